@@ -1,0 +1,78 @@
+"""Rigid transforms, cuboids and overlaps. Ego frame: x forward, y left, z up, metres; angles in radians."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+F64 = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Cuboid:
+    """A box standing upright on the ground. center: x y z of its middle; size: length width height along its own
+    axes; yaw_rad: turn of its length axis from ego x, positive to the left."""
+
+    center: tuple[float, float, float]
+    size: tuple[float, float, float]
+    yaw_rad: float
+
+    def footprint(self) -> F64:
+        """(4, 2) corners seen from above: front left, front right, rear right, rear left."""
+        half_l, half_w = self.size[0] / 2, self.size[1] / 2
+        local = np.array([[half_l, half_w], [half_l, -half_w], [-half_l, -half_w], [-half_l, half_w]])
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        return local @ np.array([[c, s], [-s, c]]) + np.asarray(self.center[:2])
+
+    def corners(self) -> F64:
+        """(8, 3) corners: the footprint at the bottom, then the same four at the top."""
+        flat = self.footprint()
+        low, high = self.center[2] - self.size[2] / 2, self.center[2] + self.size[2] / 2
+        return np.vstack([np.column_stack([flat, np.full(4, low)]), np.column_stack([flat, np.full(4, high)])])
+
+
+def transform(T: F64, points: npt.NDArray[np.floating]) -> F64:
+    """Apply a (4, 4) rigid transform to (N, 3) points."""
+    return np.asarray(points, dtype=np.float64) @ T[:3, :3].T + T[:3, 3]
+
+
+def inverse(T: F64) -> F64:
+    """Inverse of a (4, 4) rigid transform, from its transpose."""
+    out = np.eye(4)
+    out[:3, :3] = T[:3, :3].T
+    out[:3, 3] = -T[:3, :3].T @ T[:3, 3]
+    return out
+
+
+def rotation(roll_rad: float, pitch_rad: float, yaw_rad: float) -> F64:
+    """(3, 3) rotation Rz(yaw) Ry(pitch) Rx(roll). Positive pitch turns x down, positive yaw turns x left."""
+    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll_rad, pitch_rad, yaw_rad) for f in (np.cos, np.sin))
+    rx = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    ry = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+    rz = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+    return rz @ ry @ rx
+
+
+def iou_matrix(a: npt.NDArray[np.floating], b: npt.NDArray[np.floating]) -> F64:
+    """(n, m) intersection over union of (n, 4) and (m, 4) boxes ``x1 y1 x2 y2``. Boxes of no area overlap nothing."""
+    a, b = np.asarray(a, dtype=np.float64).reshape(-1, 4), np.asarray(b, dtype=np.float64).reshape(-1, 4)
+    low = np.maximum(a[:, None, :2], b[None, :, :2])
+    high = np.minimum(a[:, None, 2:], b[None, :, 2:])
+    inter = np.prod(np.clip(high - low, 0.0, None), axis=2)
+    area_a = np.prod(np.clip(a[:, 2:] - a[:, :2], 0.0, None), axis=1)
+    area_b = np.prod(np.clip(b[:, 2:] - b[:, :2], 0.0, None), axis=1)
+    union = area_a[:, None] + area_b[None, :] - inter
+    return np.divide(inter, union, out=np.zeros_like(inter), where=union > 0)
+
+
+def closest_on_polygon(corners: npt.NDArray[np.floating]) -> tuple[float, float]:
+    """The point of a convex polygon's outline, (K, 2) corners in order, nearest to the origin."""
+    start = np.asarray(corners, dtype=np.float64)
+    edge = np.roll(start, -1, axis=0) - start
+    length2 = np.maximum(np.sum(edge**2, axis=1), 1e-12)
+    t = np.clip(-np.sum(start * edge, axis=1) / length2, 0.0, 1.0)
+    on_edge = start + t[:, None] * edge
+    best = int(np.argmin(np.sum(on_edge**2, axis=1)))
+    return float(on_edge[best, 0]), float(on_edge[best, 1])

@@ -1,0 +1,50 @@
+"""The one protocol behind every recording and device: a source gives frames, by index, in the ego frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from pipeline.geometry import Cuboid
+from pipeline.types import Frame
+
+
+class SourceError(Exception):
+    """A source that cannot be opened. The text is one sentence for a person: what is wrong and with which file."""
+
+
+@dataclass(frozen=True)
+class TruthObject:
+    """One labelled object, ego frame. ``id`` is null where the labels follow no identity over time."""
+
+    label: str
+    cuboid: Cuboid
+    id: int | None = None
+
+
+class Source(Protocol):
+    """A recording that can be read anywhere. Reading a frame never raises for what is wrong with that frame's data:
+    the missing branch is null and ``Frame.notes`` says why.
+
+    uri: what was opened, as a person typed it. title: short, for a heading. rate_hz: nominal frames per second.
+    notes: what a person should know about the whole (for example how many rings remain).
+    """
+
+    uri: str
+    title: str
+    rate_hz: float
+    notes: tuple[str, ...]
+
+    def __len__(self) -> int: ...
+
+    def frame(self, index: int) -> Frame:
+        """Frame ``index`` of 0 … len−1, without ``raw_boxes``. IndexError outside."""
+        ...
+
+    def t_ns(self, index: int) -> int:
+        """The tick of a frame, without reading its data."""
+        ...
+
+    def truth(self, index: int) -> tuple[TruthObject, ...] | None:
+        """The labelled objects, empty when the frame is labelled and holds none; null when it is not labelled."""
+        ...

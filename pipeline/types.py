@@ -1,0 +1,310 @@
+"""What flows along the line: one ``Frame`` in, one ``Result`` out, and the values handed from stage to stage.
+
+Frames of reference: the *ego frame* is x forward, y left, z up, metres, origin named by the source. The image is
+u right, v down, pixels. Times are nanoseconds of the sensors' own clock. Every class is frozen; arrays inside are
+treated as read-only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.geometry import Cuboid
+
+F32 = npt.NDArray[np.float32]
+F64 = npt.NDArray[np.float64]
+I32 = npt.NDArray[np.int32]
+U8 = npt.NDArray[np.uint8]
+Point2 = tuple[float, float]
+Point3 = tuple[float, float, float]
+Box = tuple[float, float, float, float]
+"""Axis-aligned image box ``x1 y1 x2 y2`` in pixels."""
+SourceKind = Literal["V", "L", "VL"]
+"""Which sensor saw an object: vision only, LiDAR only, or both (paper, Table 3 "Name")."""
+
+VEHICLES = frozenset({"car", "truck", "bus", "motorcycle"})
+"""Class names that may be a lead vehicle. Detector labels are mapped to the COCO names by the detector."""
+
+
+# ---------------------------------------------------------------- what sensors deliver
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """One LiDAR rotation.
+
+    points: (N, 4) float32 ``x y z intensity`` in the ego frame, C-contiguous, finite.
+    ring: (N,) uint8, the channel, 0 = lowest beam.
+    """
+
+    t_ns: int
+    points: F32
+    ring: U8
+    channels: int
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One camera image. bgr: (H, W, 3) uint8. ``encoded`` is the file as the camera gave it (JPEG), if it did."""
+
+    t_ns: int
+    bgr: U8
+    encoded: bytes | None = None
+
+
+@dataclass(frozen=True)
+class CameraCalibration:
+    """Pinhole camera with OpenCV distortion.
+
+    K: (3, 3). distortion: (0,), (4,), (5,) or (8,) OpenCV order, of the raw image. T_camera_ego: (4, 4) takes
+    ego points to the camera frame (z along the optical axis, x right, y down).
+    """
+
+    K: F64
+    distortion: F64
+    T_camera_ego: F64
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class EgoState:
+    """Own motion. ``yaw_rate_radps`` is positive to the left; null when no sensor gives it."""
+
+    t_ns: int
+    speed_mps: float
+    yaw_rate_radps: float | None = None
+
+
+@dataclass(frozen=True)
+class RawBoxes:
+    """A detector's candidates above a low floor, before thresholds and non-maximum suppression.
+
+    Thresholds are parameters of the line, the network is not: this is what is cached per image and model.
+    boxes: (M, 4) float32 ``x1 y1 x2 y2`` pixels of the raw image. scores: (M,) float32. labels: M class names.
+    """
+
+    model: str
+    boxes: F32
+    scores: F32
+    labels: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Everything known at one tick. Any branch may be missing; ``notes`` says why, in words a person can act on."""
+
+    index: int
+    name: str
+    t_ns: int
+    sweep: Sweep | None = None
+    picture: Picture | None = None
+    camera: CameraCalibration | None = None
+    ego: EgoState | None = None
+    raw_boxes: RawBoxes | None = None
+    notes: tuple[str, ...] = ()
+
+
+# ---------------------------------------------------------------- what stages hand on
+
+
+@dataclass(frozen=True)
+class Detection:
+    """One box after thresholds and suppression."""
+
+    bbox: Box
+    label: str
+    score: float
+
+
+@dataclass(frozen=True)
+class VisionMeasurement:
+    """A detection with its estimated place. ``distance_m`` is the horizontal range from the ego origin to the nearest
+    face; it and ``position`` (ego x, y of that face's centre) are null where no law gives a distance."""
+
+    detection: Detection
+    distance_m: float | None
+    sigma_m: float | None
+    position: Point2 | None
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """One LiDAR cluster. ``density`` is points per square metre of footprint (paper: "number, density and
+    distribution"); ``spread`` the standard deviation of its points along x, y, z in metres."""
+
+    cluster: int
+    cuboid: Cuboid
+    closest_point: Point3
+    points: int
+    density: float
+    spread: Point3
+
+
+@dataclass(frozen=True)
+class LidarTrack:
+    """An obstacle followed over time. ``velocity_mps`` is relative to ego (x, y); null until two sightings.
+    ``obstacle`` is the last one seen, moved by the prediction while ``carried``."""
+
+    id: int
+    obstacle: Obstacle
+    velocity_mps: Point2 | None
+    hits: int
+    missed: int
+    carried: bool
+
+
+@dataclass(frozen=True)
+class VisionTrack:
+    """A detected box followed over time. ``distance_m``/``sigma_m``/``position``/``velocity_mps`` are filtered;
+    null where never measured. A carried box was not seen in this frame."""
+
+    id: int
+    bbox: Box
+    label: str
+    score: float
+    distance_m: float | None
+    sigma_m: float | None
+    position: Point2 | None
+    velocity_mps: Point2 | None
+    hits: int
+    missed: int
+    carried: bool
+
+
+@dataclass(frozen=True)
+class Gate:
+    """One test an object went through, with its number and limit; ``value`` is null when there was nothing to test."""
+
+    name: str
+    value: float | None
+    limit: float
+    passed: bool
+
+
+@dataclass(frozen=True)
+class FusedObject:
+    """The paper's Table 3 row, widened by what the contract asks for. Frames and units as in the contract."""
+
+    id: int
+    source: SourceKind
+    label: str | None
+    score: float | None
+    bbox: Box | None
+    bev: tuple[Point2, Point2, Point2, Point2]
+    cuboid: Cuboid | None
+    closest_point: Point3
+    distance_m: float
+    distance_sigma_m: float
+    velocity_mps: Point2 | None
+    carried: bool
+    hits: int
+    lidar_points: int
+    lidar_track: int | None
+    vision_track: int | None
+    gates: tuple[Gate, ...] = ()
+    speed_over_ground_mps: float | None = None
+    moving: bool | None = None
+    ttc_s: float | None = None
+    in_path: bool = False
+    in_path_probability: float | None = None
+    path_offset_m: float | None = None
+
+
+@dataclass(frozen=True)
+class Path:
+    """Where the car is going. center, left, right: (K, 2) float64 ego x, y, from the bumper outwards."""
+
+    source: Literal["lane", "gnss", "yaw_rate", "straight", "fused"]
+    center: F64
+    left: F64
+    right: F64
+    half_width_m: float
+    sigma_m: dict[str, float]
+    weights: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Cipv:
+    """The closest in-path vehicle, and why it is this one."""
+
+    id: int
+    distance_m: float
+    closing_speed_mps: float | None
+    ttc_s: float | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """Why an object is not the CIPV."""
+
+    id: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class AccCommand:
+    """What the longitudinal controller asks for. accelerator and brake are 0–1."""
+
+    state: Literal["cruise", "follow", "stop", "warn", "partial_brake", "full_brake"]
+    desired_speed_mps: float
+    accel_mps2: float
+    accelerator: float
+    brake: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class SensorHealth:
+    """Ages are against the frame's tick, milliseconds; null when the sensor gave nothing in this frame."""
+
+    lidar_age_ms: float | None
+    lidar_points: int | None
+    camera_age_ms: float | None
+    camera_skew_ms: float | None
+    ego_age_ms: float | None
+
+
+GROUND, UNCLUSTERED, DROPPED = -1, -2, -3
+"""Values of ``Layers.kind`` below zero; zero and above is the index of the cluster."""
+
+
+@dataclass(frozen=True)
+class Layers:
+    """What the stages saw, for views only; never part of the JSON.
+
+    points: (N, 4) float32, the sweep before down-sampling. kind: (N,) int32, ``GROUND``, ``UNCLUSTERED``,
+    ``DROPPED`` or the cluster index (``Obstacle.cluster``). lidar_boxes / vision_boxes: the two boxes that fusion
+    compared, by fused object id.
+    """
+
+    points: F32
+    kind: I32
+    obstacles: tuple[Obstacle, ...] = ()
+    lidar_tracks: tuple[LidarTrack, ...] = ()
+    vision_tracks: tuple[VisionTrack, ...] = ()
+    lidar_boxes: dict[int, Box] = field(default_factory=dict)
+    vision_boxes: dict[int, Box] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Result:
+    """What the line believes at one tick. ``pipeline.results.to_json`` writes it in the contract's form."""
+
+    frame: str
+    t_ns: int
+    sensors: SensorHealth
+    ego: EgoState | None
+    objects: tuple[FusedObject, ...]
+    path: Path
+    cipv: Cipv | None
+    rejected: tuple[Rejection, ...]
+    acc: AccCommand | None
+    notes: tuple[str, ...]
+    timing_ms: dict[str, float]
+    layers: Layers
