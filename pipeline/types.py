@@ -188,18 +188,21 @@ class Gate:
 
 @dataclass(frozen=True)
 class FusedObject:
-    """The paper's Table 3 row, widened by what the contract asks for. Frames and units as in the contract."""
+    """The paper's Table 3 row, widened by what the contract asks for. Frames and units as in the contract.
+
+    A V object whose distance nobody knows (no law for its class, box cut by the picture's edge, beyond the law's
+    reach) keeps its row: its place and distance are null, and it cannot be the CIPV."""
 
     id: int
     source: SourceKind
     label: str | None
     score: float | None
     bbox: Box | None
-    bev: tuple[Point2, Point2, Point2, Point2]
+    bev: tuple[Point2, Point2, Point2, Point2] | None
     cuboid: Cuboid | None
-    closest_point: Point3
-    distance_m: float
-    distance_sigma_m: float
+    closest_point: Point3 | None
+    distance_m: float | None
+    distance_sigma_m: float | None
     velocity_mps: Point2 | None
     carried: bool
     hits: int
