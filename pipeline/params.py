@@ -97,9 +97,16 @@ class DistanceParams(Section):
     coefficient: float = _slider(1829.1, 100.0, 10000.0, 1.0, "", "a, for a camera of the reference focal length")
     exponent: float = _slider(-1.093, -2.0, -0.5, 0.001, "", "b")
     reference_focal_px: float = _slider(
-        907.0, 100.0, 5000.0, 1.0, "px", "Focal length the law was fitted at; box heights are scaled to it. 907 px is 720p with a 78° diagonal"
+        907.0,
+        100.0,
+        5000.0,
+        1.0,
+        "px",
+        "Focal length the law was fitted at; box heights are scaled to it. 907 px is 720p with a 78° diagonal",
     )
-    scale_to_camera: bool = _choice(True, "Scale box heights by the camera's focal length (off: the law is this camera's)")
+    scale_to_camera: bool = _choice(
+        True, "Scale box heights by the camera's focal length (off: the law is this camera's)"
+    )
     depth_along_axis: bool = _choice(True, "The law gives depth along the optical axis; range follows from the bearing")
     per_class: bool = _choice(True, "Trucks, buses and motorcycles have laws of their own; off: cars only, as in print")
     binning: bool = _choice(False, "Round estimates to bins of 10 m between 5 and 60 m, as in print")
@@ -110,7 +117,9 @@ class DistanceParams(Section):
 class VisionTrackingParams(Section):
     """Box tracking over the last frames (paper, Algorithm 1, with its slips mended)."""
 
-    filter: Literal["queue", "kalman"] = _choice("kalman", "queue: newest box of each id (paper); kalman: filtered place")
+    filter: Literal["queue", "kalman"] = _choice(
+        "kalman", "queue: newest box of each id (paper); kalman: filtered place"
+    )
     queue_frames: int = _slider(10, 1, 30, 1, "frames", "A box not seen for this many frames ends")
     max_missed_s: float = _slider(1.0, 0.1, 5.0, 0.1, "s", "A box not seen for longer ends")
     gate_px: float = _slider(80.0, 5.0, 400.0, 1.0, "px", "dist_th: largest move of a box's centre between frames")
@@ -140,6 +149,12 @@ class FusionParams(Section):
     min_iou: float = _slider(0.1, 0.0, 0.9, 0.01, "", "Boxes overlapping less are two objects")
     range_gate: bool = _choice(True, "Do not join objects whose distances disagree beyond their uncertainty")
     range_gate_sigmas: float = _slider(3.0, 0.5, 10.0, 0.1, "σ", "Largest disagreement of the two distances")
+
+
+class MotionParams(Section):
+    """What counts as moving."""
+
+    moving_mps: float = _slider(1.5, 0.1, 10.0, 0.1, "m/s", "Speed over ground above which an object is moving")
 
 
 class PathParams(Section):
@@ -178,7 +193,9 @@ class AccParams(Section):
 class TimeParams(Section):
     """Gaps in a recording."""
 
-    reset_gap_s: float = _slider(1.5, 0.2, 10.0, 0.1, "s", "After a longer gap, or a jump back, every tracker starts anew")
+    reset_gap_s: float = _slider(
+        1.5, 0.2, 10.0, 0.1, "s", "After a longer gap, or a jump back, every tracker starts anew"
+    )
 
 
 class Params(Section):
@@ -194,6 +211,7 @@ class Params(Section):
     vision_tracking: VisionTrackingParams = VisionTrackingParams()
     alignment: AlignmentParams = AlignmentParams()
     fusion: FusionParams = FusionParams()
+    motion: MotionParams = MotionParams()
     path: PathParams = PathParams()
     cipv: CipvParams = CipvParams()
     acc: AccParams = AccParams()

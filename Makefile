@@ -1,0 +1,52 @@
+# CIPV Studio. `make demo` shows it, `make test` proves it; neither needs more than Python 3.11, make and git.
+
+PYTHON ?= python3
+BIN := .venv/bin
+
+.PHONY: install demo test check fix bench suite soak lock clean
+
+install: .venv/.installed
+
+# The lock pins every version; --no-deps-like strictness comes from installing it first and the project without deps.
+.venv/.installed: pyproject.toml requirements.lock
+	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "uv>=0.5"
+	@$(BIN)/uv pip install --quiet --python $(BIN)/python -r requirements.lock
+	@$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps -e .
+	@touch $@
+
+demo: install
+	@$(BIN)/cipv demo
+
+test: install check
+	@$(BIN)/python -m pytest -q $(TESTS)
+
+check: install
+	@$(BIN)/ruff check app pipeline tests
+	@$(BIN)/ruff format --check app pipeline tests
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports --no-cache
+
+fix: install
+	@$(BIN)/ruff check --fix app pipeline tests
+	@$(BIN)/ruff format app pipeline tests
+
+bench: install
+	@$(BIN)/cipv bench
+
+# Accuracy on the real recordings, with the table that README quotes. Writes build/accuracy.md.
+suite: install
+	@mkdir -p build
+	@$(BIN)/python -m pytest -q tests/accuracy -s
+
+# Memory over a drive looped 100 times. Writes build/soak.json.
+soak: install
+	@mkdir -p build
+	@$(BIN)/python -m pytest -q -m soak tests/soak -s
+
+lock: install
+	@$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --extra dev --no-header --no-annotate --no-emit-index-url \
+	  --output-file requirements.lock pyproject.toml
+
+clean:
+	@rm -rf .venv build dist *.egg-info

@@ -1,0 +1,146 @@
+"""Which vehicle ahead is the closest one in the path, why this one, and why not each other (paper, section CIPV).
+
+The rule, in one place: among the objects that may be a lead at all (``_ELIGIBILITY``), the one in the path with the
+smallest distance. Each test leaves its number and limit on the object; the first that fails is the reason given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from math import erf, sqrt
+
+import numpy as np
+
+from pipeline.motion import closing_speed_mps
+from pipeline.params import CipvParams
+from pipeline.path.corridor import nearest_on_path
+from pipeline.types import VEHICLES, Cipv, FusedObject, Gate, Path, Rejection
+
+
+@dataclass(frozen=True)
+class Check:
+    """One question to a candidate: the gate with its number, and the sentence that says why it failed."""
+
+    gate: Gate
+    reason: str
+
+
+def choose(
+    objects: tuple[FusedObject, ...], path: Path, last_lead: int | None, params: CipvParams
+) -> tuple[tuple[FusedObject, ...], Cipv | None, tuple[Rejection, ...]]:
+    """The objects with their place against the path and every gate, the CIPV with its reason, and a reason for each
+    other object. ``last_lead`` is the CIPV's id in the frame before.
+
+    An object is in the path when the middle of its nearest face lies between the two edges. The last lead stays in the
+    path until it is ``hysteresis_m`` outside, so that a lead at the edge does not flicker."""
+    judged, able, failures = [], [], {}
+    for item in objects:
+        limit_m = path.half_width_m + (params.hysteresis_m if item.id == last_lead else 0.0)
+        item = _located(item, path, limit_m)
+        checks = [ask(item, limit_m, params) for ask in _ELIGIBILITY]
+        item = replace(item, gates=item.gates + tuple(check.gate for check in checks))
+        judged.append(item)
+        failed = next((check.reason for check in checks if not check.gate.passed), None)
+        if failed is None:
+            able.append(item)
+        else:
+            failures[item.id] = failed
+    lead = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
+    if lead is None:
+        return tuple(judged), None, tuple(Rejection(k, reason) for k, reason in failures.items())
+    failures |= {item.id: f"behind #{lead.id}" for item in able if item.id != lead.id}
+    rejected = tuple(Rejection(item.id, failures[item.id]) for item in judged if item.id != lead.id)
+    return tuple(judged), _named(lead, len(able)), rejected
+
+
+def _located(item: FusedObject, path: Path, limit_m: float) -> FusedObject:
+    if item.bev is None:
+        return item
+    near_face = np.mean(sorted(item.bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)[:2], axis=0)
+    offsets, reached = nearest_on_path(path, near_face[None])
+    offset, ahead_m = float(offsets[0]), float(reached[0])
+    sure = _probability(offset, _sigma(path, ahead_m), path.half_width_m)
+    return replace(
+        item,
+        path_offset_m=offset,
+        in_path=ahead_m > 0.0 and abs(offset) <= limit_m,
+        in_path_probability=sure if ahead_m > 0.0 else 0.0,
+    )
+
+
+def _sigma(path: Path, ahead_m: float) -> float:
+    """Standard deviation of an offset: the path's own at that distance, and never below what a sensor resolves."""
+    at = [0.0, *(float(s) for s in path.sigma_m)]
+    return max(float(np.interp(ahead_m, at, [0.0, *path.sigma_m.values()])), 0.1)
+
+
+def _probability(offset: float, sigma: float, half_width: float) -> float:
+    """That a normal offset lies between the edges."""
+    return 0.5 * (erf((half_width - offset) / (sigma * sqrt(2))) + erf((half_width + offset) / (sigma * sqrt(2))))
+
+
+# ---------------------------------------------------------------- who may be a lead
+
+
+def _is_vehicle(item: FusedObject, limit_m: float, params: CipvParams) -> Check:
+    """A named object must be a vehicle; a nameless one (L) is judged by its size."""
+    passed = item.label is None or item.label in VEHICLES
+    return Check(Gate("vehicle_class", None, 1.0, passed), f"class {item.label}")
+
+
+def _has_distance(item: FusedObject, limit_m: float, params: CipvParams) -> Check:
+    return Check(Gate("distance_known", item.distance_m, 0.0, item.distance_m is not None), "distance not known")
+
+
+def _is_confirmed(item: FusedObject, limit_m: float, params: CipvParams) -> Check:
+    """Two sensors agreeing are enough at once; one alone must see it again."""
+    needed = 1 if item.source == "VL" else params.confirm_hits
+    return Check(Gate("hits", item.hits, needed, item.hits >= needed), f"seen {item.hits} of {needed} times")
+
+
+def _is_vehicle_sized(item: FusedObject, limit_m: float, params: CipvParams) -> Check:
+    """An L object must be as large as a vehicle's rear or side: kerbs, posts and hedges are not leads."""
+    if item.source != "L" or item.cuboid is None:
+        return Check(Gate("size", None, params.min_width_m, True), "")
+    length, width, height = item.cuboid.size
+    across = max(length, width)
+    if across < params.min_width_m:
+        return Check(Gate("size", across, params.min_width_m, False), f"only {across:.1f} m across")
+    if height < params.min_height_m:
+        return Check(Gate("size", height, params.min_height_m, False), f"only {height:.1f} m high")
+    passed = across <= params.max_size_m
+    return Check(Gate("size", across, params.max_size_m, passed), f"{across:.0f} m long: not a vehicle")
+
+
+def _is_in_path(item: FusedObject, limit_m: float, params: CipvParams) -> Check:
+    offset = item.path_offset_m
+    if offset is None:
+        return Check(Gate("path_offset", None, limit_m, False), "place not known")
+    outside = abs(offset) - limit_m
+    reason = f"out of path by {outside:.1f} m" if outside > 0 else "beside or behind the bumper"
+    return Check(Gate("path_offset", abs(offset), limit_m, item.in_path), reason)
+
+
+_ELIGIBILITY: tuple[Callable[[FusedObject, float, CipvParams], Check], ...] = (
+    _is_vehicle,
+    _has_distance,
+    _is_confirmed,
+    _is_vehicle_sized,
+    _is_in_path,
+)
+
+
+def _named(lead: FusedObject, candidates: int) -> Cipv:
+    closing = closing_speed_mps(lead)
+    seen_by = {"V": "camera only", "L": "LiDAR only", "VL": "both sensors"}[lead.source]
+    what = f"{lead.label or 'obstacle'} seen by {seen_by}"
+    others = f", nearest of {candidates} in path" if candidates > 1 else ", alone in path"
+    offset = lead.path_offset_m or 0.0
+    side = (
+        f"{abs(offset):.1f} m {'left' if offset > 0 else 'right'} of its centre"
+        if abs(offset) >= 0.05
+        else "on its centre"
+    )
+    assert lead.distance_m is not None
+    return Cipv(lead.id, lead.distance_m, closing, lead.ttc_s, f"{what}{others}, {side}")

@@ -1,0 +1,44 @@
+"""source → detector → step: every frame of a recording, in order, with its result."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Literal
+
+from pipeline.params import Params
+from pipeline.sources.base import Source
+from pipeline.step import State, step, warm_up
+from pipeline.types import Frame, Result
+from pipeline.vision.detector import Detector
+
+Sensors = Literal["lidar", "camera", "both"]
+
+
+def detect(frame: Frame, detector: Detector | None) -> Frame:
+    """The frame with the network's boxes in it. The network runs here and nowhere else."""
+    if detector is None or frame.picture is None:
+        return frame
+    return replace(frame, raw_boxes=detector.detect(frame.picture.bgr))
+
+
+def only(frame: Frame, sensors: Sensors) -> Frame:
+    """The frame as a car without the other sensor would have it. The picture stays: people still want to see it."""
+    if sensors == "lidar":
+        return replace(frame, raw_boxes=None)
+    if sensors == "camera":
+        return replace(frame, sweep=None)
+    return frame
+
+
+def run(
+    source: Source, params: Params, detector: Detector | None, sensors: Sensors = "both"
+) -> Iterator[tuple[Frame, Result]]:
+    """Each frame with its result. ``detector`` null: LiDAR goes on alone."""
+    warm_up()
+    state = State()
+    for index in range(len(source)):
+        frame = source.frame(index)
+        frame = only(detect(frame, detector if sensors != "lidar" else None), sensors)
+        state, result = step(state, frame, params)
+        yield frame, result

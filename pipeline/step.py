@@ -1,0 +1,193 @@
+"""The straight line: one frame in, one result out, state in and state out.
+
+    LiDAR:  down-sample → ground → cluster → boxes → tracks ─┐
+    camera: (raw boxes) → select → distance → tracks ────────┼→ fuse → motion → path → CIPV → ACC
+    ego ─────────────────────────────────────────────────────┘
+
+No stage keeps anything of its own: what must be remembered is in ``State``, so a frame can be run again from the same
+state with other parameters, and the same inputs give the same bytes. A branch that a frame lacks predicts, and says so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import perf_counter_ns
+
+import numpy as np
+
+from pipeline import acc, alignment, cipv, fusion, motion
+from pipeline.lidar import boxes, cluster, downsample, ground
+from pipeline.lidar import tracking as lidar_tracking
+from pipeline.lidar import warm_up as warm_up_lidar
+from pipeline.params import Params
+from pipeline.path import corridor
+from pipeline.types import (
+    DROPPED,
+    GROUND,
+    UNCLUSTERED,
+    CameraCalibration,
+    Frame,
+    Layers,
+    Obstacle,
+    Result,
+    SensorHealth,
+    Sweep,
+    VisionMeasurement,
+)
+from pipeline.vision import distance, select
+from pipeline.vision import tracking as vision_tracking
+
+
+@dataclass(frozen=True)
+class State:
+    """All that one frame leaves to the next."""
+
+    t_ns: int | None = None
+    lidar: lidar_tracking.LidarTrackerState = lidar_tracking.LidarTrackerState()
+    vision: vision_tracking.VisionTrackerState = vision_tracking.VisionTrackerState()
+    fusion: fusion.FusionState = fusion.FusionState()
+    acc: acc.AccState = acc.AccState()
+    lead_id: int | None = None
+
+
+def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
+    """Run every stage on one frame; ``frame.raw_boxes`` already holds the detector's boxes (``pipeline.run.detect``)."""
+    state, dt_s = _continue_or_restart(state, frame, params)
+    clock = _Stopwatch()
+    aligned = alignment.resolve(params.alignment, frame.camera)
+
+    seen = _perceive_lidar(frame.sweep, params, clock)
+    lidar_state, lidar_tracks = lidar_tracking.track(
+        state.lidar, seen.obstacles if frame.sweep else None, dt_s, params.lidar_tracking
+    )
+    clock.lap("lidar_tracking")
+
+    measured = _perceive_picture(frame, aligned, params)
+    clock.lap("distance")
+    vision_state, vision_tracks = vision_tracking.track(state.vision, measured, dt_s, params.vision_tracking)
+    clock.lap("vision_tracking")
+
+    fusion_state, fused = fusion.fuse(
+        state.fusion, lidar_tracks, vision_tracks, aligned, _picture_size(frame), params.fusion
+    )
+    clock.lap("fusion")
+    objects = motion.describe(fused.objects, frame.ego, params.motion)
+    path = corridor.corridor(frame.ego, params.path)
+    objects, lead, rejected = cipv.choose(objects, path, state.lead_id, params.cipv)
+    clock.lap("cipv")
+    acc_state, command = acc.control(state.acc, frame.ego, lead, objects, path, dt_s, params.acc)
+    clock.lap("acc")
+
+    result = Result(
+        frame=frame.name,
+        t_ns=frame.t_ns,
+        sensors=_health(frame),
+        ego=frame.ego,
+        objects=objects,
+        path=path,
+        cipv=lead,
+        rejected=rejected,
+        acc=command,
+        notes=frame.notes,
+        timing_ms=clock.total(),
+        layers=Layers(
+            points=frame.sweep.points if frame.sweep else np.zeros((0, 4), np.float32),
+            kind=seen.kind,
+            obstacles=seen.obstacles,
+            lidar_tracks=lidar_tracks,
+            vision_tracks=vision_tracks,
+            lidar_boxes=fused.lidar_boxes,
+            vision_boxes=fused.vision_boxes,
+        ),
+    )
+    lead_id = lead.id if lead is not None else None
+    return State(frame.t_ns, lidar_state, vision_state, fusion_state, acc_state, lead_id), result
+
+
+def warm_up() -> None:
+    """Compile every kernel before the first frame, so that the first frame is as fast as the rest."""
+    warm_up_lidar()
+
+
+@dataclass(frozen=True)
+class _LidarView:
+    """What one sweep holds: its obstacles, and for each of its (N,) points what it was taken for."""
+
+    obstacles: tuple[Obstacle, ...]
+    kind: np.ndarray
+
+
+def _perceive_lidar(sweep: Sweep | None, params: Params, clock: _Stopwatch) -> _LidarView:
+    """down-sample → ground → cluster → boxes (paper, Point Cloud Segmentation)."""
+    if sweep is None:
+        return _LidarView((), np.zeros(0, np.int32))
+    keep = downsample.keep_mask(sweep, params.downsample)
+    clock.lap("downsample")
+    plane = ground.fit_ground(sweep.points, keep, params.ground)
+    clock.lap("ground")
+    candidates = cluster.candidates(sweep.points, plane, keep, params.cluster)
+    labels = cluster.cluster(sweep.points, candidates, params.cluster)
+    clock.lap("cluster")
+    obstacles = boxes.fit_obstacles(sweep.points, labels, plane, params.box)
+    clock.lap("boxes")
+    kind = np.where(keep, np.where(plane.mask, GROUND, UNCLUSTERED), DROPPED).astype(np.int32)
+    return _LidarView(obstacles, np.where(labels >= 0, labels, kind))
+
+
+def _perceive_picture(
+    frame: Frame, aligned: alignment.Alignment | None, params: Params
+) -> tuple[VisionMeasurement, ...] | None:
+    """Raw boxes → thresholds and suppression → distance. Null when the camera or the detector gave nothing."""
+    if frame.raw_boxes is None:
+        return None
+    detections = select.select(frame.raw_boxes, params.detection)
+    return distance.measure(detections, aligned, frame.camera, params.distance)
+
+
+def _continue_or_restart(state: State, frame: Frame, params: Params) -> tuple[State, float | None]:
+    """Seconds since the frame before, from the sensors' own stamps; a fresh state after a gap or a jump back, because
+    a track carried over either would be a guess. Numbers of objects are never given twice."""
+    if state.t_ns is None:
+        return state, None
+    dt_s = (frame.t_ns - state.t_ns) / 1e9
+    if 0.0 < dt_s <= params.time.reset_gap_s:
+        return state, dt_s
+    return State(fusion=fusion.FusionState(next_id=state.fusion.next_id)), None
+
+
+def _picture_size(frame: Frame) -> tuple[int, int] | None:
+    """(width, height) of the picture, or of the calibration where the picture itself is missing."""
+    if frame.picture is not None:
+        return frame.picture.bgr.shape[1], frame.picture.bgr.shape[0]
+    camera: CameraCalibration | None = frame.camera
+    return (camera.width, camera.height) if camera is not None else None
+
+
+def _health(frame: Frame) -> SensorHealth:
+    def age(t_ns: int | None) -> float | None:
+        return None if t_ns is None else (frame.t_ns - t_ns) / 1e6
+
+    sweep, picture = frame.sweep, frame.picture
+    return SensorHealth(
+        lidar_age_ms=age(sweep.t_ns if sweep else None),
+        lidar_points=len(sweep.points) if sweep else None,
+        camera_age_ms=age(picture.t_ns if picture else None),
+        camera_skew_ms=(picture.t_ns - sweep.t_ns) / 1e6 if picture and sweep else None,
+        ego_age_ms=age(frame.ego.t_ns if frame.ego else None),
+    )
+
+
+class _Stopwatch:
+    """Milliseconds between laps."""
+
+    def __init__(self) -> None:
+        self._start = self._last = perf_counter_ns()
+        self._laps: dict[str, float] = {}
+
+    def lap(self, stage: str) -> None:
+        now = perf_counter_ns()
+        self._laps[stage] = (now - self._last) / 1e6
+        self._last = now
+
+    def total(self) -> dict[str, float]:
+        return {**self._laps, "total": (perf_counter_ns() - self._start) / 1e6}
