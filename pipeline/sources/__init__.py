@@ -1,0 +1,44 @@
+"""Recordings, devices and the simulator behind one door: ``open_source("astyx:~/data/astyx")``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from pipeline.sources.astyx import AstyxSource
+from pipeline.sources.base import Source, SourceError, TruthObject
+
+__all__ = ["Source", "SourceError", "TruthObject", "open_source"]
+
+_OPENERS: dict[str, Callable[[str, str, int], Source]] = {
+    "astyx": lambda uri, rest, rings: AstyxSource(uri, rest),
+}
+"""Scheme → what opens it, given the whole URI, the part after the colon and how many LiDAR rings to keep."""
+
+_MARKS = {"lidar_vlp16": "astyx", "camera_front": "astyx", "velodyne": "kitti", "velodyne_points": "kitti"}
+"""A folder with this one inside is such a recording."""
+
+
+def open_source(uri: str, *, rings: int = 16) -> Source:
+    """Open ``scheme:rest``. ``rings``: how many rings to keep of a LiDAR that has more (KITTI's HDL-64).
+
+    SourceError, in one sentence, when the scheme is unknown or the recording cannot be opened.
+    """
+    scheme, colon, rest = uri.partition(":")
+    is_drive_letter = len(scheme) == 1
+    if not colon or is_drive_letter or not scheme.isalnum():
+        raise SourceError(_about_bare_path(uri))
+    if scheme not in _OPENERS:
+        raise SourceError(f"{uri}: no kind of source named {scheme!r}; there are {', '.join(_OPENERS)}")
+    return _OPENERS[scheme](uri, rest, rings)
+
+
+def _about_bare_path(path: str) -> str:
+    """What to type instead of a path without a scheme."""
+    for inside, scheme in _MARKS.items():
+        try:
+            if path and (Path(path).expanduser() / inside).is_dir():
+                return f"{path}: say what kind of recording it is; it looks like {scheme}:{path}"
+        except (OSError, RuntimeError, ValueError):
+            break
+    return f"{path}: not a source; type one of {', '.join(f'{scheme}:…' for scheme in _OPENERS)}"

@@ -1,0 +1,228 @@
+"""Astyx HiRes2019: a real VLP-16 and a front camera, with boxes (Meyer and Kuschk 2019, "Automotive Radar Dataset").
+
+Layout: ``lidar_vlp16/*.txt``, ``camera_front/*.jpg``, ``calibration/*.json``, ``groundtruth_obj3d/*.json``, one file a
+frame each. The ego frame is the radar's reference frame: every sensor's ``T_to_ref_COS`` takes it there, so the
+camera's is the inverse of ``T_camera_ego``.
+
+Times are the LiDAR's: a sweep starts behind the car and looks ahead half a rotation later, and that middle is the
+frame's tick. The camera has no stamps of its own and is taken at the tick.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.geometry import Cuboid, inverse, transform
+from pipeline.sources.base import SourceError, TruthObject
+from pipeline.sources.files import (
+    camera_matrix,
+    check_looks_ahead,
+    decode_picture,
+    files_by_name,
+    read_bytes,
+    recording_folder,
+    rigid_transform,
+)
+from pipeline.sources.text_rows import parse_rows
+from pipeline.types import F64, CameraCalibration, Frame, Picture, Sweep
+
+_CHANNELS = 16
+_HALF_ROTATION_NS = 50_000_000
+_NOMINAL_STEP_NS = 300_000_000
+_NOMINAL_SIZE = (2048, 618)
+_COLUMNS = 6  # X Y Z Reflectivity LaserID Timestamp
+_HEAD_BYTES = 4096
+_LABELS = {"motorcyclist": "motorcycle", "cyclist": "bicycle", "towed object": "trailer"}
+_RING_OF_LASER = np.array([laser // 2 + 8 * (laser % 2) for laser in range(_CHANNELS)], dtype=np.uint8)
+"""VLP-16 lasers fire −15°, +1°, −13°, +3°, … (Velodyne manual 63-9243, table 9-1); rings count upwards."""
+
+
+class AstyxSource:
+    """A folder of Astyx HiRes2019 frames."""
+
+    def __init__(self, uri: str, path: str) -> None:
+        folder = recording_folder(path)
+        self.uri, self.title = uri, folder.resolve().name
+        self.notes: tuple[str, ...] = ("camera without stamps: taken at the middle of the sweep", "no ego speed recorded")
+        self._sweeps = files_by_name(folder / "lidar_vlp16", (".txt",))
+        self._pictures = files_by_name(folder / "camera_front", (".jpg", ".jpeg", ".png"))
+        self._labels = files_by_name(folder / "groundtruth_obj3d", (".json",))
+        self._calibrations = files_by_name(folder / "calibration", (".json",))
+        self._names = sorted(self._sweeps.keys() | self._pictures.keys())
+        if not self._names:
+            raise SourceError(f"{path}: no Astyx recording: neither lidar_vlp16/*.txt nor camera_front/*.jpg in it")
+        if not self._calibrations:
+            raise SourceError(f"{path}: no calibration/*.json")
+        self._size = self._picture_size()
+        self._calibration = _read_calibration(next(iter(self._calibrations.values())), self._size)
+        self._stamps = _fill_gaps([_first_stamp_ns(self._sweeps.get(name)) for name in self._names])
+        self.rate_hz = _rate_hz(self._stamps)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def t_ns(self, index: int) -> int:
+        return self._stamps[_checked(index, len(self))]
+
+    def frame(self, index: int) -> Frame:
+        name, tick = self._names[_checked(index, len(self))], self.t_ns(index)
+        notes: list[str] = []
+        T_ego_lidar, camera = self._calibration_of(name, notes)
+        sweep = self._sweep(name, tick, T_ego_lidar, notes)
+        picture = self._picture(name, tick, notes)
+        return Frame(index, name, tick, sweep, picture, camera, notes=tuple(notes))
+
+    def truth(self, index: int) -> tuple[TruthObject, ...] | None:
+        path = self._labels.get(self._names[_checked(index, len(self))])
+        if path is None:
+            return None
+        try:
+            return _parse_labels(read_bytes(path))
+        except SourceError:
+            return None
+
+    def _calibration_of(self, name: str, notes: list[str]) -> tuple[F64, CameraCalibration]:
+        path = self._calibrations.get(name)
+        if path is None:
+            return self._calibration
+        try:
+            return _read_calibration(path, self._size)
+        except SourceError as error:
+            notes.append(f"{error}; the recording's first calibration is used")
+            return self._calibration
+
+    def _sweep(self, name: str, tick: int, T_ego_lidar: F64, notes: list[str]) -> Sweep | None:
+        path = self._sweeps.get(name)
+        if path is None:
+            notes.append("no LiDAR file for this frame")
+            return None
+        try:
+            return parse_sweep(read_bytes(path), path.name, tick, T_ego_lidar, notes)
+        except SourceError as error:
+            notes.append(str(error))
+            return None
+
+    def _picture(self, name: str, tick: int, notes: list[str]) -> Picture | None:
+        path = self._pictures.get(name)
+        if path is None:
+            notes.append("no picture for this frame")
+            return None
+        try:
+            bgr, encoded = decode_picture(path)
+        except SourceError as error:
+            notes.append(str(error))
+            return None
+        if (bgr.shape[1], bgr.shape[0]) != self._size:
+            notes.append(f"{path.name}: {bgr.shape[1]}×{bgr.shape[0]}, the others are {self._size[0]}×{self._size[1]}")
+            return None
+        return Picture(tick, bgr, encoded)
+
+    def _picture_size(self) -> tuple[int, int]:
+        """Width and height of the first readable picture; the calibration files do not say."""
+        for path in self._pictures.values():
+            try:
+                bgr, _ = decode_picture(path)
+            except SourceError:
+                continue
+            return bgr.shape[1], bgr.shape[0]
+        return _NOMINAL_SIZE
+
+
+def parse_sweep(data: bytes, file: str, t_ns: int, T_ego_lidar: F64, notes: list[str]) -> Sweep:
+    """The sweep of one LiDAR text file, in the ego frame. Rows that are no point (cut, not numbers, no such laser, no
+    return) are left out and counted in ``notes``. SourceError when none is left."""
+    rows, bad = parse_rows(data, _COLUMNS)
+    bad -= 1 if data.lstrip()[:1].isalpha() else 0  # the header line
+    laser = rows[:, 4]
+    good = (laser >= 0) & (laser < _CHANNELS) & (laser == np.floor(laser))
+    good &= np.any(rows[:, :3] != 0.0, axis=1) & np.all(np.abs(rows[:, :4]) < 1e6, axis=1)
+    kept = rows[good]
+    bad += len(rows) - len(kept)
+    if not len(kept):
+        raise SourceError(f"{file}: no LiDAR points in it")
+    if bad > 0:
+        notes.append(f"{file}: {bad} unreadable rows left out")
+    points = np.empty((len(kept), 4), dtype=np.float32)
+    points[:, :3] = transform(T_ego_lidar, kept[:, :3])
+    points[:, 3] = kept[:, 3]
+    return Sweep(t_ns, points, _RING_OF_LASER[kept[:, 4].astype(np.intp)], _CHANNELS)
+
+
+def parse_calibration(data: bytes, file: str, size: tuple[int, int]) -> tuple[F64, CameraCalibration]:
+    """T_ego_lidar (4, 4) and the camera, from one calibration file. SourceError names the file and what is wrong."""
+    try:
+        sensors = {str(sensor["sensor_uid"]): sensor["calib_data"] for sensor in json.loads(data)["sensors"]}
+        lidar, front = sensors["lidar_vlp16"], sensors["camera_front"]
+        to_ego, from_camera, K = lidar["T_to_ref_COS"], front["T_to_ref_COS"], front["K"]
+    except (ValueError, TypeError, KeyError, RecursionError):
+        raise SourceError(f"{file}: not an Astyx calibration of lidar_vlp16 and camera_front") from None
+    T_ego_lidar = rigid_transform(to_ego, f"calibration {file}: T_to_ref_COS of lidar_vlp16")
+    T_ego_camera = rigid_transform(from_camera, f"calibration {file}: T_to_ref_COS of camera_front")
+    K = camera_matrix(K, f"calibration {file}: K of camera_front")
+    camera = CameraCalibration(K, np.empty(0), inverse(T_ego_camera), *size)
+    check_looks_ahead(camera, f"calibration {file}")
+    return T_ego_lidar, camera
+
+
+def _parse_labels(data: bytes) -> tuple[TruthObject, ...]:
+    """The boxes of one label file: centres and sizes in metres, ``orientation_quat`` with w first. Ids are all −1 in
+    the recording, so objects have none."""
+    try:
+        return tuple(_label(entry) for entry in json.loads(data)["objects"])
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError):
+        raise SourceError("not an Astyx label file") from None
+
+
+def _label(entry: dict[str, Any]) -> TruthObject:
+    x, y, z = (float(value) for value in entry["center3d"])
+    length, width, height = (float(value) for value in entry["dimension3d"])
+    qw, qx, qy, qz = (float(value) for value in entry["orientation_quat"])
+    yaw = float(np.arctan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz)))
+    if not np.all(np.isfinite([x, y, z, length, width, height, yaw])) or min(length, width, height) <= 0.0:
+        raise ValueError("a box without place or size")
+    name = str(entry["classname"]).lower()
+    return TruthObject(_LABELS.get(name, name), Cuboid((x, y, z), (length, width, height), yaw))
+
+
+def _read_calibration(path: Path, size: tuple[int, int]) -> tuple[F64, CameraCalibration]:
+    return parse_calibration(read_bytes(path), path.name, size)
+
+
+def _first_stamp_ns(path: Path | None) -> int | None:
+    """The tick of a sweep: the first row's stamp (µs since the hour) and half a rotation. Null when unreadable."""
+    if path is None:
+        return None
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+    except OSError:
+        return None
+    rows, _ = parse_rows(head[: head.rfind(b"\n") + 1], _COLUMNS)
+    if not len(rows) or not 0 <= rows[0, 5] < 1e12:
+        return None
+    return int(rows[0, 5]) * 1000 + _HALF_ROTATION_NS
+
+
+def _fill_gaps(stamps: list[int | None]) -> list[int]:
+    """A frame without a stamp follows the one before it by the recording's usual step."""
+    filled: list[int] = []
+    for stamp in stamps:
+        filled.append(stamp if stamp is not None else filled[-1] + _NOMINAL_STEP_NS if filled else 0)
+    return filled
+
+
+def _rate_hz(stamps: list[int]) -> float:
+    """Frames per second within a run: the median step of those under a second."""
+    steps = np.diff(np.asarray(stamps, dtype=np.int64))
+    steps = steps[(steps > 0) & (steps < 1_000_000_000)]
+    return round(1e9 / float(np.median(steps)), 2) if len(steps) else 10.0
+
+
+def _checked(index: int, count: int) -> int:
+    if not 0 <= index < count:
+        raise IndexError(f"frame {index} of {count}")
+    return index

@@ -1,0 +1,118 @@
+"""What every recording kept as a folder of files needs: listing, reading, decoding and calibration checks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.sources.base import SourceError
+from pipeline.types import F64, U8, CameraCalibration
+
+_JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
+
+
+def recording_folder(path: str) -> Path:
+    """The folder a person typed, ``~`` resolved. SourceError when it is none, or an empty one."""
+    if not path:
+        raise SourceError("no folder given after the colon")
+    try:
+        folder = Path(path).expanduser()
+        if not folder.exists():
+            raise SourceError(f"{path}: no such folder")
+        if not folder.is_dir():
+            raise SourceError(f"{path}: not a folder")
+        if not any(folder.iterdir()):
+            raise SourceError(f"{path}: the folder is empty")
+    except (OSError, RuntimeError, ValueError) as error:
+        raise SourceError(f"{path}: cannot be opened: {_reason(error)}") from None
+    return folder
+
+
+def files_by_name(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
+    """Files of a folder by their name without suffix, in order of name; empty when there is no such folder."""
+    try:
+        found = [path for path in folder.iterdir() if path.suffix.lower() in suffixes]
+    except OSError:
+        return {}
+    return {path.stem: path for path in sorted(found, key=lambda path: path.name)}
+
+
+def read_bytes(path: Path) -> bytes:
+    """The whole file. SourceError names it when it cannot be read."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SourceError(f"{path.name}: cannot be read: {_reason(error)}") from None
+
+
+def decode_picture(path: Path) -> tuple[U8, bytes | None]:
+    """(H, W, 3) uint8 blue green red, and the file itself where it is a JPEG. SourceError when it is no whole picture.
+
+    A JPEG without its end marker is refused: its lower part would be a flat grey that a detector takes for road.
+    """
+    data = read_bytes(path)
+    is_jpeg = data.startswith(_JPEG_START)
+    if is_jpeg and _JPEG_END not in data[-64:]:
+        raise SourceError(f"{path.name}: the picture is cut off")
+    try:
+        picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR) if data else None
+    except cv2.error:
+        picture = None
+    if picture is None:
+        raise SourceError(f"{path.name}: not a readable picture")
+    return np.ascontiguousarray(picture, dtype=np.uint8), data if is_jpeg else None
+
+
+def rigid_transform(values: npt.ArrayLike, what: str) -> F64:
+    """(4, 4) float64 of a (3, 4) or (4, 4) rigid transform. SourceError "… is not a rigid transform" when the numbers
+    are anything else: a wrong shape, not finite, a scaled or mirrored rotation, a last row other than 0 0 0 1."""
+    try:
+        given = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        given = np.empty(0)
+    T = np.eye(4)
+    if given.shape in ((3, 4), (4, 4)) and bool(np.all(np.isfinite(given))) and float(np.abs(given).max()) < 1e6:
+        T[: given.shape[0]] = given
+        R = T[:3, :3]
+        orthonormal = np.allclose(R @ R.T, np.eye(3), atol=1e-3) and float(np.linalg.det(R)) > 0.0
+        if orthonormal and np.allclose(T[3], [0.0, 0.0, 0.0, 1.0]):
+            return T
+    raise SourceError(f"{what} is not a rigid transform")
+
+
+def camera_matrix(values: npt.ArrayLike, what: str) -> F64:
+    """(3, 3) float64 pinhole matrix. SourceError when focal lengths are not positive or the last row is not 0 0 1."""
+    try:
+        K = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        K = np.empty(0)
+    if (
+        K.shape == (3, 3)
+        and bool(np.all(np.isfinite(K)))
+        and float(np.abs(K).max()) < 1e6
+        and min(K[0, 0], K[1, 1]) > 1.0
+        and np.allclose(K[2], [0.0, 0.0, 1.0])
+    ):
+        return K
+    raise SourceError(f"{what} is not a camera matrix")
+
+
+def check_looks_ahead(camera: CameraCalibration, what: str) -> None:
+    """SourceError unless ego +x falls inside the picture widened by half its size on every side.
+
+    A front camera sees where the car drives. The usual mistake, an extrinsic given the wrong way round, throws ego +x
+    far to the side or behind.
+    """
+    forward = camera.T_camera_ego[:3, 0]
+    if forward[2] > 0.0:
+        u, v = (camera.K @ (forward / forward[2]))[:2]
+        if -0.5 <= u / camera.width <= 1.5 and -0.5 <= v / camera.height <= 1.5:
+            return
+    raise SourceError(f"{what}: the camera does not look ahead; is its extrinsic given the wrong way round?")
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
