@@ -1,0 +1,186 @@
+"""Any YOLO-family ONNX network as one function: picture in, candidate boxes out (paper, Object Detection).
+
+The paper runs YOLOv3 under TensorRT; here the best provider that works is taken: TensorRT, CUDA, CPU.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+import onnx
+import onnxruntime as ort
+
+from pipeline.types import F32, U8, RawBoxes
+from pipeline.vision import models
+from pipeline.vision.decode import Decoder, Size, UnknownHead, pick_decoder
+from pipeline.vision.graph import MULTIPLE, fitting_size, input_size, with_input_size
+from pipeline.vision.labels import class_names
+
+FLOOR_SCORE = 0.05
+"""Candidates scored lower are not even kept; ``detection.min_score`` cannot go below it."""
+PADDING = 114
+"""Grey that fills what the picture leaves of the input, as the YOLO family is trained."""
+_FREE_SIZE: Size = (384, 640)
+"""Input of a graph of free size when no picture is known yet: 16:9."""
+_PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
+
+
+class DetectorMissing(Exception):
+    """There is no network to run. The text is a sentence with the remedy."""
+
+
+class DetectorError(Exception):
+    """A network that cannot be run, or a picture that is none. The text is a sentence for a person."""
+
+
+@dataclass(frozen=True)
+class Detector:
+    """A loaded network.
+
+    name: file, digest and input size, so that equal names give equal boxes: the key of caches. input_size: (height,
+    width). labels: class names in COCO's spelling. notes: what a person should know about how it was loaded.
+    """
+
+    name: str
+    providers: tuple[str, ...]
+    input_size: Size
+    labels: tuple[str, ...]
+    head: str
+    notes: tuple[str, ...]
+    _session: ort.InferenceSession = field(repr=False, compare=False)
+    _decoder: Decoder = field(repr=False, compare=False)
+
+    def detect(self, bgr: U8) -> RawBoxes:
+        """Candidates scored at least ``FLOOR_SCORE`` in a picture (H, W, 3) uint8, boxes clipped to it, best first.
+
+        DetectorError for an array that is no such picture or a network that fails on it.
+        """
+        if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
+            raise DetectorError(f"a picture is (H, W, 3) uint8, this is {bgr.shape} {bgr.dtype}")
+        blob, scale = letterbox(bgr, self.input_size, self._decoder)
+        boxes, scores, classes = self._decoder.decode(_run(self._session, blob), self.input_size, FLOOR_SCORE)
+        height, width = bgr.shape[:2]
+        boxes = np.clip(boxes / np.float32(scale), 0.0, np.array([width, height, width, height], np.float32))
+        keep = (boxes[:, 2] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 1]) & (classes >= 0) & (classes < len(self.labels))
+        best_first = np.flatnonzero(keep)[np.argsort(-scores[keep], kind="stable")]
+        labels = tuple(self.labels[index] for index in classes[best_first])
+        return RawBoxes(self.name, boxes[best_first].astype(np.float32), scores[best_first], labels)
+
+
+def letterbox(bgr: U8, size: Size, decoder: Decoder) -> tuple[F32, float]:
+    """The picture as the network takes it: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey, and the
+    scale from picture to input pixels."""
+    scale = min(size[0] / bgr.shape[0], size[1] / bgr.shape[1])
+    height, width = (max(1, min(round(n * scale), m)) for n, m in zip(bgr.shape[:2], size, strict=True))
+    filled = np.full((*size, 3), PADDING, np.uint8)
+    filled[:height, :width] = cv2.resize(bgr, (width, height), interpolation=cv2.INTER_LINEAR)
+    blob = cv2.dnn.blobFromImage(filled, scalefactor=decoder.scale, swapRB=decoder.rgb)
+    return np.asarray(blob, dtype=np.float32), scale
+
+
+def open_detector(
+    spec: str | None,
+    picture_size: tuple[int, int] | None,
+    threads: int = 2,
+    input_size: Size | None = None,
+) -> Detector:
+    """Load a network by name or path; null: the default one (``pipeline.vision.models``).
+
+    picture_size (width, height): the input is given the picture's aspect where the graph permits. input_size (height,
+    width), multiples of 32: that size instead, or DetectorError. DetectorMissing when there is no file, DetectorError
+    when the file is no YOLO network that can be run.
+    """
+    path = _locate(spec)
+    model = _read(path)
+    own = _own_size(model, path)
+    if input_size is not None:
+        if min(input_size) < MULTIPLE or any(side % MULTIPLE for side in input_size):
+            raise DetectorError(f"an input size is two multiples of {MULTIPLE}, not {input_size[1]}×{input_size[0]}")
+        return _at_size(model, path, own, input_size, threads)
+    wanted = fitting_size(picture_size, own) if picture_size else own or _FREE_SIZE
+    try:
+        return _at_size(model, path, own, wanted, threads)
+    except DetectorError as error:
+        if own is None or wanted == own:
+            raise
+        refusal = str(error)
+    note = f"{path.name} works only at its own input size {own[1]}×{own[0]} (at {wanted[1]}×{wanted[0]}: {refusal})"
+    return _at_size(model, path, own, own, threads, (note,))
+
+
+def _locate(spec: str | None) -> Path:
+    try:
+        path = models.find(spec) if spec else models.default_model("detector")
+    except models.ModelError as error:
+        raise DetectorMissing(str(error)) from None
+    if path is not None:
+        return path
+    what = f"No detector {spec!r}" if spec else "No detector is installed"
+    raise DetectorMissing(f"{what}: run `cipv models pull yolox_nano`, or give an ONNX file with `--detector PATH`.")
+
+
+def _read(path: Path) -> onnx.ModelProto:
+    try:
+        return onnx.load(path)
+    except Exception as error:  # protobuf's own errors have no common base class
+        raise DetectorError(f"{path} is not an ONNX file: {str(error).splitlines()[0]}") from None
+
+
+def _own_size(model: onnx.ModelProto, path: Path) -> Size | None:
+    try:
+        return input_size(model)
+    except ValueError as error:
+        raise DetectorError(f"{path.name} is no detector of pictures: {error}") from None
+
+
+def _at_size(
+    model: onnx.ModelProto, path: Path, own: Size | None, size: Size, threads: int, notes: tuple[str, ...] = ()
+) -> Detector:
+    """The detector at one input size, proven by a run on a grey picture."""
+    graph = model if own == size else with_input_size(model, size)
+    session = _session(graph.SerializeToString(), path, threads)
+    metadata = {entry.key: entry.value for entry in model.metadata_props}
+    probe = _run(session, np.full((1, 3, *size), PADDING, np.float32))
+    try:
+        decoder = pick_decoder(probe, size, metadata)
+    except UnknownHead as error:
+        raise DetectorError(f"{path.name}: {error}") from None
+    if own is not None and own != size and not decoder.own_grid and own[0] * own[1] == size[0] * size[1]:
+        # The grid inside such a graph may be of the old width: the run cannot fail, and every box would be elsewhere.
+        raise DetectorError("the grid inside the graph may belong to its own size")
+    labels = class_names(decoder.classes, metadata)
+    name = f"{path.stem}-{models.file_sha256(path)[:12]}-{size[1]}x{size[0]}"
+    return Detector(name, tuple(session.get_providers()), size, labels, decoder.name, notes, session, decoder)
+
+
+def _session(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    # Spinning workers starve the LiDAR chain between two pictures.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    available = [name for name in _PROVIDERS if name in ort.get_available_providers()]
+    refusal: Exception | None = None
+    for first in range(len(available)):
+        try:
+            return ort.InferenceSession(graph, options, providers=available[first:])
+        except Exception as error:  # onnxruntime raises a class for each status code, without a common base
+            refusal = error
+    raise DetectorError(f"{path.name} cannot be run: {_first_line(refusal)}")
+
+
+def _run(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
+    try:
+        outputs = session.run(None, {session.get_inputs()[0].name: blob})
+    except Exception as error:
+        raise DetectorError(f"the network failed: {_first_line(error)}") from None
+    return [np.asarray(output) for output in outputs]
+
+
+def _first_line(error: Exception | None) -> str:
+    return (str(error).splitlines() or ["no reason given"])[0]

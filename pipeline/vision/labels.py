@@ -1,0 +1,53 @@
+"""Class names of detectors, in COCO's spelling, in which the line decides who is a vehicle."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+
+COCO_80 = (
+    "person", "bicycle", "car", "motorcycle", "airplane", "bus", "train", "truck", "boat", "traffic light",
+    "fire hydrant", "stop sign", "parking meter", "bench", "bird", "cat", "dog", "horse", "sheep", "cow", "elephant",
+    "bear", "zebra", "giraffe", "backpack", "umbrella", "handbag", "tie", "suitcase", "frisbee", "skis", "snowboard",
+    "sports ball", "kite", "baseball bat", "baseball glove", "skateboard", "surfboard", "tennis racket", "bottle",
+    "wine glass", "cup", "fork", "knife", "spoon", "bowl", "banana", "apple", "sandwich", "orange", "broccoli",
+    "carrot", "hot dog", "pizza", "donut", "cake", "chair", "couch", "potted plant", "bed", "dining table", "toilet",
+    "tv", "laptop", "mouse", "remote", "keyboard", "cell phone", "microwave", "oven", "toaster", "sink",
+    "refrigerator", "book", "clock", "vase", "scissors", "teddy bear", "hair drier", "toothbrush",
+)  # fmt: skip
+"""The 80 classes of COCO 2017, in the order every COCO-trained YOLO numbers them."""
+
+SYNONYMS = {
+    "motorbike": "motorcycle",
+    "van": "car",
+    "vehicle": "car",
+    "pedestrian": "person",
+    "cyclist": "bicycle",
+    "lorry": "truck",
+}
+"""Other data sets' names for the classes that matter on a road."""
+
+
+def canonical(name: str) -> str:
+    """A class name in COCO's spelling: lower case, known synonyms replaced."""
+    lowered = name.strip().lower().replace("_", " ")
+    return SYNONYMS.get(lowered, lowered)
+
+
+def class_names(count: int, metadata: Mapping[str, str]) -> tuple[str, ...]:
+    """Names of a network's ``count`` classes (0: not known from its shape): from the graph's own property ``names``
+    (v5/v8 exports write a Python mapping of number to name there), else COCO's, else "class 0", "class 1", …"""
+    named = _from_metadata(metadata.get("names", ""))
+    if named and count in (0, len(named)):
+        return named
+    return COCO_80 if count in (0, len(COCO_80)) else tuple(f"class {index}" for index in range(count))
+
+
+def _from_metadata(text: str) -> tuple[str, ...]:
+    try:
+        value = ast.literal_eval(text)
+    except (ValueError, SyntaxError):
+        return ()
+    if isinstance(value, dict) and set(value) == set(range(len(value))):
+        value = [value[index] for index in range(len(value))]
+    return tuple(canonical(str(name)) for name in value) if isinstance(value, list | tuple) else ()

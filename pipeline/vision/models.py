@@ -1,0 +1,249 @@
+"""Networks by name: which ones are known, where their official files are, and the folder that keeps them.
+
+The folder is ``~/.cache/cipv/models`` (``CIPV_HOME`` replaces ``~/.cache/cipv``). A network is chosen by name or path;
+without either it is the registered default, then the first known one found in the folder or in ``$CIPV_DATA/models``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+Task = Literal["detector", "lanes"]
+Progress = Callable[[int, int], None]
+"""Called with bytes done and bytes in all."""
+
+_CHUNK = 1 << 16
+_TIMEOUT_S = 30.0
+
+
+class ModelError(Exception):
+    """A network that cannot be fetched, registered or found; one sentence with the remedy."""
+
+
+@dataclass(frozen=True)
+class KnownModel:
+    """An official file. size in bytes."""
+
+    name: str
+    task: Task
+    url: str
+    size: int
+    sha256: str
+    licence: str
+    note: str
+
+
+_YOLOX = "https://github.com/Megvii-BaseDetection/YOLOX/releases/download/0.1.1rc0/"
+KNOWN: tuple[KnownModel, ...] = (
+    KnownModel(
+        "yolox_nano", "detector", _YOLOX + "yolox_nano.onnx", 3_659_407,
+        "c789161ed43c8269fcd4e67c67eeeb4e80c622da2eb296a20bc6007bd18a0b7d",
+        "Apache-2.0", "COCO, 0.9 M parameters: about 10 ms a picture on one core",
+    ),
+    KnownModel(
+        "yolox_tiny", "detector", _YOLOX + "yolox_tiny.onnx", 20_219_662,
+        "427cc366d34e27ff7a03e2899b5e3671425c262ea2291f88bb942bc1cc70b0f7",
+        "Apache-2.0", "COCO, 5 M parameters",
+    ),
+    KnownModel(
+        "yolox_s", "detector", _YOLOX + "yolox_s.onnx", 35_858_002,
+        "c5c2d13e59ae883e6af3b45daea64af4833a4951c92d116ec270d9ddbe998063",
+        "Apache-2.0", "COCO, 9 M parameters: for a graphics card",
+    ),
+    KnownModel(
+        "twinlitenet", "lanes", "https://github.com/harrylal/TwinLiteNet-onnx-opencv-dnn/raw/main/models/best.onnx",
+        1_800_549, "f505b56bd7c9e4e38b2928373aa4daa191a9a398e07e1fb340024b9ce84d4285",
+        "MIT", "BDD100K, lane lines and drivable area",
+    ),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ModelEntry:
+    """One row of ``cipv models``. ``path`` is null while it is not here."""
+
+    name: str
+    task: Task
+    path: Path | None
+    default: bool
+    licence: str | None
+    url: str | None
+    note: str
+
+
+def store() -> Path:
+    """The folder that keeps networks; it need not exist."""
+    home = os.environ.get("CIPV_HOME")
+    return (Path(home) if home else Path.home() / ".cache" / "cipv") / "models"
+
+
+def data_models() -> Path:
+    """``$CIPV_DATA/models``; without the variable, the folder ``shared/data`` beside the project."""
+    data = os.environ.get("CIPV_DATA")
+    return (Path(data) if data else Path(__file__).resolve().parents[3] / "shared" / "data") / "models"
+
+
+def list_models() -> tuple[ModelEntry, ...]:
+    """Known networks in their order, then registered ones by name."""
+    registry = _read_registry()
+    defaults = {task: default_model(task) for task in ("detector", "lanes")}
+    entries = []
+    for known in KNOWN:
+        path = _located(known.name)
+        entries.append(
+            ModelEntry(
+                known.name, known.task, path, _same(path, defaults[known.task]), known.licence, known.url, known.note
+            )
+        )
+    known_names = {known.name for known in KNOWN}
+    for name, row in sorted(registry["models"].items()):
+        if name not in known_names:
+            path = _located(name)
+            entries.append(
+                ModelEntry(name, row["task"], path, _same(path, defaults[row["task"]]), None, None, "registered")
+            )
+    return tuple(entries)
+
+
+def find(spec: str) -> Path | None:
+    """The file of a path or a name; null when there is none."""
+    path = Path(spec).expanduser()
+    if path.is_file():
+        return path
+    return _located(spec) if _is_name(spec) else None
+
+
+def default_model(task: Task) -> Path | None:
+    """The network used when nobody names one; null when none is here."""
+    chosen = _read_registry()["defaults"].get(task)
+    names = [chosen] if chosen else []
+    names += [known.name for known in KNOWN if known.task == task]
+    found = (_located(name) for name in names)
+    return next((path for path in found if path is not None), None)
+
+
+def register(path: Path, name: str, task: Task = "detector", default: bool = True) -> Path:
+    """Copy a file into the folder under ``name`` and, unless told otherwise, make it its task's default."""
+    if not _is_name(name):
+        raise ModelError(f"{name!r} cannot be a network's name: use letters, digits, '-', '_' and '.'")
+    if not path.is_file():
+        raise ModelError(f"no file at {path}")
+    target = store() / f"{name}.onnx"
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if not _same(path, target):
+            part = target.with_suffix(".part")
+            shutil.copyfile(path, part)
+            part.replace(target)
+    except OSError as error:
+        raise ModelError(f"{target} cannot be written: {error.strerror or error}") from None
+    registry = _read_registry()
+    registry["models"][name] = {"task": task, "sha256": file_sha256(target)}
+    if default:
+        registry["defaults"][task] = name
+    _write_registry(registry)
+    return target
+
+
+def pull(name: str, progress: Progress | None = None) -> Path:
+    """Fetch a known network into the folder; size and SHA-256 must be the official ones. A file that is already there
+    and right is kept. ModelError says what went wrong; no part of a failed download stays."""
+    known = next((model for model in KNOWN if model.name == name), None)
+    if known is None:
+        raise ModelError(f"no network named {name!r}; known are {', '.join(model.name for model in KNOWN)}")
+    target = store() / f"{name}.onnx"
+    if target.is_file() and file_sha256(target) == known.sha256:
+        return target
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ModelError(f"{target.parent} cannot be made: {error.strerror or error}") from None
+    part = target.with_suffix(".part")
+    try:
+        _download(known, part, progress)
+        part.replace(target)
+    finally:
+        part.unlink(missing_ok=True)
+    return target
+
+
+def file_sha256(path: Path) -> str:
+    """Hexadecimal SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _download(known: KnownModel, part: Path, progress: Progress | None) -> None:
+    digest, done = hashlib.sha256(), 0
+    try:
+        with urllib.request.urlopen(known.url, timeout=_TIMEOUT_S) as response, part.open("wb") as file:
+            while chunk := response.read(_CHUNK):
+                done += len(chunk)
+                if done > known.size:
+                    break
+                file.write(chunk)
+                digest.update(chunk)
+                if progress is not None:
+                    progress(done, known.size)
+    except urllib.error.HTTPError as error:
+        error.close()
+        raise ModelError(
+            f"{known.url} answered {error.code} {error.reason}; fetch the file by hand and use {_by_hand(known)}"
+        ) from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "reason", None) or error
+        raise ModelError(
+            f"{known.name} cannot be fetched ({why}); without a network connection use {_by_hand(known)}"
+        ) from None
+    if done != known.size:
+        raise ModelError(
+            f"{known.url} gave {'more than ' if done > known.size else f'{done} of '}{known.size} bytes; try again"
+        )
+    if digest.hexdigest() != known.sha256:
+        raise ModelError(
+            f"{known.url} is not the official file: its SHA-256 is {digest.hexdigest()}, not {known.sha256}"
+        )
+
+
+def _by_hand(known: KnownModel) -> str:
+    return f"`cipv models register PATH {known.name}`"
+
+
+def _located(name: str) -> Path | None:
+    candidates = (folder / f"{name}.onnx" for folder in (store(), data_models()))
+    return next((path for path in candidates if path.is_file()), None)
+
+
+def _is_name(text: str) -> bool:
+    return bool(text) and not text.startswith(".") and all(c.isalnum() or c in "-_." for c in text)
+
+
+def _same(a: Path | None, b: Path | None) -> bool:
+    return a is not None and b is not None and a.resolve() == b.resolve()
+
+
+def _read_registry() -> dict[str, dict[str, Any]]:
+    path = store() / "registry.json"
+    try:
+        loaded = json.loads(path.read_text(encoding="utf-8"))
+        return {"defaults": dict(loaded["defaults"]), "models": dict(loaded["models"])}
+    except FileNotFoundError:
+        return {"defaults": {}, "models": {}}
+    except (OSError, ValueError, KeyError, TypeError):
+        raise ModelError(f"{path} is damaged; delete it and register your networks again") from None
+
+
+def _write_registry(registry: dict[str, dict[str, Any]]) -> None:
+    path = store() / "registry.json"
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(registry, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    part.replace(path)
