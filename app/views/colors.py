@@ -1,0 +1,70 @@
+"""The one palette of every view: what a colour means, and its two shades for dark and light backgrounds.
+
+LiDAR is magenta and vision cyan, as in the paper's figures; both together violet; the closest in-path vehicle green.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+from pipeline.types import FusedObject
+
+Rgb = tuple[int, int, int]
+Role = Literal[
+    "lidar", "vision", "fused", "cipv", "path", "ego", "ground", "unclustered", "cluster", "dropped", "grid", "warning"
+]
+
+
+@dataclass(frozen=True)
+class Shades:
+    """One role's colour as ``#rrggbb`` on a dark and on a light background."""
+
+    dark: str
+    light: str
+
+
+PALETTE: dict[Role, Shades] = {
+    "lidar": Shades("#ff4dd8", "#b8008f"),
+    "vision": Shades("#22d3ee", "#0e7490"),
+    "fused": Shades("#c4b5fd", "#6d28d9"),
+    "cipv": Shades("#4ade80", "#15803d"),
+    "path": Shades("#60a5fa", "#1d4ed8"),
+    "ego": Shades("#e5e7eb", "#374151"),
+    "ground": Shades("#6b7280", "#9ca3af"),
+    "unclustered": Shades("#a3a38a", "#7c7c64"),
+    "cluster": Shades("#d6a76c", "#9a6a2f"),
+    "dropped": Shades("#3f3f46", "#d4d4d8"),
+    "grid": Shades("#33373f", "#d1d5db"),
+    "warning": Shades("#fbbf24", "#b45309"),
+}
+"""``cluster`` is a LiDAR cluster that belongs to no object (yet); ``dropped`` a point that down-sampling left out."""
+
+_ROLE_OF_SOURCE: dict[str, Role] = {"L": "lidar", "V": "vision", "VL": "fused"}
+
+
+def rgb(role: Role, theme: Literal["dark", "light"] = "dark") -> Rgb:
+    """A role's colour as three numbers 0–255."""
+    text = getattr(PALETTE[role], theme)
+    return int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16)
+
+
+def role_of(each: FusedObject, cipv_id: int | None) -> Role:
+    """What an object's colour says: that it is the CIPV, else which sensors see it."""
+    return "cipv" if each.id == cipv_id else _ROLE_OF_SOURCE[each.source]
+
+
+def shade_of(color: Rgb, identity: int) -> Rgb:
+    """The colour a little darker or not, always the same for one identity, so that neighbours can be told apart."""
+    factor = (1.0, 0.82, 0.91, 0.73)[identity % 4]
+    return int(color[0] * factor), int(color[1] * factor), int(color[2] * factor)
+
+
+def palette_json() -> dict[str, dict[str, str]]:
+    """``{role: {"dark": "#…", "light": "#…"}}`` for a page."""
+    return {role: asdict(shades) for role, shades in PALETTE.items()}
+
+
+def palette_css(theme: Literal["dark", "light"]) -> str:
+    """The palette as CSS custom properties, ``--cipv-<role>: #…;`` one a line."""
+    return "\n".join(f"--cipv-{role}: {getattr(shades, theme)};" for role, shades in PALETTE.items())
