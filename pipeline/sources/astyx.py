@@ -47,7 +47,7 @@ class AstyxSource:
     def __init__(self, uri: str, path: str) -> None:
         folder = recording_folder(path)
         self.uri, self.title = uri, folder.resolve().name
-        self.notes: tuple[str, ...] = ("camera without stamps: taken at the middle of the sweep", "no ego speed recorded")
+        self.notes: tuple[str, ...] = ("camera without stamps: taken at mid-sweep", "no ego speed recorded")
         self._sweeps = files_by_name(folder / "lidar_vlp16", (".txt",))
         self._pictures = files_by_name(folder / "camera_front", (".jpg", ".jpeg", ".png"))
         self._labels = files_by_name(folder / "groundtruth_obj3d", (".json",))

@@ -1,0 +1,273 @@
+"""KITTI: HDL-64 and colour camera 2 (Geiger et al. 2013), as raw drives and as folders in the object benchmark's form.
+
+Raw: ``<date>_drive_NNNN_sync/{image_02,velodyne_points,oxts}/data`` with ``timestamps.txt`` beside each ``data`` and
+``calib_cam_to_cam.txt``, ``calib_velo_to_cam.txt`` one folder up. Object form: ``image_02`` (or ``image_2``),
+``velodyne``, ``calib``, ``label_2``, one file a frame.
+
+The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 here, as a VLP-16's reflectivity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.sources.base import SourceError, TruthObject
+from pipeline.sources.files import decode_picture, files_by_name, read_bytes, recording_folder
+from pipeline.sources.hdl64 import keep_rings, match_vlp16, ring_elevations_deg, turns
+from pipeline.sources.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
+from pipeline.sources.kitti_records import parse_labels, parse_oxts, parse_timestamps
+from pipeline.types import F32, EgoState, Frame, Picture, Sweep
+
+_STEP_NS = 100_000_000
+_RINGS = 64
+_NOMINAL_SIZE = (1242, 375)
+_PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+
+
+@dataclass(frozen=True)
+class _Files:
+    """Where a recording keeps what; files by frame name, stamps by frame number."""
+
+    pictures: dict[str, Path]
+    sweeps: dict[str, Path]
+    oxts: dict[str, Path]
+    labels: dict[str, Path]
+    calibrations: dict[str, Path]
+    raw_calibration: tuple[Path, Path] | None
+    lidar_stamps: tuple[int, ...]
+    camera_stamps: tuple[int, ...]
+
+
+class KittiSource:
+    """A KITTI drive. rings: 16 keeps the rings that a VLP-16 would have, 64 keeps all."""
+
+    def __init__(self, uri: str, path: str, rings: int = 16) -> None:
+        if rings not in (16, _RINGS):
+            raise SourceError(f"{uri}: {rings} rings asked for; KITTI gives 16 (as a VLP-16) or 64")
+        folder = recording_folder(path)
+        self.uri, self.title, self.rate_hz = uri, folder.resolve().name, 10.0
+        self._files = _raw_files(folder) if _is_raw(folder) else _object_files(folder)
+        self._names = sorted(self._files.sweeps.keys() | self._files.pictures.keys())
+        if not self._names:
+            raise SourceError(f"{path}: no KITTI recording: {_what_it_holds(folder)}")
+        self._size = self._picture_size()
+        self._calibration = self._first_calibration(path)
+        self._ticks = _ticks(self._names, self._files)
+        self._channels = self._match_rings() if rings == 16 else None
+        self.notes = self._about()
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def t_ns(self, index: int) -> int:
+        """The moment the LiDAR faces ahead, which is when KITTI triggers its cameras; 10 Hz where no stamps are."""
+        self._name(index)
+        return self._ticks[index]
+
+    def frame(self, index: int) -> Frame:
+        name, tick = self._name(index), self.t_ns(index)
+        notes: list[str] = []
+        calibration = self._calibration_of(name, notes)
+        sweep = self._sweep(name, tick, notes)
+        picture = self._picture(name, tick, notes)
+        ego = self._ego(name, tick, notes)
+        return Frame(index, name, tick, sweep, picture, calibration.camera, ego, notes=tuple(notes))
+
+    def truth(self, index: int) -> tuple[TruthObject, ...] | None:
+        name = self._name(index)
+        path = self._files.labels.get(name)
+        if path is None:
+            return None
+        try:
+            return parse_labels(read_bytes(path), self._calibration_of(name, []).T_rect_ego)
+        except SourceError:
+            return None
+
+    def _name(self, index: int) -> str:
+        if not 0 <= index < len(self._names):
+            raise IndexError(f"frame {index} of {len(self._names)}")
+        return self._names[index]
+
+    def _sweep(self, name: str, tick: int, notes: list[str]) -> Sweep | None:
+        path = self._files.sweeps.get(name)
+        if path is None:
+            notes.append("no LiDAR file for this frame")
+            return None
+        try:
+            points = parse_velodyne(read_bytes(path), path.name, notes)
+        except SourceError as error:
+            notes.append(str(error))
+            return None
+        turn = turns(points)
+        count = int(turn.max()) + 1
+        if count > _RINGS:
+            notes.append(f"{path.name}: {count} rings instead of {_RINGS}; not in KITTI's order, left out")
+            return None
+        if self._channels is None:
+            return Sweep(tick, points, (_RINGS - 1 - turn).astype(np.uint8), _RINGS)
+        channels = self._channels
+        if count < _RINGS:
+            notes.append(f"{path.name}: {count} rings instead of {_RINGS}; matched by this sweep's own elevations")
+            channels = match_vlp16(ring_elevations_deg(points, turn, count))
+        kept, ring = keep_rings(points, turn, channels)
+        return Sweep(tick, kept, ring, 16)
+
+    def _picture(self, name: str, tick: int, notes: list[str]) -> Picture | None:
+        path = self._files.pictures.get(name)
+        if path is None:
+            notes.append("no picture for this frame")
+            return None
+        try:
+            bgr, encoded = decode_picture(path)
+        except SourceError as error:
+            notes.append(str(error))
+            return None
+        if (bgr.shape[1], bgr.shape[0]) != self._size:
+            notes.append(f"{path.name}: {bgr.shape[1]}×{bgr.shape[0]}, the others are {self._size[0]}×{self._size[1]}")
+            return None
+        return Picture(_stamp(self._files.camera_stamps, name) or tick, bgr, encoded)
+
+    def _ego(self, name: str, tick: int, notes: list[str]) -> EgoState | None:
+        path = self._files.oxts.get(name)
+        if path is None:
+            return None
+        try:
+            speed_mps, yaw_rate_radps = parse_oxts(read_bytes(path), path.name)
+        except SourceError as error:
+            notes.append(str(error))
+            return None
+        return EgoState(tick, speed_mps, yaw_rate_radps)
+
+    def _calibration_of(self, name: str, notes: list[str]) -> KittiCalibration:
+        path = self._files.calibrations.get(name)
+        if path is None:
+            return self._calibration
+        try:
+            return parse_object_calibration(read_bytes(path), path.name, self._size)
+        except SourceError as error:
+            notes.append(f"{error}; the recording's first calibration is used")
+            return self._calibration
+
+    def _first_calibration(self, path: str) -> KittiCalibration:
+        if self._files.raw_calibration is not None:
+            cameras, velodyne = self._files.raw_calibration
+            names = (cameras.name, velodyne.name)
+            return parse_raw_calibration(read_bytes(cameras), read_bytes(velodyne), names, self._size)
+        if not self._files.calibrations:
+            raise SourceError(f"{path}: no calibration: neither calib/*.txt nor calib_cam_to_cam.txt one folder up")
+        first = next(iter(self._files.calibrations.values()))
+        return parse_object_calibration(read_bytes(first), first.name, self._size)
+
+    def _picture_size(self) -> tuple[int, int]:
+        """Width and height of the first readable picture; object calibration files do not say."""
+        for path in self._files.pictures.values():
+            try:
+                bgr, _ = decode_picture(path)
+            except SourceError:
+                continue
+            return bgr.shape[1], bgr.shape[0]
+        return _NOMINAL_SIZE
+
+    def _match_rings(self) -> dict[int, int]:
+        """Recorded ring → VLP-16 channel, from the first whole sweep; the laser mounts do not move within a drive."""
+        for path in self._files.sweeps.values():
+            try:
+                points = parse_velodyne(read_bytes(path), path.name, [])
+            except SourceError:
+                continue
+            turn = turns(points)
+            if int(turn.max()) == _RINGS - 1:
+                return match_vlp16(ring_elevations_deg(points, turn, _RINGS))
+        return {}
+
+    def _about(self) -> tuple[str, ...]:
+        notes = []
+        if self._channels:
+            notes.append(f"{len(self._channels)} of a VLP-16's 16 rings remain: the HDL-64 reaches only about +3°")
+        if not self._files.lidar_stamps and not self._files.camera_stamps:
+            notes.append("no time stamps: taken as 10 Hz")
+        if not self._files.oxts:
+            notes.append("no ego speed recorded")
+        return tuple(notes)
+
+
+def parse_velodyne(data: bytes, file: str, notes: list[str]) -> F32:
+    """(N, 4) float32 ``x y z intensity`` (0–255) of a Velodyne file. Points that are not finite or farther than a
+    kilometre are left out and counted in ``notes``, as is a cut last point. SourceError when none is left."""
+    whole = len(data) // 16
+    if len(data) % 16:
+        notes.append(f"{file}: cut off in the middle of a point")
+    raw = np.frombuffer(data, dtype="<f4", count=whole * 4).reshape(-1, 4)
+    with np.errstate(invalid="ignore"):  # comparing a signalling NaN of a damaged file
+        good = np.all(np.abs(raw[:, :3]) < 1000.0, axis=1) & (raw[:, 3] >= 0.0) & (raw[:, 3] <= 1.0)
+    kept = raw[good]
+    if not len(kept):
+        raise SourceError(f"{file}: no LiDAR points in it")
+    if len(kept) < len(raw):
+        notes.append(f"{file}: {len(raw) - len(kept)} unreadable points left out")
+    return np.ascontiguousarray(kept * np.array([1.0, 1.0, 1.0, 255.0]), dtype=np.float32)
+
+
+def _is_raw(folder: Path) -> bool:
+    return any((folder / sensor / "data").is_dir() for sensor in ("velodyne_points", "image_02"))
+
+
+def _raw_files(folder: Path) -> _Files:
+    names = ("calib_cam_to_cam.txt", "calib_velo_to_cam.txt")
+    home = folder.resolve().parent if not (folder / names[0]).exists() else folder
+    return _Files(
+        pictures=files_by_name(folder / "image_02" / "data", _PICTURE_SUFFIXES),
+        sweeps=files_by_name(folder / "velodyne_points" / "data", (".bin",)),
+        oxts=files_by_name(folder / "oxts" / "data", (".txt",)),
+        labels={},
+        calibrations={},
+        raw_calibration=(home / names[0], home / names[1]),
+        lidar_stamps=_read_stamps(folder / "velodyne_points" / "timestamps.txt"),
+        camera_stamps=_read_stamps(folder / "image_02" / "timestamps.txt"),
+    )
+
+
+def _object_files(folder: Path) -> _Files:
+    pictures = files_by_name(folder / "image_02", _PICTURE_SUFFIXES)
+    return _Files(
+        pictures=pictures or files_by_name(folder / "image_2", _PICTURE_SUFFIXES),
+        sweeps=files_by_name(folder / "velodyne", (".bin",)),
+        oxts={},
+        labels=files_by_name(folder / "label_2", (".txt",)),
+        calibrations=files_by_name(folder / "calib", (".txt",)),
+        raw_calibration=None,
+        lidar_stamps=(),
+        camera_stamps=(),
+    )
+
+
+def _read_stamps(path: Path) -> tuple[int, ...]:
+    try:
+        return parse_timestamps(path.read_bytes())
+    except OSError:
+        return ()
+
+
+def _ticks(names: list[str], files: _Files) -> list[int]:
+    """The tick of every frame; one without a stamp follows the frame before it by 0.1 s."""
+    ticks: list[int] = []
+    for name in names:
+        stamp = _stamp(files.lidar_stamps, name) or _stamp(files.camera_stamps, name)
+        ticks.append(stamp if stamp is not None else ticks[-1] + _STEP_NS if ticks else 0)
+    return ticks
+
+
+def _stamp(stamps: tuple[int, ...], name: str) -> int | None:
+    """The stamp of the frame of this number: lines are counted over the drive, also where a file is missing."""
+    number = int(name) if name.isdecimal() else -1
+    return stamps[number] if 0 <= number < len(stamps) and stamps[number] else None
+
+
+def _what_it_holds(folder: Path) -> str:
+    drives = sorted(path.name for path in folder.glob("*_drive_*") if path.is_dir())
+    if drives:
+        return f"it holds drives; open one of them, for example kitti:{folder / drives[0]}"
+    return "neither velodyne/*.bin nor velodyne_points/data/*.bin nor pictures in it"
