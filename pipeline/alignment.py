@@ -109,7 +109,7 @@ def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignm
     if params.model == "pinhole" and camera is not None:
         turn = np.eye(4)
         turn[:3, :3] = rotation(*(np.radians(a) for a in (params.roll_deg, params.pitch_deg, params.yaw_deg)))
-        return Pinhole(camera.K, camera.distortion, camera.T_camera_ego @ turn)
+        return Pinhole(camera.K, camera.distortion, camera.T_camera_ego @ inverse(turn))
     measured = angular_from_calibration(camera) if camera is not None else None
     typed = (params.h_res_deg, params.v_res_deg, params.cx_px, params.cy_px)
     if measured is None and any(value is None for value in typed):

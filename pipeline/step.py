@@ -51,7 +51,7 @@ class State:
 
 
 def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
-    """Run every stage on one frame; ``frame.raw_boxes`` already holds the detector's boxes (``pipeline.run.detect``)."""
+    """Run every stage on one frame, whose ``raw_boxes`` the detector has filled already (``pipeline.run.detect``)."""
     state, dt_s = _continue_or_restart(state, frame, params)
     clock = _Stopwatch()
     aligned = alignment.resolve(params.alignment, frame.camera)

@@ -1,0 +1,58 @@
+"""The `cipv` command. Exit codes: 0 done, 1 the work failed, 2 bad usage or bad input (one line, no traceback)."""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import tyro
+
+from app.commands.bench import Bench
+from app.commands.calibrate import CalibrateDistance
+from app.commands.models import Models
+from app.commands.params import ListParams
+from app.commands.run import Run
+from app.commands.serve import Demo, Serve
+from pipeline.calibration.distance import CalibrationError
+from pipeline.params import ParamsError
+from pipeline.sources.base import SourceError
+from pipeline.vision.detector import DetectorError, DetectorMissing
+from pipeline.vision.models import ModelError
+
+BAD_INPUT = (SourceError, ParamsError, DetectorMissing, DetectorError, ModelError, CalibrationError)
+
+Command = (
+    Annotated[Demo, tyro.conf.subcommand("demo")]
+    | Annotated[Serve, tyro.conf.subcommand("serve")]
+    | Annotated[Run, tyro.conf.subcommand("run")]
+    | Annotated[Models, tyro.conf.subcommand("models")]
+    | Annotated[ListParams, tyro.conf.subcommand("params")]
+    | Annotated[CalibrateDistance, tyro.conf.subcommand("calibrate")]
+    | Annotated[Bench, tyro.conf.subcommand("bench")]
+)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Entry point of the console script."""
+    command = tyro.cli(
+        Command,  # type: ignore[arg-type]
+        args=arguments,
+        prog="cipv",
+        description="CIPV Studio: which vehicle ahead is the closest one in my path, how far, how fast, and why.",
+        config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
+    )
+    try:
+        raise SystemExit(command())
+    except BAD_INPUT as error:
+        print(f"cipv: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    except BrokenPipeError:
+        # the reader of our output has gone (`cipv run … | head`): nothing is wrong, and nothing more can be written
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise SystemExit(0) from None
+    except OSError as error:
+        print(f"cipv: {error.strerror or error}: {error.filename or ''}".rstrip(": "), file=sys.stderr)
+        raise SystemExit(2) from None
+    except KeyboardInterrupt:
+        raise SystemExit(130) from None

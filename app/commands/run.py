@@ -1,0 +1,106 @@
+"""`cipv run`: a recording through the whole line, results as JSON lines and a rerun recording."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from app.options import LineOptions, SourceOptions
+from pipeline.results import write_line
+from pipeline.run import run
+from pipeline.types import Result
+
+
+@dataclass(frozen=True)
+class Run:
+    """Run the whole line on a recording and write what it believes of each frame.
+
+    Example: cipv run astyx:../shared/data/astyx --out results.jsonl --rrd drive.rrd
+    """
+
+    source: SourceOptions
+    line: LineOptions = field(default_factory=LineOptions)
+    sensors: Literal["lidar", "camera", "both"] = "both"
+    """Ablation: what a car with only this sensor would believe"""
+    out: Path | None = None
+    """Write one JSON object a frame here; - writes to standard output"""
+    rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """Write a rerun recording here"""
+
+    def __call__(self) -> int:
+        params = self.line.parameters()
+        source = self.source.open()
+        detector = self.line.open_detector(source) if self.sensors != "lidar" else None
+        tally = _Tally()
+        with ExitStack() as stack:
+            out = None
+            if self.out is not None:
+                to_stdout = str(self.out) == "-"
+                out = sys.stdout if to_stdout else stack.enter_context(self.out.open("w", encoding="utf-8"))
+            replay = None
+            if self.rrd is not None:
+                from app.views.rerun_view import RerunSink  # half a second to import: only who asks pays
+
+                replay = stack.enter_context(RerunSink(self.rrd))
+            bar = stack.enter_context(_progress())
+            task = bar.add_task(source.title, total=len(source))
+            for frame, result in run(source, params, detector, self.sensors):
+                if out is not None:
+                    write_line(out, result)
+                elif replay is None:
+                    bar.console.print(_sentence(result), highlight=False)
+                if replay is not None:
+                    replay.show(frame, result)
+                tally.add(result)
+                bar.advance(task)
+        print(tally.sentence(), file=sys.stderr)
+        return 0
+
+
+def _progress() -> Progress:
+    """On standard error, so that results can go to standard output."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    return Progress(*columns, console=Console(stderr=True), transient=True)
+
+
+def _sentence(result: Result) -> str:
+    """One frame in one line, for a person."""
+    lead = result.cipv
+    if lead is None:
+        return f"{result.frame}  no vehicle in path"
+    source = next(item.source for item in result.objects if item.id == lead.id)
+    closing = "" if lead.closing_speed_mps is None else f"  closing {lead.closing_speed_mps:+5.1f} m/s"
+    ttc = "" if lead.ttc_s is None or lead.ttc_s > 60 else f"  TTC {lead.ttc_s:.1f} s"
+    return f"{result.frame}  #{lead.id} {source:2} {lead.distance_m:6.2f} m{closing}{ttc}  {lead.reason}"
+
+
+@dataclass
+class _Tally:
+    """What to say at the end."""
+
+    frames: int = 0
+    with_lead: int = 0
+    degraded: int = 0
+    step_ms: float = 0.0
+    sources: Counter[str] = field(default_factory=Counter)
+
+    def add(self, result: Result) -> None:
+        self.frames += 1
+        self.with_lead += result.cipv is not None
+        self.degraded += bool(result.notes)
+        self.step_ms += result.timing_ms["total"]
+        self.sources.update(item.source for item in result.objects)
+
+    def sentence(self) -> str:
+        kinds = ", ".join(f"{self.sources[kind]} {kind}" for kind in ("VL", "V", "L"))
+        hurt = f"; {self.degraded} degraded frames" if self.degraded else ""
+        mean = self.step_ms / max(self.frames, 1)
+        return f"cipv: {self.frames} frames, {self.with_lead} with a CIPV; {kinds}; {mean:.1f} ms a step{hurt}"

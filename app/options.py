@@ -1,0 +1,79 @@
+"""Options that several commands share, and how they become parameters, a source and a detector."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+import yaml
+
+from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
+from pipeline.sources import open_source
+from pipeline.sources.base import Source
+from pipeline.vision.detector import Detector, DetectorMissing, open_detector
+
+
+@dataclass(frozen=True)
+class SourceOptions:
+    """Where frames come from."""
+
+    source: tyro.conf.Positional[str]
+    """What to open: astyx:<dir>, kitti:<dir> or sim:straight"""
+    rings: int = 16
+    """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
+
+    def open(self) -> Source:
+        """SourceError says in one sentence what is wrong."""
+        source = open_source(self.source, rings=self.rings)
+        for note in source.notes:
+            print(f"cipv: {note}", file=sys.stderr)
+        return source
+
+
+@dataclass(frozen=True)
+class LineOptions:
+    """How frames are processed."""
+
+    preset: Literal["default", "paper"] = "default"
+    """Parameters to start from"""
+    params: Path | None = None
+    """A preset file (YAML), as the page saves it"""
+    set: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME=VALUE")] = ()
+    """Change one parameter, e.g. cluster.z_weight=0.4 (repeatable; `cipv params` lists them)"""
+    detector: str | None = None
+    """Name or path of an ONNX detector; else the registered default, then $CIPV_DATA/models"""
+
+    def parameters(self) -> Params:
+        """preset, then --params, then each --set. ParamsError names the first that is wrong."""
+        params = preset(self.preset)
+        if self.params is not None:
+            params = from_yaml(self.params, params)
+        changes = {}
+        for change in self.set:
+            name, separator, value = change.partition("=")
+            if not separator:
+                raise ParamsError(f"--set {change}: expected NAME=VALUE")
+            changes[name] = yaml.safe_load(value)
+        return with_changes(params, changes)
+
+    def open_detector(self, source: Source) -> Detector | None:
+        """The detector, its input fitted to the source's pictures. A named one that is missing is an error; when none
+        is installed, a sentence says so and LiDAR goes on alone."""
+        try:
+            return open_detector(self.detector, picture_size(source))
+        except DetectorMissing as missing:
+            if self.detector is not None:
+                raise
+            print(f"cipv: {missing}", file=sys.stderr)
+            return None
+
+
+def picture_size(source: Source) -> tuple[int, int] | None:
+    """(width, height) of the source's pictures, from its first frame; null without picture and calibration."""
+    frame = source.frame(0)
+    if frame.picture is not None:
+        return frame.picture.bgr.shape[1], frame.picture.bgr.shape[0]
+    return (frame.camera.width, frame.camera.height) if frame.camera is not None else None

@@ -1,0 +1,125 @@
+"""Is the CIPV the right vehicle, and how far off is its distance? Judged frame by frame against labelled cuboids."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.geometry import closest_on_polygon
+from pipeline.sources.base import TruthObject
+from pipeline.types import VEHICLES, Result
+
+Verdict = Literal["correct", "none", "missed", "false", "wrong"]
+"""correct: the right vehicle · none: rightly nothing · missed: a lead, not found · false: a CIPV, no lead · wrong:
+a CIPV that is another object than the lead."""
+
+LABELLED_VEHICLES = VEHICLES | {"van", "tram", "trailer", "other vehicle", "motorcyclist"}
+"""Label names of the recordings that may be a lead, lower case."""
+
+
+@dataclass(frozen=True)
+class LeadRule:
+    """Which labelled vehicle is the lead, and when a CIPV is on it.
+
+    half_lane_m: a vehicle whose centre is nearer to the car's axis is in the lane. max_range_m: farther leads are not
+    asked for. lateral_slack_m: how far beside the label a CIPV may lie. range_slack: how far before or behind it, as a
+    share of its range, and never under 2 m.
+    """
+
+    half_lane_m: float = 1.5
+    max_range_m: float = 60.0
+    lateral_slack_m: float = 0.3
+    range_slack: float = 0.25
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One frame's verdict. Distances are horizontal ranges to the nearest face, metres; null where there is none."""
+
+    frame: str
+    verdict: Verdict
+    truth_m: float | None
+    distance_m: float | None
+    lateral_error_m: float | None
+
+    @property
+    def error_m(self) -> float | None:
+        """Estimated minus true distance, of the right vehicle only."""
+        if self.verdict != "correct" or self.truth_m is None or self.distance_m is None:
+            return None
+        return self.distance_m - self.truth_m
+
+
+def true_lead(truth: Iterable[TruthObject], rule: LeadRule) -> TruthObject | None:
+    """The labelled vehicle nearest in the lane, the lane taken as straight."""
+    ahead = [
+        item
+        for item in truth
+        if item.label.lower() in LABELLED_VEHICLES
+        and item.cuboid.center[0] > 0.0
+        and abs(item.cuboid.center[1]) < rule.half_lane_m
+        and nearest_face_m(item) <= rule.max_range_m
+    ]
+    return min(ahead, key=nearest_face_m, default=None)
+
+
+def nearest_face_m(item: TruthObject) -> float:
+    """Horizontal range from the ego origin to the nearest point of the labelled cuboid."""
+    return float(np.hypot(*closest_on_polygon(item.cuboid.footprint())))
+
+
+def judge(result: Result, truth: Iterable[TruthObject], rule: LeadRule) -> Judged:
+    """One frame's CIPV against its labels."""
+    lead = true_lead(truth, rule)
+    chosen = next((item for item in result.objects if result.cipv is not None and item.id == result.cipv.id), None)
+    in_reach = chosen is not None and chosen.distance_m is not None and chosen.distance_m <= rule.max_range_m
+    if lead is None:
+        distance = chosen.distance_m if chosen is not None and in_reach else None
+        return Judged(result.frame, "false" if in_reach else "none", None, distance, None)
+    truth_m = nearest_face_m(lead)
+    if chosen is None or chosen.distance_m is None or chosen.bev is None:
+        return Judged(result.frame, "missed", truth_m, None, None)
+    lateral = _lateral_error(chosen.bev, lead)
+    lengthwise = abs(chosen.distance_m - truth_m) <= max(2.0, rule.range_slack * truth_m)
+    on_it = lateral <= rule.lateral_slack_m and lengthwise
+    return Judged(result.frame, "correct" if on_it else "wrong", truth_m, chosen.distance_m, lateral)
+
+
+def _lateral_error(bev: tuple[tuple[float, float], ...], lead: TruthObject) -> float:
+    """How far the middle of the object's nearest face lies beside the label's side-to-side extent; 0 inside it."""
+    near_face = np.mean(sorted(bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)[:2], axis=0)
+    sides = lead.cuboid.footprint()[:, 1]
+    return float(max(sides.min() - near_face[1], near_face[1] - sides.max(), 0.0))
+
+
+@dataclass(frozen=True)
+class LeadScore:
+    """A drive's figures. errors are over correct frames: metres, and share of the true distance."""
+
+    frames: int
+    correct: int
+    missed: int
+    false: int
+    wrong: int
+    mean_error_m: float | None
+    max_error_m: float | None
+    mean_relative_error: float | None
+
+
+def score(judged: Iterable[Judged]) -> LeadScore:
+    """Sum up the frames."""
+    rows = list(judged)
+    pairs = [(abs(row.error_m), row.truth_m) for row in rows if row.error_m is not None and row.truth_m]
+    errors = [error for error, _ in pairs]
+    count = {verdict: sum(row.verdict == verdict for row in rows) for verdict in ("missed", "false", "wrong")}
+    return LeadScore(
+        frames=len(rows),
+        correct=sum(row.verdict in ("correct", "none") for row in rows),
+        **count,
+        mean_error_m=float(np.mean(errors)) if errors else None,
+        max_error_m=max(errors) if errors else None,
+        mean_relative_error=float(np.mean([error / true for error, true in pairs])) if pairs else None,
+    )

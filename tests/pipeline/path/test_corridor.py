@@ -1,0 +1,83 @@
+"""The corridor bends along the true arc, and offsets are measured from it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.params import PathParams
+from pipeline.path.corridor import arc, corridor, nearest_on_path, offset
+from pipeline.types import EgoState
+
+PARAMS = PathParams()
+
+
+def ego(speed_mps: float, yaw_rate_radps: float | None) -> EgoState:
+    return EgoState(0, speed_mps, yaw_rate_radps)
+
+
+def test_the_arc_is_not_twice_as_curved() -> None:
+    """20 m/s and 0.1 rad/s make a 200 m radius: 20 m along it the car is 1.00 m aside, not 2.00 m."""
+    path = corridor(ego(20.0, 0.1), PARAMS)
+    assert path.source == "yaw_rate"
+    assert path.center[20] == pytest.approx([200 * np.sin(0.1), 200 * (1 - np.cos(0.1))], abs=1e-9)
+    assert path.center[20, 1] == pytest.approx(1.0, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("state", "source"),
+    [
+        pytest.param(None, "straight", id="no ego state"),
+        pytest.param(ego(20.0, None), "straight", id="no yaw rate"),
+        pytest.param(ego(0.5, 0.3), "straight", id="too slow for the yaw rate to mean a curve"),
+        pytest.param(ego(20.0, 0.0), "yaw_rate", id="yaw rate says straight on"),
+    ],
+)
+def test_source_of_the_path(state: EgoState | None, source: str) -> None:
+    path = corridor(state, PARAMS)
+    assert path.source == source
+    assert np.allclose(path.center[:, 1], 0.0)
+    assert path.weights == {source: 1.0}
+
+
+def test_a_guess_is_less_sure_than_a_measurement() -> None:
+    guessed, measured = corridor(None, PARAMS), corridor(ego(20.0, 0.0), PARAMS)
+    assert guessed.sigma_m["60"] > measured.sigma_m["60"] > measured.sigma_m["10"] > 0.0
+
+
+def test_left_is_left() -> None:
+    path = corridor(ego(20.0, 0.1), PARAMS)
+    assert path.center[-1, 1] > 0
+    assert np.all(np.hypot(*(path.left - path.center).T) == pytest.approx(PARAMS.half_width_m))
+    assert path.left[0] == pytest.approx([0.0, PARAMS.half_width_m])
+    assert path.right[0] == pytest.approx([0.0, -PARAMS.half_width_m])
+
+
+@given(
+    curvature=st.floats(-0.02, 0.02),
+    s=st.floats(1.0, 70.0),
+    aside=st.floats(-5.0, 5.0),
+)
+def test_offset_of_a_point_set_beside_the_arc(curvature: float, s: float, aside: float) -> None:
+    """A point put ``aside`` metres from the arc at path length s is found there, within the chords' sagitta."""
+    path = corridor(ego(20.0, 20.0 * curvature), PARAMS)
+    point, heading = arc(curvature, np.array([s]))
+    normal = np.array([-np.sin(heading[0]), np.cos(heading[0])])
+    there = point + aside * normal
+    found, reached = nearest_on_path(path, there)
+    assert found[0] == pytest.approx(aside, abs=0.01)
+    assert reached[0] == pytest.approx(s, abs=0.1)
+
+
+def test_a_point_behind_has_negative_path_length() -> None:
+    path = corridor(None, PARAMS)
+    assert nearest_on_path(path, np.array([[-4.0, 1.0]]))[1][0] == pytest.approx(-4.0)
+    assert offset(path, np.array([[-4.0, 1.0]]))[0] == pytest.approx(1.0)
+
+
+def test_a_hairpin_does_not_lead_behind_the_car() -> None:
+    path = corridor(ego(3.0, 1.0), PARAMS)
+    assert path.center[:, 0].min() >= 0.0
+    assert np.all(np.diff(path.center[:, 1]) >= -1e-9)

@@ -1,0 +1,132 @@
+"""Fusion loses nothing and doubles nothing, joins what belongs together, and keeps its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.alignment import Alignment, Angular, project_cuboid
+from pipeline.fusion import Fusion, FusionState, fuse
+from pipeline.params import FusionParams
+from pipeline.types import Box, LidarTrack, VisionTrack
+from tests.pipeline.build import lidar_track, vision_track
+
+ALIGNMENT: Alignment = Angular(np.radians(0.06), np.radians(0.06), 640.0, 360.0)
+SIZE = (1280, 720)
+OPTIMAL, GREEDY = FusionParams(), FusionParams(assignment="greedy", min_iou=0.0, range_gate=False)
+
+
+def box_of(track: LidarTrack) -> Box:
+    box = project_cuboid(ALIGNMENT, track.obstacle.cuboid.corners(), *SIZE)
+    assert box is not None
+    return box
+
+
+def joined(
+    lidar: list[LidarTrack], vision: list[VisionTrack], params: FusionParams = OPTIMAL, state: FusionState | None = None
+) -> tuple[FusionState, Fusion]:
+    return fuse(state or FusionState(), tuple(lidar), tuple(vision), ALIGNMENT, SIZE, params)
+
+
+boxes = st.tuples(st.floats(0, 1200), st.floats(0, 650), st.floats(0, 300), st.floats(0, 300)).map(
+    lambda b: (b[0], b[1], min(b[0] + b[2], 1280.0), min(b[1] + b[3], 720.0))
+)
+places = st.tuples(st.floats(-10, 60), st.floats(-15, 15))
+
+
+@pytest.mark.parametrize("params", [OPTIMAL, GREEDY], ids=["optimal", "greedy"])
+@given(
+    seen=st.lists(st.tuples(boxes, st.none() | st.floats(3, 100)), max_size=8), hit=st.lists(places, max_size=8)
+)
+def test_every_track_lands_in_exactly_one_row(
+    params: FusionParams, seen: list[tuple[Box, float | None]], hit: list[tuple[float, float]]
+) -> None:
+    vision = [vision_track(i + 1, box, distance) for i, (box, distance) in enumerate(seen)]
+    # the first box is made to fit the first cuboid, so that pairs do happen
+    lidar = [lidar_track(j + 1, x, y) for j, (x, y) in enumerate(hit)]
+    if vision and lidar and project_cuboid(ALIGNMENT, lidar[0].obstacle.cuboid.corners(), *SIZE):
+        vision[0] = vision_track(1, box_of(lidar[0]), None)
+    _, result = joined(lidar, vision, params)
+    kinds = [item.source for item in result.objects]
+    assert kinds.count("V") + kinds.count("VL") == len(vision)
+    assert kinds.count("L") + kinds.count("VL") == len(lidar)
+    assert sorted(o.vision_track for o in result.objects if o.vision_track) == [v.id for v in vision]
+    assert sorted(o.lidar_track for o in result.objects if o.lidar_track) == [t.id for t in lidar]
+    assert len({item.id for item in result.objects}) == len(result.objects)
+
+
+def test_one_car_seen_by_both_is_one_row_with_the_lidars_place_and_the_cameras_name() -> None:
+    track = lidar_track(1, 20.0, 1.0, velocity=(-2.0, 0.0))
+    _, result = joined([track], [vision_track(1, box_of(track), 21.0)])
+    (item,) = result.objects
+    assert (item.source, item.label, item.distance_m) == ("VL", "car", pytest.approx(np.hypot(20.0, 1.0)))
+    assert item.velocity_mps == (-2.0, 0.0)
+    assert item.bbox == box_of(track)
+    assert result.vision_boxes[item.id] == box_of(track)
+
+
+def test_boxes_apart_stay_two_objects() -> None:
+    track = lidar_track(1, 20.0, 6.0)
+    _, result = joined([track], [vision_track(1, (900.0, 300.0, 1000.0, 400.0), 20.0)])
+    assert sorted(item.source for item in result.objects) == ["L", "V"]
+
+
+def test_a_far_car_over_the_roof_of_a_near_one_is_not_joined_with_it() -> None:
+    """Their boxes overlap in the picture, their ranges do not; the L row says which test kept them apart."""
+    near = lidar_track(1, 15.0)
+    x1, y1, x2, y2 = box_of(near)
+    far = vision_track(1, (x1 + 10, y1 - 5, x2 - 10, y2 - 10), 50.0, sigma_m=3.0)
+    _, result = joined([near], [far])
+    assert [item.source for item in result.objects] == ["L", "V"]
+    gate = next(g for g in result.objects[0].gates if g.name == "range_sigmas")
+    assert (gate.passed, gate.limit) == (False, OPTIMAL.range_gate_sigmas)
+    _, paper = joined([near], [far], GREEDY)
+    assert [item.source for item in paper.objects] == ["VL"]
+
+
+def test_optimal_assignment_beats_first_come_first_served() -> None:
+    """Two cars side by side, one box between: greedily it takes the better half and leaves the other car's box alone."""
+    left, right = lidar_track(1, 20.0, 1.1), lidar_track(2, 20.0, -1.1)
+    a, b = box_of(left), box_of(right)
+    shift = (b[0] - a[0]) * 0.45
+    between = vision_track(1, (a[0] + shift, a[1], a[2] + shift, a[3]))
+    on_left = vision_track(2, (a[0] - 5, a[1], a[2] - 5, a[3]))
+    _, greedy = joined([left, right], [between, on_left], GREEDY)
+    _, optimal = joined([left, right], [between, on_left], FusionParams(min_iou=0.05))
+    assert sorted(item.source for item in greedy.objects) == ["L", "V", "VL"]
+    assert sorted(item.source for item in optimal.objects) == ["VL", "VL"]
+
+
+def test_without_a_picture_every_track_keeps_its_row() -> None:
+    _, result = fuse(FusionState(), (lidar_track(1, 20.0),), (vision_track(1, (0, 0, 9, 9)),), ALIGNMENT, None, OPTIMAL)
+    assert sorted(item.source for item in result.objects) == ["L", "V"]
+
+
+def test_a_vision_object_without_distance_keeps_its_row_last() -> None:
+    _, result = joined([lidar_track(1, 50.0, -9.0)], [vision_track(1, (0, 0, 9, 9), None)])
+    assert [item.source for item in result.objects] == ["L", "V"]
+    assert result.objects[1].distance_m is None
+    assert result.objects[1].bev is None
+
+
+def test_an_object_keeps_its_number_from_v_to_vl_to_l() -> None:
+    track = lidar_track(7, 20.0)
+    seen = vision_track(4, box_of(track), 20.5)
+    state, first = joined([], [seen])
+    state, second = joined([track], [seen], state=state)
+    state, third = joined([track], [], state=state)
+    assert [f.objects[0].source for f in (first, second, third)] == ["V", "VL", "L"]
+    assert len({f.objects[0].id for f in (first, second, third)}) == 1
+
+
+def test_two_numbers_that_become_one_object_keep_the_older_and_part_again_without_a_clash() -> None:
+    track = lidar_track(1, 20.0)
+    apart = vision_track(1, (900.0, 300.0, 1000.0, 400.0), 20.0)
+    state, before = joined([track], [apart])
+    older = min(item.id for item in before.objects)
+    state, together = joined([track], [vision_track(1, box_of(track), 20.0)], state=state)
+    assert [item.id for item in together.objects] == [older]
+    _, after = joined([track], [apart], state=state)
+    assert len({item.id for item in after.objects}) == 2
