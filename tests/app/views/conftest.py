@@ -1,0 +1,135 @@
+"""A small frame and result of real types: a lead that both sensors see, a pole, a carried car and a far pedestrian."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.geometry import Cuboid
+from pipeline.types import (
+    GROUND,
+    UNCLUSTERED,
+    AccCommand,
+    CameraCalibration,
+    Cipv,
+    EgoState,
+    Frame,
+    FusedObject,
+    Layers,
+    LidarTrack,
+    Obstacle,
+    Path,
+    Picture,
+    Rejection,
+    Result,
+    SensorHealth,
+    Sweep,
+)
+
+T_NS = 1_700_000_000_000_000_000
+GROUND_M = -1.2
+LEAD = Cuboid((22.0, 0.2, -0.5), (4.2, 1.8, 1.4), 0.05)
+POLE = Cuboid((15.0, 6.0, 0.0), (0.4, 0.4, 2.4), 0.0)
+
+
+def _filled(cuboid: Cuboid, count: int, rng: np.random.Generator) -> np.ndarray:
+    inside = rng.uniform(-0.5, 0.5, (count, 3)) * cuboid.size + cuboid.center
+    return np.column_stack([inside, np.full(count, 80.0)]).astype(np.float32)
+
+
+def _cloud() -> tuple[np.ndarray, np.ndarray]:
+    """60 ground points, 40 of the lead (cluster 0), 12 of the pole (cluster 1), 5 loose ones."""
+    rng = np.random.default_rng(7)
+    ground = np.column_stack(
+        [rng.uniform(3, 40, 60), rng.uniform(-8, 8, 60), np.full(60, GROUND_M), np.full(60, 10.0)]
+    ).astype(np.float32)
+    loose = np.column_stack([rng.uniform(5, 30, 5), np.full(5, 12.0), np.full(5, 1.0), np.full(5, 5.0)])
+    parts = [ground, _filled(LEAD, 40, rng), _filled(POLE, 12, rng), loose.astype(np.float32)]
+    kinds = [GROUND, 0, 1, UNCLUSTERED]
+    return np.vstack(parts), np.repeat(kinds, [len(part) for part in parts]).astype(np.int32)
+
+
+def _object(number: int, source: str, **known: object) -> FusedObject:
+    unknown: dict[str, object] = dict.fromkeys(
+        "label score bbox bev cuboid closest_point distance_m distance_sigma_m velocity_mps lidar_track "
+        "vision_track".split()
+    )
+    fixed = {"id": number, "source": source, "carried": False, "hits": 4, "lidar_points": 0}
+    return FusedObject(**{**unknown, **fixed, **known})  # type: ignore[arg-type]
+
+
+def _corners(cuboid: Cuboid) -> tuple[tuple[float, float], ...]:
+    return tuple((float(x), float(y)) for x, y in cuboid.footprint())
+
+
+def make_frame(index: int = 0) -> Frame:
+    points, _ = _cloud()
+    bgr = np.full((120, 320, 3), (60, 90, 40), dtype=np.uint8)
+    cv2.rectangle(bgr, (140, 60), (180, 90), (30, 30, 200), -1)
+    t_ns = T_NS + index * 100_000_000
+    T_camera_ego = np.array([[0, -1, 0, 0], [0, 0, -1, 0.3], [1, 0, 0, 0.2], [0, 0, 0, 1]], dtype=np.float64)
+    K = np.array([[200.0, 0, 160], [0, 200, 60], [0, 0, 1]])
+    return Frame(
+        index=index,
+        name=f"{index:06d}",
+        t_ns=t_ns,
+        sweep=Sweep(t_ns, points, np.zeros(len(points), dtype=np.uint8), 16),
+        picture=Picture(t_ns, bgr, cv2.imencode(".jpg", bgr)[1].tobytes()),
+        camera=CameraCalibration(K, np.zeros(0), T_camera_ego, 320, 120),
+        ego=EgoState(t_ns, 15.0, 0.0),
+    )
+
+
+def make_result(index: int = 0) -> Result:
+    points, kind = _cloud()
+    lead = _object(
+        7, "VL", label="car", score=0.9, bbox=(140.0, 55.0, 182.0, 88.0), bev=_corners(LEAD), cuboid=LEAD,
+        closest_point=(19.9, 0.2, -0.5), distance_m=19.9, distance_sigma_m=0.2, velocity_mps=(-2.5, 0.0),
+        lidar_points=40, lidar_track=3, vision_track=1, in_path=True, in_path_probability=0.98, ttc_s=7.96,
+    )  # fmt: skip
+    pole = _object(
+        8, "L", bev=_corners(POLE), cuboid=POLE, closest_point=(14.8, 5.8, 0.0), distance_m=15.9, distance_sigma_m=0.2,
+        lidar_points=12, lidar_track=4,
+    )  # fmt: skip
+    truck = _object(
+        9, "V", label="truck", score=0.6, bbox=(10.0, 20.0, 60.0, 70.0), distance_m=45.0, distance_sigma_m=4.0,
+        bev=((47.0, 9.0), (47.0, 6.6), (45.0, 6.6), (45.0, 9.0)), closest_point=(45.0, 7.8, -1.2), vision_track=2,
+        carried=True,
+    )  # fmt: skip
+    person = _object(10, "V", label="person", score=0.4, bbox=(300.0, 40.0, 310.0, 70.0), vision_track=3)
+    x = np.linspace(0.0, 60.0, 31)
+    center = np.column_stack([x, 0.002 * x**2])
+    spread = (0.1, 0.1, 0.1)
+    obstacles = (
+        Obstacle(0, LEAD, (19.9, 0.2, -0.5), 40, 5.0, spread),
+        Obstacle(1, POLE, (14.8, 5.8, 0.0), 12, 70.0, spread),
+    )
+    tracks = tuple(LidarTrack(3 + i, each, (-2.5, 0.0), 4, 0, False) for i, each in enumerate(obstacles))
+    return Result(
+        frame=f"{index:06d}",
+        t_ns=T_NS + index * 100_000_000,
+        sensors=SensorHealth(0.0, len(points), 0.0, 0.0, 0.0),
+        ego=EgoState(T_NS, 15.0, 0.0),
+        objects=(lead, pole, truck, person),
+        path=Path("yaw_rate", center, center + np.array([0, 1.5]), center - np.array([0, 1.5]), 1.5, {}, {}),
+        cipv=Cipv(7, 19.9, 2.5, 7.96, "nearest in path: 19.9 m"),
+        rejected=(Rejection(8, "out of path by 4.1 m"),),
+        acc=AccCommand("follow", 13.0, -0.5, 0.0, 0.1, "gap below the desired one"),
+        notes=(),
+        timing_ms={"ground": 0.1, "cluster": 0.9, "total": 3.0},
+        layers=Layers(
+            points, kind, obstacles, tracks, (),
+            {7: (139.0, 53.0, 183.0, 90.0)}, {7: (140.0, 55.0, 182.0, 88.0), 10: (300.0, 40.0, 310.0, 70.0)},
+        ),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def frame() -> Frame:
+    return make_frame()
+
+
+@pytest.fixture
+def result() -> Result:
+    return make_result()
