@@ -1,0 +1,32 @@
+"""Recordings that the page can offer without a path being typed: the simulator's scenarios and known data folders."""
+
+from __future__ import annotations
+
+import os
+from importlib import resources
+from pathlib import Path
+
+_FOLDERS = (("lidar_vlp16", "astyx"), ("velodyne", "kitti"), ("velodyne_points", "kitti"))
+
+
+def catalog() -> list[tuple[str, str]]:
+    """(uri, title) pairs: scenarios, then the recordings right below ``CIPV_DATA`` and ``sessions``."""
+    return [*_scenarios(), *_recordings()]
+
+
+def _scenarios() -> list[tuple[str, str]]:
+    folder = resources.files("pipeline.simulation") / "scenarios"
+    names = sorted(file.name.removesuffix(".yaml") for file in folder.iterdir() if file.name.endswith(".yaml"))
+    return [(f"sim:{name}", f"Simulation · {name.replace('_', ' ')}") for name in names]
+
+
+def _recordings() -> list[tuple[str, str]]:
+    roots = [Path(os.environ["CIPV_DATA"])] if os.environ.get("CIPV_DATA") else []
+    roots.append(Path("sessions"))
+    found = []
+    for root in roots:
+        for folder in sorted(root.iterdir()) if root.is_dir() else ():
+            scheme = next((scheme for mark, scheme in _FOLDERS if (folder / mark).is_dir()), None)
+            if scheme is not None:
+                found.append((f"{scheme}:{folder}", f"{scheme} · {folder.name}"))
+    return found

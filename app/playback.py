@@ -1,0 +1,48 @@
+"""Real-time playback: which frame is due now. Pure arithmetic; the engine brings the clock."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.types import F64
+
+LONGEST_GAP_S = 1.0
+"""A recording made of several runs has gaps of minutes; nobody wants to watch those."""
+
+
+def timeline_s(t_ns: Sequence[int], rate_hz: float) -> F64:
+    """(N,) seconds from the first frame at which each frame is shown.
+
+    The frames' own stamps, except that a gap over ``LONGEST_GAP_S`` and a step back in time take one nominal period.
+    """
+    steps: F64 = np.diff(np.asarray(t_ns, dtype=np.int64)).astype(np.float64) / 1e9
+    period = 1.0 / rate_hz if rate_hz > 0 else 0.1
+    steps[(steps <= 0) | (steps > LONGEST_GAP_S)] = period
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+@dataclass(frozen=True)
+class PlaybackClock:
+    """Recording time runs from an anchor at ``speed`` times wall time."""
+
+    timeline_s: F64
+    anchor_wall_s: float
+    anchor_media_s: float
+    speed: float
+
+    def due(self, now_s: float) -> int:
+        """The newest frame whose time has come."""
+        media_s = self.anchor_media_s + (now_s - self.anchor_wall_s) * self.speed
+        return int(np.searchsorted(self.timeline_s, media_s + 1e-9, side="right")) - 1
+
+    def wait_s(self, index: int, now_s: float) -> float:
+        """Wall seconds until the frame after ``index`` is due; after the last frame, one more of its period."""
+        times = self.timeline_s
+        if index + 1 < len(times):
+            next_s = float(times[index + 1])
+        else:
+            next_s = float(times[-1] + (times[-1] - times[-2] if len(times) > 1 else LONGEST_GAP_S))
+        return max(0.0, (next_s - self.anchor_media_s) / self.speed - (now_s - self.anchor_wall_s))

@@ -1,0 +1,137 @@
+"""/api/params: what can be tuned, its values, and changing them."""
+
+from __future__ import annotations
+
+from typing import Any, get_args, get_origin
+
+import numpy as np
+from fastapi import APIRouter, HTTPException, Response
+from pydantic import BaseModel, Field
+from pydantic.fields import FieldInfo
+
+from app.engine import Engine
+from pipeline.alignment import angular_from_calibration
+from pipeline.params import PRESETS, Params, ParamsError, preset, to_yaml, with_changes
+from pipeline.types import CameraCalibration
+
+
+class Changes(BaseModel):
+    """Dotted names with their new values; null takes the recording's calibration where the parameter permits it."""
+
+    changes: dict[str, Any] = Field(min_length=1, examples=[{"cluster.z_weight": 0.4}])
+
+
+class PresetChoice(BaseModel):
+    name: str = Field(examples=list(PRESETS))
+
+
+def params_router(engine: Engine) -> APIRouter:
+    """Routes over the engine's parameters."""
+    router = APIRouter(prefix="/api", tags=["parameters"])
+
+    @router.get("/params")
+    def read() -> dict[str, Any]:
+        """Sections with every parameter's bounds, step, unit and help; values; what null means now."""
+        return _params_json(engine)
+
+    @router.patch("/params")
+    def change(body: Changes) -> dict[str, Any]:
+        """Change some parameters. The shown frame is run again at once. 422 with one sentence for a bad value."""
+        try:
+            engine.control.set_params(with_changes(engine.control.peek().params, body.changes))
+        except ParamsError as error:
+            raise HTTPException(422, str(error)) from None
+        return _params_json(engine)
+
+    @router.post("/params/preset")
+    def choose_preset(body: PresetChoice) -> dict[str, Any]:
+        """Replace every parameter by a preset's."""
+        try:
+            engine.control.set_params(preset(body.name), body.name)
+        except ParamsError as error:
+            raise HTTPException(422, str(error)) from None
+        return _params_json(engine)
+
+    @router.get("/params.yaml", response_class=Response)
+    def download() -> Response:
+        """The values as a file for `cipv run --params`."""
+        headers = {"content-disposition": 'attachment; filename="cipv-params.yaml"'}
+        return Response(to_yaml(engine.control.peek().params), media_type="application/yaml", headers=headers)
+
+    return router
+
+
+def describe() -> list[dict[str, Any]]:
+    """Every section: name, help and its parameters, in the order in which they are declared."""
+    return [
+        {
+            "name": name,
+            "help": _help(field),
+            "params": [_describe_one(key, inner) for key, inner in _section_fields(field).items()],
+        }
+        for name, field in Params.model_fields.items()
+    ]
+
+
+def effective(camera: CameraCalibration | None) -> dict[str, float]:
+    """What a parameter that is null stands for, from the shown frame's calibration."""
+    if camera is None:
+        return {}
+    model = angular_from_calibration(camera)
+    return {
+        "alignment.h_res_deg": round(float(np.degrees(model.h_res_rad)), 5),
+        "alignment.v_res_deg": round(float(np.degrees(model.v_res_rad)), 5),
+        "alignment.cx_px": round(model.cx, 1),
+        "alignment.cy_px": round(model.cy, 1),
+    }
+
+
+def _params_json(engine: Engine) -> dict[str, Any]:
+    wish, tick = engine.control.peek(), engine.snapshot.tick
+    return {
+        "preset": wish.preset,
+        "presets": list(PRESETS),
+        "revision": wish.params_revision,
+        "sections": describe(),
+        "values": flat(wish.params),
+        "base": flat(preset(wish.preset)),
+        "effective": effective(tick.frame.camera if tick else None),
+    }
+
+
+def flat(params: Params) -> dict[str, Any]:
+    """``{"cluster.z_weight": 0.4, …}`` in the order in which they are declared."""
+    return {
+        f"{section}.{key}": value for section, values in params.model_dump().items() for key, value in values.items()
+    }
+
+
+def _section_fields(field: FieldInfo) -> dict[str, FieldInfo]:
+    assert isinstance(field.annotation, type)
+    assert issubclass(field.annotation, BaseModel)
+    return field.annotation.model_fields
+
+
+def _help(field: FieldInfo) -> str:
+    return " ".join((getattr(field.annotation, "__doc__", None) or "").split())
+
+
+def _describe_one(key: str, field: FieldInfo) -> dict[str, Any]:
+    """One parameter: its kind is number, integer, boolean or choice."""
+    allowed = get_args(field.annotation) if get_origin(field.annotation) else (field.annotation,)
+    kinds = [kind for kind in allowed if kind is not type(None)]
+    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+    described: dict[str, Any] = {"key": key, "help": field.description or "", "nullable": type(None) in allowed}
+    if kinds[0] is bool:
+        return {**described, "kind": "boolean"}
+    if isinstance(kinds[0], str):
+        return {**described, "kind": "choice", "choices": kinds}
+    bounds = {name: getattr(item, name) for item in field.metadata for name in ("ge", "le") if hasattr(item, name)}
+    return {
+        **described,
+        "kind": "integer" if kinds[0] is int else "number",
+        "min": bounds.get("ge"),
+        "max": bounds.get("le"),
+        "step": extra.get("step"),
+        "unit": extra.get("unit", ""),
+    }

@@ -1,0 +1,155 @@
+"""The one web server: page, API, stream and 3D view on one port."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import socket
+import sys
+from collections.abc import AsyncIterator, Callable, Iterable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response
+from fastapi.staticfiles import StaticFiles
+
+from app.access import Access, Guard
+from app.engine import Engine
+from app.routes.params import params_router
+from app.routes.playback import playback_router
+from app.stream import Stream
+from app.views.colors import palette_css
+from app.views.viser_proxy import viser_router
+
+STATIC = Path(__file__).resolve().parent.parent / "static"
+DEFAULT_PORT = 8420
+_PORTS_TO_TRY = 20
+
+
+class PortTaken(Exception):
+    """The wanted address cannot be listened on; the text says which and what to do."""
+
+
+def create_app(
+    engine: Engine, viser_port: Callable[[], int | None] = lambda: None, hosts: Iterable[str] = ()
+) -> FastAPI:
+    """The application over a running engine. ``hosts``: names other than loopback it may be called by."""
+    access = Access(hosts)
+    stream = Stream()
+
+    @asynccontextmanager
+    async def listening(_: FastAPI) -> AsyncIterator[None]:
+        stream.publish(engine.snapshot)
+        end = engine.listen(stream.publish)
+        yield
+        end()
+
+    app = FastAPI(title="CIPV Studio", version="1", docs_url=None, redoc_url=None, lifespan=listening)
+    app.add_middleware(Guard, access=access)
+    app.add_exception_handler(RequestValidationError, _one_sentence)
+    app.include_router(playback_router(engine, stream))
+    app.include_router(params_router(engine))
+    app.include_router(viser_router(viser_port, access.allowed))
+    app.add_api_route("/palette.css", _palette, include_in_schema=False)
+    app.mount("/", _Pages(directory=STATIC, html=True), name="pages")
+    return app
+
+
+def listen_socket(host: str, port: int, *, strict: bool = False) -> socket.socket:
+    """A bound socket on ``port`` or, unless ``strict``, the next free one above it. PortTaken when there is none."""
+    candidates = [port] if strict or port == 0 else range(port, min(port + _PORTS_TO_TRY, 65536))
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    for candidate in candidates:
+        bound = socket.socket(family, socket.SOCK_STREAM)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            bound.bind((host, candidate))
+        except OSError as error:
+            bound.close()
+            if error.errno == errno.EADDRINUSE:
+                continue
+            raise PortTaken(f"cannot listen on {host}:{candidate}: {error.strerror}") from None
+        return bound
+    tried = f"port {port}" if len(candidates) == 1 else f"ports {candidates[0]}–{candidates[-1]}"
+    raise PortTaken(f"{tried} on {host} taken; choose another with --port")
+
+
+def serve(
+    engine: Engine,
+    *,
+    host: str = "127.0.0.1",
+    port: int = DEFAULT_PORT,
+    strict_port: bool = False,
+    hosts: Iterable[str] = (),
+    viser_port: Callable[[], int | None] = lambda: None,
+    on_ready: Callable[[str], None] | None = None,
+) -> None:
+    """Serve until Ctrl-C. Starts and stops the engine; prints the page's address on a line of its own when it answers.
+
+    PortTaken before anything is started.
+    """
+    bound = listen_socket(host, port, strict=strict_port)
+    number = bound.getsockname()[1]
+    if port not in (0, number):
+        print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
+    named = f"[{host}]" if ":" in host else host
+    app = create_app(engine, viser_port, (*hosts, host))
+    config = uvicorn.Config(
+        app, log_level="warning", ws_per_message_deflate=False, timeout_graceful_shutdown=1, access_log=False
+    )
+    engine.start()
+    try:
+        _Server(config, f"http://{named}:{number}", on_ready).run(sockets=[bound])
+    except KeyboardInterrupt:
+        pass  # uvicorn raises the signal again once it has shut down
+    finally:
+        engine.stop()
+        bound.close()
+
+
+class _Server(uvicorn.Server):
+    """Says where it is as soon as it answers."""
+
+    def __init__(self, config: uvicorn.Config, address: str, on_ready: Callable[[str], None] | None) -> None:
+        super().__init__(config)
+        self._address = address
+        self._on_ready = on_ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started:
+            print(self._address, flush=True)
+            if self._on_ready is not None:
+                await asyncio.to_thread(self._on_ready, self._address)
+
+
+class _Pages(StaticFiles):
+    """Static files that the browser always asks about again, so that an update is never half old."""
+
+    def file_response(self, *args: Any, **kwargs: Any) -> Response:
+        response = super().file_response(*args, **kwargs)
+        response.headers["cache-control"] = "no-cache"
+        return response
+
+
+def _palette() -> Response:
+    """The palette that all views share, as CSS custom properties for either theme."""
+    light = palette_css("light")
+    text = (
+        f":root {{\n{palette_css('dark')}\n}}\n"
+        f"@media (prefers-color-scheme: light) {{ :root:not([data-theme=dark]) {{\n{light}\n}} }}\n"
+        f":root[data-theme=light] {{\n{light}\n}}\n"
+    )
+    return Response(text, media_type="text/css", headers={"cache-control": "no-cache"})
+
+
+async def _one_sentence(_: Request, error: Exception) -> JSONResponse:
+    """422 with the first complaint: where, and what is wrong there."""
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    place = ".".join(str(part) for part in first["loc"] if part != "body")
+    return JSONResponse({"detail": f"{place}: {first['msg']}" if place else first["msg"]}, status_code=422)

@@ -1,0 +1,139 @@
+"""Every browser gets the newest message and never an old one.
+
+Each client has one place for a frame and one for a state. A newer message replaces an older one that was not sent yet,
+so a slow client skips frames and hurts nobody; one that joins late gets the current frame at once.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import threading
+import time
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from app.encode import Encoder
+from app.snapshot import Snapshot
+
+
+class Slot:
+    """The newest unsent messages of one client, by kind. Lives on the server's event loop."""
+
+    def __init__(self) -> None:
+        self._unsent: dict[str, str | bytes] = {}
+        self._newest: dict[str, int] = {}
+        self._filled = asyncio.Event()
+
+    def put(self, kind: str, message: str | bytes, order: int = 0) -> None:
+        """Replace what is unsent of this kind; a message older than one already put is ignored."""
+        if order < self._newest.get(kind, order):
+            return
+        self._newest[kind] = order
+        self._unsent[kind] = message
+        self._filled.set()
+
+    async def take(self) -> list[str | bytes]:
+        """Everything unsent, as soon as there is anything."""
+        await self._filled.wait()
+        self._filled.clear()
+        messages = list(self._unsent.values())
+        self._unsent.clear()
+        return messages
+
+
+class Stream:
+    """Between the engine's thread, which publishes, and the clients' slots on the event loop."""
+
+    def __init__(self) -> None:
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._slots: list[Slot] = []
+        self._encoder = Encoder()
+        self._lock = threading.Lock()
+        self._frame: tuple[int, bytes | None] = (-1, None)
+        self._snapshot: Snapshot | None = None
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Called by the engine. Encodes only when somebody watches, and a result only once."""
+        self._snapshot = snapshot
+        loop = self._loop
+        if loop is None or loop.is_closed() or not self._slots:
+            return
+        is_new = snapshot.sequence > self._frame[0]
+        sequence, frame = self._encoded(snapshot) if is_new else (0, None)
+        try:
+            loop.call_soon_threadsafe(self._distribute, state_message(snapshot), frame, sequence)
+        except RuntimeError:  # the server closed its loop in between
+            return
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Feed one client until it leaves. It may send ``{"ping": t}`` and gets ``t`` back with the server's clock."""
+        await socket.accept()
+        self._loop = asyncio.get_running_loop()
+        slot = Slot()
+        self._slots.append(slot)
+        try:
+            if self._snapshot is not None:
+                slot.put("state", state_message(self._snapshot))
+                sequence, frame = await asyncio.to_thread(self._encoded, self._snapshot)
+                if frame is not None:
+                    slot.put("frame", frame, sequence)
+            async with asyncio.TaskGroup() as both:
+                sender = both.create_task(_send(socket, slot))
+                await _receive(socket, slot)
+                sender.cancel()
+        except* (WebSocketDisconnect, RuntimeError):
+            pass  # the client left while something was being sent to it
+        finally:
+            self._slots.remove(slot)
+
+    def _encoded(self, snapshot: Snapshot) -> tuple[int, bytes | None]:
+        """The message of this or a newer snapshot, and its sequence."""
+        with self._lock:
+            if self._frame[0] < snapshot.sequence and snapshot.tick is not None:
+                self._frame = (snapshot.sequence, self._encoder.message(snapshot))
+            return self._frame
+
+    def _distribute(self, state: str, frame: bytes | None, sequence: int) -> None:
+        for slot in self._slots:
+            slot.put("state", state)
+            if frame is not None:
+                slot.put("frame", frame, sequence)
+
+
+def state_message(snapshot: Snapshot) -> str:
+    return _dump({"type": "state", "state": snapshot.state_json()})
+
+
+async def _send(socket: WebSocket, slot: Slot) -> None:
+    while True:
+        for message in await slot.take():
+            if isinstance(message, bytes):
+                await socket.send_bytes(message)
+            else:
+                await socket.send_text(message)
+
+
+async def _receive(socket: WebSocket, slot: Slot) -> None:
+    """Answer pings until the client leaves; what is no ping is ignored."""
+    while True:
+        message = await socket.receive()
+        if message["type"] == "websocket.disconnect":
+            return
+        sent = _ping_of(message.get("text"))
+        if sent is not None:
+            slot.put("pong", _dump({"type": "pong", "ping": sent, "server_unix_ms": time.time() * 1e3}))
+
+
+def _ping_of(text: str | None) -> float | None:
+    try:
+        value = json.loads(text or "null")
+    except ValueError:
+        return None
+    ping = value.get("ping") if isinstance(value, dict) else None
+    return float(ping) if isinstance(ping, int | float) and not isinstance(ping, bool) else None
+
+
+def _dump(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
