@@ -45,6 +45,9 @@ class GroundParams(Section):
     seed_height_m: float = _slider(0.6, 0.05, 2.0, 0.05, "m", "Th_seeds: height above the lowest points of a seed")
     distance_m: float = _slider(0.3, 0.02, 1.0, 0.01, "m", "Th_dist: a point this near the plane is ground")
     max_slope_deg: float = _slider(10.0, 1.0, 30.0, 0.5, "°", "A plane steeper than this falls back to its neighbour")
+    fit_range_m: float = _slider(50.0, 10.0, 100.0, 5.0, "m", "Planes are fitted to points this far ahead and behind")
+    fit_half_width_m: float = _slider(10.0, 2.0, 30.0, 0.5, "m", "Planes are fitted to points this far to either side")
+    min_range_m: float = _slider(2.0, 0.0, 5.0, 0.1, "m", "Returns nearer than this come from the ego vehicle itself")
 
 
 class ClusterParams(Section):
@@ -89,6 +92,9 @@ class DetectionParams(Section):
 
     min_score: float = _slider(0.3, 0.05, 0.95, 0.01, "", "Boxes scored lower are dropped")
     nms_iou: float = _slider(0.55, 0.1, 0.95, 0.01, "", "Of two boxes overlapping more, the lower score is dropped")
+    car_prior: float = _slider(
+        1.5, 1.0, 5.0, 0.1, "", "A vehicle is a car unless another class scores this many times more"
+    )
 
 
 class DistanceParams(Section):
@@ -109,9 +115,13 @@ class DistanceParams(Section):
     )
     depth_along_axis: bool = _choice(True, "The law gives depth along the optical axis; range follows from the bearing")
     per_class: bool = _choice(True, "Trucks, buses and motorcycles have laws of their own; off: cars only, as in print")
+    truck_ratio: float = _slider(1.6, 0.5, 4.0, 0.05, "", "Height of a truck, in cars")
+    bus_ratio: float = _slider(2.0, 0.5, 4.0, 0.05, "", "Height of a bus, in cars")
+    motorcycle_ratio: float = _slider(0.75, 0.3, 4.0, 0.05, "", "Height of a motorcycle without its rider, in cars")
     binning: bool = _choice(False, "Round estimates to bins of 10 m between 5 and 60 m, as in print")
     max_m: float = _slider(120.0, 20.0, 200.0, 1.0, "m", "Estimates beyond this are discarded (print: 60)")
     height_sigma_px: float = _slider(2.0, 0.2, 20.0, 0.1, "px", "Noise of a box's height: it sets the distance's sigma")
+    size_spread: float = _slider(0.1, 0.0, 0.5, 0.01, "", "How much real heights within a class differ, as a share")
 
 
 class VisionTrackingParams(Section):
@@ -183,7 +193,7 @@ class AccParams(Section):
     min_gap_m: float = _slider(5.0, 1.0, 20.0, 0.5, "m", "d_min: gap at standstill")
     time_gap_s: float = _slider(1.8, 0.8, 4.0, 0.1, "s", "d_desired = d_min + time gap × speed")
     ttc_limit_s: float = _slider(2.5, 0.5, 10.0, 0.1, "s", "Any object closing in faster than this is braked for")
-    kp: float = _slider(0.5, 0.0, 5.0, 0.05, "1/s", "PID: proportional gain")
+    kp: float = _slider(2.0, 0.0, 5.0, 0.05, "1/s", "PID: proportional gain")
     ki: float = _slider(0.05, 0.0, 2.0, 0.01, "1/s²", "PID: integral gain")
     kd: float = _slider(0.0, 0.0, 2.0, 0.01, "", "PID: derivative gain")
     max_accel_mps2: float = _slider(2.0, 0.5, 5.0, 0.1, "m/s²", "Accelerator pedal at 1")

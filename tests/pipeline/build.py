@@ -14,7 +14,12 @@ def cuboid(x: float, y: float, length: float = 4.0, width: float = 1.8, height: 
 
 
 def lidar_track(
-    track_id: int, x: float, y: float = 0.0, velocity: tuple[float, float] | None = (0.0, 0.0), hits: int = 5, **size: float
+    track_id: int,
+    x: float,
+    y: float = 0.0,
+    velocity: tuple[float, float] | None = (0.0, 0.0),
+    hits: int = 5,
+    **size: float,
 ) -> LidarTrack:
     obstacle = Obstacle(track_id - 1, cuboid(x, y, **size), (x, y, 0.0), 50, 10.0, (0.5, 0.5, 0.3))
     return LidarTrack(track_id, obstacle, velocity, hits, 0, False)

@@ -1,0 +1,108 @@
+"""Who is the closest in-path vehicle, and the reason for each one that is not."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.cipv import choose
+from pipeline.params import CipvParams, PathParams
+from pipeline.path.corridor import corridor
+from pipeline.types import Cipv, EgoState, FusedObject
+from tests.pipeline.build import fused
+
+PARAMS = CipvParams(confirm_hits=3, hysteresis_m=0.3)
+PATH = corridor(None, PathParams(half_width_m=1.5))
+
+
+def decide(*objects: FusedObject, last: int | None = None) -> tuple[Cipv | None, dict[int, str]]:
+    _, lead, rejected = choose(objects, PATH, last, PARAMS)
+    return lead, {row.id: row.reason for row in rejected}
+
+
+def test_the_nearest_in_path_leads_and_every_other_says_why_not() -> None:
+    lead, why_not = decide(fused(1, 40.0), fused(2, 25.0, 0.4), fused(3, 12.0, 3.5), fused(4, 12.0, -3.2))
+    assert lead is not None
+    assert lead.id == 2
+    assert lead.distance_m == pytest.approx(25.0, abs=0.01)
+    assert lead.reason == "car seen by both sensors, nearest of 2 in path, 0.4 m left of its centre"
+    assert why_not == {1: "behind #2", 3: "out of path by 2.0 m", 4: "out of path by 1.7 m"}
+
+
+@pytest.mark.parametrize(
+    ("item", "reason"),
+    [
+        pytest.param(fused(1, 20.0, label="person"), "class person", id="a person is no vehicle"),
+        pytest.param(fused(1, 20.0, label="bicycle"), "class bicycle", id="nor is a bicycle"),
+        pytest.param(fused(1, None, source="V"), "distance not known", id="box without a distance"),
+        pytest.param(fused(1, 20.0, source="V", hits=2), "seen 2 of 3 times", id="camera alone, not confirmed"),
+        pytest.param(fused(1, 20.0, source="L", hits=1), "seen 1 of 3 times", id="LiDAR alone, not confirmed"),
+        pytest.param(fused(1, 20.0, source="L", width=0.3, length=0.2), "only 0.3 m across", id="a post is not a rear"),
+        pytest.param(fused(1, 20.0, source="L", height=0.2), "only 0.2 m high", id="a kerb is not a rear"),
+        pytest.param(fused(1, 20.0, source="L", length=40.0), "40 m long: not a vehicle", id="a wall"),
+        pytest.param(fused(1, 20.0, 3.0), "out of path by 1.5 m", id="next lane"),
+        pytest.param(fused(1, -6.0, 0.0), "beside or behind the bumper", id="behind us"),
+    ],
+)
+def test_why_not(item: FusedObject, reason: str) -> None:
+    lead, why_not = decide(item)
+    assert lead is None
+    assert why_not == {1: reason}
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        pytest.param(fused(1, 20.0, hits=1), id="both sensors: from its first frame"),
+        pytest.param(fused(1, 20.0, source="V", hits=3), id="camera alone, confirmed"),
+        pytest.param(fused(1, 20.0, source="L", hits=3), id="a nameless obstacle as large as a car"),
+        pytest.param(fused(1, 20.0, label="truck"), id="a truck"),
+        pytest.param(fused(1, 20.0, label="motorcycle", width=0.8, length=2.0), id="a motorcycle, however narrow"),
+    ],
+)
+def test_who_may_lead(item: FusedObject) -> None:
+    lead, _ = decide(item)
+    assert lead is not None
+    assert lead.id == 1
+
+
+def test_the_gate_that_stopped_it_carries_number_and_limit() -> None:
+    (item,), lead, _ = choose((fused(1, 20.0, 3.0),), PATH, None, PARAMS)
+    assert lead is None
+    failed = [gate for gate in item.gates if not gate.passed]
+    assert [(gate.name, gate.value, gate.limit) for gate in failed] == [("path_offset", pytest.approx(3.0), 1.5)]
+
+
+def test_hysteresis_holds_the_lead_at_the_edge_but_takes_in_nobody_new() -> None:
+    at_edge = fused(1, 20.0, 1.7)
+    assert decide(at_edge, last=None)[0] is None
+    held, _ = decide(at_edge, last=1)
+    assert held is not None
+    assert decide(fused(1, 20.0, 1.9), last=1)[0] is None
+
+
+def test_in_path_is_relative_to_a_curved_path() -> None:
+    """On a 200 m left arc the car 40 m ahead stands 4 m to the left; the one straight ahead is in the next lane."""
+    bent = corridor(EgoState(0, 20.0, 0.1), PathParams(half_width_m=1.5))
+    (on_arc, straight), lead, _ = choose((fused(1, 40.0, 4.0), fused(2, 40.0, 0.0)), bent, None, PARAMS)
+    assert lead is not None
+    assert lead.id == 1
+    assert on_arc.in_path
+    assert not straight.in_path
+    assert straight.path_offset_m == pytest.approx(-4.0, abs=0.2)
+    assert on_arc.in_path_probability > 0.95 > 0.05 > straight.in_path_probability  # type: ignore[operator]
+
+
+@given(st.lists(st.tuples(st.floats(1, 90), st.floats(-6, 6), st.sampled_from(["V", "L", "VL"]), st.integers(1, 5))))
+def test_everyone_is_either_the_lead_or_has_a_reason(
+    things: list[tuple[float, float, str, int]],
+) -> None:
+    objects = [fused(i + 1, x, y, source=kind, hits=hits) for i, (x, y, kind, hits) in enumerate(things)]  # type: ignore[arg-type]
+    lead, why_not = decide(*objects)
+    assert set(why_not) | ({lead.id} if lead else set()) == {item.id for item in objects}
+    assert len(why_not) + (lead is not None) == len(objects)
+    assert all(why_not.values())
+    if lead is not None:
+        rivals = [o.distance_m for o in objects if why_not.get(o.id, "").startswith("behind #")]
+        assert all(distance >= lead.distance_m for distance in rivals if distance is not None)
