@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path as FilePath
 from types import TracebackType
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import cv2
 import numpy as np
@@ -23,8 +23,7 @@ from pipeline.params import AlignmentParams
 from pipeline.types import Box, Frame, FusedObject, Path, Picture, Result
 
 APPLICATION = "CIPV Studio"
-_THIN, _THICK = rr.Radius.ui_points(1.0), rr.Radius.ui_points(2.5)
-_POINT_3D, _POINT_2D = rr.Radius.ui_points(1.5), rr.Radius.ui_points(1.2)
+_THIN_PX, _THICK_PX, _POINT_PX = 1.0, 2.5, 1.4
 _RING_STEP_M = 20.0
 _JPEG_QUALITY = 80
 _ARROW_S = 1.0
@@ -44,7 +43,9 @@ class RerunSink:
     file cannot be made. Use it in a ``with`` block: a replay is complete once closed. One thread at a time.
     """
 
-    def __init__(self, target: str | FilePath | BinaryIO, title: str, params: AlignmentParams) -> None:
+    def __init__(
+        self, target: str | FilePath | BinaryIO, title: str = APPLICATION, params: AlignmentParams = AlignmentParams()
+    ) -> None:
         self._params = params
         self._rec = rr.RecordingStream(APPLICATION, send_properties=False)
         self._rec.send_recording_name(title)
@@ -55,7 +56,7 @@ class RerunSink:
         if isinstance(target, str | FilePath):
             self._open_file(FilePath(target))
         else:
-            self._stream, self._buffer = target, self._rec.binary_stream()
+            self._stream, self._buffer = target, rr.binary_stream(self._rec)
         self._rec.send_blueprint(blueprint())
         self._log_static()
 
@@ -65,7 +66,7 @@ class RerunSink:
         except RuntimeError as error:
             raise ReplayError(f"{path}: the replay cannot be written: {_cause(error)}") from None
 
-    def write(self, frame: Frame, result: Result) -> None:
+    def show(self, frame: Frame, result: Result) -> None:
         """Add one frame."""
         self._rec.set_time("frame", sequence=frame.index)
         self._rec.set_time("sensor_time", timestamp=np.datetime64(frame.t_ns, "ns"))
@@ -102,13 +103,13 @@ class RerunSink:
         rings = np.arange(_RING_STEP_M, BEV_AHEAD_M + 1.0, _RING_STEP_M)
         angle = np.linspace(-np.pi / 2, np.pi / 2, 61)
         arcs = [_to_bev(np.column_stack([r * np.cos(angle), r * np.sin(angle)])) for r in rings]
-        self._rec.log("bev/rings", rr.LineStrips2D(arcs, colors=rgb("grid"), radii=_THIN), static=True)
+        self._rec.log("bev/rings", rr.LineStrips2D(arcs, colors=rgb("grid"), radii=_px(_THIN_PX)), static=True)
         places = [(0.0, -r) for r in rings]
         texts = [f"{r:.0f} m" for r in rings]
-        marks = rr.Points2D(places, labels=texts, colors=rgb("ground"), radii=_THIN, show_labels=True)
+        marks = rr.Points2D(places, labels=texts, colors=rgb("ground"), radii=_px(_THIN_PX), show_labels=True)
         self._rec.log("bev/rings/labels", marks, static=True)
         ego = _to_bev(scene.ego_cuboid(0.0).footprint())
-        self._rec.log("bev/ego", rr.LineStrips2D([_closed(ego)], colors=rgb("ego"), radii=_THIN), static=True)
+        self._rec.log("bev/ego", rr.LineStrips2D([_closed(ego)], colors=rgb("ego"), radii=_px(_THIN_PX)), static=True)
         for name, role in (("distance", "cipv"), ("closing_speed", "warning"), ("ttc", "lidar")):
             line = rr.SeriesLines(colors=rgb(role), names=name, widths=2.0)  # type: ignore[arg-type]
             self._rec.log(f"curves/{name}/cipv", line, static=True)
@@ -118,16 +119,18 @@ class RerunSink:
     def _log_world(self, result: Result) -> None:
         ground_m = scene.ground_height_m(result) or 0.0
         points = result.layers.points
-        cloud = rr.Points3D(points[:, :3], colors=scene.point_colors(result), radii=_POINT_3D) if len(points) else None
+        cloud = (
+            rr.Points3D(points[:, :3], colors=scene.point_colors(result), radii=_px(_POINT_PX)) if len(points) else None
+        )
         self._put("world/points", cloud)
         self._put("world/cuboids", _cuboids([each for each in result.objects if each.cuboid], result))
         seen = [each for each in result.objects if each.source == "V" and each.bev is not None]
         self._put("world/footprints", _footprints(seen, result, ground_m))
         for side, line in _sides(result.path).items():
-            strip = rr.LineStrips3D([scene.on_ground(line, ground_m + 0.05)], colors=rgb("path"), radii=_THIN)
+            strip = rr.LineStrips3D([scene.on_ground(line, ground_m + 0.05)], colors=rgb("path"), radii=_px(_THIN_PX))
             self._put(f"world/path/{side}", strip)
         ego = scene.ego_cuboid(ground_m)
-        box = rr.Boxes3D(centers=[ego.center], sizes=[ego.size], colors=rgb("ego"), radii=_THIN)
+        box = rr.Boxes3D(centers=[ego.center], sizes=[ego.size], colors=rgb("ego"), radii=_px(_THIN_PX))
         self._put("world/ego", box)
 
     def _log_camera(self, frame: Frame, result: Result) -> None:
@@ -147,12 +150,12 @@ class RerunSink:
         lidar_colors = {number: rgb("lidar") for number in layers.lidar_boxes}
         vision_colors = {number: rgb("vision") for number in layers.vision_boxes}
         texts = {each.id: scene.object_text(each) for each in result.objects}
-        self._put(f"{OVERLAYS}/lidar_boxes", _boxes(layers.lidar_boxes, lidar_colors, {}, _THIN))
-        self._put(f"{OVERLAYS}/vision_boxes", _boxes(layers.vision_boxes, vision_colors, texts, _THIN))
+        self._put(f"{OVERLAYS}/lidar_boxes", _boxes(layers.lidar_boxes, lidar_colors, {}, _THIN_PX))
+        self._put(f"{OVERLAYS}/vision_boxes", _boxes(layers.vision_boxes, vision_colors, texts, _THIN_PX))
         number = scene.cipv_id(result)
         box = layers.vision_boxes.get(number, layers.lidar_boxes.get(number)) if number is not None else None
         lead = {} if number is None or box is None else {number: box}
-        self._put(f"{OVERLAYS}/cipv", _boxes(lead, {each: rgb("cipv") for each in lead}, {}, _THICK))
+        self._put(f"{OVERLAYS}/cipv", _boxes(lead, {each: rgb("cipv") for each in lead}, {}, _THICK_PX))
 
     def _projected(self, frame: Frame, result: Result) -> rr.Points2D | None:
         model = alignment.resolve(self._params, frame.camera)
@@ -164,14 +167,14 @@ class RerunSink:
         with np.errstate(invalid="ignore"):
             inside = np.all((pixels >= 0) & (pixels < [width, height]), axis=1)
         range_m = np.hypot(points[inside, 0], points[inside, 1])
-        return rr.Points2D(pixels[inside], colors=scene.range_colors(range_m), radii=_POINT_2D)
+        return rr.Points2D(pixels[inside], colors=scene.range_colors(range_m), radii=_px(_POINT_PX))
 
     def _log_bev(self, result: Result) -> None:
         placed = [each for each in result.objects if each.bev is not None]
         colors = [scene.object_color(each, result) for each in placed]
         rings = [_closed(_to_bev(np.asarray(each.bev))) for each in placed]
         texts = [scene.object_text(each) for each in placed]
-        strips = rr.LineStrips2D(rings, colors=colors, labels=texts, radii=_THICK, show_labels=_few(texts))
+        strips = rr.LineStrips2D(rings, colors=colors, labels=texts, radii=_px(_THICK_PX), show_labels=_few(texts))
         self._put("bev/footprints", strips if placed else None)
         moving = [each for each in placed if each.velocity_mps is not None]
         starts = [_to_bev(np.asarray(each.bev)).mean(axis=0) for each in moving]
@@ -180,13 +183,13 @@ class RerunSink:
         self._put("bev/velocity", rr.Arrows2D(origins=starts, vectors=steps, colors=arrows) if moving else None)
         for side, line in _sides(result.path).items():
             near = line[np.abs(line[:, 1]) <= BEV_ASIDE_M]
-            self._put(f"bev/path/{side}", rr.LineStrips2D([_to_bev(near)], colors=rgb("path"), radii=_THIN))
+            self._put(f"bev/path/{side}", rr.LineStrips2D([_to_bev(near)], colors=rgb("path"), radii=_px(_THIN_PX)))
 
     def _log_curves(self, result: Result) -> None:
         cipv, acc, ego = result.cipv, result.acc, result.ego
-        self._scalar("distance/cipv", cipv and cipv.distance_m)
-        self._scalar("closing_speed/cipv", cipv and cipv.closing_speed_mps)
-        self._scalar("ttc/cipv", cipv and cipv.ttc_s)
+        self._scalar("distance/cipv", None if cipv is None else cipv.distance_m)
+        self._scalar("closing_speed/cipv", None if cipv is None else cipv.closing_speed_mps)
+        self._scalar("ttc/cipv", None if cipv is None else cipv.ttc_s)
         self._scalar("speed/desired", None if acc is None else acc.desired_speed_mps * 3.6)
         self._scalar("speed/ego", None if ego is None else ego.speed_mps * 3.6)
         for stage, value in result.timing_ms.items():
@@ -205,6 +208,11 @@ class RerunSink:
             self._rec.log("reasons/rejected", rr.TextLog(f"#{each.id}: {each.reason}", level=rr.TextLogLevel.DEBUG))
         for note in result.notes:
             self._rec.log("reasons/notes", rr.TextLog(note, level=rr.TextLogLevel.WARN))
+
+
+def _px(radius: float | list[float]) -> Any:
+    """A radius in screen points, the same however near one looks."""
+    return rr.Radius.ui_points(radius)
 
 
 def _cause(error: RuntimeError) -> str:
@@ -240,7 +248,7 @@ def _cuboids(objects: list[FusedObject], result: Result) -> rr.Boxes3D | None:
         rotations=[rr.RotationAxisAngle(axis=(0, 0, 1), radians=box.yaw_rad) for box in boxes],
         colors=[rgb("cipv") if each.id == lead else rgb("lidar") for each in objects],
         labels=[scene.object_text(each) for each in objects],
-        radii=[_THICK if each.id == lead else _THIN for each in objects],
+        radii=_px([_THICK_PX if each.id == lead else _THIN_PX for each in objects]),
     )
 
 
@@ -250,11 +258,13 @@ def _footprints(objects: list[FusedObject], result: Result, ground_m: float) -> 
         return None
     colors = [scene.object_color(each, result) for each in objects]
     texts = [scene.object_text(each) for each in objects]
-    return rr.LineStrips3D([line for line in outlines if line is not None], colors=colors, labels=texts, radii=_THICK)
+    return rr.LineStrips3D(
+        [line for line in outlines if line is not None], colors=colors, labels=texts, radii=_px(_THICK_PX)
+    )
 
 
 def _boxes(
-    boxes: dict[int, Box], colors: dict[int, tuple[int, int, int]], texts: dict[int, str], radius: float
+    boxes: dict[int, Box], colors: dict[int, tuple[int, int, int]], texts: dict[int, str], radius_px: float
 ) -> rr.Boxes2D | None:
     if not boxes:
         return None
@@ -263,7 +273,7 @@ def _boxes(
         array_format=rr.Box2DFormat.XYXY,
         colors=[colors[number] for number in boxes],
         labels=[texts[number] for number in boxes] if texts else None,
-        radii=radius,
+        radii=_px(radius_px),
     )
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from app.views.colors import Rgb, rgb, role_of, shade_of
 from pipeline.geometry import Cuboid
-from pipeline.types import DROPPED, GROUND, UNCLUSTERED, F64, FusedObject, Path, Result
+from pipeline.types import DROPPED, F64, GROUND, UNCLUSTERED, FusedObject, Path, Result
 
 U8 = npt.NDArray[np.uint8]
 ColorBy = Literal["kind", "height", "intensity", "range"]

@@ -16,7 +16,9 @@ LOOKS_ALONG_X = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
 """Camera axes (x right, y down, z ahead) from ego axes."""
 
 
-def camera(mount_m: tuple[float, float, float] = (0.0, 0.0, 0.0), distortion: tuple[float, ...] = ()) -> CameraCalibration:
+def camera(
+    mount_m: tuple[float, float, float] = (0.0, 0.0, 0.0), distortion: tuple[float, ...] = ()
+) -> CameraCalibration:
     T = np.eye(4)
     T[:3, :3] = LOOKS_ALONG_X
     T[:3, 3] = -LOOKS_ALONG_X @ np.array(mount_m)
@@ -60,7 +62,7 @@ def test_inverse_printed_in_the_paper_is_wrong() -> None:
     """y = x_img·tan(x_img·h_res) would put a car 3 m to the left of a 20 m range hundreds of metres away."""
     model = MODELS["angular"]
     assert isinstance(model, Angular)
-    (u, v), = model.project(np.array([[np.sqrt(400 - 9), 3.0, 0.0]]))
+    ((u, v),) = model.project(np.array([[np.sqrt(400 - 9), 3.0, 0.0]]))
     printed = (u - model.cx) * np.tan((u - model.cx) * model.h_res_rad)
     ours = model.unproject(np.array([[u, v]]), np.array([20.0]))[0, 1]
     assert ours == pytest.approx(3.0)

@@ -37,9 +37,7 @@ places = st.tuples(st.floats(-10, 60), st.floats(-15, 15))
 
 
 @pytest.mark.parametrize("params", [OPTIMAL, GREEDY], ids=["optimal", "greedy"])
-@given(
-    seen=st.lists(st.tuples(boxes, st.none() | st.floats(3, 100)), max_size=8), hit=st.lists(places, max_size=8)
-)
+@given(seen=st.lists(st.tuples(boxes, st.none() | st.floats(3, 100)), max_size=8), hit=st.lists(places, max_size=8))
 def test_every_track_lands_in_exactly_one_row(
     params: FusionParams, seen: list[tuple[Box, float | None]], hit: list[tuple[float, float]]
 ) -> None:
@@ -87,7 +85,7 @@ def test_a_far_car_over_the_roof_of_a_near_one_is_not_joined_with_it() -> None:
 
 
 def test_optimal_assignment_beats_first_come_first_served() -> None:
-    """Two cars side by side, one box between: greedily it takes the better half and leaves the other car's box alone."""
+    """Two cars side by side, one box between: greedily it takes the better half and leaves the other car's alone."""
     left, right = lidar_track(1, 20.0, 1.1), lidar_track(2, 20.0, -1.1)
     a, b = box_of(left), box_of(right)
     shift = (b[0] - a[0]) * 0.45

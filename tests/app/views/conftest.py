@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import MISSING, fields
+
 import cv2
 import numpy as np
 import pytest
@@ -51,10 +53,8 @@ def _cloud() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _object(number: int, source: str, **known: object) -> FusedObject:
-    unknown: dict[str, object] = dict.fromkeys(
-        "label score bbox bev cuboid closest_point distance_m distance_sigma_m velocity_mps lidar_track "
-        "vision_track".split()
-    )
+    names = {each.name for each in fields(FusedObject) if each.default is MISSING and each.default_factory is MISSING}
+    unknown: dict[str, object] = dict.fromkeys(names)
     fixed = {"id": number, "source": source, "carried": False, "hits": 4, "lidar_points": 0}
     return FusedObject(**{**unknown, **fixed, **known})  # type: ignore[arg-type]
 
