@@ -191,8 +191,11 @@ def _decode_maps(
         centre = centre_of(kept[:, :2], np.column_stack([x, y]).astype(np.float32), stride)
         scores = _sigmoid(kept[:, 4:5]) * _sigmoid(kept[:, 5:])
         parts.append(_above(centre, extent_of(kept[:, 2:4], anchors), scores, floor))
-    boxes, scores, classes = zip(*parts, strict=True)
-    return np.concatenate(boxes), np.concatenate(scores), np.concatenate(classes)
+    return (
+        np.concatenate([boxes for boxes, _, _ in parts]),
+        np.concatenate([scores for _, scores, _ in parts]),
+        np.concatenate([classes for _, _, classes in parts]),
+    )
 
 
 def _above(centre: F32, extent: F32, class_scores: F32, floor: float) -> Decoded:

@@ -1,0 +1,175 @@
+"""Fitting the distance law to another camera: the paper's regression, repeated on any labelled recording.
+
+A pair is one detected box and the true depth of its object. Truth comes from labelled cuboids, or from the LiDAR, whose
+boxes say how far an object is wherever they and a detection overlap in the picture.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.alignment import Alignment, project_cuboid, resolve
+from pipeline.geometry import Cuboid, closest_on_polygon, iou_matrix, transform
+from pipeline.lidar import boxes, cluster, downsample, ground
+from pipeline.params import Params
+from pipeline.sources.base import Source
+from pipeline.types import VEHICLES, CameraCalibration, Frame
+from pipeline.vision.detector import Detector
+from pipeline.vision.distance import PowerLaw, fit_power_law, height_at_reference, is_cut
+from pipeline.vision.select import select
+
+MIN_IOU = 0.4
+MIN_DEPTH_M = 3.0
+"""Nearer than this a face of the object no longer fills the box: its height says little."""
+
+
+class TooFewPairs(Exception):
+    """A recording without enough labelled boxes to fit anything; one sentence."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One box with its truth. height_px: as the reference camera would see it. depth_m: of the object's nearest point
+    along the optical axis. range_m: of the same point from the ego origin, on the ground plane."""
+
+    frame: str
+    label: str
+    height_px: float
+    depth_m: float
+    range_m: float
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """A class's law and how well it fits its own pairs: mean and 90th-percentile share of the true depth, and the
+    robust standard deviation of the logarithm of estimate over truth."""
+
+    law: PowerLaw
+    pairs: int
+    mean_relative_error: float
+    p90_relative_error: float
+    log_sigma: float
+
+
+def collect_pairs(
+    source: Source, detector: Detector, truth: Literal["labels", "lidar"] = "labels", params: Params | None = None
+) -> tuple[Pair, ...]:
+    """Every detected vehicle of a recording that overlaps a true object's projection, one-to-one."""
+    params = params or Params()
+    pairs: list[Pair] = []
+    for index in range(len(source)):
+        if truth == "labels" and source.truth(index) is None:
+            continue
+        frame = source.frame(index)
+        alignment = resolve(params.alignment, frame.camera)
+        if frame.picture is None or frame.camera is None or alignment is None:
+            continue
+        cuboids = _labelled(source, index) if truth == "labels" else _clusters(frame, params)
+        pairs += _frame_pairs(frame, frame.camera, cuboids, alignment, detector, params)
+    return tuple(pairs)
+
+
+def fit_laws(pairs: Iterable[Pair], exponent: float | None = None) -> Mapping[str, LawFit]:
+    """A law for each class with pairs at two or more heights (one, with the exponent given), by class name.
+
+    TooFewPairs when no class has.
+    """
+    by_class: dict[str, list[Pair]] = {}
+    for pair in pairs:
+        by_class.setdefault(pair.label, []).append(pair)
+    needed = 2 if exponent is None else 1
+    fits = {
+        label: _fit(members, exponent)
+        for label, members in sorted(by_class.items())
+        if len({pair.height_px for pair in members}) >= needed
+    }
+    if not fits:
+        raise TooFewPairs("no class has enough detected vehicles with a known distance to fit a law to")
+    return fits
+
+
+def as_overrides(fits: Mapping[str, LawFit]) -> dict[str, dict[str, float]]:
+    """The fitted laws as a parameter file's section: the car's law, and how much taller the other classes are.
+
+    TooFewPairs when there is no car, whose law the others are told by."""
+    if "car" not in fits:
+        raise TooFewPairs("no car was detected with a known distance, and the other classes' laws are relative to it")
+    car = fits["car"].law
+    section = {"coefficient": round(car.coefficient, 1), "exponent": round(car.exponent, 4)}
+    for label in ("truck", "bus", "motorcycle"):
+        if label in fits:
+            section[f"{label}_ratio"] = round(_height_ratio(car, fits[label]), 2)
+    return {"distance": section}
+
+
+def _height_ratio(car: PowerLaw, other: LawFit) -> float:
+    """How many times taller the class is than a car, from both boxes at 30 m."""
+
+    def height_px(law: PowerLaw) -> float:
+        return float((30.0 / law.coefficient) ** (1.0 / law.exponent))
+
+    return height_px(other.law) / height_px(car)
+
+
+def _fit(pairs: list[Pair], exponent: float | None) -> LawFit:
+    height = np.array([pair.height_px for pair in pairs])
+    depth = np.array([pair.depth_m for pair in pairs])
+    law = fit_power_law(height, depth, exponent)
+    ratio = law.coefficient * height**law.exponent / depth
+    error = np.abs(ratio - 1.0)
+    return LawFit(
+        law,
+        len(pairs),
+        float(error.mean()),
+        float(np.quantile(error, 0.9)),
+        float(1.4826 * np.median(np.abs(np.log(ratio)))),
+    )
+
+
+def _frame_pairs(
+    frame: Frame,
+    camera: CameraCalibration,
+    cuboids: list[Cuboid],
+    alignment: Alignment,
+    detector: Detector,
+    params: Params,
+) -> list[Pair]:
+    assert frame.picture is not None
+    detections = [d for d in select(detector.detect(frame.picture.bgr), params.detection) if d.label in VEHICLES]
+    projected = [project_cuboid(alignment, cuboid.corners(), camera.width, camera.height) for cuboid in cuboids]
+    seen = [(cuboid, box) for cuboid, box in zip(cuboids, projected, strict=True) if box is not None]
+    if not detections or not seen:
+        return []
+    iou = iou_matrix(np.array([d.bbox for d in detections]), np.array([box for _, box in seen]))
+    pairs = []
+    for row, detection in enumerate(detections):
+        column = int(iou[row].argmax())
+        mutual = int(iou[:, column].argmax()) == row
+        if not mutual or iou[row, column] < MIN_IOU or is_cut(detection.bbox, camera):
+            continue
+        cuboid = seen[column][0]
+        x, y = closest_on_polygon(cuboid.footprint())
+        depth_m = float(transform(camera.T_camera_ego, np.array([[x, y, cuboid.center[2]]]))[0, 2])
+        if depth_m >= MIN_DEPTH_M:
+            height = height_at_reference(detection.bbox, float(camera.K[1, 1]), params.distance)
+            pairs.append(Pair(frame.name, detection.label, height, depth_m, float(np.hypot(x, y))))
+    return pairs
+
+
+def _labelled(source: Source, index: int) -> list[Cuboid]:
+    return [item.cuboid for item in source.truth(index) or ()]
+
+
+def _clusters(frame: Frame, params: Params) -> list[Cuboid]:
+    if frame.sweep is None:
+        return []
+    points = frame.sweep.points
+    keep = downsample.keep_mask(frame.sweep, params.downsample)
+    plane = ground.fit_ground(points, keep, params.ground)
+    candidates = cluster.candidates(points, plane, keep, params.cluster)
+    found = boxes.fit_obstacles(points, cluster.cluster(points, candidates, params.cluster), plane, params.box)
+    return [obstacle.cuboid for obstacle in found]

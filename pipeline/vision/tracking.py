@@ -1,0 +1,270 @@
+"""Boxes followed from picture to picture (paper, Algorithm 1), as a pure function: state in, state out.
+
+The printed algorithm measures half widths where it means centres, takes the first candidate under the threshold and
+gives a new number for every one that fails. Here a box goes to its nearest candidate, one-to-one, and a new object is
+numbered once. An object not seen is carried, says so, and ends after ``queue_frames`` pictures or ``max_missed_s``.
+
+Two filters. ``queue`` is the paper's: the newest box of each object stands for it, its distance is the last one
+measured, and it has no velocity. ``kalman`` predicts both the box and the place, each with a constant-velocity filter.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from pipeline import kalman
+from pipeline.geometry import F64
+from pipeline.kalman import CvState
+from pipeline.params import VisionTrackingParams
+from pipeline.types import VEHICLES, Box, VisionMeasurement, VisionTrack
+
+SPEED_SIGMA_MPS = 8.0
+"""How fast a new object may be closing in or away, before a second sighting tells."""
+_NOMINAL_DT_S = 0.1
+_MAX_GROWTH = 3.0
+"""The pixel gate is meant for pictures 0.1 s apart; it widens with the time since the last sighting, thrice at most."""
+_OUTLIER = 9.21
+"""99 % point of χ² with 2 degrees of freedom: a place farther off weighs less."""
+_CAR_WIDTH_M = 1.8
+"""Turns box widths into metres, so that a box's motion in the picture is as lively as its object's on the road."""
+_CENTRE_NOISE = 0.04
+"""Noise of a box's centre, in box widths."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """One object between two pictures. unseen_s, unplaced_s: since its last sighting, and since its last distance.
+    box_filter: its centre in pixels. place_filter: its place, ego x y. votes: summed score of each class name."""
+
+    track: VisionTrack
+    unseen_s: float
+    unplaced_s: float
+    placed: int
+    box_filter: CvState
+    place_filter: CvState | None
+    votes: tuple[tuple[str, float], ...]
+
+
+@dataclass(frozen=True)
+class VisionTrackerState:
+    """All that one picture leaves to the next."""
+
+    next_id: int = 1
+    followed: tuple[Followed, ...] = field(default=())
+
+
+def track(
+    state: VisionTrackerState,
+    measurements: tuple[VisionMeasurement, ...] | None,
+    dt_s: float | None,
+    params: VisionTrackingParams,
+) -> tuple[VisionTrackerState, tuple[VisionTrack, ...]]:
+    """One tick. ``measurements`` null: the camera gave nothing, which counts as time but not as a picture in which the
+    object was missing. ``dt_s`` null: the first tick. Tracks come by id."""
+    expected = [_predict(followed, dt_s or 0.0, params) for followed in state.followed]
+    if measurements is None:
+        kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
+        return replace(state, followed=kept), tuple(followed.track for followed in kept)
+    partner = _match(expected, measurements, params)
+    kept_list = [
+        _seen(followed, measurements[partner[row]], params) if row in partner else _missed(followed)
+        for row, followed in enumerate(expected)
+    ]
+    taken = set(partner.values())
+    fresh = [measurement for column, measurement in enumerate(measurements) if column not in taken]
+    kept_list += [_new(state.next_id + index, measurement, params) for index, measurement in enumerate(fresh)]
+    alive = tuple(
+        followed
+        for followed in kept_list
+        if followed.track.missed < params.queue_frames and followed.unseen_s <= params.max_missed_s
+    )
+    return VisionTrackerState(state.next_id + len(fresh), alive), tuple(followed.track for followed in alive)
+
+
+def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
+    """Where the object should be now; carried until a box says that it is there."""
+    aged = replace(
+        followed,
+        track=replace(followed.track, carried=True),
+        unseen_s=followed.unseen_s + dt_s,
+        unplaced_s=followed.unplaced_s + dt_s,
+    )
+    if params.filter == "queue":
+        return aged
+    return _show(_predict_place(_predict_box(aged, dt_s, params), dt_s, params))
+
+
+def _predict_box(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
+    px_per_m = _width(followed.track.bbox) / _CAR_WIDTH_M
+    moved = kalman.predict(followed.box_filter, dt_s, params.accel_sigma_mps2 * px_per_m)
+    box = _around(moved.mean[:2], followed.track.bbox)
+    return replace(followed, box_filter=moved, track=replace(followed.track, bbox=box))
+
+
+def _predict_place(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
+    """The place a moment later, and the box grown or shrunk as the range changed. A place not measured for
+    ``max_missed_s`` is forgotten, though its box be seen (it may be too near to be measured)."""
+    if followed.place_filter is None:
+        return followed
+    moved = kalman.predict(followed.place_filter, dt_s, params.accel_sigma_mps2)
+    before_m, now_m = (math.hypot(*filtered.mean[:2]) for filtered in (followed.place_filter, moved))
+    if followed.unplaced_s > params.max_missed_s or now_m <= 0.0 or moved.mean[0] <= 0.0:
+        lost = replace(followed.track, distance_m=None, sigma_m=None, position=None, velocity_mps=None)
+        return replace(followed, place_filter=None, placed=0, track=lost)
+    box = _around(followed.box_filter.mean[:2], followed.track.bbox, before_m / now_m)
+    return replace(followed, place_filter=moved, track=replace(followed.track, bbox=box))
+
+
+def _match(
+    expected: list[Followed], measurements: tuple[VisionMeasurement, ...], params: VisionTrackingParams
+) -> dict[int, int]:
+    """Index of followed object → index of measurement: the one-to-one choice of least total centre distance, in gates,
+    among pairs that pass every gate. As many pairs as possible come first, then the distance."""
+    if not expected or not measurements:
+        return {}
+    cost = np.array([[_cost(followed, seen, params) for seen in measurements] for followed in expected])
+    possible = np.isfinite(cost)
+    forbidden = float(min(cost.shape)) + 1.0
+    rows, columns = linear_sum_assignment(np.where(possible, cost, forbidden))
+    return {int(row): int(column) for row, column in zip(rows, columns, strict=True) if possible[row, column]}
+
+
+def _cost(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> float:
+    """Distance of the centres in gates, infinite where the two cannot be one object."""
+    old, new = followed.track.bbox, seen.detection.bbox
+    if (followed.track.label in VEHICLES) != (seen.detection.label in VEHICLES):
+        return math.inf
+    if followed.track.label not in VEHICLES and followed.track.label != seen.detection.label:
+        return math.inf
+    gate_px = params.gate_px
+    if params.filter == "kalman":
+        growth = min(max(followed.unseen_s / _NOMINAL_DT_S, 1.0), _MAX_GROWTH)
+        gate_px = max(gate_px, params.gate_sizes * _width(old)) * growth
+        ratio = max(_width(old), 1.0) / max(_width(new), 1.0)
+        if max(ratio, 1.0 / ratio) > params.max_size_ratio:
+            return math.inf
+    share = math.dist(_centre(old), _centre(new)) / gate_px
+    return share if share <= 1.0 else math.inf
+
+
+def _new(track_id: int, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
+    detection = seen.detection
+    shown = VisionTrack(
+        id=track_id,
+        bbox=detection.bbox,
+        label=detection.label,
+        score=detection.score,
+        distance_m=seen.distance_m,
+        sigma_m=seen.sigma_m,
+        position=seen.position,
+        velocity_mps=None,
+        hits=1,
+        missed=0,
+        carried=False,
+    )
+    box_filter = kalman.start(_centre(detection.bbox), _box_noise(detection.bbox), _box_speed_sigma(detection.bbox))
+    votes = ((detection.label, detection.score),)
+    followed = Followed(shown, 0.0, 0.0 if seen.position else math.inf, 0, box_filter, None, votes)
+    return _place(followed, seen, params) if params.filter == "kalman" else followed
+
+
+def _seen(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
+    """The object with this picture's box and distance taken in."""
+    detection = seen.detection
+    shown = replace(
+        followed.track,
+        bbox=detection.bbox,
+        label=detection.label,
+        score=detection.score,
+        hits=followed.track.hits + 1,
+        missed=0,
+        carried=False,
+    )
+    current = replace(followed, track=shown, unseen_s=0.0)
+    if params.filter == "queue":
+        measured = replace(shown, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position)
+        return replace(current, track=measured)
+    votes = dict(followed.votes)
+    votes[detection.label] = votes.get(detection.label, 0.0) + detection.score
+    label = max(votes, key=lambda name: votes[name])
+    box_filter = kalman.update(followed.box_filter, _centre(detection.bbox), _box_noise(detection.bbox))
+    current = replace(current, track=replace(shown, label=label), votes=tuple(votes.items()), box_filter=box_filter)
+    return _place(current, seen, params)
+
+
+def _missed(followed: Followed) -> Followed:
+    return replace(followed, track=replace(followed.track, missed=followed.track.missed + 1))
+
+
+def _place(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
+    """The measured place taken in; one far from the expected weighs less, by as much as it is too far."""
+    if seen.position is None or seen.sigma_m is None or seen.distance_m is None:
+        bare = replace(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m)
+        return replace(followed, track=bare) if followed.place_filter is None else _show(followed)
+    noise = place_noise(seen.position, seen.sigma_m, params.bearing_sigma_deg)
+    if followed.place_filter is None:
+        filtered = kalman.start(seen.position, noise, SPEED_SIGMA_MPS)
+    else:
+        surprise = kalman.mahalanobis2(followed.place_filter, seen.position, noise)
+        filtered = kalman.update(followed.place_filter, seen.position, noise * max(1.0, surprise / _OUTLIER))
+    share = seen.sigma_m / seen.distance_m
+    return _show(replace(followed, place_filter=filtered, placed=followed.placed + 1, unplaced_s=0.0), share)
+
+
+def _show(followed: Followed, share: float | None = None) -> Followed:
+    """The track's public numbers, from its filter. ``share``: sigma over distance of the measurement taken in.
+
+    The sigma shown never falls below that of one sighting: most of it is the object's own unknown height, an error
+    that no number of sightings averages out.
+    """
+    if followed.place_filter is None:
+        return followed
+    x, y, vx, vy = (float(value) for value in followed.place_filter.mean)
+    range_m = math.hypot(x, y)
+    ray = np.array([x, y]) / range_m
+    filter_sigma = math.sqrt(float(ray @ followed.place_filter.cov[:2, :2] @ ray))
+    if share is None:
+        before = followed.track
+        share = before.sigma_m / before.distance_m if before.sigma_m and before.distance_m else 0.0
+    shown = replace(
+        followed.track,
+        distance_m=range_m,
+        sigma_m=max(filter_sigma, share * range_m),
+        position=(x, y),
+        velocity_mps=(vx, vy) if followed.placed >= 2 else None,
+    )
+    return replace(followed, track=shown)
+
+
+def place_noise(position: tuple[float, float], range_sigma_m: float, bearing_sigma_deg: float) -> F64:
+    """(2, 2) covariance of a place seen by a camera: long along the ray, narrow across it."""
+    bearing = math.atan2(position[1], position[0])
+    across_m = math.hypot(*position) * math.radians(bearing_sigma_deg)
+    turn = np.array([[math.cos(bearing), -math.sin(bearing)], [math.sin(bearing), math.cos(bearing)]])
+    return turn @ np.diag([range_sigma_m**2, across_m**2]) @ turn.T
+
+
+def _box_noise(box: Box) -> F64:
+    return np.eye(2) * max(_CENTRE_NOISE * _width(box), 1.0) ** 2
+
+
+def _box_speed_sigma(box: Box) -> float:
+    return SPEED_SIGMA_MPS * _width(box) / _CAR_WIDTH_M
+
+
+def _around(centre: F64, box: Box, scale: float = 1.0) -> Box:
+    half_w, half_h = _width(box) / 2 * scale, (box[3] - box[1]) / 2 * scale
+    u, v = float(centre[0]), float(centre[1])
+    return u - half_w, v - half_h, u + half_w, v + half_h
+
+
+def _centre(box: Box) -> tuple[float, float]:
+    return (box[0] + box[2]) / 2, (box[1] + box[3]) / 2
+
+
+def _width(box: Box) -> float:
+    return box[2] - box[0]
