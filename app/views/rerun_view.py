@@ -24,6 +24,7 @@ from pipeline.types import Box, Frame, FusedObject, Path, Picture, Result
 
 APPLICATION = "CIPV Studio"
 _THIN_PX, _THICK_PX, _POINT_PX = 1.0, 2.5, 1.4
+_CALIBRATED = AlignmentParams()
 _RING_STEP_M = 20.0
 _JPEG_QUALITY = 80
 _ARROW_S = 1.0
@@ -44,7 +45,7 @@ class RerunSink:
     """
 
     def __init__(
-        self, target: str | FilePath | BinaryIO, title: str = APPLICATION, params: AlignmentParams = AlignmentParams()
+        self, target: str | FilePath | BinaryIO, title: str = APPLICATION, params: AlignmentParams = _CALIBRATED
     ) -> None:
         self._params = params
         self._rec = rr.RecordingStream(APPLICATION, send_properties=False)

@@ -1,0 +1,95 @@
+"""Sliders, switches and choices of every parameter in the 3D view, built from the parameters' own schema."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import viser
+
+from pipeline.params import Params
+
+OnChange = Callable[[str, Any], None]
+_ORDER_AFTER_DISPLAY = 10.0
+
+
+class ParamsGui:
+    """One folder a section, closed at first; a parameter that may be null has a switch "auto" before its slider.
+
+    ``on_change(name, value)`` is called with a dotted name when a person moves something, never for ``set``.
+    """
+
+    def __init__(self, gui: viser.GuiApi, params: Params, on_change: OnChange) -> None:
+        self._gui = gui
+        self._on_change = on_change
+        self._inputs: dict[str, Any] = {}
+        self._autos: dict[str, Any] = {}
+        schema = Params.model_json_schema()
+        values = params.model_dump()
+        for order, (section, entry) in enumerate(schema["properties"].items()):
+            declared = schema["$defs"][entry["$ref"].rpartition("/")[2]]
+            with gui.add_folder(_words(section), expand_by_default=False, order=_ORDER_AFTER_DISPLAY + order):
+                for key, spec in declared["properties"].items():
+                    self._add(f"{section}.{key}", spec, values[section][key])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The dotted names that have an input."""
+        return tuple(self._inputs)
+
+    def set(self, params: Params) -> None:
+        """Show these values to everybody. Nobody is told of a change."""
+        for section, values in params.model_dump().items():
+            for key, value in values.items():
+                self._show(f"{section}.{key}", value)
+
+    def _show(self, name: str, value: Any) -> None:
+        auto = self._autos.get(name)
+        if auto is not None:
+            auto.value = value is None
+            self._inputs[name].disabled = value is None
+        if value is not None:
+            self._inputs[name].value = value
+
+    def _add(self, name: str, spec: Mapping[str, Any], value: Any) -> None:
+        label, hint = _label(name, spec), spec.get("description", "")
+        if "anyOf" in spec:
+            auto = self._gui.add_checkbox(f"{label} auto", value is None, hint="Take it from the calibration")
+            self._autos[name] = auto
+            auto.on_update(lambda event: self._auto_moved(name, event))
+        handle = self._input(label, hint, spec, value)
+        self._inputs[name] = handle
+        handle.on_update(lambda event: self._moved(name, event))
+
+    def _input(self, label: str, hint: str, spec: Mapping[str, Any], value: Any) -> Any:
+        if "enum" in spec:
+            return self._gui.add_dropdown(label, spec["enum"], initial_value=value, hint=hint)
+        if spec.get("type") == "boolean":
+            return self._gui.add_checkbox(label, value, hint=hint)
+        bounds = next(each for each in spec.get("anyOf", [spec]) if "minimum" in each)
+        low, high = bounds["minimum"], bounds["maximum"]
+        start = value if value is not None else low
+        number = int if bounds["type"] == "integer" else float
+        return self._gui.add_slider(
+            label, number(low), number(high), number(spec["step"]), number(start), hint=hint, disabled=value is None
+        )
+
+    def _moved(self, name: str, event: viser.GuiEvent[Any]) -> None:
+        if event.client_id is not None:
+            self._on_change(name, event.target.value)
+
+    def _auto_moved(self, name: str, event: viser.GuiEvent[Any]) -> None:
+        if event.client_id is not None:
+            handle = self._inputs[name]
+            handle.disabled = bool(event.target.value)
+            self._on_change(name, None if event.target.value else handle.value)
+
+
+def _words(name: str) -> str:
+    """``lidar_tracking`` → ``Lidar tracking``."""
+    return name.replace("_", " ").capitalize()
+
+
+def _label(name: str, spec: Mapping[str, Any]) -> str:
+    key, unit = name.partition(".")[2], spec.get("unit", "")
+    return f"{_words(key)} ({unit})" if unit else _words(key)

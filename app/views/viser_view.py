@@ -1,0 +1,172 @@
+"""The 3D view in a browser: one viser server on loopback that shows the newest frame to whoever looks.
+
+Every scene node has a fixed name and is replaced in place, so a view that runs for days holds as many nodes as the
+picture has parts, and a browser that joins late gets the present state from viser itself.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import Any, get_args
+
+import numpy as np
+import rich
+import viser
+
+from app.views import scene, viser_nodes
+from app.views.viser_gui import OnChange, ParamsGui
+from app.views.viser_nodes import Strokes
+from pipeline.params import Params
+from pipeline.types import Frame, FusedObject, Result
+
+HOST = "127.0.0.1"
+CAMERA_POSITION, CAMERA_TARGET = (-15.0, 0.0, 9.0), (17.0, 0.0, -1.0)
+_LABELS = ("vehicles and in path", "all", "none")
+_ARROW_S = 1.0
+
+
+@dataclass(frozen=True)
+class _Display:
+    """What the person looking has chosen."""
+
+    color_by: scene.ColorBy = "kind"
+    point_size_m: float = 0.08
+    labels: str = _LABELS[0]
+    picture: bool = True
+
+
+class ViserView:
+    """Starts the server at once. ``port`` 0 takes a free one; a taken port silently becomes the next: read ``port``.
+
+    ``on_change(name, value)`` hears of every slider that a person moves, on a thread of viser's.
+    """
+
+    def __init__(self, params: Params, on_change: OnChange = lambda name, value: None, port: int = 0) -> None:
+        self._lock = threading.Lock()
+        self._shown: tuple[Frame, Result] | None = None
+        self._display = _Display()
+        self._labels = 0
+        with _silent():
+            self._server = viser.ViserServer(HOST, port, label="CIPV Studio", verbose=False)
+        self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+        camera = self._server.initial_camera
+        camera.position, camera.look_at, camera.up = CAMERA_POSITION, CAMERA_TARGET, (0.0, 0.0, 1.0)
+        self._scene = self._server.scene
+        self._add_static()
+        self._add_display_options()
+        self._params = ParamsGui(self._server.gui, params, on_change)
+
+    @property
+    def port(self) -> int:
+        """The port it listens on, on loopback."""
+        return self._server.get_port()
+
+    def show(self, frame: Frame, result: Result) -> None:
+        """Show this frame to everybody, now and to whoever joins later. Safe from any thread."""
+        with self._lock:
+            self._shown = (frame, result)
+            self._draw()
+
+    def set_params(self, params: Params) -> None:
+        """Put the sliders where the parameters are; ``on_change`` does not hear of it."""
+        self._params.set(params)
+
+    def close(self) -> None:
+        """Stop the server and disconnect everybody."""
+        with _silent():
+            self._server.stop()
+
+    # ------------------------------------------------------------ what never changes
+
+    def _add_static(self) -> None:
+        viser_nodes.grid(self._scene)
+        self._scene.world_axes.visible = False
+
+    def _add_display_options(self) -> None:
+        gui, start = self._server.gui, self._display
+        with gui.add_folder("Display", order=0.0):
+            color_by = gui.add_dropdown("Colour by", get_args(scene.ColorBy), initial_value=start.color_by)
+            size = gui.add_slider("Point size (m)", 0.02, 0.4, 0.01, start.point_size_m)
+            labels = gui.add_dropdown("Labels", _LABELS, initial_value=start.labels)
+            picture = gui.add_checkbox("Camera picture", start.picture)
+
+        def chosen(_: Any) -> None:
+            with self._lock:
+                self._display = _Display(color_by.value, size.value, labels.value, picture.value)
+                self._draw()
+
+        for handle in (color_by, size, labels, picture):
+            handle.on_update(chosen)
+
+    # ------------------------------------------------------------ one frame
+
+    def _draw(self) -> None:
+        if self._shown is None:
+            return
+        frame, result = self._shown
+        ground_m = scene.ground_height_m(result)
+        floor_m = 0.0 if ground_m is None else ground_m
+        with self._server.atomic():
+            self._draw_points(result)
+            self._draw_objects(frame, result, floor_m)
+            self._draw_labels(result, floor_m)
+            viser_nodes.path(self._scene, result.path, floor_m)
+            viser_nodes.floor(self._scene, floor_m)
+            viser_nodes.picture(self._scene, frame, self._display.picture)
+
+    def _draw_points(self, result: Result) -> None:
+        points = result.layers.points
+        viser_nodes.cloud(
+            self._scene, points[:, :3], scene.point_colors(result, self._display.color_by), self._display.point_size_m
+        )
+
+    def _draw_objects(self, frame: Frame, result: Result, floor_m: float) -> None:
+        cuboids, footprints, rays, velocities = Strokes(), Strokes(), Strokes(), Strokes()
+        eye = viser_nodes.camera_position(frame)
+        for each in result.objects:
+            outline = scene.flat_outline(each, floor_m + 0.05)
+            if outline is None:
+                continue
+            color, middle = scene.object_color(each, result), outline[:-1].mean(axis=0)
+            if each.cuboid is not None:
+                cuboids.add(scene.cuboid_edges(each.cuboid), color)
+            else:
+                footprints.add(np.stack([outline[:-1], outline[1:]], axis=1), color)
+                rays.add(np.array([[eye, middle]]), color)
+            if each.velocity_mps is not None:
+                velocities.add(np.stack([middle, middle + np.array([*each.velocity_mps, 0.0]) * _ARROW_S]), color)
+        viser_nodes.lines(self._scene, "/cuboids", cuboids, 2.5)
+        viser_nodes.lines(self._scene, "/footprints", footprints, 2.5)
+        viser_nodes.lines(self._scene, "/rays", rays, 1.0)
+        viser_nodes.arrows(self._scene, velocities)
+        lead = next((each for each in result.objects if each.id == scene.cipv_id(result)), None)
+        viser_nodes.lead(self._scene, lead, floor_m)
+
+    def _draw_labels(self, result: Result, floor_m: float) -> None:
+        """Labels are numbered places that objects share, not nodes of their own: ids come and go without end."""
+        named = [each for each in result.objects if self._has_label(each, result) and each.bev is not None]
+        for place in range(max(len(named), self._labels)):
+            if place < len(named):
+                each = named[place]
+                viser_nodes.label(self._scene, place, scene.object_text(each), viser_nodes.top_of(each, floor_m))
+            else:
+                viser_nodes.label(self._scene, place, "", None)
+        self._labels = max(len(named), self._labels)
+
+    def _has_label(self, each: FusedObject, result: Result) -> bool:
+        if self._display.labels == "all":
+            return True
+        matters = each.source != "L" or each.in_path or each.id == scene.cipv_id(result)
+        return self._display.labels == _LABELS[0] and matters
+
+
+class _silent:
+    """viser prints its own address, which is not the one people should open."""
+
+    def __enter__(self) -> None:
+        self._was = rich.get_console().quiet
+        rich.get_console().quiet = True
+
+    def __exit__(self, *_: object) -> None:
+        rich.get_console().quiet = self._was
