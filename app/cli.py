@@ -7,7 +7,7 @@ import sys
 from typing import Annotated
 
 import tyro
-from pipeline.calibration.distance import CalibrationError
+from pipeline.calibration.distance import TooFewPairs
 
 from app.commands.bench import Bench
 from app.commands.calibrate import CalibrateDistance
@@ -20,15 +20,16 @@ from pipeline.sources.base import SourceError
 from pipeline.vision.detector import DetectorError, DetectorMissing
 from pipeline.vision.models import ModelError
 
-BAD_INPUT = (SourceError, ParamsError, DetectorMissing, DetectorError, ModelError, CalibrationError)
+BAD_INPUT = (SourceError, ParamsError, DetectorMissing, DetectorError, ModelError, TooFewPairs)
 
+Calibrate = Annotated[CalibrateDistance, tyro.conf.subcommand("distance")]
 Command = (
     Annotated[Demo, tyro.conf.subcommand("demo")]
     | Annotated[Serve, tyro.conf.subcommand("serve")]
     | Annotated[Run, tyro.conf.subcommand("run")]
-    | Annotated[Models, tyro.conf.subcommand("models")]
+    | Annotated[Models, tyro.conf.subcommand("models", description="Networks: list, pull, register.")]
     | Annotated[ListParams, tyro.conf.subcommand("params")]
-    | Annotated[CalibrateDistance, tyro.conf.subcommand("calibrate")]
+    | Annotated[Calibrate, tyro.conf.subcommand("calibrate", description="Fit the line to another car or camera.")]
     | Annotated[Bench, tyro.conf.subcommand("bench")]
 )
 

@@ -10,10 +10,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from app.options import LineOptions, SourceOptions
+from app.progress import frames_progress
 from pipeline.results import write_line
 from pipeline.run import run
 from pipeline.types import Result
@@ -49,8 +48,8 @@ class Run:
             if self.rrd is not None:
                 from app.views.rerun_view import RerunSink  # half a second to import: only who asks pays
 
-                replay = stack.enter_context(RerunSink(self.rrd))
-            bar = stack.enter_context(_progress())
+                replay = stack.enter_context(RerunSink(self.rrd, source.title, params.alignment))
+            bar = stack.enter_context(frames_progress())
             task = bar.add_task(source.title, total=len(source))
             for frame, result in run(source, params, detector, self.sensors):
                 if out is not None:
@@ -63,12 +62,6 @@ class Run:
                 bar.advance(task)
         print(tally.sentence(), file=sys.stderr)
         return 0
-
-
-def _progress() -> Progress:
-    """On standard error, so that results can go to standard output."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    return Progress(*columns, console=Console(stderr=True), transient=True)
 
 
 def _sentence(result: Result) -> str:

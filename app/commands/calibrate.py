@@ -1,0 +1,51 @@
+"""`cipv calibrate distance`: the paper's regression from box height to distance, repeated for another camera."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Literal
+
+import yaml
+from rich.console import Console
+from rich.table import Table
+
+from app.options import LineOptions, SourceOptions, picture_size
+from pipeline.calibration.distance import as_overrides, collect_pairs, fit_laws
+from pipeline.vision.detector import open_detector
+
+
+@dataclass(frozen=True)
+class CalibrateDistance:
+    """Fit d = a·h^b, class by class, to a recording's own detections.
+
+    Example: cipv calibrate distance astyx:../shared/data/astyx --out law.yaml
+    """
+
+    source: SourceOptions
+    line: LineOptions = field(default_factory=LineOptions)
+    truth: Literal["labels", "lidar"] = "labels"
+    """Where the true distances come from: labelled cuboids, or the LiDAR's own boxes (no labels needed)"""
+    out: Path | None = None
+    """Write a preset file for `cipv run --params`"""
+    json: bool = False
+    """Print the laws and their figures as JSON"""
+
+    def __call__(self) -> int:
+        params = self.line.parameters()
+        source = self.source.open()
+        detector = open_detector(self.line.detector, picture_size(source))
+        fits = fit_laws(collect_pairs(source, detector, self.truth, params))
+        if self.json:
+            print(json.dumps({label: asdict(fit) for label, fit in fits.items()}, indent=1))
+        else:
+            table = Table("class", "a", "b", "pairs", "mean error", "90 % below", title="d = a · h^b")
+            for label, fit in fits.items():
+                numbers = (f"{fit.law.coefficient:.1f}", f"{fit.law.exponent:.3f}", str(fit.pairs))
+                shares = (f"{100 * fit.mean_relative_error:.1f} %", f"{100 * fit.p90_relative_error:.1f} %")
+                table.add_row(label, *numbers, *shares)
+            Console().print(table)
+        if self.out is not None:
+            self.out.write_text(yaml.safe_dump(as_overrides(fits), sort_keys=False), encoding="utf-8")
+        return 0

@@ -1,0 +1,68 @@
+"""The real drives that accuracy is judged on, and running them once for all tests that look at them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from pipeline.evaluation.lead import Judged, LeadRule, judge
+from pipeline.params import preset, with_changes
+from pipeline.run import Sensors, run
+from pipeline.sources import open_source
+from pipeline.types import Result
+from pipeline.vision.detector import open_detector
+
+SCORED_CLIPS = {
+    "lead near 20 m": range(60, 69),
+    "following at 22–24 m": range(183, 193),
+    "closing from 32 to 23 m": range(414, 426),
+}
+"""Astyx frames whose lead is judged; 057–059 are a lane change whose lead is half outside the corridor."""
+EMPTY_CLIP = range(47, 52)
+"""Astyx frames with nothing in path nearer than 70 m."""
+RULE = LeadRule()
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A recording's results, and its verdicts where it is labelled, by frame name."""
+
+    results: dict[str, Result]
+    judged: dict[str, Judged]
+
+    def clip(self, numbers: range) -> list[Judged]:
+        """The verdicts of Astyx frames by number."""
+        return [self.judged[f"{number:06d}"] for number in numbers]
+
+
+@cache
+def drive(
+    folder: Path,
+    kind: str,
+    preset_name: str = "default",
+    sensors: Sensors = "both",
+    changes: tuple[tuple[str, float], ...] = (),
+) -> Drive:
+    """Run a recording of the data folder with YOLOX-nano. ``changes``: dotted parameters on top of the preset."""
+    name = {"astyx": "astyx", "kitti": "kitti_0052"}[kind]
+    source = open_source(f"{kind}:{folder / name}")
+    params = with_changes(preset(preset_name), dict(changes))
+    picture = source.frame(0).picture
+    assert picture is not None
+    size = (picture.bgr.shape[1], picture.bgr.shape[0])
+    detector = open_detector(str(folder / "models" / "yolox_nano.onnx"), size)
+    results, judged = {}, {}
+    for frame, result in run(source, params, detector, sensors):
+        results[frame.name] = result
+        truth = source.truth(frame.index)
+        if truth is not None:
+            judged[frame.name] = judge(result, truth, RULE)
+    return Drive(results, judged)
+
+
+def all_scored(of: Drive) -> Iterator[Judged]:
+    """The 31 frames of the three clips."""
+    for numbers in SCORED_CLIPS.values():
+        yield from of.clip(numbers)

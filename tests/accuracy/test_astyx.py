@@ -1,0 +1,66 @@
+"""A real VLP-16 and a real camera: the lead is the labelled one, and its distance is right."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.calibration.distance import Pair, collect_pairs, fit_laws
+from pipeline.evaluation.lead import score
+from pipeline.sources import open_source
+from pipeline.vision.detector import open_detector
+from tests.accuracy.drives import EMPTY_CLIP, SCORED_CLIPS, all_scored, drive
+
+ALL_CLIPS = (range(47, 52), range(57, 69), range(183, 193), range(414, 426))
+
+
+@pytest.fixture(scope="module")
+def pairs(data_dir: Path) -> tuple[Pair, ...]:
+    """Every detected vehicle of the recording with its labelled depth."""
+    source = open_source(f"astyx:{data_dir / 'astyx'}")
+    detector = open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (2048, 618))
+    return collect_pairs(source, detector)
+
+
+def test_the_labelled_lead_is_the_cipv(data_dir: Path) -> None:
+    total = score(all_scored(drive(data_dir, "astyx")))
+    assert total.frames == 31
+    assert total.correct >= 30
+    assert total.mean_error_m is not None
+    assert total.mean_error_m < 0.5
+
+
+def test_no_lead_is_made_up_on_an_empty_road(data_dir: Path) -> None:
+    """A car 71–81 m ahead in the next lane, and nothing else."""
+    results = drive(data_dir, "astyx").results
+    for number in EMPTY_CLIP:
+        lead = results[f"{number:06d}"].cipv
+        assert lead is None or lead.distance_m > 60.0, (number, lead)
+
+
+@pytest.mark.parametrize("clip", SCORED_CLIPS, ids=lambda name: name)
+def test_camera_alone_estimates_distance_with_a_law_fitted_elsewhere(
+    clip: str, data_dir: Path, pairs: tuple[Pair, ...]
+) -> None:
+    """The law is fitted on the other clips only."""
+    own = next(numbers for numbers in ALL_CLIPS if SCORED_CLIPS[clip][0] in numbers)
+    law = fit_laws(pair for pair in pairs if int(pair.frame) not in own)["car"].law
+    changes = (("distance.coefficient", law.coefficient), ("distance.exponent", law.exponent))
+    total = score(drive(data_dir, "astyx", sensors="camera", changes=changes).clip(SCORED_CLIPS[clip]))
+    assert total.mean_relative_error is not None
+    assert total.mean_relative_error <= 0.12
+
+
+def test_default_beats_paper_to_be_the_default(data_dir: Path) -> None:
+    default, paper = (score(all_scored(drive(data_dir, "astyx", name))) for name in ("default", "paper"))
+    assert default.correct >= paper.correct
+    assert default.mean_error_m is not None
+    assert paper.mean_error_m is None or default.mean_error_m <= paper.mean_error_m
+
+
+@pytest.mark.parametrize("sensors", ["lidar", "camera"])
+def test_fused_is_never_worse_than_one_sensor(data_dir: Path, sensors: str) -> None:
+    fused = score(all_scored(drive(data_dir, "astyx")))
+    alone = score(all_scored(drive(data_dir, "astyx", sensors=sensors)))  # type: ignore[arg-type]
+    assert fused.correct >= alone.correct
