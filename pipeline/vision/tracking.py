@@ -122,33 +122,31 @@ def _predict_place(followed: Followed, dt_s: float, params: VisionTrackingParams
 def _match(
     expected: list[Followed], measurements: tuple[VisionMeasurement, ...], params: VisionTrackingParams
 ) -> dict[int, int]:
-    """Index of followed object → index of measurement: the one-to-one choice of least total centre distance, in gates,
-    among pairs that pass every gate. As many pairs as possible come first, then the distance."""
+    """Index of followed object → index of measurement: the one-to-one choice of least total cost, where leaving a pair
+    apart costs as much as a pair at its gate. (Making as many pairs as possible would shift a whole row of cars by one
+    when the first leaves the picture.)"""
     if not expected or not measurements:
         return {}
     cost = np.array([[_cost(followed, seen, params) for seen in measurements] for followed in expected])
-    possible = np.isfinite(cost)
-    forbidden = float(min(cost.shape)) + 1.0
-    rows, columns = linear_sum_assignment(np.where(possible, cost, forbidden))
-    return {int(row): int(column) for row, column in zip(rows, columns, strict=True) if possible[row, column]}
+    rows, columns = linear_sum_assignment(np.minimum(cost, 1.0))
+    return {int(row): int(column) for row, column in zip(rows, columns, strict=True) if cost[row, column] < 1.0}
 
 
 def _cost(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> float:
-    """Distance of the centres in gates, infinite where the two cannot be one object."""
+    """How unlike a box is to the one expected: 0 the same, 1 at the gate, infinite for another kind of object.
+
+    queue: distance of the centres (print: of the half widths). kalman: also how much the width changed."""
     old, new = followed.track.bbox, seen.detection.bbox
-    if (followed.track.label in VEHICLES) != (seen.detection.label in VEHICLES):
+    labels = (followed.track.label, seen.detection.label)
+    if labels[0] != labels[1] and not VEHICLES.issuperset(labels):
         return math.inf
-    if followed.track.label not in VEHICLES and followed.track.label != seen.detection.label:
-        return math.inf
-    gate_px = params.gate_px
-    if params.filter == "kalman":
-        growth = min(max(followed.unseen_s / _NOMINAL_DT_S, 1.0), _MAX_GROWTH)
-        gate_px = max(gate_px, params.gate_sizes * _width(old)) * growth
-        ratio = max(_width(old), 1.0) / max(_width(new), 1.0)
-        if max(ratio, 1.0 / ratio) > params.max_size_ratio:
-            return math.inf
-    share = math.dist(_centre(old), _centre(new)) / gate_px
-    return share if share <= 1.0 else math.inf
+    moved_px = math.dist(_centre(old), _centre(new))
+    if params.filter == "queue":
+        return moved_px / params.gate_px
+    growth = min(max(followed.unseen_s / _NOMINAL_DT_S, 1.0), _MAX_GROWTH)
+    moved = moved_px / (max(params.gate_px, params.gate_sizes * _width(old)) * growth)
+    resized = abs(math.log(max(_width(new), 1.0) / max(_width(old), 1.0))) / math.log(params.max_size_ratio)
+    return math.hypot(moved, resized)
 
 
 def _new(track_id: int, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
