@@ -7,7 +7,6 @@ import sys
 from typing import Annotated
 
 import tyro
-from pipeline.calibration.distance import TooFewPairs
 
 from app.commands.bench import Bench
 from app.commands.calibrate import CalibrateDistance
@@ -15,6 +14,7 @@ from app.commands.models import Models
 from app.commands.params import ListParams
 from app.commands.run import Run
 from app.commands.serve import Demo, Serve
+from pipeline.calibration.distance import TooFewPairs
 from pipeline.params import ParamsError
 from pipeline.sources.base import SourceError
 from pipeline.vision.detector import DetectorError, DetectorMissing
