@@ -69,6 +69,7 @@ class BoxParams(Section):
         "l_shape", "axis_aligned: sides along ego x and y; l_shape: the turn whose sides lie closest to the points"
     )
     yaw_step_deg: float = _slider(2.0, 0.5, 10.0, 0.5, "°", "Step of the search for the best turn")
+    ground_gap_m: float = _slider(1.2, 0.0, 3.0, 0.1, "m", "A cluster whose lowest point is nearer the ground stands on it")
 
 
 class LidarTrackingParams(Section):

@@ -1,0 +1,27 @@
+"""Per-channel down-sampling (paper, Point Cloud Segmentation: "down-sampling … points of each channel")."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.params import DownsampleParams
+from pipeline.types import Sweep
+
+Mask = npt.NDArray[np.bool_]
+
+
+def keep_mask(sweep: Sweep, params: DownsampleParams) -> Mask:
+    """(N,) bool: the first and then every ``keep_every``-th point of each channel, in the order of the sweep.
+
+    Counting is per channel, so every ring is thinned alike whatever order the points come in.
+    """
+    count = len(sweep.ring)
+    if params.keep_every == 1:
+        return np.ones(count, dtype=np.bool_)
+    by_ring = np.argsort(sweep.ring, kind="stable")
+    sorted_ring = sweep.ring[by_ring]
+    place_in_ring = np.arange(count) - np.searchsorted(sorted_ring, sorted_ring, side="left")
+    keep = np.empty(count, dtype=np.bool_)
+    keep[by_ring] = place_in_ring % params.keep_every == 0
+    return keep
