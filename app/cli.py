@@ -14,13 +14,14 @@ from app.commands.models import Models
 from app.commands.params import ListParams
 from app.commands.run import Run
 from app.commands.serve import Demo, Serve
+from app.server import PortTaken
 from pipeline.calibration.distance import TooFewPairs
 from pipeline.params import ParamsError
 from pipeline.sources.base import SourceError
 from pipeline.vision.detector import DetectorError, DetectorMissing
 from pipeline.vision.models import ModelError
 
-BAD_INPUT = (SourceError, ParamsError, DetectorMissing, DetectorError, ModelError, TooFewPairs)
+BAD_INPUT = (SourceError, ParamsError, DetectorMissing, DetectorError, ModelError, TooFewPairs, PortTaken)
 
 Calibrate = Annotated[CalibrateDistance, tyro.conf.subcommand("distance")]
 Command = (

@@ -1,0 +1,44 @@
+"""`cipv bench`: how fast each stage is, against what a user would take instead, in the same run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from app.bench.suite import run_all
+from app.options import LineOptions
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Time the stages and their peers, interleaved in one process. Ends within 45 s.
+
+    Example: cipv bench --json > bench.json
+    """
+
+    line: LineOptions = field(default_factory=LineOptions)
+    json: bool = False
+    """Print the figures as JSON"""
+
+    def __call__(self) -> int:
+        figures = run_all(self.line.parameters(), self.line.detector)
+        if self.json:
+            print(json.dumps(figures, indent=1))
+        else:
+            Console().print(_table(figures))
+        return 0
+
+
+def _table(figures: dict[str, dict[str, Any]]) -> Table:
+    table = Table("stage", "median ms", "p99 ms", "peer", "median ms", "times faster", title="cipv bench")
+    for stage, row in figures.items():
+        peers = list(row["peers"].items()) or [("", None)]
+        for n, (name, peer) in enumerate(peers):
+            own = (stage, f"{row['median_ms']:.3f}", f"{row['p99_ms']:.3f}") if n == 0 else ("", "", "")
+            other = (f"{peer['median_ms']:.2f}", f"{peer['ratio']:.1f} ×") if peer else ("", "")
+            table.add_row(*own, name, *other)
+    return table

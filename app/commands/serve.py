@@ -1,0 +1,91 @@
+"""`cipv serve` and `cipv demo`: the dashboard."""
+
+from __future__ import annotations
+
+import webbrowser
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+import tyro
+
+from app.engine import Engine
+from app.options import LineOptions
+from app.scene_feed import SceneFeed
+from app.server import DEFAULT_PORT, serve
+from pipeline.sources import open_source
+from pipeline.vision.detector import open_detector
+
+
+@dataclass(frozen=True)
+class ServerOptions:
+    """Where the dashboard listens."""
+
+    host: str = "127.0.0.1"
+    """Address to listen on"""
+    port: int | None = None
+    """Port to listen on; without one, the first free from 8420 on"""
+    allow_host: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
+    """Another name this server may be called by (repeatable)"""
+    browser: bool = False
+    """Open a browser once the dashboard answers"""
+
+    def serve(self, engine: Engine) -> int:
+        """Until Ctrl-C."""
+        on_ready: Callable[[str], None] | None = webbrowser.open if self.browser else None  # type: ignore[assignment]
+        with SceneFeed(engine) as feed:
+            serve(
+                engine,
+                host=self.host,
+                port=DEFAULT_PORT if self.port is None else self.port,
+                strict_port=self.port is not None,
+                hosts=self.allow_host,
+                viser_port=lambda: feed.port,
+                on_ready=on_ready,
+            )
+        return 0
+
+
+@dataclass(frozen=True)
+class Serve:
+    """Open the dashboard on a recording.
+
+    Example: cipv serve astyx:../shared/data/astyx --port 8420
+    """
+
+    source: tyro.conf.Positional[str]
+    """What to open: astyx:<dir>, kitti:<dir> or sim:straight"""
+    server: ServerOptions = field(default_factory=ServerOptions)
+    line: LineOptions = field(default_factory=LineOptions)
+    sensors: Literal["lidar", "camera", "both"] = "both"
+    """Ablation: what a car with only this sensor would believe"""
+    rings: int = 16
+    """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
+
+    def __call__(self) -> int:
+        params = self.line.parameters()
+        open_source(self.source, rings=self.rings)  # a typing mistake is said here, not on the page
+        engine = Engine(
+            lambda uri: open_source(uri, rings=self.rings),
+            lambda size: open_detector(self.line.detector, size),
+            params,
+            preset=self.line.preset,
+            uri=self.source,
+            sensors=self.sensors,
+            playing=True,
+        )
+        return self.server.serve(engine)
+
+
+@dataclass(frozen=True)
+class Demo:
+    """Open the dashboard on a simulated drive; nothing else is needed.
+
+    Example: cipv demo
+    """
+
+    server: ServerOptions = field(default_factory=ServerOptions)
+    line: LineOptions = field(default_factory=LineOptions)
+
+    def __call__(self) -> int:
+        return Serve("sim:straight", self.server, self.line)()

@@ -1,0 +1,70 @@
+"""Keeps the 3D view up to date with the engine, on a thread of its own, newest frame only."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from app.engine import Engine
+from app.snapshot import Snapshot
+from app.views.viser_view import ViserView
+from pipeline.params import ParamsError, with_changes
+
+
+class SceneFeed:
+    """Draws the engine's newest snapshot in viser. While one is drawn, older ones that wait are dropped: the 3D view may
+    be slower than the line, but never behind it. Use it in a ``with`` block."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._engine = engine
+        self._view = ViserView(engine.snapshot.params, self._moved)
+        self._condition = threading.Condition()
+        self._newest: Snapshot | None = None
+        self._ended = False
+        self._thread = threading.Thread(target=self._work, name="cipv-scene", daemon=True)
+
+    @property
+    def port(self) -> int:
+        """Where viser listens, on loopback."""
+        return self._view.port
+
+    def __enter__(self) -> SceneFeed:
+        self._stop_listening = self._engine.listen(self._offer)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop_listening()
+        with self._condition:
+            self._ended = True
+            self._condition.notify()
+        self._thread.join()
+        self._view.close()
+
+    def _offer(self, snapshot: Snapshot) -> None:
+        with self._condition:
+            self._newest = snapshot
+            self._condition.notify()
+
+    def _moved(self, name: str, value: Any) -> None:
+        """A slider in the 3D view was moved. viser's own bounds are the schema's, so only a race can be refused."""
+        control = self._engine.control
+        try:
+            control.set_params(with_changes(control.peek().params, {name: value}))
+        except ParamsError:
+            self._view.set_params(control.peek().params)
+
+    def _work(self) -> None:
+        drawn: Snapshot | None = None
+        while True:
+            with self._condition:
+                self._condition.wait_for(lambda: self._ended or self._newest is not None)
+                if self._ended:
+                    return
+                newest, self._newest = self._newest, None
+            assert newest is not None
+            if drawn is None or newest.params is not drawn.params:
+                self._view.set_params(newest.params)
+            if newest.tick is not None and (drawn is None or newest.tick is not drawn.tick):
+                self._view.show(newest.tick.frame, newest.tick.result)
+            drawn = newest

@@ -1,0 +1,132 @@
+"""The whole line on a small scene: the same inputs give the same bytes, and a missing branch never stops it."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+
+import numpy as np
+import pytest
+
+from pipeline.params import Params, preset, with_changes
+from pipeline.results import write_line
+from pipeline.sources import open_source
+from pipeline.step import State, step
+from pipeline.types import Frame, RawBoxes, Result
+
+
+@pytest.fixture(scope="module")
+def frames() -> list[Frame]:
+    """Eight simulated frames with boxes where a detector that sees everything would put them."""
+    source = open_source("sim:straight")
+    return [dataclasses.replace(source.frame(i), raw_boxes=_perfect_boxes(source, i)) for i in range(8)]
+
+
+def _perfect_boxes(source: object, index: int) -> RawBoxes:
+    from pipeline.alignment import project_cuboid, resolve
+
+    frame, truth = source.frame(index), source.truth(index)  # type: ignore[attr-defined]
+    aligned = resolve(Params().alignment, frame.camera)
+    assert aligned is not None
+    ahead = [item for item in truth if item.cuboid.center[0] > 5.0]
+    found = [
+        (project_cuboid(aligned, item.cuboid.corners(), frame.camera.width, frame.camera.height), item.label)
+        for item in ahead
+    ]
+    kept = [(box, label) for box, label in found if box is not None]
+    boxes = np.array([box for box, _ in kept], np.float32).reshape(-1, 4)
+    return RawBoxes("perfect", boxes, np.full(len(kept), 0.9, np.float32), tuple(label for _, label in kept))
+
+
+def drive(frames: list[Frame], params: Params) -> list[Result]:
+    state, results = State(), []
+    for frame in frames:
+        state, result = step(state, frame, params)
+        results.append(result)
+    return results
+
+
+def as_bytes(results: list[Result]) -> bytes:
+    out = io.StringIO()
+    for result in results:
+        write_line(out, dataclasses.replace(result, timing_ms={}))
+    return out.getvalue().encode()
+
+
+@pytest.mark.parametrize("name", ["default", "paper"])
+def test_the_same_input_twice_gives_the_same_bytes(frames: list[Frame], name: str) -> None:
+    first, second = (as_bytes(drive(frames, preset(name))) for _ in range(2))
+    assert first == second
+    assert as_bytes(drive(frames, with_changes(preset(name), {"path.half_width_m": 0.6}))) != first
+
+
+def test_a_frame_can_be_run_again_from_the_state_before_it(frames: list[Frame]) -> None:
+    """What a slider on a paused frame does: nothing that happened in between leaves a trace."""
+    state = State()
+    for frame in frames[:-1]:
+        state, _ = step(state, frame, Params())
+    _, first = step(state, frames[-1], Params())
+    step(state, frames[-1], with_changes(Params(), {"cluster.tolerance_m": 2.5, "fusion.min_iou": 0.9}))
+    _, again = step(state, frames[-1], Params())
+    assert as_bytes([again]) == as_bytes([first])
+
+
+def test_the_lead_is_found_by_both_sensors(frames: list[Frame]) -> None:
+    last = drive(frames, Params())[-1]
+    assert last.cipv is not None
+    lead = next(item for item in last.objects if item.id == last.cipv.id)
+    assert last.acc is not None
+    assert lead.label in ("car", "truck")
+
+
+@pytest.mark.parametrize(
+    ("missing", "kinds"),
+    [
+        pytest.param({"raw_boxes": None, "picture": None}, {"L"}, id="camera lost: LiDAR goes on alone"),
+        pytest.param({"sweep": None}, {"V"}, id="LiDAR lost: the camera goes on alone"),
+        pytest.param({"sweep": None, "raw_boxes": None, "picture": None}, set(), id="both lost"),
+        pytest.param({"camera": None}, {"L", "V"}, id="no calibration: nothing can be joined"),
+    ],
+)
+def test_a_missing_branch(frames: list[Frame], missing: dict[str, None], kinds: set[str]) -> None:
+    results = drive([dataclasses.replace(frame, **missing) for frame in frames], Params())
+    assert {item.source for result in results for item in result.objects} == kinds
+
+
+def test_a_sensor_lost_midway_is_carried_and_says_so(frames: list[Frame]) -> None:
+    hurt = [*frames[:5], dataclasses.replace(frames[5], sweep=None, notes=("LiDAR: file missing",))]
+    last = drive(hurt, Params())[-1]
+    carried = [item for item in last.objects if item.lidar_track is not None]
+    assert carried
+    assert all(item.carried for item in carried)
+    assert last.sensors.lidar_age_ms is None
+    assert last.notes == ("LiDAR: file missing",)
+
+
+def test_no_ego_state_no_speed_over_ground_and_no_pedals(frames: list[Frame]) -> None:
+    last = drive([dataclasses.replace(frame, ego=None) for frame in frames], Params())[-1]
+    assert last.acc is None
+    assert all(item.speed_over_ground_mps is None and item.moving is None for item in last.objects)
+
+
+def test_after_a_gap_every_tracker_starts_anew_and_no_number_is_used_twice(frames: list[Frame]) -> None:
+    later = [dataclasses.replace(frame, t_ns=frame.t_ns + 60_000_000_000) for frame in frames[:2]]
+    results = drive([*frames[:4], *later], Params())
+    before = {item.id for result in results[:4] for item in result.objects}
+    after = {item.id for item in results[4].objects}
+    assert after
+    assert not before & after
+    assert all(item.hits == 1 for item in results[4].objects)
+
+
+def test_time_running_backwards_starts_anew(frames: list[Frame]) -> None:
+    results = drive([frames[3], frames[2]], Params())
+    assert all(item.hits == 1 for item in results[1].objects)
+
+
+def test_every_point_is_accounted_for(frames: list[Frame]) -> None:
+    for result in drive(frames, with_changes(Params(), {"downsample.keep_every": 2})):
+        kind = result.layers.kind
+        assert len(kind) == len(result.layers.points)
+        assert {-3, -1} <= set(np.unique(kind))
+        assert kind.max() == len(result.layers.obstacles) - 1
