@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import cv2
@@ -15,7 +16,7 @@ from app.views.colors import Rgb, rgb
 from pipeline.geometry import F64, inverse, transform
 from pipeline.types import Frame, FusedObject, Path, Point3
 
-_PICTURE_DISTANCE_M = 4.0
+_PICTURE_DISTANCE_M = 2.0
 _PICTURE_WIDTH_PX = 640
 _LABEL_LIFT_M = 0.5
 _FLAT_LABEL_LIFT_M = 1.2
@@ -54,7 +55,7 @@ def lines(scene: viser.SceneApi, name: str, strokes: Strokes, width_px: float) -
     if not strokes.parts:
         return _hide(scene, name)
     counts = [len(part) for part in strokes.parts]
-    colors = np.repeat(np.asarray(strokes.colors, dtype=np.uint8), counts, axis=0)
+    colors = np.repeat(_linear(strokes.colors), counts, axis=0)
     both_ends = np.repeat(colors[:, None, :], 2, axis=1)
     scene.add_line_segments(
         name, np.concatenate(strokes.parts), both_ends, thickness=width_px, thickness_units="screen"
@@ -178,6 +179,13 @@ def picture(scene: viser.SceneApi, frame: Frame, wanted: bool) -> None:
     rays = np.stack([np.broadcast_to(eye, ring.shape), ring], axis=1)
     frame_lines = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
     lines(scene, "/camera/edges", Strokes([rays, frame_lines], [rgb("vision")] * 2), 1.0)
+
+
+def _linear(colors: Sequence[Rgb]) -> outlines.U8:
+    """sRGB to linear light: the client takes the colours of a line's ends as linear, and would show them pale."""
+    level = np.asarray(colors, dtype=np.float64) / 255.0
+    light = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
+    return np.rint(light * 255.0).astype(np.uint8)
 
 
 def _segments(line: F64) -> F64:

@@ -133,3 +133,9 @@ def frame() -> Frame:
 @pytest.fixture
 def result() -> Result:
     return make_result()
+
+
+@pytest.fixture
+def frames() -> list[tuple[Frame, Result]]:
+    """Three ticks, 0.1 s apart."""
+    return [(make_frame(index), make_result(index)) for index in range(3)]
