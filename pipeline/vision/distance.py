@@ -24,7 +24,7 @@ from pipeline.types import Box, CameraCalibration, Detection, VisionMeasurement
 BIN_M, BIN_LOW_M, BIN_HIGH_M = 10.0, 5.0, 60.0
 _BORDER_PX = 1.0
 _NEAREST_M = 0.5
-_STEPS = 3
+_STEPS = 2
 _HUBER = 1.345
 """Residuals beyond this many standard deviations weigh less: 95 % efficiency on clean data (Huber 1981, section 4)."""
 _ROUNDS = 30
@@ -141,14 +141,19 @@ def range_at_depth(pixels: F64, depth_m: F64, alignment: Alignment, camera: Came
     """(N,) horizontal ranges from the ego origin of the points on (N, 2) pixels' rays that lie ``depth_m`` (N,) along
     the optical axis (along ego x for a camera without calibration). NaN where that point is not ahead.
 
-    Depth is linear in range but for the few decimetres between the mounts, so rescaling converges at once.
+    Depth is linear in range but for the few decimetres between the mounts, so Newton's method is there in two steps.
     """
+
+    def depth_at(ranges_m: F64) -> F64:
+        points = alignment.unproject(pixels, ranges_m)
+        return transform(camera.T_camera_ego, points)[:, 2] if camera is not None else points[:, 0]
+
     range_m = np.where(depth_m > _NEAREST_M, depth_m, np.nan)
     for _ in range(_STEPS):
-        points = alignment.unproject(pixels, range_m)
-        depth = transform(camera.T_camera_ego, points)[:, 2] if camera is not None else points[:, 0]
-        range_m = np.where(depth > 0.0, range_m * depth_m / np.where(depth > 0.0, depth, 1.0), np.nan)
-    return range_m
+        here = depth_at(range_m)
+        slope = depth_at(range_m + 1.0) - here
+        range_m = np.where(slope > 0.0, range_m + (depth_m - here) / np.where(slope > 0.0, slope, 1.0), np.nan)
+    return np.where(range_m > _NEAREST_M, range_m, np.nan)
 
 
 def _depths(

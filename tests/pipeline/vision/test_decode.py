@@ -122,7 +122,9 @@ def test_known_boxes_come_back(name: str) -> None:
 def test_nothing_above_the_floor_is_empty(name: str) -> None:
     outputs, metadata, *_ = HEADS[name]
     boxes, scores, classes = pick_decoder(outputs, SIZE, metadata).decode(outputs, SIZE, 0.95)
-    assert boxes.shape == (0, 4) and scores.shape == (0,) and classes.shape == (0,)
+    assert boxes.shape == (0, 4)
+    assert scores.shape == (0,)
+    assert classes.shape == (0,)
 
 
 @pytest.mark.parametrize("name", HEADS)

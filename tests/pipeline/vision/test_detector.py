@@ -49,11 +49,13 @@ def test_a_bright_patch_is_found_where_it_is(tmp_path: Path, size: tuple[int | s
     detector = open_detector(str(networks.yolox(tmp_path / "tiny.onnx", size)), (512, 128))
     assert detector.input_size == (128, 512)
     raw = detector.detect(_road(128, 512, (320, 64)))
-    assert raw.labels[0] == "car" and raw.scores[0] == pytest.approx(1.0)
+    assert raw.labels[0] == "car"
+    assert raw.scores[0] == pytest.approx(1.0)
     centre = (raw.boxes[0, :2] + raw.boxes[0, 2:]) / 2
     assert np.all(np.abs(centre - (328, 72)) <= 8)
     assert raw.model == detector.name
-    assert (np.diff(raw.scores) <= 0).all() and raw.scores.min() >= FLOOR_SCORE
+    assert (np.diff(raw.scores) <= 0).all()
+    assert raw.scores.min() >= FLOOR_SCORE
 
 
 def test_boxes_are_scaled_back_to_the_picture(tmp_path: Path) -> None:
@@ -61,7 +63,9 @@ def test_boxes_are_scaled_back_to_the_picture(tmp_path: Path) -> None:
     raw = open_detector(path, None, input_size=(64, 128)).detect(_road(256, 512, (256, 128)))
     centre = (raw.boxes[0, :2] + raw.boxes[0, 2:]) / 2
     assert np.all(np.abs(centre - (264, 136)) <= 32)
-    assert raw.boxes[:, 0::2].max() <= 512 and raw.boxes[:, 1::2].max() <= 256 and raw.boxes.min() >= 0
+    assert raw.boxes[:, 0::2].max() <= 512
+    assert raw.boxes[:, 1::2].max() <= 256
+    assert raw.boxes.min() >= 0
 
 
 def test_a_graph_that_holds_its_size_keeps_it_and_says_so(tmp_path: Path) -> None:
@@ -110,12 +114,13 @@ def test_equal_files_and_sizes_have_equal_names(tmp_path: Path) -> None:
 def test_the_same_picture_gives_the_same_bytes(tmp_path: Path) -> None:
     path, picture = str(networks.yolox(tmp_path / "tiny.onnx")), _road(128, 512, (320, 64))
     first, second = (open_detector(path, (512, 128)).detect(picture) for _ in range(2))
-    assert first.boxes.tobytes() == second.boxes.tobytes() and first.scores.tobytes() == second.scores.tobytes()
+    assert first.boxes.tobytes() == second.boxes.tobytes()
+    assert first.scores.tobytes() == second.scores.tobytes()
 
 
 def test_without_a_network_the_remedy_is_named() -> None:
     for spec in (None, "nothing-here"):
-        with pytest.raises(DetectorMissing, match="cipv models pull yolox_nano.*--detector PATH"):
+        with pytest.raises(DetectorMissing, match=r"cipv models pull yolox_nano.*--detector PATH"):
             open_detector(spec, (1280, 720))
 
 
@@ -153,7 +158,8 @@ def test_the_real_network_finds_the_real_lead(data_dir: Path, monkeypatch: pytes
     monkeypatch.setenv("CIPV_DATA", str(data_dir))
     picture = cv2.imread(str(data_dir / "kitti_0052" / "image_02" / "0000000007.png"))
     detector = open_detector(None, (picture.shape[1], picture.shape[0]))
-    assert detector.input_size == (256, 832) and detector.notes == ()
+    assert detector.input_size == (256, 832)
+    assert detector.notes == ()
     best = select(detector.detect(picture), DetectionParams())[0]
     assert best.label == "car"
     np.testing.assert_allclose(best.bbox, (556, 185, 714, 335), atol=8)  # the recording's own label
