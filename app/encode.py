@@ -87,7 +87,8 @@ def encode_picture(picture: Picture) -> SentPicture:
     bgr, scale = picture.bgr, 1.0
     if width > MAX_WIDTH_PX:
         scale = MAX_WIDTH_PX / width
-        bgr = cv2.resize(bgr, (MAX_WIDTH_PX, round(height * scale)), interpolation=cv2.INTER_AREA)
+        small = cv2.resize(bgr, (MAX_WIDTH_PX, round(height * scale)), interpolation=cv2.INTER_AREA)
+        bgr = small.astype(np.uint8, copy=False)
     _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return SentPicture(jpeg.tobytes(), bgr.shape[1], bgr.shape[0], scale)
 

@@ -137,10 +137,11 @@ class _Pages(StaticFiles):
 
 
 def _palette() -> Response:
-    """The palette that all views share, as CSS custom properties for either theme."""
-    light = palette_css("light")
+    """The palette that all views share, as CSS custom properties for either theme. --picture-… are the shades to draw
+    over a photograph with, the same in both."""
+    dark, light = palette_css("dark"), palette_css("light")
     text = (
-        f":root {{\n{palette_css('dark')}\n}}\n"
+        f":root {{\n{dark}\n{dark.replace('--cipv-', '--picture-')}\n}}\n"
         f"@media (prefers-color-scheme: light) {{ :root:not([data-theme=dark]) {{\n{light}\n}} }}\n"
         f":root[data-theme=light] {{\n{light}\n}}\n"
     )

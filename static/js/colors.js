@@ -1,0 +1,42 @@
+/** Colours of roles, from the palette that all views share (/palette.css). */
+import { get } from "./store.js";
+
+const ROLE_OF_SOURCE = { L: "lidar", V: "vision", VL: "fused" };
+const cache = new Map();
+
+/** A role's colour for this theme. @param {string} role */
+export const color = (role) => read(`--cipv-${role}`);
+
+/** A role's colour over a photograph. @param {string} role */
+export const onPicture = (role) => read(`--picture-${role}`);
+
+/** A colour of the page itself. @param {string} name */
+export const ui = (name) => read(`--${name}`);
+
+export function forget() {
+  cache.clear();
+}
+
+function read(name) {
+  if (!cache.has(name)) cache.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim() || "#888");
+  return cache.get(name);
+}
+
+/** @param {import("./types.js").FusedObject} item @param {number|null} cipvId */
+export const roleOf = (item, cipvId) => (item.id === cipvId ? "cipv" : ROLE_OF_SOURCE[item.source]);
+
+/** The CIPV's id in the shown frame. */
+export const cipvId = () => get("frame")?.result.cipv?.id ?? null;
+
+/** Near is warm, far is cold; no green and no magenta, which mean something. */
+const STOPS = [[255, 86, 56], [255, 160, 30], [250, 226, 90], [150, 205, 255], [80, 120, 255], [90, 80, 200]];
+export const RANGE_STEPS = 32;
+export const RANGE_MAX_M = 70;
+
+/** `RANGE_STEPS` colours from 0 m to `RANGE_MAX_M`. */
+export const RANGE_COLORS = Array.from({ length: RANGE_STEPS }, (_, i) => {
+  const at = (Math.sqrt(i / (RANGE_STEPS - 1))) * (STOPS.length - 1);
+  const low = Math.min(Math.floor(at), STOPS.length - 2);
+  const mix = STOPS[low].map((c, k) => Math.round(c + (STOPS[low + 1][k] - c) * (at - low)));
+  return `rgb(${mix.join(" ")})`;
+});

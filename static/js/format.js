@@ -1,0 +1,28 @@
+/** Numbers as people read them. What is unknown is a dash. */
+
+export const DASH = "–";
+
+/** @param {number|null|undefined} value */
+export function num(value, digits = 1) {
+  return value === null || value === undefined ? DASH : value.toFixed(digits).replace(/^-(?=0(\.0*)?$)/, "").replace("-", "−");
+}
+
+export function signed(value, digits = 1) {
+  const text = num(value, digits);
+  return value > 0 && Number(value.toFixed(digits)) !== 0 ? `+${text}` : text;
+}
+
+/** m/s → km/h */
+export const kmh = (mps) => (mps === null || mps === undefined ? null : mps * 3.6);
+
+/** Seconds as m:ss.s */
+export function clock(seconds) {
+  const minutes = Math.floor(seconds / 60);
+  return `${minutes}:${(seconds - 60 * minutes).toFixed(1).padStart(4, "0")}`;
+}
+
+/** Left or right of the path's centre, in metres: "1.2 L". */
+export function side(offset) {
+  if (offset === null || offset === undefined) return DASH;
+  return `${Math.abs(offset).toFixed(1)} ${offset >= 0 ? "L" : "R"}`;
+}

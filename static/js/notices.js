@@ -1,0 +1,47 @@
+/** What a person must know: a missing detector, degraded frames, a lost connection. */
+import { $, el, text } from "./dom.js";
+import { get, on } from "./store.js";
+
+const dismissed = new Set();
+let shown = "";
+
+export function setUp() {
+  on(["state", "frame", "link"], update);
+  setInterval(update, 1000);
+}
+
+function update() {
+  const link = get("link");
+  document.documentElement.dataset.link = link?.status ?? "connecting";
+  text($("#link"), { live: "live", lost: "connection lost", connecting: "connecting" }[link?.status ?? "connecting"]);
+  const busy = get("state")?.busy;
+  $("#busy").hidden = !busy;
+  text($("#busy"), busy ?? "");
+  const notices = [...lost(link), ...standing(), ...ofFrame()].filter(({ text: words }) => !dismissed.has(words));
+  const key = JSON.stringify(notices);
+  if (key === shown) return;
+  shown = key;
+  $("#notices").replaceChildren(...notices.map(notice));
+}
+
+function lost(link) {
+  if (link?.status !== "lost") return [];
+  const seconds = Math.round((Date.now() - link.since) / 1000);
+  return [{ level: "error", text: `Connection lost ${seconds} s ago. What you see is old; trying to reach the server again.`, fixed: true }];
+}
+
+const standing = () => get("state")?.notices ?? [];
+
+/** What the shown frame lacks; it goes with the frame. */
+function ofFrame() {
+  return (get("frame")?.result.notes ?? []).map((words) => ({ level: "warning", text: words, fixed: true }));
+}
+
+function notice({ level, text: words, fixed }) {
+  const close = () => {
+    dismissed.add(words);
+    update();
+  };
+  return el("div", { class: "notice", data: { level } }, el("b", { textContent: level }), el("span", { textContent: words }),
+    fixed ? null : el("button", { type: "button", textContent: "✕", aria: { label: "Dismiss" }, onclick: close }));
+}

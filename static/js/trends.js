@@ -1,0 +1,80 @@
+/**
+ * Strips of the CIPV's figures over the whole recording, from the frames this browser has seen. A value computed with
+ * older parameters is drawn fainter, so that before and after can be compared. A click goes to that place.
+ */
+import { playback } from "./api.js";
+import { color, ui } from "./colors.js";
+import { fitted } from "./dom.js";
+import { get, on, painter } from "./store.js";
+
+/** What each strip shows, and the least height of its scale. */
+const STRIPS = {
+  distance: { value: (cipv) => cipv.distance_m, low: 0, high: 40 },
+  closing: { value: (cipv) => (cipv.closing_speed_mps === null ? null : cipv.closing_speed_mps * 3.6), low: -10, high: 10 },
+  ttc: { value: (cipv) => (cipv.ttc_s === null ? null : Math.min(cipv.ttc_s, 20)), low: 0, high: 10 },
+};
+
+/** @type {Map<number, {cipv: import("./types.js").Cipv|null, revision: number}>} */
+const seen = new Map();
+let uri = null;
+
+export function setUp() {
+  on(["frame"], remember);
+}
+
+/** @param {keyof STRIPS} key @param {HTMLCanvasElement} canvas */
+export function addStrip(key, canvas) {
+  const draw = painter(() => drawStrip(key, canvas));
+  on(["frame", "theme"], draw);
+  new ResizeObserver(draw).observe(canvas);
+  canvas.addEventListener("click", (event) => {
+    const count = get("state")?.count ?? 0;
+    if (count) playback({ seek: Math.min(count - 1, Math.floor((event.offsetX / canvas.clientWidth) * count)) });
+  });
+}
+
+function remember() {
+  const { state, result } = get("frame");
+  if (state.uri !== uri) seen.clear();
+  uri = state.uri;
+  seen.set(state.index, { cipv: result.cipv, revision: state.params_revision });
+}
+
+function drawStrip(key, canvas) {
+  const { ctx, width, height } = fitted(canvas);
+  const frame = get("frame");
+  if (!frame || !width) return;
+  const { count, index, params_revision } = frame.state;
+  const { value, low, high } = STRIPS[key];
+  const samples = [...seen].sort(([a], [b]) => a - b).map(([at, { cipv, revision }]) => ({ at, value: cipv && value(cipv), revision, id: cipv?.id }));
+  const values = samples.map((s) => s.value).filter((v) => v !== null);
+  const bottom = Math.min(low, ...values), top = Math.max(high, ...values);
+  const X = (at) => ((at + 0.5) / count) * width;
+  const Y = (v) => height - 3 - ((v - bottom) / (top - bottom)) * (height - 6);
+  if (bottom < 0) line(ctx, 0, Y(0), width, Y(0), color("grid"));
+  const step = largestStep(samples);
+  ctx.lineWidth = 1.5;
+  for (let i = 0; i < samples.length; i++) {
+    const a = samples[i - 1], b = samples[i];
+    if (b.value === null) continue;
+    ctx.strokeStyle = ctx.fillStyle = color("cipv");
+    ctx.globalAlpha = b.revision === params_revision ? 0.95 : 0.35;
+    if (a && a.value !== null && a.id === b.id && b.at - a.at <= step) line(ctx, X(a.at), Y(a.value), X(b.at), Y(b.value));
+    else ctx.fillRect(X(b.at) - 1, Y(b.value) - 1, 2, 2);
+  }
+  ctx.globalAlpha = 1;
+  line(ctx, X(index), 0, X(index), height, ui("accent"));
+}
+
+/** Frames may have been skipped while playing: samples a few frames apart still belong together. */
+function largestStep(samples) {
+  return samples.length > 20 ? 4 : 2;
+}
+
+function line(ctx, x1, y1, x2, y2, style) {
+  if (style) ctx.strokeStyle = style;
+  ctx.beginPath();
+  ctx.moveTo(x1, y1);
+  ctx.lineTo(x2, y2);
+  ctx.stroke();
+}

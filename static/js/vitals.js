@@ -1,0 +1,38 @@
+/** How fresh and how fast: from result made to painted, frames painted a second, and what the stages took. */
+import { serverNow } from "./connection.js";
+import { $, el, text } from "./dom.js";
+import { num } from "./format.js";
+import { get, on } from "./store.js";
+
+const ITEMS = [
+  ["fps", "fps", "Frames painted in the last second", ""],
+  ["age", "age", "Milliseconds from the result made to the frame painted", ""],
+  ["line", "line", "Milliseconds that the stages took, without the network", "optional"],
+  ["net", "net", "Milliseconds of the network; 0 when its boxes were cached", "optional"],
+];
+const values = {};
+/** @type {number[]} */
+let painted = [];
+
+export function setUp() {
+  $("#vitals").append(...ITEMS.map(([key, label, title, className]) =>
+    el("div", { title, class: className }, el("dt", { textContent: label }), (values[key] = el("dd", { textContent: "–" })))));
+  on(["frame"], () => requestAnimationFrame(afterPaint));
+  setInterval(showRate, 500);
+}
+
+function afterPaint() {
+  const frame = get("frame");
+  painted.push(performance.now());
+  text(values.age, num(Math.max(0, serverNow() - frame.madeUnixMs), 0));
+  text(values.line, num(frame.result.timing_ms.total, 1));
+  text(values.net, num(frame.detectMs, 0));
+  const { timing_ms: stages } = frame.result;
+  $("#vitals").title = Object.entries(stages).map(([stage, ms]) => `${stage} ${num(ms, 2)} ms`).join("\n");
+}
+
+function showRate() {
+  const now = performance.now();
+  painted = painted.filter((t) => now - t < 1000);
+  text(values.fps, String(painted.length));
+}
