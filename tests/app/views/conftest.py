@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
 from dataclasses import MISSING, fields
+from typing import Any
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
+import viser
+import zstandard
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 from pipeline.geometry import Cuboid
 from pipeline.types import (
@@ -139,3 +147,93 @@ def result() -> Result:
 def frames() -> list[tuple[Frame, Result]]:
     """Three ticks, 0.1 s apart."""
     return [(make_frame(index), make_result(index)) for index in range(3)]
+
+
+class SceneClient:
+    """A browser's end of viser's protocol: collects what the server sends, and can move a slider.
+
+    Messages come as ``[8 bytes inner size][8 bytes packed size][zstd of msgpack][arrays]``.
+    """
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self.connection = connection
+        self.messages: list[dict[str, Any]] = []
+        self.largest = 0
+
+    def read_until(self, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """The first message that is wanted; TimeoutError when none comes."""
+        while True:
+            data = self.connection.recv(timeout=20)
+            assert isinstance(data, bytes)
+            self.largest = max(self.largest, len(data))
+            packed = data[16 : 16 + int.from_bytes(data[8:16], "little")]
+            batch = msgspec.msgpack.decode(zstandard.decompress(packed))["messages"]
+            self.messages += batch
+            found = next((each for each in batch if wanted(each)), None)
+            if found is not None:
+                return found
+
+    def read_present_state(self) -> None:
+        self.look()
+        self.read_until(lambda each: each["type"] == "ReplayDoneMessage")
+
+    def nodes(self) -> dict[str, bool]:
+        """Name and visibility of every scene node, after all messages so far."""
+        seen: dict[str, bool] = {}
+        for each in self.messages:
+            if each["type"] == "SetSceneNodeVisibilityMessage":
+                seen[each["name"]] = each["visible"]
+            elif each["type"] == "RemoveSceneNodeMessage":
+                seen.pop(each["name"], None)
+        return seen
+
+    def newest(self, name: str) -> dict[str, Any]:
+        """The newest message that made a node."""
+        return next(each for each in reversed(self.messages) if each.get("name") == name and "props" in each)
+
+    def texts(self) -> list[str]:
+        """The labels that are shown."""
+        return [
+            self.newest(name)["props"]["text"]
+            for name, shown in self.nodes().items()
+            if shown and name.startswith("/labels/")
+        ]
+
+    def inputs(self, label: str) -> list[dict[str, Any]]:
+        """Every input of the panel with this label, in the panel's order."""
+        return [each for each in self.messages if each.get("props", {}).get("label") == label]
+
+    def look(self) -> None:
+        """The browser's first word, its camera: only then does viser count it as somebody."""
+        pose = {"wxyz": (1.0, 0.0, 0.0, 0.0), "position": (-9.0, 0.0, 5.0), "look_at": (9.0, 0.0, 0.0)}
+        lens = {"fov": 1.2, "near": 0.01, "far": 1000.0, "image_height": 600, "image_width": 800}
+        self._send("ViewerCameraMessage", **pose, **lens, up_direction=(0.0, 0.0, 1.0))
+
+    def move(self, uuid: str, value: object) -> None:
+        """What the browser sends when a person moves a slider."""
+        self._send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
+
+    def _send(self, kind: str, **fields: Any) -> None:
+        self.connection.send(msgspec.msgpack.encode({"type": kind, **fields}))
+
+
+OpenScene = Callable[..., SceneClient]
+
+
+@pytest.fixture
+def open_scene() -> Iterator[OpenScene]:
+    """Connect to ``ws://127.0.0.1:<port><path>`` as viser's own page does."""
+    with ExitStack() as stack:
+
+        def opening(port: int, path: str = "", version: str = viser.__version__, **options: Any) -> SceneClient:
+            connection = connect(
+                f"ws://127.0.0.1:{port}{path}",
+                subprotocols=[Subprotocol(f"viser-v{version}")],
+                compression=None,
+                max_size=None,
+                proxy=None,
+                **options,
+            )
+            return SceneClient(stack.enter_context(connection))
+
+        yield opening

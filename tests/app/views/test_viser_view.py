@@ -1,0 +1,169 @@
+"""The 3D view as a browser sees it: what arrives, what stays, what goes, and what sliders do."""
+
+from __future__ import annotations
+
+import dataclasses
+import queue
+import socket
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.views.viser_gui import ParamsGui
+from app.views.viser_view import ViserView
+from pipeline.params import Params, with_changes
+from pipeline.types import Frame, Layers, Result
+
+Ticks = list[tuple[Frame, Result]]
+Changes = queue.Queue[tuple[str, Any]]
+PARTS = (
+    *("/points", "/cuboids", "/footprints", "/rays", "/velocities", "/cipv", "/path/ribbon", "/path/lines", "/grid"),
+    *("/ego", "/camera/picture", "/camera/edges", "/labels/0", "/labels/1"),
+)
+
+
+@pytest.fixture
+def changes() -> Changes:
+    return queue.Queue()
+
+
+@pytest.fixture
+def view(changes: Changes) -> Iterator[ViserView]:
+    view = ViserView(Params(), lambda name, value: changes.put((name, value)))
+    yield view
+    view.close()
+
+
+def test_who_joins_late_gets_the_present_picture(
+    view: ViserView, frame: Frame, result: Result, open_scene: Any
+) -> None:
+    view.show(frame, result)
+    client = open_scene(view.port)
+    client.read_present_state()
+    assert {name: True for name in PARTS}.items() <= client.nodes().items()
+    assert client.texts() == ["#7 car 19.9 m", "#9 truck 45.0 m carried"]
+    theme = next(each for each in client.messages if each["type"] == "ThemeConfigurationMessage")
+    assert (theme["dark_mode"], theme["show_share_button"]) == (True, False)
+
+
+def test_camera_starts_behind_and_above_the_ego_looking_forward(view: ViserView, open_scene: Any) -> None:
+    client = open_scene(view.port)
+    client.read_present_state()
+    of_type = {each["type"]: each for each in client.messages if each.get("initial")}
+    x, _, z = of_type["SetCameraPositionMessage"]["position"]
+    ahead, _, _ = of_type["SetCameraLookAtMessage"]["look_at"]
+    assert x < 0 < z
+    assert ahead > 0
+
+
+def test_what_vanishes_is_hidden(view: ViserView, frame: Frame, result: Result, open_scene: Any) -> None:
+    view.show(frame, result)
+    nothing = Layers(np.zeros((0, 4), np.float32), np.zeros(0, np.int32))
+    view.show(
+        dataclasses.replace(frame, sweep=None, picture=None),
+        dataclasses.replace(result, objects=(), cipv=None, layers=nothing),
+    )
+    client = open_scene(view.port)
+    client.read_present_state()
+    shown = {name for name, visible in client.nodes().items() if visible}
+    assert shown & set(PARTS) == {"/path/ribbon", "/path/lines", "/grid", "/ego"}
+    assert client.texts() == []
+
+
+def test_a_thousand_objects_later_a_late_browser_gets_no_more_than_at_first(
+    view: ViserView, frame: Frame, result: Result, open_scene: Any
+) -> None:
+    counts = []
+    for ids in (range(0, 2), range(2, 60)):
+        for tick in ids:
+            objects = tuple(dataclasses.replace(each, id=each.id + 20 * tick) for each in result.objects)
+            lead = dataclasses.replace(result.cipv, id=7 + 20 * tick)  # type: ignore[type-var]
+            view.show(frame, dataclasses.replace(result, objects=objects, cipv=lead))
+        client = open_scene(view.port)
+        client.read_present_state()
+        counts.append((len(client.messages), sorted(client.nodes())))
+    assert counts[0] == counts[1]
+
+
+def test_a_frame_shown_while_somebody_looks_arrives(view: ViserView, frames: Ticks, open_scene: Any) -> None:
+    client = open_scene(view.port)
+    client.read_present_state()
+    view.show(*frames[0])
+    client.read_until(lambda each: each.get("name") == "/points" and each["type"] == "PointCloudMessage")
+
+
+def test_a_slider_that_a_person_moves_is_heard_of_once(view: ViserView, changes: Changes, open_scene: Any) -> None:
+    client = open_scene(view.port)
+    client.read_present_state()
+    (slider,) = client.inputs("Z weight")
+    client.move(slider["uuid"], 0.25)
+    assert changes.get(timeout=20) == ("cluster.z_weight", 0.25)
+    assert changes.empty()
+
+
+def test_parameters_set_from_outside_reach_browsers_and_nobody_is_told(
+    view: ViserView, changes: Changes, open_scene: Any
+) -> None:
+    client = open_scene(view.port)
+    client.read_present_state()
+    (slider,) = client.inputs("Z weight")
+    view.set_params(with_changes(Params(), {"cluster.z_weight": 0.9, "cluster.front_only": False}))
+    update = client.read_until(lambda each: each["type"] == "GuiUpdateMessage" and each["uuid"] == slider["uuid"])
+    assert update["updates"] == {"value": 0.9}
+    client.move(slider["uuid"], 0.3)
+    assert changes.get(timeout=20) == ("cluster.z_weight", 0.3), "only the person's own move is told"
+
+
+def test_a_parameter_that_may_be_null_has_a_switch(view: ViserView, changes: Changes, open_scene: Any) -> None:
+    client = open_scene(view.port)
+    client.read_present_state()
+    (switch,) = client.inputs("H res deg (°/px) auto")
+    (slider,) = client.inputs("H res deg (°/px)")
+    assert (switch["value"], slider["props"]["disabled"]) == (True, True)
+    client.move(slider["uuid"], 0.05)
+    assert changes.get(timeout=20) == ("alignment.h_res_deg", 0.05)
+    client.move(switch["uuid"], True)
+    client.move(switch["uuid"], False)
+    client.read_until(lambda each: each.get("uuid") == slider["uuid"] and each.get("updates") == {"disabled": False})
+
+
+def test_every_parameter_has_an_input(view: ViserView) -> None:
+    declared = {f"{section}.{key}" for section, values in Params().model_dump().items() for key in values}
+    gui: ParamsGui = view._params
+    assert set(gui.names) == declared
+
+
+def test_display_choices_redraw_the_frame_that_is_shown(
+    view: ViserView, frame: Frame, result: Result, open_scene: Any
+) -> None:
+    view.show(frame, result)
+    client = open_scene(view.port)
+    client.read_present_state()
+    client.move(client.inputs("Point size (m)")[0]["uuid"], 0.3)
+    cloud = client.read_until(lambda each: each.get("name") == "/points" and "props" in each)
+    assert cloud["props"]["point_size"] == 0.3
+    client.move(client.inputs("Labels")[0]["uuid"], "all")
+    client.read_until(lambda each: each.get("name") == "/labels/2" and "props" in each)
+    assert client.texts() == ["#7 car 19.9 m", "#8 obstacle 15.9 m", "#9 truck 45.0 m carried"]
+    client.move(client.inputs("Camera picture")[0]["uuid"], False)
+    client.read_until(lambda each: each.get("name") == "/camera/picture" and each.get("visible") is False)
+
+
+def test_it_listens_on_loopback_only_and_a_taken_port_becomes_another(view: ViserView) -> None:
+    assert view._server.get_host() == "127.0.0.1"
+    second = ViserView(Params(), port=view.port)
+    try:
+        assert second.port != view.port
+    finally:
+        second.close()
+
+
+def test_closing_frees_the_port(capsys: pytest.CaptureFixture[str]) -> None:
+    view = ViserView(Params())
+    port = view.port
+    view.close()
+    with socket.socket() as probe:
+        assert probe.connect_ex(("127.0.0.1", port)) != 0
+    assert capsys.readouterr().out == "", "the address that people open is printed by the web server alone"
