@@ -8,12 +8,14 @@ from pathlib import Path
 from pipeline.sources.astyx import AstyxSource
 from pipeline.sources.base import Source, SourceError, TruthObject
 from pipeline.sources.kitti import KittiSource
+from pipeline.sources.simulated import SimulatedSource
 
 __all__ = ["Source", "SourceError", "TruthObject", "open_source"]
 
 _OPENERS: dict[str, Callable[[str, str, int], Source]] = {
     "astyx": lambda uri, rest, rings: AstyxSource(uri, rest),
     "kitti": lambda uri, rest, rings: KittiSource(uri, rest, rings),
+    "sim": lambda uri, rest, rings: SimulatedSource(uri, rest),
 }
 """Scheme → what opens it, given the whole URI, the part after the colon and how many LiDAR rings to keep."""
 

@@ -1,0 +1,132 @@
+"""Actors: what they are, and where their script has them at any time.
+
+Speed is piecewise linear in time, so the way driven is piecewise quadratic and exact. A lane change is a smooth step
+(quintic, no jump in sideways acceleration) between two lanes' middles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from pipeline.simulation.roads import Road, Strict
+
+Kind = Literal["car", "van", "truck", "bus", "motorcycle"]
+SIZES_M: dict[str, tuple[float, float, float]] = {
+    "car": (4.5, 1.82, 1.48),
+    "van": (5.3, 2.0, 2.05),
+    "truck": (12.0, 2.5, 3.8),
+    "bus": (11.5, 2.5, 3.1),
+    "motorcycle": (2.2, 0.8, 1.45),
+}
+"""Usual length, width and height of each kind."""
+
+
+class LaneChange(Strict):
+    start_s: float = Field(ge=0.0)
+    duration_s: float = Field(gt=0.2, le=30.0)
+    lane: int
+
+
+class Script(Strict):
+    """How something drives. speed_mps: time in seconds → speed, linear in between, constant outside."""
+
+    lane: int
+    speed_mps: dict[float, float] = Field(min_length=1)
+    lane_changes: tuple[LaneChange, ...] = ()
+
+    @field_validator("speed_mps")
+    @classmethod
+    def _in_order(cls, speeds: dict[float, float]) -> dict[float, float]:
+        if min(speeds.values()) < 0.0 or max(speeds.values()) > 100.0:
+            raise ValueError("speeds must lie between 0 and 100 m/s")
+        return dict(sorted(speeds.items()))
+
+    @model_validator(mode="after")
+    def _one_change_at_a_time(self) -> Script:
+        free_at = 0.0
+        lane = self.lane
+        for change in self.lane_changes:
+            if change.start_s < free_at:
+                raise ValueError(f"the lane change at {change.start_s:g} s starts before the one before it ends")
+            if (change.lane > 0) != (lane > 0):
+                raise ValueError(f"the lane change at {change.start_s:g} s leads to the other carriageway")
+            free_at, lane = change.start_s + change.duration_s, change.lane
+        return self
+
+
+class Actor(Script):
+    """One other vehicle. ahead_m: from the ego origin to its nearest face along the road at time 0, negative when its
+    nearest face is behind. size_m: length, width, height; null takes the kind's usual size."""
+
+    id: int = Field(ge=1)
+    kind: Kind
+    ahead_m: float = Field(ge=-1000.0, le=5000.0)
+    colour: str = Field("#8090a0", pattern="^#[0-9a-fA-F]{6}$")
+    size_m: tuple[float, float, float] | None = None
+
+    def size(self) -> tuple[float, float, float]:
+        return self.size_m or SIZES_M[self.kind]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A moment of a script. travelled_m: way driven since time 0. heading_rad: turn from the lane's own direction.
+    d_rate_mps and d_accel_mps2: of the offset d, metres to the left of the reference line."""
+
+    travelled_m: float
+    d_m: float
+    speed_mps: float
+    accel_mps2: float
+    d_rate_mps: float
+    d_accel_mps2: float
+
+
+def motion(script: Script, road: Road, t_s: float) -> Motion:
+    """Where a script is at time t."""
+    corners = list(script.speed_mps.items())
+    d_m, d_rate, d_accel = _offset(script, road, t_s)
+    return Motion(
+        travelled_m=_travelled_m(corners, t_s),
+        d_m=d_m,
+        speed_mps=_speed_mps(corners, t_s),
+        accel_mps2=(_speed_mps(corners, t_s + 0.05) - _speed_mps(corners, t_s - 0.05)) / 0.1,
+        d_rate_mps=d_rate,
+        d_accel_mps2=d_accel,
+    )
+
+
+def _speed_mps(corners: list[tuple[float, float]], t_s: float) -> float:
+    """Speed at time t, linear between (time, speed) corners in order, constant outside them."""
+    before_s, before = corners[0]
+    for after_s, after in corners:
+        if t_s <= after_s:
+            return before + (after - before) * (t_s - before_s) / (after_s - before_s) if after_s > before_s else after
+        before_s, before = after_s, after
+    return before
+
+
+def _travelled_m(corners: list[tuple[float, float]], t_s: float) -> float:
+    """Integral of the speed from 0 to t, by trapezoids over the corners in between: exact for linear pieces."""
+    stops = [0.0, *(time for time, _ in corners if 0.0 < time < t_s), t_s]
+    speeds = [_speed_mps(corners, stop) for stop in stops]
+    return sum((stops[i + 1] - stops[i]) * (speeds[i] + speeds[i + 1]) / 2 for i in range(len(stops) - 1))
+
+
+def _offset(script: Script, road: Road, t_s: float) -> tuple[float, float, float]:
+    """d in metres, its rate and its acceleration."""
+    here = road.lane_offset_m(script.lane)
+    for change in script.lane_changes:
+        there = road.lane_offset_m(change.lane)
+        p = (t_s - change.start_s) / change.duration_s
+        if p <= 0.0:
+            break
+        if p < 1.0:
+            step = p**3 * (10.0 - 15.0 * p + 6.0 * p * p)
+            rate = 30.0 * p * p * (1.0 - p) ** 2 / change.duration_s
+            accel = 60.0 * p * (1.0 - p) * (1.0 - 2.0 * p) / change.duration_s**2
+            return here + (there - here) * step, (there - here) * rate, (there - here) * accel
+        here = there
+    return here, 0.0, 0.0

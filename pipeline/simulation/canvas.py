@@ -1,0 +1,136 @@
+"""Filling polygons of the ego frame into a picture: projection, clipping at the near plane, daylight and haze.
+
+Polygons are gathered first and shaded, projected and clipped all together; a picture has about a thousand of them.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.geometry import transform
+from pipeline.types import F64, U8, CameraCalibration
+
+NEAR_M = 0.4
+HAZE_M = 420.0
+HAZE_BGR = np.array([214.0, 200.0, 184.0])
+SUN = np.array([-0.55, 0.45, 0.70])
+"""Where the light comes from, ego axes: behind, to the left and above; unit length."""
+_SHIFT = 4  # OpenCV takes coordinates in 1/16 px
+_FAR_OUTSIDE_PX = 20_000.0
+
+Colour = tuple[float, float, float]
+Point = tuple[float, float, float]
+Ints = npt.NDArray[np.int64]
+
+
+def hazed(bgr: F64, distance_m: npt.ArrayLike) -> F64:
+    """(…, 3) colours as seen through the air over a distance."""
+    clear = np.exp(-np.asarray(distance_m, dtype=np.float64) / HAZE_M)[..., None]
+    mixed: F64 = bgr * clear + HAZE_BGR * (1.0 - clear)
+    return mixed
+
+
+def lit(bgr: F64, normals: F64) -> F64:
+    """(F, 3) colours of surfaces with (F, 3) normals in the ego frame: sun, sky from above, a little from everywhere.
+    A normal of length zero is left as it is."""
+    sun = np.maximum(normals @ SUN, 0.0)
+    sky = 0.5 + 0.5 * normals[:, 2]
+    shaded = np.minimum(bgr * (0.36 + 0.52 * sun + 0.30 * sky)[:, None] + 14.0 * sky[:, None], 255.0)
+    return np.where(np.any(normals != 0.0, axis=1)[:, None], shaded, bgr)
+
+
+class Canvas:
+    """A picture under a camera. ``add`` gathers polygons, ``paint`` fills them in the order they were added."""
+
+    def __init__(self, bgr: U8, camera: CameraCalibration) -> None:
+        self.bgr = bgr
+        self._T = camera.T_camera_ego
+        self._focal = np.array([camera.K[0, 0], camera.K[1, 1]])
+        self._center = camera.K[:2, 2]
+        self._clear()
+
+    def _clear(self) -> None:
+        self._points: list[F64] = []
+        self._counts: list[Ints] = []
+        self._colours: list[F64] = []
+        self._normals: list[F64] = []
+        self._faces: list[tuple[tuple[Point, ...], Colour, Point]] = []
+
+    def add(self, points: F64, counts: Ints, colours: F64, normals: F64 | None = None) -> None:
+        """Polygons one after another: (V, 3) ego points, (P,) corners of each, (P, 3) colours and (P, 3) normals, by
+        which they are shaded; without them colours stay as they are, apart from the haze."""
+        self._gather_faces()
+        self._points.append(points)
+        self._counts.append(counts)
+        self._colours.append(colours)
+        self._normals.append(np.zeros((len(counts), 3)) if normals is None else normals)
+
+    def add_face(self, corners: tuple[Point, ...], bgr: Colour, normal: Point = (0.0, 0.0, 0.0)) -> None:
+        """One polygon given corner by corner."""
+        self._faces.append((corners, bgr, normal))
+
+    def _gather_faces(self) -> None:
+        """Turn single faces into arrays, all at once: one by one they would cost more than filling them."""
+        if not self._faces:
+            return
+        corners, colours, normals = zip(*self._faces, strict=True)
+        self._faces = []
+        self._points.append(np.array([point for face in corners for point in face]))
+        self._counts.append(np.array([len(face) for face in corners]))
+        self._colours.append(np.array(colours, dtype=np.float64))
+        self._normals.append(np.array(normals, dtype=np.float64))
+
+    def paint(self, haze: bool = True) -> None:
+        """Shade, project and fill everything gathered, and forget it."""
+        self._gather_faces()
+        if not self._points:
+            return
+        points, counts = transform(self._T, np.concatenate(self._points)), np.concatenate(self._counts)
+        colours = lit(np.concatenate(self._colours), np.concatenate(self._normals))
+        self._clear()
+        starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        if haze:
+            colours = hazed(colours, np.linalg.norm(np.add.reduceat(points, starts) / counts[:, None], axis=1))
+        nearest = np.minimum.reduceat(points[:, 2], starts)
+        depth = np.maximum(points[:, 2:], NEAR_M)
+        fixed = self._fixed_point(points[:, :2] / depth * self._focal + self._center)
+        seen = (nearest >= NEAR_M) & self._inside(fixed, starts)
+        crossing = (nearest < NEAR_M) & (np.maximum.reduceat(points[:, 2], starts) > NEAR_M)
+        ends, colour_list = (starts + counts).tolist(), colours.tolist()
+        for i in np.flatnonzero(seen | crossing).tolist():
+            start, end = int(starts[i]), ends[i]
+            outline = self._clipped(points[start:end]) if crossing[i] else fixed[start:end]
+            if len(outline) >= 3:
+                cv2.fillPoly(self.bgr, [outline], colour_list[i], cv2.LINE_AA, _SHIFT)
+
+    def _fixed_point(self, pixels: F64) -> npt.NDArray[np.int32]:
+        return (np.clip(pixels, -_FAR_OUTSIDE_PX, _FAR_OUTSIDE_PX) * (1 << _SHIFT)).astype(np.int32)
+
+    def _inside(self, fixed: npt.NDArray[np.int32], starts: Ints) -> npt.NDArray[np.bool_]:
+        """Which polygons touch the picture and are not smaller than a fifth of a pixel."""
+        low, high = np.minimum.reduceat(fixed, starts), np.maximum.reduceat(fixed, starts)
+        size = np.array([self.bgr.shape[1], self.bgr.shape[0]]) << _SHIFT
+        touches: npt.NDArray[np.bool_] = np.all((high >= 0) & (low <= size), axis=1) & np.any(high - low > 3, axis=1)
+        return touches
+
+    def _clipped(self, polygon: F64) -> npt.NDArray[np.int32]:
+        """The pixels of what remains of a polygon beyond the near plane."""
+        kept = clip_near(polygon)
+        return self._fixed_point(kept[:, :2] / kept[:, 2:] * self._focal + self._center)
+
+
+def clip_near(polygon: F64) -> F64:
+    """The part of a (K, 3) polygon of the camera's axes beyond the near plane (Sutherland and Hodgman 1974); empty
+    when none is."""
+    kept: list[F64] = []
+    for i in range(len(polygon)):
+        here, there = polygon[i], polygon[(i + 1) % len(polygon)]
+        here_in, there_in = here[2] >= NEAR_M, there[2] >= NEAR_M
+        if here_in:
+            kept.append(here)
+        if here_in != there_in:
+            share = (NEAR_M - here[2]) / (there[2] - here[2])
+            kept.append(here + share * (there - here))
+    return np.array(kept).reshape(-1, 3)

@@ -1,0 +1,83 @@
+"""Scenarios: YAML files that say what road there is, who drives on it and how; a wrong file is told in one sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+from pydantic import Field, ValidationError, model_validator
+
+from pipeline.simulation.actors import Actor, Script
+from pipeline.simulation.roads import Road, Strict
+
+_FOLDER = Path(__file__).parent / "scenarios"
+
+
+class ScenarioError(ValueError):
+    """A scenario that does not exist or cannot be understood; the text names what is wrong."""
+
+
+class Ego(Script):
+    """The ego vehicle's own script. start_m: where on the road its LiDAR is at time 0."""
+
+    start_m: float = 100.0
+
+
+class Scenario(Strict):
+    title: str
+    seed: int = Field(0, ge=0)
+    duration_s: float = Field(gt=0.0, le=3600.0)
+    rate_hz: float = Field(10.0, ge=1.0, le=20.0)
+    road: Road
+    ego: Ego
+    actors: tuple[Actor, ...] = ()
+
+    @model_validator(mode="after")
+    def _lanes_and_ids(self) -> Scenario:
+        for script in (self.ego, *self.actors):
+            for lane in (script.lane, *(change.lane for change in script.lane_changes)):
+                self.road.lane_offset_m(lane)
+        if self.ego.lane > 0:
+            raise ValueError("the ego vehicle must drive along the road, on a lane below 0")
+        ids = [actor.id for actor in self.actors]
+        if len(set(ids)) != len(ids):
+            raise ValueError("two actors have the same id")
+        return self
+
+    def frame_count(self) -> int:
+        return max(1, round(self.duration_s * self.rate_hz))
+
+
+def names() -> tuple[str, ...]:
+    """The built-in scenarios."""
+    return tuple(sorted(path.stem for path in _FOLDER.glob("*.yaml")))
+
+
+def load(name_or_path: str) -> Scenario:
+    """A built-in scenario by its name, or any file that ends in .yaml. ScenarioError says what is wrong."""
+    path = Path(name_or_path).expanduser() if name_or_path.endswith((".yaml", ".yml")) else None
+    if path is None:
+        if name_or_path not in names():
+            raise ScenarioError(f"no scenario named {name_or_path!r}; there are {', '.join(names())}")
+        path = _FOLDER / f"{name_or_path}.yaml"
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        raise ScenarioError(f"{path.name}: cannot be read: {error}") from None
+    return parse(text, path.name)
+
+
+def parse(text: str, file: str) -> Scenario:
+    """The scenario of a YAML text. ScenarioError names the file, the key and what is wrong with it."""
+    try:
+        loaded = yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ScenarioError(f"{file}: not YAML: {str(error).splitlines()[0]}") from None
+    if not isinstance(loaded, dict):
+        raise ScenarioError(f"{file}: expected keys such as title, road, ego and actors")
+    try:
+        return Scenario.model_validate(loaded)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"]) or "scenario"
+        raise ScenarioError(f"{file}: {where}: {first['msg']}") from None
