@@ -43,7 +43,7 @@ class GroundParams(Section):
     iterations: int = _slider(5, 1, 20, 1, "", "N_iter: refinements of each plane")
     lowest_points: int = _slider(200, 10, 2000, 10, "points", "N_LPR: lowest points averaged for the seed height")
     seed_height_m: float = _slider(0.6, 0.05, 2.0, 0.05, "m", "Th_seeds: height above the lowest points of a seed")
-    distance_m: float = _slider(0.3, 0.02, 1.0, 0.01, "m", "Th_dist: a point this near the plane is ground")
+    distance_m: float = _slider(0.25, 0.02, 1.0, 0.01, "m", "Th_dist: a point this near the plane is ground")
     max_slope_deg: float = _slider(10.0, 1.0, 30.0, 0.5, "°", "A plane steeper than this falls back to its neighbour")
     fit_range_m: float = _slider(50.0, 10.0, 100.0, 5.0, "m", "Planes are fitted to points this far ahead and behind")
     fit_half_width_m: float = _slider(10.0, 2.0, 30.0, 0.5, "m", "Planes are fitted to points this far to either side")
@@ -53,7 +53,7 @@ class GroundParams(Section):
 class ClusterParams(Section):
     """Exact Euclidean clustering with a weight on z (paper, Point Cloud Segmentation)."""
 
-    tolerance_m: float = _slider(0.7, 0.1, 3.0, 0.05, "m", "Points nearer than this are one object")
+    tolerance_m: float = _slider(0.9, 0.1, 3.0, 0.05, "m", "Points nearer than this are one object")
     z_weight: float = _slider(0.4, 0.05, 1.0, 0.05, "", "Weight on height: below 1 joins rings that lie 2° apart")
     min_points: int = _slider(4, 1, 50, 1, "points", "Smaller clusters are dropped")
     max_points: int = _slider(20000, 100, 50000, 100, "points", "Larger clusters are dropped")
@@ -83,8 +83,10 @@ class LidarTrackingParams(Section):
     max_density_ratio: float = _slider(6.0, 1.1, 50.0, 0.1, "", "Largest ratio of point densities")
     max_spread_change_m: float = _slider(1.5, 0.1, 5.0, 0.1, "m", "Largest change of the spread along any axis")
     max_missed_s: float = _slider(0.6, 0.0, 3.0, 0.1, "s", "A track not seen for longer ends")
+    carry_hits: int = _slider(3, 1, 20, 1, "frames", "A track seen fewer times ends as soon as a sweep does not show it")
     accel_sigma_mps2: float = _slider(3.0, 0.1, 20.0, 0.1, "m/s²", "Kalman: how hard objects may accelerate")
     position_sigma_m: float = _slider(0.15, 0.01, 2.0, 0.01, "m", "Kalman: noise of a cluster's position")
+    start_speed_mps: float = _slider(15.0, 1.0, 60.0, 1.0, "m/s", "How fast a newly seen object may move; widens its gate")
     trajectory_frames: int = _slider(5, 2, 20, 1, "frames", "trajectory: positions that the velocity is fitted to")
 
 

@@ -1,0 +1,21 @@
+"""The LiDAR branch: down-sample, ground, cluster, boxes, tracking (paper, Point Cloud Segmentation, LiDAR Tracking)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.lidar import boxes, cluster, ground
+from pipeline.params import Params
+
+
+def warm_up() -> None:
+    """Compile every kernel, or load it from numba's cache, on a made-up sweep: a flat road and one wall on it."""
+    params = Params()
+    x, y = np.meshgrid(np.linspace(3.0, 20.0, 20), np.linspace(-5.0, 5.0, 20))
+    road = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, -1.5), np.zeros(x.size)])
+    wall = np.column_stack([np.full(20, 15.0), np.linspace(-1.0, 1.0, 20), np.full(20, -0.5), np.zeros(20)])
+    points = np.vstack([road, wall]).astype(np.float32)
+    keep = np.ones(len(points), dtype=np.bool_)
+    plane = ground.fit_ground(points, keep, params.ground)
+    labels = cluster.cluster(points, cluster.candidates(points, plane, keep, params.cluster), params.cluster)
+    boxes.fit_obstacles(points, labels, plane, params.box)

@@ -48,9 +48,7 @@ def fit_obstacles(points: F32, labels: I32, ground: Ground, params: BoxParams) -
     area = np.maximum(boxes[:, 2] * boxes[:, 3], MIN_AREA_M2)
     sides = np.maximum(np.column_stack([boxes[:, 2:4], boxes[:, 6] - bottom]), MIN_SIDE_M)
     center_z = (bottom + boxes[:, 6]) / 2
-    rows = zip(
-        boxes.tolist(), sides.tolist(), center_z.tolist(), sizes.tolist(), (sizes / area).tolist(), strict=True
-    )
+    rows = zip(boxes.tolist(), sides.tolist(), center_z.tolist(), sizes.tolist(), (sizes / area).tolist(), strict=True)
     return tuple(
         Obstacle(
             cluster=i,

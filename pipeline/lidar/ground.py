@@ -129,16 +129,16 @@ def _fit(  # type: ignore[no-untyped-def]  # pragma: no cover
     edges = _edges(all_x, area, segments, reach_m)
     x, y, z, starts = _by_segment(all_x, all_y, all_z, area, edges)
     planes = np.full((segments, 4), np.nan)
-    thickness = np.full(segments, np.inf)
+    raggedness = np.full(segments, np.inf)
     flat = np.array([0.0, 0.0, 1.0, 0.0])
     for s in range(segments):
         a, b = starts[s], starts[s + 1]
-        planes[s], thickness[s] = _refine(x[a:b], y[a:b], z[a:b], flat, iterations, lowest, seed_m, distance_m, min_nz)
-    fitted = np.isfinite(thickness)
+        planes[s], raggedness[s] = _refine(x[a:b], y[a:b], z[a:b], flat, iterations, lowest, seed_m, distance_m, min_nz)
+    fitted = np.isfinite(raggedness)
     if not fitted.any():
         planes[:] = np.nan
         return planes, edges, fitted
-    root = int(np.argmin(thickness))
+    root = int(np.argmin(raggedness))
     for k in range(1, segments):  # from the root ahead, then from the root back
         s = root + k if root + k < segments else segments - 1 - k
         neighbour = planes[s - 1] if s > root else planes[s + 1]
@@ -146,8 +146,8 @@ def _fit(  # type: ignore[no-untyped-def]  # pragma: no cover
         if fitted[s] and _meets(planes[s], neighbour, shared, distance_m):
             continue
         a, b = starts[s], starts[s + 1]
-        plane, thick = _refine(x[a:b], y[a:b], z[a:b], neighbour, iterations, lowest, seed_m, distance_m, min_nz)
-        fitted[s] = np.isfinite(thick) and _meets(plane, neighbour, shared, distance_m)
+        plane, ragged = _refine(x[a:b], y[a:b], z[a:b], neighbour, iterations, lowest, seed_m, distance_m, min_nz)
+        fitted[s] = np.isfinite(ragged) and _meets(plane, neighbour, shared, distance_m)
         planes[s] = plane if fitted[s] else neighbour
     return planes, edges, fitted
 
@@ -210,11 +210,14 @@ def _by_segment(all_x, all_y, all_z, area, edges):  # type: ignore[no-untyped-de
 def _refine(  # type: ignore[no-untyped-def]  # pragma: no cover
     x, y, z, prior, iterations, lowest, seed_m, distance_m, min_nz
 ):
-    """One segment: its plane (4,) and the standard deviation of its points across it, infinite where the plane cannot
-    be trusted. ``prior`` (4,) says which way is low."""
-    plane, thickness = prior.copy(), np.inf
+    """One segment: its plane (4,), and how ragged that is: the standard deviation of its points across it over their
+    share of the segment's points, m; infinite where it cannot be the road. ``prior`` (4,) says which way is low.
+
+    The band around the plane narrows evenly from ``seed_m`` to ``distance_m``: taken at once, a narrow band keeps to
+    the strip of a tilted road that the lowest points came from."""
+    plane, raggedness = prior.copy(), np.inf
     low, high = _seed_heights(x, y, z, prior, lowest, seed_m)
-    for _ in range(iterations):
+    for k in range(1, iterations + 1):
         count, mean, cov = _moments(x, y, z, plane, low, high)
         if count < max(MIN_SEEDS, MIN_SHARE * len(x)):
             return plane, np.inf
@@ -224,9 +227,10 @@ def _refine(  # type: ignore[no-untyped-def]  # pragma: no cover
             return plane, np.inf
         plane[:3] = normal
         plane[3] = -(normal[0] * mean[0] + normal[1] * mean[1] + normal[2] * mean[2])
-        thickness = np.sqrt(max(values[0], 0.0))
-        low, high = -distance_m, distance_m
-    return plane, thickness
+        raggedness = np.sqrt(max(values[0], 0.0)) * len(x) / count
+        high = distance_m + max(seed_m - distance_m, 0.0) * max(iterations - 1 - k, 0) / max(iterations - 1, 1)
+        low = -high
+    return plane, raggedness
 
 
 @numba.njit(cache=True, nogil=True)

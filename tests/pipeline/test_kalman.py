@@ -86,3 +86,13 @@ def test_mahalanobis_counts_sigmas(dx: float, dy: float) -> None:
     state = kalman.start((1.0, 2.0), R, 1.0)
     expected = dx**2 / (2 * R[0, 0]) + dy**2 / (2 * R[1, 1])
     assert kalman.mahalanobis2(state, (1.0 + dx, 2.0 + dy), R) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+def test_many_states_at_once_are_the_same_as_one_by_one() -> None:
+    rng = np.random.default_rng(5)
+    places, seen = rng.normal(0.0, 20.0, (7, 2)), rng.normal(0.0, 20.0, (7, 2))
+    together = kalman.update(kalman.predict(kalman.start(places, R, 9.0), 0.1, 2.0), seen, R)
+    for i in range(7):
+        alone = kalman.update(kalman.predict(kalman.start(places[i], R, 9.0), 0.1, 2.0), seen[i], R)
+        assert together.mean[i] == pytest.approx(alone.mean, abs=1e-12)
+        assert together.cov[i] == pytest.approx(alone.cov, abs=1e-12)
