@@ -42,7 +42,8 @@ class Detector:
     """A loaded network.
 
     name: file, digest and input size, so that equal names give equal boxes: the key of caches. input_size: (height,
-    width). labels: class names in COCO's spelling. notes: what a person should know about how it was loaded.
+    width). labels: class names in COCO's spelling. notes: what a person should know about how it was loaded. graph: the
+    ONNX file as it runs, at this input size.
     """
 
     name: str
@@ -51,6 +52,8 @@ class Detector:
     labels: tuple[str, ...]
     head: str
     notes: tuple[str, ...]
+    threads: int
+    graph: bytes = field(repr=False, compare=False)
     _session: ort.InferenceSession = field(repr=False, compare=False)
     _decoder: Decoder = field(repr=False, compare=False)
 
@@ -61,25 +64,27 @@ class Detector:
         """
         if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
             raise DetectorError(f"a picture is (H, W, 3) uint8, this is {bgr.shape} {bgr.dtype}")
-        blob, scale = letterbox(bgr, self.input_size, self._decoder)
-        boxes, scores, classes = self._decoder.decode(_run(self._session, blob), self.input_size, FLOOR_SCORE)
-        height, width = bgr.shape[:2]
-        boxes = np.clip(boxes / np.float32(scale), 0.0, np.array([width, height, width, height], np.float32))
+        return self.decode(_run(self._session, self.blob(bgr)), (bgr.shape[0], bgr.shape[1]))
+
+    def blob(self, bgr: U8) -> F32:
+        """The picture as the network takes it: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey."""
+        scale = _scale((bgr.shape[0], bgr.shape[1]), self.input_size)
+        height, width = (max(1, min(round(n * scale), m)) for n, m in zip(bgr.shape[:2], self.input_size, strict=True))
+        filled = np.full((*self.input_size, 3), PADDING, np.uint8)
+        filled[:height, :width] = cv2.resize(bgr, (width, height), interpolation=cv2.INTER_LINEAR)
+        blob = cv2.dnn.blobFromImage(filled, scalefactor=self._decoder.scale, swapRB=self._decoder.rgb)
+        return np.asarray(blob, dtype=np.float32)
+
+    def decode(self, outputs: Sequence[F32], picture: Size) -> RawBoxes:
+        """The network's raw outputs for a picture of (height, width) as boxes in that picture's pixels."""
+        boxes, scores, classes = self._decoder.decode(outputs, self.input_size, FLOOR_SCORE)
+        height, width = picture
+        edges = np.array([width, height, width, height], np.float32)
+        boxes = np.clip(boxes / np.float32(_scale(picture, self.input_size)), 0.0, edges)
         keep = (boxes[:, 2] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 1]) & (classes >= 0) & (classes < len(self.labels))
         best_first = np.flatnonzero(keep)[np.argsort(-scores[keep], kind="stable")]
         labels = tuple(self.labels[index] for index in classes[best_first])
         return RawBoxes(self.name, boxes[best_first].astype(np.float32), scores[best_first], labels)
-
-
-def letterbox(bgr: U8, size: Size, decoder: Decoder) -> tuple[F32, float]:
-    """The picture as the network takes it: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey, and the
-    scale from picture to input pixels."""
-    scale = min(size[0] / bgr.shape[0], size[1] / bgr.shape[1])
-    height, width = (max(1, min(round(n * scale), m)) for n, m in zip(bgr.shape[:2], size, strict=True))
-    filled = np.full((*size, 3), PADDING, np.uint8)
-    filled[:height, :width] = cv2.resize(bgr, (width, height), interpolation=cv2.INTER_LINEAR)
-    blob = cv2.dnn.blobFromImage(filled, scalefactor=decoder.scale, swapRB=decoder.rgb)
-    return np.asarray(blob, dtype=np.float32), scale
 
 
 def open_detector(
@@ -141,8 +146,8 @@ def _at_size(
     model: onnx.ModelProto, path: Path, own: Size | None, size: Size, threads: int, notes: tuple[str, ...] = ()
 ) -> Detector:
     """The detector at one input size, proven by a run on a grey picture."""
-    graph = model if own == size else with_input_size(model, size)
-    session = _session(graph.SerializeToString(), path, threads)
+    graph = (model if own == size else with_input_size(model, size)).SerializeToString()
+    session = _session(graph, path, threads)
     metadata = {entry.key: entry.value for entry in model.metadata_props}
     probe = _run(session, np.full((1, 3, *size), PADDING, np.float32))
     try:
@@ -154,7 +159,9 @@ def _at_size(
         raise DetectorError("the grid inside the graph may belong to its own size")
     labels = class_names(decoder.classes, metadata)
     name = f"{path.stem}-{models.file_sha256(path)[:12]}-{size[1]}x{size[0]}"
-    return Detector(name, tuple(session.get_providers()), size, labels, decoder.name, notes, session, decoder)
+    return Detector(
+        name, tuple(session.get_providers()), size, labels, decoder.name, notes, threads, graph, session, decoder
+    )
 
 
 def _session(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
@@ -172,6 +179,11 @@ def _session(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
         except Exception as error:  # onnxruntime raises a class for each status code, without a common base
             refusal = error
     raise DetectorError(f"{path.name} cannot be run: {_first_line(refusal)}")
+
+
+def _scale(picture: Size, size: Size) -> float:
+    """Input pixels per picture pixel, both (height, width)."""
+    return min(size[0] / picture[0], size[1] / picture[1])
 
 
 def _run(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:

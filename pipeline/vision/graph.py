@@ -49,7 +49,8 @@ def input_size(model: onnx.ModelProto) -> Size | None:
 
 
 def with_input_size(model: onnx.ModelProto, size: Size) -> onnx.ModelProto:
-    """A copy that takes 1×3×size. Every declared shape after the input is dropped; the runtime infers them anew."""
+    """A copy that takes 1×3×size. Every declared shape after the input is dropped and inferred anew; where the graph
+    holds its old size in constants that leaves contradictions, which the runtime then reports."""
     changed = onnx.ModelProto()
     changed.CopyFrom(model)
     weights = {tensor.name for tensor in changed.graph.initializer}
@@ -60,7 +61,7 @@ def with_input_size(model: onnx.ModelProto, size: Size) -> onnx.ModelProto:
     del changed.graph.value_info[:]
     for value in changed.graph.output:
         value.type.tensor_type.ClearField("shape")
-    return changed
+    return onnx.shape_inference.infer_shapes(changed)
 
 
 def _up(length: float) -> int:

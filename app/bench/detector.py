@@ -1,0 +1,64 @@
+"""The network's part of the bench: a picture in, candidate boxes out, and the same file read by OpenCV's own engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import cycle
+from typing import Any
+
+import cv2
+import numpy as np
+
+from app.bench.timing import interleaved
+from pipeline.types import U8
+from pipeline.vision.detector import Detector
+
+
+def stages(pictures: Sequence[U8], detector: Detector, budget_s: float) -> dict[str, dict[str, Any]]:
+    """``{"detector": …}`` in the contract's form, or nothing without a picture. pictures: (H, W, 3) uint8, taken in
+    turn. The peer runs the same graph at the same size on as many threads; where it cannot, it is left out."""
+    if not pictures:
+        return {}
+    ours = _in_turn(detector.detect, pictures)
+    contestants = {"ours": ours}
+    peer = _opencv(detector, pictures)
+    if peer is not None:
+        contestants["cv2.dnn"] = peer
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(detector.threads)
+    try:
+        times = interleaved(contestants, budget_s)
+    finally:
+        cv2.setNumThreads(threads)
+    median = float(np.median(times["ours"]) * 1e3)
+    peers = {name: float(np.median(spent) * 1e3) for name, spent in times.items() if name != "ours"}
+    return {
+        "detector": {
+            "median_ms": round(median, 4),
+            "p99_ms": round(float(np.percentile(times["ours"], 99)) * 1e3, 4),
+            "peers": {name: {"median_ms": round(ms, 4), "ratio": round(ms / median, 2)} for name, ms in peers.items()},
+            "model": detector.name,
+            "providers": list(detector.providers),
+        }
+    }
+
+
+def _in_turn(work: Callable[[U8], object], pictures: Sequence[U8]) -> Callable[[], object]:
+    turn = cycle(pictures)
+    return lambda: work(next(turn))
+
+
+def _opencv(detector: Detector, pictures: Sequence[U8]) -> Callable[[], object] | None:
+    """``cv2.dnn`` on the same graph, pre-processing and decoding ours; null when OpenCV cannot read it."""
+    try:
+        network = cv2.dnn.readNetFromONNX(np.frombuffer(detector.graph, np.uint8))
+
+        def detect(bgr: U8) -> object:
+            network.setInput(detector.blob(bgr))
+            outputs = network.forward(network.getUnconnectedOutLayersNames())
+            return detector.decode([np.asarray(output, np.float32) for output in outputs], bgr.shape[:2])
+
+        detect(pictures[0])
+    except cv2.error:
+        return None
+    return _in_turn(detect, pictures)

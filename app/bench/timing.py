@@ -1,0 +1,35 @@
+"""Timing contestants fairly: in one process, in turns, so that whatever slows the machine slows all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from time import perf_counter
+
+_MAX_REPEATS = 20
+_MIN_ROUNDS = 3
+
+
+def interleaved(contestants: Mapping[str, Callable[[], object]], budget_s: float) -> dict[str, list[float]]:
+    """Seconds of every run of every contestant, by name.
+
+    The first run of each is not counted (compiling, caches). Then come rounds in which each has its turn, until
+    ``budget_s`` of wall time is over, three rounds at least. In a turn a fast contestant runs as often as fits into one
+    run of the slowest, 20 times at most, so that a slow peer does not leave the fast one with a handful of samples.
+    """
+    end = perf_counter() + budget_s
+    first = {name: min(_time(run), _time(run)) for name, run in contestants.items()}
+    slowest = max(first.values(), default=0.0)
+    repeats = {name: max(1, min(_MAX_REPEATS, int(slowest / max(spent, 1e-9)))) for name, spent in first.items()}
+    times: dict[str, list[float]] = {name: [] for name in contestants}
+    rounds = 0
+    while contestants and (rounds < _MIN_ROUNDS or perf_counter() < end):
+        for name, run in contestants.items():
+            times[name] += [_time(run) for _ in range(repeats[name])]
+        rounds += 1
+    return times
+
+
+def _time(run: Callable[[], object]) -> float:
+    start = perf_counter()
+    run()
+    return perf_counter() - start
