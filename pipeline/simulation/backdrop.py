@@ -13,9 +13,16 @@ from pipeline.types import F32, F64, U8, CameraCalibration
 TILE_M = 24.0
 _TILE_PX = 1024
 _ZENITH_BGR = np.array([196.0, 142.0, 84.0])
-_LEVELS_M = (  # fmt: skip
-    (0.0, 0.0), (5.0, 0.6), (7.0, 0.9), (9.5, 1.4), (13.0, 2.0),
-    (18.0, 3.0), (25.0, 4.2), (36.0, 6.0), (55.0, 9.0),
+_LEVELS_M = (
+    (0.0, 0.0),
+    (5.0, 0.6),
+    (7.0, 0.9),
+    (9.5, 1.4),
+    (13.0, 2.0),
+    (18.0, 3.0),
+    (25.0, 4.2),
+    (36.0, 6.0),
+    (55.0, 9.0),
 )
 """From this distance on the ground's grain is blurred by so many pixels of its tile: a coarse mip chain."""
 _GRAIN_ENDS_M = 110.0

@@ -65,7 +65,7 @@ class DrawnCamera:
         return bgr
 
     def _paint_sky(self, above: U8, world: World) -> None:
-        turned_px = int(round(world.pose[2] * self.camera.K[0, 0]))
+        turned_px = round(world.pose[2] * self.camera.K[0, 0])
         columns = self._sky.shape[1]
         start = (WIDTH - turned_px) % columns
         first = self._sky[: len(above), start : start + WIDTH]
@@ -75,10 +75,10 @@ class DrawnCamera:
     def _add_standing(self, canvas: Canvas, world: World) -> None:
         """Vehicles and what stands beside the road, far first (painter's algorithm)."""
         ahead = [state for state in world.actors if -_BEHIND_M < state.cuboid.center[0] < _AHEAD_M]
-        jobs = [(state.cuboid.center[0], 1, partial(_add_vehicle, canvas, state)) for state in ahead]
+        jobs = [(*state.cuboid.center[:2], partial(_add_vehicle, canvas, state)) for state in ahead]
         for thing, x, y, yaw in self._roadside.near(world, _BEHIND_M, _AHEAD_M):
-            jobs.append((x, 0, partial(add_thing, canvas, thing, x, y, yaw)))
-        for _, _, add in sorted(jobs, key=lambda job: (-job[0], job[1])):
+            jobs.append((x, y, partial(add_thing, canvas, thing, x, y, yaw)))
+        for _, _, add in sorted(jobs, key=lambda job: (-job[0], -abs(job[1]))):
             add()
 
 

@@ -119,9 +119,7 @@ def _trees(rng: np.random.Generator, start_m: float, end_m: float, right_m: floa
                 away, height, variant = rng.uniform(6.0, 24.0), rng.uniform(5.0, 10.0), rng.random()
                 crown = height * rng.uniform(0.45, 0.7)
                 place_s = float(s + rng.uniform(-5.0, 5.0))
-                things.append(
-                    Thing("tree", place_s, edge + side * away, crown, crown, 0.0, height, float(variant))
-                )
+                things.append(Thing("tree", place_s, edge + side * away, crown, crown, 0.0, height, float(variant)))
     return things
 
 

@@ -17,7 +17,8 @@ _WINDOWS: Colour = (110, 96, 84)
 _STEEL, _POST_STEEL, _STEEL_LIGHT, _STEEL_DARK = (150, 152, 150), (104, 106, 104), (196, 198, 196), (112, 114, 112)
 _DETAIL_M = 90.0
 _STOREY_M = 3.2
-_CROWN = ((1.0, 0.0, 0.0, 0.78), (0.80, -0.10, 0.16, 1.0), (0.50, -0.22, 0.34, 1.24))
+_TURN, _COARSE_TURN = (np.linspace(0.0, 2 * np.pi, steps, endpoint=False) for steps in (24, 10))
+_CROWN = np.array([[1.0, 0.0, 0.0, 0.78], [0.80, -0.10, 0.16, 1.0], [0.50, -0.22, 0.34, 1.24]])
 """Rounds of leaves: size, shift to the right and up in crown radii, brightness."""
 
 
@@ -44,24 +45,16 @@ def _tree(canvas: Canvas, thing: Thing, x: float, y: float) -> None:
     radius, distance = thing.length_m / 2, hypot(x, y)
     middle_z = thing.high_m - radius - LIDAR_HEIGHT_M
     _upright(canvas, (x, y + 0.07 * radius), (x, y - 0.07 * radius), 0.0, thing.high_m - radius, _TRUNK)
-    turn = np.linspace(0.0, 2 * np.pi, 24 if distance < 70.0 else 10, endpoint=False)
+    turn = _TURN if distance < _DETAIL_M else _COARSE_TURN
     wave = radius * (1.0 + 0.10 * np.sin(turn * 3 + 9 * thing.variant) + 0.06 * np.sin(turn * 7 + 31 * thing.variant))
-    rounds = _CROWN if distance < 180.0 else _CROWN[:2]
-    points = np.concatenate(
-        [
-            np.column_stack(
-                [
-                    np.full(len(turn), x),
-                    y - radius * right + wave * size * np.cos(turn),
-                    middle_z + radius * up + wave * size * 1.08 * np.sin(turn),
-                ]
-            )
-            for size, right, up, _ in rounds
-        ]
-    )
+    size, right, up, light = _CROWN.T[:, :, None]
+    points = np.empty((len(_CROWN), len(turn), 3))
+    points[..., 0] = x
+    points[..., 1] = y - radius * right + size * wave * np.cos(turn)
+    points[..., 2] = middle_z + radius * up + size * wave * 1.08 * np.sin(turn)
     green = _GREENS[int(thing.variant * len(_GREENS)) % len(_GREENS)]
-    colours = np.array([np.minimum(green * light, 255.0) for *_, light in rounds])
-    canvas.add(points, np.full(len(rounds), len(turn)), colours)
+    counts = np.full(len(_CROWN), len(turn))
+    canvas.add(points.reshape(-1, 3), counts, np.minimum(green * light, 255.0))
 
 
 def _building(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> None:

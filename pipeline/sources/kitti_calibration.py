@@ -65,9 +65,7 @@ def _values(table: dict[str, list[float]], name: str, shape: tuple[int, int], fi
     return np.array(numbers, dtype=np.float64).reshape(shape)
 
 
-def _calibration(
-    projection: F64, rectify: F64, velo_to_cam: F64, file: str, size: tuple[int, int]
-) -> KittiCalibration:
+def _calibration(projection: F64, rectify: F64, velo_to_cam: F64, file: str, size: tuple[int, int]) -> KittiCalibration:
     K = camera_matrix(projection[:, :3], f"calibration {file}: the projection of camera 2")
     T_rect_cam = rigid_transform(np.hstack([rectify, np.zeros((3, 1))]), f"calibration {file}: the rectification")
     T_cam_ego = rigid_transform(velo_to_cam, f"calibration {file}: Velodyne to camera")

@@ -44,8 +44,11 @@ def _label(fields: list[str], T_ego_rect: F64) -> TruthObject:
     center = transform(T_ego_rect, np.array([[x, y - height / 2, z]]))[0]
     along = T_ego_rect[:3, :3] @ np.array([np.cos(rotation_y), 0.0, -np.sin(rotation_y)])
     name = fields[0].lower()
-    cuboid = Cuboid((float(center[0]), float(center[1]), float(center[2])), (length, width, height),
-                    float(np.arctan2(along[1], along[0])))
+    cuboid = Cuboid(
+        (float(center[0]), float(center[1]), float(center[2])),
+        (length, width, height),
+        float(np.arctan2(along[1], along[0])),
+    )
     return TruthObject(_LABELS.get(name, name), cuboid)
 
 
