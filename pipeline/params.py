@@ -69,7 +69,7 @@ class BoxParams(Section):
         "l_shape", "axis_aligned: sides along ego x and y; l_shape: the turn whose sides lie closest to the points"
     )
     yaw_step_deg: float = _slider(2.0, 0.5, 10.0, 0.5, "°", "Step of the search for the best turn")
-    ground_gap_m: float = _slider(1.2, 0.0, 3.0, 0.1, "m", "A cluster whose lowest point is nearer the ground stands on it")
+    ground_gap_m: float = _slider(1.2, 0.0, 3.0, 0.1, "m", "A cluster that ends nearer the ground stands on it")
 
 
 class LidarTrackingParams(Section):
@@ -83,10 +83,10 @@ class LidarTrackingParams(Section):
     max_density_ratio: float = _slider(6.0, 1.1, 50.0, 0.1, "", "Largest ratio of point densities")
     max_spread_change_m: float = _slider(1.5, 0.1, 5.0, 0.1, "m", "Largest change of the spread along any axis")
     max_missed_s: float = _slider(0.6, 0.0, 3.0, 0.1, "s", "A track not seen for longer ends")
-    carry_hits: int = _slider(3, 1, 20, 1, "frames", "A track seen fewer times ends as soon as a sweep does not show it")
+    carry_hits: int = _slider(3, 1, 20, 1, "frames", "A track seen fewer times ends when a sweep lacks it")
     accel_sigma_mps2: float = _slider(3.0, 0.1, 20.0, 0.1, "m/s²", "Kalman: how hard objects may accelerate")
     position_sigma_m: float = _slider(0.15, 0.01, 2.0, 0.01, "m", "Kalman: noise of a cluster's position")
-    start_speed_mps: float = _slider(15.0, 1.0, 60.0, 1.0, "m/s", "How fast a newly seen object may move; widens its gate")
+    start_speed_mps: float = _slider(15.0, 1.0, 60.0, 1.0, "m/s", "How fast a new object may move; widens its gate")
     trajectory_frames: int = _slider(5, 2, 20, 1, "frames", "trajectory: positions that the velocity is fitted to")
 
 

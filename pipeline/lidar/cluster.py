@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from pipeline.lidar.ground import Ground
 from pipeline.params import ClusterParams
-from pipeline.types import F32, I32
+from pipeline.types import F32, F64, I32
 
 Mask = npt.NDArray[np.bool_]
 
@@ -50,7 +50,7 @@ def cluster(points: F32, candidates: Mask, params: ClusterParams) -> I32:
 
 
 @numba.njit(cache=True, nogil=True)
-def _within(points, candidates, max_range_m, front_only):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _within(points: F32, candidates: Mask, max_range_m: float, front_only: bool) -> I32:
     """Indices of the candidates in range."""
     chosen = np.empty(len(points), dtype=np.int32)
     count, limit2 = 0, max_range_m * max_range_m
@@ -63,7 +63,9 @@ def _within(points, candidates, max_range_m, front_only):  # type: ignore[no-unt
 
 
 @numba.njit(cache=True, nogil=True)
-def _cells(points, chosen, z_weight, cell_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _cells(
+    points: F32, chosen: I32, z_weight: float, cell_m: float
+) -> tuple[F64, npt.NDArray[np.int64], I32, tuple[int, int]]:
     """xyz (M, 3) float64 with z weighted; the column and the level of each point; columns along x and y.
 
     Two empty columns surround the grid, so that neighbours need no bounds test."""
@@ -89,7 +91,9 @@ def _cells(points, chosen, z_weight, cell_m):  # type: ignore[no-untyped-def]  #
 
 
 @numba.njit(cache=True, nogil=True)
-def _components(xyz, column, level, first_cell, ny, tolerance_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _components(
+    xyz: F64, column: npt.NDArray[np.int64], level: I32, first_cell: I32, ny: int, tolerance_m: float
+) -> I32:
     """(M,) the first point of each point's component. ``first_cell`` is the grid, all zeros on entry: per column, one
     more than the number of its newest cell; the cells of a column are a chain."""
     count = len(xyz)
@@ -143,7 +147,7 @@ def _components(xyz, column, level, first_cell, ny, tolerance_m):  # type: ignor
 
 
 @numba.njit(cache=True, nogil=True)
-def _root(parent, c):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _root(parent: I32, c: int) -> int:
     """The least cell joined with ``c``, halving the path on the way."""
     while parent[c] != c:
         parent[c] = parent[parent[c]]
@@ -152,7 +156,7 @@ def _root(parent, c):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @numba.njit(cache=True, nogil=True)
-def _touch(packed, a0, a1, b0, b1, limit2):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _touch(packed: F64, a0: int, a1: int, b0: int, b1: int, limit2: float) -> bool:
     """Whether any point of one cell lies within the tolerance of any point of the other."""
     for a in range(a0, a1):
         for b in range(b0, b1):
@@ -163,7 +167,7 @@ def _touch(packed, a0, a1, b0, b1, limit2):  # type: ignore[no-untyped-def]  # p
 
 
 @numba.njit(cache=True, nogil=True)
-def _number(roots, chosen, labels, min_points, max_points):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _number(roots: I32, chosen: I32, labels: I32, min_points: int, max_points: int) -> None:
     """Writes 0, 1, … into ``labels`` for the components of an accepted size, by first point."""
     size = np.zeros(len(roots), dtype=np.int32)
     for k in range(len(roots)):
