@@ -2,12 +2,17 @@
 
 Each client has one place for a frame and one for a state. A newer message replaces an older one that was not sent yet,
 so a slow client skips frames and hurts nobody; one that joins late gets the current frame at once.
+
+Buffers of the system between here and a page hold many frames, which would be a queue after all. A page therefore asks
+for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no more than ``FRAMES_UNDER_WAY`` are sent
+ahead of that.
 """
 
 from __future__ import annotations
 
 import asyncio
 import json
+import math
 import threading
 import time
 from typing import Any
@@ -17,11 +22,18 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from app.encode import Encoder
 from app.snapshot import Snapshot
 
+FRAMES_UNDER_WAY = 2
+"""One being painted while the next is on its way."""
+
 
 class Slot:
-    """The newest unsent messages of one client, by kind. Lives on the server's event loop."""
+    """The newest unsent messages of one client, by kind. Lives on the server's event loop.
 
-    def __init__(self) -> None:
+    ``paced``: frames wait for ``painted``."""
+
+    def __init__(self, paced: bool = False) -> None:
+        self._paced = paced
+        self._under_way = 0
         self._unsent: dict[str, str | bytes] = {}
         self._newest: dict[str, int] = {}
         self._filled = asyncio.Event()
@@ -34,13 +46,22 @@ class Slot:
         self._unsent[kind] = message
         self._filled.set()
 
+    def painted(self) -> None:
+        """The client is done with one of the frames it got."""
+        self._under_way = max(0, self._under_way - 1)
+        self._filled.set()
+
     async def take(self) -> list[str | bytes]:
-        """Everything unsent, as soon as there is anything."""
-        await self._filled.wait()
-        self._filled.clear()
-        messages = list(self._unsent.values())
-        self._unsent.clear()
-        return messages
+        """Everything that may be sent, as soon as there is anything."""
+        while True:
+            await self._filled.wait()
+            self._filled.clear()
+            is_full = self._paced and self._under_way >= FRAMES_UNDER_WAY
+            ready = {kind: message for kind, message in self._unsent.items() if not (is_full and kind == "frame")}
+            self._under_way += "frame" in ready
+            self._unsent = {kind: message for kind, message in self._unsent.items() if kind not in ready}
+            if ready:
+                return list(ready.values())
 
 
 class Stream:
@@ -71,7 +92,7 @@ class Stream:
         """Feed one client until it leaves. It may send ``{"ping": t}`` and gets ``t`` back with the server's clock."""
         await socket.accept()
         self._loop = asyncio.get_running_loop()
-        slot = Slot()
+        slot = Slot(paced=socket.query_params.get("paced") == "1")
         self._slots.append(slot)
         try:
             if self._snapshot is not None:
@@ -116,23 +137,25 @@ async def _send(socket: WebSocket, slot: Slot) -> None:
 
 
 async def _receive(socket: WebSocket, slot: Slot) -> None:
-    """Answer pings until the client leaves; what is no ping is ignored."""
+    """Hear the client until it leaves; what is nothing we know is ignored."""
     while True:
         message = await socket.receive()
         if message["type"] == "websocket.disconnect":
             return
-        sent = _ping_of(message.get("text"))
-        if sent is not None:
-            slot.put("pong", _dump({"type": "pong", "ping": sent, "server_unix_ms": time.time() * 1e3}))
+        said = _object(message.get("text"))
+        ping = said.get("ping")
+        if isinstance(ping, int | float) and math.isfinite(ping):
+            slot.put("pong", _dump({"type": "pong", "ping": ping, "server_unix_ms": time.time() * 1e3}))
+        if said.get("painted") is True:
+            slot.painted()
 
 
-def _ping_of(text: str | None) -> float | None:
+def _object(text: str | None) -> dict[str, Any]:
     try:
         value = json.loads(text or "null")
-    except ValueError:
-        return None
-    ping = value.get("ping") if isinstance(value, dict) else None
-    return float(ping) if isinstance(ping, int | float) and not isinstance(ping, bool) else None
+    except (ValueError, RecursionError):
+        return {}
+    return value if isinstance(value, dict) else {}
 
 
 def _dump(value: Any) -> str:

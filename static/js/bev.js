@@ -1,5 +1,5 @@
 /** The plan view: ego frame from above, x up and y left, in metres. */
-import { color, roleOf, ui } from "./colors.js";
+import { color, onPicture, roleOf, ui } from "./colors.js";
 import { $, fitted } from "./dom.js";
 import { num } from "./format.js";
 import { Labels } from "./labels.js";
@@ -112,21 +112,16 @@ function drawObjects(ctx, { result }, layers) {
     ctx.stroke();
     ctx.setLineDash([]);
     if (item.source !== "L") sigma(ctx, item);
-    if (layers.velocity && item.velocity_mps) arrow(ctx, item);
+    if (layers.velocity && item.velocity_mps && !item.carried) arrow(ctx, item);
     ctx.globalAlpha = 1;
     if (item.id === chosen) ring(ctx, item.bev);
   }
   for (const item of order.reverse()) {
-    if (item.source === "L" && !important(item) && !item.in_path) continue;
+    if (!important(item) && (item.carried || (item.source === "L" && !item.in_path))) continue;
     const u = Math.max(...item.bev.map(([, y]) => U(y))) + 3, v = Math.min(...item.bev.map(([x]) => V(x))) + 14;
     const distance = item.distance_m === null ? "" : ` ${num(item.distance_m)}`;
-    labels.put(item.id === lead ? `CIPV #${item.id} ${distance} m` : `#${item.id}${distance}`, u, v, item.id === lead ? color("cipv") : onTag(item), item.id === lead);
+    labels.put(item.id === lead ? `CIPV #${item.id} ${distance} m` : `#${item.id}${distance}`, u, v, onPicture(roleOf(item, lead)), item.id === lead);
   }
-}
-
-/** Tags have a dark ground in both themes. */
-function onTag(item) {
-  return { L: "#ff8fe6", V: "#67e8f9", VL: "#d6ccff" }[item.source];
 }
 
 function outline(ctx, corners) {

@@ -26,6 +26,7 @@ function draw() {
   describe(frame);
   if (!frame.picture) return message(ctx, width, height, "No camera picture in this frame");
   const { picture } = frame;
+  fitPane(picture);
   const scale = Math.min(width / picture.width, height / picture.height);
   place = { x: (width - picture.width * scale) / 2, y: (height - picture.height * scale) / 2, scale };
   ctx.save();
@@ -39,6 +40,13 @@ function draw() {
   if (layers.points) drawPoints(ctx, frame);
   drawObjects(ctx, frame, layers);
   ctx.restore();
+}
+
+/** Without a height chosen by a person, the pane is as high as its picture. */
+function fitPane({ width, height }) {
+  const aspect = (width / height).toFixed(3);
+  const workspace = $("#workspace");
+  if (workspace.style.getPropertyValue("--aspect") !== aspect) workspace.style.setProperty("--aspect", aspect);
 }
 
 function describe(frame) {
@@ -118,13 +126,16 @@ function drawObjects(ctx, frame, layers) {
   for (const item of farFirst.reverse()) {
     const anchor = display.vision_boxes[item.id] ?? display.lidar_boxes[item.id];
     const isLead = item.id === lead;
-    if (!anchor || !(isLead || item.source !== "L" || item.id === get("selection") || item.in_path)) continue;
+    if (!anchor || !(isLead || item.id === get("selection") || deservesTag(item))) continue;
     if (anchor === display.vision_boxes[item.id] ? !layers.visionBoxes && !isLead : !layers.cuboids && !layers.lidarBoxes && !isLead) continue;
     const name = isLead ? `CIPV #${item.id}` : `#${item.id} ${item.type ?? ""}`.trim();
     const words = item.distance_m === null ? name : `${name}  ${num(item.distance_m)} m`;
     labels.put(words, X(anchor[0]), Y(anchor[1]), onPicture(roleOf(item, lead)), isLead);
   }
 }
+
+/** Roadside returns and what is only carried along would bury the picture in tags. */
+const deservesTag = (item) => !item.carried && (item.source !== "L" || item.in_path);
 
 function box(ctx, [x1, y1, x2, y2], tint, width) {
   ctx.strokeStyle = tint;

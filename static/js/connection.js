@@ -9,7 +9,9 @@ const RETRY_MS = [300, 600, 1200, 2500, 5000];
 let clockOffset = 0;
 let attempts = 0;
 let lastSequence = -1;
-/** @type {ArrayBuffer|null} */
+let isFirst = true;
+/** @typedef {{buffer: ArrayBuffer, done: () => void}} Received */
+/** @type {Received|null} */
 let waiting = null;
 let decoding = false;
 
@@ -19,7 +21,7 @@ export function serverNow() {
 }
 
 export function connect() {
-  const url = new URL("api/stream", location.href);
+  const url = new URL("api/stream?paced=1", location.href);
   url.protocol = url.protocol.replace("http", "ws");
   const socket = new WebSocket(url);
   socket.binaryType = "arraybuffer";
@@ -27,12 +29,14 @@ export function connect() {
   socket.onopen = () => {
     attempts = 0;
     lastSequence = -1;
+    isFirst = true;
     set("link", { status: "live", since: Date.now() });
     const ping = () => socket.send(JSON.stringify({ ping: Date.now() }));
     ping();
     pinging = setInterval(ping, PING_MS);
   };
-  socket.onmessage = ({ data }) => (typeof data === "string" ? onText(JSON.parse(data)) : onBinary(data));
+  const done = () => socket.readyState === WebSocket.OPEN && socket.send('{"painted":true}');
+  socket.onmessage = ({ data }) => (typeof data === "string" ? onText(JSON.parse(data)) : onBinary({ buffer: data, done }));
   socket.onclose = () => {
     clearInterval(pinging);
     if (attempts === 0) set("link", { status: "lost", since: Date.now() });
@@ -45,9 +49,10 @@ function onText(message) {
   if (message.type === "pong") clockOffset = message.server_unix_ms - (Date.now() + message.ping) / 2;
 }
 
-/** Keep only the newest message while a picture is being decoded. */
-async function onBinary(buffer) {
-  waiting = buffer;
+/** Keep only the newest message while a picture is being decoded. @param {Received} received */
+async function onBinary(received) {
+  waiting?.done();
+  waiting = received;
   if (decoding) return;
   decoding = true;
   while (waiting) {
@@ -58,10 +63,14 @@ async function onBinary(buffer) {
   decoding = false;
 }
 
-async function show(buffer) {
+/** @param {Received} received */
+async function show({ buffer, done }) {
   const { frame, jpeg } = decode(buffer);
-  if (frame.state.sequence < lastSequence) return;
+  if (frame.state.sequence < lastSequence) return done();
   lastSequence = frame.state.sequence;
+  frame.isLate = isFirst;
+  isFirst = false;
   if (jpeg.length) frame.bitmap = await createImageBitmap(new Blob([jpeg], { type: "image/jpeg" })).catch(() => null);
   set("frame", frame);
+  requestAnimationFrame(done);
 }

@@ -37,9 +37,10 @@ export function control(name, param, change) {
   };
 }
 
-/** "min_score" → "min score"; the unit stands beside it. */
+/** "min_score" → "min score", but a symbol like h_res stays one. The unit stands beside it. */
 function words(key) {
-  return key.replace(/_(m|s|px|deg|mps|mps2|kmh|px)$/, "").replaceAll("_", " ");
+  const bare = key.replace(/_(m|s|px|deg|mps|mps2|kmh)$/, "");
+  return /^.(_|$)/.test(bare) ? bare : bare.replaceAll("_", " ");
 }
 
 function slider(id, param, change) {

@@ -3,7 +3,7 @@ import { $, memory } from "./dom.js";
 
 /** Which custom property a gutter sets, from the pointer's place in the workspace. */
 const GUTTERS = {
-  camera: { property: "--camera-h", size: (x, y, box) => y - box.top - 6, limits: (box) => [90, box.height - 110] },
+  camera: { property: "--camera-h", size: (x, y, box) => y - box.top - 6, limits: (box) => [110, box.height - 110] },
   bev: { property: "--bev-w", size: (x, y, box) => box.right - 6 - paramsWidth() - x, limits: (box) => [180, box.width - paramsWidth() - 280] },
   params: { property: "--params-w", size: (x, y, box) => box.right - 6 - x, limits: () => [220, 520] },
 };

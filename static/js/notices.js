@@ -30,7 +30,13 @@ function lost(link) {
   return [{ level: "error", text: `Connection lost ${seconds} s ago. What you see is old; trying to reach the server again.`, fixed: true }];
 }
 
-const standing = () => get("state")?.notices ?? [];
+/** What holds for the whole recording; plain information shares one line. */
+function standing() {
+  const notices = get("state")?.notices ?? [];
+  const infos = notices.filter(({ level }) => level === "info").map(({ text: words }) => words);
+  const rest = notices.filter(({ level }) => level !== "info");
+  return infos.length ? [...rest, { level: "info", text: infos.join(" · ") }] : rest;
+}
 
 /** What the shown frame lacks; it goes with the frame. */
 function ofFrame() {

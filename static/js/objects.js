@@ -9,10 +9,10 @@ import { get, on, paint, select, set } from "./store.js";
 /** key, heading, help, text of a cell, what it is sorted by. */
 const COLUMNS = [
   ["id", "#", "Number of the object; it keeps it while it is tracked", (o) => `#${o.id}`, (o) => o.id],
-  ["source", "Seen by", "V camera, L LiDAR, VL both", (o) => o.source, (o) => o.source],
+  ["source", "Seen", "V camera, L LiDAR, VL both", (o) => o.source, (o) => o.source],
   ["type", "Class", "What the detector calls it, and its score", (o) => (o.type ? `${o.type} ${num(o.type_score, 2)}` : DASH), (o) => o.type ?? "~"],
   ["distance", "Distance", "To its nearest point, with one sigma, metres", distance, (o) => o.distance_m ?? Infinity],
-  ["velocity", "Rel. speed", "Along our heading, relative to us, km/h: negative comes nearer", (o) => (o.velocity_mps ? signed(kmh(o.velocity_mps[0])) : DASH), (o) => o.velocity_mps?.[0] ?? Infinity],
+  ["velocity", "Δ km/h", "Along our heading, relative to us, km/h: negative comes nearer", (o) => (o.velocity_mps ? signed(kmh(o.velocity_mps[0])) : DASH), (o) => o.velocity_mps?.[0] ?? Infinity],
   ["ttc", "TTC", "Time to collision, seconds; a dash when the gap does not shrink", (o) => num(o.ttc_s), (o) => o.ttc_s ?? Infinity],
   ["offset", "Offset", "From the middle of the path, metres to the left or right", (o) => side(o.path_offset_m), (o) => Math.abs(o.path_offset_m ?? Infinity)],
   ["inPath", "In path", "Inside our corridor, and how probable that is", inPath, (o) => -(o.in_path_probability ?? Number(o.in_path))],
@@ -21,7 +21,8 @@ const COLUMNS = [
   ["reason", "Why, or why not", "", null, null],
 ];
 
-let sort = { key: "distance", down: false };
+/** Null key: what matters first. */
+let sort = { key: null, down: false };
 /** @type {Map<number, {row: HTMLTableRowElement, cells: Record<string, HTMLElement>}>} */
 const rows = new Map();
 const body = $("#objects tbody");
@@ -55,7 +56,8 @@ function heading([key, label, help, , by]) {
 }
 
 function sortBy(key) {
-  sort = { key, down: sort.key === key && !sort.down };
+  if (sort.key !== key) sort = { key, down: false };
+  else sort = sort.down ? { key: null, down: false } : { key, down: true };
   reflectSort();
   update();
 }
@@ -73,7 +75,7 @@ function update() {
   const { objects, rejected, cipv } = frame.result;
   const reasons = new Map(rejected.map(({ id, reason }) => [id, reason]));
   if (cipv) reasons.set(cipv.id, cipv.reason);
-  const by = COLUMNS.find(([key]) => key === sort.key)[4];
+  const by = COLUMNS.find(([key]) => key === sort.key)?.[4] ?? ((o) => relevance(o, cipv?.id));
   const order = [...objects].sort((a, b) => compare(by(a), by(b)) * (sort.down ? -1 : 1) || a.id - b.id);
   const present = new Set(objects.map(({ id }) => id));
   for (const [id, { row }] of rows) {
@@ -87,6 +89,12 @@ function update() {
   });
   const count = (source) => objects.filter((o) => o.source === source).length;
   text($("#object-facts"), `${objects.length}: ${count("VL")} VL · ${count("V")} V · ${count("L")} L`);
+}
+
+/** The CIPV, then what is in the path, then what a camera sees, then the rest; nearer first among equals. */
+function relevance(item, lead) {
+  const group = item.id === lead ? 0 : item.in_path ? 1 : item.source !== "L" && !item.carried ? 2 : 3;
+  return group * 1000 + Math.min(item.distance_m ?? 999, 999);
 }
 
 const compare = (a, b) => (a < b ? -1 : a > b ? 1 : 0);
@@ -112,7 +120,8 @@ function create(id) {
   const row = el("tr", { tabIndex: 0, data: { id } }, ...COLUMNS.map(([key]) => {
     if (key === "source") return el("td", { class: "left" }, (cells[key] = el("span", { class: "pill" })));
     const isLeft = key === "type";
-    return (cells[key] = el("td", { class: key === "reason" ? "reason" : key === "id" ? "id" : isLeft ? "left" : "" }));
+    const kind = key === "reason" ? "reason" : key === "id" ? "id" : isLeft ? "left" : "";
+    return (cells[key] = el("td", { class: kind, data: { key } }));
   }));
   const held = { row, cells };
   rows.set(id, held);

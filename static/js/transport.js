@@ -2,6 +2,7 @@
 import { playback } from "./api.js";
 import { $, el, text } from "./dom.js";
 import { clock } from "./format.js";
+import { icon } from "./icons.js";
 import { get, on } from "./store.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
@@ -9,11 +10,12 @@ const parts = {};
 let dragging = false;
 
 export function setUp() {
-  const button = (label, words, title, act) => el("button", { type: "button", class: "icon-button", textContent: words, title, aria: { label }, onclick: act });
-  parts.back = button("Step back", "⏮", "One frame back (←)", () => playback({ step: -1 }));
-  parts.play = button("Play", "▶", "Play or pause (space)", togglePlay);
+  parts.playIcon = icon("play");
+  parts.pauseIcon = icon("pause");
+  parts.back = button("Step back", "One frame back (←)", () => playback({ step: -1 }), icon("back"));
+  parts.play = button("Play", "Play or pause (space)", togglePlay, parts.playIcon, parts.pauseIcon);
   parts.play.classList.add("play");
-  parts.next = button("Step forward", "⏭", "One frame on (→)", () => playback({ step: 1 }));
+  parts.next = button("Step forward", "One frame on (→)", () => playback({ step: 1 }), icon("next"));
   parts.seek = el("input", { type: "range", class: "seek", min: 0, max: 0, step: 1, value: 0, aria: { label: "Frame" } });
   parts.name = el("span", { class: "name", title: "The recording's own name of this frame" });
   parts.count = el("span", { class: "dim" });
@@ -29,6 +31,10 @@ export function setUp() {
   });
   parts.seek.addEventListener("change", () => (dragging = false));
   on(["state"], update);
+}
+
+function button(label, title, act, ...icons) {
+  return el("button", { type: "button", class: "icon-button", title, aria: { label }, onclick: act }, ...icons);
 }
 
 export function togglePlay() {
@@ -56,7 +62,8 @@ function update() {
   const state = get("state");
   const has = state.count > 0;
   for (const part of [parts.back, parts.play, parts.next, parts.seek, parts.speed, parts.loop]) part.disabled = !has;
-  text(parts.play, state.playing ? "❚❚" : "▶");
+  parts.playIcon.classList.toggle("is-off", state.playing);
+  parts.pauseIcon.classList.toggle("is-off", !state.playing);
   parts.play.setAttribute("aria-label", state.playing ? "Pause" : "Play");
   parts.seek.max = Math.max(0, state.count - 1);
   if (!dragging) parts.seek.value = state.index;

@@ -24,6 +24,7 @@
  * @typedef {{lidar_boxes: Record<string, number[]>, vision_boxes: Record<string, number[]>,
  *   cuboids: Record<string, Pixels>, path: {center: Pixels, left: Pixels, right: Pixels}|null}} Display
  * @typedef {{madeUnixMs: number, detectMs: number, state: State, result: Result, display: Display,
+ *   isLate?: boolean,
  *   picture: {width: number, height: number, scale: number}|null, bitmap: ImageBitmap|null,
  *   count: number, xyz: Int16Array, uv: Int16Array, owner: Uint16Array, kind: Uint8Array}} Frame
  */

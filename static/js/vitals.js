@@ -24,7 +24,7 @@ export function setUp() {
 function afterPaint() {
   const frame = get("frame");
   painted.push(performance.now());
-  text(values.age, num(Math.max(0, serverNow() - frame.madeUnixMs), 0));
+  text(values.age, frame.isLate ? "–" : num(Math.max(0, serverNow() - frame.madeUnixMs), 0));
   text(values.line, num(frame.result.timing_ms.total, 1));
   text(values.net, num(frame.detectMs, 0));
   const { timing_ms: stages } = frame.result;
