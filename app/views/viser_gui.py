@@ -10,11 +10,10 @@ import viser
 from pipeline.params import Params
 
 OnChange = Callable[[str, Any], None]
-_ORDER_AFTER_DISPLAY = 10.0
 
 
 class ParamsGui:
-    """One folder a section, closed at first; a parameter that may be null has a switch "auto" before its slider.
+    """One folder a section, all closed at first; a parameter that may be null has a switch "auto" before its slider.
 
     ``on_change(name, value)`` is called with a dotted name when a person moves something, never for ``set``.
     """
@@ -26,11 +25,12 @@ class ParamsGui:
         self._autos: dict[str, Any] = {}
         schema = Params.model_json_schema()
         values = params.model_dump()
-        for order, (section, entry) in enumerate(schema["properties"].items()):
-            declared = schema["$defs"][entry["$ref"].rpartition("/")[2]]
-            with gui.add_folder(_words(section), expand_by_default=False, order=_ORDER_AFTER_DISPLAY + order):
-                for key, spec in declared["properties"].items():
-                    self._add(f"{section}.{key}", spec, values[section][key])
+        with gui.add_folder("Parameters", expand_by_default=False):
+            for section, entry in schema["properties"].items():
+                declared = schema["$defs"][entry["$ref"].rpartition("/")[2]]
+                with gui.add_folder(_words(section), expand_by_default=False):
+                    for key, spec in declared["properties"].items():
+                        self._add(f"{section}.{key}", spec, values[section][key])
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from app.views.colors import Rgb, rgb
 from pipeline.geometry import F64, inverse, transform
 from pipeline.types import Frame, FusedObject, Path, Point3
 
-_PICTURE_DISTANCE_M = 2.0
+_PICTURE_DISTANCE_M = 2.5
 _PICTURE_WIDTH_PX = 640
 _LABEL_LIFT_M = 0.5
 _FLAT_LABEL_LIFT_M = 1.2

@@ -6,6 +6,7 @@ picture has parts, and a browser that joins late gets the present state from vis
 
 from __future__ import annotations
 
+import math
 import threading
 from dataclasses import dataclass
 from typing import Any, get_args
@@ -21,7 +22,7 @@ from pipeline.params import Params
 from pipeline.types import Frame, FusedObject, Result
 
 HOST = "127.0.0.1"
-CAMERA_POSITION, CAMERA_TARGET = (-15.0, 0.0, 9.0), (17.0, 0.0, -1.0)
+CAMERA_POSITION, CAMERA_TARGET, CAMERA_FOV_DEG = (-16.0, 0.0, 9.0), (20.0, 0.0, -1.0), 48.0
 _LABELS = ("vehicles and in path", "all", "none")
 _ARROW_S = 1.0
 
@@ -31,7 +32,7 @@ class _Display:
     """What the person looking has chosen."""
 
     color_by: scene.ColorBy = "kind"
-    point_size_m: float = 0.08
+    point_size_m: float = 0.06
     labels: str = _LABELS[0]
     picture: bool = True
 
@@ -49,9 +50,12 @@ class ViserView:
         self._labels = 0
         with _silent():
             self._server = viser.ViserServer(HOST, port, label="CIPV Studio", verbose=False)
-        self._server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False)
+        self._server.gui.configure_theme(
+            dark_mode=True, show_logo=False, show_share_button=False, control_width="small"
+        )
         camera = self._server.initial_camera
         camera.position, camera.look_at, camera.up = CAMERA_POSITION, CAMERA_TARGET, (0.0, 0.0, 1.0)
+        camera.fov = math.radians(CAMERA_FOV_DEG)
         self._scene = self._server.scene
         self._add_static()
         self._add_display_options()
@@ -85,7 +89,7 @@ class ViserView:
 
     def _add_display_options(self) -> None:
         gui, start = self._server.gui, self._display
-        with gui.add_folder("Display", order=0.0):
+        with gui.add_folder("Display"):
             color_by = gui.add_dropdown("Colour by", get_args(scene.ColorBy), initial_value=start.color_by)
             size = gui.add_slider("Point size (m)", 0.02, 0.4, 0.01, start.point_size_m)
             labels = gui.add_dropdown("Labels", _LABELS, initial_value=start.labels)
@@ -157,8 +161,8 @@ class ViserView:
     def _has_label(self, each: FusedObject, result: Result) -> bool:
         if self._display.labels == "all":
             return True
-        matters = each.source != "L" or each.in_path or each.id == scene.cipv_id(result)
-        return self._display.labels == _LABELS[0] and matters
+        seen = not each.carried and (each.source != "L" or each.in_path)
+        return self._display.labels == _LABELS[0] and (seen or each.id == scene.cipv_id(result))
 
 
 class _silent:
