@@ -19,6 +19,17 @@ from pipeline.types import VEHICLES, Cipv, FusedObject, Gate, Path, Rejection
 
 
 @dataclass(frozen=True)
+class Candidate:
+    """An object with what its tests need to know: whether it led in the frame before, and how far from the path's
+    centre it may be."""
+
+    item: FusedObject
+    leads: bool
+    limit_m: float
+    params: CipvParams
+
+
+@dataclass(frozen=True)
 class Check:
     """One question to a candidate: the gate with its number, and the sentence that says why it failed."""
 
@@ -36,9 +47,10 @@ def choose(
     path until it is ``hysteresis_m`` outside, so that a lead at the edge does not flicker."""
     judged, able, failures = [], [], {}
     for item in objects:
-        limit_m = path.half_width_m + (params.hysteresis_m if item.id == last_lead else 0.0)
+        leads = item.id == last_lead
+        limit_m = path.half_width_m + (params.hysteresis_m if leads else 0.0)
         item = _located(item, path, limit_m)
-        checks = [ask(item, limit_m, params) for ask in _ELIGIBILITY]
+        checks = [ask(Candidate(item, leads, limit_m, params)) for ask in _ELIGIBILITY]
         item = replace(item, gates=item.gates + tuple(check.gate for check in checks))
         judged.append(item)
         failed = next((check.reason for check in checks if not check.gate.passed), None)
@@ -83,24 +95,33 @@ def _probability(offset: float, sigma: float, half_width: float) -> float:
 # ---------------------------------------------------------------- who may be a lead
 
 
-def _is_vehicle(item: FusedObject, limit_m: float, params: CipvParams) -> Check:
+def _is_vehicle(who: Candidate) -> Check:
     """A named object must be a vehicle; a nameless one (L) is judged by its size."""
-    passed = item.label is None or item.label in VEHICLES
-    return Check(Gate("vehicle_class", None, 1.0, passed), f"class {item.label}")
+    label = who.item.label
+    return Check(Gate("vehicle_class", None, 1.0, label is None or label in VEHICLES), f"class {label}")
 
 
-def _has_distance(item: FusedObject, limit_m: float, params: CipvParams) -> Check:
-    return Check(Gate("distance_known", item.distance_m, 0.0, item.distance_m is not None), "distance not known")
+def _has_distance(who: Candidate) -> Check:
+    distance = who.item.distance_m
+    return Check(Gate("distance_known", distance, 0.0, distance is not None), "distance not known")
 
 
-def _is_confirmed(item: FusedObject, limit_m: float, params: CipvParams) -> Check:
+def _is_confirmed(who: Candidate) -> Check:
     """Two sensors agreeing are enough at once; one alone must see it again."""
-    needed = 1 if item.source == "VL" else params.confirm_hits
-    return Check(Gate("hits", item.hits, needed, item.hits >= needed), f"seen {item.hits} of {needed} times")
+    hits, needed = who.item.hits, 1 if who.item.source == "VL" else who.params.confirm_hits
+    return Check(Gate("hits", hits, needed, hits >= needed), f"seen {hits} of {needed} times")
 
 
-def _is_vehicle_sized(item: FusedObject, limit_m: float, params: CipvParams) -> Check:
+def _is_seen(who: Candidate) -> Check:
+    """A carried object may stay the lead, so that the lead does not flicker; it may not become it, because where it is
+    now is only a guess."""
+    passed = not who.item.carried or who.leads or who.params.carried_may_become_lead
+    return Check(Gate("seen", float(not who.item.carried), 1.0, passed), "not seen in this frame")
+
+
+def _is_vehicle_sized(who: Candidate) -> Check:
     """An L object must be as large as a vehicle's rear or side: kerbs, posts and hedges are not leads."""
+    item, params = who.item, who.params
     if item.source != "L" or item.cuboid is None:
         return Check(Gate("size", None, params.min_width_m, True), "")
     length, width, height = item.cuboid.size
@@ -113,19 +134,20 @@ def _is_vehicle_sized(item: FusedObject, limit_m: float, params: CipvParams) -> 
     return Check(Gate("size", across, params.max_size_m, passed), f"{across:.0f} m long: not a vehicle")
 
 
-def _is_in_path(item: FusedObject, limit_m: float, params: CipvParams) -> Check:
-    offset = item.path_offset_m
+def _is_in_path(who: Candidate) -> Check:
+    offset = who.item.path_offset_m
     if offset is None:
-        return Check(Gate("path_offset", None, limit_m, False), "place not known")
-    outside = abs(offset) - limit_m
+        return Check(Gate("path_offset", None, who.limit_m, False), "place not known")
+    outside = abs(offset) - who.limit_m
     reason = f"out of path by {outside:.1f} m" if outside > 0 else "beside or behind the bumper"
-    return Check(Gate("path_offset", abs(offset), limit_m, item.in_path), reason)
+    return Check(Gate("path_offset", abs(offset), who.limit_m, who.item.in_path), reason)
 
 
-_ELIGIBILITY: tuple[Callable[[FusedObject, float, CipvParams], Check], ...] = (
+_ELIGIBILITY: tuple[Callable[[Candidate], Check], ...] = (
     _is_vehicle,
     _has_distance,
     _is_confirmed,
+    _is_seen,
     _is_vehicle_sized,
     _is_in_path,
 )

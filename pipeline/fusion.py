@@ -60,7 +60,7 @@ def fuse(
     """One row per physical object. ``picture_size`` is (width, height) in pixels; without it or without an alignment
     nothing can be compared, and every track keeps a row of its own."""
     projected = [
-        project_cuboid(alignment, track.obstacle.cuboid.corners(), *picture_size)
+        project_cuboid(alignment, _full_corners(track, params), *picture_size)
         if alignment is not None and picture_size is not None
         else None
         for track in lidar
@@ -87,6 +87,16 @@ def fuse(
             vision_boxes[object_id] = seen.bbox
     objects.sort(key=lambda o: (o.distance_m is None, o.distance_m or 0.0, o.id))
     return state, Fusion(tuple(objects), lidar_boxes, vision_boxes)
+
+
+def _full_corners(track: LidarTrack, params: FusionParams) -> F64:
+    """(8, 3) corners of a track's cuboid, taller by half the gap between rings at either end: the object's edge lies
+    anywhere between the last ring that hit it and the next one that did not. At 25 m a gap is 0.9 m, half a car."""
+    corners = track.obstacle.cuboid.corners()
+    margin = _range(track) * np.tan(np.radians(params.ring_gap_deg / 2))
+    corners[:4, 2] -= margin
+    corners[4:, 2] += margin
+    return corners
 
 
 def _overlap(vision: tuple[VisionTrack, ...], projected: list[Box | None]) -> F64:

@@ -167,6 +167,9 @@ class FusionParams(Section):
         "optimal", "greedy: each vision box takes its best free partner (paper); optimal: best total, one-to-one"
     )
     min_iou: float = _slider(0.1, 0.0, 0.9, 0.01, "", "Boxes overlapping less are two objects")
+    ring_gap_deg: float = _slider(
+        2.0, 0.0, 4.0, 0.1, "°", "Angle between rings: an object's edge is taken half a gap beyond the last ring on it"
+    )
     range_gate: bool = _choice(True, "Do not join objects whose distances disagree beyond their uncertainty")
     range_gate_sigmas: float = _slider(3.0, 0.5, 10.0, 0.1, "σ", "Largest disagreement of the two distances")
 
@@ -190,6 +193,7 @@ class CipvParams(Section):
     """Who may be the closest in-path vehicle, and who is."""
 
     confirm_hits: int = _slider(3, 1, 20, 1, "frames", "Sightings before an object seen by one sensor counts")
+    carried_may_become_lead: bool = _choice(False, "An object that is not seen in this frame may take over as CIPV")
     hysteresis_m: float = _slider(0.3, 0.0, 2.0, 0.05, "m", "The lead leaves the path only this far outside it")
     min_width_m: float = _slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest extent across, a vehicle's rear or side")
     min_height_m: float = _slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest height")
@@ -254,8 +258,8 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         },
         "vision_tracking": {"filter": "queue"},
         "alignment": {"model": "angular"},
-        "fusion": {"assignment": "greedy", "min_iou": 0.0, "range_gate": False},
-        "cipv": {"confirm_hits": 1, "hysteresis_m": 0.0},
+        "fusion": {"assignment": "greedy", "min_iou": 0.0, "ring_gap_deg": 0.0, "range_gate": False},
+        "cipv": {"confirm_hits": 1, "carried_may_become_lead": True, "hysteresis_m": 0.0},
     },
 }
 """What a preset changes against the declared defaults."""

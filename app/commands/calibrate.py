@@ -11,7 +11,7 @@ import yaml
 from rich.console import Console
 from rich.table import Table
 
-from app.options import LineOptions, SourceOptions, picture_size
+from app.options import LineOptions, SourceOptions, source_picture_size
 from pipeline.calibration.distance import as_overrides, collect_pairs, fit_laws
 from pipeline.vision.detector import open_detector
 
@@ -27,6 +27,8 @@ class CalibrateDistance:
     line: LineOptions = field(default_factory=LineOptions)
     truth: Literal["labels", "lidar"] = "labels"
     """Where the true distances come from: labelled cuboids, or the LiDAR's own boxes (no labels needed)"""
+    free_exponent: bool = False
+    """Fit b too, as in print. By default b is −1, which a pinhole camera must give and which carries over better"""
     out: Path | None = None
     """Write a preset file for `cipv run --params`"""
     json: bool = False
@@ -35,8 +37,9 @@ class CalibrateDistance:
     def __call__(self) -> int:
         params = self.line.parameters()
         source = self.source.open()
-        detector = open_detector(self.line.detector, picture_size(source))
-        fits = fit_laws(collect_pairs(source, detector, self.truth, params))
+        detector = open_detector(self.line.detector, source_picture_size(source))
+        pairs = collect_pairs(source, detector, self.truth, params)
+        fits = fit_laws(pairs, None if self.free_exponent else -1.0)
         if self.json:
             print(json.dumps({label: asdict(fit) for label, fit in fits.items()}, indent=1))
         else:

@@ -32,12 +32,13 @@ class LeadRule:
     half_lane_m: float = 1.5
     max_range_m: float = 60.0
     lateral_slack_m: float = 0.3
-    range_slack: float = 0.25
+    range_slack: float = 0.15
 
 
 @dataclass(frozen=True)
 class Judged:
-    """One frame's verdict. Distances are horizontal ranges to the nearest face, metres; null where there is none."""
+    """One frame's verdict. Distances are horizontal ranges to the nearest face, lateral_error_m how far the CIPV lies
+    beside the lead (0: on it), metres; null where there is none."""
 
     frame: str
     verdict: Verdict
@@ -47,8 +48,10 @@ class Judged:
 
     @property
     def error_m(self) -> float | None:
-        """Estimated minus true distance, of the right vehicle only."""
-        if self.verdict != "correct" or self.truth_m is None or self.distance_m is None:
+        """Estimated minus true distance, of every CIPV that lies where the lead is from side to side: also of one whose
+        distance is too far off to be called correct. Null otherwise."""
+        beside = self.lateral_error_m is None or self.lateral_error_m > 0.0
+        if beside or self.truth_m is None or self.distance_m is None:
             return None
         return self.distance_m - self.truth_m
 
@@ -82,9 +85,9 @@ def judge(result: Result, truth: Iterable[TruthObject], rule: LeadRule) -> Judge
     truth_m = nearest_face_m(lead)
     if chosen is None or chosen.distance_m is None or chosen.bev is None:
         return Judged(result.frame, "missed", truth_m, None, None)
-    lateral = _lateral_error(chosen.bev, lead)
+    lateral = max(_lateral_error(chosen.bev, lead) - rule.lateral_slack_m, 0.0)
     lengthwise = abs(chosen.distance_m - truth_m) <= max(2.0, rule.range_slack * truth_m)
-    on_it = lateral <= rule.lateral_slack_m and lengthwise
+    on_it = lateral == 0.0 and lengthwise
     return Judged(result.frame, "correct" if on_it else "wrong", truth_m, chosen.distance_m, lateral)
 
 
@@ -97,7 +100,7 @@ def _lateral_error(bev: tuple[tuple[float, float], ...], lead: TruthObject) -> f
 
 @dataclass(frozen=True)
 class LeadScore:
-    """A drive's figures. errors are over correct frames: metres, and share of the true distance."""
+    """A drive's figures. Errors: metres, and share of the true distance; over the frames that have one."""
 
     frames: int
     correct: int

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -80,6 +82,15 @@ def test_hysteresis_holds_the_lead_at_the_edge_but_takes_in_nobody_new() -> None
     held, _ = decide(at_edge, last=1)
     assert held is not None
     assert decide(fused(1, 20.0, 1.9), last=1)[0] is None
+
+
+def test_a_carried_object_may_stay_the_lead_but_not_become_it() -> None:
+    unseen = dataclasses.replace(fused(1, 20.0), carried=True)
+    lead, why_not = decide(unseen)
+    assert lead is None
+    assert why_not == {1: "not seen in this frame"}
+    held, _ = decide(unseen, last=1)
+    assert held is not None
 
 
 def test_in_path_is_relative_to_a_curved_path() -> None:

@@ -61,8 +61,18 @@ def test_one_car_seen_by_both_is_one_row_with_the_lidars_place_and_the_cameras_n
     (item,) = result.objects
     assert (item.source, item.label, item.distance_m) == ("VL", "car", pytest.approx(np.hypot(20.0, 1.0)))
     assert item.velocity_mps == (-2.0, 0.0)
-    assert item.bbox == box_of(track)
+    assert item.bbox == result.lidar_boxes[item.id]
     assert result.vision_boxes[item.id] == box_of(track)
+
+
+def test_a_far_cluster_of_one_ring_still_meets_its_cars_box() -> None:
+    """At 40 m rings lie 1.4 m apart: one ring on a car is a line, and only the gap beyond it makes it a box."""
+    line = lidar_track(1, 40.0, height=0.1)
+    whole = vision_track(1, box_of(lidar_track(2, 40.0, height=1.5)), 40.0)
+    _, result = joined([line], [whole])
+    assert [item.source for item in result.objects] == ["VL"]
+    _, without = joined([line], [whole], FusionParams(ring_gap_deg=0.0))
+    assert sorted(item.source for item in without.objects) == ["L", "V"]
 
 
 def test_boxes_apart_stay_two_objects() -> None:

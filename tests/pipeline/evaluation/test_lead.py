@@ -61,11 +61,13 @@ def test_verdicts(objects: list[FusedObject], truth: list[TruthObject], verdict:
     assert judge(believed(*objects), truth, RULE).verdict == verdict
 
 
-def test_errors_are_of_the_right_vehicle_only() -> None:
+def test_an_error_is_told_of_whatever_lies_in_the_leads_place_from_side_to_side() -> None:
     good = judge(believed(fused(1, 20.4)), [labelled(20, 0)], RULE)
-    wrong = judge(believed(fused(1, 12.0)), [labelled(20, 0)], RULE)
+    far_off = judge(believed(fused(1, 12.0)), [labelled(20, 0)], RULE)
+    beside = judge(believed(fused(1, 20.0, -1.4)), [labelled(20, 1.4)], RULE)
     assert good.error_m == pytest.approx(0.4, abs=0.01)
-    assert wrong.error_m is None
+    assert far_off.error_m == pytest.approx(-8.0, abs=0.01)
+    assert beside.error_m is None
 
 
 def test_score_counts_and_averages() -> None:
