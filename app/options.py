@@ -63,7 +63,7 @@ class LineOptions:
         """The detector, its input fitted to the source's pictures. A named one that is missing is an error; when none
         is installed, a sentence says so and LiDAR goes on alone."""
         try:
-            return open_detector(self.detector, picture_size(source))
+            return open_detector(self.detector, source_picture_size(source))
         except DetectorMissing as missing:
             if self.detector is not None:
                 raise
@@ -71,7 +71,7 @@ class LineOptions:
             return None
 
 
-def picture_size(source: Source) -> tuple[int, int] | None:
+def source_picture_size(source: Source) -> tuple[int, int] | None:
     """(width, height) of the source's pictures, from its first frame; null without picture and calibration."""
     frame = source.frame(0)
     if frame.picture is not None:

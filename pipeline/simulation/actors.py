@@ -7,12 +7,13 @@ Speed is piecewise linear in time, so the way driven is piecewise quadratic and 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from pipeline.simulation.roads import Road, Strict
 
+Extent = Annotated[float, Field(ge=0.3, le=30.0)]
 Kind = Literal["car", "van", "truck", "bus", "motorcycle"]
 SIZES_M: dict[str, tuple[float, float, float]] = {
     "car": (4.5, 1.82, 1.48),
@@ -65,7 +66,7 @@ class Actor(Script):
     kind: Kind
     ahead_m: float = Field(ge=-1000.0, le=5000.0)
     colour: str = Field("#8090a0", pattern="^#[0-9a-fA-F]{6}$")
-    size_m: tuple[float, float, float] | None = None
+    size_m: tuple[Extent, Extent, Extent] | None = None
 
     def size(self) -> tuple[float, float, float]:
         return self.size_m or SIZES_M[self.kind]

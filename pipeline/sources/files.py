@@ -11,7 +11,9 @@ import numpy.typing as npt
 from pipeline.sources.base import SourceError
 from pipeline.types import F64, U8, CameraCalibration
 
-_JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
+_JPEG_START = b"\xff\xd8"
+_MARKERS = ((_JPEG_START, b"\xff\xd9"), (b"\x89PNG", b"IEND"))
+_END_BYTES = 64
 
 
 def recording_folder(path: str) -> Path:
@@ -51,12 +53,13 @@ def read_bytes(path: Path) -> bytes:
 def decode_picture(path: Path) -> tuple[U8, bytes | None]:
     """(H, W, 3) uint8 blue green red, and the file itself where it is a JPEG. SourceError when it is no whole picture.
 
-    A JPEG without its end marker is refused: its lower part would be a flat grey that a detector takes for road.
+    A JPEG or PNG without its end marker is refused: its lower part would be a flat grey that a detector takes for road.
     """
     data = read_bytes(path)
     is_jpeg = data.startswith(_JPEG_START)
-    if is_jpeg and _JPEG_END not in data[-64:]:
-        raise SourceError(f"{path.name}: the picture is cut off")
+    for start, end in _MARKERS:
+        if data.startswith(start) and end not in data[-_END_BYTES:]:
+            raise SourceError(f"{path.name}: the picture is cut off")
     try:
         picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR) if data else None
     except cv2.error:
@@ -71,7 +74,7 @@ def rigid_transform(values: npt.ArrayLike, what: str) -> F64:
     are anything else: a wrong shape, not finite, a scaled or mirrored rotation, a last row other than 0 0 0 1."""
     try:
         given = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         given = np.empty(0)
     T = np.eye(4)
     if given.shape in ((3, 4), (4, 4)) and bool(np.all(np.isfinite(given))) and float(np.abs(given).max()) < 1e6:
@@ -84,17 +87,19 @@ def rigid_transform(values: npt.ArrayLike, what: str) -> F64:
 
 
 def camera_matrix(values: npt.ArrayLike, what: str) -> F64:
-    """(3, 3) float64 pinhole matrix. SourceError when focal lengths are not positive or the last row is not 0 0 1."""
+    """(3, 3) float64 pinhole matrix. SourceError unless focal lengths are positive, what is below the diagonal is zero
+    and the last element one."""
     try:
         K = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         K = np.empty(0)
     if (
         K.shape == (3, 3)
         and bool(np.all(np.isfinite(K)))
         and float(np.abs(K).max()) < 1e6
         and min(K[0, 0], K[1, 1]) > 1.0
-        and np.allclose(K[2], [0.0, 0.0, 1.0])
+        and np.allclose(np.tril(K, -1), 0.0)
+        and np.isclose(K[2, 2], 1.0)
     ):
         return K
     raise SourceError(f"{what} is not a camera matrix")
@@ -107,7 +112,7 @@ def check_looks_ahead(camera: CameraCalibration, what: str) -> None:
     far to the side or behind.
     """
     forward = camera.T_camera_ego[:3, 0]
-    if forward[2] > 0.0:
+    if forward[2] > 1e-3:
         u, v = (camera.K @ (forward / forward[2]))[:2]
         if -0.5 <= u / camera.width <= 1.5 and -0.5 <= v / camera.height <= 1.5:
             return
