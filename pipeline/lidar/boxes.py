@@ -91,37 +91,42 @@ def _boxes(points: F32, labels: I32, count: int, step_rad: float) -> tuple[F64, 
     return boxes, size
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
+@numba.njit(cache=True, nogil=True)
 def _best_turn(x: F64, y: F64, step_rad: float) -> float:
-    """The turn in [0, π/2) at which the points lie closest to two sides: Σ 1/max(d, d0), d the distance to the nearer
-    of the two chosen sides (Zhang 2017, Algorithm 4); 0 for an infinite step."""
+    """The turn in [0, π/2) of the best closeness; 0 for an infinite step."""
     if not step_rad < np.pi / 2 or len(x) < 3:
         return 0.0
     stride = (len(x) + SEARCH_POINTS - 1) // SEARCH_POINTS
-    px, py = x[::stride].copy(), y[::stride].copy()
-    u, v = np.empty(len(px)), np.empty(len(px))
+    near_x, near_y = (x[::stride] - x[0]).astype(np.float32), (y[::stride] - y[0]).astype(np.float32)
+    u, v = np.empty_like(near_x), np.empty_like(near_y)
     best, best_score = 0.0, -1.0
     for k in range(int(np.ceil(np.pi / 2 / step_rad - 1e-9))):
-        turn = k * step_rad
-        cos, sin = np.cos(turn), np.sin(turn)
-        u_low = v_low = np.inf
-        u_high = v_high = -np.inf
-        u_sum = v_sum = 0.0
-        for i in range(len(px)):
-            u[i], v[i] = px[i] * cos + py[i] * sin, py[i] * cos - px[i] * sin
-            u_low, u_high = min(u_low, u[i]), max(u_high, u[i])
-            v_low, v_high = min(v_low, v[i]), max(v_high, v[i])
-            u_sum += u[i]
-            v_sum += v[i]
-        # of each pair of sides the one that the points gather at
-        u_side = u_high if u_sum / len(px) > (u_low + u_high) / 2 else u_low
-        v_side = v_high if v_sum / len(px) > (v_low + v_high) / 2 else v_low
-        score = 0.0
-        for i in range(len(px)):
-            score += 1.0 / max(min(abs(u[i] - u_side), abs(v[i] - v_side)), NEAREST_M)
+        score = _closeness(near_x, near_y, k * step_rad, u, v)
         if score > best_score:
-            best, best_score = turn, score
+            best, best_score = k * step_rad, score
     return best
+
+
+@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "nnan"})
+def _closeness(x: F32, y: F32, turn: float, u: F32, v: F32) -> float:
+    """Σ 1/max(d, d0), d the distance of a point to the nearer of two sides of the box with this turn: of each pair of
+    parallel sides the one that the points gather at (Zhang 2017, Algorithm 4). ``u``, ``v``: room to work in."""
+    cos, sin = np.float32(np.cos(turn)), np.float32(np.sin(turn))
+    u_low = u_high = x[0] * cos + y[0] * sin
+    v_low = v_high = y[0] * cos - x[0] * sin
+    u_sum = v_sum = np.float32(0.0)
+    for i in range(len(x)):
+        u[i], v[i] = x[i] * cos + y[i] * sin, y[i] * cos - x[i] * sin
+        u_low, u_high = min(u_low, u[i]), max(u_high, u[i])
+        v_low, v_high = min(v_low, v[i]), max(v_high, v[i])
+        u_sum += u[i]
+        v_sum += v[i]
+    u_side = u_high if 2 * u_sum > len(x) * (u_low + u_high) else u_low
+    v_side = v_high if 2 * v_sum > len(x) * (v_low + v_high) else v_low
+    score, nearest = np.float32(0.0), np.float32(NEAREST_M)
+    for i in range(len(x)):
+        score += np.float32(1.0) / max(min(abs(u[i] - u_side), abs(v[i] - v_side)), nearest)
+    return float(score)
 
 
 @numba.njit(cache=True, nogil=True)

@@ -13,13 +13,13 @@ The paper computes velocity "from the trajectory": ``trajectory`` fits a line to
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
 from pipeline import kalman
+from pipeline.geometry import Cuboid
 from pipeline.params import LidarTrackingParams
 from pipeline.types import F64, LidarTrack, Obstacle, Point2
 
@@ -29,21 +29,25 @@ MIN_GATE_POINTS = 10
 """Counts and densities below this many points are noise: one ring more or less doubles them."""
 
 
+_NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
+
+
 @dataclass(frozen=True)
 class Tracked:
-    """One track and what its filters remember. ``history``: (t_s, x, y) of the last sightings, oldest first."""
+    """One track and its past. ``history``: (t_s, x, y) of the last sightings' reference points, oldest first."""
 
     track: LidarTrack
-    filter: kalman.CvState
     history: tuple[tuple[float, float, float], ...]
     missed_s: float = 0.0
 
 
 @dataclass(frozen=True)
 class LidarTrackerState:
-    """All that one frame leaves to the next. ``clock_s`` runs from the first frame."""
+    """All that one frame leaves to the next. ``filters``: one state a track, in the order of ``tracks``, mean (T, 4),
+    cov (T, 4, 4). ``clock_s`` runs from the first frame."""
 
     tracks: tuple[Tracked, ...] = ()
+    filters: kalman.CvState = _NO_FILTERS
     next_id: int = 1
     clock_s: float = 0.0
 
@@ -59,28 +63,34 @@ def track(
     obstacles: null when the LiDAR delivered nothing, in which case every track is carried on by its prediction. dt_s:
     seconds ≥ 0 since the tick before; null at the first, and then no track of an earlier time lives on.
     """
-    living = () if dt_s is None else _predict(state.tracks, dt_s, params)
-    clock_s = state.clock_s + (dt_s or 0.0)
-    if obstacles is None:
-        kept = [t for t in (_carry(t, dt_s or 0.0) for t in living) if t.missed_s <= params.max_missed_s]
-        return LidarTrackerState(tuple(kept), state.next_id, clock_s), tuple(t.track for t in kept)
+    if dt_s is None:
+        state, dt_s = LidarTrackerState(next_id=state.next_id, clock_s=state.clock_s), 0.0
+    clock_s = state.clock_s + dt_s
+    filters = kalman.predict(state.filters, dt_s, params.accel_sigma_mps2)
+    places = reference_points(obstacles or ())
+    partner = associate(state.tracks, filters, obstacles or (), places, dt_s, params)
+    filters = _correct(filters, places, partner, params)
 
-    places = reference_points(obstacles)
-    partner = associate(living, obstacles, places, dt_s or 0.0, params)
-    measured = _update(living, places, partner, params)
-    kept = []
-    for index, (tracked, filtered) in enumerate(zip(living, measured, strict=True)):
-        seen = partner.get(index)
-        if seen is not None:
-            kept.append(_sight(tracked, filtered, obstacles[seen], places[seen], clock_s, params))
+    tracks, rows = [], []
+    for i, tracked in enumerate(state.tracks):
+        seen = partner.get(i)
+        if obstacles is not None and seen is not None:
+            after = _sight(tracked, filters.mean[i], obstacles[seen], places[seen], clock_s, params)
         else:
-            carried = _carry(tracked, dt_s or 0.0)
-            if carried.missed_s <= params.max_missed_s and carried.track.hits >= params.carry_hits:
-                kept.append(carried)
+            after = _carry(tracked, dt_s)
+            if _ended(after, obstacles is not None, params):
+                continue
+        tracks.append(after)
+        rows.append(i)
     taken = set(partner.values())
-    fresh = [j for j in range(len(obstacles)) if j not in taken]
-    kept += _begin([obstacles[j] for j in fresh], places[fresh], state.next_id, clock_s, params)
-    return LidarTrackerState(tuple(kept), state.next_id + len(fresh), clock_s), tuple(t.track for t in kept)
+    fresh = [j for j in range(len(places)) if j not in taken]
+    tracks += [_begin(state.next_id + k, (obstacles or ())[j], places[j], clock_s) for k, j in enumerate(fresh)]
+    begun = kalman.start(places[fresh], _noise(params), params.start_speed_mps)
+    filters = kalman.CvState(
+        np.concatenate([filters.mean[rows], begun.mean]), np.concatenate([filters.cov[rows], begun.cov])
+    )
+    next_state = LidarTrackerState(tuple(tracks), filters, state.next_id + len(fresh), clock_s)
+    return next_state, tuple(t.track for t in tracks)
 
 
 def reference_points(obstacles: tuple[Obstacle, ...]) -> F64:
@@ -94,12 +104,19 @@ def reference_points(obstacles: tuple[Obstacle, ...]) -> F64:
 
 
 def associate(
-    tracks: tuple[Tracked, ...], obstacles: tuple[Obstacle, ...], places: F64, dt_s: float, params: LidarTrackingParams
+    tracks: tuple[Tracked, ...],
+    filters: kalman.CvState,
+    obstacles: tuple[Obstacle, ...],
+    places: F64,
+    dt_s: float,
+    params: LidarTrackingParams,
 ) -> dict[int, int]:
-    """Index of a predicted track → index of its obstacle, one-to-one, of least total distance; gated pairs only."""
+    """Index of a track → index of its obstacle, one-to-one, of least total distance, gated pairs only. The filters
+    stand at the present time already."""
     if not tracks or not obstacles:
         return {}
-    expected = np.array([_place(t, dt_s, params) for t in tracks])
+    kalman_filter = params.filter == "kalman"
+    expected = filters.mean[:, :2] if kalman_filter else np.array([_extrapolate(t, dt_s) for t in tracks])
     distance = np.linalg.norm(expected[:, None] - places, axis=2)
     new = np.array([t.track.hits < 2 for t in tracks])
     gate = params.gate_m + new * params.start_speed_mps * dt_s
@@ -127,40 +144,26 @@ def _ratio(a: F64, b: F64) -> F64:
     return np.maximum(a[:, None], b) / np.minimum(a[:, None], b)
 
 
-def _place(tracked: Tracked, dt_s: float, params: LidarTrackingParams) -> npt.ArrayLike:
-    """Where the reference point is expected now. The state's filter has been predicted to now already."""
-    if params.filter == "kalman":
-        return tracked.filter.mean[:2]
+def _extrapolate(tracked: Tracked, dt_s: float) -> Point2:
+    """Where the trajectory leads to now."""
     vx, vy = tracked.track.velocity_mps or (0.0, 0.0)
     _, x, y = tracked.history[-1]
     since_s = tracked.missed_s + dt_s
     return (x + vx * since_s, y + vy * since_s)
 
 
-def _predict(tracks: tuple[Tracked, ...], dt_s: float, params: LidarTrackingParams) -> tuple[Tracked, ...]:
-    """Every filter at the present time."""
-    if not tracks:
-        return ()
-    later = kalman.predict(_stack(tracks), dt_s, params.accel_sigma_mps2)
-    return tuple(replace(t, filter=kalman.CvState(m, c)) for t, m, c in zip(tracks, later.mean, later.cov, strict=True))
-
-
-def _update(
-    tracks: tuple[Tracked, ...], places: F64, partner: dict[int, int], params: LidarTrackingParams
-) -> list[kalman.CvState]:
-    """The filter of each track after its measurement; as predicted where it has none."""
-    filters = [t.filter for t in tracks]
-    if partner:
-        matched = sorted(partner)
-        z = places[[partner[i] for i in matched]]
-        after = kalman.update(_stack([tracks[i] for i in matched]), z, _noise(params))
-        for i, mean, cov in zip(matched, after.mean, after.cov, strict=True):
-            filters[i] = kalman.CvState(mean, cov)
-    return filters
-
-
-def _stack(tracks: tuple[Tracked, ...] | list[Tracked]) -> kalman.CvState:
-    return kalman.CvState(np.array([t.filter.mean for t in tracks]), np.array([t.filter.cov for t in tracks]))
+def _correct(
+    filters: kalman.CvState, places: F64, partner: dict[int, int], params: LidarTrackingParams
+) -> kalman.CvState:
+    """The filters after their measurements; as predicted where there is none."""
+    if not partner:
+        return filters
+    rows = sorted(partner)
+    z = places[[partner[i] for i in rows]]
+    after = kalman.update(kalman.CvState(filters.mean[rows], filters.cov[rows]), z, _noise(params))
+    mean, cov = filters.mean.copy(), filters.cov.copy()
+    mean[rows], cov[rows] = after.mean, after.cov
+    return kalman.CvState(mean, cov)
 
 
 def _noise(params: LidarTrackingParams) -> F64:
@@ -168,21 +171,13 @@ def _noise(params: LidarTrackingParams) -> F64:
 
 
 def _sight(
-    tracked: Tracked,
-    filtered: kalman.CvState,
-    obstacle: Obstacle,
-    place: F64,
-    clock_s: float,
-    params: LidarTrackingParams,
+    tracked: Tracked, mean: F64, obstacle: Obstacle, place: F64, clock_s: float, params: LidarTrackingParams
 ) -> Tracked:
     """Seen again."""
     history = (*tracked.history, (clock_s, float(place[0]), float(place[1])))[-params.trajectory_frames :]
-    if params.filter == "kalman":
-        velocity: Point2 | None = (float(filtered.mean[2]), float(filtered.mean[3]))
-    else:
-        velocity = slope(history)
+    velocity = (float(mean[2]), float(mean[3])) if params.filter == "kalman" else slope(history)
     last = tracked.track
-    return Tracked(LidarTrack(last.id, obstacle, velocity, last.hits + 1, 0, False), filtered, history)
+    return Tracked(LidarTrack(last.id, obstacle, velocity, last.hits + 1, 0, False), history)
 
 
 def slope(history: tuple[tuple[float, float, float], ...]) -> Point2 | None:
@@ -198,28 +193,25 @@ def _carry(tracked: Tracked, dt_s: float) -> Tracked:
     last, seen = tracked.track, tracked.track.obstacle
     vx, vy = last.velocity_mps or (0.0, 0.0)
     (cx, cy, cz), (px, py, pz) = seen.cuboid.center, seen.closest_point
-    moved = replace(
-        seen,
+    moved = Obstacle(
         cluster=-1,
-        cuboid=replace(seen.cuboid, center=(cx + vx * dt_s, cy + vy * dt_s, cz)),
+        cuboid=Cuboid((cx + vx * dt_s, cy + vy * dt_s, cz), seen.cuboid.size, seen.cuboid.yaw_rad),
         closest_point=(px + vx * dt_s, py + vy * dt_s, pz),
+        points=seen.points,
+        density=seen.density,
+        spread=seen.spread,
     )
-    track = replace(last, obstacle=moved, missed=last.missed + 1, carried=True)
-    return replace(tracked, track=track, missed_s=tracked.missed_s + dt_s)
+    carried = LidarTrack(last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True)
+    return Tracked(carried, tracked.history, tracked.missed_s + dt_s)
 
 
-def _begin(
-    obstacles: list[Obstacle], places: F64, first_id: int, clock_s: float, params: LidarTrackingParams
-) -> list[Tracked]:
-    """A track for each obstacle that continues none."""
-    if not obstacles:
-        return []
-    filters = kalman.start(places, _noise(params), params.start_speed_mps)
-    return [
-        Tracked(
-            LidarTrack(first_id + k, obstacle, None, 1, 0, False),
-            kalman.CvState(filters.mean[k], filters.cov[k]),
-            ((clock_s, float(places[k, 0]), float(places[k, 1])),),
-        )
-        for k, obstacle in enumerate(obstacles)
-    ]
+def _ended(tracked: Tracked, sweep_lacks_it: bool, params: LidarTrackingParams) -> bool:
+    """Whether a carried track is given up. One seen only once or twice does not outlive a sweep that lacks it: its
+    velocity is the difference of two noisy places, and would send a ghost across the road."""
+    too_young = sweep_lacks_it and tracked.track.hits < params.carry_hits
+    return too_young or tracked.missed_s > params.max_missed_s + 1e-9
+
+
+def _begin(track_id: int, obstacle: Obstacle, place: F64, clock_s: float) -> Tracked:
+    """A track for an obstacle that continues none."""
+    return Tracked(LidarTrack(track_id, obstacle, None, 1, 0, False), ((clock_s, float(place[0]), float(place[1])),))
