@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import rerun.blueprint as rrb
 
 CAMERA = "world/camera"
 OVERLAYS = f"{CAMERA}/overlay"
 BEV_AHEAD_M, BEV_BEHIND_M, BEV_ASIDE_M = 80.0, 8.0, 24.0
+TTC_AXIS_S = 20.0
+"""A longer time to collision is no news."""
 _BACKGROUND = (13, 17, 23)
+_NO_LEGEND = rrb.PlotLegend(visible=False)
 
 
 def blueprint() -> rrb.Blueprint:
@@ -28,13 +33,18 @@ def blueprint() -> rrb.Blueprint:
         background=_BACKGROUND,
         visual_bounds=rrb.VisualBounds2D(x_range=(-BEV_ASIDE_M, BEV_ASIDE_M), y_range=(-BEV_AHEAD_M, BEV_BEHIND_M)),
     )
-    reasons = rrb.TextLogView(name="Reasons", origin="reasons")
+    reasons = rrb.TextLogView(
+        name="Reasons",
+        origin="reasons",
+        columns=rrb.TextLogColumns(timeline_columns=["frame"], text_log_columns=["LogLevel", "Body"]),
+        rows=rrb.TextLogRows(filter_by_log_level=["INFO", "WARN"]),
+    )
     curves = rrb.Horizontal(
-        _curve("Distance to the CIPV (m)", "curves/distance"),
-        _curve("Closing speed (m/s)", "curves/closing_speed"),
-        _curve("Time to collision (s)", "curves/ttc"),
-        _curve("Speed (km/h)", "curves/speed"),
-        _curve("Stage times (ms)", "curves/timing"),
+        _curve("Distance to the CIPV (m)", "distance"),
+        _curve("Closing speed (m/s)", "closing_speed"),
+        _curve("Time to collision (s)", "ttc", axis_y=rrb.ScalarAxis(range=(0.0, TTC_AXIS_S))),
+        _curve("Speed (km/h)", "speed", plot_legend=rrb.PlotLegend(visible=True)),
+        _curve("Stage times (ms)", "timing", plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop)),
     )
     left = rrb.Vertical(camera, rrb.Horizontal(bev, reasons, column_shares=[3, 2]), row_shares=[2, 3])
     return rrb.Blueprint(
@@ -46,5 +56,5 @@ def blueprint() -> rrb.Blueprint:
     )
 
 
-def _curve(name: str, origin: str) -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(name=name, origin=origin, plot_legend=rrb.PlotLegend(visible=True))
+def _curve(name: str, curve: str, **options: Any) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(name=name, origin=f"curves/{curve}", **{"plot_legend": _NO_LEGEND, **options})

@@ -7,26 +7,23 @@ from __future__ import annotations
 
 from pathlib import Path as FilePath
 from types import TracebackType
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
-import cv2
 import numpy as np
-import numpy.typing as npt
 import rerun as rr
 
+from app.views import rerun_parts as parts
 from app.views import scene
 from app.views.colors import rgb
 from app.views.rerun_blueprint import BEV_AHEAD_M, BEV_ASIDE_M, CAMERA, OVERLAYS, blueprint
 from pipeline import alignment
-from pipeline.geometry import F64, inverse
+from pipeline.geometry import inverse
 from pipeline.params import AlignmentParams
-from pipeline.types import Box, Frame, FusedObject, Path, Picture, Result
+from pipeline.types import Frame, Result
 
 APPLICATION = "CIPV Studio"
-_THIN_PX, _THICK_PX, _POINT_PX = 1.0, 2.5, 1.4
 _CALIBRATED = AlignmentParams()
 _RING_STEP_M = 20.0
-_JPEG_QUALITY = 80
 _ARROW_S = 1.0
 """Velocity arrows reach as far as the object moves, relative to ego, in this time."""
 
@@ -103,14 +100,18 @@ class RerunSink:
         self._rec.log("world", rr.ViewCoordinates.FLU, static=True)
         rings = np.arange(_RING_STEP_M, BEV_AHEAD_M + 1.0, _RING_STEP_M)
         angle = np.linspace(-np.pi / 2, np.pi / 2, 61)
-        arcs = [_to_bev(np.column_stack([r * np.cos(angle), r * np.sin(angle)])) for r in rings]
-        self._rec.log("bev/rings", rr.LineStrips2D(arcs, colors=rgb("grid"), radii=_px(_THIN_PX)), static=True)
+        arcs = [parts.to_bev(np.column_stack([r * np.cos(angle), r * np.sin(angle)])) for r in rings]
+        self._rec.log("bev/rings", rr.LineStrips2D(arcs, colors=rgb("grid"), radii=parts.THIN), static=True)
         places = [(0.0, -r) for r in rings]
         texts = [f"{r:.0f} m" for r in rings]
-        marks = rr.Points2D(places, labels=texts, colors=rgb("ground"), radii=_px(_THIN_PX), show_labels=True)
+        marks = rr.Points2D(places, labels=texts, colors=rgb("ground"), radii=parts.THIN, show_labels=True)
         self._rec.log("bev/rings/labels", marks, static=True)
-        ego = _to_bev(scene.ego_cuboid(0.0).footprint())
-        self._rec.log("bev/ego", rr.LineStrips2D([_closed(ego)], colors=rgb("ego"), radii=_px(_THIN_PX)), static=True)
+        ego = parts.to_bev(scene.ego_cuboid(0.0).footprint())
+        self._rec.log(
+            "bev/ego",
+            rr.LineStrips2D([parts.closed(ego)], colors=rgb("ego"), radii=parts.THIN),
+            static=True,
+        )
         for name, role in (("distance", "cipv"), ("closing_speed", "warning"), ("ttc", "lidar")):
             line = rr.SeriesLines(colors=rgb(role), names=name, widths=2.0)  # type: ignore[arg-type]
             self._rec.log(f"curves/{name}/cipv", line, static=True)
@@ -121,17 +122,22 @@ class RerunSink:
         ground_m = scene.ground_height_m(result) or 0.0
         points = result.layers.points
         cloud = (
-            rr.Points3D(points[:, :3], colors=scene.point_colors(result), radii=_px(_POINT_PX)) if len(points) else None
+            rr.Points3D(points[:, :3], colors=scene.point_colors(result), radii=parts.POINT) if len(points) else None
         )
         self._put("world/points", cloud)
-        self._put("world/cuboids", _cuboids([each for each in result.objects if each.cuboid], result))
-        seen = [each for each in result.objects if each.source == "V" and each.bev is not None]
-        self._put("world/footprints", _footprints(seen, result, ground_m))
-        for side, line in _sides(result.path).items():
-            strip = rr.LineStrips3D([scene.on_ground(line, ground_m + 0.05)], colors=rgb("path"), radii=_px(_THIN_PX))
+        others = [each for each in result.objects if each.cuboid is not None and each.id != scene.cipv_id(result)]
+        self._put("world/cuboids", parts.cuboids(others, result, rr.components.FillMode.MajorWireframe))
+        lead = [each for each in result.objects if each.cuboid is not None and each.id == scene.cipv_id(result)]
+        self._put("world/cipv", parts.cuboids(lead, result, rr.components.FillMode.TransparentFillMajorWireframe))
+        flat = [each for each in result.objects if each.cuboid is None and each.bev is not None]
+        self._put("world/footprints", parts.footprints(flat, result, ground_m))
+        named = [each for each in result.objects if each.bev is not None and scene.deserves_label(each, result)]
+        self._put("world/labels", parts.labels(named, result, ground_m))
+        for side, line in parts.sides(result.path).items():
+            strip = rr.LineStrips3D([scene.on_ground(line, ground_m + 0.05)], colors=rgb("path"), radii=parts.THIN)
             self._put(f"world/path/{side}", strip)
         ego = scene.ego_cuboid(ground_m)
-        box = rr.Boxes3D(centers=[ego.center], sizes=[ego.size], colors=rgb("ego"), radii=_px(_THIN_PX))
+        box = rr.Boxes3D(centers=[ego.center], sizes=[ego.size], colors=rgb("ego"), radii=parts.THIN, fill_mode="solid")
         self._put("world/ego", box)
 
     def _log_camera(self, frame: Frame, result: Result) -> None:
@@ -145,18 +151,21 @@ class RerunSink:
                 image_plane_distance=3.0,
             )
             self._rec.log(CAMERA, lens)
-        self._put(f"{CAMERA}/image", None if frame.picture is None else _encoded(frame.picture))
+        self._put(f"{CAMERA}/image", None if frame.picture is None else parts.encoded(frame.picture))
         self._put(f"{OVERLAYS}/points", self._projected(frame, result))
         layers = result.layers
         lidar_colors = {number: rgb("lidar") for number in layers.lidar_boxes}
         vision_colors = {number: rgb("vision") for number in layers.vision_boxes}
-        texts = {each.id: scene.object_text(each) for each in result.objects}
-        self._put(f"{OVERLAYS}/lidar_boxes", _boxes(layers.lidar_boxes, lidar_colors, {}, _THIN_PX))
-        self._put(f"{OVERLAYS}/vision_boxes", _boxes(layers.vision_boxes, vision_colors, texts, _THIN_PX))
+        seen = {each.id: scene.object_text(each) for each in result.objects if scene.deserves_label(each, result)}
+        now = {number: box for number, box in layers.vision_boxes.items() if number in seen}
+        carried = {number: box for number, box in layers.vision_boxes.items() if number not in seen}
+        self._put(f"{OVERLAYS}/lidar_boxes", parts.boxes(layers.lidar_boxes, lidar_colors, {}, parts.THIN))
+        self._put(f"{OVERLAYS}/vision_boxes", parts.boxes(now, vision_colors, seen, parts.THIN))
+        self._put(f"{OVERLAYS}/carried_boxes", parts.boxes(carried, vision_colors, {}, parts.FAINT))
         number = scene.cipv_id(result)
         box = layers.vision_boxes.get(number, layers.lidar_boxes.get(number)) if number is not None else None
         lead = {} if number is None or box is None else {number: box}
-        self._put(f"{OVERLAYS}/cipv", _boxes(lead, {each: rgb("cipv") for each in lead}, {}, _THICK_PX))
+        self._put(f"{OVERLAYS}/cipv", parts.boxes(lead, {each: rgb("cipv") for each in lead}, {}, parts.THICK))
 
     def _projected(self, frame: Frame, result: Result) -> rr.Points2D | None:
         model = alignment.resolve(self._params, frame.camera)
@@ -168,23 +177,26 @@ class RerunSink:
         with np.errstate(invalid="ignore"):
             inside = np.all((pixels >= 0) & (pixels < [width, height]), axis=1)
         range_m = np.hypot(points[inside, 0], points[inside, 1])
-        return rr.Points2D(pixels[inside], colors=scene.range_colors(range_m), radii=_px(_POINT_PX))
+        return rr.Points2D(pixels[inside], colors=scene.range_colors(range_m), radii=parts.POINT)
 
     def _log_bev(self, result: Result) -> None:
         placed = [each for each in result.objects if each.bev is not None]
         colors = [scene.object_color(each, result) for each in placed]
-        rings = [_closed(_to_bev(np.asarray(each.bev))) for each in placed]
-        texts = [scene.object_text(each) for each in placed]
-        strips = rr.LineStrips2D(rings, colors=colors, labels=texts, radii=_px(_THICK_PX), show_labels=_few(texts))
-        self._put("bev/footprints", strips if placed else None)
+        rings = [parts.closed(parts.to_bev(np.asarray(each.bev))) for each in placed]
+        self._put("bev/footprints", rr.LineStrips2D(rings, colors=colors, radii=parts.THICK) if placed else None)
+        named = [each for each in placed if scene.deserves_label(each, result)]
+        self._put("bev/labels", parts.bev_labels(named, result))
         moving = [each for each in placed if each.velocity_mps is not None]
-        starts = [_to_bev(np.asarray(each.bev)).mean(axis=0) for each in moving]
-        steps = [_to_bev(np.asarray([each.velocity_mps]))[0] * _ARROW_S for each in moving]
+        starts = [parts.to_bev(np.asarray(each.bev)).mean(axis=0) for each in moving]
+        steps = [parts.to_bev(np.asarray([each.velocity_mps]))[0] * _ARROW_S for each in moving]
         arrows = [scene.object_color(each, result) for each in moving]
         self._put("bev/velocity", rr.Arrows2D(origins=starts, vectors=steps, colors=arrows) if moving else None)
-        for side, line in _sides(result.path).items():
+        for side, line in parts.sides(result.path).items():
             near = line[np.abs(line[:, 1]) <= BEV_ASIDE_M]
-            self._put(f"bev/path/{side}", rr.LineStrips2D([_to_bev(near)], colors=rgb("path"), radii=_px(_THIN_PX)))
+            self._put(
+                f"bev/path/{side}",
+                rr.LineStrips2D([parts.to_bev(near)], colors=rgb("path"), radii=parts.THIN),
+            )
 
     def _log_curves(self, result: Result) -> None:
         cipv, acc, ego = result.cipv, result.acc, result.ego
@@ -211,76 +223,6 @@ class RerunSink:
             self._rec.log("reasons/notes", rr.TextLog(note, level=rr.TextLogLevel.WARN))
 
 
-def _px(radius: float | list[float]) -> Any:
-    """A radius in screen points, the same however near one looks."""
-    return rr.Radius.ui_points(radius)
-
-
 def _cause(error: RuntimeError) -> str:
     """The operating system's own words, without the library's frame around them."""
     return str(error).removeprefix("Failed to create file: ").partition(" (os error")[0].lower()
-
-
-def _sides(path: Path) -> dict[str, F64]:
-    return {"center": path.center, "left": path.left, "right": path.right}
-
-
-def _to_bev(points: npt.NDArray[np.floating]) -> F64:
-    """Ego x, y as a picture seen from above, forward is up: right is −y, down is −x."""
-    return np.column_stack([-points[:, 1], -points[:, 0]])
-
-
-def _closed(ring: F64) -> F64:
-    return np.vstack([ring, ring[:1]])
-
-
-def _few(texts: list[str]) -> bool:
-    return len(texts) <= 40
-
-
-def _cuboids(objects: list[FusedObject], result: Result) -> rr.Boxes3D | None:
-    boxes = [each.cuboid for each in objects if each.cuboid is not None]
-    if not boxes:
-        return None
-    lead = scene.cipv_id(result)
-    return rr.Boxes3D(
-        centers=[box.center for box in boxes],
-        sizes=[box.size for box in boxes],
-        rotations=[rr.RotationAxisAngle(axis=(0, 0, 1), radians=box.yaw_rad) for box in boxes],
-        colors=[rgb("cipv") if each.id == lead else rgb("lidar") for each in objects],
-        labels=[scene.object_text(each) for each in objects],
-        radii=_px([_THICK_PX if each.id == lead else _THIN_PX for each in objects]),
-    )
-
-
-def _footprints(objects: list[FusedObject], result: Result, ground_m: float) -> rr.LineStrips3D | None:
-    outlines = [scene.flat_outline(each, ground_m + 0.05) for each in objects]
-    if not outlines:
-        return None
-    colors = [scene.object_color(each, result) for each in objects]
-    texts = [scene.object_text(each) for each in objects]
-    return rr.LineStrips3D(
-        [line for line in outlines if line is not None], colors=colors, labels=texts, radii=_px(_THICK_PX)
-    )
-
-
-def _boxes(
-    boxes: dict[int, Box], colors: dict[int, tuple[int, int, int]], texts: dict[int, str], radius_px: float
-) -> rr.Boxes2D | None:
-    if not boxes:
-        return None
-    return rr.Boxes2D(
-        array=np.asarray(list(boxes.values())),
-        array_format=rr.Box2DFormat.XYXY,
-        colors=[colors[number] for number in boxes],
-        labels=[texts[number] for number in boxes] if texts else None,
-        radii=_px(radius_px),
-    )
-
-
-def _encoded(picture: Picture) -> rr.EncodedImage:
-    """The camera's own JPEG as it came; a raw picture is encoded once."""
-    if picture.encoded is not None and picture.encoded.startswith(b"\xff\xd8"):
-        return rr.EncodedImage(contents=picture.encoded, media_type="image/jpeg")
-    jpeg = cv2.imencode(".jpg", picture.bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1]
-    return rr.EncodedImage(contents=jpeg.tobytes(), media_type="image/jpeg")

@@ -13,13 +13,14 @@ import numpy.typing as npt
 
 from app.views.colors import Rgb, rgb, role_of, shade_of
 from pipeline.geometry import Cuboid
-from pipeline.types import DROPPED, F64, GROUND, UNCLUSTERED, FusedObject, Path, Result
+from pipeline.types import DROPPED, F64, GROUND, UNCLUSTERED, FusedObject, Path, Point3, Result
 
 U8 = npt.NDArray[np.uint8]
 ColorBy = Literal["kind", "height", "intensity", "range"]
 
 EGO_LENGTH_M, EGO_WIDTH_M, EGO_HEIGHT_M = 4.5, 1.8, 1.5
 """A car of ordinary size, drawn behind the sensor: the paper mounts the LiDAR on the front bumper."""
+_LABEL_LIFT_M, _FLAT_LABEL_LIFT_M = 0.5, 1.2
 _HEIGHT_SPAN_M = (-0.3, 3.0)
 _RANGE_SPAN_M = (0.0, 80.0)
 _BRIGHTEST_PERCENTILE = 98.0
@@ -40,6 +41,19 @@ def object_text(each: FusedObject) -> str:
     """``#7 car 23.4 m``; ``?`` where the distance is unknown, and said so when the object is only carried."""
     distance = "? m" if each.distance_m is None else f"{each.distance_m:.1f} m"
     return f"#{each.id} {each.label or 'obstacle'} {distance}{' carried' if each.carried else ''}"
+
+
+def deserves_label(each: FusedObject, result: Result) -> bool:
+    """The CIPV, what is in path and what the camera sees now: not every pole, and nothing that is only carried."""
+    return each.id == cipv_id(result) or (not each.carried and (each.source != "L" or each.in_path))
+
+
+def top_of(each: FusedObject, floor_m: float) -> Point3:
+    """Where the label of an object with a footprint goes: above its middle."""
+    x, y = np.asarray(each.bev).mean(axis=0)
+    if each.cuboid is None:
+        return float(x), float(y), floor_m + _FLAT_LABEL_LIFT_M
+    return float(x), float(y), each.cuboid.center[2] + each.cuboid.size[2] / 2 + _LABEL_LIFT_M
 
 
 def owners(result: Result) -> dict[int, FusedObject]:

@@ -18,8 +18,6 @@ from pipeline.types import Frame, FusedObject, Path, Point3
 
 _PICTURE_DISTANCE_M = 2.5
 _PICTURE_WIDTH_PX = 640
-_LABEL_LIFT_M = 0.5
-_FLAT_LABEL_LIFT_M = 1.2
 
 
 def cloud(scene: viser.SceneApi, points: npt.NDArray[np.float32], colors: outlines.U8, size_m: float) -> None:
@@ -96,14 +94,6 @@ def label(scene: viser.SceneApi, place: int, text: str, position: Point3 | None)
     if position is None:
         return _hide(scene, name)
     scene.add_label(name, text, position=position, anchor="bottom-center", font_screen_scale=0.8)
-
-
-def top_of(each: FusedObject, floor_m: float) -> Point3:
-    """Above the middle of an object that has a footprint."""
-    x, y = np.asarray(each.bev).mean(axis=0)
-    if each.cuboid is None:
-        return float(x), float(y), floor_m + _FLAT_LABEL_LIFT_M
-    return float(x), float(y), each.cuboid.center[2] + each.cuboid.size[2] / 2 + _LABEL_LIFT_M
 
 
 def path(scene: viser.SceneApi, corridor: Path, floor_m: float) -> None:

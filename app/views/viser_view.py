@@ -153,7 +153,7 @@ class ViserView:
         for place in range(max(len(named), self._labels)):
             if place < len(named):
                 each = named[place]
-                viser_nodes.label(self._scene, place, scene.object_text(each), viser_nodes.top_of(each, floor_m))
+                viser_nodes.label(self._scene, place, scene.object_text(each), scene.top_of(each, floor_m))
             else:
                 viser_nodes.label(self._scene, place, "", None)
         self._labels = max(len(named), self._labels)
@@ -161,8 +161,7 @@ class ViserView:
     def _has_label(self, each: FusedObject, result: Result) -> bool:
         if self._display.labels == "all":
             return True
-        seen = not each.carried and (each.source != "L" or each.in_path)
-        return self._display.labels == _LABELS[0] and (seen or each.id == scene.cipv_id(result))
+        return self._display.labels == _LABELS[0] and scene.deserves_label(each, result)
 
 
 class _silent:

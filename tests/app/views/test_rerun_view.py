@@ -81,10 +81,14 @@ def test_points_keep_their_places_and_colours(tmp_path: Path, frames: Ticks) -> 
 
 def test_cuboids_are_magenta_the_cipv_green_and_named(tmp_path: Path, frames: Ticks) -> None:
     path = write(tmp_path / "a.rrd", frames[:1])
-    assert rows(path, "/world/cuboids", "Boxes3D:labels")[0][1] == ["#7 car 19.9 m", "#8 obstacle 15.9 m"]
-    assert rows(path, "/world/cuboids", "Boxes3D:colors")[0][1] == [packed(rgb("cipv")), packed(rgb("lidar"))]
-    center, _ = rows(path, "/world/cuboids", "Boxes3D:centers")[0][1]
-    assert center == pytest.approx([22.0, 0.2, -0.5])
+    for entity, text, role in (
+        ("/world/cuboids", "#8 obstacle 15.9 m", "lidar"),
+        ("/world/cipv", "#7 car 19.9 m", "cipv"),
+    ):
+        assert rows(path, entity, "Boxes3D:labels")[0][1] == [text]
+        assert rows(path, entity, "Boxes3D:colors")[0][1] == [packed(rgb(role))]
+    assert rows(path, "/world/cipv", "Boxes3D:centers")[0][1][0] == pytest.approx([22.0, 0.2, -0.5])
+    assert rows(path, "/world/labels", "Points3D:labels")[0][1] == ["#7 car 19.9 m"]
 
 
 def test_boxes_in_the_picture_are_where_the_result_has_them(tmp_path: Path, frames: Ticks) -> None:
