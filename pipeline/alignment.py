@@ -123,14 +123,20 @@ def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignm
     return Angular(float(np.radians(h_deg)), float(np.radians(v_deg)), float(cx), float(cy))  # type: ignore[arg-type]
 
 
-def project_cuboid(alignment: Alignment, corners: F64, width: int, height: int) -> Box | None:
-    """The image box around a cuboid's (8, 3) corners, clipped to the picture; null when outside it or behind.
+def project_cuboids(alignment: Alignment, corners: F64, width: int, height: int) -> list[Box | None]:
+    """The image boxes around cuboids' (M, 8, 3) corners, clipped to the picture; null for one outside it or behind.
 
-    Paper: "the cuboid of the bounding box … is projected onto the image"."""
-    uv = alignment.project(corners)
-    uv = uv[~np.isnan(uv[:, 0])]
-    if len(uv) < 4:
-        return None
-    x1, y1 = np.clip(uv.min(axis=0), 0.0, [width, height])
-    x2, y2 = np.clip(uv.max(axis=0), 0.0, [width, height])
-    return (float(x1), float(y1), float(x2), float(y2)) if x2 > x1 and y2 > y1 else None
+    Paper: "the cuboid of the bounding box … is projected onto the image". All at once: a sweep has dozens."""
+    uv = alignment.project(corners.reshape(-1, 3)).reshape(-1, 8, 2)
+    behind = np.isnan(uv)
+    enough = np.sum(~behind[..., 0], axis=1) >= 4
+    low = np.clip(np.where(behind, np.inf, uv).min(axis=1), 0.0, [width, height])
+    high = np.clip(np.where(behind, -np.inf, uv).max(axis=1), 0.0, [width, height])
+    inside = enough & np.all(high > low, axis=1)
+    boxes = np.hstack([low, high]).tolist()
+    return [(x1, y1, x2, y2) if ok else None for ok, (x1, y1, x2, y2) in zip(inside, boxes, strict=True)]
+
+
+def project_cuboid(alignment: Alignment, corners: F64, width: int, height: int) -> Box | None:
+    """The image box around one cuboid's (8, 3) corners; see ``project_cuboids``."""
+    return project_cuboids(alignment, corners[None], width, height)[0]

@@ -15,15 +15,18 @@ import numpy as np
 from pipeline.motion import closing_speed_mps
 from pipeline.params import CipvParams
 from pipeline.path.corridor import nearest_on_path
-from pipeline.types import VEHICLES, Cipv, FusedObject, Gate, Path, Rejection
+from pipeline.types import VEHICLES, Cipv, FusedObject, Gate, Path, Point2, Rejection
+
+SMALLEST_SIGMA_M = 0.1
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """An object with what its tests need to know: whether it led in the frame before, and how far from the path's
-    centre it may be."""
+    """An object with what its tests need to know: its place against the path, whether it led in the frame before, and
+    how far from the path's centre it may be."""
 
     item: FusedObject
+    place: Place | None
     leads: bool
     limit_m: float
     params: CipvParams
@@ -46,12 +49,17 @@ def choose(
     An object is in the path when the middle of its nearest face lies between the two edges. The last lead stays in the
     path until it is ``hysteresis_m`` outside, so that a lead at the edge does not flicker."""
     judged, able, failures = [], [], {}
-    for item in objects:
+    for item, place in zip(objects, _places(objects, path), strict=True):
         leads = item.id == last_lead
         limit_m = path.half_width_m + (params.hysteresis_m if leads else 0.0)
-        item = _located(item, path, limit_m)
-        checks = [ask(Candidate(item, leads, limit_m, params)) for ask in _ELIGIBILITY]
-        item = replace(item, gates=item.gates + tuple(check.gate for check in checks))
+        checks = [ask(Candidate(item, place, leads, limit_m, params)) for ask in _ELIGIBILITY]
+        item = replace(
+            item,
+            gates=item.gates + tuple(check.gate for check in checks),
+            path_offset_m=place.offset_m if place else None,
+            in_path=place is not None and place.within(limit_m),
+            in_path_probability=_probability(place, path) if place else None,
+        )
         judged.append(item)
         failed = next((check.reason for check in checks if not check.gate.passed), None)
         if failed is None:
@@ -66,30 +74,43 @@ def choose(
     return tuple(judged), _named(lead, len(able)), rejected
 
 
-def _located(item: FusedObject, path: Path, limit_m: float) -> FusedObject:
-    if item.bev is None:
-        return item
-    near_face = np.mean(sorted(item.bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)[:2], axis=0)
-    offsets, reached = nearest_on_path(path, near_face[None])
-    offset, ahead_m = float(offsets[0]), float(reached[0])
-    sure = _probability(offset, _sigma(path, ahead_m), path.half_width_m)
-    return replace(
-        item,
-        path_offset_m=offset,
-        in_path=ahead_m > 0.0 and abs(offset) <= limit_m,
-        in_path_probability=sure if ahead_m > 0.0 else 0.0,
-    )
+@dataclass(frozen=True)
+class Place:
+    """Where the middle of an object's nearest face is against the path: signed offset from the centre line, positive to
+    the left, and path length to its foot."""
+
+    offset_m: float
+    ahead_m: float
+
+    def within(self, limit_m: float) -> bool:
+        return self.ahead_m > 0.0 and abs(self.offset_m) <= limit_m
 
 
-def _sigma(path: Path, ahead_m: float) -> float:
-    """Standard deviation of an offset: the path's own at that distance, and never below what a sensor resolves."""
+def _places(objects: tuple[FusedObject, ...], path: Path) -> list[Place | None]:
+    """Each object's place; null where it is not known."""
+    faces = [near_face_middle(item.bev) for item in objects if item.bev is not None]
+    if not faces:
+        return [None] * len(objects)
+    offsets, reached = nearest_on_path(path, np.array(faces))
+    known = iter(Place(offset, ahead) for offset, ahead in zip(offsets.tolist(), reached.tolist(), strict=True))
+    return [next(known) if item.bev is not None else None for item in objects]
+
+
+def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
+    """The middle of the side that faces the ego origin: between the two nearest corners."""
+    (ax, ay), (bx, by) = sorted(bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)[:2]
+    return (ax + bx) / 2, (ay + by) / 2
+
+
+def _probability(place: Place, path: Path) -> float:
+    """That the true offset lies between the edges, it being normal around the measured one with the path's own sigma at
+    that distance, and never surer than a sensor resolves."""
+    if place.ahead_m <= 0.0:
+        return 0.0
     at = [0.0, *(float(s) for s in path.sigma_m)]
-    return max(float(np.interp(ahead_m, at, [0.0, *path.sigma_m.values()])), 0.1)
-
-
-def _probability(offset: float, sigma: float, half_width: float) -> float:
-    """That a normal offset lies between the edges."""
-    return 0.5 * (erf((half_width - offset) / (sigma * sqrt(2))) + erf((half_width + offset) / (sigma * sqrt(2))))
+    sigma = max(float(np.interp(place.ahead_m, at, [0.0, *path.sigma_m.values()])), SMALLEST_SIGMA_M)
+    scale = sigma * sqrt(2)
+    return 0.5 * (erf((path.half_width_m - place.offset_m) / scale) + erf((path.half_width_m + place.offset_m) / scale))
 
 
 # ---------------------------------------------------------------- who may be a lead
@@ -135,12 +156,11 @@ def _is_vehicle_sized(who: Candidate) -> Check:
 
 
 def _is_in_path(who: Candidate) -> Check:
-    offset = who.item.path_offset_m
-    if offset is None:
+    if who.place is None:
         return Check(Gate("path_offset", None, who.limit_m, False), "place not known")
-    outside = abs(offset) - who.limit_m
-    reason = f"out of path by {outside:.1f} m" if outside > 0 else "beside or behind the bumper"
-    return Check(Gate("path_offset", abs(offset), who.limit_m, who.item.in_path), reason)
+    aside = abs(who.place.offset_m)
+    reason = f"out of path by {aside - who.limit_m:.1f} m" if aside > who.limit_m else "beside or behind the bumper"
+    return Check(Gate("path_offset", aside, who.limit_m, who.place.within(who.limit_m)), reason)
 
 
 _ELIGIBILITY: tuple[Callable[[Candidate], Check], ...] = (

@@ -7,12 +7,13 @@ so V + VL = vision tracks and L + VL = LiDAR tracks, always.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pipeline.alignment import Alignment, project_cuboid
+from pipeline.alignment import Alignment, project_cuboids
 from pipeline.geometry import F64, iou_matrix
 from pipeline.params import FusionParams
 from pipeline.types import Box, FusedObject, Gate, LidarTrack, Point2, VisionTrack
@@ -59,12 +60,10 @@ def fuse(
 ) -> tuple[FusionState, Fusion]:
     """One row per physical object. ``picture_size`` is (width, height) in pixels; without it or without an alignment
     nothing can be compared, and every track keeps a row of its own."""
-    projected = [
-        project_cuboid(alignment, _full_corners(track, params), *picture_size)
-        if alignment is not None and picture_size is not None
-        else None
-        for track in lidar
-    ]
+    projected: list[Box | None] = [None] * len(lidar)
+    if alignment is not None and picture_size is not None and lidar:
+        corners = np.stack([_full_corners(track, params) for track in lidar])
+        projected = project_cuboids(alignment, corners, *picture_size)
     overlap = _overlap(vision, projected)
     joinable, gates = _gates(overlap, vision, lidar, params)
     partner = _assign(overlap, joinable, params)
@@ -93,7 +92,7 @@ def _full_corners(track: LidarTrack, params: FusionParams) -> F64:
     """(8, 3) corners of a track's cuboid, taller by half the gap between rings at either end: the object's edge lies
     anywhere between the last ring that hit it and the next one that did not. At 25 m a gap is 0.9 m, half a car."""
     corners = track.obstacle.cuboid.corners()
-    margin = _range(track) * np.tan(np.radians(params.ring_gap_deg / 2))
+    margin = _range(track) * math.tan(math.radians(params.ring_gap_deg / 2))
     corners[:4, 2] -= margin
     corners[4:, 2] += margin
     return corners
@@ -116,7 +115,7 @@ def _gates(
         tests = [Gate("iou", iou, params.min_iou, iou >= params.min_iou)]
         distance, sigma = vision[i].distance_m, vision[i].sigma_m
         if params.range_gate and distance is not None and sigma is not None:
-            gap = abs(distance - _range(lidar[j])) / float(np.hypot(sigma, LIDAR_RANGE_SIGMA_M))
+            gap = abs(distance - _range(lidar[j])) / math.hypot(sigma, LIDAR_RANGE_SIGMA_M)
             tests.append(Gate("range_sigmas", gap, params.range_gate_sigmas, gap <= params.range_gate_sigmas))
         joinable[i, j] = all(test.passed for test in tests)
         gates[int(i), int(j)] = tuple(tests)
@@ -221,7 +220,7 @@ def _row(
 
 def _range(track: LidarTrack) -> float:
     """Horizontal range from the ego origin to the cluster's nearest point."""
-    return float(np.hypot(*track.obstacle.closest_point[:2]))
+    return math.hypot(*track.obstacle.closest_point[:2])
 
 
 def _typical_footprint(near_face: Point2, label: str) -> F64:
@@ -233,5 +232,5 @@ def _typical_footprint(near_face: Point2, label: str) -> F64:
 
 
 def _quad(corners: F64) -> tuple[Point2, Point2, Point2, Point2]:
-    a, b, c, d = ((float(x), float(y)) for x, y in corners)
+    a, b, c, d = ((x, y) for x, y in corners.tolist())
     return a, b, c, d

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,16 +22,26 @@ class Cuboid:
 
     def footprint(self) -> F64:
         """(4, 2) corners seen from above: front left, front right, rear right, rear left."""
-        half_l, half_w = self.size[0] / 2, self.size[1] / 2
-        local = np.array([[half_l, half_w], [half_l, -half_w], [-half_l, -half_w], [-half_l, half_w]])
-        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
-        return local @ np.array([[c, s], [-s, c]]) + np.asarray(self.center[:2])
+        x, y, _ = self.center
+        c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        ahead_x, ahead_y = c * self.size[0] / 2, s * self.size[0] / 2
+        left_x, left_y = -s * self.size[1] / 2, c * self.size[1] / 2
+        return np.array(
+            [
+                (x + ahead_x + left_x, y + ahead_y + left_y),
+                (x + ahead_x - left_x, y + ahead_y - left_y),
+                (x - ahead_x - left_x, y - ahead_y - left_y),
+                (x - ahead_x + left_x, y - ahead_y + left_y),
+            ]
+        )
 
     def corners(self) -> F64:
         """(8, 3) corners: the footprint at the bottom, then the same four at the top."""
-        flat = self.footprint()
-        low, high = self.center[2] - self.size[2] / 2, self.center[2] + self.size[2] / 2
-        return np.vstack([np.column_stack([flat, np.full(4, low)]), np.column_stack([flat, np.full(4, high)])])
+        corners = np.empty((8, 3))
+        corners[:4, :2] = corners[4:, :2] = self.footprint()
+        corners[:4, 2] = self.center[2] - self.size[2] / 2
+        corners[4:, 2] = self.center[2] + self.size[2] / 2
+        return corners
 
 
 def transform(T: F64, points: npt.NDArray[np.floating]) -> F64:

@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 
+from pipeline.cipv import near_face_middle
 from pipeline.geometry import closest_on_polygon
 from pipeline.sources.base import TruthObject
-from pipeline.types import VEHICLES, Result
+from pipeline.types import VEHICLES, Point2, Result
 
 Verdict = Literal["correct", "none", "missed", "false", "wrong"]
 """correct: the right vehicle · none: rightly nothing · missed: a lead, not found · false: a CIPV, no lead · wrong:
@@ -91,11 +92,11 @@ def judge(result: Result, truth: Iterable[TruthObject], rule: LeadRule) -> Judge
     return Judged(result.frame, "correct" if on_it else "wrong", truth_m, chosen.distance_m, lateral)
 
 
-def _lateral_error(bev: tuple[tuple[float, float], ...], lead: TruthObject) -> float:
+def _lateral_error(bev: tuple[Point2, Point2, Point2, Point2], lead: TruthObject) -> float:
     """How far the middle of the object's nearest face lies beside the label's side-to-side extent; 0 inside it."""
-    near_face = np.mean(sorted(bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)[:2], axis=0)
+    y = near_face_middle(bev)[1]
     sides = lead.cuboid.footprint()[:, 1]
-    return float(max(sides.min() - near_face[1], near_face[1] - sides.max(), 0.0))
+    return float(max(sides.min() - y, y - sides.max(), 0.0))
 
 
 @dataclass(frozen=True)

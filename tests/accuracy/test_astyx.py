@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.calibration.distance import Pair, collect_pairs, fit_laws
-from pipeline.evaluation.lead import score
+from pipeline.evaluation.lead import Judged, score
 from pipeline.sources import open_source
 from pipeline.vision.detector import open_detector
 from tests.accuracy.drives import EMPTY_CLIP, SCORED_CLIPS, all_scored, drive
@@ -39,16 +39,22 @@ def test_no_lead_is_made_up_on_an_empty_road(data_dir: Path) -> None:
         assert lead is None or lead.distance_m > 60.0, (number, lead)
 
 
-@pytest.mark.parametrize("clip", SCORED_CLIPS, ids=lambda name: name)
-def test_camera_alone_estimates_distance_with_a_law_fitted_elsewhere(
-    clip: str, data_dir: Path, pairs: tuple[Pair, ...]
-) -> None:
-    """The law is fitted on the other clips only."""
-    own = next(numbers for numbers in ALL_CLIPS if SCORED_CLIPS[clip][0] in numbers)
-    others = [pair for pair in pairs if int(pair.frame) not in own]
-    law = fit_laws(others, exponent=-1.0)["car"].law
-    changes = (("distance.coefficient", law.coefficient), ("distance.exponent", law.exponent))
-    total = score(drive(data_dir, "astyx", sensors="camera", changes=changes).clip(SCORED_CLIPS[clip]))
+def camera_only_without_own_clip(folder: Path, pairs: tuple[Pair, ...]) -> dict[str, list[Judged]]:
+    """Each scored clip's verdicts with the camera alone, its distance law fitted on the other clips only."""
+    verdicts = {}
+    for clip, numbers in SCORED_CLIPS.items():
+        own = next(recorded for recorded in ALL_CLIPS if numbers[0] in recorded)
+        law = fit_laws([pair for pair in pairs if int(pair.frame) not in own], exponent=-1.0)["car"].law
+        changes = (("distance.coefficient", law.coefficient), ("distance.exponent", law.exponent))
+        verdicts[clip] = drive(folder, "astyx", sensors="camera", changes=changes).clip(numbers)
+    return verdicts
+
+
+def test_camera_alone_estimates_distance_with_a_law_fitted_elsewhere(data_dir: Path, pairs: tuple[Pair, ...]) -> None:
+    by_clip = camera_only_without_own_clip(data_dir, pairs)
+    total = score(row for rows in by_clip.values() for row in rows)
+    assert total.frames == 31
+    assert total.missed <= 4  # an object that one sensor sees counts from its third sighting
     assert total.mean_relative_error is not None
     assert total.mean_relative_error <= 0.12
 
