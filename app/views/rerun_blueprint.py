@@ -46,7 +46,7 @@ def blueprint() -> rrb.Blueprint:
         _curve("Speed (km/h)", "speed", plot_legend=rrb.PlotLegend(visible=True)),
         _curve("Stage times (ms)", "timing", plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop)),
     )
-    left = rrb.Vertical(camera, rrb.Horizontal(bev, reasons, column_shares=[3, 2]), row_shares=[2, 3])
+    left = rrb.Vertical(camera, rrb.Horizontal(bev, reasons), row_shares=[2, 3])
     return rrb.Blueprint(
         rrb.Vertical(rrb.Horizontal(left, world, column_shares=[1, 1]), curves, row_shares=[3, 1]),
         rrb.TimePanel(state="collapsed", timeline="sensor_time"),

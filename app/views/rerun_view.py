@@ -214,9 +214,11 @@ class RerunSink:
 
     def _log_reasons(self, result: Result) -> None:
         reason = "no vehicle in path" if result.cipv is None else f"CIPV #{result.cipv.id}: {result.cipv.reason}"
-        self._rec.log("reasons/cipv", rr.TextLog(reason, level=rr.TextLogLevel.INFO, color=rgb("cipv")))
+        self._rec.log("reasons/cipv", rr.TextLog(reason, level=rr.TextLogLevel.INFO))
         if result.acc is not None:
-            self._rec.log("reasons/acc", rr.TextLog(f"{result.acc.state}: {result.acc.reason}", level="INFO"))
+            self._rec.log(
+                "reasons/acc", rr.TextLog(f"{result.acc.state}: {result.acc.reason}", level=rr.TextLogLevel.INFO)
+            )
         for each in result.rejected:
             self._rec.log("reasons/rejected", rr.TextLog(f"#{each.id}: {each.reason}", level=rr.TextLogLevel.DEBUG))
         for note in result.notes:
