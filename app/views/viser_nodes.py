@@ -93,7 +93,12 @@ def label(scene: viser.SceneApi, place: int, text: str, position: Point3 | None)
     name = f"/labels/{place}"
     if position is None:
         return _hide(scene, name)
-    scene.add_label(name, text, position=position, anchor="bottom-center", font_screen_scale=0.8)
+    handle = scene.get_handle_by_name(name)
+    if isinstance(handle, viser.LabelHandle):
+        handle.text = text
+        _stand_at(handle, position)
+    else:
+        scene.add_label(name, text, position=position, anchor="bottom-center", font_screen_scale=0.8)
 
 
 def path(scene: viser.SceneApi, corridor: Path, floor_m: float) -> None:
@@ -112,19 +117,19 @@ def path(scene: viser.SceneApi, corridor: Path, floor_m: float) -> None:
     lines(scene, "/path/lines", Strokes(parts, [rgb("path")] * len(parts)), 2.0)
 
 
-def grid(scene: viser.SceneApi, floor_m: float = 0.0) -> None:
-    """Ten-metre squares."""
+def floor(scene: viser.SceneApi, floor_m: float) -> None:
+    """What stands on the ground, at this frame's ground: a grid of ten-metre squares and the ego car."""
+    at: Point3 = (60.0, 0.0, floor_m - 0.02)
+    ego = outlines.ego_cuboid(floor_m)
+    grid, car = scene.get_handle_by_name("/grid"), scene.get_handle_by_name("/ego")
+    if grid is not None and car is not None:
+        _stand_at(grid, at)
+        _stand_at(car, ego.center)
+        return
     scene.add_grid(
         "/grid", 200.0, 200.0, cell_size=2.0, section_size=10.0, cell_thickness=0.5, section_thickness=1.0,
-        cell_color=rgb("grid"), section_color=rgb("grid"), position=(60.0, 0.0, floor_m - 0.02),
-        fade_distance=150.0, shadow_opacity=0.0,
+        cell_color=rgb("grid"), section_color=rgb("grid"), position=at, fade_distance=150.0, shadow_opacity=0.0,
     )  # fmt: skip
-
-
-def floor(scene: viser.SceneApi, floor_m: float) -> None:
-    """What stands on the ground, at this frame's ground: the grid and the ego car."""
-    grid(scene, floor_m)
-    ego = outlines.ego_cuboid(floor_m)
     scene.add_box(
         "/ego", rgb("ego"), ego.size, opacity=0.5, position=ego.center, cast_shadow=False, receive_shadow=False
     )
@@ -181,6 +186,12 @@ def _linear(colors: Sequence[Rgb]) -> outlines.U8:
 def _segments(line: F64) -> F64:
     """(K, 3) polyline as (K−1, 2, 3) segments."""
     return np.stack([line[:-1], line[1:]], axis=1)
+
+
+def _stand_at(handle: viser.SceneNodeHandle, position: Point3) -> None:
+    """Moving a node that is there costs a tenth of making it anew."""
+    handle.position = position
+    handle.visible = True
 
 
 def _hide(scene: viser.SceneApi, name: str) -> None:

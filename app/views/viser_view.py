@@ -84,7 +84,7 @@ class ViserView:
     # ------------------------------------------------------------ what never changes
 
     def _add_static(self) -> None:
-        viser_nodes.grid(self._scene)
+        viser_nodes.floor(self._scene, 0.0)
         self._scene.world_axes.visible = False
 
     def _add_display_options(self) -> None:

@@ -187,17 +187,14 @@ class SceneClient:
                 seen.pop(each["name"], None)
         return seen
 
-    def newest(self, name: str) -> dict[str, Any]:
-        """The newest message that made a node."""
-        return next(each for each in reversed(self.messages) if each.get("name") == name and "props" in each)
-
     def texts(self) -> list[str]:
         """The labels that are shown."""
-        return [
-            self.newest(name)["props"]["text"]
-            for name, shown in self.nodes().items()
-            if shown and name.startswith("/labels/")
-        ]
+        words: dict[str, str] = {}
+        for each in self.messages:
+            written = each.get("props", each.get("updates", {}))
+            if each.get("name", "").startswith("/labels/") and "text" in written:
+                words[each["name"]] = written["text"]
+        return [words[name] for name, shown in self.nodes().items() if shown and name in words]
 
     def inputs(self, label: str) -> list[dict[str, Any]]:
         """Every input of the panel with this label, in the panel's order."""

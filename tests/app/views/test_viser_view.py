@@ -72,6 +72,20 @@ def test_what_vanishes_is_hidden(view: ViserView, frame: Frame, result: Result, 
     assert client.texts() == []
 
 
+def test_labels_and_the_ego_car_follow_the_newest_frame(
+    view: ViserView, frame: Frame, result: Result, open_scene: Any
+) -> None:
+    view.show(frame, result)
+    layers = dataclasses.replace(result.layers, points=result.layers.points + np.float32([0, 0, 0.5, 0]))
+    nearer = dataclasses.replace(result.objects[0], distance_m=11.0)
+    view.show(frame, dataclasses.replace(result, objects=(nearer, *result.objects[1:]), layers=layers))
+    client = open_scene(view.port)
+    client.read_present_state()
+    assert client.texts() == ["#7 car 11.0 m"]
+    placed = [each for each in client.messages if each["type"] == "SetPositionMessage" and each["name"] == "/ego"]
+    assert placed[-1]["position"][2] == pytest.approx(-1.2 + 0.5 + 1.5 / 2, abs=1e-3), "on this frame's ground"
+
+
 def test_a_thousand_objects_later_a_late_browser_gets_no_more_than_at_first(
     view: ViserView, frame: Frame, result: Result, open_scene: Any
 ) -> None:
