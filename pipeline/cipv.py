@@ -7,7 +7,7 @@ smallest distance. Each test leaves its number and limit on the object; the firs
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import erf, sqrt
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.motion import closing_speed_mps
 from pipeline.params import CipvParams
 from pipeline.path.corridor import nearest_on_path
+from pipeline.records import evolve
 from pipeline.types import VEHICLES, Cipv, FusedObject, Gate, Path, Point2, Rejection
 
 SMALLEST_SIGMA_M = 0.1
@@ -53,7 +54,7 @@ def choose(
         leads = item.id == last_lead
         limit_m = path.half_width_m + (params.hysteresis_m if leads else 0.0)
         checks = [ask(Candidate(item, place, leads, limit_m, params)) for ask in _ELIGIBILITY]
-        item = replace(
+        item = evolve(
             item,
             gates=item.gates + tuple(check.gate for check in checks),
             path_offset_m=place.offset_m if place else None,

@@ -13,12 +13,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
 F64 = npt.NDArray[np.float64]
-
-_H = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True)
@@ -45,20 +44,57 @@ def predict(state: CvState, dt_s: float, accel_sigma: float) -> CvState:
     """The state ``dt_s`` ≥ 0 seconds later. ``accel_sigma``: m/s², along each axis. ValueError when time runs back."""
     if dt_s < 0.0:
         raise ValueError(f"a filter cannot run back in time: dt = {dt_s} s")
-    F = np.eye(4)
-    F[0, 2] = F[1, 3] = dt_s
-    G = np.array([[dt_s**2 / 2, 0.0], [0.0, dt_s**2 / 2], [dt_s, 0.0], [0.0, dt_s]])
-    return CvState(state.mean @ F.T, F @ state.cov @ F.T + accel_sigma**2 * (G @ G.T))
+    mean, cov = _predict(state.mean.reshape(-1, 4), state.cov.reshape(-1, 4, 4), dt_s, accel_sigma**2)
+    return CvState(mean.reshape(state.mean.shape), cov.reshape(state.cov.shape))
 
 
 def update(state: CvState, z: npt.ArrayLike, R: F64) -> CvState:
     """The state after a position ``z`` (…, 2) m measured with covariance ``R`` (2, 2) m² (Joseph form)."""
-    S = state.cov[..., :2, :2] + R
-    K = np.linalg.solve(S, state.cov[..., :2, :]).swapaxes(-1, -2)
-    keep = np.eye(4) - K @ _H
-    innovation = np.asarray(z, dtype=np.float64) - state.mean[..., :2]
-    cov = keep @ state.cov @ keep.swapaxes(-1, -2) + K @ R @ K.swapaxes(-1, -2)
-    return CvState(state.mean + np.squeeze(K @ innovation[..., None], -1), (cov + cov.swapaxes(-1, -2)) / 2)
+    z = np.asarray(z, dtype=np.float64).reshape(-1, 2)
+    mean, cov = _update(state.mean.reshape(-1, 4), state.cov.reshape(-1, 4, 4), z, R)
+    return CvState(mean.reshape(state.mean.shape), cov.reshape(state.cov.shape))
+
+
+@numba.njit(cache=True, nogil=True)
+def _predict(mean, cov, dt, accel_var):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """F P Fᵀ + Q written out: position and velocity are two 2×2 blocks."""
+    new_mean, new_cov = mean.copy(), cov.copy()
+    for t in range(len(mean)):
+        for i in range(2):
+            new_mean[t, i] += dt * mean[t, i + 2]
+        for i in range(2):
+            for j in range(2):
+                vp, pv, vv = cov[t, i + 2, j], cov[t, i, j + 2], cov[t, i + 2, j + 2]
+                new_cov[t, i, j] += dt * (vp + pv) + dt * dt * vv
+                new_cov[t, i, j + 2] += dt * vv
+                new_cov[t, i + 2, j] += dt * vv
+            new_cov[t, i, i] += accel_var * dt**4 / 4
+            new_cov[t, i, i + 2] += accel_var * dt**3 / 2
+            new_cov[t, i + 2, i] += accel_var * dt**3 / 2
+            new_cov[t, i + 2, i + 2] += accel_var * dt**2
+    return new_mean, new_cov
+
+
+@numba.njit(cache=True, nogil=True)
+def _update(mean, cov, z, R):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Joseph form, which stays symmetric and positive however the gains are rounded."""
+    new_mean, new_cov = np.empty_like(mean), np.empty_like(cov)
+    keep = np.empty((4, 4))
+    for t in range(len(mean)):
+        a, b = cov[t, 0, 0] + R[0, 0], cov[t, 0, 1] + R[0, 1]
+        c, d = cov[t, 1, 0] + R[1, 0], cov[t, 1, 1] + R[1, 1]
+        det = a * d - b * c
+        gain = np.empty((4, 2))
+        for i in range(4):
+            gain[i, 0] = (cov[t, i, 0] * d - cov[t, i, 1] * c) / det
+            gain[i, 1] = (cov[t, i, 1] * a - cov[t, i, 0] * b) / det
+        for i in range(4):
+            new_mean[t, i] = mean[t, i] + gain[i, 0] * (z[t, 0] - mean[t, 0]) + gain[i, 1] * (z[t, 1] - mean[t, 1])
+            for j in range(4):
+                keep[i, j] = (1.0 if i == j else 0.0) - (gain[i, j] if j < 2 else 0.0)
+        joseph = keep @ cov[t] @ keep.T + gain @ R @ gain.T
+        new_cov[t] = (joseph + joseph.T) / 2
+    return new_mean, new_cov
 
 
 def mahalanobis2(state: CvState, z: npt.ArrayLike, R: F64) -> float:

@@ -7,11 +7,11 @@ that pulls away has a negative closing speed and no TTC.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 
 from pipeline.params import MotionParams
+from pipeline.records import evolve
 from pipeline.types import EgoState, FusedObject
 
 
@@ -34,10 +34,10 @@ def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) ->
     closing = closing_speed_mps(item)
     ttc = item.distance_m / closing if closing is not None and closing > 0 and item.distance_m is not None else None
     if ego is None or item.velocity_mps is None or item.closest_point is None:
-        return replace(item, ttc_s=ttc)
+        return evolve(item, ttc_s=ttc)
     yaw_rate = ego.yaw_rate_radps or 0.0
     x, y, _ = item.closest_point
     vx = item.velocity_mps[0] + ego.speed_mps - yaw_rate * y
     vy = item.velocity_mps[1] + yaw_rate * x
     speed = float(np.hypot(vx, vy))
-    return replace(item, ttc_s=ttc, speed_over_ground_mps=speed, moving=speed > params.moving_mps)
+    return evolve(item, ttc_s=ttc, speed_over_ground_mps=speed, moving=speed > params.moving_mps)

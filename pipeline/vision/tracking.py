@@ -11,7 +11,7 @@ measured, and it has no velocity. ``kalman`` predicts both the box and the place
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -20,6 +20,7 @@ from pipeline import kalman
 from pipeline.geometry import F64
 from pipeline.kalman import CvState
 from pipeline.params import VisionTrackingParams
+from pipeline.records import evolve
 from pipeline.types import VEHICLES, Box, VisionMeasurement, VisionTrack
 
 SPEED_SIGMA_MPS = 8.0
@@ -68,7 +69,7 @@ def track(
     expected = [_predict(followed, dt_s or 0.0, params) for followed in state.followed]
     if measurements is None:
         kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
-        return replace(state, followed=kept), tuple(followed.track for followed in kept)
+        return evolve(state, followed=kept), tuple(followed.track for followed in kept)
     partner = _match(expected, measurements, params)
     kept_list = [
         _seen(followed, measurements[partner[row]], params) if row in partner else _missed(followed)
@@ -87,9 +88,9 @@ def track(
 
 def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
     """Where the object should be now; carried until a box says that it is there."""
-    aged = replace(
+    aged = evolve(
         followed,
-        track=replace(followed.track, carried=True),
+        track=evolve(followed.track, carried=True),
         unseen_s=followed.unseen_s + dt_s,
         unplaced_s=followed.unplaced_s + dt_s,
     )
@@ -102,7 +103,7 @@ def _predict_box(followed: Followed, dt_s: float, params: VisionTrackingParams) 
     px_per_m = _width(followed.track.bbox) / _CAR_WIDTH_M
     moved = kalman.predict(followed.box_filter, dt_s, params.accel_sigma_mps2 * px_per_m)
     box = _around(moved.mean[:2], followed.track.bbox)
-    return replace(followed, box_filter=moved, track=replace(followed.track, bbox=box))
+    return evolve(followed, box_filter=moved, track=evolve(followed.track, bbox=box))
 
 
 def _predict_place(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
@@ -113,10 +114,10 @@ def _predict_place(followed: Followed, dt_s: float, params: VisionTrackingParams
     moved = kalman.predict(followed.place_filter, dt_s, params.accel_sigma_mps2)
     before_m, now_m = (math.hypot(*filtered.mean[:2]) for filtered in (followed.place_filter, moved))
     if followed.unplaced_s > params.max_missed_s or now_m <= 0.0 or moved.mean[0] <= 0.0:
-        lost = replace(followed.track, distance_m=None, sigma_m=None, position=None, velocity_mps=None)
-        return replace(followed, place_filter=None, placed=0, track=lost)
+        lost = evolve(followed.track, distance_m=None, sigma_m=None, position=None, velocity_mps=None)
+        return evolve(followed, place_filter=None, placed=0, track=lost)
     box = _around(followed.box_filter.mean[:2], followed.track.bbox, before_m / now_m)
-    return replace(followed, place_filter=moved, track=replace(followed.track, bbox=box))
+    return evolve(followed, place_filter=moved, track=evolve(followed.track, bbox=box))
 
 
 def _match(
@@ -173,7 +174,7 @@ def _new(track_id: int, seen: VisionMeasurement, params: VisionTrackingParams) -
 def _seen(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
     """The object with this picture's box and distance taken in."""
     detection = seen.detection
-    shown = replace(
+    shown = evolve(
         followed.track,
         bbox=detection.bbox,
         label=detection.label,
@@ -182,27 +183,27 @@ def _seen(followed: Followed, seen: VisionMeasurement, params: VisionTrackingPar
         missed=0,
         carried=False,
     )
-    current = replace(followed, track=shown, unseen_s=0.0)
+    current = evolve(followed, track=shown, unseen_s=0.0)
     if params.filter == "queue":
-        measured = replace(shown, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position)
-        return replace(current, track=measured)
+        measured = evolve(shown, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position)
+        return evolve(current, track=measured)
     votes = dict(followed.votes)
     votes[detection.label] = votes.get(detection.label, 0.0) + detection.score
     label = max(votes, key=lambda name: votes[name])
     box_filter = kalman.update(followed.box_filter, _centre(detection.bbox), _box_noise(detection.bbox))
-    current = replace(current, track=replace(shown, label=label), votes=tuple(votes.items()), box_filter=box_filter)
+    current = evolve(current, track=evolve(shown, label=label), votes=tuple(votes.items()), box_filter=box_filter)
     return _place(current, seen, params)
 
 
 def _missed(followed: Followed) -> Followed:
-    return replace(followed, track=replace(followed.track, missed=followed.track.missed + 1))
+    return evolve(followed, track=evolve(followed.track, missed=followed.track.missed + 1))
 
 
 def _place(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
     """The measured place taken in; one far from the expected weighs less, by as much as it is too far."""
     if seen.position is None or seen.sigma_m is None or seen.distance_m is None:
-        bare = replace(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m)
-        return replace(followed, track=bare) if followed.place_filter is None else _show(followed)
+        bare = evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m)
+        return evolve(followed, track=bare) if followed.place_filter is None else _show(followed)
     noise = place_noise(seen.position, seen.sigma_m, params.bearing_sigma_deg)
     if followed.place_filter is None:
         filtered = kalman.start(seen.position, noise, SPEED_SIGMA_MPS)
@@ -210,7 +211,7 @@ def _place(followed: Followed, seen: VisionMeasurement, params: VisionTrackingPa
         surprise = kalman.mahalanobis2(followed.place_filter, seen.position, noise)
         filtered = kalman.update(followed.place_filter, seen.position, noise * max(1.0, surprise / _OUTLIER))
     share = seen.sigma_m / seen.distance_m
-    return _show(replace(followed, place_filter=filtered, placed=followed.placed + 1, unplaced_s=0.0), share)
+    return _show(evolve(followed, place_filter=filtered, placed=followed.placed + 1, unplaced_s=0.0), share)
 
 
 def _show(followed: Followed, share: float | None = None) -> Followed:
@@ -228,14 +229,14 @@ def _show(followed: Followed, share: float | None = None) -> Followed:
     if share is None:
         before = followed.track
         share = before.sigma_m / before.distance_m if before.sigma_m and before.distance_m else 0.0
-    shown = replace(
+    shown = evolve(
         followed.track,
         distance_m=range_m,
         sigma_m=max(filter_sigma, share * range_m),
         position=(x, y),
         velocity_mps=(vx, vy) if followed.placed >= 2 else None,
     )
-    return replace(followed, track=shown)
+    return evolve(followed, track=shown)
 
 
 def place_noise(position: tuple[float, float], range_sigma_m: float, bearing_sigma_deg: float) -> F64:
