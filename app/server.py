@@ -98,12 +98,9 @@ def serve(
         print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
     named = f"[{host}]" if ":" in host else host
     app = create_app(engine, viser_port, (*hosts, host))
-    config = uvicorn.Config(
-        app, log_level="warning", ws_per_message_deflate=False, timeout_graceful_shutdown=1, access_log=False
-    )
     engine.start()
     try:
-        _Server(config, f"http://{named}:{number}", on_ready).run(sockets=[bound])
+        Server(app, f"http://{named}:{number}", on_ready).run(sockets=[bound])
     except KeyboardInterrupt:
         pass  # uvicorn raises the signal again once it has shut down
     finally:
@@ -111,11 +108,15 @@ def serve(
         bound.close()
 
 
-class _Server(uvicorn.Server):
-    """Says where it is as soon as it answers."""
+class Server(uvicorn.Server):
+    """Says where it is as soon as it answers. Compressing the stream would cost more than sending it."""
 
-    def __init__(self, config: uvicorn.Config, address: str, on_ready: Callable[[str], None] | None) -> None:
-        super().__init__(config)
+    def __init__(self, app: FastAPI, address: str, on_ready: Callable[[str], None] | None) -> None:
+        super().__init__(
+            uvicorn.Config(
+                app, log_level="warning", access_log=False, ws_per_message_deflate=False, timeout_graceful_shutdown=1
+            )
+        )
         self._address = address
         self._on_ready = on_ready
 

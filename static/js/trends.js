@@ -14,6 +14,9 @@ const STRIPS = {
   ttc: { value: (cipv) => (cipv.ttc_s === null ? null : Math.min(cipv.ttc_s, 20)), low: 0, high: 10 },
 };
 
+/** Frames may have been skipped while playing: samples this near to each other are still joined by a line. */
+const JOINED_S = 0.6;
+
 /** @type {Map<number, {cipv: import("./types.js").Cipv|null, revision: number}>} */
 const seen = new Map();
 let uri = null;
@@ -44,7 +47,7 @@ function drawStrip(key, canvas) {
   const { ctx, width, height } = fitted(canvas);
   const frame = get("frame");
   if (!frame || !width) return;
-  const { count, index, params_revision } = frame.state;
+  const { count, index, params_revision, rate_hz } = frame.state;
   const { value, low, high } = STRIPS[key];
   const samples = [...seen].sort(([a], [b]) => a - b).map(([at, { cipv, revision }]) => ({ at, value: cipv && value(cipv), revision, id: cipv?.id }));
   const values = samples.map((s) => s.value).filter((v) => v !== null);
@@ -52,23 +55,18 @@ function drawStrip(key, canvas) {
   const X = (at) => ((at + 0.5) / count) * width;
   const Y = (v) => height - 3 - ((v - bottom) / (top - bottom)) * (height - 6);
   if (bottom < 0) line(ctx, 0, Y(0), width, Y(0), color("grid"));
-  const step = largestStep(samples);
+  const joined = Math.max(2, Math.ceil(JOINED_S * rate_hz));
   ctx.lineWidth = 1.5;
   for (let i = 0; i < samples.length; i++) {
     const a = samples[i - 1], b = samples[i];
     if (b.value === null) continue;
     ctx.strokeStyle = ctx.fillStyle = color("cipv");
     ctx.globalAlpha = b.revision === params_revision ? 0.95 : 0.35;
-    if (a && a.value !== null && a.id === b.id && b.at - a.at <= step) line(ctx, X(a.at), Y(a.value), X(b.at), Y(b.value));
+    if (a && a.value !== null && a.id === b.id && b.at - a.at <= joined) line(ctx, X(a.at), Y(a.value), X(b.at), Y(b.value));
     else ctx.fillRect(X(b.at) - 1, Y(b.value) - 1, 2, 2);
   }
   ctx.globalAlpha = 1;
   line(ctx, X(index), 0, X(index), height, ui("accent"));
-}
-
-/** Frames may have been skipped while playing: samples a few frames apart still belong together. */
-function largestStep(samples) {
-  return samples.length > 20 ? 4 : 2;
 }
 
 function line(ctx, x1, y1, x2, y2, style) {

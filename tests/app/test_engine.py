@@ -1,0 +1,244 @@
+"""The worker: playback, seeking, parameters on a paused frame, and what goes wrong."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from app.engine import Engine
+from app.line import WARM_UP_FRAMES, DetectionCache, Line
+from app.snapshot import Snapshot
+from pipeline.params import Params, with_changes
+from pipeline.results import to_json
+from pipeline.step import State, step
+from pipeline.types import Result
+from pipeline.vision.detector import DetectorMissing
+from tests.app.recording import CountingDetector, Recording, opener
+
+WAIT_S = 60.0
+Start = Callable[..., tuple[Engine, Recording, CountingDetector]]
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """An engine on a recording, showing its first frame, paused."""
+    with ExitStack() as stack:
+
+        def begin(recording: Recording | None = None, **options) -> tuple[Engine, Recording, CountingDetector]:
+            recording, detector = recording or Recording(), CountingDetector()
+            engine = Engine(opener(recording), lambda _: detector, Params(), uri=recording.uri, **options)
+            engine.start()
+            stack.callback(engine.stop)
+            stack.callback(recording.gate.set)
+            engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+            return engine, recording, detector
+
+        yield begin
+
+
+def body(result: Result) -> str:
+    """A result's bytes, times of this machine apart."""
+    plain = to_json(result)
+    del plain["timing_ms"]
+    return json.dumps(plain)
+
+
+def at(index: int) -> Callable[[Snapshot], bool]:
+    return lambda s: s.tick is not None and s.index == index
+
+
+def played(recording: Recording, first: int, last: int, params: Params) -> Result:
+    """What the plain line says at ``last``, run from a fresh state at ``first``."""
+    detector, state = CountingDetector(), State()
+    for index in range(first, last + 1):
+        frame = recording.frame(index)
+        assert frame.picture is not None
+        boxes = detector.detect(frame.picture.bgr)
+        state, result = step(state, type(frame)(**{**vars(frame), "raw_boxes": boxes}), params)
+    return result
+
+
+def test_opens_paused_on_the_first_frame_and_finds_the_car(start: Start):
+    engine, recording, _ = start()
+    shown = engine.snapshot
+    assert (shown.index, shown.playing, shown.count) == (0, False, len(recording))
+    assert shown.tick is not None
+    assert shown.tick.result.cipv is not None
+    assert shown.tick.result.cipv.distance_m == pytest.approx(30.0, abs=0.2)
+
+
+@pytest.mark.parametrize("index", [1, WARM_UP_FRAMES, WARM_UP_FRAMES + 1, 25])
+def test_a_seek_gives_the_bytes_of_playing_there_from_its_warm_up(start: Start, index: int):
+    engine, recording, _ = start()
+    engine.control.seek(index)
+    tick = engine.wait_for(at(index), WAIT_S).tick
+    assert tick is not None
+    expected = played(recording, max(0, index - WARM_UP_FRAMES), index, Params())
+    assert body(tick.result) == body(expected)
+
+
+def test_a_seek_depends_on_nothing_before_it(start: Start):
+    engine, _, _ = start()
+    bodies = []
+    for detour in (3, 29, 0):
+        engine.control.seek(detour)
+        engine.wait_for(at(detour), WAIT_S)
+        engine.control.seek(20)
+        tick = engine.wait_for(at(20), WAIT_S).tick
+        assert tick is not None
+        bodies.append(body(tick.result))
+    assert len(set(bodies)) == 1
+
+
+def test_steps_go_through_every_frame_and_back(start: Start):
+    engine, recording, _ = start()
+    recording.reads.clear()
+    engine.control.step(3)
+    tick = engine.wait_for(at(3), WAIT_S).tick
+    assert recording.reads == [1, 2, 3]
+    assert tick is not None
+    assert body(tick.result) == body(played(recording, 0, 3, Params()))
+    engine.control.step(-1)
+    engine.wait_for(at(2), WAIT_S)
+    engine.control.step(-99)
+    engine.wait_for(at(0), WAIT_S)
+
+
+def test_a_step_beyond_the_end_stays_on_the_last_frame(start: Start):
+    engine, recording, _ = start()
+    last = len(recording) - 1
+    engine.control.seek(10**6)
+    engine.wait_for(at(last), WAIT_S)
+    engine.control.seek(last - 2)
+    engine.wait_for(at(last - 2), WAIT_S)
+    engine.control.step(5)
+    engine.wait_for(at(last), WAIT_S)
+
+
+def test_a_parameter_on_a_paused_frame_runs_neither_network_nor_reading(start: Start):
+    engine, recording, detector = start()
+    engine.control.seek(15)
+    before = engine.wait_for(at(15), WAIT_S)
+    calls, reads = detector.calls, len(recording.reads)
+    revision = engine.control.set_params(with_changes(Params(), {"detection.min_score": 0.9}))
+    after = engine.wait_for(lambda s: s.params_revision == revision, WAIT_S)
+    assert (detector.calls, len(recording.reads)) == (calls, reads)
+    assert before.tick is not None
+    assert after.tick is not None
+    assert after.tick.before is before.tick.before
+    assert after.tick.frame is before.tick.frame
+    assert after.sequence == before.sequence + 1
+    assert body(after.tick.result) != body(before.tick.result), "the box scored 0.8 is below the new threshold"
+    revision = engine.control.set_params(Params())
+    again = engine.wait_for(lambda s: s.params_revision == revision, WAIT_S)
+    assert again.tick is not None
+    assert body(again.tick.result) == body(before.tick.result)
+
+
+def test_a_frame_that_was_seen_costs_no_network_again(start: Start):
+    engine, _, detector = start()
+    for index in (12, 0, 12):
+        engine.control.seek(index)
+        engine.wait_for(at(index), WAIT_S)
+    assert detector.calls == len({0, *range(2, 13)})
+
+
+def test_reopening_costs_no_network_either(start: Start):
+    engine, recording, detector = start()
+    engine.control.seek(5)
+    engine.wait_for(at(5), WAIT_S)
+    calls = detector.calls
+    engine.control.change(uri=recording.uri)
+    engine.wait_for(at(0), WAIT_S)
+    assert detector.calls == calls
+
+
+def test_an_overtaken_seek_is_dropped_on_the_way(start: Start):
+    engine, recording, _ = start()
+    shown: list[int] = []
+    engine.listen(lambda s: shown.append(s.index))
+    recording.reads.clear()
+    recording.reading.clear()
+    recording.gate.clear()
+    engine.control.seek(20)
+    assert recording.reading.wait(WAIT_S)
+    engine.control.seek(22)
+    engine.control.seek(24)
+    recording.gate.set()
+    engine.wait_for(at(24), WAIT_S)
+    assert recording.reads[:2] == [10, 14], "one frame of the first seek was read, then the last seek began"
+    assert not {20, 22} & set(shown)
+
+
+def test_playing_shows_the_frames_in_order_and_stops_at_the_end(start: Start):
+    engine, recording, _ = start()
+    shown: list[int] = []
+    engine.listen(lambda s: shown.append(s.index))
+    engine.control.change(playing=True, loop=False, speed=10.0)
+    end = engine.wait_for(lambda s: not s.playing and s.index == len(recording) - 1, WAIT_S)
+    assert shown == sorted(shown)
+    assert len(set(shown)) + end.skipped >= len(recording) - 1
+
+
+def test_playing_in_a_loop_begins_again(start: Start):
+    engine, _, _ = start(Recording(count=4))
+    engine.control.change(playing=True, loop=True, speed=10.0)
+    engine.wait_for(at(3), WAIT_S)
+    assert engine.wait_for(at(0), WAIT_S).playing
+
+
+def test_a_recording_that_cannot_be_opened_leaves_the_old_one(start: Start):
+    engine, recording, _ = start()
+    engine.control.change(uri="test:nowhere")
+    shown = engine.wait_for(lambda s: any(n.level == "error" for n in s.notices), WAIT_S)
+    assert "test:nowhere: no such recording" in [n.text for n in shown.notices]
+    assert shown.uri == recording.uri
+    engine.control.seek(3)
+    shown = engine.wait_for(at(3), WAIT_S)
+    assert not any(n.level == "error" for n in shown.notices), "the next frame takes the complaint away"
+
+
+def test_a_frame_that_cannot_be_read_is_said_and_the_worker_goes_on(start: Start):
+    engine, _, _ = start(Recording(broken=frozenset({7})))
+    engine.control.seek(7)
+    shown = engine.wait_for(lambda s: any(n.level == "error" for n in s.notices), WAIT_S)
+    assert "frame 7 is not there" in shown.notices[-1].text
+    assert not shown.playing
+    engine.control.seek(2)
+    engine.wait_for(at(2), WAIT_S)
+    assert engine.alive
+
+
+def test_without_a_detector_lidar_goes_on_alone_and_the_page_is_told_the_remedy():
+    def missing(_: tuple[int, int] | None) -> CountingDetector:
+        raise DetectorMissing("No detector is installed: run `cipv models pull yolox_nano`.")
+
+    engine = Engine(opener(Recording()), missing, Params(), uri="test:car")
+    engine.start()
+    try:
+        shown = engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+        assert any("cipv models pull" in n.text and n.level == "warning" for n in shown.notices)
+        assert shown.tick is not None
+        assert {item.source for item in shown.tick.result.objects} == {"L"}
+    finally:
+        engine.stop()
+
+
+@pytest.mark.parametrize(("sensors", "sources"), [("lidar", {"L"}), ("camera", {"V"}), ("both", {"VL"})])
+def test_sensors_can_be_taken_away(start: Start, sensors: str, sources: set[str]):
+    engine, _, detector = start(sensors=sensors)
+    tick = engine.snapshot.tick
+    assert tick is not None
+    assert {item.source for item in tick.result.objects} == sources
+    assert tick.frame.picture is not None, "people still want to see the picture"
+    assert (detector.calls == 0) == (sensors == "lidar")
+
+
+def test_a_line_abandons_a_seek_and_keeps_its_tick():
+    line = Line(Recording(), CountingDetector(), DetectionCache(), "both")
+    first = line.seek(4, Params())
+    assert line.seek(20, Params(), superseded=lambda: True) is None
+    assert line.tick is first

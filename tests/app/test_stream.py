@@ -1,0 +1,68 @@
+"""A client's slot: newest only, never a queue."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from app.stream import FRAMES_UNDER_WAY, Slot
+
+Taken = Callable[[Slot], list[str | bytes] | None]
+
+
+async def _now(slot: Slot) -> list[str | bytes] | None:
+    task = asyncio.ensure_future(slot.take())
+    for _ in range(5):
+        await asyncio.sleep(0)
+    if task.done():
+        return task.result()
+    task.cancel()
+    return None
+
+
+@pytest.fixture
+def taken() -> Iterator[Taken]:
+    """What a slot gives now; null when it would wait."""
+    with asyncio.Runner() as runner:
+        yield lambda slot: runner.run(_now(slot))
+
+
+def test_a_slow_client_gets_only_the_newest_of_each_kind(taken: Taken):
+    slot = Slot()
+    for number in range(5):
+        slot.put("state", f"state {number}")
+        slot.put("frame", b"frame %d" % number, number)
+    assert taken(slot) == ["state 4", b"frame 4"]
+    assert taken(slot) is None
+
+
+def test_an_older_frame_never_replaces_a_newer_one(taken: Taken):
+    slot = Slot()
+    slot.put("frame", b"new", 8)
+    slot.put("frame", b"old", 7)
+    assert taken(slot) == [b"new"]
+    slot.put("frame", b"older", 6)
+    assert taken(slot) is None
+
+
+def test_a_paced_client_gets_no_frame_ahead_of_what_it_has_painted(taken: Taken):
+    slot = Slot(paced=True)
+    for number in range(FRAMES_UNDER_WAY):
+        slot.put("frame", b"%d" % number, number)
+        assert taken(slot) == [b"%d" % number]
+    for number in (10, 11):
+        slot.put("frame", b"%d" % number, number)
+        assert taken(slot) is None
+    slot.put("state", "still told")
+    assert taken(slot) == ["still told"]
+    slot.painted()
+    assert taken(slot) == [b"11"]
+
+
+def test_a_client_that_is_not_paced_gets_every_frame_it_can_take(taken: Taken):
+    slot = Slot()
+    for number in range(10):
+        slot.put("frame", b"%d" % number, number)
+        assert taken(slot) == [b"%d" % number]
