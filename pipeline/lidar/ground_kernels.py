@@ -171,13 +171,12 @@ def _refine(
         count, mean, cov = _moments(x, y, z, plane, low, high)
         if count < max(MIN_SEEDS, MIN_SHARE * len(x)):
             return plane, np.inf
-        values, vectors = _jacobi(cov)
-        normal = vectors[:, 0] if vectors[2, 0] > 0.0 else -vectors[:, 0]
-        if values[1] < MIN_SPREAD_M * MIN_SPREAD_M or normal[2] < min_nz:
+        normal, across, along = _flattest(cov)
+        if along < MIN_SPREAD_M * MIN_SPREAD_M or normal[2] < min_nz:
             return plane, np.inf
         plane[:3] = normal
         plane[3] = -(normal[0] * mean[0] + normal[1] * mean[1] + normal[2] * mean[2])
-        raggedness = np.sqrt(max(values[0], 0.0)) * len(x) / count
+        raggedness = np.sqrt(max(across, 0.0)) * len(x) / count
         high = distance_m + max(seed_m - distance_m, 0.0) * max(iterations - 1 - k, 0) / max(iterations - 1, 1)
         low = -high
     return plane, raggedness
@@ -191,10 +190,13 @@ def _seed_heights(x: F32, y: F32, z: F32, prior: F64, lowest: int, seed_m: float
     """
     a, b, c = np.float32(prior[0]), np.float32(prior[1]), np.float32(prior[2])
     d, scale = np.float32(prior[3] - HEIGHT_LOW_M), np.float32(BINS_PER_M)
+    bottom, top = np.float32(0.0), np.float32(HEIGHT_BINS - 1)
+    levels = np.empty(len(x), dtype=np.uint16)
+    for i in range(len(x)):  # apart from the counting, which cannot use vector instructions
+        levels[i] = np.uint16(min(max((a * x[i] + b * y[i] + c * z[i] + d) * scale, bottom), top))
     histogram = np.zeros(HEIGHT_BINS, dtype=np.int32)
     for i in range(len(x)):
-        h = (a * x[i] + b * y[i] + c * z[i] + d) * scale
-        histogram[min(max(int(h), 0), HEIGHT_BINS - 1)] += 1
+        histogram[levels[i]] += 1
     wanted = max(1, min(lowest, len(x) // LOWEST_SHARE))
     taken, total = 0, 0
     for level in range(HEIGHT_BINS):
@@ -245,11 +247,14 @@ def _moments(x: F32, y: F32, z: F32, plane: F64, low_m: float, high_m: float) ->
 
 
 @numba.njit(cache=True, nogil=True)
-def _jacobi(matrix: F64) -> tuple[F64, F64]:
-    """Eigenvalues, ascending, and eigenvectors, as columns, of a symmetric (3, 3) matrix by cyclic Jacobi rotations
-    (Golub, Van Loan, *Matrix Computations*, section 8.5). Six sweeps reach the last digit."""
-    m, v = matrix.copy(), np.eye(3)
-    for _ in range(6):
+def _flattest(cov: F64) -> tuple[F64, float, float]:
+    """Of a symmetric (3, 3) covariance: the eigenvector of the smallest eigenvalue, pointing up, that eigenvalue, and
+    the middle one. Cyclic Jacobi rotations (Golub, Van Loan, *Matrix Computations*, section 8.5)."""
+    m, v = cov.copy(), np.eye(3)
+    negligible = 1e-30 * (m[0, 0] + m[1, 1] + m[2, 2]) ** 2
+    for _ in range(8):
+        if m[0, 1] ** 2 + m[0, 2] ** 2 + m[1, 2] ** 2 <= negligible:
+            break
         for p, q in ((0, 1), (0, 2), (1, 2)):
             if m[p, q] == 0.0:
                 continue
@@ -263,9 +268,13 @@ def _jacobi(matrix: F64) -> tuple[F64, F64]:
                 m[p, k], m[q, k] = c * m[p, k] - s * m[q, k], s * m[p, k] + c * m[q, k]
             for k in range(3):
                 v[k, p], v[k, q] = c * v[k, p] - s * v[k, q], s * v[k, p] + c * v[k, q]
-    values = np.array([m[0, 0], m[1, 1], m[2, 2]])
-    order = np.argsort(values)
-    return values[order], v[:, order]
+    least = 0
+    for k in range(1, 3):
+        if m[k, k] < m[least, least]:
+            least = k
+    middle = min(m[(least + 1) % 3, (least + 1) % 3], m[(least + 2) % 3, (least + 2) % 3])
+    upwards = 1.0 if v[2, least] > 0.0 else -1.0
+    return v[:, least] * upwards, m[least, least], middle
 
 
 @numba.njit(cache=True, nogil=True)

@@ -1,0 +1,98 @@
+"""Ground fitting in plain numpy: the same method as ``pipeline.lidar.ground``, written as one would write it first.
+
+It is what ``cipv bench`` measures the compiled version against, and what a test compares its masks with.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.lidar import ground_kernels as shared
+from pipeline.lidar.ground import Ground
+from pipeline.params import GroundParams
+from pipeline.types import F32, F64
+
+Mask = npt.NDArray[np.bool_]
+
+
+def fit_ground_numpy(points: F32, keep: Mask, params: GroundParams) -> Ground:
+    """The same arguments and the same answer as ``pipeline.lidar.ground.fit_ground``."""
+    xyz = points[:, :3]
+    x, y = xyz[:, 0], xyz[:, 1]
+    inside = keep & (np.abs(x) < params.fit_range_m) & (np.abs(y) < params.fit_half_width_m)
+    area = xyz[inside & (x * x + y * y >= np.float32(params.min_range_m**2))]
+    edges = _edges(area[:, 0], params)
+    segment = np.searchsorted(edges[1:-1].astype(np.float32), area[:, 0], side="right")
+    parts = [area[segment == s] for s in range(params.segments)]
+    planes, fitted = _fit(parts, edges, params)
+    here = planes[np.searchsorted(edges[1:-1].astype(np.float32), x, side="right")]
+    mask = keep & fitted.any() & (_heights(xyz, here - [0.0, 0.0, 0.0, params.distance_m]) <= 0.0)
+    return Ground(mask, planes, edges, fitted)
+
+
+def _edges(x: F32, params: GroundParams) -> F64:
+    """Bounds of equal counts along x, on multiples of the bin."""
+    bins = int(np.ceil(2.0 * params.fit_range_m / shared.X_BIN_M))
+    sample = ((x[:: shared.EDGE_SAMPLE] + params.fit_range_m) / shared.X_BIN_M).astype(int)
+    before = np.concatenate([[0], np.cumsum(np.bincount(sample, minlength=bins + 1))])[:-1]
+    wanted = np.arange(1, params.segments) * len(sample)
+    inner = np.searchsorted(before * params.segments, wanted, side="left") * shared.X_BIN_M - params.fit_range_m
+    return np.concatenate([[-params.fit_range_m], inner, [params.fit_range_m]])
+
+
+def _fit(parts: list[F32], edges: F64, params: GroundParams) -> tuple[F64, Mask]:
+    """The planes from the least ragged one outwards."""
+    alone = [_refine(part, np.array([0.0, 0.0, 1.0, 0.0]), params) for part in parts]
+    planes = np.array([plane for plane, _ in alone])
+    raggedness = np.array([ragged for _, ragged in alone])
+    fitted = np.isfinite(raggedness)
+    if not fitted.any():
+        return np.full_like(planes, np.nan), fitted
+    root = int(np.argmin(raggedness))
+    for s in [*range(root + 1, params.segments), *range(root - 1, -1, -1)]:
+        neighbour, shared_x = (planes[s - 1], edges[s]) if s > root else (planes[s + 1], edges[s + 1])
+        if fitted[s] and _meets(planes[s], neighbour, shared_x, params):
+            continue
+        plane, ragged = _refine(parts[s], neighbour, params)
+        fitted[s] = np.isfinite(ragged) and _meets(plane, neighbour, shared_x, params)
+        planes[s] = plane if fitted[s] else neighbour
+    return planes, fitted
+
+
+def _meets(plane: F64, neighbour: F64, x: float, params: GroundParams) -> bool:
+    step = (plane[3] + plane[0] * x) / plane[2] - (neighbour[3] + neighbour[0] * x) / neighbour[2]
+    return bool(abs(step) <= params.distance_m)
+
+
+def _refine(part: F32, prior: F64, params: GroundParams) -> tuple[F64, float]:
+    """One segment's plane and its raggedness, infinite where it cannot be the road."""
+    wanted = max(1, min(params.lowest_points, len(part) // shared.LOWEST_SHARE))
+    raised = _heights(part, prior - [0.0, 0.0, 0.0, shared.HEIGHT_LOW_M]) * np.float32(shared.BINS_PER_M)
+    levels = np.clip(raised.astype(int), 0, shared.HEIGHT_BINS - 1)
+    centimetres = np.partition(levels, wanted - 1)[:wanted] if len(part) else levels
+    mean_m = (centimetres.mean() + 0.5) / shared.BINS_PER_M + shared.HEIGHT_LOW_M if len(part) else 0.0
+    plane, ragged = prior, np.inf
+    low, high = mean_m - params.seed_height_m, mean_m + params.seed_height_m
+    for k in range(1, params.iterations + 1):
+        height = _heights(part, plane)
+        seeds = part[(height >= np.float32(low)) & (height <= np.float32(high))].astype(np.float64)
+        if len(seeds) < max(shared.MIN_SEEDS, shared.MIN_SHARE * len(part)):
+            return plane, np.inf
+        center = seeds.mean(axis=0)
+        vectors, values, _ = np.linalg.svd(np.cov((seeds - center).T, bias=True))
+        normal = vectors[:, 2] * (1.0 if vectors[2, 2] > 0.0 else -1.0)
+        if values[1] < shared.MIN_SPREAD_M**2 or normal[2] < np.cos(np.radians(params.max_slope_deg)):
+            return plane, np.inf
+        plane = np.append(normal, -normal @ center)
+        ragged = float(np.sqrt(values[2])) * len(part) / len(seeds)
+        left = max(params.iterations - 1 - k, 0) / max(params.iterations - 1, 1)
+        high = params.distance_m + max(params.seed_height_m - params.distance_m, 0.0) * left
+        low = -high
+    return plane, ragged
+
+
+def _heights(xyz: F32, planes: F64) -> F32:
+    """Heights in single precision over one plane (4,) or one a point (N, 4)."""
+    a, b, c, d = planes.astype(np.float32).T
+    return np.asarray(a * xyz[:, 0] + b * xyz[:, 1] + c * xyz[:, 2] + d)
