@@ -11,16 +11,18 @@ _FOLDERS = (("lidar_vlp16", "astyx"), ("velodyne", "kitti"), ("velodyne_points",
 
 def catalog() -> list[tuple[str, str]]:
     """(uri, title) pairs: scenarios, then the recordings right below ``CIPV_DATA`` and ``sessions``."""
-    return [*_scenarios(), *_recordings()]
+    return [*scenarios(), *recordings()]
 
 
-def _scenarios() -> list[tuple[str, str]]:
+def scenarios() -> list[tuple[str, str]]:
+    """(uri, title) of the simulator's built-in scenarios, by name."""
     folder = resources.files("pipeline.simulation") / "scenarios"
     names = sorted(file.name.removesuffix(".yaml") for file in folder.iterdir() if file.name.endswith(".yaml"))
     return [(f"sim:{name}", f"Simulation · {name.replace('_', ' ')}") for name in names]
 
 
-def _recordings() -> list[tuple[str, str]]:
+def recordings() -> list[tuple[str, str]]:
+    """(uri, title) of the folders right below ``CIPV_DATA`` and ``sessions`` that look like a known recording."""
     roots = [Path(os.environ["CIPV_DATA"])] if os.environ.get("CIPV_DATA") else []
     roots.append(Path("sessions"))
     found = []
