@@ -7,8 +7,8 @@ smallest distance. Each test leaves its number and limit on the object; the firs
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import erf, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,8 +21,7 @@ from pipeline.types import VEHICLES, Cipv, FusedObject, Gate, Path, Point2, Reje
 SMALLEST_SIGMA_M = 0.1
 
 
-@dataclass(frozen=True)
-class Candidate:
+class Candidate(NamedTuple):
     """An object with what its tests need to know: its place against the path, whether it led in the frame before, and
     how far from the path's centre it may be."""
 
@@ -33,8 +32,7 @@ class Candidate:
     params: CipvParams
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """One question to a candidate: the gate with its number, and the sentence that says why it failed."""
 
     gate: Gate
@@ -75,8 +73,7 @@ def choose(
     return tuple(judged), _named(lead, len(able)), rejected
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """Where the middle of an object's nearest face is against the path: signed offset from the centre line, positive to
     the left, and path length to its foot."""
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from pipeline.alignment import Alignment, project_cuboids
-from pipeline.geometry import F64, iou_matrix
+from pipeline.geometry import F64, corners_of, iou_matrix
 from pipeline.params import FusionParams
 from pipeline.types import Box, FusedObject, Gate, LidarTrack, Point2, VisionTrack
 
@@ -60,10 +60,10 @@ def fuse(
 ) -> tuple[FusionState, Fusion]:
     """One row per physical object. ``picture_size`` is (width, height) in pixels; without it or without an alignment
     nothing can be compared, and every track keeps a row of its own."""
+    corners = corners_of([track.obstacle.cuboid for track in lidar])
     projected: list[Box | None] = [None] * len(lidar)
-    if alignment is not None and picture_size is not None and lidar:
-        corners = np.stack([_full_corners(track, params) for track in lidar])
-        projected = project_cuboids(alignment, corners, *picture_size)
+    if alignment is not None and picture_size is not None:
+        projected = project_cuboids(alignment, _to_the_gaps(corners, lidar, params), *picture_size)
     overlap = _overlap(vision, projected)
     joinable, gates = _gates(overlap, vision, lidar, params)
     partner = _assign(overlap, joinable, params)
@@ -79,7 +79,8 @@ def fuse(
         seen, hit = (vision[i] if i is not None else None), (lidar[j] if j is not None else None)
         box = projected[j] if j is not None else None
         tested = gates[i, j] if i is not None and j is not None else _nearest_miss(overlap, gates, i, j)
-        objects.append(_row(object_id, seen, hit, box, tested))
+        footprint = corners[j, :4, :2] if j is not None else None
+        objects.append(_row(object_id, seen, hit, box, footprint, tested))
         if box is not None:
             lidar_boxes[object_id] = box
         if seen is not None:
@@ -88,14 +89,14 @@ def fuse(
     return state, Fusion(tuple(objects), lidar_boxes, vision_boxes)
 
 
-def _full_corners(track: LidarTrack, params: FusionParams) -> F64:
-    """(8, 3) corners of a track's cuboid, taller by half the gap between rings at either end: the object's edge lies
-    anywhere between the last ring that hit it and the next one that did not. At 25 m a gap is 0.9 m, half a car."""
-    corners = track.obstacle.cuboid.corners()
-    margin = _range(track) * math.tan(math.radians(params.ring_gap_deg / 2))
-    corners[:4, 2] -= margin
-    corners[4:, 2] += margin
-    return corners
+def _to_the_gaps(corners: F64, lidar: tuple[LidarTrack, ...], params: FusionParams) -> F64:
+    """(M, 8, 3) corners made taller by half the gap between rings at either end: an object's edge lies anywhere between
+    the last ring that hit it and the next one that did not. At 25 m a gap is 0.9 m, half a car."""
+    margin = np.array([_range(track) for track in lidar]) * math.tan(math.radians(params.ring_gap_deg / 2))
+    taller = corners.copy()
+    taller[:, :4, 2] -= margin[:, None]
+    taller[:, 4:, 2] += margin[:, None]
+    return taller
 
 
 def _overlap(vision: tuple[VisionTrack, ...], projected: list[Box | None]) -> F64:
@@ -170,20 +171,24 @@ def _nearest_miss(
 
 
 def _row(
-    object_id: int, seen: VisionTrack | None, hit: LidarTrack | None, box: Box | None, gates: tuple[Gate, ...]
+    object_id: int,
+    seen: VisionTrack | None,
+    hit: LidarTrack | None,
+    box: Box | None,
+    footprint: F64 | None,
+    gates: tuple[Gate, ...],
 ) -> FusedObject:
     """Table 3: place, distance and velocity from the LiDAR where it has the object, the type from the camera."""
     label, score = (seen.label, seen.score) if seen is not None else (None, None)
-    if hit is not None:
-        cuboid = hit.obstacle.cuboid
+    if hit is not None and footprint is not None:
         return FusedObject(
             id=object_id,
             source="VL" if seen is not None else "L",
             label=label,
             score=score,
             bbox=box if box is not None else (seen.bbox if seen is not None else None),
-            bev=_quad(cuboid.footprint()),
-            cuboid=cuboid,
+            bev=_quad(footprint),
+            cuboid=hit.obstacle.cuboid,
             closest_point=hit.obstacle.closest_point,
             distance_m=_range(hit),
             distance_sigma_m=LIDAR_RANGE_SIGMA_M,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,26 +22,29 @@ class Cuboid:
 
     def footprint(self) -> F64:
         """(4, 2) corners seen from above: front left, front right, rear right, rear left."""
-        x, y, _ = self.center
-        c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        ahead_x, ahead_y = c * self.size[0] / 2, s * self.size[0] / 2
-        left_x, left_y = -s * self.size[1] / 2, c * self.size[1] / 2
-        return np.array(
-            [
-                (x + ahead_x + left_x, y + ahead_y + left_y),
-                (x + ahead_x - left_x, y + ahead_y - left_y),
-                (x - ahead_x - left_x, y - ahead_y - left_y),
-                (x - ahead_x + left_x, y - ahead_y + left_y),
-            ]
-        )
+        return corners_of([self])[0, :4, :2]
 
     def corners(self) -> F64:
         """(8, 3) corners: the footprint at the bottom, then the same four at the top."""
-        corners = np.empty((8, 3))
-        corners[:4, :2] = corners[4:, :2] = self.footprint()
-        corners[:4, 2] = self.center[2] - self.size[2] / 2
-        corners[4:, 2] = self.center[2] + self.size[2] / 2
-        return corners
+        return corners_of([self])[0]
+
+
+_SIDES = np.array([(1, 1), (1, -1), (-1, -1), (-1, 1)]) / 2
+"""Along length and along width: front left, front right, rear right, rear left."""
+
+
+def corners_of(cuboids: Sequence[Cuboid]) -> F64:
+    """(M, 8, 3) corners of many cuboids at once, in the order of ``Cuboid.corners``."""
+    numbers = np.array([(*each.center, *each.size, each.yaw_rad) for each in cuboids]).reshape(-1, 7)
+    c, s = np.cos(numbers[:, 6:]), np.sin(numbers[:, 6:])
+    along, across = numbers[:, 3:4] * _SIDES[:, 0], numbers[:, 4:5] * _SIDES[:, 1]
+    corners = np.empty((len(numbers), 8, 3))
+    corners[:, :4, 0] = corners[:, 4:, 0] = numbers[:, 0:1] + c * along - s * across
+    corners[:, :4, 1] = corners[:, 4:, 1] = numbers[:, 1:2] + s * along + c * across
+    half_height = numbers[:, 5:6] / 2
+    corners[:, :4, 2] = numbers[:, 2:3] - half_height
+    corners[:, 4:, 2] = numbers[:, 2:3] + half_height
+    return corners
 
 
 def transform(T: F64, points: npt.NDArray[np.floating]) -> F64:

@@ -15,7 +15,7 @@ from time import perf_counter_ns
 
 import numpy as np
 
-from pipeline import acc, alignment, cipv, fusion, motion
+from pipeline import acc, alignment, cipv, fusion, kalman, motion
 from pipeline.lidar import boxes, cluster, downsample, ground
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.lidar import warm_up as warm_up_lidar
@@ -107,6 +107,9 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
 def warm_up() -> None:
     """Compile every kernel before the first frame, so that the first frame is as fast as the rest."""
     warm_up_lidar()
+    one = np.eye(2)
+    kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)
+    corridor.nearest_on_path(corridor.corridor(None, Params().path), np.zeros((1, 2)))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ treated as read-only.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -176,8 +176,7 @@ class VisionTrack:
     carried: bool
 
 
-@dataclass(frozen=True)
-class Gate:
+class Gate(NamedTuple):
     """One test an object went through, with its number and limit; ``value`` is null when there was nothing to test."""
 
     name: str

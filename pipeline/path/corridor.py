@@ -7,6 +7,7 @@ r(1 − cos θ).
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from pipeline.geometry import F64
@@ -71,18 +72,31 @@ def offset(path: Path, points: F64) -> F64:
 def nearest_on_path(path: Path, points: F64) -> tuple[F64, F64]:
     """Signed offset (N,) and path length (N,) of each point's foot on the centre line. A point before the first or
     beyond the last piece is measured against that piece's extension."""
-    start, edge = path.center[:-1], np.diff(path.center, axis=0)
-    length = np.hypot(*edge.T)
-    along = edge / length[:, None]
-    rel = np.asarray(points, dtype=np.float64)[:, None, :] - start[None]
-    t = np.sum(rel * along, axis=2)
-    low, high = np.zeros(len(edge)), length.copy()
-    low[0], high[-1] = -np.inf, np.inf
-    t = np.clip(t, low, high)
-    foot = rel - t[..., None] * along
-    piece = np.argmin(np.sum(foot**2, axis=2), axis=1)
-    rows = np.arange(len(rel))
-    cross = along[piece, 0] * rel[rows, piece, 1] - along[piece, 1] * rel[rows, piece, 0]
-    reached = np.concatenate([[0.0], np.cumsum(length)[:-1]])[piece] + t[rows, piece]
-    side = np.where(cross >= 0, 1.0, -1.0)
-    return side * np.sqrt(np.sum(foot[rows, piece] ** 2, axis=1)), reached
+    return _nearest(path.center, np.asarray(points, dtype=np.float64))
+
+
+@numba.njit(cache=True, nogil=True)
+def _nearest(center, points):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """For each point, the foot on each piece of the line; the nearest foot wins, the first of equals."""
+    offset, reached = np.empty(len(points)), np.empty(len(points))
+    last = len(center) - 2
+    for n in range(len(points)):
+        best2, travelled = np.inf, 0.0
+        for k in range(last + 1):
+            dx, dy = center[k + 1, 0] - center[k, 0], center[k + 1, 1] - center[k, 1]
+            length = np.sqrt(dx * dx + dy * dy)
+            dx, dy = dx / length, dy / length
+            rx, ry = points[n, 0] - center[k, 0], points[n, 1] - center[k, 1]
+            t = rx * dx + ry * dy
+            if t < 0.0 and k > 0:
+                t = 0.0
+            if t > length and k < last:
+                t = length
+            ex, ey = rx - t * dx, ry - t * dy
+            distance2 = ex * ex + ey * ey
+            if distance2 < best2:
+                best2 = distance2
+                side = 1.0 if dx * ry - dy * rx >= 0.0 else -1.0
+                offset[n], reached[n] = side * np.sqrt(distance2), travelled + t
+            travelled += length
+    return offset, reached
