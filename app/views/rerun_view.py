@@ -131,7 +131,7 @@ class RerunSink:
         self._put("world/cipv", parts.cuboids(lead, result, rr.components.FillMode.TransparentFillMajorWireframe))
         flat = [each for each in result.objects if each.cuboid is None and each.bev is not None]
         self._put("world/footprints", parts.footprints(flat, result, ground_m))
-        named = [each for each in result.objects if each.bev is not None and scene.deserves_label(each, result)]
+        named = [each for each in result.objects if each.bev is not None and scene.stands_out(each, result)]
         self._put("world/labels", parts.labels(named, result, ground_m))
         for side, line in parts.sides(result.path).items():
             strip = rr.LineStrips3D([scene.on_ground(line, ground_m + 0.05)], colors=rgb("path"), radii=parts.THIN)
@@ -156,7 +156,7 @@ class RerunSink:
         layers = result.layers
         lidar_colors = {number: rgb("lidar") for number in layers.lidar_boxes}
         vision_colors = {number: rgb("vision") for number in layers.vision_boxes}
-        seen = {each.id: scene.object_text(each) for each in result.objects if scene.deserves_label(each, result)}
+        seen = {each.id: scene.object_text(each) for each in result.objects if scene.stands_out(each, result)}
         now = {number: box for number, box in layers.vision_boxes.items() if number in seen}
         carried = {number: box for number, box in layers.vision_boxes.items() if number not in seen}
         self._put(f"{OVERLAYS}/lidar_boxes", parts.boxes(layers.lidar_boxes, lidar_colors, {}, parts.THIN))
@@ -184,9 +184,9 @@ class RerunSink:
         colors = [scene.object_color(each, result) for each in placed]
         rings = [parts.closed(parts.to_bev(np.asarray(each.bev))) for each in placed]
         self._put("bev/footprints", rr.LineStrips2D(rings, colors=colors, radii=parts.THICK) if placed else None)
-        named = [each for each in placed if scene.deserves_label(each, result)]
+        named = [each for each in placed if scene.stands_out(each, result)]
         self._put("bev/labels", parts.bev_labels(named, result))
-        moving = [each for each in placed if each.velocity_mps is not None]
+        moving = [each for each in named if each.velocity_mps is not None]
         starts = [parts.to_bev(np.asarray(each.bev)).mean(axis=0) for each in moving]
         steps = [parts.to_bev(np.asarray([each.velocity_mps]))[0] * _ARROW_S for each in moving]
         arrows = [scene.object_color(each, result) for each in moving]

@@ -43,8 +43,10 @@ def object_text(each: FusedObject) -> str:
     return f"#{each.id} {each.label or 'obstacle'} {distance}{' carried' if each.carried else ''}"
 
 
-def deserves_label(each: FusedObject, result: Result) -> bool:
-    """The CIPV, what is in path and what the camera sees now: not every pole, and nothing that is only carried."""
+def stands_out(each: FusedObject, result: Result) -> bool:
+    """The CIPV, what is in path and what the camera sees now: not every pole, and nothing that is only carried.
+
+    These get a name and an arrow of their velocity; arrows of all that stands still would fill the view."""
     return each.id == cipv_id(result) or (not each.carried and (each.source != "L" or each.in_path))
 
 

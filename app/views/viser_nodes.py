@@ -64,9 +64,13 @@ def arrows(scene: viser.SceneApi, strokes: Strokes) -> None:
     """Each part is (2, 3): where an arrow starts and ends."""
     if not strokes.parts:
         return _hide(scene, "/velocities")
-    colors = np.asarray(strokes.colors, dtype=np.uint8)
     scene.add_arrows(
-        "/velocities", np.stack(strokes.parts), colors, shaft_radius=0.05, head_radius=0.15, head_length=0.4
+        "/velocities",
+        np.stack(strokes.parts),
+        _linear(strokes.colors),
+        shaft_radius=0.05,
+        head_radius=0.15,
+        head_length=0.4,
     )
 
 

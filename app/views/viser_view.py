@@ -138,7 +138,7 @@ class ViserView:
             else:
                 footprints.add(np.stack([outline[:-1], outline[1:]], axis=1), color)
                 rays.add(np.array([[eye, middle]]), color)
-            if each.velocity_mps is not None:
+            if each.velocity_mps is not None and scene.stands_out(each, result):
                 velocities.add(np.stack([middle, middle + np.array([*each.velocity_mps, 0.0]) * _ARROW_S]), color)
         viser_nodes.lines(self._scene, "/cuboids", cuboids, 2.5)
         viser_nodes.lines(self._scene, "/footprints", footprints, 2.5)
@@ -161,7 +161,7 @@ class ViserView:
     def _has_label(self, each: FusedObject, result: Result) -> bool:
         if self._display.labels == "all":
             return True
-        return self._display.labels == _LABELS[0] and scene.deserves_label(each, result)
+        return self._display.labels == _LABELS[0] and scene.stands_out(each, result)
 
 
 class _silent:
