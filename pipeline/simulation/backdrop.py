@@ -132,11 +132,11 @@ def _grain(seed: int) -> U8:
 
 def _wrapped(tile: U8, blur_px: float) -> U8:
     """The tile twice over in both directions, so that any shift can be cut out of it."""
-    twice = np.tile(tile, (2, 2))
     if blur_px > 0.0:
-        twice = np.asarray(cv2.GaussianBlur(np.tile(tile, (3, 3)), (0, 0), blur_px), dtype=np.uint8)
-        twice = twice[_TILE_PX:, _TILE_PX:]
-    return np.pad(twice, ((0, 2), (0, 2)), mode="wrap")
+        rim = int(4 * blur_px) + 1
+        padded = cv2.GaussianBlur(np.pad(tile, rim, mode="wrap"), (0, 0), blur_px)
+        tile = np.asarray(padded[rim:-rim, rim:-rim], dtype=np.uint8)
+    return np.pad(np.tile(tile, (2, 2)), ((0, 2), (0, 2)), mode="wrap")
 
 
 def _tile_maps(x: F64, y: F64) -> tuple[np.ndarray, np.ndarray]:

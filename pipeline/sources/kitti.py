@@ -113,6 +113,9 @@ class KittiSource:
             notes.append(f"{path.name}: {count} rings instead of {_RINGS}; matched by this sweep's own elevations")
             channels = match_vlp16(ring_elevations_deg(points, turn, count))
         kept, ring = keep_rings(points, turn, channels)
+        if not len(kept):
+            notes.append(f"{path.name}: none of its rings lies where a VLP-16 has one")
+            return None
         return Sweep(tick, kept, ring, 16)
 
     def _picture(self, name: str, tick: int, notes: list[str]) -> Picture | None:

@@ -1,0 +1,66 @@
+"""Who is where, seen from the ego vehicle."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.simulation import world
+
+from .worlds import with_actors
+
+
+def only(actors: str, **road: object) -> world.ActorState:
+    return world.at(with_actors(actors, **road), 0.0).actors[0]  # type: ignore[arg-type]
+
+
+def test_ahead_is_to_the_nearest_face() -> None:
+    rear = only("{id: 1, kind: car, lane: -2, ahead_m: 30, speed_mps: {0: 20}}").cuboid
+    assert rear.center[0] - rear.size[0] / 2 == pytest.approx(30.0)
+    assert rear.center[1] == pytest.approx(0.0)
+    assert rear.center[2] - rear.size[2] / 2 == pytest.approx(-world.LIDAR_HEIGHT_M), "it stands on the road"
+    behind = only("{id: 1, kind: car, lane: -2, ahead_m: -20, speed_mps: {0: 20}}").cuboid
+    assert behind.center[0] + behind.size[0] / 2 == pytest.approx(-20.0)
+
+
+def test_left_is_left_and_oncoming_comes() -> None:
+    left = only("{id: 1, kind: car, lane: -1, ahead_m: 30, speed_mps: {0: 20}}").cuboid
+    assert left.center[1] == pytest.approx(3.6)
+    scene = with_actors("{id: 1, kind: car, lane: 1, ahead_m: 100, speed_mps: {0: 25}}")
+    before, after = (world.at(scene, t).actors[0].cuboid for t in (0.0, 1.0))
+    assert before.center[1] == pytest.approx(3.6 / 2 + 3.6 + 4.0 + 3.6 / 2)
+    assert before.center[0] - after.center[0] == pytest.approx(45.0), "20 m/s towards 25 m/s"
+    assert abs(before.yaw_rad) == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize(("curvature", "sign"), [(0.005, 1.0), (-0.005, -1.0)])
+def test_a_left_curve_turns_left(curvature: float, sign: float) -> None:
+    segments = f"{{length_m: 5000, curvature_per_m: {curvature}}}"
+    scene = with_actors("{id: 1, kind: car, lane: -2, ahead_m: 40, speed_mps: {0: 20}}", segments=segments)
+    now = world.at(scene, 2.0)
+    assert np.sign(now.yaw_rate_radps) == sign
+    d = scene.road.lane_offset_m(-2)
+    assert now.yaw_rate_radps == pytest.approx(20.0 * curvature / (1 - curvature * d))
+    lead = now.actors[0].cuboid
+    assert np.sign(lead.center[1]) == sign
+    assert np.sign(lead.yaw_rad) == sign
+
+
+def test_the_yaw_rate_is_what_the_heading_does() -> None:
+    """In a lane change the heading's own derivative is the yaw rate that the frame tells."""
+    scene = with_actors()
+    change = {"start_s": 1.0, "duration_s": 4.0, "lane": -1}
+    ego = scene.ego.model_validate({**scene.ego.model_dump(), "lane_changes": [change]})
+    scene = scene.model_validate({**scene.model_dump(), "ego": ego.model_dump()})
+    for t in (1.5, 2.2, 3.5):
+        turned = world.at(scene, t + 0.01).pose[2] - world.at(scene, t - 0.01).pose[2]
+        assert turned / 0.02 == pytest.approx(world.at(scene, t).yaw_rate_radps, rel=0.03)
+
+
+def test_to_ego_undoes_the_pose() -> None:
+    now = world.at(with_actors(segments="{length_m: 900, curvature_per_m: 0.01}"), 3.0)
+    x, y, heading = now.pose
+    ahead_left = np.array(
+        [[x + 5 * np.cos(heading) - 2 * np.sin(heading), y + 5 * np.sin(heading) + 2 * np.cos(heading)]]
+    )
+    np.testing.assert_allclose(now.to_ego(ahead_left), [[5.0, 2.0]], atol=1e-9)

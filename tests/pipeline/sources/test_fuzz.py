@@ -1,0 +1,85 @@
+"""Every file of a recording, damaged at random: a sentence or a degraded frame, never another exception."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from pipeline.sources import SourceError, open_source
+
+from .conftest import write_astyx, write_kitti, write_kitti_raw
+
+FILES = {
+    "astyx lidar": (write_astyx, "astyx", "lidar_vlp16/000002.txt"),
+    "astyx picture": (write_astyx, "astyx", "camera_front/000002.jpg"),
+    "astyx first calibration": (write_astyx, "astyx", "calibration/000001.json"),
+    "astyx calibration": (write_astyx, "astyx", "calibration/000002.json"),
+    "astyx labels": (write_astyx, "astyx", "groundtruth_obj3d/000002.json"),
+    "kitti velodyne": (write_kitti, "kitti", "velodyne/0000000001.bin"),
+    "kitti picture": (write_kitti, "kitti", "image_02/0000000001.png"),
+    "kitti calibration": (write_kitti, "kitti", "calib/0000000001.txt"),
+    "kitti labels": (write_kitti, "kitti", "label_2/0000000001.txt"),
+    "kitti oxts": (write_kitti_raw, "kitti", "oxts/data/0000000001.txt"),
+    "kitti stamps": (write_kitti_raw, "kitti", "velodyne_points/timestamps.txt"),
+    "kitti raw cameras": (write_kitti_raw, "kitti", "../calib_cam_to_cam.txt"),
+    "kitti raw velodyne": (write_kitti_raw, "kitti", "../calib_velo_to_cam.txt"),
+}
+
+EDITS = st.lists(
+    st.tuples(
+        st.floats(0, 1, exclude_max=True),
+        st.sampled_from(["cut", "drop", "insert", "replace", "double"]),
+        st.one_of(
+            st.binary(min_size=1, max_size=8), st.sampled_from([b"nan", b"1e999", b"-", b"9" * 30, b"null", b"{}"])
+        ),
+    ),
+    min_size=1,
+    max_size=4,
+)
+
+
+def damaged(data: bytes, edits: list[tuple[float, str, bytes]]) -> bytes:
+    for place, kind, extra in edits:
+        at = int(place * len(data))
+        match kind:
+            case "cut":
+                data = data[:at]
+            case "drop":
+                data = data[:at] + data[at + len(extra) :]
+            case "insert":
+                data = data[:at] + extra + data[at:]
+            case "replace":
+                data = data[:at] + extra + data[at + len(extra) :]
+            case "double":
+                data = data[:at] + data[at : at + 400] + data[at:]
+    return data
+
+
+@pytest.mark.parametrize("what", FILES)
+def test_damage(what: str, tmp_path: Path) -> None:
+    write, scheme, name = FILES[what]
+    folder = write(tmp_path / "recording")
+    path = folder / name
+    whole = path.read_bytes()
+
+    @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+    @given(EDITS)
+    def survives(edits: list[tuple[float, str, bytes]]) -> None:
+        path.write_bytes(damaged(whole, edits))
+        try:
+            source = open_source(f"{scheme}:{folder}")
+        except SourceError:
+            return
+        for index in range(len(source)):
+            frame = source.frame(index)
+            for branch in (frame.sweep, frame.picture):
+                assert branch is not None or frame.notes, "a missing branch says why"
+            if frame.sweep is not None:
+                assert bool((abs(frame.sweep.points) < 1e7).all())
+                assert frame.sweep.ring.max() < frame.sweep.channels
+            source.truth(index)
+
+    survives()

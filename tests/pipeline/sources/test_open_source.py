@@ -1,0 +1,75 @@
+"""One door to every kind of recording, and what it says when there is nothing behind it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from pipeline.sources import SourceError, open_source
+
+
+@pytest.mark.parametrize(
+    ("uri", "says"),
+    [
+        ("nosuch:thing", "no kind of source named 'nosuch'; there are astyx, kitti, sim"),
+        ("", "not a source; type one of astyx:"),
+        ("/somewhere/else", "/somewhere/else: not a source"),
+        ("C:\\drives\\one", "not a source"),
+        ("astyx:", "no folder given"),
+        ("astyx:missing/folder", "missing/folder: no such folder"),
+        ("kitti:missing/folder", "missing/folder: no such folder"),
+        ("astyx:bad\0name", "no such folder"),
+        ("astyx:~no_such_user_here/x", "cannot be opened"),
+        ("sim:", "no scenario named ''; there are"),
+        ("sim:nosuch", "no scenario named 'nosuch'; there are"),
+        ("sim:nosuch.yaml", "nosuch.yaml: cannot be read"),
+    ],
+)
+def test_a_wrong_uri_gives_one_sentence(uri: str, says: str) -> None:
+    with pytest.raises(SourceError) as error:
+        open_source(uri)
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("scheme", ["astyx", "kitti"])
+def test_an_empty_folder_and_a_file_are_told_apart(scheme: str, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(SourceError, match="is empty"):
+        open_source(f"{scheme}:{tmp_path / 'empty'}")
+    with pytest.raises(SourceError, match="not a folder"):
+        open_source(f"{scheme}:{tmp_path / 'file'}")
+
+
+@pytest.mark.parametrize("scheme", ["astyx", "kitti"])
+def test_a_folder_of_something_else_is_refused(scheme: str, tmp_path: Path) -> None:
+    (tmp_path / "holiday.txt").write_text("x")
+    with pytest.raises(SourceError, match=r"no (Astyx|KITTI) recording"):
+        open_source(f"{scheme}:{tmp_path}")
+
+
+def test_a_bare_path_is_guessed(astyx: Path, kitti: Path) -> None:
+    with pytest.raises(SourceError, match=f"looks like astyx:{astyx}"):
+        open_source(str(astyx))
+    with pytest.raises(SourceError, match=f"looks like kitti:{kitti}"):
+        open_source(str(kitti))
+
+
+def test_relative_paths_and_home_work(astyx: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(astyx.parent)
+    monkeypatch.setenv("HOME", str(astyx.parent))
+    assert len(open_source("astyx:astyx")) == len(open_source(f"astyx:~{os.sep}astyx")) == 2
+
+
+def test_a_date_folder_points_to_its_drives(kitti_raw: Path) -> None:
+    with pytest.raises(SourceError, match=r"it holds drives; open one of them, for example kitti:.*drive_0009_sync"):
+        open_source(f"kitti:{kitti_raw.parent}")
+
+
+@pytest.mark.parametrize("rings", [0, 15, 32])
+def test_kitti_gives_16_or_64_rings(kitti: Path, rings: int) -> None:
+    with pytest.raises(SourceError, match=f"{rings} rings asked for"):
+        open_source(f"kitti:{kitti}", rings=rings)
