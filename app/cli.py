@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Annotated
+from collections.abc import Callable
 
 import tyro
 
 from app.commands.bench import Bench
-from app.commands.calibrate import CalibrateDistance
+from app.commands.calibrate import Calibrate
 from app.commands.models import Models
 from app.commands.params import ListParams
 from app.commands.run import Run
@@ -23,22 +23,21 @@ from pipeline.vision.models import ModelError
 
 BAD_INPUT = (SourceError, ParamsError, DetectorMissing, DetectorError, ModelError, TooFewPairs, PortTaken)
 
-Calibrate = Annotated[CalibrateDistance, tyro.conf.subcommand("distance")]
-Command = (
-    Annotated[Demo, tyro.conf.subcommand("demo")]
-    | Annotated[Serve, tyro.conf.subcommand("serve")]
-    | Annotated[Run, tyro.conf.subcommand("run")]
-    | Annotated[Models, tyro.conf.subcommand("models", description="Networks: list, pull, register.")]
-    | Annotated[ListParams, tyro.conf.subcommand("params")]
-    | Annotated[Calibrate, tyro.conf.subcommand("calibrate", description="Fit the line to another car or camera.")]
-    | Annotated[Bench, tyro.conf.subcommand("bench")]
-)
+COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {
+    "demo": Demo,
+    "serve": Serve,
+    "run": Run,
+    "models": Models,
+    "params": ListParams,
+    "calibrate": Calibrate,
+    "bench": Bench,
+}
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of the console script."""
-    command = tyro.cli(
-        Command,  # type: ignore[arg-type]
+    command = tyro.extras.subcommand_cli_from_dict(
+        COMMANDS,
         args=arguments,
         prog="cipv",
         description="CIPV Studio: which vehicle ahead is the closest one in my path, how far, how fast, and why.",

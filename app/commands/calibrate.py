@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Literal
 
+import tyro
 import yaml
 from rich.console import Console
 from rich.table import Table
@@ -17,12 +18,14 @@ from pipeline.vision.detector import open_detector
 
 
 @dataclass(frozen=True)
-class CalibrateDistance:
-    """Fit d = a·h^b, class by class, to a recording's own detections.
+class Calibrate:
+    """Fit the line to another car or camera: d = a·h^b, class by class, to a recording's own detections.
 
     Example: cipv calibrate distance astyx:../shared/data/astyx --out law.yaml
     """
 
+    what: tyro.conf.Positional[Literal["distance"]]
+    """What to fit: the law that gives distance from box height"""
     source: SourceOptions
     line: LineOptions = field(default_factory=LineOptions)
     truth: Literal["labels", "lidar"] = "labels"

@@ -77,11 +77,18 @@ class RegisterModel:
         return 0
 
 
-Models = (
-    Annotated[ListModels, tyro.conf.subcommand("list")]
-    | Annotated[PullModel, tyro.conf.subcommand("pull")]
-    | Annotated[RegisterModel, tyro.conf.subcommand("register")]
-)
+@dataclass(frozen=True)
+class Models:
+    """Networks: which are here, fetch an official one, add your own ONNX file."""
+
+    action: (
+        Annotated[ListModels, tyro.conf.subcommand("list")]
+        | Annotated[PullModel, tyro.conf.subcommand("pull")]
+        | Annotated[RegisterModel, tyro.conf.subcommand("register")]
+    )
+
+    def __call__(self) -> int:
+        return self.action()
 
 
 def _table(entries: tuple[ModelEntry, ...]) -> Table:
