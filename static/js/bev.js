@@ -112,6 +112,7 @@ function drawObjects(ctx, { result }, layers) {
     ctx.stroke();
     ctx.setLineDash([]);
     if (item.source !== "L") sigma(ctx, item);
+    ctx.globalAlpha = item.source === "L" && !important(item) ? 0.4 : 1;
     if (layers.velocity && item.velocity_mps && !item.carried) arrow(ctx, item);
     ctx.globalAlpha = 1;
     if (item.id === chosen) ring(ctx, item.bev);

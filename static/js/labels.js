@@ -19,7 +19,8 @@ export class Labels {
     const h = strong ? HEIGHT + 4 : HEIGHT;
     ctx.font = `${strong ? "700 13px" : "600 11px"} system-ui, "DejaVu Sans", sans-serif`;
     const w = ctx.measureText(words).width + 10;
-    const at = { x: Math.max(2, x), y: Math.max(2, y - h - 1), w, h };
+    const right = ctx.canvas.clientWidth - w - 2;
+    const at = { x: Math.max(2, Math.min(x, right)), y: Math.max(2, y - h - 1), w, h };
     for (let tries = 0; this.#overlaps(at); tries++) {
       if (tries === 3 && !strong) return;
       if (tries === 12) break;

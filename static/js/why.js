@@ -1,6 +1,6 @@
 /** Why the selected object (or else the CIPV) is what it is: its reason and every gate with number and limit. */
 import { $, el } from "./dom.js";
-import { num } from "./format.js";
+import { DASH, num } from "./format.js";
 import { get, paint } from "./store.js";
 
 const panel = $("#why");
@@ -27,9 +27,11 @@ function update() {
 
 /** @param {import("./types.js").Gate} g */
 function gate(g) {
-  const value = g.value === null ? "nothing to test" : num(g.value, digits(g.value));
-  return el("span", { class: "gate", data: { passed: g.passed ? "yes" : "no" } },
-    el("b", { textContent: g.name.replaceAll("_", " ") }), ` ${value} `, el("span", { textContent: `limit ${num(g.limit, digits(g.limit))}` }));
+  const value = g.value === null ? DASH : num(g.value, digits(g.value));
+  const limit = g.limit === null ? DASH : num(g.limit, digits(g.limit));
+  const title = `${g.value === null ? "nothing to test" : `value ${value}`}, limit ${limit}: ${g.passed ? "passed" : "failed"}`;
+  return el("span", { class: "gate", title, data: { passed: g.passed ? "yes" : "no" } },
+    el("b", { textContent: g.name.replaceAll("_", " ") }), ` ${value} `, el("span", { textContent: `/ ${limit}` }));
 }
 
 const digits = (value) => (Number.isInteger(value) ? 0 : Math.abs(value) < 10 ? 2 : 1);

@@ -1,0 +1,150 @@
+"""A real server on the simulator and a real browser that must stay quiet and on this machine."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from app.engine import Engine
+from app.server import Server, create_app, listen_socket
+from pipeline.params import Params
+from pipeline.sources import open_source
+from pipeline.types import U8, RawBoxes
+from pipeline.vision.detector import Detector, DetectorMissing, open_detector
+
+CHROMIUM = Path("/usr/bin/chromium")
+FLAGS = [
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+WAIT_MS = 60_000
+
+
+class CountedDetector:
+    """The installed network, counted; without one, no boxes."""
+
+    def __init__(self, size: tuple[int, int] | None) -> None:
+        self.calls = 0
+        self._network: Detector | None
+        try:
+            self._network = open_detector(None, size)
+        except DetectorMissing:
+            self._network = None
+
+    @property
+    def name(self) -> str:
+        return self._network.name if self._network else "none"
+
+    def detect(self, bgr: U8) -> RawBoxes:
+        self.calls += 1
+        if self._network is not None:
+            return self._network.detect(bgr)
+        return RawBoxes(self.name, np.zeros((0, 4), np.float32), np.zeros(0, np.float32), ())
+
+
+@dataclass
+class Site:
+    """A running dashboard. ``stop`` ends its server as a crash would for the pages."""
+
+    engine: Engine
+    port: int
+    detectors: list[CountedDetector] = field(default_factory=list)
+    _server: Server | None = None
+    _thread: threading.Thread | None = None
+
+    @property
+    def address(self) -> str:
+        return f"http://127.0.0.1:{self.port}"
+
+    @property
+    def network_runs(self) -> int:
+        return sum(detector.calls for detector in self.detectors)
+
+    def start(self) -> None:
+        bound, is_ready = listen_socket("127.0.0.1", self.port, strict=True), threading.Event()
+        self.port = bound.getsockname()[1]
+        server = Server(create_app(self.engine), self.address, lambda _: is_ready.set())
+        self._server, self._thread = server, threading.Thread(target=lambda: server.run(sockets=[bound]))
+        self._thread.start()
+        assert is_ready.wait(60)
+
+    def stop(self) -> None:
+        assert self._server is not None
+        assert self._thread is not None
+        self._server.should_exit = True
+        self._thread.join()
+
+
+@pytest.fixture(scope="module")
+def site() -> Iterator[Site]:
+    """The dashboard on ``sim:straight``, paused on its first frame."""
+    detectors: list[CountedDetector] = []
+
+    def open_counted(size: tuple[int, int] | None) -> CountedDetector:
+        detectors.append(CountedDetector(size))
+        return detectors[-1]
+
+    engine = Engine(open_source, open_counted, Params(), uri="sim:straight")
+    engine.start()
+    engine.wait_for(lambda s: s.tick is not None, 120)
+    running = Site(engine, 0, detectors)
+    running.start()
+    yield running
+    running.stop()
+    engine.stop()
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    if not CHROMIUM.exists():
+        if os.environ.get("CIPV_BROWSER_TESTS") == "1":
+            pytest.fail(f"CIPV_BROWSER_TESTS=1, but there is no {CHROMIUM}")
+        pytest.skip(f"no {CHROMIUM}: the page is not looked at")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        yield browser
+        browser.close()
+
+
+OpenPage = Callable[..., Page]
+
+
+@pytest.fixture
+def open_page(browser: Browser, site: Site) -> Iterator[OpenPage]:
+    """Opens the dashboard in a fresh profile; at the end no page may have complained or called elsewhere."""
+    complaints: list[str] = []
+    pages: list[Page] = []
+
+    def begin(width: int = 1440, height: int = 900, address: str | None = None) -> Page:
+        page = browser.new_page(viewport={"width": width, "height": height}, color_scheme="dark")
+        pages.append(page)
+        page.set_default_timeout(WAIT_MS)
+        page.on("console", lambda m: complaints.append(m.text) if m.type in ("error", "warning") else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", lambda r: complaints.append(r.url) if _leaves(r.url, address or site.address) else None)
+        page.goto(address or site.address)
+        page.wait_for_function("document.querySelector('#transport .name').textContent !== ''")
+        page.wait_for_selector("#objects tbody tr", state="attached")
+        return page
+
+    yield begin
+    for page in pages:
+        page.context.close()
+    assert complaints == []
+
+
+def _leaves(url: str, address: str) -> bool:
+    return not url.startswith((address, address.replace("http", "ws"), "data:", "blob:"))

@@ -1,0 +1,244 @@
+"""The dashboard as a person uses it."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.engine import Engine
+from pipeline.params import Params
+from tests.app.recording import CountingDetector, Recording, opener
+from tests.browser.conftest import OpenPage, Site
+
+WAIT_S = 60
+START = 60
+"""A frame of the scenario with traffic around."""
+
+
+@pytest.fixture(autouse=True)
+def _paused_in_traffic(site: Site) -> None:
+    site.engine.control.set_params(Params(), "default")
+    site.engine.control.change(playing=False, speed=1.0, loop=True)
+    site.engine.control.seek(START)
+    revision = site.engine.control.peek().params_revision
+    site.engine.wait_for(
+        lambda s: s.index == START and s.params_revision == revision and not s.playing and s.params is s.tick.params,
+        WAIT_S,
+    )
+
+
+def frame_name(page: Page) -> str:
+    return page.inner_text("#transport .name")
+
+
+def wait_for_frame(page: Page, index: int) -> None:
+    expect(page.locator("#transport .where .dim")).to_have_text(f"{index + 1}/200", timeout=WAIT_S * 1000)
+
+
+def pixels(page: Page, canvas: str) -> str:
+    """What is painted, once nothing more is to be painted."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    return page.evaluate(f"document.querySelector('{canvas}').toDataURL()")
+
+
+def colours(page: Page, canvas: str) -> int:
+    """How many different colours a canvas shows: a blank one has one."""
+    return page.evaluate(
+        """(selector) => {
+          const canvas = document.querySelector(selector);
+          const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+          return new Set(new Uint32Array(data.buffer)).size;
+        }""",
+        canvas,
+    )
+
+
+def test_it_opens_and_shows_the_frame_everywhere(open_page: OpenPage, site: Site):
+    page = open_page()
+    wait_for_frame(page, START)
+    tick = site.engine.snapshot.tick
+    assert tick is not None
+    assert frame_name(page) == tick.result.frame
+    assert page.locator("#objects tbody tr").count() == len(tick.result.objects)
+    pixels(page, "#camera")
+    assert colours(page, "#camera") > 1000, "a picture"
+    assert colours(page, "#bev") > 8, "a plan with points and objects"
+    expect(page.locator("#link")).to_have_text("live")
+
+
+def test_the_banner_says_what_the_result_says(open_page: OpenPage, site: Site):
+    page = open_page()
+    wait_for_frame(page, START)
+    tick = site.engine.snapshot.tick
+    assert tick is not None
+    cipv = tick.result.cipv
+    assert cipv is not None, "there is a lead at this frame"
+    expect(page.locator("[data-figure=distance] .value span")).to_have_text(f"{cipv.distance_m:.1f}")
+    expect(page.locator(".lead .reason")).to_have_text(cipv.reason)
+    expect(page.locator("tr.is-cipv td").first).to_have_text(f"#{cipv.id}")
+
+
+def test_it_plays_and_pauses(open_page: OpenPage, site: Site):
+    page = open_page()
+    page.keyboard.press("Space")
+    site.engine.wait_for(lambda s: s.playing and s.index > START + 2, WAIT_S)
+    page.get_by_role("button", name="Pause").click()
+    site.engine.wait_for(lambda s: not s.playing, WAIT_S)
+    wait_for_frame(page, site.engine.snapshot.index)
+
+
+def test_it_steps_and_seeks(open_page: OpenPage):
+    page = open_page()
+    wait_for_frame(page, START)
+    page.keyboard.press("ArrowRight")
+    wait_for_frame(page, START + 1)
+    page.get_by_role("button", name="Step back").click()
+    wait_for_frame(page, START)
+    page.get_by_role("slider", name="Frame").fill("90")
+    wait_for_frame(page, 90)
+    page.locator("h1").click()
+    page.keyboard.press("Home")
+    wait_for_frame(page, 0)
+
+
+def test_a_slider_on_the_paused_frame_changes_picture_and_table_without_the_network(open_page: OpenPage, site: Site):
+    page = open_page()
+    wait_for_frame(page, START)
+    runs, before, camera = site.network_runs, page.inner_text("#objects tbody"), pixels(page, "#camera")
+    page.locator("[data-param='cluster.tolerance_m'] input[type=range]").fill("0.2")
+    expect(page.locator("[data-section=cluster] .count")).to_have_text("1 changed")
+    site.engine.wait_for(lambda s: s.params.cluster.tolerance_m == 0.2 and s.tick.params is s.params, WAIT_S)
+    page.wait_for_function("(text) => document.querySelector('#objects tbody').innerText !== text", arg=before)
+    assert pixels(page, "#camera") != camera
+    assert site.engine.snapshot.index == START
+    assert site.network_runs == runs
+    page.get_by_role("button", name="Reset tolerance").click()
+    page.wait_for_function("(text) => document.querySelector('#objects tbody').innerText === text", arg=before)
+    expect(page.locator("[data-section=cluster] .count")).to_have_text("")
+
+
+def test_h_res_moves_the_projected_points_and_chooses_its_model(open_page: OpenPage, site: Site):
+    page = open_page()
+    wait_for_frame(page, START)
+    runs, camera = site.network_runs, pixels(page, "#camera")
+    slider = page.locator("[data-param='alignment.h_res_deg'] input[type=range]")
+    slider.fill(str(float(slider.input_value()) * 1.3))
+    site.engine.wait_for(lambda s: s.params.alignment.model == "angular" and s.tick.params is s.params, WAIT_S)
+    expect(page.locator("[data-param='alignment.model'] button[aria-pressed=true]")).to_have_text("angular")
+    page.wait_for_function("(old) => document.querySelector('#camera').toDataURL() !== old", arg=camera)
+    assert site.network_runs == runs
+
+
+def test_parameters_can_be_searched_and_a_preset_chosen(open_page: OpenPage, site: Site):
+    page = open_page()
+    page.get_by_label("Search parameters").fill("slope")
+    expect(page.locator(".param:visible")).to_have_count(1)
+    page.get_by_label("Search parameters").fill("")
+    page.get_by_label("Preset").select_option("paper")
+    assert site.engine.wait_for(lambda s: s.preset == "paper", WAIT_S).params.fusion.assignment == "greedy"
+
+
+def test_a_selected_object_is_explained(open_page: OpenPage, site: Site):
+    page = open_page()
+    wait_for_frame(page, START)
+    tick = site.engine.snapshot.tick
+    assert tick is not None
+    rejection = tick.result.rejected[0]
+    plan, camera = pixels(page, "#bev"), pixels(page, "#camera")
+    page.locator(f"#objects tr[data-id='{rejection.id}']").click()
+    expect(page.locator("#why")).to_contain_text(f"#{rejection.id}")
+    expect(page.locator("#why")).to_contain_text(rejection.reason)
+    gates = next(item.gates for item in tick.result.objects if item.id == rejection.id)
+    expect(page.locator("#why .gate")).to_have_count(len(gates))
+    assert (pixels(page, "#bev"), pixels(page, "#camera")) != (plan, camera), "it is marked in the views too"
+    page.keyboard.press("Escape")
+    expect(page.locator("tr.is-selected")).to_have_count(0)
+
+
+def test_the_plan_selects_zooms_and_fits(open_page: OpenPage, site: Site):
+    page = open_page()
+    wait_for_frame(page, START)
+    fitted = pixels(page, "#bev")
+    page.locator("#bev").hover()
+    page.mouse.wheel(0, -400)
+    page.wait_for_function("(old) => document.querySelector('#bev').toDataURL() !== old", arg=fitted)
+    page.locator("#bev").dblclick(position={"x": 5, "y": 5})
+    page.wait_for_function("(old) => document.querySelector('#bev').toDataURL() === old", arg=fitted)
+
+
+def test_layers_can_be_switched_off_and_stay_off(open_page: OpenPage):
+    page = open_page()
+    wait_for_frame(page, START)
+    shown = pixels(page, "#camera")
+    page.locator("#camera-layers").get_by_role("button", name="Points").click()
+    assert pixels(page, "#camera") != shown
+    page.reload()
+    page.wait_for_selector("#objects tbody tr")
+    expect(page.locator("[data-layer=points]")).to_have_attribute("aria-pressed", "false")
+
+
+def test_whoever_joins_late_sees_the_same(open_page: OpenPage):
+    first = open_page()
+    first.get_by_role("slider", name="Frame").fill("75")
+    wait_for_frame(first, 75)
+    second = open_page()
+    wait_for_frame(second, 75)
+    assert second.inner_text("#objects tbody") == first.inner_text("#objects tbody")
+
+
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (1024, 768), (800, 480)])
+def test_everything_fits_on_the_screen(open_page: OpenPage, width: int, height: int):
+    page = open_page(width, height)
+    assert page.evaluate("[document.body.scrollWidth, document.body.scrollHeight]") == [width, height]
+    for selector in ("#banner", "#camera", "#bev", "#transport", "#params-button"):
+        box = page.locator(selector).bounding_box()
+        assert box is not None
+        assert box["width"] > 0
+        assert box["x"] >= 0
+        assert box["y"] >= 0
+        assert box["x"] + box["width"] <= width + 0.5
+        assert box["y"] + box["height"] <= height + 0.5
+
+
+def test_every_control_has_a_name(open_page: OpenPage):
+    page = open_page()
+    page.evaluate("document.querySelectorAll('details').forEach((section) => (section.open = true))")
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll("button, input, select, canvas:not([aria-hidden]), iframe")]
+          .filter((e) => !(e.getAttribute("aria-label") || e.textContent.trim() || e.title || e.labels?.length))
+          .map((e) => e.outerHTML)"""
+    )
+    assert nameless == []
+
+
+def test_help_and_theme(open_page: OpenPage):
+    page = open_page()
+    page.keyboard.press("?")
+    expect(page.get_by_role("dialog")).to_contain_text("play or pause")
+    page.get_by_role("button", name="Close").click()
+    dark = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    page.keyboard.press("d")
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") != dark
+
+
+def test_a_lost_connection_is_said_and_found_again(browser, site: Site):
+    """Old data never looks fresh. The browser itself complains about refused connections here, so no quiet page."""
+    recording = Recording()
+    engine = Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri)
+    engine.start()
+    own = Site(engine, 0)
+    own.start()
+    page = browser.new_page()
+    try:
+        page.goto(own.address)
+        expect(page.locator("#link")).to_have_text("live", timeout=WAIT_S * 1000)
+        own.stop()
+        expect(page.locator("#notices")).to_contain_text("Connection lost", timeout=WAIT_S * 1000)
+        expect(page.locator("#link")).to_have_text("connection lost")
+        own.start()
+        expect(page.locator("#link")).to_have_text("live", timeout=WAIT_S * 1000)
+        expect(page.locator("#notices")).not_to_contain_text("Connection lost")
+    finally:
+        page.context.close()
+        own.stop()
+        engine.stop()
