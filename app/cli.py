@@ -14,14 +14,7 @@ from app.commands.models import Models
 from app.commands.params import ListParams
 from app.commands.run import Run
 from app.commands.serve import Demo, Serve
-from app.server import PortTaken
-from pipeline.calibration.distance import TooFewPairs
-from pipeline.params import ParamsError
-from pipeline.sources.base import SourceError
-from pipeline.vision.detector import DetectorError, DetectorMissing
-from pipeline.vision.models import ModelError
-
-BAD_INPUT = (SourceError, ParamsError, DetectorMissing, DetectorError, ModelError, TooFewPairs, PortTaken)
+from pipeline.errors import BadInput
 
 COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {
     "demo": Demo,
@@ -32,6 +25,9 @@ COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {
     "calibrate": Calibrate,
     "bench": Bench,
 }
+
+_NAMED_WRONG = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)
+"""A path that a person named cannot be used; any other failure of the system is not their doing."""
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -45,7 +41,7 @@ def main(arguments: list[str] | None = None) -> None:
     )
     try:
         raise SystemExit(command())
-    except BAD_INPUT as error:
+    except BadInput as error:
         print(f"cipv: {error}", file=sys.stderr)
         raise SystemExit(2) from None
     except BrokenPipeError:
@@ -54,6 +50,11 @@ def main(arguments: list[str] | None = None) -> None:
         raise SystemExit(0) from None
     except OSError as error:
         print(f"cipv: {error.strerror or error}: {error.filename or ''}".rstrip(": "), file=sys.stderr)
-        raise SystemExit(2) from None
+        raise SystemExit(2 if isinstance(error, _NAMED_WRONG) else 1) from None
     except KeyboardInterrupt:
         raise SystemExit(130) from None
+    except Exception as error:
+        if os.environ.get("CIPV_DEBUG"):
+            raise
+        print(f"cipv: {type(error).__name__}: {error} (CIPV_DEBUG=1 shows where)", file=sys.stderr)
+        raise SystemExit(1) from None

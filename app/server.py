@@ -24,13 +24,14 @@ from app.routes.playback import playback_router
 from app.stream import Stream
 from app.views.colors import palette_css
 from app.views.viser_proxy import viser_router
+from pipeline.errors import BadInput
 
 STATIC = Path(__file__).resolve().parent.parent / "static"
 DEFAULT_PORT = 8420
 _PORTS_TO_TRY = 20
 
 
-class PortTaken(Exception):
+class PortTaken(BadInput):
     """The wanted address cannot be listened on; the text says which and what to do."""
 
 

@@ -13,8 +13,10 @@ from typing import Any, Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from pipeline.errors import BadInput
 
-class ParamsError(ValueError):
+
+class ParamsError(BadInput):
     """A parameter that does not exist or a value out of its bounds; the text names it."""
 
 
@@ -287,8 +289,10 @@ def from_yaml(path: Path, base: Params) -> Params:
     """``base`` with a preset file's values: a mapping of section to parameter to value."""
     try:
         loaded = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ParamsError(f"{path}: cannot be read: {str(error).splitlines()[0]}") from None
+    except OSError as error:
+        raise ParamsError(f"{path}: {error.strerror}") from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ParamsError(f"{path}: not a parameter file: {str(error).splitlines()[0]}") from None
     if not isinstance(loaded, dict) or not all(isinstance(values, dict) for values in loaded.values()):
         raise ParamsError(f"{path}: expected sections with parameters below them")
     changes = {f"{section}.{key}": value for section, values in loaded.items() for key, value in values.items()}

@@ -55,7 +55,7 @@ class Run:
                 if out is not None:
                     write_line(out, result)
                 elif replay is None:
-                    bar.console.print(_sentence(result), highlight=False)
+                    print(_sentence(result))
                 if replay is not None:
                     replay.show(frame, result)
                 tally.add(result)

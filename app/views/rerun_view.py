@@ -17,6 +17,7 @@ from app.views import scene
 from app.views.colors import rgb
 from app.views.rerun_blueprint import BEV_AHEAD_M, BEV_ASIDE_M, CAMERA, OVERLAYS, blueprint
 from pipeline import alignment
+from pipeline.errors import BadInput
 from pipeline.geometry import inverse
 from pipeline.params import AlignmentParams
 from pipeline.types import Frame, Result
@@ -28,7 +29,7 @@ _ARROW_S = 1.0
 """Velocity arrows reach as far as the object moves, relative to ego, in this time."""
 
 
-class ReplayError(Exception):
+class ReplayError(BadInput):
     """A replay that cannot be written; the text is one sentence that names the file."""
 
 

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.alignment import Alignment, project_cuboid, resolve
+from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid, closest_on_polygon, iou_matrix, transform
 from pipeline.lidar import boxes, cluster, downsample, ground
 from pipeline.params import Params
@@ -27,7 +28,7 @@ MIN_DEPTH_M = 3.0
 """Nearer than this a face of the object no longer fills the box: its height says little."""
 
 
-class TooFewPairs(Exception):
+class TooFewPairs(BadInput):
     """A recording without enough labelled boxes to fit anything; one sentence."""
 
 

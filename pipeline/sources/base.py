@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
+from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.types import Frame
 
 
-class SourceError(Exception):
+class SourceError(BadInput):
     """A source that cannot be opened. The text is one sentence for a person: what is wrong and with which file."""
 
 

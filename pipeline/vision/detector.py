@@ -14,6 +14,7 @@ import numpy as np
 import onnx
 import onnxruntime as ort
 
+from pipeline.errors import BadInput
 from pipeline.types import F32, U8, RawBoxes
 from pipeline.vision import models
 from pipeline.vision.decode import Decoder, Size, UnknownHead, pick_decoder
@@ -29,11 +30,11 @@ _FREE_SIZE: Size = (384, 640)
 _PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
 
 
-class DetectorMissing(Exception):
+class DetectorMissing(BadInput):
     """There is no network to run. The text is a sentence with the remedy."""
 
 
-class DetectorError(Exception):
+class DetectorError(BadInput):
     """A network that cannot be run, or a picture that is none. The text is a sentence for a person."""
 
 

@@ -17,6 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from pipeline.errors import BadInput
+
 Task = Literal["detector", "lanes"]
 Progress = Callable[[int, int], None]
 """Called with bytes done and bytes in all."""
@@ -25,7 +27,7 @@ _CHUNK = 1 << 16
 _TIMEOUT_S = 30.0
 
 
-class ModelError(Exception):
+class ModelError(BadInput):
     """A network that cannot be fetched, registered or found; one sentence with the remedy."""
 
 
