@@ -62,7 +62,7 @@ def _fit(parts: list[F32], edges: F64, params: GroundParams) -> tuple[F64, Mask]
 
 def _meets(plane: F64, neighbour: F64, x: float, params: GroundParams) -> bool:
     step = (plane[3] + plane[0] * x) / plane[2] - (neighbour[3] + neighbour[0] * x) / neighbour[2]
-    return bool(abs(step) <= params.distance_m)
+    return bool(abs(step) <= params.distance_m and plane[:3] @ neighbour[:3] >= shared.MIN_COS_BEND)
 
 
 def _refine(part: F32, prior: F64, params: GroundParams) -> tuple[F64, float]:

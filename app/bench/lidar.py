@@ -25,8 +25,6 @@ OURS = "ours"
 VOXEL_M = 0.2
 RANSAC_POINTS, RANSAC_ITERATIONS = 3, 1000
 """As in Open3D's own tutorial."""
-QHULL_POINTS = 4
-"""Open3D's oriented box stops at fewer: it starts from a convex hull."""
 SYSTEM_LIBRARIES = "on slim systems Open3D needs libegl1 libgl1 libx11-6 libusb-1.0-0"
 RATE_S = 0.1
 
@@ -122,7 +120,8 @@ class Open3dPeer:
         return self._dbscan(prepared.sweep.points[prepared.chosen, :3], min_points=1)
 
     def chain(self, prepared: Prepared, voxel_m: float | None) -> list[Any]:
-        """Points to oriented boxes: voxels, RANSAC plane, DBSCAN of what lies ahead, a box a cluster; no tracks."""
+        """Points to boxes: voxels, RANSAC plane, DBSCAN of what lies ahead, a box a cluster. Less than our line does:
+        it does not turn the boxes (its oriented box warns on the console about every flat cluster) nor track."""
         cloud = self._cloud(prepared.sweep.points[:, :3])
         if voxel_m is not None:
             cloud = cloud.voxel_down_sample(voxel_m)
@@ -130,12 +129,10 @@ class Open3dPeer:
         rest = np.asarray(cloud.select_by_index(ground, invert=True).points)
         ahead = rest[(np.hypot(rest[:, 0], rest[:, 1]) <= self._params.cluster.max_range_m) & (rest[:, 0] > 0.0)]
         labels = self._dbscan(ahead, self._params.cluster.min_points)
-        members = [ahead[labels == c] for c in range(labels.max(initial=-1) + 1)]
-        box = self._open3d.geometry.OrientedBoundingBox
+        box = self._open3d.geometry.AxisAlignedBoundingBox
         return [
-            box.create_from_points(self._open3d.utility.Vector3dVector(points), robust=True)
-            for points in members
-            if len(points) >= QHULL_POINTS
+            box.create_from_points(self._open3d.utility.Vector3dVector(ahead[labels == c]))
+            for c in range(labels.max(initial=-1) + 1)
         ]
 
     def _dbscan(self, xyz: npt.NDArray[np.floating], min_points: int) -> npt.NDArray[np.int32]:

@@ -17,6 +17,8 @@ MIN_SPREAD_M = 0.7
 """Standard deviation that the seeds need along both directions of their plane; below it they are a line."""
 MIN_SHARE = 0.05
 """Nor is it the road where it holds less than this share of its segment's points."""
+MIN_COS_BEND = float(np.cos(np.radians(3.0)))
+"""Neighbouring planes turn by 3° at most: roads change their slope by less over the length of a segment."""
 LOWEST_SHARE = 5
 """The lowest points are at most one in five of a segment's: sparse segments would else count cars among them."""
 X_BIN_M = 0.1
@@ -94,9 +96,11 @@ def fit(
 
 @numba.njit(cache=True, nogil=True)
 def _meets(plane: F64, neighbour: F64, x: float, distance_m: float) -> bool:
-    """Whether two planes have about one height straight ahead of or behind the ego, at (x, 0)."""
+    """Whether a road can go on from one plane to the other: about one height straight ahead of or behind the ego, at
+    (x, 0), and no kink between them."""
     step = (plane[3] + plane[0] * x) / plane[2] - (neighbour[3] + neighbour[0] * x) / neighbour[2]
-    return abs(step) <= distance_m
+    bend = plane[0] * neighbour[0] + plane[1] * neighbour[1] + plane[2] * neighbour[2]
+    return abs(step) <= distance_m and bend >= MIN_COS_BEND
 
 
 @numba.njit(cache=True, nogil=True)

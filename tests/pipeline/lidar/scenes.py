@@ -1,0 +1,50 @@
+"""Sweeps made by hand: a VLP-16 over a plane road with boxes on it, by intersecting rays; and real ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.geometry import rotation
+from pipeline.sources import open_source
+from pipeline.sources.base import TruthObject
+from pipeline.types import F32, F64, Frame
+
+Block = tuple[float, float, float, float, float, float]
+"""x, y, z from; x, y, z to."""
+
+
+def scan(blocks: Sequence[Block] = (), height_m: float = 1.5, tilt_deg: tuple[float, float] = (0.0, 0.0)) -> F32:
+    """(N, 4) the returns of 16 rings of 600 columns within 60 m. The road is ``height_m`` below the sensor; blocks
+    stand in its frame; then all is turned by (roll, pitch)."""
+    elevation = np.radians(np.arange(-15.0, 16.0, 2.0))
+    azimuth = np.radians(np.arange(0.0, 360.0, 0.6))
+    e, a = (g.ravel() for g in np.meshgrid(elevation, azimuth))
+    ray = np.column_stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = np.where(ray[:, 2] < 0, -height_m / ray[:, 2], np.inf)
+        for block in blocks:
+            low, high = np.array(block[:3]) / ray, np.array(block[3:]) / ray
+            enter = np.nanmax(np.minimum(low, high), axis=1)
+            leave = np.nanmin(np.maximum(low, high), axis=1)
+            hit = (enter <= leave) & (enter > 0.0)
+            reach = np.where(hit, np.minimum(reach, enter), reach)
+    seen = reach < 60.0
+    xyz = ray[seen] * reach[seen, None] @ rotation(np.radians(tilt_deg[0]), np.radians(tilt_deg[1]), 0.0).T
+    return np.column_stack([xyz, np.zeros(len(xyz))]).astype(np.float32)
+
+
+def road_height(xy: F64, height_m: float, tilt_deg: tuple[float, float]) -> F64:
+    """The road's z at places of the turned frame."""
+    normal = rotation(np.radians(tilt_deg[0]), np.radians(tilt_deg[1]), 0.0)[:, 2]
+    return np.asarray((-height_m - xy @ normal[:2]) / normal[2])
+
+
+def real_frames(data_dir: Path) -> Iterator[tuple[Frame, tuple[TruthObject, ...]]]:
+    """Every real frame: Astyx (16 rings) and KITTI cut to what a VLP-16 would see of it (about 10 rings)."""
+    for uri in (f"astyx:{data_dir / 'astyx'}", f"kitti:{data_dir / 'kitti_0052'}"):
+        source = open_source(uri)
+        for index in range(len(source)):
+            yield source.frame(index), source.truth(index) or ()

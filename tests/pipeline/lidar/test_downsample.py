@@ -1,0 +1,29 @@
+"""Thinning is per channel."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.lidar.downsample import keep_mask
+from pipeline.params import DownsampleParams
+from pipeline.types import Sweep
+
+
+def _sweep(ring: list[int]) -> Sweep:
+    return Sweep(0, np.zeros((len(ring), 4), np.float32), np.array(ring, np.uint8), 16)
+
+
+def test_every_second_point_of_each_channel_in_the_order_of_the_sweep() -> None:
+    kept = keep_mask(_sweep([0, 1, 0, 1, 0, 1, 1]), DownsampleParams(keep_every=2))
+    assert kept.tolist() == [True, True, False, False, True, True, False]
+
+
+@given(st.lists(st.integers(0, 15), max_size=200), st.integers(1, 10))
+def test_each_channel_keeps_its_share(ring: list[int], keep_every: int) -> None:
+    kept = keep_mask(_sweep(ring), DownsampleParams(keep_every=keep_every))
+    for channel in set(ring):
+        of_channel = kept[np.array(ring) == channel]
+        assert of_channel.sum() == -(-len(of_channel) // keep_every)
+        assert of_channel[0]
