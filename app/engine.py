@@ -24,6 +24,9 @@ from pipeline.vision.detector import DetectorError, DetectorMissing
 
 logger = logging.getLogger("cipv.engine")
 
+_PATIENCE_S = 10.0
+"""A read that hangs must not keep the program from ending; the worker is a daemon."""
+
 OpenSource = Callable[[str], Source]
 OpenDetector = Callable[[tuple[int, int] | None], Detects]
 Listener = Callable[[Snapshot], None]
@@ -65,7 +68,7 @@ class Engine:
         """End the worker. A network run or a read in progress is finished first."""
         self.control.change(stop=True)
         if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join()
+            self._thread.join(_PATIENCE_S)
 
     @property
     def alive(self) -> bool:
@@ -99,8 +102,8 @@ class Engine:
                 self._fail(f"{type(error).__name__}: {_first_line(error)}")
 
     def _serve(self, wish: Wish) -> None:
-        if wish.uri is not None:
-            self._open(wish.uri)
+        if wish.uri is not None and not self._open(wish.uri):
+            return None
         if self._line is None:
             return self._show(wish, None)
         shown = self.snapshot
@@ -157,15 +160,16 @@ class Engine:
 
     # ------------------------------------------------------------ opening
 
-    def _open(self, uri: str) -> None:
-        """Replace the recording; when it cannot be opened the old one stays and a notice says why."""
+    def _open(self, uri: str) -> bool:
+        """Replace the recording; when it cannot be opened the old one stays, a notice says why, and this is false."""
         self._publish(replace(self.snapshot, busy=f"Opening {uri} …"))
         try:
             source = self._open_source(uri)
             if len(source) == 0:
                 raise SourceError(f"{uri}: holds no frames")
         except SourceError as error:
-            return self._fail(str(error))
+            self._fail(str(error))
+            return False
         notices = [Notice("info", text) for text in source.notes]
         detector = self._detector_for(source, notices) if self._sensors != "lidar" else None
         self._line = Line(source, detector, self._detections, self._sensors)
@@ -186,6 +190,7 @@ class Engine:
                 busy=None,
             )
         )
+        return True
 
     def _detector_for(self, source: Source, notices: list[Notice]) -> Detects | None:
         """The detector for the source's picture size; where there is none, LiDAR goes on alone and a notice says so."""
@@ -250,7 +255,13 @@ class Engine:
             self._shown.notify_all()
         if changed:
             for listener in tuple(self._listeners):
-                listener(snapshot)
+                self._tell(listener, snapshot)
+
+    def _tell(self, listener: Listener, snapshot: Snapshot) -> None:
+        try:
+            listener(snapshot)
+        except Exception:  # a view that fails takes neither the line nor the other views with it
+            logger.exception("a view failed on frame %s", snapshot.index)
 
 
 def _first_line(error: BaseException) -> str:

@@ -19,8 +19,10 @@ from fastapi.staticfiles import StaticFiles
 
 from app.access import Access, Guard
 from app.engine import Engine
+from app.history import History
 from app.routes.params import params_router
 from app.routes.playback import playback_router
+from app.snapshot import Snapshot
 from app.stream import Stream
 from app.views.colors import palette_css
 from app.views.viser_proxy import viser_router
@@ -40,19 +42,23 @@ def create_app(
 ) -> FastAPI:
     """The application over a running engine. ``hosts``: names other than loopback it may be called by."""
     access = Access(hosts)
-    stream = Stream()
+    stream, history = Stream(), History()
+
+    def show(snapshot: Snapshot) -> None:
+        history.record(snapshot)
+        stream.publish(snapshot)
 
     @asynccontextmanager
     async def listening(_: FastAPI) -> AsyncIterator[None]:
-        stream.publish(engine.snapshot)
-        end = engine.listen(stream.publish)
+        show(engine.snapshot)
+        end = engine.listen(show)
         yield
         end()
 
     app = FastAPI(title="CIPV Studio", version="1", docs_url=None, redoc_url=None, lifespan=listening)
     app.add_middleware(Guard, access=access)
     app.add_exception_handler(RequestValidationError, _one_sentence)
-    app.include_router(playback_router(engine, stream))
+    app.include_router(playback_router(engine, stream, history))
     app.include_router(params_router(engine))
     app.include_router(viser_router(viser_port, access.allowed))
     app.add_api_route("/palette.css", _palette, include_in_schema=False)

@@ -1,8 +1,8 @@
 /**
- * Strips of the CIPV's figures over the whole recording, from the frames this browser has seen. A value computed with
+ * Strips of the CIPV's figures over the whole recording, as far as it was run. A value computed with
  * older parameters is drawn fainter, so that before and after can be compared. A click goes to that place.
  */
-import { playback } from "./api.js";
+import { playback, request } from "./api.js";
 import { color, ui } from "./colors.js";
 import { fitted } from "./dom.js";
 import { get, on, painter } from "./store.js";
@@ -17,9 +17,12 @@ const STRIPS = {
 /** Frames may have been skipped while playing: samples this near to each other are still joined by a line. */
 const JOINED_S = 0.6;
 
-/** @type {Map<number, {cipv: import("./types.js").Cipv|null, revision: number}>} */
+/** @typedef {{id: number, distance_m: number, closing_speed_mps: number|null, ttc_s: number|null}} Figures */
+/** @type {Map<number, {cipv: Figures|null, revision: number}>} */
 const seen = new Map();
 let uri = null;
+/** @type {(() => void)[]} */
+const strips = [];
 
 export function setUp() {
   on(["frame"], remember);
@@ -29,6 +32,7 @@ export function setUp() {
 export function addStrip(key, canvas) {
   const draw = painter(() => drawStrip(key, canvas));
   on(["frame", "theme"], draw);
+  strips.push(draw);
   new ResizeObserver(draw).observe(canvas);
   canvas.addEventListener("click", (event) => {
     const count = get("state")?.count ?? 0;
@@ -38,9 +42,22 @@ export function addStrip(key, canvas) {
 
 function remember() {
   const { state, result } = get("frame");
-  if (state.uri !== uri) seen.clear();
-  uri = state.uri;
+  if (state.uri !== uri) {
+    uri = state.uri;
+    seen.clear();
+    catchUp();
+  }
   seen.set(state.index, { cipv: result.cipv, revision: state.params_revision });
+}
+
+/** What the server ran before this page came. */
+async function catchUp() {
+  const history = await request("api/history").catch(() => null);
+  if (history?.uri !== uri) return;
+  for (const [index, revision, id, distance_m, closing_speed_mps, ttc_s] of history.samples) {
+    if (!seen.has(index)) seen.set(index, { cipv: id === null ? null : { id, distance_m, closing_speed_mps, ttc_s }, revision });
+  }
+  for (const draw of strips) draw();
 }
 
 function drawStrip(key, canvas) {

@@ -196,6 +196,10 @@ def test_a_recording_that_cannot_be_opened_leaves_the_old_one(start: Start):
     shown = engine.wait_for(lambda s: any(n.level == "error" for n in s.notices), WAIT_S)
     assert "test:nowhere: no such recording" in [n.text for n in shown.notices]
     assert shown.uri == recording.uri
+    engine.control.change(loop=False)
+    later = engine.wait_for(lambda s: not s.loop, WAIT_S)
+    assert later.notices == shown.notices, "it stays said"
+    assert later.sequence == shown.sequence, "and nothing was run again"
     engine.control.seek(3)
     shown = engine.wait_for(at(3), WAIT_S)
     assert not any(n.level == "error" for n in shown.notices), "the next frame takes the complaint away"
@@ -235,6 +239,23 @@ def test_sensors_can_be_taken_away(start: Start, sensors: str, sources: set[str]
     assert {item.source for item in tick.result.objects} == sources
     assert tick.frame.picture is not None, "people still want to see the picture"
     assert (detector.calls == 0) == (sensors == "lidar")
+
+
+def test_a_view_that_fails_takes_nothing_with_it(start: Start, caplog: pytest.LogCaptureFixture):
+    engine, _, _ = start()
+    told: list[int] = []
+
+    def broken(_: Snapshot) -> None:
+        raise ValueError("broken view")
+
+    engine.listen(broken)
+    engine.listen(lambda s: told.append(s.index))
+    for index in (2, 3):
+        engine.control.seek(index)
+        engine.wait_for(at(index), WAIT_S)
+    engine.stop()
+    assert told[-1] == 3
+    assert "broken view" in caplog.text
 
 
 def test_a_line_abandons_a_seek_and_keeps_its_tick():

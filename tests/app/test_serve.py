@@ -1,0 +1,61 @@
+"""The server as a program: it says where it is, answers there, and ends at once on Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+from websockets.sync.client import connect
+
+from app.server import listen_socket
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = """
+import sys
+from app.engine import Engine
+from app.server import serve
+from pipeline.params import Params
+from tests.app.recording import CountingDetector, Recording, opener
+engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car", playing=True)
+serve(engine, port=int(sys.argv[1]))
+"""
+
+
+@pytest.fixture
+def taken_port() -> Iterator[int]:
+    """A port that somebody else listens on."""
+    with listen_socket("127.0.0.1", 0) as held:
+        held.listen()
+        yield held.getsockname()[1]
+
+
+def test_it_passes_over_a_taken_port_answers_and_ends_with_open_streams(taken_port: int):
+    program = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(taken_port)],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert program.stdout is not None
+        address = program.stdout.readline().strip()
+        port = int(address.removeprefix("http://127.0.0.1:"))
+        assert taken_port < port <= taken_port + 20
+        assert httpx.get(f"{address}/api/healthz", timeout=60).json()["status"] == "ok"
+        with connect(f"{address.replace('http', 'ws')}/api/stream", max_size=None) as stream:
+            stream.recv(60)
+            program.send_signal(signal.SIGINT)
+            _, errors = program.communicate(timeout=30)
+        assert program.returncode == 0
+        assert errors.strip() == f"cipv: port {taken_port} is taken, using {port}"
+    finally:
+        program.kill()
+        program.wait()
