@@ -9,13 +9,17 @@ from pipeline.params import Params
 
 
 def warm_up() -> None:
-    """Compile every kernel, or load it from numba's cache, on a made-up sweep: a flat road and one wall on it."""
+    """Compile every kernel, or load it from numba's cache, on a made-up sweep: a flat road and one wall on it.
+
+    Twice: to numba an array that may not be written, as one read from a file, is a type of its own."""
     params = Params()
     x, y = np.meshgrid(np.linspace(3.0, 20.0, 20), np.linspace(-5.0, 5.0, 20))
     road = np.column_stack([x.ravel(), y.ravel(), np.full(x.size, -1.5), np.zeros(x.size)])
     wall = np.column_stack([np.full(20, 15.0), np.linspace(-1.0, 1.0, 20), np.full(20, -0.5), np.zeros(20)])
     points = np.vstack([road, wall]).astype(np.float32)
     keep = np.ones(len(points), dtype=np.bool_)
-    plane = ground.fit_ground(points, keep, params.ground)
-    labels = cluster.cluster(points, cluster.candidates(points, plane, keep, params.cluster), params.cluster)
-    boxes.fit_obstacles(points, labels, plane, params.box)
+    for writeable in (True, False):
+        points.flags.writeable = writeable
+        plane = ground.fit_ground(points, keep, params.ground)
+        labels = cluster.cluster(points, cluster.candidates(points, plane, keep, params.cluster), params.cluster)
+        boxes.fit_obstacles(points, labels, plane, params.box)

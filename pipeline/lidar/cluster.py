@@ -129,15 +129,18 @@ def _components(
     parent = np.arange(cells).astype(np.int32)
     limit2 = tolerance_m * tolerance_m
     for c in range(cells):
+        mine = _root(parent, c)
         for dx in range(3):
             for dy in range(-2 if dx > 0 else 0, 3):  # half of the neighbours; the other half looks back
                 other = first_cell[cell_column[c] + dx * ny + dy] - 1
                 while other >= 0:
-                    in_reach = abs(cell_level[other] - cell_level[c]) <= 2 and other != c
-                    if in_reach:
-                        a, b = _root(parent, c), _root(parent, other)
-                        if a != b and _touch(packed, start[c], start[c + 1], start[other], start[other + 1], limit2):
-                            parent[max(a, b)] = min(a, b)
+                    if abs(cell_level[other] - cell_level[c]) <= 2:
+                        theirs = _root(parent, other)
+                        if mine != theirs and _touch(
+                            packed, start[c], start[c + 1], start[other], start[other + 1], limit2
+                        ):
+                            mine, theirs = min(mine, theirs), max(mine, theirs)
+                            parent[theirs] = mine
                     other = below[other]
     # cells are numbered by their first points, so the least cell of a component holds its first point
     roots = np.empty(count, dtype=np.int32)
