@@ -120,7 +120,7 @@ def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignm
         else typed
     )
     h_deg, v_deg, cx, cy = (b if t is None else t for t, b in zip(typed, base, strict=True))
-    return Angular(float(np.radians(h_deg)), float(np.radians(v_deg)), float(cx), float(cy))  # type: ignore[arg-type]
+    return Angular(float(np.radians(h_deg)), float(np.radians(v_deg)), float(cx), float(cy))
 
 
 def project_cuboids(alignment: Alignment, corners: F64, width: int, height: int) -> list[Box | None]:

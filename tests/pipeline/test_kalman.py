@@ -22,7 +22,8 @@ def test_prediction_moves_with_the_velocity_and_grows_less_certain() -> None:
 def test_zero_time_changes_nothing() -> None:
     state = kalman.start((3.0, -1.0), R, 10.0)
     same = kalman.predict(state, 0.0, 3.0)
-    assert np.array_equal(same.mean, state.mean) and np.array_equal(same.cov, state.cov)
+    assert np.array_equal(same.mean, state.mean)
+    assert np.array_equal(same.cov, state.cov)
 
 
 def test_time_does_not_run_back() -> None:

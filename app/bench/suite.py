@@ -1,0 +1,52 @@
+"""Everything that `cipv bench` measures, on real sweeps where they are and on simulated ones where not."""
+
+from __future__ import annotations
+
+import sys
+from itertools import islice
+from typing import Any
+
+from app.bench import detector as detector_bench
+from app.bench import lidar as lidar_bench
+from app.bench import line as line_bench
+from app.catalog import recordings
+from app.options import source_picture_size
+from pipeline.params import Params
+from pipeline.sources import open_source
+from pipeline.sources.base import Source
+from pipeline.vision.detector import Detector, DetectorMissing, open_detector
+
+BUDGET_S = {"lidar": 18.0, "line": 12.0, "detector": 6.0}
+"""Wall time of each part; together with loading and compiling they stay below 45 s."""
+FRAMES = 12
+
+
+def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, Any]]:
+    """The contract's object: stage → median_ms, p99_ms and peers with their ratios."""
+    source = _source()
+    print(f"cipv: measuring on {source.title}", file=sys.stderr)
+    frames = [source.frame(i) for i in islice(range(len(source)), len(source) - min(FRAMES, len(source)), None)]
+    sweeps = [frame.sweep for frame in frames if frame.sweep is not None]
+    pictures = [frame.picture.bgr for frame in frames if frame.picture is not None]
+    network = _detector(detector_spec, source)
+    figures = lidar_bench.stages(sweeps, BUDGET_S["lidar"])
+    figures |= line_bench.stages(frames, params, network, BUDGET_S["line"])
+    if network is not None:
+        figures |= detector_bench.stages(pictures, network, BUDGET_S["detector"])
+    return figures
+
+
+def _source() -> Source:
+    """The first real 16-channel recording, else the simulator."""
+    real = [uri for uri, _ in recordings() if uri.startswith("astyx:")]
+    return open_source(real[0] if real else "sim:straight")
+
+
+def _detector(spec: str | None, source: Source) -> Detector | None:
+    try:
+        return open_detector(spec, source_picture_size(source))
+    except DetectorMissing as missing:
+        if spec is not None:
+            raise
+        print(f"cipv: {missing}", file=sys.stderr)
+        return None
