@@ -3,6 +3,7 @@ import { color, onPicture, roleOf, ui } from "./colors.js";
 import { $, fitted } from "./dom.js";
 import { num } from "./format.js";
 import { Labels } from "./labels.js";
+import { DotRaster, rgba } from "./raster.js";
 import { get, paint, select } from "./store.js";
 import { Viewport } from "./viewport.js";
 
@@ -13,6 +14,7 @@ const CLUSTER = 2;
 const PICK_PX = 8;
 
 const canvas = $("#bev");
+const raster = new DotRaster();
 /** @type {Viewport} */
 let view;
 const U = (y) => view.u(y);
@@ -32,7 +34,7 @@ function draw() {
   if (frame) {
     const layers = get("layers");
     if (layers.planPath) drawPath(ctx, frame.result.path);
-    if (layers.planPoints) drawPoints(ctx, frame);
+    if (layers.planPoints) drawPoints(ctx, frame, { width, height });
     drawObjects(ctx, frame, layers);
   }
   drawEgo(ctx);
@@ -76,22 +78,19 @@ function drawPath(ctx, path) {
   ctx.globalAlpha = 1;
 }
 
-function drawPoints(ctx, { count, xyz, kind, owner, result }) {
-  const tints = result.objects.map((item) => color(roleOf(item, result.cipv?.id ?? null)));
-  const place = (i, s) => ctx.fillRect(U(xyz[3 * i + 1] / 100) - s / 2, V(xyz[3 * i] / 100) - s / 2, s, s);
-  for (const code of [3, 0, 1]) {
-    ctx.fillStyle = color(KIND_ROLES[code]);
-    ctx.globalAlpha = code === 1 ? 0.8 : 0.5;
-    for (let i = 0; i < count; i++) if (kind[i] === code) place(i, 1.2);
+/** Ground and loose points first, clusters over them in the colour of their object. */
+function drawPoints(ctx, { count, xyz, kind, owner, result }, { width, height }) {
+  const lead = result.cipv?.id ?? null;
+  const tints = [rgba(color("cluster")), ...result.objects.map((item) => rgba(color(roleOf(item, lead))))];
+  const loose = KIND_ROLES.map((role) => rgba(color(role), role === "unclustered" ? 0.8 : 0.55));
+  raster.begin(width, height);
+  for (const isCluster of [false, true]) {
+    for (let i = 0; i < count; i++) {
+      if ((kind[i] === CLUSTER) !== isCluster) continue;
+      raster.dot(U(xyz[3 * i + 1] / 100), V(xyz[3 * i] / 100), isCluster ? 2 : 1, isCluster ? tints[owner[i]] : loose[kind[i]]);
+    }
   }
-  ctx.globalAlpha = 1;
-  let last = null;
-  for (let i = 0; i < count; i++) {
-    if (kind[i] !== CLUSTER) continue;
-    const tint = owner[i] ? tints[owner[i] - 1] : color("cluster");
-    if (tint !== last) ctx.fillStyle = last = tint;
-    place(i, 1.8);
-  }
+  raster.drawOn(ctx);
 }
 
 function drawObjects(ctx, { result }, layers) {

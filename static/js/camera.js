@@ -3,13 +3,18 @@ import { RANGE_COLORS, RANGE_MAX_M, RANGE_STEPS, onPicture, roleOf } from "./col
 import { $, fitted, text } from "./dom.js";
 import { num } from "./format.js";
 import { Labels } from "./labels.js";
+import { DotRaster, pack } from "./raster.js";
 import { get, paint, select } from "./store.js";
 
 const UNSEEN = -32768;
 const GROUND = 0;
 const EDGES = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
 
+const TINTS = RANGE_COLORS.map(([r, g, b]) => pack(r, g, b, 0.95));
+const GROUND_TINTS = RANGE_COLORS.map(([r, g, b]) => pack(r, g, b, 0.7));
+
 const canvas = $("#camera");
+const raster = new DotRaster();
 /** Where the picture lies in the pane. */
 let place = { x: 0, y: 0, scale: 1 };
 
@@ -37,7 +42,7 @@ function draw() {
   else message(ctx, width, height, "The picture of this frame could not be decoded");
   const layers = get("layers");
   if (layers.path && frame.display.path) drawPath(ctx, frame.display.path);
-  if (layers.points) drawPoints(ctx, frame);
+  if (layers.points) drawPoints(ctx, frame, width, height);
   drawObjects(ctx, frame, layers);
   ctx.restore();
 }
@@ -84,24 +89,21 @@ function trace(ctx, pixels) {
   pixels.forEach(([u, v], i) => (i ? ctx.lineTo(X(u), Y(v)) : ctx.moveTo(X(u), Y(v))));
 }
 
-/** Points in one colour after the other: changing the fill style is what costs. Ground is drawn fainter and smaller. */
-function drawPoints(ctx, { count, xyz, uv, kind, picture }) {
-  const buckets = Array.from({ length: RANGE_STEPS }, () => []);
+/** Points coloured by range, ground fainter and smaller, near ones over far ones. */
+function drawPoints(ctx, { count, xyz, uv, kind, picture }, width, height) {
+  raster.begin(width, height);
   const perStep = (RANGE_MAX_M * 100) / RANGE_STEPS;
-  for (let i = 0; i < count; i++) {
-    const u = uv[2 * i], v = uv[2 * i + 1];
-    if (u === UNSEEN || u < 0 || v < 0 || u >= picture.width || v >= picture.height) continue;
-    buckets[Math.min(RANGE_STEPS - 1, Math.floor(Math.hypot(xyz[3 * i], xyz[3 * i + 1]) / perStep))].push(i);
-  }
-  for (const faint of [true, false]) {
-    const size = faint ? 1.3 : 2.2;
-    ctx.globalAlpha = faint ? 0.55 : 0.95;
-    for (let b = RANGE_STEPS - 1; b >= 0; b--) {
-      ctx.fillStyle = RANGE_COLORS[b];
-      for (const i of buckets[b]) if ((kind[i] === GROUND) === faint) ctx.fillRect(X(uv[2 * i]) - size / 2, Y(uv[2 * i + 1]) - size / 2, size, size);
+  for (const isGround of [true, false]) {
+    const tints = isGround ? GROUND_TINTS : TINTS;
+    for (let i = 0; i < count; i++) {
+      if ((kind[i] === GROUND) !== isGround) continue;
+      const u = uv[2 * i], v = uv[2 * i + 1];
+      if (u === UNSEEN || u < 0 || v < 0 || u >= picture.width || v >= picture.height) continue;
+      const step = Math.min(RANGE_STEPS - 1, Math.floor(Math.hypot(xyz[3 * i], xyz[3 * i + 1]) / perStep));
+      raster.dot(X(u), Y(v), isGround ? 1 : 2, tints[step]);
     }
   }
-  ctx.globalAlpha = 1;
+  raster.drawOn(ctx);
 }
 
 function drawObjects(ctx, frame, layers) {

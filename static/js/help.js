@@ -3,7 +3,7 @@ import { $, el } from "./dom.js";
 
 const KEYS = [
   ["Space", "play or pause"], ["← →", "one frame back or on"], ["Shift ← →", "ten frames"], ["Home End", "first or last frame"],
-  ["[ ]", "slower or faster"], ["L", "loop"], ["1 … 5", "camera layers"], ["B", "plan or 3D"], ["P", "parameters"],
+  ["[ ]", "slower or faster"], ["L", "loop"], ["1 … 5", "camera layers"], ["B", "plan or 3D"], ["M", "plan or 3D large"], ["P", "parameters"],
   ["O", "open a recording"], ["D", "dark or light"], ["Esc", "deselect"], ["?", "this help"],
 ];
 const COLORS = [

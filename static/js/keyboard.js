@@ -5,7 +5,7 @@ import { toggle as toggleLayer } from "./layers.js";
 import * as sources from "./sources.js";
 import { get, set } from "./store.js";
 import { shiftSpeed, toggleLoop, togglePlay } from "./transport.js";
-import { toggleParams, toggleTheme, toggleThree } from "./window.js";
+import { grow, toggleParams, toggleTheme, toggleThree } from "./window.js";
 
 const CAMERA_LAYERS = ["points", "cuboids", "lidarBoxes", "visionBoxes", "path"];
 const ACTIONS = {
@@ -18,6 +18,7 @@ const ACTIONS = {
   "]": () => shiftSpeed(1),
   l: toggleLoop,
   b: toggleThree,
+  m: () => grow("bev"),
   p: toggleParams,
   o: sources.open,
   d: toggleTheme,

@@ -1,6 +1,7 @@
 /** What of the page is open: theme, parameters, plan or 3D. */
 import { forget } from "./colors.js";
 import { $, el, memory } from "./dom.js";
+import { icon } from "./icons.js";
 import { set } from "./store.js";
 
 const root = document.documentElement;
@@ -15,6 +16,10 @@ export function setUp() {
   showParams(memory.read("params", true) && !matchMedia(NARROW).matches);
   $("#params-button").addEventListener("click", toggleParams);
   for (const [tab, three] of [["#tab-bev", false], ["#tab-3d", true]]) $(tab).addEventListener("click", () => showThree(three));
+  for (const button of document.querySelectorAll("[data-grow]")) {
+    if (button.matches(".grow")) button.append(icon("grow"));
+    button.addEventListener("click", () => grow(button.dataset.grow));
+  }
   $(".tabs").addEventListener("keydown", (event) => {
     if (event.key !== "ArrowLeft" && event.key !== "ArrowRight") return;
     event.preventDefault();
@@ -44,6 +49,13 @@ export function toggleParams() {
 function showParams(open) {
   root.dataset.params = open ? "open" : "closed";
   $("#params-button").setAttribute("aria-pressed", String(open));
+}
+
+/** Give a pane the whole workspace, or take it back. @param {"camera"|"bev"|"table"} pane */
+export function grow(pane) {
+  const { dataset } = $("#workspace");
+  dataset.grown = dataset.grown === pane ? "" : pane;
+  for (const button of document.querySelectorAll("[data-grow]")) button.setAttribute("aria-pressed", String(button.dataset.grow === dataset.grown));
 }
 
 const isThree = () => !$("#three-body").hidden;

@@ -155,7 +155,39 @@ def test_a_selected_object_is_explained(open_page: OpenPage, site: Site):
     expect(page.locator("tr.is-selected")).to_have_count(0)
 
 
-def test_the_plan_selects_zooms_and_fits(open_page: OpenPage, site: Site):
+def test_a_click_in_the_picture_or_the_plan_selects(open_page: OpenPage, site: Site):
+    page = open_page()
+    wait_for_frame(page, START)
+    tick = site.engine.snapshot.tick
+    assert tick is not None
+    assert tick.frame.picture is not None
+    lead = tick.result.cipv
+    assert lead is not None
+    boxes = tick.result.layers.vision_boxes or tick.result.layers.lidar_boxes
+    number, box = min(boxes.items(), key=lambda item: (item[1][2] - item[1][0]) * (item[1][3] - item[1][1]))
+    canvas = page.locator("#camera").bounding_box()
+    assert canvas is not None
+    height, width = tick.frame.picture.bgr.shape[:2]
+    scale = min(canvas["width"] / width, canvas["height"] / height)
+    left, top = (canvas["width"] - width * scale) / 2, (canvas["height"] - height * scale) / 2
+    middle = {"x": left + scale * (box[0] + box[2]) / 2, "y": top + scale * (box[1] + box[3]) / 2}
+    page.locator("#camera").click(position=middle)
+    expect(page.locator("tr.is-selected td").first).to_have_text(f"#{number}")
+    page.keyboard.press("Escape")
+    plan = page.locator("#bev").bounding_box()
+    assert plan is not None
+    # the plan is fitted: from 5 m behind the bumper to 74 m ahead, at least 13 m to either side
+    per_metre = min(plan["height"] / 79, plan["width"] / 26)
+    item = next(item for item in tick.result.objects if item.id == lead.id)
+    assert item.bev is not None
+    x, y = (sum(corner[axis] for corner in item.bev) / 4 for axis in (0, 1))
+    page.locator("#bev").click(
+        position={"x": plan["width"] / 2 - y * per_metre, "y": plan["height"] - (x + 5) * per_metre}
+    )
+    expect(page.locator("tr.is-selected td").first).to_have_text(f"#{lead.id}")
+
+
+def test_the_plan_zooms_and_fits(open_page: OpenPage):
     page = open_page()
     wait_for_frame(page, START)
     fitted = pixels(page, "#bev")
@@ -198,6 +230,27 @@ def test_everything_fits_on_the_screen(open_page: OpenPage, width: int, height: 
         assert box["y"] >= 0
         assert box["x"] + box["width"] <= width + 0.5
         assert box["y"] + box["height"] <= height + 0.5
+
+
+def test_a_pane_can_have_the_whole_workspace_and_give_it_back(open_page: OpenPage):
+    page = open_page()
+    small, workspace = page.locator("#bev").bounding_box(), page.locator("#workspace").bounding_box()
+    page.keyboard.press("m")
+    large = page.locator("#bev").bounding_box()
+    assert small is not None
+    assert large is not None
+    assert workspace is not None
+    assert large["width"] > 1.5 * small["width"]
+    assert large["x"] < workspace["x"] + 20
+    page.keyboard.press("m")
+    assert page.locator("#bev").bounding_box() == small
+
+
+def test_on_a_small_screen_the_objects_are_one_press_away(open_page: OpenPage):
+    page = open_page(800, 480)
+    expect(page.locator("#objects")).to_be_hidden()
+    page.get_by_role("button", name="Objects", exact=True).click()
+    expect(page.locator("#objects")).to_be_visible()
 
 
 def test_every_control_has_a_name(open_page: OpenPage):
