@@ -49,11 +49,12 @@ class World:
         return np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s])
 
 
-def at(scenario: Scenario, t_s: float) -> World:
-    """The world at time t; nothing is carried from one moment to the next."""
-    road, ego = scenario.road, scenario.ego
-    own = motion(ego, road, t_s)
-    s_m = ego.start_m + own.travelled_m
+def at(scenario: Scenario, t_s: float, ego: Motion | None = None) -> World:
+    """The world at time t; nothing is carried from one moment to the next. ``ego`` given: the ego vehicle moves as
+    that says (closed loop), else as its script says. The others follow their scripts either way."""
+    road = scenario.road
+    own = ego if ego is not None else motion(scenario.ego, road, t_s)
+    s_m = scenario.ego.start_m + own.travelled_m
     x, y, road_heading = road.to_world(s_m, own.d_m)[0]
     heading = road_heading + _drift_rad(own)
     curvature = road.curvature_per_m(s_m)

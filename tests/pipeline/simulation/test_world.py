@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.simulation import world
+from pipeline.simulation.actors import Motion
 
 from .worlds import with_actors
 
@@ -64,3 +65,13 @@ def test_to_ego_undoes_the_pose() -> None:
         [[x + 5 * np.cos(heading) - 2 * np.sin(heading), y + 5 * np.sin(heading) + 2 * np.cos(heading)]]
     )
     np.testing.assert_allclose(now.to_ego(ahead_left), [[5.0, 2.0]], atol=1e-9)
+
+
+def test_a_given_ego_motion_replaces_the_script_and_leaves_the_others_to_theirs() -> None:
+    scene = with_actors("{id: 1, kind: car, lane: -2, ahead_m: 30, speed_mps: {0: 20}}")
+    scripted = world.at(scene, 2.0)
+    braked = world.at(scene, 2.0, Motion(30.0, scene.road.lane_offset_m(-2), 10.0, -5.0, 0.0, 0.0))
+    assert scripted.s_m - braked.s_m == pytest.approx(10.0)
+    assert braked.speed_mps == 10.0
+    assert braked.actors[0].cuboid.center[0] - scripted.actors[0].cuboid.center[0] == pytest.approx(10.0)
+    assert braked.actors[0].speed_mps == 20.0
