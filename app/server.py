@@ -71,7 +71,8 @@ def listen_socket(host: str, port: int, *, strict: bool = False) -> socket.socke
     candidates = [port] if strict or port == 0 else range(port, min(port + _PORTS_TO_TRY, 65536))
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for candidate in candidates:
-        bound = socket.socket(family, socket.SOCK_STREAM)
+        # asyncio switches Nagle's delay of 40 ms off only where the protocol is named
+        bound = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             bound.bind((host, candidate))

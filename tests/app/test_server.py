@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import http.client
 import json
+import socket
 import struct
 import threading
 from collections.abc import Callable, Iterator
@@ -340,6 +342,30 @@ def test_a_ping_comes_back_with_the_servers_clock_and_rubbish_is_ignored(stream:
 
 
 # ------------------------------------------------------------ ports
+
+
+def test_small_messages_are_not_held_back():
+    """asyncio sets TCP_NODELAY on what it accepts only where the listening socket names its protocol."""
+
+    async def accepted_delay() -> int:
+        loop = asyncio.get_running_loop()
+        found: asyncio.Future[int] = loop.create_future()
+
+        class Probe(asyncio.Protocol):
+            def connection_made(self, transport: asyncio.BaseTransport) -> None:
+                accepted = transport.get_extra_info("socket")
+                found.set_result(accepted.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY))
+                transport.close()
+
+        bound = listen_socket("127.0.0.1", 0)
+        async with await loop.create_server(Probe, sock=bound):
+            _, writer = await asyncio.open_connection(*bound.getsockname())
+            no_delay = await found
+            writer.close()
+            await writer.wait_closed()
+            return no_delay
+
+    assert asyncio.run(accepted_delay())
 
 
 def test_a_taken_port_is_said_or_passed_over():
