@@ -18,7 +18,7 @@ from pipeline.lidar.cluster import candidates, cluster
 from pipeline.lidar.downsample import keep_mask
 from pipeline.lidar.ground import fit_ground
 from pipeline.lidar.tracking import LidarTrackerState, track
-from pipeline.params import Params
+from pipeline.params import Params, with_changes
 from pipeline.types import F32, Obstacle, Sweep
 
 OURS = "ours"
@@ -46,7 +46,7 @@ def stages(sweeps: list[Sweep], budget_s: float) -> dict[str, dict[str, Any]]:
     if not sweeps:
         return {}
     warm_up()
-    params = Params()
+    params = with_changes(Params(), {"cluster.front_only": False})  # the whole rotation, as peers' speeds are quoted
     prepared = [_prepare(sweep, params) for sweep in sweeps]
     open3d, reason = _open3d()
     ground: dict[str, Callable[[], object]] = {
@@ -74,8 +74,7 @@ def _prepare(sweep: Sweep, params: Params) -> Prepared:
     ground = fit_ground(sweep.points, keep, params.ground)
     chosen = candidates(sweep.points, ground, keep, params.cluster)
     range_m = np.hypot(sweep.points[:, 0], sweep.points[:, 1])
-    in_reach = (range_m <= params.cluster.max_range_m) & (sweep.points[:, 0] > 0.0)
-    return Prepared(sweep, keep, chosen & in_reach)
+    return Prepared(sweep, keep, chosen & (range_m <= params.cluster.max_range_m))
 
 
 def _each(prepared: list[Prepared], run: Callable[[Prepared], object]) -> Callable[[], object]:
@@ -120,18 +119,18 @@ class Open3dPeer:
         return self._dbscan(prepared.sweep.points[prepared.chosen, :3], min_points=1)
 
     def chain(self, prepared: Prepared, voxel_m: float | None) -> list[Any]:
-        """Points to boxes: voxels, RANSAC plane, DBSCAN of what lies ahead, a box a cluster. Less than our line does:
+        """Points to boxes: voxels, RANSAC plane, DBSCAN of what is in reach, a box a cluster. Less than our line does:
         it does not turn the boxes (its oriented box warns on the console about every flat cluster) nor track."""
         cloud = self._cloud(prepared.sweep.points[:, :3])
         if voxel_m is not None:
             cloud = cloud.voxel_down_sample(voxel_m)
         _, ground = cloud.segment_plane(self._params.ground.distance_m, RANSAC_POINTS, RANSAC_ITERATIONS)
         rest = np.asarray(cloud.select_by_index(ground, invert=True).points)
-        ahead = rest[(np.hypot(rest[:, 0], rest[:, 1]) <= self._params.cluster.max_range_m) & (rest[:, 0] > 0.0)]
-        labels = self._dbscan(ahead, self._params.cluster.min_points)
+        near = rest[np.hypot(rest[:, 0], rest[:, 1]) <= self._params.cluster.max_range_m]
+        labels = self._dbscan(near, self._params.cluster.min_points)
         box = self._open3d.geometry.AxisAlignedBoundingBox
         return [
-            box.create_from_points(self._open3d.utility.Vector3dVector(ahead[labels == c]))
+            box.create_from_points(self._open3d.utility.Vector3dVector(near[labels == c]))
             for c in range(labels.max(initial=-1) + 1)
         ]
 

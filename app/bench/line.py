@@ -44,8 +44,8 @@ def _row(times_s: list[float]) -> dict[str, Any]:
 
 
 def _times(frames: list[Frame], params: Params, budget_s: float, detector: Detector | None = None) -> list[float]:
-    """Seconds from a decoded picture and a sweep to the result, going round the frames until the time is over. Without a
-    detector: of the step alone."""
+    """Seconds from a decoded picture and a sweep to the result, going round the frames until the time is over. Without
+    a detector: of the step alone."""
     times: list[float] = []
     state, end = State(), perf_counter() + budget_s
     for frame in cycle(frames):

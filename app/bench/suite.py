@@ -16,7 +16,7 @@ from pipeline.sources import open_source
 from pipeline.sources.base import Source
 from pipeline.vision.detector import Detector, DetectorMissing, open_detector
 
-BUDGET_S = {"lidar": 18.0, "line": 12.0, "detector": 6.0}
+BUDGET_S = {"lidar": 14.0, "line": 9.0, "detector": 4.0}
 """Wall time of each part; together with loading and compiling they stay below 45 s."""
 FRAMES = 12
 

@@ -36,9 +36,15 @@ class Bench:
 def _table(figures: dict[str, dict[str, Any]]) -> Table:
     table = Table("stage", "median ms", "p99 ms", "peer", "median ms", "times faster", title="cipv bench")
     for stage, row in figures.items():
-        peers = list(row["peers"].items()) or [("", None)]
-        for n, (name, peer) in enumerate(peers):
+        peers = [_peer_cells(name, peer) for name, peer in row["peers"].items()] or [("", "", "")]
+        for n, cells in enumerate(peers):
             own = (stage, f"{row['median_ms']:.3f}", f"{row['p99_ms']:.3f}") if n == 0 else ("", "", "")
-            other = (f"{peer['median_ms']:.2f}", f"{peer['ratio']:.1f} ×") if peer else ("", "")
-            table.add_row(*own, name, *other)
+            table.add_row(*own, *cells)
     return table
+
+
+def _peer_cells(name: str, peer: dict[str, Any]) -> tuple[str, str, str]:
+    """A peer that could not be measured says why."""
+    if peer["ratio"] is None:
+        return name, "absent", peer["absent"]
+    return name, f"{peer['median_ms']:.2f}", f"{peer['ratio']:.1f} ×"
