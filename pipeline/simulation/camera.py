@@ -1,6 +1,7 @@
 """A drawn camera: 1280×720, 78° diagonal field of view, behind the windshield, looking 2° down.
 
-The LiDAR sits in the bumper, 1.6 m ahead of the camera and 0.8 m below it, so the parallax between them is real.
+The LiDAR sits in the bumper, 1.6 m ahead of the camera and 0.8 m below it, so the parallax between them is real. The
+scene is drawn by an ideal pinhole first; ``lens`` then makes of it what a real camera would have seen.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy as np
 from pipeline.geometry import Cuboid, inverse, rotation
 from pipeline.simulation import backdrop
 from pipeline.simulation.canvas import Canvas, Colour
+from pipeline.simulation.lens import ORDINARY, CameraModel, Lens
 from pipeline.simulation.roads import Road
 from pipeline.simulation.roadside import Roadside
 from pipeline.simulation.scenery import paint_ground
@@ -28,30 +30,37 @@ _SHADOWS = ((0.35, 0.35, (72.0, 69.0, 68.0)), (0.12, 0.12, (52.0, 50.0, 49.0)), 
 _BRAKE_ON, _BRAKE_OFF = (70.0, 60.0, 255.0), (36.0, 30.0, 150.0)
 
 
-def calibration() -> CameraCalibration:
-    """The camera's pinhole model, exactly as it draws; no distortion."""
+def calibration(model: CameraModel = ORDINARY) -> CameraCalibration:
+    """The camera exactly as its pictures are: pinhole with radial distortion."""
     focal = float(np.hypot(WIDTH, HEIGHT) / 2 / np.tan(np.radians(DIAGONAL_FOV_DEG / 2)))
     K = np.array([[focal, 0.0, WIDTH / 2], [0.0, focal, HEIGHT / 2], [0.0, 0.0, 1.0]])
     axes = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # columns: camera x, y, z in level ego axes
     T_ego_camera = np.eye(4)
     T_ego_camera[:3, :3] = rotation(0.0, np.radians(PITCH_DOWN_DEG), 0.0) @ axes
     T_ego_camera[:3, 3] = PLACE_M
-    return CameraCalibration(K, np.empty(0), inverse(T_ego_camera), WIDTH, HEIGHT)
+    distortion = np.array([model.k1, model.k2, 0.0, 0.0])
+    return CameraCalibration(K, distortion, inverse(T_ego_camera), WIDTH, HEIGHT)
 
 
 class DrawnCamera:
     """Draws the world for one scenario. What does not change from moment to moment is prepared once."""
 
-    def __init__(self, road: Road, roadside: Roadside, seed: int) -> None:
-        self.camera = calibration()
+    def __init__(self, road: Road, roadside: Roadside, seed: int, model: CameraModel = ORDINARY) -> None:
+        self.camera = calibration(model)
+        self._lens = Lens(self.camera, model, seed)
+        self._drawn = self._lens.drawn
         self._road, self._roadside = road, roadside
-        self._ground = backdrop.Ground(self.camera, -LIDAR_HEIGHT_M, seed)
-        self._sky = backdrop.sky(WIDTH, self._ground.horizon, float(self.camera.K[0, 0]), seed)
+        self._ground = backdrop.Ground(self._drawn, -LIDAR_HEIGHT_M, seed)
+        self._sky = backdrop.sky(self._drawn.width, self._ground.horizon, float(self.camera.K[0, 0]), seed)
 
     def picture(self, world: World) -> U8:
         """(720, 1280, 3) uint8 blue green red of one moment."""
-        bgr = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
-        canvas = Canvas(bgr, self.camera)
+        return self._lens.picture(self._ideal(world), world.t_s)
+
+    def _ideal(self, world: World) -> U8:
+        """The picture of the ideal camera, with the rim that the lens needs."""
+        bgr = np.empty((self._drawn.height, self._drawn.width, 3), dtype=np.uint8)
+        canvas = Canvas(bgr, self._drawn)
         horizon = self._ground.horizon
         self._paint_sky(bgr[:horizon], world)
         paint_ground(canvas, self._road, world, horizon)
@@ -66,11 +75,11 @@ class DrawnCamera:
 
     def _paint_sky(self, above: U8, world: World) -> None:
         turned_px = round(world.pose[2] * self.camera.K[0, 0])
-        columns = self._sky.shape[1]
-        start = (WIDTH - turned_px) % columns
-        first = self._sky[: len(above), start : start + WIDTH]
+        columns, width = self._sky.shape[1], above.shape[1]
+        start = (width - turned_px) % columns
+        first = self._sky[: len(above), start : start + width]
         above[:, : first.shape[1]] = first
-        above[:, first.shape[1] :] = self._sky[: len(above), : WIDTH - first.shape[1]]
+        above[:, first.shape[1] :] = self._sky[: len(above), : width - first.shape[1]]
 
     def _add_standing(self, canvas: Canvas, world: World) -> None:
         """Vehicles and what stands beside the road, far first (painter's algorithm)."""

@@ -124,13 +124,10 @@ class Canvas:
 def clip_near(polygon: F64) -> F64:
     """The part of a (K, 3) polygon of the camera's axes beyond the near plane (Sutherland and Hodgman 1974); empty
     when none is."""
-    kept: list[F64] = []
-    for i in range(len(polygon)):
-        here, there = polygon[i], polygon[(i + 1) % len(polygon)]
-        here_in, there_in = here[2] >= NEAR_M, there[2] >= NEAR_M
-        if here_in:
-            kept.append(here)
-        if here_in != there_in:
-            share = (NEAR_M - here[2]) / (there[2] - here[2])
-            kept.append(here + share * (there - here))
-    return np.array(kept).reshape(-1, 3)
+    after = np.roll(polygon, -1, axis=0)
+    depth, depth_after = polygon[:, 2], after[:, 2]
+    kept = depth >= NEAR_M
+    cut = kept != (depth_after >= NEAR_M)
+    share = (NEAR_M - depth) / np.where(cut, depth_after - depth, 1.0)
+    both = np.stack([polygon, polygon + share[:, None] * (after - polygon)], axis=1)
+    return np.asarray(both[np.column_stack([kept, cut])], dtype=np.float64)

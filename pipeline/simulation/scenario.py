@@ -8,6 +8,7 @@ import yaml
 from pydantic import Field, ValidationError, model_validator
 
 from pipeline.simulation.actors import Actor, Script
+from pipeline.simulation.lens import ORDINARY, CameraModel
 from pipeline.simulation.roads import Road, Strict
 
 _FOLDER = Path(__file__).parent / "scenarios"
@@ -29,6 +30,7 @@ class Scenario(Strict):
     duration_s: float = Field(gt=0.0, le=3600.0)
     rate_hz: float = Field(10.0, ge=1.0, le=20.0)
     road: Road
+    camera: CameraModel = ORDINARY
     ego: Ego
     actors: tuple[Actor, ...] = ()
 

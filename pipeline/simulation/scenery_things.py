@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import cos, hypot, sin
 
 import numpy as np
 
-from pipeline.simulation.canvas import Canvas, Colour, Point
+from pipeline.simulation.canvas import Canvas, Colour, Ints, Point
 from pipeline.simulation.roadside import RAIL_HIGH_M, RAIL_LOW_M, Thing
 from pipeline.simulation.world import LIDAR_HEIGHT_M
+from pipeline.types import F64
 
 _GREENS = np.array([[46.0, 92.0, 60.0], [52.0, 112.0, 84.0], [44.0, 104.0, 96.0], [58.0, 98.0, 58.0]])
 _TRUNK: Colour = (48, 62, 74)
@@ -42,19 +44,25 @@ def add_thing(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> N
 
 def _tree(canvas: Canvas, thing: Thing, x: float, y: float) -> None:
     """A trunk and overlapping rounds of leaves, the upper ones lighter; all stand square to the ego axis."""
-    radius, distance = thing.length_m / 2, hypot(x, y)
-    middle_z = thing.high_m - radius - LIDAR_HEIGHT_M
-    _upright(canvas, (x, y + 0.07 * radius), (x, y - 0.07 * radius), 0.0, thing.high_m - radius, _TRUNK)
-    turn = _TURN if distance < _DETAIL_M else _COARSE_TURN
+    points, counts, colours = _tree_shape(thing, hypot(x, y) < _DETAIL_M)
+    canvas.add(points + np.array([x, y, -LIDAR_HEIGHT_M]), counts, colours)
+
+
+@lru_cache(maxsize=4096)
+def _tree_shape(thing: Thing, fine: bool) -> tuple[F64, Ints, F64]:
+    """Points from the tree's foot, corners of each polygon, colours: what ``Canvas.add`` takes."""
+    radius, turn = thing.length_m / 2, _TURN if fine else _COARSE_TURN
     wave = radius * (1.0 + 0.10 * np.sin(turn * 3 + 9 * thing.variant) + 0.06 * np.sin(turn * 7 + 31 * thing.variant))
     size, right, up, light = _CROWN.T[:, :, None]
-    points = np.empty((len(_CROWN), len(turn), 3))
-    points[..., 0] = x
-    points[..., 1] = y - radius * right + size * wave * np.cos(turn)
-    points[..., 2] = middle_z + radius * up + size * wave * 1.08 * np.sin(turn)
+    leaves = np.zeros((len(_CROWN), len(turn), 3))
+    leaves[..., 1] = -radius * right + size * wave * np.cos(turn)
+    leaves[..., 2] = thing.high_m - radius + radius * up + size * wave * 1.08 * np.sin(turn)
+    half, top = 0.07 * radius, thing.high_m - radius
+    trunk = [[0.0, half, 0.0], [0.0, -half, 0.0], [0.0, -half, top], [0.0, half, top]]
     green = _GREENS[int(thing.variant * len(_GREENS)) % len(_GREENS)]
-    counts = np.full(len(_CROWN), len(turn))
-    canvas.add(points.reshape(-1, 3), counts, np.minimum(green * light, 255.0))
+    counts = np.array([4, *[len(turn)] * len(_CROWN)])
+    colours = np.concatenate([[_TRUNK], np.minimum(green * light, 255.0)])
+    return np.concatenate([trunk, leaves.reshape(-1, 3)]), counts, colours
 
 
 def _building(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> None:

@@ -32,7 +32,8 @@ class SimulatedSource:
         last = world.at(self._scenario, self._scenario.duration_s)
         start_m, end_m = self._scenario.ego.start_m - _BEFORE_M, last.s_m + _BEYOND_M
         self._roadside = Roadside.build(self._scenario.road, self._scenario.seed, start_m, end_m)
-        self._camera = DrawnCamera(self._scenario.road, self._roadside, self._scenario.seed)
+        road, seed = self._scenario.road, self._scenario.seed
+        self._camera = DrawnCamera(road, self._roadside, seed, self._scenario.camera)
 
     def __len__(self) -> int:
         return self._scenario.frame_count()
