@@ -104,11 +104,11 @@ def avoid(
         and item.ttc_s is not None
         and item.ttc_s < params.ttc_limit_s
         and (closing_speed_mps(item) or 0.0) > STANDSTILL_MPS
-        and _enters_corridor(item, path)
+        and enters_corridor(item, path)
     ]
 
 
-def _enters_corridor(item: FusedObject, path: Path) -> bool:
+def enters_corridor(item: FusedObject, path: Path) -> bool:
     """Whether the object's sideways motion carries it into the corridor before it is reached."""
     if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None:
         return False
@@ -123,6 +123,6 @@ def pid(state: AccState, error_mps: float, dt_s: float | None, params: AccParams
     slope = (error_mps - state.error_mps) / dt_s if dt_s and state.error_mps is not None else 0.0
     integral = state.integral_m + (error_mps * dt_s if dt_s else 0.0)
     wanted = params.kp * error_mps + params.ki * integral + params.kd * slope
-    accel = min(max(wanted, -params.max_decel_mps2), params.max_accel_mps2)
+    accel = min(max(wanted, -min(params.brake_limit_mps2, params.max_decel_mps2)), params.max_accel_mps2)
     winds_up = (wanted != accel) and (error_mps > 0) == (wanted > 0)
     return AccState(state.integral_m if winds_up else integral, error_mps), accel

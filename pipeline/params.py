@@ -214,6 +214,30 @@ class AccParams(Section):
     kd: float = _slider(0.0, 0.0, 2.0, 0.01, "", "PID: derivative gain")
     max_accel_mps2: float = _slider(2.0, 0.5, 5.0, 0.1, "m/s²", "Accelerator pedal at 1")
     max_decel_mps2: float = _slider(8.0, 1.0, 10.0, 0.1, "m/s²", "Brake pedal at 1")
+    brake_limit_mps2: float = _slider(
+        8.0, 0.0, 10.0, 0.1, "m/s²", "ACC brakes no harder; ISO 15622 permits 3.5 at speed, 0 leaves it all to AEB"
+    )
+
+
+class AebParams(Section):
+    """Emergency braking beside ACC: a stage comes in when the time to collision falls below its limit, or when more
+    deceleration is needed than its limit."""
+
+    enabled: bool = _choice(True, "Warn and brake in an emergency; off: ACC alone, as in print")
+    min_speed_kmh: float = _slider(5.0, 0.0, 30.0, 1.0, "km/h", "Below this own speed no stage comes in")
+    warn_ttc_s: float = _slider(2.2, 0.5, 6.0, 0.1, "s", "Warning when the time to collision is shorter")
+    partial_ttc_s: float = _slider(1.4, 0.3, 4.0, 0.1, "s", "Partial braking when it is shorter")
+    full_ttc_s: float = _slider(0.9, 0.2, 3.0, 0.1, "s", "Full braking when it is shorter")
+    partial_when_mps2: float = _slider(4.0, 1.0, 10.0, 0.1, "m/s²", "Partial braking when this much is needed")
+    full_when_mps2: float = _slider(5.5, 1.0, 10.0, 0.1, "m/s²", "Full braking when this much is needed")
+    partial_decel_mps2: float = _slider(4.0, 0.5, 8.0, 0.1, "m/s²", "How hard partial braking brakes")
+    full_decel_mps2: float = _slider(8.0, 2.0, 10.0, 0.1, "m/s²", "How hard full braking brakes")
+    build_up_s: float = _slider(0.3, 0.0, 1.0, 0.05, "s", "From the command to full pressure; driven unbraked")
+    margin_m: float = _slider(1.0, 0.0, 5.0, 0.1, "m", "Gap that braking shall leave")
+    confirm_frames: int = _slider(2, 1, 10, 1, "frames", "A stage must be asked for in this many frames in a row")
+    release_ttc_s: float = _slider(6.0, 1.0, 20.0, 0.5, "s", "Braking goes on while the time to collision is shorter")
+    release_s: float = _slider(0.3, 0.0, 3.0, 0.1, "s", "Braking ends when the danger has been gone for this long")
+    standstill_s: float = _slider(2.0, 0.0, 10.0, 0.5, "s", "The brakes hold for this long at standstill")
 
 
 class TimeParams(Section):
@@ -241,6 +265,7 @@ class Params(Section):
     path: PathParams = PathParams()
     cipv: CipvParams = CipvParams()
     acc: AccParams = AccParams()
+    aeb: AebParams = AebParams()
     time: TimeParams = TimeParams()
 
 
@@ -262,6 +287,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "alignment": {"model": "angular"},
         "fusion": {"assignment": "greedy", "min_iou": 0.0, "ring_gap_deg": 0.0, "range_gate": False},
         "cipv": {"confirm_hits": 1, "carried_may_become_lead": True, "hysteresis_m": 0.0},
+        "aeb": {"enabled": False},
     },
 }
 """What a preset changes against the declared defaults."""

@@ -1,7 +1,7 @@
 """The straight line: one frame in, one result out, state in and state out.
 
     LiDAR:  down-sample → ground → cluster → boxes → tracks ─┐
-    camera: (raw boxes) → select → distance → tracks ────────┼→ fuse → motion → path → CIPV → ACC
+    camera: (raw boxes) → select → distance → tracks ────────┼→ fuse → motion → path → CIPV → ACC, AEB
     ego ─────────────────────────────────────────────────────┘
 
 No stage keeps anything of its own: what must be remembered is in ``State``, so a frame can be run again from the same
@@ -15,7 +15,7 @@ from time import perf_counter_ns
 
 import numpy as np
 
-from pipeline import acc, alignment, cipv, fusion, kalman, motion
+from pipeline import acc, aeb, alignment, cipv, fusion, kalman, motion
 from pipeline.lidar import boxes, cluster, downsample, ground
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.lidar import warm_up as warm_up_lidar
@@ -47,6 +47,7 @@ class State:
     vision: vision_tracking.VisionTrackerState = vision_tracking.VisionTrackerState()
     fusion: fusion.FusionState = fusion.FusionState()
     acc: acc.AccState = acc.AccState()
+    aeb: aeb.AebState = aeb.AebState()
     lead_id: int | None = None
 
 
@@ -77,6 +78,8 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     clock.lap("cipv")
     acc_state, command = acc.control(state.acc, frame.ego, lead, objects, path, dt_s, params.acc)
     clock.lap("acc")
+    aeb_state, command = aeb.guard(state.aeb, command, frame.ego, lead, objects, path, dt_s, params.aeb, params.acc)
+    clock.lap("aeb")
 
     result = Result(
         frame=frame.name,
@@ -101,7 +104,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         ),
     )
     lead_id = lead.id if lead is not None else None
-    return State(frame.t_ns, lidar_state, vision_state, fusion_state, acc_state, lead_id), result
+    return State(frame.t_ns, lidar_state, vision_state, fusion_state, acc_state, aeb_state, lead_id), result
 
 
 def warm_up() -> None:

@@ -102,6 +102,13 @@ def test_integral_removes_a_standing_error_and_does_not_wind_up() -> None:
     assert after < 0.0, "after a long full throttle a small overspeed brakes at once"
 
 
+def test_braking_may_be_left_to_others() -> None:
+    comfortable = AccParams(brake_limit_mps2=3.5)
+    assert pid(AccState(), -20.0, 0.1, comfortable)[1] == -3.5
+    assert pid(AccState(), -20.0, 0.1, AccParams(brake_limit_mps2=0.0))[1] == 0.0
+    assert pid(AccState(), -20.0, 0.1, AccParams())[1] == -8.0
+
+
 def test_the_desired_gap_grows_with_speed() -> None:
     assert desired_gap_m(0.0, PARAMS) == 5.0
     assert desired_gap_m(20.0, PARAMS) == 35.0
