@@ -71,7 +71,7 @@ class Pinhole:
         in_camera = transform(self.T_camera_ego, np.asarray(points, dtype=np.float64).reshape(-1, 3))
         behind = in_camera[:, 2] < self._NEAREST_M
         in_camera[behind] = (0.0, 0.0, 1.0)
-        if self.distortion.size:
+        if self.distortion.size and len(in_camera):  # OpenCV gives None for no points
             uv = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), self.K, self.distortion)[0].reshape(-1, 2)
         else:
             uv = in_camera[:, :2] / in_camera[:, 2:] * [self.K[0, 0], self.K[1, 1]] + self.K[:2, 2]
@@ -80,7 +80,7 @@ class Pinhole:
     def unproject(self, pixels: F64, range_m: F64) -> F64:
         """The point on the pixel's ray whose horizontal range from the ego origin is ``range_m``."""
         pixels = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
-        if self.distortion.size:
+        if self.distortion.size and len(pixels):
             flat = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.K, self.distortion).reshape(-1, 2)
         else:
             flat = (pixels - self.K[:2, 2]) / [self.K[0, 0], self.K[1, 1]]

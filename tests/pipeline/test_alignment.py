@@ -54,6 +54,12 @@ def test_left_is_left_and_up_is_up(model: Angular | Pinhole) -> None:
 
 
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
+def test_no_points_are_no_pixels(model: Angular | Pinhole) -> None:
+    assert model.project(np.zeros((0, 3))).shape == (0, 2)
+    assert model.unproject(np.zeros((0, 2)), np.zeros(0)).shape == (0, 3)
+
+
+@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS.keys())
 def test_behind_the_camera_is_nowhere(model: Angular | Pinhole) -> None:
     assert np.isnan(model.project(np.array([[-5.0, 0.3, 0.0]]))).all()
 
