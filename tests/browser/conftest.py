@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from app.engine import Engine
 from app.server import Server, create_app, listen_socket
@@ -31,6 +31,7 @@ FLAGS = [
     "--disable-sync",
 ]
 WAIT_MS = 60_000
+expect.set_options(timeout=WAIT_MS)
 
 
 class CountedDetector:
@@ -136,7 +137,7 @@ def open_page(browser: Browser, site: Site) -> Iterator[OpenPage]:
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on("request", lambda r: complaints.append(r.url) if _leaves(r.url, address or site.address) else None)
         page.goto(address or site.address)
-        page.wait_for_function("document.querySelector('#transport .name').textContent !== ''")
+        expect(page.locator("#transport .name")).not_to_be_empty()
         page.wait_for_selector("#objects tbody tr", state="attached")
         return page
 

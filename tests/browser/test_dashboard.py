@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 from playwright.sync_api import Page, expect
 
@@ -17,14 +19,11 @@ START = 60
 
 @pytest.fixture(autouse=True)
 def _paused_in_traffic(site: Site) -> None:
-    site.engine.control.set_params(Params(), "default")
-    site.engine.control.change(playing=False, speed=1.0, loop=True)
-    site.engine.control.seek(START)
-    revision = site.engine.control.peek().params_revision
-    site.engine.wait_for(
-        lambda s: s.index == START and s.params_revision == revision and not s.playing and s.params is s.tick.params,
-        WAIT_S,
-    )
+    control, before = site.engine.control, site.engine.snapshot.sequence
+    revision = control.peek().params_revision + 1
+    wishes = {"playing": False, "speed": 1.0, "loop": True, "target": START, "steps": 0}
+    control.change(params=Params(), preset="default", params_revision=revision, **wishes)
+    site.engine.wait_for(lambda s: s.sequence > before and s.params_revision == revision and s.index == START, WAIT_S)
 
 
 def frame_name(page: Page) -> str:
@@ -39,6 +38,16 @@ def pixels(page: Page, canvas: str) -> str:
     """What is painted, once nothing more is to be painted."""
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
     return page.evaluate(f"document.querySelector('{canvas}').toDataURL()")
+
+
+def repainted(page: Page, canvas: str, old: str, *, like: bool = False) -> bool:
+    """True as soon as a canvas shows something else than ``old``, or with ``like`` the same. One look a painted frame;
+    the page's policy forbids playwright's own way of waiting, which evaluates text."""
+    deadline = time.monotonic() + WAIT_S
+    while time.monotonic() < deadline:
+        if (pixels(page, canvas) == old) == like:
+            return True
+    return False
 
 
 def colours(page: Page, canvas: str) -> int:
@@ -104,16 +113,17 @@ def test_it_steps_and_seeks(open_page: OpenPage):
 def test_a_slider_on_the_paused_frame_changes_picture_and_table_without_the_network(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
-    runs, before, camera = site.network_runs, page.inner_text("#objects tbody"), pixels(page, "#camera")
+    runs, before, camera = site.network_runs, page.text_content("#objects tbody"), pixels(page, "#camera")
     page.locator("[data-param='cluster.tolerance_m'] input[type=range]").fill("0.2")
     expect(page.locator("[data-section=cluster] .count")).to_have_text("1 changed")
     site.engine.wait_for(lambda s: s.params.cluster.tolerance_m == 0.2 and s.tick.params is s.params, WAIT_S)
-    page.wait_for_function("(text) => document.querySelector('#objects tbody').innerText !== text", arg=before)
-    assert pixels(page, "#camera") != camera
+    assert before
+    expect(page.locator("#objects tbody")).not_to_have_text(before)
+    assert repainted(page, "#camera", camera)
     assert site.engine.snapshot.index == START
     assert site.network_runs == runs
     page.get_by_role("button", name="Reset tolerance").click()
-    page.wait_for_function("(text) => document.querySelector('#objects tbody').innerText === text", arg=before)
+    expect(page.locator("#objects tbody")).to_have_text(before)
     expect(page.locator("[data-section=cluster] .count")).to_have_text("")
 
 
@@ -125,7 +135,7 @@ def test_h_res_moves_the_projected_points_and_chooses_its_model(open_page: OpenP
     slider.fill(str(float(slider.input_value()) * 1.3))
     site.engine.wait_for(lambda s: s.params.alignment.model == "angular" and s.tick.params is s.params, WAIT_S)
     expect(page.locator("[data-param='alignment.model'] button[aria-pressed=true]")).to_have_text("angular")
-    page.wait_for_function("(old) => document.querySelector('#camera').toDataURL() !== old", arg=camera)
+    assert repainted(page, "#camera", camera)
     assert site.network_runs == runs
 
 
@@ -150,7 +160,7 @@ def test_a_selected_object_is_explained(open_page: OpenPage, site: Site):
     expect(page.locator("#why")).to_contain_text(rejection.reason)
     gates = next(item.gates for item in tick.result.objects if item.id == rejection.id)
     expect(page.locator("#why .gate")).to_have_count(len(gates))
-    assert (pixels(page, "#bev"), pixels(page, "#camera")) != (plan, camera), "it is marked in the views too"
+    assert repainted(page, "#bev", plan) or repainted(page, "#camera", camera), "it is marked in the views too"
     page.keyboard.press("Escape")
     expect(page.locator("tr.is-selected")).to_have_count(0)
 
@@ -193,9 +203,9 @@ def test_the_plan_zooms_and_fits(open_page: OpenPage):
     fitted = pixels(page, "#bev")
     page.locator("#bev").hover()
     page.mouse.wheel(0, -400)
-    page.wait_for_function("(old) => document.querySelector('#bev').toDataURL() !== old", arg=fitted)
+    assert repainted(page, "#bev", fitted)
     page.locator("#bev").dblclick(position={"x": 5, "y": 5})
-    page.wait_for_function("(old) => document.querySelector('#bev').toDataURL() === old", arg=fitted)
+    assert repainted(page, "#bev", fitted, like=True)
 
 
 def test_layers_can_be_switched_off_and_stay_off(open_page: OpenPage):
@@ -203,7 +213,7 @@ def test_layers_can_be_switched_off_and_stay_off(open_page: OpenPage):
     wait_for_frame(page, START)
     shown = pixels(page, "#camera")
     page.locator("#camera-layers").get_by_role("button", name="Points").click()
-    assert pixels(page, "#camera") != shown
+    assert repainted(page, "#camera", shown)
     page.reload()
     page.wait_for_selector("#objects tbody tr")
     expect(page.locator("[data-layer=points]")).to_have_attribute("aria-pressed", "false")
@@ -215,7 +225,7 @@ def test_whoever_joins_late_sees_the_same(open_page: OpenPage):
     wait_for_frame(first, 75)
     second = open_page()
     wait_for_frame(second, 75)
-    assert second.inner_text("#objects tbody") == first.inner_text("#objects tbody")
+    expect(second.locator("#objects tbody")).to_have_text(first.text_content("#objects tbody") or "")
 
 
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (1024, 768), (800, 480)])
