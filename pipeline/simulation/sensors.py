@@ -1,0 +1,49 @@
+"""The ego vehicle's sensors in one scenario: any moment of the world as the ``Frame`` that the line takes.
+
+Recorded drives and closed loops see the world through this one place, so both see the same.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+from pipeline.simulation import lidar
+from pipeline.simulation.camera import DrawnCamera, calibration
+from pipeline.simulation.roadside import Roadside
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.world import World
+from pipeline.types import CameraCalibration, EgoState, Frame, Picture
+
+_BEFORE_M, _BEYOND_M = 100.0, 600.0
+
+
+class Sensors:
+    """LiDAR, camera and speedometer. end_m: how far along the road the ego vehicle gets; the roadside ends 600 m
+    later. The same world and index give the same frame."""
+
+    def __init__(self, scenario: Scenario, end_m: float) -> None:
+        self._scenario = scenario
+        self._roadside = Roadside.build(
+            scenario.road, scenario.seed, scenario.ego.start_m - _BEFORE_M, end_m + _BEYOND_M
+        )
+
+    def frame(self, now: World, index: int, t_ns: int, picture: bool = True) -> Frame:
+        """What the sensors give at one tick. picture: draw the camera's picture; without it the frame is made ten times
+        faster, and still says how the camera is mounted."""
+        return Frame(
+            index,
+            f"{index:06d}",
+            t_ns,
+            sweep=lidar.sweep(now, self._roadside, self._scenario.seed, index, t_ns),
+            picture=Picture(t_ns, self._camera.picture(now)) if picture else None,
+            camera=self.camera,
+            ego=EgoState(t_ns, now.speed_mps, now.yaw_rate_radps),
+        )
+
+    @cached_property
+    def camera(self) -> CameraCalibration:
+        return calibration(self._scenario.camera)
+
+    @cached_property
+    def _camera(self) -> DrawnCamera:
+        return DrawnCamera(self._scenario.road, self._roadside, self._scenario.seed, self._scenario.camera)
