@@ -65,7 +65,9 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
 
     measured = _perceive_picture(frame, aligned, params)
     clock.lap("distance")
-    vision_state, vision_tracks = vision_tracking.track(state.vision, measured, dt_s, params.vision_tracking)
+    vision_state, vision_tracks = vision_tracking.track(
+        state.vision, measured, dt_s, params.vision_tracking, frame.ego.speed_mps if frame.ego else None
+    )
     clock.lap("vision_tracking")
 
     fusion_state, fused = fusion.fuse(

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -50,6 +51,13 @@ class Followed:
     votes: tuple[tuple[str, float], ...]
 
 
+class SpeedGuess(NamedTuple):
+    """What a new object's relative speed along ego x is taken for, and its standard deviation along each axis."""
+
+    along_mps: float
+    sigma_mps: float
+
+
 @dataclass(frozen=True)
 class VisionTrackerState:
     """All that one picture leaves to the next."""
@@ -63,21 +71,24 @@ def track(
     measurements: tuple[VisionMeasurement, ...] | None,
     dt_s: float | None,
     params: VisionTrackingParams,
+    ego_speed_mps: float | None = None,
 ) -> tuple[VisionTrackerState, tuple[VisionTrack, ...]]:
     """One tick. ``measurements`` null: the camera gave nothing, which counts as time but not as a picture in which the
-    object was missing. ``dt_s`` null: the first tick. Tracks come by id."""
+    object was missing. ``dt_s`` null: the first tick. ``ego_speed_mps``: what a new object's speed is guessed from.
+    Tracks come by id."""
+    guess = _first_guess(ego_speed_mps)
     expected = [_predict(followed, dt_s or 0.0, params) for followed in state.followed]
     if measurements is None:
         kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
         return evolve(state, followed=kept), tuple(followed.track for followed in kept)
     partner = _match(expected, measurements, params)
     kept_list = [
-        _seen(followed, measurements[partner[row]], params) if row in partner else _missed(followed)
+        _seen(followed, measurements[partner[row]], guess, params) if row in partner else _missed(followed)
         for row, followed in enumerate(expected)
     ]
     taken = set(partner.values())
     fresh = [measurement for column, measurement in enumerate(measurements) if column not in taken]
-    kept_list += [_new(state.next_id + index, measurement, params) for index, measurement in enumerate(fresh)]
+    kept_list += [_new(state.next_id + index, measurement, guess, params) for index, measurement in enumerate(fresh)]
     alive = tuple(
         followed
         for followed in kept_list
@@ -150,7 +161,15 @@ def _cost(followed: Followed, seen: VisionMeasurement, params: VisionTrackingPar
     return math.hypot(moved, resized)
 
 
-def _new(track_id: int, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
+def _first_guess(ego_speed_mps: float | None) -> SpeedGuess:
+    """What is on a road stands or goes along with us: relative speeds from −v to 0, around −v/2. A guess of 0 ± 8 m/s
+    would take 2 s to believe that a car standing ahead of a fast ego vehicle stands. Without ego speed it must do."""
+    if ego_speed_mps is None:
+        return SpeedGuess(0.0, SPEED_SIGMA_MPS)
+    return SpeedGuess(-ego_speed_mps / 2, max(SPEED_SIGMA_MPS, ego_speed_mps / 2))
+
+
+def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: VisionTrackingParams) -> Followed:
     detection = seen.detection
     shown = VisionTrack(
         id=track_id,
@@ -168,10 +187,10 @@ def _new(track_id: int, seen: VisionMeasurement, params: VisionTrackingParams) -
     box_filter = kalman.start(_centre(detection.bbox), _box_noise(detection.bbox), _box_speed_sigma(detection.bbox))
     votes = ((detection.label, detection.score),)
     followed = Followed(shown, 0.0, 0.0 if seen.position else math.inf, 0, box_filter, None, votes)
-    return _place(followed, seen, params) if params.filter == "kalman" else followed
+    return _place(followed, seen, guess, params) if params.filter == "kalman" else followed
 
 
-def _seen(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
+def _seen(followed: Followed, seen: VisionMeasurement, guess: SpeedGuess, params: VisionTrackingParams) -> Followed:
     """The object with this picture's box and distance taken in."""
     detection = seen.detection
     shown = evolve(
@@ -192,21 +211,22 @@ def _seen(followed: Followed, seen: VisionMeasurement, params: VisionTrackingPar
     label = max(votes, key=lambda name: votes[name])
     box_filter = kalman.update(followed.box_filter, _centre(detection.bbox), _box_noise(detection.bbox))
     current = evolve(current, track=evolve(shown, label=label), votes=tuple(votes.items()), box_filter=box_filter)
-    return _place(current, seen, params)
+    return _place(current, seen, guess, params)
 
 
 def _missed(followed: Followed) -> Followed:
     return evolve(followed, track=evolve(followed.track, missed=followed.track.missed + 1))
 
 
-def _place(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> Followed:
+def _place(followed: Followed, seen: VisionMeasurement, guess: SpeedGuess, params: VisionTrackingParams) -> Followed:
     """The measured place taken in; one far from the expected weighs less, by as much as it is too far."""
     if seen.position is None or seen.sigma_m is None or seen.distance_m is None:
         bare = evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m)
         return evolve(followed, track=bare) if followed.place_filter is None else _show(followed)
     noise = place_noise(seen.position, seen.sigma_m, params.bearing_sigma_deg)
     if followed.place_filter is None:
-        filtered = kalman.start(seen.position, noise, SPEED_SIGMA_MPS)
+        filtered = kalman.start(seen.position, noise, guess.sigma_mps)
+        filtered.mean[2] = guess.along_mps
     else:
         surprise = kalman.mahalanobis2(followed.place_filter, seen.position, noise)
         filtered = kalman.update(followed.place_filter, seen.position, noise * max(1.0, surprise / _OUTLIER))

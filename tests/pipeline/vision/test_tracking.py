@@ -216,3 +216,18 @@ def test_every_detection_is_in_one_track_and_tracks_are_bounded(
         assert all(np.isfinite(t.bbox).all() for t in tracks)
         born = max([born, *(t.id for t in tracks)])
     assert born <= sum(len(p or ()) for p in pictures)
+
+
+def test_a_standing_car_ahead_of_a_fast_ego_car_is_soon_known_to_stand() -> None:
+    """Twelve pictures of a car that 28 m/s bring nearer: with the own speed known, its closing speed is nearly right."""
+
+    def closing_mps(ego_speed_mps: float | None) -> float:
+        state = VisionTrackerState()
+        for index in range(12):
+            seen = _car(70.0 - 2.8 * index, sigma=0.12)
+            state, tracks = track(state, (seen,), 0.1 if index else None, VisionTrackingParams(), ego_speed_mps)
+        assert tracks[0].velocity_mps is not None
+        return -tracks[0].velocity_mps[0]
+
+    assert closing_mps(28.0) > 25.0
+    assert closing_mps(None) < 24.0
