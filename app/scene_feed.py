@@ -12,8 +12,10 @@ from pipeline.params import ParamsError, with_changes
 
 
 class SceneFeed:
-    """Draws the engine's newest snapshot in viser. While one is drawn, older ones that wait are dropped: the 3D view may
-    be slower than the line, but never behind it. Use it in a ``with`` block."""
+    """Draws the engine's newest snapshot in viser, while a browser looks. While one is drawn, older ones that wait are
+    dropped: the 3D view may be slower than the line, but never behind it. Use it in a ``with`` block.
+
+    drawn: frames drawn so far."""
 
     def __init__(self, engine: Engine) -> None:
         self._engine = engine
@@ -21,6 +23,7 @@ class SceneFeed:
         self._condition = threading.Condition()
         self._newest: Snapshot | None = None
         self._ended = False
+        self.drawn = 0
         self._thread = threading.Thread(target=self._work, name="cipv-scene", daemon=True)
 
     @property
@@ -29,6 +32,7 @@ class SceneFeed:
         return self._view.port
 
     def __enter__(self) -> SceneFeed:
+        self._view.on_watched(lambda: self._offer(self._engine.snapshot))
         self._stop_listening = self._engine.listen(self._offer)
         self._thread.start()
         return self
@@ -63,8 +67,11 @@ class SceneFeed:
                     return
                 newest, self._newest = self._newest, None
             assert newest is not None
+            if not self._view.watched:
+                continue
             if drawn is None or newest.params is not drawn.params:
                 self._view.set_params(newest.params)
             if newest.tick is not None and (drawn is None or newest.tick is not drawn.tick):
                 self._view.show(newest.tick.frame, newest.tick.result)
+                self.drawn += 1
             drawn = newest

@@ -115,7 +115,9 @@ def _gates(
         iou = float(overlap[i, j])
         tests = [Gate("iou", iou, params.min_iou, iou >= params.min_iou)]
         distance, sigma = vision[i].distance_m, vision[i].sigma_m
-        if params.range_gate and distance is not None and sigma is not None:
+        # boxes of nearly one place and size are one object: there it is the height law that errs, not the LiDAR
+        doubtful = params.range_gate and iou < params.sure_iou
+        if doubtful and distance is not None and sigma is not None:
             gap = abs(distance - _range(lidar[j])) / math.hypot(sigma, LIDAR_RANGE_SIGMA_M)
             tests.append(Gate("range_sigmas", gap, params.range_gate_sigmas, gap <= params.range_gate_sigmas))
         joinable[i, j] = all(test.passed for test in tests)

@@ -173,6 +173,7 @@ class FusionParams(Section):
         2.0, 0.0, 4.0, 0.1, "°", "Angle between rings: an object's edge is taken half a gap beyond the last ring on it"
     )
     range_gate: bool = _choice(True, "Do not join objects whose distances disagree beyond their uncertainty")
+    sure_iou: float = _slider(0.5, 0.1, 1.0, 0.05, "", "Boxes overlapping more are one object whatever their distances")
     range_gate_sigmas: float = _slider(3.0, 0.5, 10.0, 0.1, "σ", "Largest disagreement of the two distances")
 
 

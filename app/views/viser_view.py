@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, get_args
 
@@ -53,6 +54,7 @@ class ViserView:
         self._server.gui.configure_theme(
             dark_mode=True, show_logo=False, show_share_button=False, control_width="small"
         )
+        self._server.gui.main_panel.minimize()  # the scene first: a pane of the dashboard is small
         camera = self._server.initial_camera
         camera.position, camera.look_at, camera.up = CAMERA_POSITION, CAMERA_TARGET, (0.0, 0.0, 1.0)
         camera.fov = math.radians(CAMERA_FOV_DEG)
@@ -60,6 +62,15 @@ class ViserView:
         self._add_static()
         self._add_display_options()
         self._params = ParamsGui(self._server.gui, params, on_change)
+
+    @property
+    def watched(self) -> bool:
+        """Whether a browser is looking."""
+        return bool(self._server.get_clients())
+
+    def on_watched(self, callback: Callable[[], None]) -> None:
+        """Call ``callback``, on a thread of viser's, when a browser comes to look."""
+        self._server.on_client_connect(lambda _: callback())
 
     @property
     def port(self) -> int:

@@ -85,13 +85,21 @@ def test_a_far_car_over_the_roof_of_a_near_one_is_not_joined_with_it() -> None:
     """Their boxes overlap in the picture, their ranges do not; the L row says which test kept them apart."""
     near = lidar_track(1, 15.0)
     x1, y1, x2, y2 = box_of(near)
-    far = vision_track(1, (x1 + 10, y1 - 5, x2 - 10, y2 - 10), 50.0, sigma_m=3.0)
+    far = vision_track(1, (x1 + 20, y1 - 10, x2 - 25, (y1 + y2) / 2), 50.0, sigma_m=3.0)
     _, result = joined([near], [far])
     assert [item.source for item in result.objects] == ["L", "V"]
     gate = next(g for g in result.objects[0].gates if g.name == "range_sigmas")
     assert (gate.passed, gate.limit) == (False, OPTIMAL.range_gate_sigmas)
     _, paper = joined([near], [far], GREEDY)
     assert [item.source for item in paper.objects] == ["VL"]
+
+
+def test_boxes_of_one_place_and_size_are_one_object_though_the_height_law_errs() -> None:
+    """A van taken for a car seems nearer than it is: the LiDAR knows better."""
+    van = lidar_track(1, 30.0, height=2.3)
+    _, result = joined([van], [vision_track(1, box_of(van), 19.0, sigma_m=1.5)])
+    assert [item.source for item in result.objects] == ["VL"]
+    assert result.objects[0].distance_m == pytest.approx(30.0)
 
 
 def test_optimal_assignment_beats_first_come_first_served() -> None:

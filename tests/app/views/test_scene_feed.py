@@ -1,0 +1,56 @@
+"""The 3D view follows the engine while somebody looks, and its sliders reach the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from app.engine import Engine
+from app.scene_feed import SceneFeed
+from pipeline.params import Params
+from tests.app.recording import CountingDetector, Recording, opener
+
+WAIT_S = 60.0
+
+
+@pytest.fixture
+def engine() -> Iterator[Engine]:
+    recording = Recording()
+    started = Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri)
+    started.start()
+    started.wait_for(lambda shown: shown.tick is not None, WAIT_S)
+    yield started
+    started.stop()
+
+
+def test_nothing_is_drawn_while_nobody_looks(engine: Engine) -> None:
+    with SceneFeed(engine) as feed:
+        engine.control.seek(1)
+        engine.wait_for(lambda shown: shown.index == 1, WAIT_S)
+    assert feed.drawn == 0
+
+
+def test_who_comes_to_look_sees_the_present_frame_and_the_ones_after(engine: Engine, open_scene: Any) -> None:
+    with SceneFeed(engine) as feed:
+        client = open_scene(feed.port)
+        client.look()
+        client.read_until(_is_cloud)
+        engine.control.seek(1)
+        client.read_until(_is_cloud)
+    assert feed.drawn >= 2
+
+
+def test_a_slider_of_the_3d_view_reaches_the_engine(engine: Engine, open_scene: Any) -> None:
+    with SceneFeed(engine) as feed:
+        client = open_scene(feed.port)
+        client.read_present_state()
+        slider = client.inputs("Half width m (m)")[0]
+        client.move(slider["uuid"], 2.5)
+        engine.wait_for(lambda shown: shown.params.path.half_width_m == 2.5, WAIT_S)
+
+
+def _is_cloud(message: dict[str, Any]) -> bool:
+    """A cloud made or a cloud changed."""
+    return str(message.get("name", "")).startswith("/points")
