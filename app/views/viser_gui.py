@@ -85,11 +85,17 @@ class ParamsGui:
             self._on_change(name, None if event.target.value else handle.value)
 
 
+_UNIT_SUFFIXES = frozenset({"m", "px", "deg", "s", "mps", "mps2", "kmh"})
+"""Ends of names in code that say the unit."""
+
+
 def _words(name: str) -> str:
     """``lidar_tracking`` → ``Lidar tracking``."""
     return name.replace("_", " ").capitalize()
 
 
 def _label(name: str, spec: Mapping[str, Any]) -> str:
+    """``path.half_width_m`` → ``Half width (m)``: the unit as people write it, once."""
     key, unit = name.partition(".")[2], spec.get("unit", "")
-    return f"{_words(key)} ({unit})" if unit else _words(key)
+    stem, _, last = key.rpartition("_")
+    return f"{_words(stem if stem and last in _UNIT_SUFFIXES else key)} ({unit})" if unit else _words(key)

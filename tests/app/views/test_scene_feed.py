@@ -46,7 +46,7 @@ def test_a_slider_of_the_3d_view_reaches_the_engine(engine: Engine, open_scene: 
     with SceneFeed(engine) as feed:
         client = open_scene(feed.port)
         client.read_present_state()
-        slider = client.inputs("Half width m (m)")[0]
+        slider = client.inputs("Half width (m)")[0]
         client.move(slider["uuid"], 2.5)
         engine.wait_for(lambda shown: shown.params.path.half_width_m == 2.5, WAIT_S)
 
