@@ -1,4 +1,4 @@
-"""Roads: a reference line of straights and arcs, with lanes beside it, named as ASAM OpenDRIVE names them.
+"""Roads: a reference line of straights, arcs and transitions, with lanes beside it, named as ASAM OpenDRIVE names them.
 
 The reference line runs in the middle of the median. Lanes −1, −2, … lie to its right and run along it, −1 the
 innermost; +1, +2, … lie to its left and run against it. A place on the road is (s, d): metres along the reference
@@ -7,13 +7,20 @@ line, metres to its left. World: x, y metres, heading counter-clockwise from x; 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cached_property
+from math import ceil
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from pipeline.simulation.lines import Line
 from pipeline.types import F64
+
+_TRANSITION_STEP_M = 0.5
+_CROSSING_REACH_M = 250.0
 
 
 class Strict(BaseModel):
@@ -21,21 +28,84 @@ class Strict(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A changed copy, validated anew, into which nothing worked out from the old values is carried."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self).model_validate({**fields, **(update or {})})
+
 
 class Segment(Strict):
-    """A stretch of one curvature, positive to the left; 0 is straight."""
+    """A stretch of road, straight unless it says otherwise; curvature is positive to the left. ``radius_m`` may stand
+    for ``curvature_per_m``. With ``end_curvature_per_m`` the curvature changes evenly along the segment: a transition
+    (clothoid) between a straight and a bend."""
 
     length_m: float = Field(gt=0.0, le=100_000.0)
-    curvature_per_m: float = Field(0.0, ge=-0.2, le=0.2)
+    curvature_per_m: float = Field(default=0.0, ge=-0.2, le=0.2)
+    end_curvature_per_m: float | None = Field(default=None, ge=-0.2, le=0.2)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _radius(cls, given: Any) -> Any:
+        if not isinstance(given, dict) or "radius_m" not in given:
+            return given
+        rest = {key: value for key, value in given.items() if key != "radius_m"}
+        radius = given["radius_m"]
+        if "curvature_per_m" in rest:
+            raise ValueError("radius_m and curvature_per_m say the same thing; keep one")
+        if not isinstance(radius, int | float) or isinstance(radius, bool) or not abs(radius) >= 5.0:
+            raise ValueError("radius_m must be a number of at least 5 (to the left) or at most −5 (to the right)")
+        return {**rest, "curvature_per_m": 1.0 / radius}
+
+    @model_validator(mode="after")
+    def _short_transition(self) -> Segment:
+        if self.end_curvature_per_m is not None and self.length_m > 2000.0:
+            raise ValueError("a transition may be 2000 m long at most")
+        return self
+
+    def arcs(self) -> list[tuple[float, float]]:
+        """(length, curvature) of the arcs that make it up. A transition is cut into arcs of at most half a metre, each
+        of the curvature at its middle: headings at the joints are exact, places are within a millimetre or so."""
+        if self.end_curvature_per_m is None:
+            return [(self.length_m, self.curvature_per_m)]
+        count = ceil(self.length_m / _TRANSITION_STEP_M)
+        shares = (np.arange(count) + 0.5) / count
+        bends = self.curvature_per_m + shares * (self.end_curvature_per_m - self.curvature_per_m)
+        return [(self.length_m / count, bend) for bend in bends.tolist()]
+
+
+class Crossing(Strict):
+    """Another road, straight and level, across this one. s_m: where the two middle lines meet. angle_deg: by how much
+    its own direction is turned to the left of this road's there; 90 runs from right to left."""
+
+    s_m: float = Field(ge=0.0, le=100_000.0)
+    angle_deg: float = Field(default=90.0, ge=40.0, le=140.0)
+    lanes_each_way: int = Field(default=1, ge=1, le=3)
+    lane_width_m: float = Field(default=3.5, ge=2.5, le=5.0)
+
+    def half_width_m(self) -> float:
+        return self.lanes_each_way * self.lane_width_m
 
 
 class Road(Strict):
     segments: tuple[Segment, ...] = Field(min_length=1)
-    lane_width_m: float = Field(3.6, ge=2.0, le=6.0)
-    lanes_forward: int = Field(3, ge=1, le=6)
-    lanes_oncoming: int = Field(2, ge=0, le=6)
-    median_m: float = Field(4.0, ge=0.0, le=30.0)
-    shoulder_m: float = Field(2.5, ge=0.0, le=10.0)
+    crossings: tuple[Crossing, ...] = ()
+    lane_width_m: float = Field(default=3.6, ge=2.0, le=6.0)
+    lanes_forward: int = Field(default=3, ge=1, le=6)
+    lanes_oncoming: int = Field(default=2, ge=0, le=6)
+    median_m: float = Field(default=4.0, ge=0.0, le=30.0)
+    shoulder_m: float = Field(default=2.5, ge=0.0, le=10.0)
+
+    @model_validator(mode="after")
+    def _wide_enough_bends(self) -> Road:
+        """A lane inside a bend that is tighter than its offset would run backwards."""
+        widest = max(abs(edge) for pair in self.edges_m() for edge in pair)
+        for segment in self.segments:
+            for bend in (segment.curvature_per_m, segment.end_curvature_per_m or 0.0):
+                if abs(bend) * widest > 0.9:
+                    raise ValueError(
+                        f"a bend of {1 / abs(bend):.3g} m radius is too tight for a road {2 * widest:.3g} m wide"
+                    )
+        return self
 
     def lane_offset_m(self, lane: int) -> float:
         """d of a lane's middle. ValueError for a lane that the road does not have."""
@@ -54,39 +124,27 @@ class Road(Strict):
     def curvature_per_m(self, s_m: float) -> float:
         """Curvature of the reference line at s; the first and last segment go on for ever."""
         ends = np.cumsum([segment.length_m for segment in self.segments])
-        return self.segments[min(int(np.searchsorted(ends, s_m, side="right")), len(ends) - 1)].curvature_per_m
+        index = min(int(np.searchsorted(ends, s_m, side="right")), len(ends) - 1)
+        segment = self.segments[index]
+        if segment.end_curvature_per_m is None:
+            return segment.curvature_per_m
+        share = min(max(1.0 - (ends[index] - s_m) / segment.length_m, 0.0), 1.0)
+        return segment.curvature_per_m + float(share) * (segment.end_curvature_per_m - segment.curvature_per_m)
 
     def to_world(self, s_m: npt.ArrayLike, d_m: npt.ArrayLike) -> F64:
         """(N, 3) x, y, heading of places (s, d), each (N,) or a number."""
-        s, d = np.broadcast_arrays(np.atleast_1d(np.asarray(s_m, dtype=np.float64)), np.asarray(d_m, dtype=np.float64))
-        starts, poses = self._segment_starts
-        index = np.clip(np.searchsorted(starts, s, side="right") - 1, 0, len(starts) - 1)
-        curvature = np.array([segment.curvature_per_m for segment in self.segments])[index]
-        x0, y0, heading0 = poses[index].T
-        along, sideways, turned = _arc(s - starts[index], curvature)
-        x = x0 + along * np.cos(heading0) - sideways * np.sin(heading0)
-        y = y0 + along * np.sin(heading0) + sideways * np.cos(heading0)
-        heading = heading0 + turned
-        return np.column_stack([x - d * np.sin(heading), y + d * np.cos(heading), heading])
+        return self.line.to_world(s_m, d_m)
 
     @cached_property
-    def _segment_starts(self) -> tuple[F64, F64]:
-        """s of each segment's start, and its (x, y, heading)."""
-        starts, poses = [0.0], [(0.0, 0.0, 0.0)]
-        for segment in self.segments[:-1]:
-            x, y, heading = poses[-1]
-            (along,), (sideways,), (turned,) = _arc(np.array([segment.length_m]), np.array([segment.curvature_per_m]))
-            c, s = np.cos(heading), np.sin(heading)
-            poses.append((x + along * c - sideways * s, y + along * s + sideways * c, heading + turned))
-            starts.append(starts[-1] + segment.length_m)
-        return np.array(starts), np.array(poses)
+    def line(self) -> Line:
+        """The reference line."""
+        return Line([arc for segment in self.segments for arc in segment.arcs()])
 
-
-def _arc(length_m: F64, curvature_per_m: F64) -> tuple[F64, F64, F64]:
-    """Metres ahead, metres to the left and the turn after a way along arcs: sin θ/κ and (1 − cos θ)/κ, θ = κ·s.
-
-    Written with sinc, which has no division by zero on a straight."""
-    turned = curvature_per_m * length_m
-    along = length_m * np.sinc(turned / np.pi)
-    sideways = length_m * np.sin(turned / 2) * np.sinc(turned / (2 * np.pi))
-    return along, sideways, turned
+    @cached_property
+    def crossing_lines(self) -> tuple[Line, ...]:
+        """The middle line of each crossing road; s = 0 is where it meets this road's."""
+        lines = []
+        for crossing in self.crossings:
+            x, y, heading = self.to_world(crossing.s_m, 0.0)[0].tolist()
+            lines.append(Line([(_CROSSING_REACH_M, 0.0)], (x, y, heading + float(np.radians(crossing.angle_deg)))))
+        return tuple(lines)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from pipeline.simulation.roads import Road
 from pipeline.simulation.world import World
@@ -21,6 +22,10 @@ RAIL_LOW_M, RAIL_HIGH_M = 0.42, 0.75
 _POST_STEP_M = 25.0
 _GANTRY_STEP_M = 450.0
 SIGN_LOW_M, SIGN_HIGH_M = 5.3, 7.6
+_BY_THE_ROAD = frozenset({"rail", "post", "gantry_leg", "gantry_sign"})
+"""These stand where they do because the road is there; they only make way for crossings."""
+_COURSE_STEP_M = 4.0
+_CORNER_M = 5.0
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,26 @@ def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, .
         *_trees(rng, start_m, end_m, right, left),
         *_buildings(rng, start_m, end_m, right, left),
     ]
-    return tuple(sorted(things, key=lambda thing: thing.s_m))
+    return tuple(sorted(_off_the_road(things, road, start_m, end_m), key=lambda thing: thing.s_m))
+
+
+def _off_the_road(things: list[Thing], road: Road, start_m: float, end_m: float) -> list[Thing]:
+    """Without what a crossing road or another stretch of the same, winding road runs through."""
+    s_m, d_m = np.array([thing.s_m for thing in things]), np.array([thing.d_m for thing in things])
+    places = road.to_world(s_m, d_m)[:, :2]
+    reach_m = np.array([np.hypot(thing.length_m, thing.width_m) / 2 for thing in things])
+    clear = np.ones(len(things), dtype=bool)
+    if not road.line.straight:
+        course = road.to_world(np.arange(start_m - 60.0, end_m + 60.0, _COURSE_STEP_M), 0.0)[:, :2]
+        nearest_m, _ = cKDTree(course).query(places)
+        own_m = np.where(np.array([thing.kind in _BY_THE_ROAD for thing in things]), np.inf, reach_m)
+        widest = max(abs(edge) for pair in road.edges_m() for edge in pair) + road.shoulder_m
+        clear &= (nearest_m > widest + own_m) | np.isinf(own_m)
+    for crossing, line in zip(road.crossings, road.crossing_lines, strict=True):
+        x, y, heading = line.to_world(0.0, 0.0)[0]
+        beside = np.abs((places[:, 1] - y) * np.cos(heading) - (places[:, 0] - x) * np.sin(heading))
+        clear &= beside > crossing.half_width_m() + _CORNER_M + reach_m
+    return [thing for thing, stays in zip(things, clear, strict=True) if stays]
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+from math import ceil
 from pathlib import Path
 
 import yaml
@@ -10,8 +12,10 @@ from pydantic import Field, ValidationError, model_validator
 from pipeline.simulation.actors import Actor, Script
 from pipeline.simulation.lens import ORDINARY, CameraModel
 from pipeline.simulation.roads import Road, Strict
+from pipeline.simulation.routes import CrossingActor, Route, route
 
 _FOLDER = Path(__file__).parent / "scenarios"
+_GAP_STEP_S = 0.01
 
 
 class ScenarioError(ValueError):
@@ -26,13 +30,14 @@ class Ego(Script):
 
 class Scenario(Strict):
     title: str
-    seed: int = Field(0, ge=0)
+    seed: int = Field(default=0, ge=0)
     duration_s: float = Field(gt=0.0, le=3600.0)
-    rate_hz: float = Field(10.0, ge=1.0, le=20.0)
+    rate_hz: float = Field(default=10.0, ge=1.0, le=20.0)
     road: Road
     camera: CameraModel = ORDINARY
     ego: Ego
     actors: tuple[Actor, ...] = ()
+    crossing_actors: tuple[CrossingActor, ...] = ()
 
     @model_validator(mode="after")
     def _lanes_and_ids(self) -> Scenario:
@@ -41,13 +46,40 @@ class Scenario(Strict):
                 self.road.lane_offset_m(lane)
         if self.ego.lane > 0:
             raise ValueError("the ego vehicle must drive along the road, on a lane below 0")
-        ids = [actor.id for actor in self.actors]
+        if any(script.brake is not None and script.brake.at_s is None for script in (self.ego, *self.crossing_actors)):
+            raise ValueError("only vehicles on the ego vehicle's road can brake at_gap_m; give at_s")
+        ids = [actor.id for actor in (*self.actors, *self.crossing_actors)]
         if len(set(ids)) != len(ids):
             raise ValueError("two actors have the same id")
+        for actor in self.crossing_actors:
+            route(actor, self.road)
         return self
 
     def frame_count(self) -> int:
         return max(1, round(self.duration_s * self.rate_hz))
+
+    @cached_property
+    def cast(self) -> tuple[Actor, ...]:
+        """The actors on the road, every gap at which one brakes turned into the time when the drive reaches it."""
+        return tuple(_timed(self, actor) for actor in self.actors)
+
+    @cached_property
+    def routes(self) -> tuple[Route, ...]:
+        """The ways of ``crossing_actors``."""
+        return tuple(route(actor, self.road) for actor in self.crossing_actors)
+
+
+def _timed(scenario: Scenario, actor: Actor) -> Actor:
+    if actor.brake is None or actor.brake.at_gap_m is None:
+        return actor
+    road, ego, wanted = scenario.road, scenario.ego, actor.brake.at_gap_m
+    own_d_m, half = road.lane_offset_m(ego.lane) + ego.offset_m, actor.size()[0] / 2
+    for step in range(ceil(scenario.duration_s / _GAP_STEP_S)):
+        t_s = step * _GAP_STEP_S
+        own_m = road.line.advance(ego.start_m, ego.travelled_m(t_s), own_d_m)
+        if actor.place_m(road, ego.start_m, actor.travelled_m(t_s)) - half - own_m <= wanted:
+            return actor.model_copy(update={"brake": actor.brake.model_copy(update={"at_s": t_s, "at_gap_m": None})})
+    return actor
 
 
 def names() -> tuple[str, ...]:

@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 
 from pipeline.simulation.canvas import Canvas
-from pipeline.simulation.roads import Road
+from pipeline.simulation.lines import Line
+from pipeline.simulation.roads import Crossing, Road
 from pipeline.simulation.world import LIDAR_HEIGHT_M, World
 from pipeline.types import F64
 
@@ -22,23 +23,64 @@ _MARK_M, _EDGE_M, _INNER_SHOULDER_M = 0.15, 0.28, 0.5
 _WHEELS_M, _TRACK_M = 0.78, 0.48
 
 
+_CORNER_M = 4.0  # from the edge of the crossing road to where markings go on: room for the corners' curbs
+_CROSSING_SEEN_M = 120.0
+_STOP_LINE_M = 0.5
+_NO_MEDIAN_M = 0.6
+
 _Strip = tuple[F64, F64, F64]
-"""A polygon on the road: s and d of its corners, and its colour."""
+"""A polygon beside a line: s and d of its corners, and its colour."""
 
 
 def paint_ground(canvas: Canvas, road: Road, world: World, horizon: int) -> None:
-    """Grass, carriageways and their markings."""
+    """Grass, carriageways and their markings, crossing roads and theirs."""
     cv2.rectangle(canvas.bgr, (0, horizon), (canvas.bgr.shape[1], canvas.bgr.shape[0]), _GRASS, cv2.FILLED)
     far = world.s_m + np.concatenate([np.arange(-_BEHIND_M, 60.0, 5.0), np.geomspace(60.0, _AHEAD_M, 16)])
-    strips = [*_carriageways(road, far), *_wheel_tracks(road, far[far < world.s_m + _WORN_AHEAD_M])]
-    for right, left in road.edges_m():
-        strips += [_strip(far, edge - _EDGE_M / 2, edge + _EDGE_M / 2, _WHITE) for edge in (right + 0.25, left - 0.25)]
-        for line in range(1, round((left - right) / road.lane_width_m)):
-            strips += _dashes(world, right + line * road.lane_width_m)
+    crossings = [
+        (crossing, line)
+        for crossing, line in zip(road.crossings, road.crossing_lines, strict=True)
+        if -_CROSSING_SEEN_M < crossing.s_m - world.s_m < _AHEAD_M
+    ]
+    open_m = [_junction(crossing, road) for crossing, _ in crossings]
+    _add(canvas, world, road.line, [*_carriageways(road, far), *_wheel_tracks(road, far[far < far[0] + _WORN_AHEAD_M])])
+    for crossing, line in crossings:
+        _add(canvas, world, line, _crossing(crossing, road))
+    _add(canvas, world, road.line, [*_edge_lines(road, far, open_m), *_lane_lines(road, world, open_m)])
+
+
+def _add(canvas: Canvas, world: World, line: Line, strips: list[_Strip]) -> None:
+    """Hand strips beside a line to the canvas."""
     s, d = (np.concatenate([strip[i] for strip in strips]) for i in (0, 1))
-    flat = world.to_ego(road.to_world(s, d))
+    flat = world.to_ego(line.to_world(s, d))
     counts, colours = np.array([len(strip[0]) for strip in strips]), np.array([strip[2] for strip in strips])
     canvas.add(np.column_stack([flat, np.full(len(flat), -LIDAR_HEIGHT_M)]), counts, colours)
+
+
+def _junction(crossing: Crossing, road: Road) -> tuple[float, float]:
+    """From where to where along the road its markings leave room for a crossing."""
+    turn = np.radians(crossing.angle_deg)
+    widest = max(abs(edge) for pair in road.edges_m() for edge in pair)
+    half = crossing.half_width_m() / np.sin(turn) + widest / abs(np.tan(turn)) + _CORNER_M
+    return crossing.s_m - float(half), crossing.s_m + float(half)
+
+
+def _crossing(crossing: Crossing, road: Road) -> list[_Strip]:
+    """The crossing road: its asphalt, a corner's worth of it along the main road, and its own markings."""
+    half, turn = crossing.half_width_m(), np.radians(crossing.angle_deg)
+    edges = [edge for pair in road.edges_m() for edge in pair]
+    room = half / abs(np.tan(turn)) + road.shoulder_m + _CORNER_M
+    near, far = max(edges) / np.sin(turn) + room, -min(edges) / np.sin(turn) + room
+    reach = np.array([-_CROSSING_SEEN_M, -far, near, _CROSSING_SEEN_M])
+    wide = np.array([half, half + _CORNER_M, half + _CORNER_M, half])
+    strips: list[_Strip] = [(np.concatenate([reach, reach[::-1]]), np.concatenate([-wide, wide[::-1]]), _ASPHALT)]
+    for start, end, stop_side in ((-_CROSSING_SEEN_M, -far, -1.0), (near, _CROSSING_SEEN_M, 1.0)):
+        ends = np.array([start, end])
+        strips += [_strip(ends, edge - _MARK_M / 2, edge + _MARK_M / 2, _WHITE) for edge in (0.2 - half, half - 0.2)]
+        strips.append(_strip(ends, -_MARK_M / 2, _MARK_M / 2, _WHITE))
+        stop = end if stop_side < 0 else start
+        right, left = sorted((0.0, stop_side * half))
+        strips.append(_strip(stop + np.array([-_STOP_LINE_M / 2, _STOP_LINE_M / 2]), right, left, _WHITE))
+    return strips
 
 
 def _carriageways(road: Road, s_m: F64) -> list[_Strip]:
@@ -57,11 +99,39 @@ def _wheel_tracks(road: Road, s_m: F64) -> list[_Strip]:
     return [_strip(s_m, middle - _TRACK_M / 2, middle + _TRACK_M / 2, _WORN) for middle in middles]
 
 
-def _dashes(world: World, d_m: float) -> list[_Strip]:
+def _edge_lines(road: Road, s_m: F64, open_m: list[tuple[float, float]]) -> list[_Strip]:
+    """Solid lines along both sides of each carriageway, open at junctions; none where two meet without a median."""
+    pairs = [(right + 0.25, left - 0.25) for right, left in road.edges_m()]
+    edges = [edge for pair in pairs for edge in pair if not (_undivided(road) and abs(edge) < _NO_MEDIAN_M)]
+    return [
+        _strip(part, edge - _EDGE_M / 2, edge + _EDGE_M / 2, _WHITE) for part in _without(s_m, open_m) for edge in edges
+    ]
+
+
+def _lane_lines(road: Road, world: World, open_m: list[tuple[float, float]]) -> list[_Strip]:
+    """Dashes between lanes of one direction, and between directions where no median divides them."""
     period = _DASH_M + _GAP_M
     first = np.floor((world.s_m - _BEHIND_M) / period) * period
     starts = np.arange(first, world.s_m + _DASHES_AHEAD_M, period)
-    return [_strip(start + _DASH_ENDS, d_m - _MARK_M / 2, d_m + _MARK_M / 2, _WHITE) for start in starts]
+    free = [start for start in starts if not any(low < start + _DASH_M and start < high for low, high in open_m)]
+    lines = [0.0] if _undivided(road) else []
+    for right, left in road.edges_m():
+        lines += list(right + road.lane_width_m * np.arange(1, round((left - right) / road.lane_width_m)))
+    return [_strip(start + _DASH_ENDS, d - _MARK_M / 2, d + _MARK_M / 2, _WHITE) for d in lines for start in free]
+
+
+def _undivided(road: Road) -> bool:
+    return road.lanes_oncoming > 0 and road.median_m < _NO_MEDIAN_M
+
+
+def _without(s_m: F64, open_m: list[tuple[float, float]]) -> list[F64]:
+    """A rising row of places cut into the stretches outside the open intervals."""
+    parts, start = [], float(s_m[0])
+    for low, high in sorted(open_m):
+        parts.append((start, low))
+        start = max(start, high)
+    parts.append((start, float(s_m[-1])))
+    return [np.array([a, *s_m[(s_m > a) & (s_m < b)], b]) for a, b in parts if b > a]
 
 
 def _strip(s_m: F64, right_m: float, left_m: float, bgr: F64) -> _Strip:

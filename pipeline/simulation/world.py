@@ -11,7 +11,8 @@ from math import atan2, hypot, pi, remainder
 import numpy as np
 
 from pipeline.geometry import Cuboid
-from pipeline.simulation.actors import Actor, Motion, motion
+from pipeline.simulation.actors import Motion, Vehicle, motion
+from pipeline.simulation.roads import Road
 from pipeline.simulation.scenario import Scenario
 from pipeline.types import F64
 
@@ -21,12 +22,14 @@ _BRAKING_MPS2 = -0.4
 
 @dataclass(frozen=True)
 class ActorState:
-    """An actor at one moment, in the ego frame; braking: its brake lights are on."""
+    """An actor at one moment, in the ego frame. speed_mps: over ground, the way it points. braking: its brake lights
+    are on. yaw_rate_radps: of its own turning in the world."""
 
-    actor: Actor
+    actor: Vehicle
     cuboid: Cuboid
     speed_mps: float
     braking: bool
+    yaw_rate_radps: float
 
 
 @dataclass(frozen=True)
@@ -54,39 +57,56 @@ def at(scenario: Scenario, t_s: float, ego: Motion | None = None) -> World:
     that says (closed loop), else as its script says. The others follow their scripts either way."""
     road = scenario.road
     own = ego if ego is not None else motion(scenario.ego, road, t_s)
-    s_m = scenario.ego.start_m + own.travelled_m
-    x, y, road_heading = road.to_world(s_m, own.d_m)[0]
-    heading = road_heading + _drift_rad(own)
-    curvature = road.curvature_per_m(s_m)
-    yaw_rate = own.speed_mps * curvature / (1.0 - curvature * own.d_m) + own.d_accel_mps2 / max(own.speed_mps, 0.1)
-    world = World(t_s, (float(x), float(y), float(heading)), s_m, own.d_m, own.speed_mps, float(yaw_rate), ())
-    return replace(world, actors=_actor_states(scenario, world))
+    lane_d_m = road.lane_offset_m(scenario.ego.lane) + scenario.ego.offset_m
+    s_m = road.line.advance(scenario.ego.start_m, own.travelled_m, lane_d_m)
+    x, y, road_heading = road.to_world(s_m, own.d_m)[0].tolist()
+    pose = (x, y, road_heading + _drift_rad(own))
+    world = World(t_s, pose, s_m, own.d_m, own.speed_mps, _yaw_rate(own, road, s_m, 1.0), ())
+    states = [*_on_the_road(scenario, world), *_crossing(scenario, world)]
+    return replace(world, actors=tuple(sorted(states, key=lambda s: (-hypot(*s.cuboid.center[:2]), s.actor.id))))
 
 
-def _actor_states(scenario: Scenario, world: World) -> tuple[ActorState, ...]:
-    actors = scenario.actors
-    motions = [motion(actor, scenario.road, world.t_s) for actor in actors]
-    s_m = [_place_m(scenario, actor, now) for actor, now in zip(actors, motions, strict=True)]
-    poses = scenario.road.to_world(np.array(s_m), np.array([now.d_m for now in motions]))
-    places = world.to_ego(poses)
+def _on_the_road(scenario: Scenario, world: World) -> list[ActorState]:
+    """Those that keep to lanes. A vehicle that drives against the road is turned by half a circle, and its drift to the
+    road's left is one to its driver's right."""
+    road, actors = scenario.road, scenario.cast
+    if not actors:
+        return []
+    motions = [motion(actor, road, world.t_s) for actor in actors]
+    start_m = scenario.ego.start_m
+    s_m = [actor.place_m(road, start_m, now.travelled_m) for actor, now in zip(actors, motions, strict=True)]
+    poses = road.to_world(np.array(s_m), np.array([now.d_m for now in motions]))
     states = []
-    for actor, now, (x, y), heading in zip(actors, motions, places.tolist(), poses[:, 2].tolist(), strict=True):
-        length, width, height = actor.size()
-        yaw = heading - world.pose[2] + _direction(actor) * _drift_rad(now) + (pi if actor.lane > 0 else 0.0)
-        cuboid = Cuboid((x, y, height / 2 - LIDAR_HEIGHT_M), (length, width, height), remainder(yaw, 2 * pi))
-        states.append(ActorState(actor, cuboid, now.speed_mps, now.accel_mps2 < _BRAKING_MPS2))
-    return tuple(sorted(states, key=lambda state: (-hypot(*state.cuboid.center[:2]), state.actor.id)))
+    for actor, now, s, pose in zip(actors, motions, s_m, poses, strict=True):
+        way = actor.direction()
+        pose[2] += way * _drift_rad(now) + (pi if way < 0.0 else 0.0)
+        states.append(_state(world, actor, pose, now.speed_mps, now.accel_mps2, _yaw_rate(now, road, s, way)))
+    return states
 
 
-def _place_m(scenario: Scenario, actor: Actor, now: Motion) -> float:
-    """s of an actor's middle: ``ahead_m`` is to the face that is nearest at time 0."""
-    half = actor.size()[0] / 2 if actor.ahead_m >= 0.0 else -actor.size()[0] / 2
-    return scenario.ego.start_m + actor.ahead_m + half + _direction(actor) * now.travelled_m
+def _crossing(scenario: Scenario, world: World) -> list[ActorState]:
+    """Those that come over a crossing."""
+    states = []
+    for actor, way in zip(scenario.crossing_actors, scenario.routes, strict=True):
+        s_m = way.arrival_m + actor.travelled_m(world.t_s) - actor.travelled_m(actor.arrive_s)
+        speed, accel = actor.speed_and_accel(world.t_s)
+        states.append(_state(world, actor, way.line.to_world(s_m, 0.0)[0], speed, accel, way.bend(s_m) * speed))
+    return states
 
 
-def _direction(actor: Actor) -> float:
-    """+1 along the road, −1 against it. Against it, a drift to the road's left is one to the driver's right."""
-    return -1.0 if actor.lane > 0 else 1.0
+def _state(world: World, actor: Vehicle, pose: F64, speed_mps: float, accel_mps2: float, yaw_rate: float) -> ActorState:
+    """An actor that stands at a pose in the world, as the ego vehicle sees it."""
+    length, width, height = actor.size()
+    x, y = world.to_ego(pose[None])[0].tolist()
+    yaw = remainder(float(pose[2]) - world.pose[2], 2 * pi)
+    cuboid = Cuboid((x, y, height / 2 - LIDAR_HEIGHT_M), (length, width, height), yaw)
+    return ActorState(actor, cuboid, speed_mps, accel_mps2 < _BRAKING_MPS2, yaw_rate)
+
+
+def _yaw_rate(now: Motion, road: Road, s_m: float, way: float) -> float:
+    """Of something on the road at s; way: +1 along it, −1 against it."""
+    bend = road.curvature_per_m(s_m)
+    return way * (now.speed_mps * bend / (1.0 - bend * now.d_m) + now.d_accel_mps2 / max(now.speed_mps, 0.1))
 
 
 def _drift_rad(now: Motion) -> float:

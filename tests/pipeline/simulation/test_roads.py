@@ -53,3 +53,48 @@ def test_lanes_are_counted_from_the_median() -> None:
 
 def test_curvature_by_place() -> None:
     assert [ROAD.curvature_per_m(s) for s in (-10.0, 50.0, 150.0, 320.0, 9999.0)] == [0.0, 0.0, 0.01, 0.0, 0.0]
+
+
+def test_a_radius_stands_for_a_curvature() -> None:
+    assert Segment.model_validate({"length_m": 10, "radius_m": -250}).curvature_per_m == pytest.approx(-0.004)
+    for wrong in ({"radius_m": 3}, {"radius_m": "wide"}, {"radius_m": 50, "curvature_per_m": 0.02}):
+        with pytest.raises(ValueError, match="radius_m"):
+            Segment.model_validate({"length_m": 10, **wrong})
+
+
+def test_a_transition_bends_evenly() -> None:
+    """A clothoid: heading κ₁s²/2L, and its end against the integral."""
+    road = Road(
+        segments=(Segment(length_m=50.0, end_curvature_per_m=0.02), Segment(length_m=9.0, curvature_per_m=0.02))
+    )
+    assert road.curvature_per_m(25.0) == pytest.approx(0.01)
+    assert road.curvature_per_m(50.0) == pytest.approx(0.02)
+    s = np.linspace(0.0, 50.0, 200_001)
+    heading = 0.02 * s**2 / 100.0
+    x, y, turned = road.to_world(50.0, 0.0)[0]
+    assert turned == pytest.approx(heading[-1])
+    assert (x, y) == (
+        pytest.approx(np.trapezoid(np.cos(heading), s), abs=1e-3),
+        pytest.approx(np.trapezoid(np.sin(heading), s), abs=1e-3),
+    )
+
+
+def test_a_road_too_wide_for_its_bend_is_refused() -> None:
+    with pytest.raises(ValueError, match="too tight"):
+        Road.model_validate({"segments": [{"length_m": 10, "radius_m": 12}]})
+
+
+@pytest.mark.parametrize("d", [-6.0, 0.0, 6.0])
+def test_a_way_driven_is_as_long_as_the_line_beside_the_road(d: float) -> None:
+    end = ROAD.line.advance(10.0, 300.0, d)
+    course = ROAD.to_world(np.linspace(10.0, end, 20_001), d)
+    assert np.hypot(*np.diff(course[:, :2], axis=0).T).sum() == pytest.approx(300.0, rel=1e-6)
+    assert ROAD.line.advance(end, -300.0, d) == pytest.approx(10.0)
+
+
+def test_a_changed_copy_forgets_the_old_course_and_is_checked() -> None:
+    assert ROAD.line.advance(0.0, 10.0, 0.0) == 10.0
+    straight = ROAD.model_copy(update={"segments": ({"length_m": 500.0},)})
+    assert straight.to_world(300.0, 0.0)[0, 1] == 0.0
+    with pytest.raises(ValueError, match="lanes_forward"):
+        ROAD.model_copy(update={"lanes_forward": 0})

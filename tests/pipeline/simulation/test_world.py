@@ -75,3 +75,40 @@ def test_a_given_ego_motion_replaces_the_script_and_leaves_the_others_to_theirs(
     assert braked.speed_mps == 10.0
     assert braked.actors[0].cuboid.center[0] - scripted.actors[0].cuboid.center[0] == pytest.approx(10.0)
     assert braked.actors[0].speed_mps == 20.0
+
+
+def test_braking_at_a_gap_starts_when_the_gap_is_that() -> None:
+    lead = "{id: 1, kind: car, lane: -2, ahead_m: 50, speed_mps: {0: 15}, brake: {at_gap_m: 40, decel_mps2: 6}}"
+    scene = with_actors(lead)
+    gaps = {}
+    for t in np.arange(1.5, 2.6, 0.01):
+        lead_now = world.at(scene, float(t)).actors[0]
+        gaps[round(float(t), 2)] = (lead_now.cuboid.center[0] - lead_now.cuboid.size[0] / 2, lead_now.speed_mps)
+    assert gaps[1.99][1] == 15.0
+    assert gaps[2.0][0] == pytest.approx(40.0, abs=0.1)  # 20 m/s onto 15 m/s: 10 m nearer after 2 s
+    assert gaps[2.5][1] == pytest.approx(12.0, abs=0.1)
+
+
+@pytest.mark.parametrize("lane", [-1, -3])
+def test_ground_covered_is_the_speed_in_a_bend_too(lane: int) -> None:
+    """On the inner lane of a bend a car that drives 20 m/s covers 20 m of its own lane a second."""
+    scene = with_actors(segments="{length_m: 900, radius_m: 60}", lane=lane)
+    here, there = world.at(scene, 3.0), world.at(scene, 3.01)
+    assert np.hypot(there.pose[0] - here.pose[0], there.pose[1] - here.pose[1]) == pytest.approx(0.2, rel=1e-4)
+    assert here.speed_mps == 20.0
+
+
+def test_an_actors_yaw_rate_is_what_its_heading_does() -> None:
+    changing = "lane_changes: [{start_s: 0, duration_s: 4, lane: -2}]"
+    along = f"{{id: 1, kind: car, lane: -1, ahead_m: 20, speed_mps: {{0: 20}}, {changing}}}"
+    actors = along + ", {id: 2, kind: car, lane: 1, ahead_m: 90, speed_mps: {0: 15}}"
+    scene = with_actors(actors, segments="{length_m: 900, radius_m: 100}")
+
+    def headings(t_s: float) -> dict[int, float]:
+        now = world.at(scene, t_s)
+        return {state.actor.id: state.cuboid.yaw_rad + now.pose[2] for state in now.actors}
+
+    before, after = headings(1.0), headings(1.02)
+    for state in world.at(scene, 1.01).actors:
+        turned = np.remainder(after[state.actor.id] - before[state.actor.id] + np.pi, 2 * np.pi) - np.pi
+        assert turned / 0.02 == pytest.approx(state.yaw_rate_radps, rel=0.03)
