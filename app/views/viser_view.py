@@ -100,7 +100,7 @@ class ViserView:
 
     def _add_display_options(self) -> None:
         gui, start = self._server.gui, self._display
-        with gui.add_folder("Display"):
+        with gui.add_folder("Display", expand_by_default=False):
             color_by = gui.add_dropdown("Colour by", get_args(scene.ColorBy), initial_value=start.color_by)
             size = gui.add_slider("Point size (m)", 0.02, 0.4, 0.01, start.point_size_m)
             labels = gui.add_dropdown("Labels", _LABELS, initial_value=start.labels)

@@ -133,8 +133,8 @@ def test_parameters_set_from_outside_reach_browsers_and_nobody_is_told(
 def test_a_parameter_that_may_be_null_has_a_switch(view: ViserView, changes: Changes, open_scene: Any) -> None:
     client = open_scene(view.port)
     client.read_present_state()
-    (switch,) = client.inputs("H res deg (°/px) auto")
-    (slider,) = client.inputs("H res deg (°/px)")
+    (switch,) = client.inputs("H res (°/px) auto")
+    (slider,) = client.inputs("H res (°/px)")
     assert (switch["value"], slider["props"]["disabled"]) == (True, True)
     client.move(slider["uuid"], 0.05)
     assert changes.get(timeout=20) == ("alignment.h_res_deg", 0.05)
