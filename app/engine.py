@@ -17,8 +17,8 @@ from app.line import DetectionCache, Detects, Line, Tick
 from app.playback import PlaybackClock
 from app.snapshot import Notice, Snapshot
 from pipeline.params import Params
-from pipeline.run import Sensors
-from pipeline.sources.base import Source, SourceError
+from pipeline.run import Sensors, picture_size
+from pipeline.sources.base import Source, SourceError, is_simulated
 from pipeline.step import warm_up
 from pipeline.vision.detector import DetectorError, DetectorMissing
 
@@ -28,13 +28,13 @@ _PATIENCE_S = 10.0
 """A read that hangs must not keep the program from ending; the worker is a daemon."""
 
 OpenSource = Callable[[str], Source]
-OpenDetector = Callable[[tuple[int, int] | None], Detects]
+OpenDetector = Callable[[Source], Detects]
 Listener = Callable[[Snapshot], None]
 
 
 class Engine:
-    """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` takes the picture's
-    (width, height); null runs without a camera's detector and says nothing about it."""
+    """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
+    one for a source's pictures; null runs without a camera's detector and says nothing about it."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class Engine:
         self._open_detector = open_detector
         self._sensors: Sensors = sensors
         self._detections = DetectionCache()
-        self._detectors: dict[tuple[int, int] | None, Detects] = {}
+        self._detectors: dict[tuple[bool, tuple[int, int] | None], Detects] = {}
         self._line: Line | None = None
         self._clock: PlaybackClock | None = None
         self._skipped = 0
@@ -193,18 +193,19 @@ class Engine:
         return True
 
     def _detector_for(self, source: Source, notices: list[Notice]) -> Detects | None:
-        """The detector for the source's picture size; where there is none, LiDAR goes on alone and a notice says so."""
+        """The detector for the source's pictures; where there is none, LiDAR goes on alone and a notice says so."""
         if self._open_detector is None:
             return None
-        picture = source.frame(0).picture
-        size = (picture.bgr.shape[1], picture.bgr.shape[0]) if picture is not None else None
+        kind = (is_simulated(source), picture_size(source))
         try:
-            if size not in self._detectors:
-                self._detectors[size] = self._open_detector(size)
+            if kind not in self._detectors:
+                self._detectors[kind] = self._open_detector(source)
         except (DetectorMissing, DetectorError) as error:
             notices.append(Notice("warning", f"{error} LiDAR goes on alone."))
             return None
-        return self._detectors[size]
+        detector = self._detectors[kind]
+        notices += [Notice("warning", note) for note in detector.notes]
+        return detector
 
     # ------------------------------------------------------------ showing
 

@@ -26,10 +26,13 @@ _CACHED_BOXES = 4096
 
 
 class Detects(Protocol):
-    """What the line needs of a detector."""
+    """What the line needs of a detector. notes: what a person should know about it."""
 
     @property
     def name(self) -> str: ...
+
+    @property
+    def notes(self) -> tuple[str, ...]: ...
 
     def detect(self, bgr: U8) -> RawBoxes: ...
 

@@ -11,9 +11,10 @@ import tyro
 import yaml
 
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
+from pipeline.run import detector_for
 from pipeline.sources import open_source
 from pipeline.sources.base import Source
-from pipeline.vision.detector import Detector, DetectorMissing, open_detector
+from pipeline.vision.detector import Detector, DetectorMissing
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ class LineOptions:
     set: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME=VALUE")] = ()
     """Change one parameter, e.g. cluster.z_weight=0.4 (repeatable; `cipv params` lists them)"""
     detector: str | None = None
-    """Name or path of an ONNX detector; else the registered default, then $CIPV_DATA/models"""
+    """Name or path of an ONNX detector; else the registered default, then $CIPV_DATA/models, then the
+    embedded one, which knows simulated cars only and is the default for sim:"""
 
     def parameters(self) -> Params:
         """preset, then --params, then each --set. ParamsError names the first that is wrong."""
@@ -60,20 +62,15 @@ class LineOptions:
         return with_changes(params, changes)
 
     def open_detector(self, source: Source) -> Detector | None:
-        """The detector, its input fitted to the source's pictures. A named one that is missing is an error; when none
-        is installed, a sentence says so and LiDAR goes on alone."""
+        """The detector for the source's pictures, with what there is to say about it. A named one that is missing is
+        an error; when none is to be had, a sentence says so and LiDAR goes on alone."""
         try:
-            return open_detector(self.detector, source_picture_size(source))
+            detector = detector_for(source, self.detector)
         except DetectorMissing as missing:
             if self.detector is not None:
                 raise
             print(f"cipv: {missing}", file=sys.stderr)
             return None
-
-
-def source_picture_size(source: Source) -> tuple[int, int] | None:
-    """(width, height) of the source's pictures, from its first frame; null without picture and calibration."""
-    frame = source.frame(0)
-    if frame.picture is not None:
-        return frame.picture.bgr.shape[1], frame.picture.bgr.shape[0]
-    return (frame.camera.width, frame.camera.height) if frame.camera is not None else None
+        for note in detector.notes:
+            print(f"cipv: {note}", file=sys.stderr)
+        return detector

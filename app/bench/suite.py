@@ -10,11 +10,11 @@ from app.bench import detector as detector_bench
 from app.bench import lidar as lidar_bench
 from app.bench import line as line_bench
 from app.catalog import recordings
-from app.options import source_picture_size
 from pipeline.params import Params
+from pipeline.run import detector_for
 from pipeline.sources import open_source
 from pipeline.sources.base import Source
-from pipeline.vision.detector import Detector, DetectorMissing, open_detector
+from pipeline.vision.detector import Detector, DetectorMissing
 
 BUDGET_S = {"lidar": 14.0, "line": 9.0, "detector": 4.0}
 """Wall time of each part; together with loading and compiling they stay below 45 s."""
@@ -44,7 +44,7 @@ def _source() -> Source:
 
 def _detector(spec: str | None, source: Source) -> Detector | None:
     try:
-        return open_detector(spec, source_picture_size(source))
+        return detector_for(source, spec)
     except DetectorMissing as missing:
         if spec is not None:
             raise

@@ -12,9 +12,9 @@ import yaml
 from rich.console import Console
 from rich.table import Table
 
-from app.options import LineOptions, SourceOptions, source_picture_size
+from app.options import LineOptions, SourceOptions
 from pipeline.calibration.distance import as_overrides, collect_pairs, fit_laws
-from pipeline.vision.detector import open_detector
+from pipeline.run import detector_for
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Calibrate:
     def __call__(self) -> int:
         params = self.line.parameters()
         source = self.source.open()
-        detector = open_detector(self.line.detector, source_picture_size(source))
+        detector = detector_for(source, self.line.detector)
         pairs = collect_pairs(source, detector, self.truth, params)
         fits = fit_laws(pairs, None if self.free_exponent else -1.0)
         if self.json:

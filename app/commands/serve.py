@@ -13,8 +13,8 @@ from app.engine import Engine
 from app.options import LineOptions
 from app.scene_feed import SceneFeed
 from app.server import DEFAULT_PORT, serve
+from pipeline.run import detector_for
 from pipeline.sources import open_source
-from pipeline.vision.detector import open_detector
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Serve:
         open_source(self.source, rings=self.rings)  # a typing mistake is said here, not on the page
         engine = Engine(
             lambda uri: open_source(uri, rings=self.rings),
-            lambda size: open_detector(self.line.detector, size),
+            lambda source: detector_for(source, self.line.detector),
             params,
             preset=self.line.preset,
             uri=self.source,

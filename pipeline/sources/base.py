@@ -49,3 +49,8 @@ class Source(Protocol):
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
         """The labelled objects, empty when the frame is labelled and holds none; null when it is not labelled."""
         ...
+
+
+def is_simulated(source: Source) -> bool:
+    """Whether its pictures are drawn, which a detector may have to know."""
+    return source.uri.startswith("sim:")

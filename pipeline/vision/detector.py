@@ -27,6 +27,9 @@ PADDING = 114
 """Grey that fills what the picture leaves of the input, as the YOLO family is trained."""
 _FREE_SIZE: Size = (384, 640)
 """Input of a graph of free size when no picture is known yet: 16:9."""
+_SIMULATED_ONLY = (
+    "using the embedded detector, which knows simulated cars only; pull a real one with `cipv models pull yolox_nano`"
+)
 _PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
 
 
@@ -94,28 +97,30 @@ def open_detector(
     threads: int = 2,
     input_size: Size | None = None,
 ) -> Detector:
-    """Load a network by name or path; null: the default one (``pipeline.vision.models``).
+    """Load a network by name or path; null: the default one (``pipeline.vision.models``), with a note when that is the
+    embedded one.
 
     picture_size (width, height): the input is given the picture's aspect where the graph permits. input_size (height,
     width), multiples of 32: that size instead, or DetectorError. DetectorMissing when there is no file, DetectorError
     when the file is no YOLO network that can be run.
     """
     path = _locate(spec)
+    notes = (_SIMULATED_ONLY,) if spec is None and path == models.find(models.EMBEDDED) else ()
     model = _read(path)
     own = _own_size(model, path)
     if input_size is not None:
         if min(input_size) < MULTIPLE or any(side % MULTIPLE for side in input_size):
             raise DetectorError(f"an input size is two multiples of {MULTIPLE}, not {input_size[1]}×{input_size[0]}")
-        return _at_size(model, path, own, input_size, threads)
+        return _at_size(model, path, own, input_size, threads, notes)
     wanted = fitting_size(picture_size, own) if picture_size else own or _FREE_SIZE
     try:
-        return _at_size(model, path, own, wanted, threads)
+        return _at_size(model, path, own, wanted, threads, notes)
     except DetectorError as error:
         if own is None or wanted == own:
             raise
         refusal = str(error)
     note = f"{path.name} works only at its own input size {own[1]}×{own[0]} (at {wanted[1]}×{wanted[0]}: {refusal})"
-    return _at_size(model, path, own, own, threads, (note,))
+    return _at_size(model, path, own, own, threads, (*notes, note))
 
 
 def _locate(spec: str | None) -> Path:

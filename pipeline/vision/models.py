@@ -1,7 +1,8 @@
 """Networks by name: which ones are known, where their official files are, and the folder that keeps them.
 
 The folder is ``~/.cache/cipv/models`` (``CIPV_HOME`` replaces ``~/.cache/cipv``). A network is chosen by name or path;
-without either it is the registered default, then the first known one found in the folder or in ``$CIPV_DATA/models``.
+without either it is the registered default, then the first known one found in the folder or in ``$CIPV_DATA/models``,
+then the embedded one, which is part of the program and knows simulated vehicles only.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ Task = Literal["detector", "lanes"]
 Progress = Callable[[int, int], None]
 """Called with bytes done and bytes in all."""
 
+EMBEDDED = "embedded"
+"""Name of the detector that comes with the program."""
+_EMBEDDED_FILE = Path(__file__).parent / "embedded" / "simulated_vehicles.onnx"
 _CHUNK = 1 << 16
 _TIMEOUT_S = 30.0
 
@@ -95,7 +99,7 @@ def data_models() -> Path:
 
 
 def list_models() -> tuple[ModelEntry, ...]:
-    """Known networks in their order, then registered ones by name."""
+    """Known networks in their order, the embedded one, then registered ones by name."""
     registry = _read_registry()
     defaults = {task: default_model(task) for task in ("detector", "lanes")}
     entries = []
@@ -106,6 +110,9 @@ def list_models() -> tuple[ModelEntry, ...]:
                 known.name, known.task, path, _same(path, defaults[known.task]), known.licence, known.url, known.note
             )
         )
+    own = _located(EMBEDDED)
+    note = "part of the program: simulated vehicles only, 0.5 M parameters"
+    entries.append(ModelEntry(EMBEDDED, "detector", own, _same(own, defaults["detector"]), None, None, note))
     known_names = {known.name for known in KNOWN}
     for name, row in sorted(registry["models"].items()):
         if name not in known_names:
@@ -129,6 +136,7 @@ def default_model(task: Task) -> Path | None:
     chosen = _read_registry()["defaults"].get(task)
     names = [chosen] if chosen else []
     names += [known.name for known in KNOWN if known.task == task]
+    names += [EMBEDDED] if task == "detector" else []
     found = (_located(name) for name in names)
     return next((path for path in found if path is not None), None)
 
@@ -137,6 +145,8 @@ def register(path: Path, name: str, task: Task = "detector", default: bool = Tru
     """Copy a file into the folder under ``name`` and, unless told otherwise, make it its task's default."""
     if not _is_name(name):
         raise ModelError(f"{name!r} cannot be a network's name: use letters, digits, '-', '_' and '.'")
+    if name == EMBEDDED:
+        raise ModelError(f"{EMBEDDED!r} is the detector that comes with the program: use another name")
     if not path.is_file():
         raise ModelError(f"no file at {path}")
     target = store() / f"{name}.onnx"
@@ -221,6 +231,8 @@ def _by_hand(known: KnownModel) -> str:
 
 
 def _located(name: str) -> Path | None:
+    if name == EMBEDDED:
+        return _EMBEDDED_FILE
     candidates = (folder / f"{name}.onnx" for folder in (store(), data_models()))
     return next((path for path in candidates if path.is_file()), None)
 

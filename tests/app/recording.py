@@ -22,6 +22,7 @@ class CountingDetector:
     """Finds the drawn car, and counts how often it was asked: where no network runs, a call is what matters."""
 
     name: str = "counting"
+    notes: tuple[str, ...] = ()
     calls: int = 0
 
     def detect(self, bgr: U8) -> RawBoxes:

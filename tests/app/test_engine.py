@@ -13,6 +13,7 @@ from app.line import WARM_UP_FRAMES, DetectionCache, Line
 from app.snapshot import Snapshot
 from pipeline.params import Params, with_changes
 from pipeline.results import to_json
+from pipeline.sources.base import Source
 from pipeline.step import State, step
 from pipeline.types import Result
 from pipeline.vision.detector import DetectorMissing
@@ -217,7 +218,7 @@ def test_a_frame_that_cannot_be_read_is_said_and_the_worker_goes_on(start: Start
 
 
 def test_without_a_detector_lidar_goes_on_alone_and_the_page_is_told_the_remedy():
-    def missing(_: tuple[int, int] | None) -> CountingDetector:
+    def missing(_: Source) -> CountingDetector:
         raise DetectorMissing("No detector is installed: run `cipv models pull yolox_nano`.")
 
     engine = Engine(opener(Recording()), missing, Params(), uri="test:car")
@@ -227,6 +228,37 @@ def test_without_a_detector_lidar_goes_on_alone_and_the_page_is_told_the_remedy(
         assert any("cipv models pull" in n.text and n.level == "warning" for n in shown.notices)
         assert shown.tick is not None
         assert {item.source for item in shown.tick.result.objects} == {"L"}
+    finally:
+        engine.stop()
+
+
+def test_what_a_detector_has_to_say_is_said_on_the_page():
+    network = CountingDetector(notes=("it knows simulated cars only",))
+    engine = Engine(opener(Recording()), lambda _: network, Params(), uri="test:car")
+    engine.start()
+    try:
+        shown = engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+        assert [n.text for n in shown.notices] == [*Recording().notes, "it knows simulated cars only"]
+    finally:
+        engine.stop()
+
+
+def test_the_detector_is_asked_for_again_where_pictures_are_drawn():
+    """A network for real pictures is not the one for the simulator, even when the pictures are equally large."""
+    asked: list[str] = []
+
+    def open_detector(source: Source) -> CountingDetector:
+        asked.append(source.uri)
+        return CountingDetector()
+
+    recordings = [Recording(uri=uri) for uri in ("test:car", "test:other", "sim:car")]
+    engine = Engine(opener(*recordings), open_detector, Params(), uri="test:car")
+    engine.start()
+    try:
+        for uri in ("test:car", "test:other", "sim:car", "test:car"):
+            engine.control.change(uri=uri)
+            engine.wait_for(lambda s, uri=uri: s.uri == uri and s.tick is not None, WAIT_S)
+        assert asked == ["test:car", "sim:car"]
     finally:
         engine.stop()
 

@@ -15,9 +15,10 @@ from playwright.sync_api import Browser, Page, expect, sync_playwright
 from app.engine import Engine
 from app.server import Server, create_app, listen_socket
 from pipeline.params import Params
-from pipeline.sources import open_source
+from pipeline.run import detector_for
+from pipeline.sources import Source, open_source
 from pipeline.types import U8, RawBoxes
-from pipeline.vision.detector import Detector, DetectorMissing, open_detector
+from pipeline.vision.detector import Detector, DetectorMissing
 
 CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = [
@@ -37,11 +38,13 @@ expect.set_options(timeout=WAIT_MS)
 class CountedDetector:
     """The installed network, counted; without one, no boxes."""
 
-    def __init__(self, size: tuple[int, int] | None) -> None:
+    notes: tuple[str, ...] = ()
+
+    def __init__(self, source: Source) -> None:
         self.calls = 0
         self._network: Detector | None
         try:
-            self._network = open_detector(None, size)
+            self._network = detector_for(source)
         except DetectorMissing:
             self._network = None
 
@@ -94,8 +97,8 @@ def site() -> Iterator[Site]:
     """The dashboard on ``sim:straight``, paused on its first frame."""
     detectors: list[CountedDetector] = []
 
-    def open_counted(size: tuple[int, int] | None) -> CountedDetector:
-        detectors.append(CountedDetector(size))
+    def open_counted(source: Source) -> CountedDetector:
+        detectors.append(CountedDetector(source))
         return detectors[-1]
 
     engine = Engine(open_source, open_counted, Params(), uri="sim:straight")

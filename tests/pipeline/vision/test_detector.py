@@ -9,6 +9,7 @@ import pytest
 from pipeline.params import DetectionParams
 from pipeline.vision.detector import FLOOR_SCORE, DetectorError, DetectorMissing, open_detector
 from pipeline.vision.graph import fitting_size
+from pipeline.vision.models import register
 from pipeline.vision.select import select
 from tests.pipeline.vision import networks
 
@@ -119,9 +120,23 @@ def test_the_same_picture_gives_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_without_a_network_the_remedy_is_named() -> None:
-    for spec in (None, "nothing-here"):
-        with pytest.raises(DetectorMissing, match=r"cipv models pull yolox_nano.*--detector PATH"):
-            open_detector(spec, (1280, 720))
+    with pytest.raises(DetectorMissing, match=r"cipv models pull yolox_nano.*--detector PATH"):
+        open_detector("nothing-here", (1280, 720))
+
+
+def test_with_no_other_network_the_embedded_one_is_used_and_says_what_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for variable in ("CIPV_HOME", "CIPV_DATA"):
+        monkeypatch.setenv(variable, str(tmp_path / variable))
+    fallen_back, named = (open_detector(spec, (1280, 720)) for spec in (None, "embedded"))
+    assert fallen_back.name == named.name
+    assert fallen_back.labels == ("car", "truck", "bus", "motorcycle")
+    assert "simulated cars only" in fallen_back.notes[0]
+    assert "cipv models pull yolox_nano" in fallen_back.notes[0]
+    assert named.notes == ()
+    register(networks.yolox(tmp_path / "mine.onnx"), "mine")
+    assert open_detector(None, (1280, 720)).notes == ()
 
 
 @pytest.mark.parametrize(

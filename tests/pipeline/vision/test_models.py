@@ -63,7 +63,7 @@ def _files() -> list[str]:
 
 def test_a_good_file_is_kept_and_becomes_the_default(monkeypatch: pytest.MonkeyPatch, address: str) -> None:
     _known(monkeypatch, f"{address}/good")
-    assert models.default_model("detector") is None
+    assert models.default_model("detector") == models.find("embedded")
     steps: list[tuple[int, int]] = []
     path = models.pull("yolox_nano", lambda done, total: steps.append((done, total)))
     assert path.read_bytes() == CONTENT
@@ -144,7 +144,7 @@ def test_registering_beside_keeps_the_default(tmp_path: Path) -> None:
 def test_a_stored_file_can_be_made_the_default_in_place(tmp_path: Path) -> None:
     (tmp_path / "a.onnx").write_bytes(b"a")
     stored = models.register(tmp_path / "a.onnx", "a", default=False)
-    assert models.default_model("detector") is None
+    assert models.default_model("detector") == models.find("embedded")
     models.register(stored, "a")
     assert models.default_model("detector") == stored
     assert stored.read_bytes() == b"a"
@@ -156,6 +156,23 @@ def test_a_name_that_is_a_path_is_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(models.ModelError, match="cannot be a network's name"):
         models.register(tmp_path / "a.onnx", name)
     assert models.find(name) is None
+
+
+def test_the_embedded_name_is_taken(tmp_path: Path) -> None:
+    (tmp_path / "a.onnx").write_bytes(b"a")
+    with pytest.raises(models.ModelError, match="comes with the program"):
+        models.register(tmp_path / "a.onnx", "embedded")
+
+
+def test_the_embedded_detector_is_here_and_listed_and_the_last_resort(tmp_path: Path) -> None:
+    path = models.find("embedded")
+    assert path is not None
+    assert path.stat().st_size < 3_000_000
+    row = next(entry for entry in models.list_models() if entry.name == "embedded")
+    assert (row.path, row.default, row.task) == (path, True, "detector")
+    (tmp_path / "a.onnx").write_bytes(b"a")
+    models.register(tmp_path / "a.onnx", "mine")
+    assert not next(entry for entry in models.list_models() if entry.name == "embedded").default
 
 
 def test_registering_nothing_is_refused(tmp_path: Path) -> None:
@@ -173,7 +190,8 @@ def test_the_data_folder_is_looked_in_last(tmp_path: Path) -> None:
 
 
 def test_the_list_names_every_known_network_and_what_is_here(tmp_path: Path) -> None:
-    entries = models.list_models()
+    *entries, embedded = models.list_models()
+    assert embedded.name == "embedded"
     assert [entry.name for entry in entries] == ["yolox_nano", "yolox_tiny", "yolox_s", "twinlitenet"]
     assert all(entry.path is None and not entry.default for entry in entries)
     assert all(entry.licence and entry.url and entry.url.startswith("https://github.com/") for entry in entries)
