@@ -13,6 +13,7 @@ from app.commands.calibrate import Calibrate
 from app.commands.models import Models
 from app.commands.params import ListParams
 from app.commands.run import Run
+from app.commands.scenarios import Scenarios
 from app.commands.serve import Demo, Serve
 from pipeline.errors import BadInput
 
@@ -23,6 +24,7 @@ COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {
     "models": Models,
     "params": ListParams,
     "calibrate": Calibrate,
+    "scenarios": Scenarios,
     "bench": Bench,
 }
 

@@ -194,7 +194,7 @@ def _row(
             closest_point=hit.obstacle.closest_point,
             distance_m=_range(hit),
             distance_sigma_m=LIDAR_RANGE_SIGMA_M,
-            velocity_mps=hit.velocity_mps,
+            velocity_mps=_velocity(seen, hit),
             carried=hit.carried,
             hits=max(hit.hits, seen.hits) if seen is not None else hit.hits,
             lidar_points=hit.obstacle.points,
@@ -223,6 +223,12 @@ def _row(
         vision_track=seen.id,
         gates=gates,
     )
+
+
+def _velocity(seen: VisionTrack | None, hit: LidarTrack) -> Point2 | None:
+    """The LiDAR's, or the camera's for the one frame in which the LiDAR has just found what the camera follows: whoever
+    brakes for it must not lose its speed then."""
+    return hit.velocity_mps if hit.velocity_mps is not None or seen is None else seen.velocity_mps
 
 
 def _range(track: LidarTrack) -> float:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from pipeline.alignment import Alignment, Angular, project_cuboid
 from pipeline.fusion import Fusion, FusionState, fuse
 from pipeline.params import FusionParams
+from pipeline.records import evolve
 from pipeline.types import Box, LidarTrack, VisionTrack
 from tests.pipeline.build import lidar_track, vision_track
 
@@ -146,3 +147,14 @@ def test_two_numbers_that_become_one_object_keep_the_older_and_part_again_withou
     assert [item.id for item in together.objects] == [older]
     _, after = joined([track], [apart], state=state)
     assert len({item.id for item in after.objects}) == 2
+
+
+def test_an_object_that_the_lidar_has_just_found_keeps_the_cameras_velocity() -> None:
+    track = lidar_track(1, 30.0, velocity=None)
+    seen = vision_track(1, box_of(track), 30.5)
+    closing = evolve(seen, velocity_mps=(-12.0, 0.0))
+    _, result = joined([track], [closing])
+    assert result.objects[0].source == "VL"
+    assert result.objects[0].velocity_mps == (-12.0, 0.0)
+    _, later = joined([lidar_track(1, 30.0, velocity=(-11.0, 0.0))], [closing])
+    assert later.objects[0].velocity_mps == (-11.0, 0.0), "the LiDAR's own is the better one"

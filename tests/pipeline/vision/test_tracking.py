@@ -219,7 +219,7 @@ def test_every_detection_is_in_one_track_and_tracks_are_bounded(
 
 
 def test_a_standing_car_ahead_of_a_fast_ego_car_is_soon_known_to_stand() -> None:
-    """Twelve pictures of a car that 28 m/s bring nearer: with the own speed known, its closing speed is nearly right."""
+    """Twelve pictures of a car that 28 m/s bring nearer: with the own speed known, its closing speed is right soon."""
 
     def closing_mps(ego_speed_mps: float | None) -> float:
         state = VisionTrackerState()

@@ -1,0 +1,69 @@
+"""`cipv scenarios run`: the paper's experiments and the road testers' in the simulator."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+from rich.console import Console
+from rich.table import Table as RichTable
+
+from app.progress import frames_progress
+from app.report import html, in_words
+from pipeline.evaluation.experiments.runner import count_cases, of_suite, run_all
+from pipeline.evaluation.experiments.sections import Coloured, Section, as_json
+
+_FILE_WIDTH = 160
+"""Columns of a table that goes to a file or a pipe."""
+
+
+@dataclass(frozen=True)
+class Scenarios:
+    """Drive experiments in the closed loop and report their figures beside the printed ones.
+
+    Example: cipv scenarios run --suite paper --report paper.html
+    """
+
+    what: tyro.conf.Positional[Literal["run"]]
+    """What to do: drive them"""
+    suite: str = "paper"
+    """paper, euroncap, iso, all, or the name of one experiment"""
+    short: bool = False
+    """A few cases of each only: seconds instead of minutes"""
+    jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 0
+    """Processes; 0 is one a core"""
+    report: Path | None = None
+    """Write an HTML file with tables and charts"""
+    json: bool = False
+    """Print the figures as JSON"""
+
+    def __call__(self) -> int:
+        experiments = of_suite(self.suite)
+        with frames_progress() as progress:
+            bar = progress.add_task("driving", total=count_cases(experiments, self.short))
+            sections = run_all(experiments, self.short, self.jobs, lambda: progress.advance(bar))
+        if self.report is not None:
+            self.report.parent.mkdir(parents=True, exist_ok=True)
+            self.report.write_text(html(sections, f"Experiments: {self.suite}"), encoding="utf-8")
+        if self.json:
+            print(json.dumps([as_json(section) for section in sections], indent=1, ensure_ascii=False))
+        else:
+            _show(sections)
+        return 0
+
+
+def _show(sections: list[Section]) -> None:
+    console = Console(width=None if Console().is_terminal else _FILE_WIDTH)
+    for section in sections:
+        console.rule(section.title)
+        for paragraph in section.text:
+            console.print(paragraph)
+        for table in section.tables:
+            shown = RichTable(*table.columns, title=table.title, caption=table.caption or None)
+            for row in table.rows:
+                values = (cell.value if isinstance(cell, Coloured) else cell for cell in row)
+                shown.add_row(*(in_words(value, table.decimals) for value in values))
+            console.print(shown)

@@ -1,0 +1,77 @@
+"""The experiments' report as one HTML file: tables and charts, light or dark as the reader's system is, and nothing
+loaded from anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+
+from app.svg import chart_svg
+from pipeline.evaluation.experiments.sections import Cell, Coloured, Section, Table
+
+_STYLE = """
+:root { color-scheme: light dark; --ground: #fff; --ink: #1b2024; --soft: #5d6870; --edge: #d8dee2; --raised: #f4f6f7;
+  --c0: #0b6bcb; --c1: #c2410c; --c2: #15803d; --c3: #9333ea; --c4: #0e7490; --c5: #be123c; }
+@media (prefers-color-scheme: dark) { :root { --ground: #14181b; --ink: #e6eaed; --soft: #98a4ad; --edge: #30383e;
+  --raised: #1c2226; --c0: #6cb4ff; --c1: #ff9d6b; --c2: #6fd08c; --c3: #c99bff; --c4: #5fcfe0; --c5: #ff8fa3; } }
+body { font: 15px/1.5 system-ui, sans-serif; background: var(--ground); color: var(--ink); max-width: 1180px;
+  margin: 0 auto; padding: 24px; }
+h1 { font-size: 24px; } h2 { font-size: 19px; margin-top: 44px; border-bottom: 1px solid var(--edge); }
+h3 { font-size: 15px; margin: 22px 0 6px; } p { max-width: 80ch; } nav a { margin-right: 14px; } a { color: var(--c0); }
+.wide { overflow-x: auto; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: 13.5px; }
+th, td { padding: 3px 10px; border-bottom: 1px solid var(--edge); text-align: right; white-space: nowrap; }
+th { background: var(--raised); font-weight: 600; } td.word, th.word { text-align: left; }
+caption, .note { caption-side: bottom; text-align: left; color: var(--soft); font-size: 13px; padding-top: 4px; }
+.charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); gap: 18px; }
+figure { margin: 12px 0; } figcaption { font-weight: 600; font-size: 13.5px; } figure > svg { width: 100%; }
+svg text { fill: var(--soft); font-size: 11px; } .grid { stroke: var(--edge); } .legend { font-size: 12px; }
+.key { margin-right: 14px; white-space: nowrap; } .key svg { margin-right: 5px; }
+.line0 { stroke: var(--c0); } .line1 { stroke: var(--c1); } .line2 { stroke: var(--c2); } .line3 { stroke: var(--c3); }
+.line4 { stroke: var(--c4); } .line5 { stroke: var(--c5); }
+.fill0 { fill: var(--c0); } .fill1 { fill: var(--c1); } .fill2 { fill: var(--c2); } .fill3 { fill: var(--c3); }
+.fill4 { fill: var(--c4); } .fill5 { fill: var(--c5); }
+.green { background: #2e9e4f; color: #fff; } .yellow { background: #f5d90a; color: #222; }
+.orange { background: #ef8b17; color: #222; } .brown { background: #8d5524; color: #fff; }
+.red { background: #c62828; color: #fff; } .grey { background: #8a949b; color: #fff; }
+"""
+
+
+def html(sections: Iterable[Section], title: str) -> str:
+    """The whole page."""
+    sections = list(sections)
+    links = "".join(f'<a href="#{escape(each.name)}">{escape(each.name)}</a>' for each in sections)
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body><h1>{escape(title)}</h1>"
+        f"<nav>{links}</nav>{''.join(_section(each) for each in sections)}</body></html>\n"
+    )
+
+
+def _section(section: Section) -> str:
+    return (
+        f'<section id="{escape(section.name)}"><h2>{escape(section.title)}</h2>'
+        + "".join(f"<p>{escape(paragraph)}</p>" for paragraph in section.text)
+        + "".join(_table(table) for table in section.tables)
+        + f'<div class="charts">{"".join(chart_svg(chart) for chart in section.charts)}</div></section>'
+    )
+
+
+def _table(table: Table) -> str:
+    head = "".join(f"<th>{escape(name)}</th>" for name in table.columns)
+    rows = "".join(f"<tr>{''.join(_cell(cell, table.decimals) for cell in row)}</tr>" for row in table.rows)
+    caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
+    return f'<h3>{escape(table.title)}</h3><div class="wide"><table>{caption}<tr>{head}</tr>{rows}</table></div>'
+
+
+def _cell(cell: Cell | Coloured, decimals: int) -> str:
+    value, tone = (cell.value, cell.tone) if isinstance(cell, Coloured) else (cell, "")
+    kind = "word" if isinstance(value, str) and not tone else tone
+    return f'<td class="{kind}">{escape(in_words(value, decimals))}</td>'
+
+
+def in_words(value: Cell, decimals: int) -> str:
+    """As people read it: a dash for null, whole numbers whole."""
+    if value is None:
+        return "–"
+    return f"{value:.{decimals}f}" if isinstance(value, float) else str(value)

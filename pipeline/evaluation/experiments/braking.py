@@ -1,0 +1,233 @@
+"""Experiment: three braking manoeuvres in the closed loop (paper, section AEB test).
+
+CCRs: 100 km/h towards a standing car. CCRm: 50 km/h towards one that drives 20 km/h. CCRb: both at 50 km/h, 50 m apart,
+and the lead brakes at 6 m/s² to standstill. The LiDAR alone against both sensors, ACC alone against ACC with AEB.
+
+The paper reports no drive, only the constant deceleration that its detection ranges would ask for; ``printed`` and
+``needed`` work that out as printed and as physics has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import mean
+from typing import Literal
+
+from pipeline.evaluation.experiments.sections import Chart, Experiment, Section, Series, Table
+from pipeline.evaluation.experiments.track import Drive, approach, parameters, scene
+from pipeline.run import Sensors
+from pipeline.simulation.loop import Setup
+
+KMH = 1.0 / 3.6
+Manoeuvre = Literal["CCRs", "CCRm", "CCRb"]
+LEAD_DECEL_MPS2 = 6.0
+_LEAD_BRAKES_AT_S = 2.0
+SENSORS: dict[Sensors, str] = {"lidar": "LiDAR", "both": "fused"}
+
+
+@dataclass(frozen=True)
+class Printed:
+    """A manoeuvre as the paper computes it: speed before and after, km/h; the gap it wants to be left, m; detection
+    ranges, m, and the decelerations that it prints for them."""
+
+    speed_kmh: float
+    end_kmh: float
+    keep_m: float
+    lidar_m: float
+    fused_m: float
+    lidar_mps2: float
+    fused_mps2: float
+
+
+PAPER: dict[Manoeuvre, Printed] = {
+    "CCRs": Printed(100.0, 0.0, 10.0, 30.0, 60.0, 19.29, 7.72),
+    "CCRm": Printed(50.0, 20.0, 20.0, 35.0, 60.0, 5.401, 2.025),
+    "CCRb": Printed(50.0, 0.0, 10.0, 30.0, 50.0, 4.823, 2.411),
+}
+
+
+def printed_decel_mps2(speed_mps: float, end_mps: float, detected_m: float, keep_m: float) -> float:
+    """The paper's formula: (v² − v₀²) / (2·(d − d_keep)). It takes the lead for standing, whatever it does."""
+    return (speed_mps**2 - end_mps**2) / (2.0 * (detected_m - keep_m))
+
+
+def needed_decel_mps2(closing_mps: float, detected_m: float, keep_m: float) -> float:
+    """Physics for a lead at constant speed: Δv² / (2·(d − d_keep)), in the lead's own frame."""
+    return closing_mps**2 / (2.0 * (detected_m - keep_m))
+
+
+def needed_behind_braking_mps2(
+    speed_mps: float, lead_mps: float, lead_decel_mps2: float, gap_m: float, keep_m: float
+) -> float:
+    """Physics for a lead that brakes to standstill: its own stopping distance adds to the gap."""
+    return speed_mps**2 / (2.0 * (gap_m + lead_mps**2 / (2.0 * lead_decel_mps2) - keep_m))
+
+
+@dataclass(frozen=True)
+class Case:
+    manoeuvre: Manoeuvre
+    sensors: Sensors
+    controller: str
+    seed: int
+
+
+def cases(short: bool) -> list[Case]:
+    manoeuvres: tuple[Manoeuvre, ...] = ("CCRs",) if short else ("CCRs", "CCRm", "CCRb")
+    return [
+        Case(manoeuvre, sensors, controller, seed)
+        for manoeuvre in manoeuvres
+        for sensors in SENSORS
+        for controller in ("ACC", "ACC + AEB")
+        for seed in range(1 if short else 10)
+    ]
+
+
+def run(case: Case) -> Drive:
+    speed = PAPER[case.manoeuvre].speed_kmh * KMH
+    target, duration_s = _target(case.manoeuvre, speed)
+    scenario = scene({0.0: speed}, target, duration_s, case.seed)
+    setup = Setup(parameters(case.controller, speed), case.sensors)
+    return approach(scenario, setup, stop_when_still=case.manoeuvre != "CCRm")
+
+
+def _target(manoeuvre: Manoeuvre, speed_mps: float) -> tuple[dict[str, object], float]:
+    """The target and how long the drive lasts."""
+    if manoeuvre == "CCRs":
+        return {"ahead_m": 120.0, "speed_mps": {0.0: 0.0}, "colour": "#a3202a"}, 15.0
+    if manoeuvre == "CCRm":
+        return {"ahead_m": 100.0, "speed_mps": {0.0: 20.0 * KMH}, "colour": "#a3202a"}, 25.0
+    brakes_until = _LEAD_BRAKES_AT_S + speed_mps / LEAD_DECEL_MPS2
+    return {
+        "ahead_m": 50.0,
+        "speed_mps": {0.0: speed_mps, _LEAD_BRAKES_AT_S: speed_mps, brakes_until: 0.0},
+        "colour": "#a3202a",
+    }, 20.0
+
+
+def report(cases: Sequence[Case], drives: Sequence[Drive]) -> Section:
+    done = list(zip(cases, drives, strict=True))
+    groups = dict.fromkeys((case.manoeuvre, case.sensors, case.controller) for case in cases)
+    rows = [
+        _row(key, [drive for case, drive in done if (case.manoeuvre, case.sensors, case.controller) == key])
+        for key in groups
+    ]
+    manoeuvres = list(dict.fromkeys(case.manoeuvre for case in cases))
+    return Section(
+        "braking",
+        "Braking: CCRs, CCRm and CCRb in the closed loop",
+        (
+            "Means over the runs; the smallest gap and the impact are the worst. Impact speed is relative to the "
+            "target. Camera boxes are projected truth with a detector's errors.",
+            *(_verdict(manoeuvre, done) for manoeuvre in manoeuvres),
+        ),
+        (Table("Drives", _COLUMNS, tuple(rows)), closed_forms()),
+        tuple(chart for manoeuvre in manoeuvres for chart in _charts(manoeuvre, done)),
+    )
+
+
+_COLUMNS = (
+    "manoeuvre",
+    "sensors",
+    "controller",
+    "runs",
+    "acquired at m",
+    "braked from m",
+    "mean m/s²",
+    "peak m/s²",
+    "jerk m/s³",
+    "smallest gap m",
+    "impacts",
+    "impact km/h",
+)
+
+
+def _row(key: tuple[Manoeuvre, Sensors, str], drives: list[Drive]) -> tuple[str | float | int | None, ...]:
+    impacts = [drive.impact_mps / KMH for drive in drives if drive.impact_mps is not None]
+    return (
+        key[0],
+        SENSORS[key[1]],
+        key[2],
+        len(drives),
+        _mean(drive.acquired_m for drive in drives),
+        _mean(drive.brakes_m for drive in drives),
+        _mean(drive.mean_decel_mps2() for drive in drives),
+        max(drive.peak_decel_mps2() for drive in drives),
+        max(drive.peak_jerk_mps3() for drive in drives),
+        min(drive.smallest_gap_m for drive in drives),
+        len(impacts),
+        max(impacts, default=None),
+    )
+
+
+def _mean(values: object) -> float | None:
+    known = [value for value in values if value is not None]  # type: ignore[attr-defined]
+    return mean(known) if known else None
+
+
+def _verdict(manoeuvre: Manoeuvre, done: list[tuple[Case, Drive]]) -> str:
+    """Fused against the LiDAR alone, in words, with AEB."""
+
+    def worst(sensors: Sensors) -> tuple[float, float]:
+        """Impact (0 without) and negative gap: smaller is better."""
+        return max(
+            (drive.impact_mps or 0.0, -drive.smallest_gap_m)
+            for case, drive in done
+            if (case.manoeuvre, case.sensors, case.controller) == (manoeuvre, sensors, "ACC + AEB")
+        )
+
+    lidar, fused = worst("lidar"), worst("both")
+    better = "better than" if fused < lidar else "no better than"
+    return f"{manoeuvre}: with AEB, fused ends {_ends(fused)} at worst, {better} the LiDAR alone ({_ends(lidar)})."
+
+
+def _ends(worst: tuple[float, float]) -> str:
+    return f"in an impact at {worst[0] / KMH:.0f} km/h" if worst[0] > 0.0 else f"{-worst[1]:.1f} m before contact"
+
+
+def closed_forms() -> Table:
+    """The printed decelerations, out of the printed formula, and the right physics beside."""
+    rows = []
+    for manoeuvre, paper in PAPER.items():
+        speed, end = paper.speed_kmh * KMH, paper.end_kmh * KMH
+        for name, detected, value in (
+            ("LiDAR", paper.lidar_m, paper.lidar_mps2),
+            ("fused", paper.fused_m, paper.fused_mps2),
+        ):
+            formula = printed_decel_mps2(speed, end, detected, paper.keep_m)
+            physics = (
+                needed_behind_braking_mps2(speed, speed, LEAD_DECEL_MPS2, detected, paper.keep_m)
+                if manoeuvre == "CCRb"
+                else needed_decel_mps2(speed - end, detected, paper.keep_m)
+            )
+            rows.append((manoeuvre, name, detected, paper.keep_m, value, formula, physics))
+    return Table(
+        "Constant deceleration needed from the paper's detection ranges, m/s²",
+        ("manoeuvre", "sensors", "detected at m", "gap kept m", "printed", "printed formula", "physics"),
+        tuple(rows),
+        "The print takes every lead for standing. Physics: CCRm closes at 30 km/h only; in CCRb the lead's own "
+        f"stopping distance (at {LEAD_DECEL_MPS2:g} m/s²) adds to the gap.",
+        3,
+    )
+
+
+def _charts(manoeuvre: Manoeuvre, done: list[tuple[Case, Drive]]) -> tuple[Chart, Chart]:
+    first = [(case, drive) for case, drive in done if case.manoeuvre == manoeuvre and case.seed == 0]
+
+    def lines(values: str, scale: float) -> tuple[Series, ...]:
+        return tuple(
+            Series(
+                f"{SENSORS[case.sensors]}, {case.controller}",
+                drive.t_s,
+                tuple(value * scale for value in getattr(drive, values)),
+            )
+            for case, drive in first
+        )
+
+    return (
+        Chart(f"{manoeuvre}: speed", "time s", "speed km/h", lines("speed_mps", 1.0 / KMH)),
+        Chart(f"{manoeuvre}: gap", "time s", "gap m", lines("gap_m", 1.0)),
+    )
+
+
+BRAKING = Experiment("braking", "paper", "Braking: CCRs, CCRm and CCRb", cases, run, report)

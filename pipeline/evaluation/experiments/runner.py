@@ -1,0 +1,68 @@
+"""Runs experiments case by case over the cores. Outcomes come back in the order of the cases, so the report does not
+depend on which process was faster."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+from pipeline.errors import BadInput
+from pipeline.evaluation.experiments.braking import BRAKING
+from pipeline.evaluation.experiments.sections import Experiment, Section
+
+EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (BRAKING,)
+SUITES = ("paper", "euroncap", "iso", "all")
+
+
+class NoSuchSuite(BadInput):
+    """A suite that does not exist."""
+
+
+def of_suite(suite: str) -> tuple[Experiment[Any, Any], ...]:
+    """The experiments of a suite, or the one of that name. NoSuchSuite when there is neither."""
+    found = tuple(each for each in EXPERIMENTS if suite in ("all", each.suite, each.name))
+    if not found:
+        names = ", ".join((*SUITES, *(each.name for each in EXPERIMENTS)))
+        raise NoSuchSuite(f"no suite or experiment named {suite!r}; there are {names}")
+    return found
+
+
+def count_cases(experiments: Iterable[Experiment[Any, Any]], short: bool) -> int:
+    return sum(len(each.cases(short)) for each in experiments)
+
+
+def run_all(
+    experiments: Iterable[Experiment[Any, Any]],
+    short: bool = False,
+    jobs: int = 0,
+    done: Callable[[], None] = lambda: None,
+) -> list[Section]:
+    """Each experiment's report. jobs: processes; 0 is one a core, 1 none but this one. ``done`` is called after every
+    case."""
+    jobs = jobs or os.cpu_count() or 1
+    if jobs == 1:
+        return [_run_here(each, short, done) for each in experiments]
+    # spawn: a forked child would inherit numba's and onnxruntime's threads half alive
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        return [_run_in(pool, each, short, done) for each in experiments]
+
+
+def _run_here(experiment: Experiment[Any, Any], short: bool, done: Callable[[], None]) -> Section:
+    cases, outcomes = experiment.cases(short), []
+    for case in cases:
+        outcomes.append(experiment.run(case))
+        done()
+    return experiment.report(cases, outcomes)
+
+
+def _run_in(
+    pool: ProcessPoolExecutor, experiment: Experiment[Any, Any], short: bool, done: Callable[[], None]
+) -> Section:
+    cases, outcomes = experiment.cases(short), []
+    for outcome in pool.map(experiment.run, cases):
+        outcomes.append(outcome)
+        done()
+    return experiment.report(cases, outcomes)

@@ -1,0 +1,107 @@
+"""What an experiment reports: text, tables and charts as plain values, for a page or a script to show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeVar
+
+Suite = Literal["paper", "euroncap", "iso"]
+Tone = Literal["green", "yellow", "orange", "brown", "red", "grey"]
+Cell = str | float | int | None
+
+
+@dataclass(frozen=True)
+class Coloured:
+    """A cell with a colour that means something; the table's caption says what."""
+
+    value: Cell
+    tone: Tone
+
+
+@dataclass(frozen=True)
+class Table:
+    """Numbers keep their full precision here; null is shown as a dash. decimals: for people."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Cell | Coloured, ...], ...]
+    caption: str = ""
+    decimals: int = 2
+
+
+@dataclass(frozen=True)
+class Series:
+    """One line (or its points) of a chart."""
+
+    name: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    points_only: bool = False
+
+
+@dataclass(frozen=True)
+class Chart:
+    title: str
+    x_label: str
+    y_label: str
+    series: tuple[Series, ...]
+
+
+@dataclass(frozen=True)
+class Section:
+    """One experiment's report. text: paragraphs, what was done and what it shows."""
+
+    name: str
+    title: str
+    text: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
+    charts: tuple[Chart, ...] = ()
+
+
+Case = TypeVar("Case")
+Outcome = TypeVar("Outcome")
+
+
+@dataclass(frozen=True)
+class Experiment(Generic[Case, Outcome]):
+    """cases: what is to be driven, in short or in full; each can be sent to another process. run: one case to its
+    outcome, a pure function at a module's top level. report: all of them, in order, to a section."""
+
+    name: str
+    suite: Suite
+    title: str
+    cases: Callable[[bool], Sequence[Case]]
+    run: Callable[[Case], Outcome]
+    report: Callable[[Sequence[Case], Sequence[Outcome]], Section]
+
+
+def as_json(section: Section) -> dict[str, Any]:
+    """The section as plain dicts, lists, strings and numbers."""
+    return {
+        "name": section.name,
+        "title": section.title,
+        "text": list(section.text),
+        "tables": [
+            {
+                "title": table.title,
+                "columns": list(table.columns),
+                "rows": [[_plain(cell) for cell in row] for row in table.rows],
+                "caption": table.caption,
+            }
+            for table in section.tables
+        ],
+        "charts": [
+            {
+                "title": chart.title,
+                "x": chart.x_label,
+                "y": chart.y_label,
+                "series": [{"name": line.name, "x": list(line.x), "y": list(line.y)} for line in chart.series],
+            }
+            for chart in section.charts
+        ],
+    }
+
+
+def _plain(cell: Cell | Coloured) -> Any:
+    return {"value": cell.value, "tone": cell.tone} if isinstance(cell, Coloured) else cell
