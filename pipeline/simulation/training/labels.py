@@ -19,6 +19,7 @@ CLASSES = ("car", "truck", "bus", "motorcycle")
 CLASS_OF = {"car": 0, "van": 0, "truck": 1, "bus": 2, "motorcycle": 3}
 """A van is a car, as in COCO."""
 _FAR_OUTSIDE_PX = 20_000.0
+_WIDEST_TAN = 1.1
 
 
 @dataclass(frozen=True)
@@ -77,9 +78,21 @@ def _outline(state: ActorState, camera: CameraCalibration) -> F64:
         return np.empty((0, 2))
     if points[:, 2].min() < NEAR_M:
         points = np.concatenate([clip_near(face) for face in np.split(points, np.cumsum(shape.counts)[:-1])])
-    pixels = points[:, :2] / points[:, 2:] * (camera.K[0, 0], camera.K[1, 1]) + camera.K[:2, 2]
+    flat = through_lens(points[:, :2] / points[:, 2:], camera)
+    pixels = flat * (camera.K[0, 0], camera.K[1, 1]) + camera.K[:2, 2]
     hull = cv2.convexHull(np.clip(pixels, -_FAR_OUTSIDE_PX, _FAR_OUTSIDE_PX).astype(np.float32))
     return np.asarray(hull[:, 0], dtype=np.float64)
+
+
+def through_lens(flat: F64, camera: CameraCalibration) -> F64:
+    """(K, 2) points of the image plane at distance 1 as the lens bends them (k1, k2). Beyond the picture, where the
+    polynomial may turn back, the bend stays what it is at its rim."""
+    if not camera.distortion.size:
+        return flat
+    k1, k2 = camera.distortion[:2]
+    squared = np.minimum((flat**2).sum(axis=1, keepdims=True), _WIDEST_TAN**2)
+    bent: F64 = flat * (1.0 + k1 * squared + k2 * squared**2)
+    return bent
 
 
 def _inside(outline: F64, camera: CameraCalibration) -> F64:

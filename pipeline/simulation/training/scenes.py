@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ _NEAREST_M, _FARTHEST_M = -9.0, 130.0
 _CLEAR_AHEAD_M = 3.0
 _LONGEST_CHANGE_S = 5.0
 _BEYOND_M = 600.0
+_SOME_TURNED, _TURNED, _SHORT_M = 0.35, 0.4, 7.0
 
 Size = tuple[float, float, float]
 Models = dict[str, list[Size]]
@@ -48,7 +49,20 @@ def moments(seed: int, count: int) -> Iterator[Moment]:
             backdrop = int(rng.integers(1 << 31))
             camera = DrawnCamera(road, Roadside.build(road, backdrop, 0.0, _ROAD_M), backdrop)
         now = world.at(random_traffic(rng, road, models), float(rng.uniform(0.0, _LONGEST_CHANGE_S)))
+        if rng.random() < _SOME_TURNED:
+            now = _turned(rng, now)
         yield Moment(camera.picture(now), now)
+
+
+def _turned(rng: np.random.Generator, now: world.World) -> world.World:
+    """The same world with some of its cars turned any way, as crossings and turns show them."""
+    actors = tuple(
+        replace(state, cuboid=replace(state.cuboid, yaw_rad=float(rng.uniform(-np.pi, np.pi))))
+        if state.cuboid.size[0] < _SHORT_M and rng.random() < _TURNED
+        else state
+        for state in now.actors
+    )
+    return replace(now, actors=actors)
 
 
 def random_road(rng: np.random.Generator) -> Road:
@@ -63,6 +77,7 @@ def random_road(rng: np.random.Generator) -> Road:
                 }
                 for _ in range(12)
             ],
+            "crossings": [{"s_m": float(s_m)} for s_m in _crossing_places(rng)],
             "lane_width_m": float(rng.uniform(3.0, 4.0)),
             "lanes_forward": int(rng.integers(1, 5)),
             "lanes_oncoming": int(rng.integers(0, 4)),
@@ -70,6 +85,11 @@ def random_road(rng: np.random.Generator) -> Road:
             "shoulder_m": float(rng.uniform(0.5, 3.0)),
         }
     )
+
+
+def _crossing_places(rng: np.random.Generator) -> list[float]:
+    """None on most roads, else one every 150 m or so."""
+    return [] if rng.random() < 0.6 else (np.arange(100.0, 2000.0, 150.0) + rng.uniform(0.0, 50.0)).tolist()
 
 
 def random_traffic(rng: np.random.Generator, road: Road, models: Models) -> Scenario:

@@ -1,6 +1,6 @@
 """Train the embedded detector on the CPU and write it as ONNX.
 
-``python -m pipeline.simulation.training.train FOLDER OUT.onnx --minutes 30``
+``python -m pipeline.simulation.training.train OUT.onnx FOLDER …``
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _WINDOWS: tuple[tuple[Size, int], ...] = (((192, 320), 20), (INPUT_SIZE, 5))
 """Sizes of training windows with the batch that costs about the same; the small one is four times as cheap a picture,
 and far vehicles are what needs the many examples."""
 _SMALL_SHARE = 0.75
-_RATE, _DECAY, _WARM_UP_STEPS = 3e-3, 0.02, 60
+_DECAY, _WARM_UP_STEPS = 0.02, 60
 _AVERAGE = 0.995
 _CLIP = 10.0
 
@@ -36,8 +36,12 @@ _CLIP = 10.0
 class Examples:
     """The files of ``dataset``, drawn from in shuffled rounds."""
 
-    def __init__(self, folder: Path, seed: int) -> None:
-        self.folder, self.rows = folder, read_labels(folder)
+    def __init__(self, folders: list[Path], seed: int) -> None:
+        self.examples = [
+            (folder / f"{number:06d}.jpg", rows)
+            for folder in folders
+            for number, rows in enumerate(read_labels(folder))
+        ]
         self.rng = np.random.default_rng([seed, 12])
         self._order: list[int] = []
 
@@ -55,28 +59,40 @@ class Examples:
 
     def _one(self, size: Size) -> tuple[np.ndarray, F32]:
         if not self._order:
-            self._order = self.rng.permutation(len(self.rows)).tolist()
-        number = self._order.pop()
-        picture = cv2.imread(str(self.folder / f"{number:06d}.jpg"))
-        return view(self.rng, np.asarray(picture, dtype=np.uint8), self.rows[number], size)
+            self._order = self.rng.permutation(len(self.examples)).tolist()
+        path, rows = self.examples[self._order.pop()]
+        return view(self.rng, np.asarray(cv2.imread(str(path)), dtype=np.uint8), rows, size)
 
 
-def train(folder: Path, out: Path, steps: int, minutes: float, seed: int, threads: int, bf16: bool) -> None:
+def train(
+    folders: list[Path],
+    out: Path,
+    steps: int,
+    minutes: float = math.inf,
+    seed: int = 1,
+    threads: int = 2,
+    bf16: bool = False,
+    rate: float = 3e-3,
+    start_from: Path | None = None,
+) -> None:
     """At most ``steps`` steps or ``minutes``, whichever is first, on a cosine schedule over that. A checkpoint and an
-    ONNX file are written every tenth of the way. With --minutes the result depends on the machine's speed."""
+    ONNX file are written every tenth of the way. With ``minutes`` the result depends on the
+    machine's speed. start_from: weights of an earlier round (the .pt file beside its ONNX)."""
     torch.manual_seed(seed)
     torch.set_num_threads(threads)
-    examples = Examples(folder, seed)
+    examples = Examples(folders, seed)
     network = Network()
+    if start_from is not None:
+        network.load_state_dict(torch.load(start_from))
     average = copy.deepcopy(network)
-    optimiser = torch.optim.AdamW(network.parameters(), lr=_RATE, weight_decay=_DECAY)
+    optimiser = torch.optim.AdamW(network.parameters(), lr=rate, weight_decay=_DECAY)
     start, next_save = time.monotonic(), 0.1
     for step in range(steps):
         done = max(step / steps, (time.monotonic() - start) / (60.0 * minutes))
         if done >= 1.0:
             break
         for group in optimiser.param_groups:
-            group["lr"] = _RATE * min(1.0, (step + 1) / _WARM_UP_STEPS) * (0.02 + 0.49 * (1 + math.cos(math.pi * done)))
+            group["lr"] = rate * min(1.0, (step + 1) / _WARM_UP_STEPS) * (0.02 + 0.49 * (1 + math.cos(math.pi * done)))
         size, count = _WINDOWS[0 if examples.rng.random() < _SMALL_SHARE else 1]
         pictures, labels, boxes = examples.batch(size, count)
         with torch.autocast("cpu", torch.bfloat16, enabled=bf16):
@@ -115,15 +131,16 @@ def _save(average: Network, out: Path) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--steps", type=int, default=3000)
+    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("--steps", type=int, default=4500)
     parser.add_argument("--minutes", type=float, default=math.inf)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--bf16", action="store_true", help="mixed precision, for processors that have it")
-    options = parser.parse_args()
-    train(options.folder, options.out, options.steps, options.minutes, options.seed, options.threads, options.bf16)
+    parser.add_argument("--rate", type=float, default=3e-3, help="learning rate at its highest")
+    parser.add_argument("--start-from", type=Path, help="weights of an earlier round, a .pt file")
+    train(**vars(parser.parse_args()))
 
 
 if __name__ == "__main__":

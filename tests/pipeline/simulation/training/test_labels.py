@@ -46,13 +46,13 @@ def test_the_box_is_where_the_vehicle_is_drawn() -> None:
     """Two pictures that differ in the car's paint alone differ inside its box and up to its edges."""
     pictures, found = [], None
     for colour in ("#ff0000", "#0000ff"):
-        now = world.at(_scenario({"ahead_m": 12.0, "lane": -2, "colour": colour}), 0.0)
+        now = world.at(_scenario({"ahead_m": 5.0, "lane": -2, "colour": colour}), 0.0)
         scenario = _scenario()
         camera = DrawnCamera(scenario.road, Roadside.build(scenario.road, 1, 0.0, 700.0), 1)
         pictures.append(camera.picture(now).astype(int))
         (found,) = labels(now, calibration())
     assert found is not None
-    rows, columns = np.nonzero(np.abs(pictures[0] - pictures[1]).sum(axis=2) > 30)
+    rows, columns = np.nonzero(np.abs(pictures[0] - pictures[1]).sum(axis=2) > 60)
     x1, y1, x2, y2 = found.box
     assert (columns.min(), columns.max()) == (pytest.approx(x1, abs=4), pytest.approx(x2, abs=4))
     assert rows.min() == pytest.approx(y1, abs=4)
