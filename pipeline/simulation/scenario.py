@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError, model_validator
 
 from pipeline.simulation.actors import Actor, Script
 from pipeline.simulation.lens import ORDINARY, CameraModel
+from pipeline.simulation.lidar_model import VLP16, LidarModel
 from pipeline.simulation.roads import Road, Strict
 from pipeline.simulation.routes import CrossingActor, Route, route
 
@@ -34,6 +35,7 @@ class Scenario(Strict):
     duration_s: float = Field(gt=0.0, le=3600.0)
     rate_hz: float = Field(default=10.0, ge=1.0, le=20.0)
     road: Road
+    lidar: LidarModel = VLP16
     camera: CameraModel = ORDINARY
     ego: Ego
     actors: tuple[Actor, ...] = ()

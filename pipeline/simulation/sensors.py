@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from functools import cached_property
 
-from pipeline.simulation import lidar
 from pipeline.simulation.camera import DrawnCamera, calibration
+from pipeline.simulation.lidar import Lidar
 from pipeline.simulation.roadside import Roadside
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.world import World
@@ -23,6 +23,7 @@ class Sensors:
 
     def __init__(self, scenario: Scenario, end_m: float) -> None:
         self._scenario = scenario
+        self._lidar = Lidar(scenario.lidar)
         self._roadside = Roadside.build(
             scenario.road, scenario.seed, scenario.ego.start_m - _BEFORE_M, end_m + _BEYOND_M
         )
@@ -34,7 +35,7 @@ class Sensors:
             index,
             f"{index:06d}",
             t_ns,
-            sweep=lidar.sweep(now, self._roadside, self._scenario.seed, index, t_ns),
+            sweep=self._lidar.sweep(now, self._roadside, self._scenario.seed, index, t_ns),
             picture=Picture(t_ns, self._camera.picture(now)) if picture else None,
             camera=self.camera,
             ego=EgoState(t_ns, now.speed_mps, now.yaw_rate_radps),
