@@ -12,11 +12,12 @@ from typing import Any
 from pipeline.errors import BadInput
 from pipeline.evaluation.experiments.bev_error import BEV_ERROR
 from pipeline.evaluation.experiments.braking import BRAKING
+from pipeline.evaluation.experiments.ncap import NCAP
 from pipeline.evaluation.experiments.ranging import RANGING
 from pipeline.evaluation.experiments.regression import REGRESSION
 from pipeline.evaluation.experiments.sections import Experiment, Section
 
-EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, BRAKING)
+EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, BRAKING, NCAP)
 SUITES = ("paper", "euroncap", "iso", "all")
 
 

@@ -1,0 +1,243 @@
+"""Experiment: the car-to-car rear grid of Euro NCAP, and UN Regulation 152 beside it.
+
+CCRs: 10–80 km/h towards a standing car. CCRm: 30–80 km/h towards one that drives 20 km/h. Both in steps of 5 km/h, at
+five overlaps. CCRb: both at 50 km/h, 12 or 40 m apart, the lead brakes at 2 or 6 m/s². Impact speeds are relative, in
+the protocol's colours (Euro NCAP Assessment Protocol, Safety Assist, AEB car-to-car). As in a test, a robot holds the
+speed until AEB acts; a run whose approach left the protocol's tolerance is void.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from pipeline.evaluation.experiments.sections import Cell, Coloured, Experiment, Section, Table, Tone
+from pipeline.evaluation.experiments.track import Drive, approach, parameters, scene
+from pipeline.run import Sensors
+from pipeline.simulation.loop import Setup
+
+KMH = 1.0 / 3.6
+Test = Literal["CCRs", "CCRm", "CCRb"]
+OVERLAPS = (-50, -75, 100, 75, 50)
+"""Share of the ego car's width that meets the target, %. Negative: the target stands to the ego car's left."""
+EGO_WIDTH_M = 1.82
+MOVING_KMH = 20.0
+BRAKED_KMH = 50.0
+START_TTC_S = 4.0
+_RUN_UP_S = 1.5
+SPEED_TOLERANCE_MPS = 1.0 * KMH
+BANDS: tuple[tuple[float, Tone], ...] = ((5.0, "green"), (15.0, "yellow"), (25.0, "orange"), (35.0, "brown"))
+"""Relative impact speeds, km/h, below which a cell has the colour; red from there on."""
+R152_LIMITS: tuple[tuple[float, float], ...] = ((42.0, 0.0), (45.0, 15.0), (50.0, 25.0), (55.0, 30.0), (60.0, 35.0))
+"""UN R152, 5.2.1.4, category M1 unladen: up to this relative speed, km/h, the impact may be no faster than that."""
+SETUPS: tuple[tuple[Sensors, str], ...] = (
+    ("both", "AEB"),
+    ("lidar", "AEB"),
+    ("both", "ACC"),
+    ("lidar", "ACC"),
+    ("both", "ACC + AEB"),
+)
+_NAMES = {"both": "fused", "lidar": "LiDAR", "camera": "camera"}
+
+
+@dataclass(frozen=True)
+class Case:
+    """speed_kmh: of the ego car. overlap: %. gap_m, decel_mps2: CCRb only."""
+
+    test: Test
+    speed_kmh: float
+    overlap: int
+    sensors: Sensors
+    controller: str
+    gap_m: float = 0.0
+    decel_mps2: float = 0.0
+
+    def closing_mps(self) -> float:
+        return (self.speed_kmh - (MOVING_KMH if self.test == "CCRm" else 0.0)) * KMH
+
+
+@dataclass(frozen=True)
+class Result:
+    """impact_kmh: relative, 0 when avoided. void: why the run does not count, empty when it does."""
+
+    impact_kmh: float
+    void: str
+
+
+def cases(short: bool) -> list[Case]:
+    speeds = {"CCRs": range(10, 81, 5), "CCRm": range(30, 81, 5)} if not short else {"CCRs": (30, 60), "CCRm": (50,)}
+    overlaps = (-50, 100) if short else OVERLAPS
+    found = []
+    for sensors, controller in SETUPS[:2] if short else SETUPS:
+        grid: list[tuple[Test, float, int]] = [
+            (test, float(speed), overlap) for test in ("CCRs", "CCRm") for speed in speeds[test] for overlap in overlaps
+        ]
+        found += [Case(test, speed, overlap, sensors, controller) for test, speed, overlap in grid]
+        found += [
+            Case("CCRb", BRAKED_KMH, 100, sensors, controller, gap, decel)
+            for decel in (2.0, 6.0)
+            for gap in (12.0, 40.0)
+            if not short or (decel, gap) == (6.0, 40.0)
+        ]
+    return found
+
+
+def run(case: Case) -> Result:
+    speed = case.speed_kmh * KMH
+    aside = (1.0 - abs(case.overlap) / 100.0) * EGO_WIDTH_M * (1.0 if case.overlap < 0 else -1.0)
+    target: dict[str, object] = {"offset_m": aside, "colour": "#8e9aa3"}
+    if case.test == "CCRb":
+        target |= {
+            "ahead_m": case.gap_m,
+            "speed_mps": {0.0: speed},
+            "brake": {"at_s": _RUN_UP_S, "decel_mps2": case.decel_mps2},
+        }
+    else:
+        target |= {
+            "ahead_m": case.closing_mps() * (START_TTC_S + _RUN_UP_S),
+            "speed_mps": {0.0: MOVING_KMH * KMH if case.test == "CCRm" else 0.0},
+        }
+    scenario = scene({0.0: speed}, target, _RUN_UP_S + 14.0, seed=0)
+    drive = approach(scenario, Setup(parameters(case.controller, speed), case.sensors))
+    return Result((drive.impact_mps or 0.0) / KMH, _void(case, drive))
+
+
+def _void(case: Case, drive: Drive) -> str:
+    """Why the approach was not as the protocol wants it: speed within 0 to +1 km/h from the test's start until the car
+    brakes by itself, which it may not do before the start."""
+    wanted = case.speed_kmh * KMH
+    for t_s, speed, state, accel in zip(drive.t_s, drive.speed_mps, drive.states, drive.accel_mps2, strict=True):
+        acts = accel < -0.5 or state in ("partial_brake", "full_brake")
+        if t_s < _RUN_UP_S and acts:
+            return "braked before the start"
+        if acts:
+            return ""
+        if t_s >= _RUN_UP_S and not -0.01 <= speed - wanted <= SPEED_TOLERANCE_MPS:
+            return f"speed off by {(speed - wanted) / KMH:.1f} km/h"
+    return ""
+
+
+def tone(result: Result) -> Tone:
+    if result.void:
+        return "grey"
+    return next((colour for limit, colour in BANDS if result.impact_kmh < limit), "red")
+
+
+def report(cases: Sequence[Case], results: Sequence[Result]) -> Section:
+    done = dict(zip(cases, results, strict=True))
+    setups = list(dict.fromkeys((case.sensors, case.controller) for case in cases))
+    tables = [_summary(setups, done), _r152(done)]
+    for sensors, controller in setups:
+        mine = {
+            case: result for case, result in done.items() if (case.sensors, case.controller) == (sensors, controller)
+        }
+        name = f"{_NAMES[sensors]}, {controller}"
+        tables += [_grid(test, name, mine) for test in ("CCRs", "CCRm")]
+        tables.append(_braked(name, mine))
+    return Section(
+        "ncap",
+        "Euro NCAP car-to-car rear grid",
+        (
+            f"Every run starts {_RUN_UP_S:g} s before TTC {START_TTC_S:g} s with the speed held; the camera's boxes "
+            "are projected truth with a detector's errors. AEB: a robot holds the speed and only AEB brakes. ACC: the "
+            "paper's speed law alone, set to the test speed. Cells are relative impact speeds in km/h; 0 is avoided. "
+            "Grey: the approach was not as the protocol wants it.",
+            _verdict(done),
+        ),
+        tuple(tables),
+    )
+
+
+def _summary(setups: list[tuple[Sensors, str]], done: dict[Case, Result]) -> Table:
+    rows: list[tuple[Cell, ...]] = []
+    for sensors, controller in setups:
+        for test in ("CCRs", "CCRm", "CCRb"):
+            valid = [
+                result
+                for case, result in done.items()
+                if (case.sensors, case.controller, case.test) == (sensors, controller, test) and not result.void
+            ]
+            avoided = sum(result.impact_kmh == 0.0 for result in valid)
+            mean = sum(result.impact_kmh for result in valid) / len(valid) if valid else None
+            worst = max((result.impact_kmh for result in valid), default=None)
+            rows.append((_NAMES[sensors], controller, test, len(valid), avoided, mean, worst))
+    columns = ("sensors", "controller", "test", "valid runs", "avoided", "mean impact km/h", "worst km/h")
+    return Table("What each gives", columns, tuple(rows), decimals=1)
+
+
+def _grid(test: Test, name: str, done: dict[Case, Result]) -> Table:
+    mine = {(case.speed_kmh, case.overlap): result for case, result in done.items() if case.test == test}
+    overlaps = [overlap for overlap in OVERLAPS if any(key[1] == overlap for key in mine)]
+    rows = tuple(
+        (f"{speed:.0f} km/h", *(_cell(mine.get((speed, overlap))) for overlap in overlaps))
+        for speed in sorted({speed for speed, _ in mine})
+    )
+    return Table(f"{test}: {name}", ("speed", *(f"{overlap} %" for overlap in overlaps)), rows, decimals=0)
+
+
+def _braked(name: str, done: dict[Case, Result]) -> Table:
+    mine = {(case.decel_mps2, case.gap_m): result for case, result in done.items() if case.test == "CCRb"}
+    gaps = sorted({gap for _, gap in mine})
+    rows = tuple(
+        (f"−{decel:.0f} m/s²", *(_cell(mine.get((decel, gap))) for gap in gaps))
+        for decel in sorted({decel for decel, _ in mine})
+    )
+    return Table(f"CCRb at 50 km/h: {name}", ("lead brakes", *(f"{gap:.0f} m" for gap in gaps)), rows, decimals=0)
+
+
+def _cell(result: Result | None) -> Cell | Coloured:
+    if result is None:
+        return None
+    return Coloured(result.void or result.impact_kmh, tone(result))
+
+
+def _r152(done: dict[Case, Result]) -> Table:
+    """Standing and moving targets, full overlap, AEB alone, against the Regulation's limits."""
+    rows: list[tuple[Cell | Coloured, ...]] = []
+    for test in ("CCRs", "CCRm"):
+        for closing in sorted({round(case.closing_mps() / KMH) for case in done if case.test == test}):
+            limit = r152_limit_kmh(closing)
+            if limit is None:
+                continue
+            cells = [
+                _passes(result, limit)
+                for sensors in ("both", "lidar")
+                for case, result in done.items()
+                if (case.test, case.sensors, case.controller, case.overlap) == (test, sensors, "AEB", 100)
+                and round(case.closing_mps() / KMH) == closing
+            ]
+            rows.append((test, f"{closing} km/h", limit, *cells))
+    columns = ("test", "relative speed", "limit km/h", "fused km/h", "LiDAR km/h")
+    caption = "UN R152, M1 unladen: green within the limit, red beyond it."
+    return Table("UN R152: largest relative impact speed", columns, tuple(rows), caption, 0)
+
+
+def r152_limit_kmh(relative_kmh: float) -> float | None:
+    """The impact speed that the Regulation permits; null beyond the speeds that it covers."""
+    return next((limit for up_to, limit in R152_LIMITS if relative_kmh <= up_to), None)
+
+
+def _passes(result: Result, limit_kmh: float) -> Coloured:
+    return Coloured(result.impact_kmh, "green" if result.impact_kmh <= limit_kmh else "red")
+
+
+def _verdict(done: dict[Case, Result]) -> str:
+    """AEB alone: how many cells fused ends slower than the LiDAR alone, and how many faster."""
+    pairs = [
+        (result, done[other])
+        for case, result in done.items()
+        if (case.sensors, case.controller) == ("both", "AEB")
+        and (other := Case(case.test, case.speed_kmh, case.overlap, "lidar", "AEB", case.gap_m, case.decel_mps2))
+        in done
+    ]
+    counted = [(fused.impact_kmh, lidar.impact_kmh) for fused, lidar in pairs if not fused.void and not lidar.void]
+    better = sum(fused < lidar - 1.0 for fused, lidar in counted)
+    worse = sum(fused > lidar + 1.0 for fused, lidar in counted)
+    return (
+        f"With AEB alone, of {len(counted)} runs fused ends slower than the LiDAR alone in {better}, faster in {worse} "
+        f"and the same (within 1 km/h) in {len(counted) - better - worse}."
+    )
+
+
+NCAP = Experiment("ncap", "euroncap", "Euro NCAP car-to-car rear grid", cases, run, report)

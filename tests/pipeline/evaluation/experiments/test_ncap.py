@@ -1,0 +1,65 @@
+"""The grid has every cell, colours are the protocol's, and a bad approach is void."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipeline.evaluation.experiments.ncap import (
+    OVERLAPS,
+    SETUPS,
+    Case,
+    Result,
+    Test,
+    cases,
+    r152_limit_kmh,
+    report,
+    run,
+    tone,
+)
+from pipeline.evaluation.experiments.sections import Coloured
+
+
+@pytest.mark.parametrize(("test", "speeds"), [("CCRs", range(10, 81, 5)), ("CCRm", range(30, 81, 5))])
+def test_the_grid_is_the_protocols(test: Test, speeds: range) -> None:
+    mine = [case for case in cases(False) if case.test == test and (case.sensors, case.controller) == SETUPS[0]]
+    assert {(case.speed_kmh, case.overlap) for case in mine} == {(float(v), o) for v in speeds for o in OVERLAPS}
+
+
+def test_a_braking_lead_brakes_twice_as_hard_from_two_gaps() -> None:
+    mine = {(case.decel_mps2, case.gap_m) for case in cases(False) if case.test == "CCRb"}
+    assert mine == {(2.0, 12.0), (2.0, 40.0), (6.0, 12.0), (6.0, 40.0)}
+
+
+@pytest.mark.parametrize(
+    ("impact_kmh", "colour"),
+    [(0.0, "green"), (4.9, "green"), (5.0, "yellow"), (15.0, "orange"), (25.0, "brown"), (35.0, "red"), (80.0, "red")],
+)
+def test_colours(impact_kmh: float, colour: str) -> None:
+    assert tone(Result(impact_kmh, "")) == colour
+    assert tone(Result(impact_kmh, "speed off by 2.0 km/h")) == "grey"
+
+
+@pytest.mark.parametrize(("relative", "limit"), [(10, 0), (42, 0), (45, 15), (50, 25), (60, 35), (65, None)])
+def test_limits_of_the_regulation(relative: float, limit: float | None) -> None:
+    assert r152_limit_kmh(relative) == limit
+
+
+def test_aeb_avoids_a_standing_car_at_40_and_without_brakes_there_is_an_impact() -> None:
+    fused = Case("CCRs", 40.0, 100, "both", "AEB")
+    assert run(fused) == Result(0.0, "")
+    blind = run(Case("CCRs", 80.0, 100, "lidar", "AEB"))
+    assert not blind.void
+    assert 5.0 < blind.impact_kmh < 80.0, "too fast for the LiDAR's reach, but braked"
+
+
+def test_a_car_that_brakes_before_the_start_makes_the_run_void() -> None:
+    assert run(Case("CCRb", 50.0, 100, "both", "ACC", 12.0, 2.0)).void == "braked before the start"
+
+
+def test_the_report_has_a_coloured_cell_for_each_run() -> None:
+    chosen = [Case("CCRs", 30.0, overlap, sensors, "AEB") for sensors in ("both", "lidar") for overlap in (-50, 100)]
+    section = report(chosen, [Result(0.0, ""), Result(8.0, ""), Result(30.0, ""), Result(0.0, "speed off")])
+    grids = {table.title: table.rows for table in section.tables}
+    assert grids["CCRs: fused, AEB"] == (("30 km/h", Coloured(0.0, "green"), Coloured(8.0, "yellow")),)
+    assert grids["CCRs: LiDAR, AEB"] == (("30 km/h", Coloured(30.0, "brown"), Coloured("speed off", "grey")),)
+    assert "of 1 runs fused ends slower than the LiDAR alone in 1" in section.text[1], "a void run does not count"
