@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from pipeline.simulation.canvas import HAZE_BGR, HAZE_M
+from pipeline.simulation.lens import undistorted
 from pipeline.types import F32, F64, U8, CameraCalibration
 
 TILE_M = 24.0
@@ -26,6 +27,7 @@ _LEVELS_M = (
 )
 """From this distance on the ground's grain is blurred by so many pixels of its tile: a coarse mip chain."""
 _GRAIN_ENDS_M = 110.0
+_LEVEL = -1e-4  # slope at which a ray counts as looking down
 _CLEAREST_FAR = 0.5  # fields at the horizon keep a colour, or they would look like water
 
 
@@ -113,8 +115,10 @@ def _ground_under(camera: CameraCalibration, ground_z_m: float) -> tuple[int, F6
     place = -R.T @ t
     v, u = np.mgrid[0 : camera.height, 0 : camera.width].astype(np.float64)
     K = camera.K
-    ray = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones_like(u)], axis=2) @ R
-    steep = ray[..., 2].max(axis=1) < -1e-4
+    flat = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1]], axis=2).reshape(-1, 2)
+    flat = undistorted(flat, camera.distortion).reshape(*u.shape, 2)
+    ray = np.concatenate([flat, np.ones((*u.shape, 1))], axis=2) @ R
+    steep = ray[..., 2].max(axis=1) < _LEVEL
     horizon = int(np.argmax(steep))
     ray = ray[horizon:]
     reach = (ground_z_m - place[2]) / ray[..., 2]

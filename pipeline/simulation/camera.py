@@ -1,7 +1,6 @@
 """A drawn camera: 1280×720, 78° diagonal field of view, behind the windshield, looking 2° down.
 
-The LiDAR sits in the bumper, 1.6 m ahead of the camera and 0.8 m below it, so the parallax between them is real. The
-scene is drawn by an ideal pinhole first; ``lens`` then makes of it what a real camera would have seen.
+The LiDAR sits in the bumper, 1.6 m ahead of the camera and 0.8 m below it, so the parallax between them is real.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import numpy as np
 from pipeline.geometry import Cuboid, inverse, rotation
 from pipeline.simulation import backdrop
 from pipeline.simulation.canvas import Canvas, Colour
-from pipeline.simulation.lens import ORDINARY, CameraModel, Lens
+from pipeline.simulation.lens import ORDINARY, CameraModel, Sensor
 from pipeline.simulation.roads import Road
 from pipeline.simulation.roadside import Roadside
 from pipeline.simulation.scenery import paint_ground
@@ -47,20 +46,19 @@ class DrawnCamera:
 
     def __init__(self, road: Road, roadside: Roadside, seed: int, model: CameraModel = ORDINARY) -> None:
         self.camera = calibration(model)
-        self._lens = Lens(self.camera, model, seed)
-        self._drawn = self._lens.drawn
+        self._sensor = Sensor(self.camera, model, seed)
         self._road, self._roadside = road, roadside
-        self._ground = backdrop.Ground(self._drawn, -LIDAR_HEIGHT_M, seed)
-        self._sky = backdrop.sky(self._drawn.width, self._ground.horizon, float(self.camera.K[0, 0]), seed)
+        self._ground = backdrop.Ground(self.camera, -LIDAR_HEIGHT_M, seed)
+        self._sky = backdrop.sky(WIDTH, self._ground.horizon, float(self.camera.K[0, 0]), seed)
 
     def picture(self, world: World) -> U8:
         """(720, 1280, 3) uint8 blue green red of one moment."""
-        return self._lens.picture(self._ideal(world), world.t_s)
+        return self._sensor.expose(self._drawn(world), world.t_s)
 
-    def _ideal(self, world: World) -> U8:
-        """The picture of the ideal camera, with the rim that the lens needs."""
-        bgr = np.empty((self._drawn.height, self._drawn.width, 3), dtype=np.uint8)
-        canvas = Canvas(bgr, self._drawn)
+    def _drawn(self, world: World) -> U8:
+        """What falls on the sensor: sharp and without noise."""
+        bgr = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
+        canvas = Canvas(bgr, self.camera)
         horizon = self._ground.horizon
         self._paint_sky(bgr[:horizon], world)
         paint_ground(canvas, self._road, world, horizon)

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.geometry import transform
+from pipeline.simulation.lens import distorted
 from pipeline.types import F64, U8, CameraCalibration
 
 NEAR_M = 0.4
@@ -19,6 +20,7 @@ SUN = np.array([-0.55, 0.45, 0.70])
 """Where the light comes from, ego axes: behind, to the left and above; unit length."""
 _SHIFT = 4  # OpenCV takes coordinates in 1/16 px
 _FAR_OUTSIDE_PX = 20_000.0
+_PIECE_PX, _MOST_PIECES = 160.0, 64  # an edge of 160 px in the picture's corner is bent by a quarter of a pixel
 
 Colour = tuple[float, float, float]
 Point = tuple[float, float, float]
@@ -49,6 +51,7 @@ class Canvas:
         self._T = camera.T_camera_ego
         self._focal = np.array([camera.K[0, 0], camera.K[1, 1]])
         self._center = camera.K[:2, 2]
+        self._distortion = camera.distortion
         self._clear()
 
     def _clear(self) -> None:
@@ -93,20 +96,40 @@ class Canvas:
         starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
         if haze:
             colours = hazed(colours, np.linalg.norm(np.add.reduceat(points, starts) / counts[:, None], axis=1))
-        nearest = np.minimum.reduceat(points[:, 2], starts)
-        depth = np.maximum(points[:, 2:], NEAR_M)
-        fixed = self._fixed_point(points[:, :2] / depth * self._focal + self._center)
-        seen = (nearest >= NEAR_M) & self._inside(fixed, starts)
-        crossing = (nearest < NEAR_M) & (np.maximum.reduceat(points[:, 2], starts) > NEAR_M)
-        ends, colour_list = (starts + counts).tolist(), colours.tolist()
-        for i in np.flatnonzero(seen | crossing).tolist():
-            start, end = int(starts[i]), ends[i]
-            outline = self._clipped(points[start:end]) if crossing[i] else fixed[start:end]
-            if len(outline) >= 3:
-                cv2.fillPoly(self.bgr, [outline], colour_list[i], cv2.LINE_AA, _SHIFT)
+        nearest, farthest = (f.reduceat(points[:, 2], starts) for f in (np.minimum, np.maximum))
+        chosen = np.flatnonzero(farthest > NEAR_M)
+        outlines = [points[start : start + count] for start, count in zip(starts[chosen], counts[chosen], strict=True)]
+        for i in np.flatnonzero(nearest[chosen] < NEAR_M):
+            outlines[i] = clip_near(outlines[i])
+        self._fill(outlines, colours[chosen])
 
-    def _fixed_point(self, pixels: F64) -> npt.NDArray[np.int32]:
-        return (np.clip(pixels, -_FAR_OUTSIDE_PX, _FAR_OUTSIDE_PX) * (1 << _SHIFT)).astype(np.int32)
+    def _fill(self, outlines: list[F64], colours: F64) -> None:
+        """Fill (K, 3) polygons beyond the near plane, camera axes, in order."""
+        if not outlines:
+            return
+        points, counts = np.concatenate(outlines), np.array([len(outline) for outline in outlines])
+        flat, counts = self._fine_edges(points[:, :2] / points[:, 2:], counts)
+        pixels = distorted(flat, self._distortion) * self._focal + self._center
+        fixed = (np.clip(pixels, -_FAR_OUTSIDE_PX, _FAR_OUTSIDE_PX) * (1 << _SHIFT)).astype(np.int32)
+        starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        ends, starts_list, colour_list = (starts + counts).tolist(), starts.tolist(), colours.tolist()
+        for i in np.flatnonzero(self._inside(fixed, starts)).tolist():
+            cv2.fillPoly(self.bgr, [fixed[starts_list[i] : ends[i]]], colour_list[i], cv2.LINE_AA, _SHIFT)
+
+    def _fine_edges(self, flat: F64, counts: Ints) -> tuple[F64, Ints]:
+        """Cut long edges into pieces: behind a lens a straight edge is bent."""
+        if not self._distortion.size:
+            return flat, counts
+        after = np.arange(1, len(flat) + 1)
+        starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        after[starts + counts - 1] = starts
+        edge = flat[after] - flat
+        length_px = np.hypot(edge[:, 0], edge[:, 1]) * self._focal[0]
+        pieces = np.clip(np.ceil(length_px / _PIECE_PX), 1, _MOST_PIECES).astype(np.int64)
+        first = np.cumsum(pieces) - pieces
+        share = (np.arange(int(pieces.sum())) - np.repeat(first, pieces)) / np.repeat(pieces, pieces)
+        fine = np.repeat(flat, pieces, axis=0) + share[:, None] * np.repeat(edge, pieces, axis=0)
+        return fine, np.add.reduceat(pieces, starts)
 
     def _inside(self, fixed: npt.NDArray[np.int32], starts: Ints) -> npt.NDArray[np.bool_]:
         """Which polygons touch the picture and are not smaller than a fifth of a pixel."""
@@ -114,11 +137,6 @@ class Canvas:
         size = np.array([self.bgr.shape[1], self.bgr.shape[0]]) << _SHIFT
         touches: npt.NDArray[np.bool_] = np.all((high >= 0) & (low <= size), axis=1) & np.any(high - low > 3, axis=1)
         return touches
-
-    def _clipped(self, polygon: F64) -> npt.NDArray[np.int32]:
-        """The pixels of what remains of a polygon beyond the near plane."""
-        kept = clip_near(polygon)
-        return self._fixed_point(kept[:, :2] / kept[:, 2:] * self._focal + self._center)
 
 
 def clip_near(polygon: F64) -> F64:

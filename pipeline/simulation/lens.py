@@ -1,11 +1,6 @@
-"""What a real camera does to an ideal pinhole picture: lens distortion, blur, exposure that wanders, noise.
-
-The ideal picture is drawn a little larger than the camera's own: a barrel-shaped lens gathers what lies beyond it.
-"""
+"""What sets a real camera apart from a pinhole: lens distortion, blur, exposure that wanders, noise."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -43,50 +38,43 @@ ORDINARY = CameraModel()
 """A decent webcam."""
 
 
-class Lens:
-    """Turns ideal pictures of ``drawn`` into the camera's own. seed: of the noise and of the exposure's phase."""
+def distorted(flat: F64, distortion: F64) -> F64:
+    """(N, 2) of directions x/z, y/z: where a lens puts them, as OpenCV has it; distortion: k1 and k2 first, or empty.
+    Beyond what the lens is modelled for, the distortion grows no more, so that nothing outside folds back inside."""
+    if not distortion.size:
+        return flat
+    k1, k2 = distortion[:2]
+    r2 = np.minimum(np.sum(flat**2, axis=1), _WIDEST_TAN**2)
+    return np.asarray(flat * (1.0 + k1 * r2 + k2 * r2**2)[:, None], dtype=np.float64)
+
+
+def undistorted(flat: F64, distortion: F64) -> F64:
+    """The inverse of ``distorted`` within the picture. The radial law has no inverse in closed form; it is tabulated
+    and read backwards."""
+    if not distortion.size:
+        return flat
+    ideal = np.linspace(0.0, _WIDEST_TAN, 4000)
+    bent = distorted(np.column_stack([ideal, np.zeros(len(ideal))]), distortion)[:, 0]
+    radius = np.hypot(flat[:, 0], flat[:, 1])
+    return np.asarray(flat * (np.interp(radius, bent, ideal) / np.maximum(radius, 1e-9))[:, None], dtype=np.float64)
+
+
+class Sensor:
+    """Blur, exposure and noise of one camera. seed: of the noise and of the exposure's phase."""
 
     def __init__(self, camera: CameraCalibration, model: CameraModel, seed: int) -> None:
         self._model, self._seed = model, seed
-        ideal = _undistorted(camera, model)
-        corner = np.array([camera.width - 1.0, camera.height - 1.0])
-        beyond = max(0.0, float(np.max(-ideal.min(axis=(0, 1)))), float(np.max(ideal.max(axis=(0, 1)) - corner)))
-        rim = int(np.ceil(beyond))
-        shift = np.array([[0.0, 0.0, rim], [0.0, 0.0, rim], [0.0, 0.0, 0.0]])
-        self.drawn = replace(
-            camera,
-            K=camera.K + shift,
-            distortion=np.empty(0),
-            width=camera.width + 2 * rim,
-            height=camera.height + 2 * rim,
-        )
-        at = (ideal + rim).astype(np.float32)
-        self._maps = cv2.convertMaps(at[..., 0], at[..., 1], cv2.CV_16SC2) if model.k1 or model.k2 else None
         self._grain = _grain(camera, model.noise, seed)
 
-    def picture(self, ideal: U8, t_s: float) -> U8:
-        """(H, W, 3) uint8 as the camera gives it at time t, from the ideal picture of ``drawn``."""
-        seen = cv2.remap(ideal, *self._maps, cv2.INTER_LINEAR) if self._maps else ideal
+    def expose(self, seen: U8, t_s: float) -> U8:
+        """(H, W, 3) uint8 as the camera gives it at time t, from what falls on its sensor."""
         if self._model.blur_px > 0.0:
-            seen = cv2.GaussianBlur(seen, (0, 0), self._model.blur_px)
+            seen = np.asarray(cv2.GaussianBlur(seen, (0, 0), self._model.blur_px), dtype=np.uint8)
         gain = 2.0 ** (self._model.exposure_stops * np.sin(2 * np.pi * t_s / _EXPOSURE_PERIOD_S + self._seed))
         rng = np.random.default_rng([self._seed, 5, round(t_s * 1e6)])
         row, column = rng.integers(0, _NOISE_ROOM_PX, 2)
         grain = self._grain[row : row + seen.shape[0], column : column + seen.shape[1]]
         return np.asarray(cv2.addWeighted(seen, gain, grain, 1.0, -128.0), dtype=np.uint8)
-
-
-def _undistorted(camera: CameraCalibration, model: CameraModel) -> F64:
-    """(H, W, 2): where in the ideal picture each pixel of the camera looks. The radial law has no inverse in closed
-    form; it is tabulated and read backwards."""
-    focal, center = np.array([camera.K[0, 0], camera.K[1, 1]]), camera.K[:2, 2]
-    v, u = np.mgrid[0 : camera.height, 0 : camera.width].astype(np.float64)
-    flat = (np.stack([u, v], axis=2) - center) / focal
-    radius = np.hypot(flat[..., 0], flat[..., 1])
-    ideal_radius = np.linspace(0.0, _WIDEST_TAN, 4000)
-    distorted = ideal_radius * (1.0 + model.k1 * ideal_radius**2 + model.k2 * ideal_radius**4)
-    stretch = np.interp(radius, distorted, ideal_radius) / np.maximum(radius, 1e-9)
-    return np.asarray(flat * stretch[..., None] * focal + center, dtype=np.float64)
 
 
 def _grain(camera: CameraCalibration, sigma: float, seed: int) -> U8:

@@ -15,6 +15,8 @@ _GRASS = (66, 118, 92)
 _ASPHALT, _SHOULDER, _WORN = (np.array(bgr, dtype=float) for bgr in ((88, 85, 84), (98, 95, 93), (80, 77, 76)))
 _WHITE = np.array([232.0, 236.0, 236.0])
 _BEHIND_M, _AHEAD_M = 4.0, 420.0
+_STRAIGHT_STEPS_M = np.array([-_BEHIND_M, 90.0, _AHEAD_M])
+_BENT_STEPS_M = np.concatenate([np.arange(-_BEHIND_M, 50.0, 2.5), np.geomspace(50.0, _AHEAD_M, 24)])
 _WORN_AHEAD_M, _DASHES_AHEAD_M = 90.0, 240.0
 _DASH_M, _GAP_M = 6.0, 12.0
 """Lane lines of a German motorway: 6 m of paint, 12 m without (RMS-1)."""
@@ -35,14 +37,19 @@ _Strip = tuple[F64, F64, F64]
 def paint_ground(canvas: Canvas, road: Road, world: World, horizon: int) -> None:
     """Grass, carriageways and their markings, crossing roads and theirs."""
     cv2.rectangle(canvas.bgr, (0, horizon), (canvas.bgr.shape[1], canvas.bgr.shape[0]), _GRASS, cv2.FILLED)
-    far = world.s_m + np.concatenate([np.arange(-_BEHIND_M, 60.0, 5.0), np.geomspace(60.0, _AHEAD_M, 16)])
+    far = world.s_m + (_STRAIGHT_STEPS_M if road.line.straight else _BENT_STEPS_M)
     crossings = [
         (crossing, line)
         for crossing, line in zip(road.crossings, road.crossing_lines, strict=True)
         if -_CROSSING_SEEN_M < crossing.s_m - world.s_m < _AHEAD_M
     ]
     open_m = [_junction(crossing, road) for crossing, _ in crossings]
-    _add(canvas, world, road.line, [*_carriageways(road, far), *_wheel_tracks(road, far[far < far[0] + _WORN_AHEAD_M])])
+    _add(
+        canvas,
+        world,
+        road.line,
+        [*_carriageways(road, far), *_wheel_tracks(road, far[far <= world.s_m + _WORN_AHEAD_M])],
+    )
     for crossing, line in crossings:
         _add(canvas, world, line, _crossing(crossing, road))
     _add(canvas, world, road.line, [*_edge_lines(road, far, open_m), *_lane_lines(road, world, open_m)])
