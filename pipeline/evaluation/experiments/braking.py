@@ -88,7 +88,7 @@ def run(case: Case) -> Drive:
     target, duration_s = _target(case.manoeuvre, speed)
     scenario = scene({0.0: speed}, target, duration_s, case.seed)
     setup = Setup(parameters(case.controller, speed), case.sensors)
-    return approach(scenario, setup, stop_when_still=case.manoeuvre != "CCRm")
+    return approach(scenario, setup, stop_when_over=case.manoeuvre != "CCRm")
 
 
 def _target(manoeuvre: Manoeuvre, speed_mps: float) -> tuple[dict[str, object], float]:

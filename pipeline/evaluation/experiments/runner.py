@@ -12,12 +12,13 @@ from typing import Any
 from pipeline.errors import BadInput
 from pipeline.evaluation.experiments.bev_error import BEV_ERROR
 from pipeline.evaluation.experiments.braking import BRAKING
+from pipeline.evaluation.experiments.choosing import CHOOSING
 from pipeline.evaluation.experiments.ncap import NCAP
 from pipeline.evaluation.experiments.ranging import RANGING
 from pipeline.evaluation.experiments.regression import REGRESSION
 from pipeline.evaluation.experiments.sections import Experiment, Section
 
-EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, BRAKING, NCAP)
+EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, BRAKING, NCAP)
 SUITES = ("paper", "euroncap", "iso", "all")
 
 

@@ -92,12 +92,12 @@ class Drive:
         return max((abs(b - a) / (t1 - t0) for a, b, t0, t1 in changes), default=0.0)
 
 
-def approach(scenario: Scenario, setup: Setup, stop_when_still: bool = True) -> Drive:
-    """Drive until contact, until the car stands (if so wished), or to the scenario's end."""
-    return record(drive(scenario, setup), stop_when_still)
+def approach(scenario: Scenario, setup: Setup, stop_when_over: bool = True) -> Drive:
+    """Drive until contact, until the danger is over (if so wished), or to the scenario's end."""
+    return record(drive(scenario, setup), stop_when_over)
 
 
-def record(ticks: Iterable[Tick], stop_when_still: bool = True) -> Drive:
+def record(ticks: Iterable[Tick], stop_when_over: bool = True) -> Drive:
     rows: list[tuple[float, float, float, float, float, float | None, str]] = []
     acquired = brakes = impact = None
     for tick in ticks:
@@ -112,10 +112,16 @@ def record(ticks: Iterable[Tick], stop_when_still: bool = True) -> Drive:
         acquired = gap if acquired is None and measured is not None else acquired
         brakes = gap if brakes is None and command is not None and command.brake > _PEDAL_TOUCHED else brakes
         rows.append((tick.t_s, speed, tick.vehicle.accel_mps2, gap, target.speed_mps, measured, state))
-        if stop_when_still and speed < _STANDING_MPS:
+        if stop_when_over and _over(tick, target):
             break
     times, speeds, accels, gaps, targets, measures, states = tuple(zip(*rows, strict=True)) or ((),) * 7
     return Drive(times, speeds, accels, gaps, targets, measures, states, acquired, brakes, impact)
+
+
+def _over(tick: Tick, target: ActorState) -> bool:
+    """The car stands, or has braked down to the speed of a target that goes on as it does."""
+    speed, accel = tick.vehicle.speed_mps, tick.vehicle.accel_mps2
+    return speed < _STANDING_MPS or (accel < -_BRAKING_MPS2 and speed <= target.speed_mps and not target.braking)
 
 
 def target_of(tick: Tick) -> ActorState:
