@@ -80,6 +80,24 @@ class EgoState:
     yaw_rate_radps: float | None = None
 
 
+GnssQuality = Literal["single", "dgnss", "rtk_float", "rtk_fixed"]
+
+
+@dataclass(frozen=True)
+class GnssFix:
+    """Where the ego origin is on the Earth (WGS 84). alt_m: above the ellipsoid. course_rad: which way it moves,
+    clockwise from true north; null when it stands. sigma_m: standard deviation of the place, each way."""
+
+    t_ns: int
+    lat_deg: float
+    lon_deg: float
+    alt_m: float
+    course_rad: float | None
+    speed_mps: float
+    quality: GnssQuality
+    sigma_m: float
+
+
 @dataclass(frozen=True)
 class RawBoxes:
     """A detector's candidates above a low floor, before thresholds and non-maximum suppression.
@@ -107,6 +125,7 @@ class Frame:
     ego: EgoState | None = None
     raw_boxes: RawBoxes | None = None
     notes: tuple[str, ...] = ()
+    gnss: GnssFix | None = None
 
 
 # ---------------------------------------------------------------- what stages hand on

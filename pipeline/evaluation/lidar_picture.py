@@ -55,7 +55,7 @@ def _rings(sweep: Sweep, colour: tuple[int, int, int]) -> U8:
     ahead = sweep.points[:, 0] > 0.0
     bearing = np.degrees(np.arctan2(sweep.points[ahead, 1], sweep.points[ahead, 0]))
     u = (0.5 - bearing / (2 * _BEARING_DEG)) * _WIDTH
-    v = _RINGS - 12 - sweep.ring[ahead] * (_RINGS - 24) / 15
+    v = _RINGS - 12 - sweep.ring[ahead].astype(np.float64) * (_RINGS - 24) / 15
     _dots(sheet, np.column_stack([u, v]).round().astype(np.int32), colour)
     return sheet
 

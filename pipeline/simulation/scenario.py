@@ -10,6 +10,7 @@ import yaml
 from pydantic import Field, ValidationError, model_validator
 
 from pipeline.simulation.actors import Actor, Script
+from pipeline.simulation.gnss_model import RTK, GnssModel
 from pipeline.simulation.lens import ORDINARY, CameraModel
 from pipeline.simulation.lidar_model import VLP16, LidarModel
 from pipeline.simulation.roads import Road, Strict
@@ -37,6 +38,7 @@ class Scenario(Strict):
     road: Road
     lidar: LidarModel = VLP16
     camera: CameraModel = ORDINARY
+    gnss: GnssModel = RTK
     ego: Ego
     actors: tuple[Actor, ...] = ()
     crossing_actors: tuple[CrossingActor, ...] = ()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from pipeline.simulation import gnss
 from pipeline.simulation.camera import DrawnCamera, calibration
 from pipeline.simulation.lidar import Lidar
 from pipeline.simulation.roadside import Roadside
@@ -18,7 +19,7 @@ _BEFORE_M, _BEYOND_M = 100.0, 600.0
 
 
 class Sensors:
-    """LiDAR, camera and speedometer. end_m: how far along the road the ego vehicle gets; the roadside ends 600 m
+    """LiDAR, camera, speedometer and GNSS. end_m: how far along the road the ego vehicle gets; the roadside ends 600 m
     later. The same world and index give the same frame."""
 
     def __init__(self, scenario: Scenario, end_m: float) -> None:
@@ -39,6 +40,7 @@ class Sensors:
             picture=Picture(t_ns, self._camera.picture(now)) if picture else None,
             camera=self.camera,
             ego=EgoState(t_ns, now.speed_mps, now.yaw_rate_radps),
+            gnss=gnss.fix(now, self._scenario.gnss, self._scenario.seed, index, t_ns),
         )
 
     @cached_property

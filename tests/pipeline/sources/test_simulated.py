@@ -87,3 +87,13 @@ def test_a_scenario_of_ones_own(tmp_path: Path) -> None:
     path.write_text("{title: Mine, colour: red}")
     with pytest.raises(SourceError, match=r"mine\.yaml: "):
         open_source(f"sim:{path}")
+
+
+def test_gnss_tells_the_way_driven(frames: dict[int, Frame]) -> None:
+    first, last = frames[0].gnss, frames[100].gnss
+    assert first is not None
+    assert last is not None
+    assert first.t_ns == frames[0].t_ns
+    driven_m = np.hypot((last.lat_deg - first.lat_deg) * 110_950.0, (last.lon_deg - first.lon_deg) * 90_540.0)
+    assert driven_m == pytest.approx(180.0, abs=3.0)  # 20 m/s for 4.5 s, then down to 12.8 m/s at 10 s
+    assert first.quality == "rtk_fixed"
