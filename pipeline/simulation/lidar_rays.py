@@ -22,6 +22,7 @@ _FIRING_ORDER = np.array([2 * ring if ring < 8 else 2 * ring - 15 for ring in ra
 COLUMNS = round(_ROTATION_S / 2 / _FIRING_S)
 COLUMNS_PER_RAD = (COLUMNS - 1) / np.pi
 
+_BEHIND_M = 3.0  # what is farther behind cannot get ahead within a sweep
 BOX_FIELDS = 13
 """x y z of the middle, half length, width and height, cos and sin of the yaw, material, velocity x and y, yaw rate,
 share of the material's usual range."""
@@ -88,9 +89,13 @@ def cast(rays: F64, times_s: F64, boxes: F64, ground: F64, spare: int) -> tuple[
 
 @numba.njit(cache=True, nogil=True)
 def _columns_of(box: F64, columns: int, spare: int) -> tuple[int, int]:
-    """The columns that can meet a box: all of them, unless it is wholly ahead."""
+    """The columns that can meet a box: all of them, unless it is wholly ahead, wholly on one side or wholly behind, so
+    that the bearings of its corners say where it lies."""
     x, y, half_l, half_w, c, s = box[0], box[1], box[3], box[4], box[6], box[7]
-    if x - abs(half_l * c) - abs(half_w * s) <= 0.5:
+    deep, wide = abs(half_l * c) + abs(half_w * s), abs(half_l * s) + abs(half_w * c)
+    if x + deep < -_BEHIND_M - abs(y):
+        return 0, 0
+    if x - deep <= 0.5 and abs(y) - wide <= 0.5:
         return 0, columns
     low, high = np.inf, -np.inf
     for k in range(4):
