@@ -7,7 +7,7 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from pipeline.simulation.canvas import HAZE_BGR, HAZE_M
+from pipeline.simulation.canvas import HAZE_BGR, HAZE_M, Ints
 from pipeline.simulation.lens import undistorted
 from pipeline.types import F32, F64, U8, CameraCalibration
 
@@ -36,19 +36,19 @@ def sky(width: int, horizon: int, focal_px: float, seed: int) -> U8:
     """(horizon + 2, 3·width, 3): a panorama three pictures wide, to be cut by the heading."""
     rng = np.random.default_rng([seed, 3])
     rows, columns = horizon + 2, 3 * width
-    height = np.linspace(1.0, 0.0, rows)[:, None]
-    gradient = HAZE_BGR + (_ZENITH_BGR - HAZE_BGR) * (height**0.75)[..., None]
+    height = np.linspace(1.0, 0.0, rows, dtype=np.float32)[:, None]
+    gradient = (HAZE_BGR + (_ZENITH_BGR - HAZE_BGR) * (height**0.75)[..., None]).astype(np.float32)
     picture = np.broadcast_to(gradient, (rows, columns, 3)).copy()
     stretched = cv2.resize(_octaves(rng, 256, (4, 8, 16, 32, 64)), (columns, rows * 2))[:rows]
     cloud = np.clip((stretched - 0.55) * 3.2, 0.0, 1.0) * np.clip(height * 2.2, 0.0, 1.0) * 0.8
-    picture += (np.array([252.0, 250.0, 247.0]) - picture) * cloud[..., None]
+    picture += (np.array([252.0, 250.0, 247.0], dtype=np.float32) - picture) * cloud[..., None]
     for distance_m, size_px, colour in ((2600, 34, (120, 128, 96)), (1300, 22, (84, 112, 78)), (600, 15, (60, 92, 66))):
         _ridge(picture, rng, horizon, size_px, np.array(colour, dtype=float), distance_m)
     painted: U8 = np.clip(picture, 0, 255).astype(np.uint8)
     return painted
 
 
-def _ridge(picture: F64, rng: np.random.Generator, horizon: int, size_px: int, bgr: F64, distance_m: float) -> None:
+def _ridge(picture: F32, rng: np.random.Generator, horizon: int, size_px: int, bgr: F64, distance_m: float) -> None:
     """A line of hills or woods along the horizon, seen through the haze."""
     columns = picture.shape[1]
     knots = rng.random(columns // 90 + 2)
@@ -59,9 +59,10 @@ def _ridge(picture: F64, rng: np.random.Generator, horizon: int, size_px: int, b
     clear = np.exp(-distance_m / (HAZE_M * 2.2))
     colour = bgr * clear + HAZE_BGR * (1 - clear)
     top = horizon - line * size_px
-    rows = np.arange(picture.shape[0])[:, None]
+    first = max(int(top.min()), 0)
+    rows = np.arange(first, picture.shape[0])[:, None]
     cover = np.clip(rows - top[None, :], 0.0, 1.0)[..., None]
-    picture += (colour - picture) * cover
+    picture[first:] += (colour - picture[first:]) * cover
 
 
 def _octaves(rng: np.random.Generator, size: int, steps: tuple[int, ...]) -> F32:
@@ -113,17 +114,21 @@ def _ground_under(camera: CameraCalibration, ground_z_m: float) -> tuple[int, F6
     """The row of the horizon, and ego x, y and distance of the ground in every pixel below it."""
     R, t = camera.T_camera_ego[:3, :3], camera.T_camera_ego[:3, 3]
     place = -R.T @ t
-    v, u = np.mgrid[0 : camera.height, 0 : camera.width].astype(np.float64)
-    K = camera.K
-    flat = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1]], axis=2).reshape(-1, 2)
-    flat = undistorted(flat, camera.distortion).reshape(*u.shape, 2)
-    ray = np.concatenate([flat, np.ones((*u.shape, 1))], axis=2) @ R
-    steep = ray[..., 2].max(axis=1) < _LEVEL
-    horizon = int(np.argmax(steep))
-    ray = ray[horizon:]
+    edges = _rays(camera, np.arange(camera.height), np.array([0, camera.width // 2, camera.width - 1])) @ R
+    horizon = int(np.argmax(edges[..., 2].max(axis=1) < _LEVEL))
+    ray = _rays(camera, np.arange(horizon, camera.height), np.arange(camera.width)) @ R
     reach = (ground_z_m - place[2]) / ray[..., 2]
     x, y = place[0] + reach * ray[..., 0], place[1] + reach * ray[..., 1]
     return horizon, x, y, np.hypot(x - place[0], y - place[1])
+
+
+def _rays(camera: CameraCalibration, rows: Ints, columns: Ints) -> F64:
+    """(rows, columns, 3) where pixels look, camera axes, z = 1."""
+    v, u = np.meshgrid(rows, columns, indexing="ij")
+    K = camera.K
+    seen = np.column_stack([((u - K[0, 2]) / K[0, 0]).ravel(), ((v - K[1, 2]) / K[1, 1]).ravel()])
+    ideal = undistorted(seen, camera.distortion)
+    return np.column_stack([ideal, np.ones(len(ideal))]).reshape(*u.shape, 3)
 
 
 def _grain(seed: int) -> U8:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from pipeline.simulation.roads import Road
 from pipeline.simulation.world import World
@@ -65,6 +64,8 @@ def _off_the_road(things: list[Thing], road: Road, start_m: float, end_m: float)
     reach_m = np.array([np.hypot(thing.length_m, thing.width_m) / 2 for thing in things])
     clear = np.ones(len(things), dtype=bool)
     if not road.line.straight:
+        from scipy.spatial import cKDTree  # half a second that a straight road need not wait for
+
         course = road.to_world(np.arange(start_m - 60.0, end_m + 60.0, _COURSE_STEP_M), 0.0)[:, :2]
         nearest_m, _ = cKDTree(course).query(places)
         own_m = np.where(np.array([thing.kind in _BY_THE_ROAD for thing in things]), np.inf, reach_m)
