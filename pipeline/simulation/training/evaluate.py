@@ -93,7 +93,7 @@ def _count(truth: tuple[Label, ...], detections: tuple[Detection, ...], focal_px
         if place is None or label.visible < FREE_SHARE:
             continue
         best = int(np.argmax(row)) if len(row) else -1
-        hit = best >= 0 and row[best] >= MATCH_IOU
+        hit = best >= 0 and bool(row[best] >= MATCH_IOU)
         place.vehicles += 1
         place.found += hit
         place.leads += label is lead
