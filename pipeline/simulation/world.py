@@ -18,6 +18,7 @@ from pipeline.types import F64
 
 LIDAR_HEIGHT_M = 0.5
 _BRAKING_MPS2 = -0.4
+_SLOWEST_STEER_MPS = 2.0  # slower than this a lane change is a creep to the side, not a turn on the spot
 
 
 @dataclass(frozen=True)
@@ -106,9 +107,11 @@ def _state(world: World, actor: Vehicle, pose: F64, speed_mps: float, accel_mps2
 def _yaw_rate(now: Motion, road: Road, s_m: float, way: float) -> float:
     """Of something on the road at s; way: +1 along it, −1 against it."""
     bend = road.curvature_per_m(s_m)
-    return way * (now.speed_mps * bend / (1.0 - bend * now.d_m) + now.d_accel_mps2 / max(now.speed_mps, 0.1))
+    return way * (
+        now.speed_mps * bend / (1.0 - bend * now.d_m) + now.d_accel_mps2 / max(now.speed_mps, _SLOWEST_STEER_MPS)
+    )
 
 
 def _drift_rad(now: Motion) -> float:
     """How far a vehicle that changes lanes points to the left of the road."""
-    return atan2(now.d_rate_mps, max(now.speed_mps, 0.1))
+    return atan2(now.d_rate_mps, max(now.speed_mps, _SLOWEST_STEER_MPS))

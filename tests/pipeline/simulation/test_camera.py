@@ -123,3 +123,24 @@ def test_clipping_keeps_what_is_beyond_the_near_plane(corners: tuple[tuple[float
         assert kept[:, 2].min() >= NEAR_M - 1e-9
         for corner in triangle[beyond]:
             assert np.any(np.all(np.isclose(kept, corner), axis=1)), "corners beyond the plane stay"
+
+
+TOWN = "{length_m: 2000}], lanes_forward: 1, lanes_oncoming: 1, median_m: 0, crossings: [{s_m: 125, lanes_each_way: 1}"
+
+
+def test_a_crossing_road_is_painted_with_its_lines() -> None:
+    """25 m ahead: asphalt where grass was, our lines open, its own lines across."""
+    crossed, now = draw(with_actors(segments=TOWN, lane=-1))
+    plain, _ = draw(with_actors(segments=TOWN.replace("{s_m: 125, lanes_each_way: 1}", ""), lane=-1))
+
+    def at(picture: U8, x: float, s_y: float) -> npt.NDArray[np.int64]:
+        u, v = np.round(pixels(np.array([[x, s_y - now.d_m, -0.5]]))[0]).astype(int)
+        return picture[v, u].astype(np.int64)
+
+    right_edge = -3.6 + 0.25
+    assert at(plain, 25.0, right_edge).min() > 170, "the edge line of a road without a crossing"
+    assert at(crossed, 25.0, right_edge).max() < 150, "is open at the crossing"
+    beside = at(plain, 25.0, -11.0), at(crossed, 25.0, -11.0)
+    assert beside[0][1] > beside[0][2] + 10, "grass is green"
+    assert abs(beside[1][1] - beside[1][2]) < 12, "asphalt is grey"
+    assert at(crossed, 25.0 - 3.5 + 0.2, -14.0).min() > 150, "the crossing road's own edge line"

@@ -112,3 +112,9 @@ def test_an_actors_yaw_rate_is_what_its_heading_does() -> None:
     for state in world.at(scene, 1.01).actors:
         turned = np.remainder(after[state.actor.id] - before[state.actor.id] + np.pi, 2 * np.pi) - np.pi
         assert turned / 0.02 == pytest.approx(state.yaw_rate_radps, rel=0.03)
+
+
+def test_a_lane_change_at_standstill_does_not_turn_on_the_spot() -> None:
+    change = "lane_changes: [{start_s: 0, duration_s: 4, lane: -1}]"
+    scene = with_actors(f"{{id: 1, kind: car, lane: -2, ahead_m: 30, speed_mps: {{0: 0}}, {change}}}")
+    assert abs(world.at(scene, 2.0).actors[0].cuboid.yaw_rad) < 0.8
