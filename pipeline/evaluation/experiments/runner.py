@@ -13,12 +13,13 @@ from pipeline.errors import BadInput
 from pipeline.evaluation.experiments.bev_error import BEV_ERROR
 from pipeline.evaluation.experiments.braking import BRAKING
 from pipeline.evaluation.experiments.choosing import CHOOSING
+from pipeline.evaluation.experiments.iso import ISO
 from pipeline.evaluation.experiments.ncap import NCAP
 from pipeline.evaluation.experiments.ranging import RANGING
 from pipeline.evaluation.experiments.regression import REGRESSION
 from pipeline.evaluation.experiments.sections import Experiment, Section
 
-EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, BRAKING, NCAP)
+EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, BRAKING, NCAP, ISO)
 SUITES = ("paper", "euroncap", "iso", "all")
 
 
@@ -51,8 +52,11 @@ def run_all(
     if jobs == 1:
         return [_run_here(each, short, done) for each in experiments]
     # spawn: a forked child would inherit numba's and onnxruntime's threads half alive
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+    pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
+    try:
         return [_run_in(pool, each, short, done) for each in experiments]
+    finally:
+        pool.shutdown(cancel_futures=True)  # a person who interrupts does not want the rest driven first
 
 
 def _run_here(experiment: Experiment[Any, Any], short: bool, done: Callable[[], None]) -> Section:
