@@ -33,8 +33,8 @@ def test_nothing_stands_on_a_crossing_road(angle_deg: float) -> None:
 
 
 def test_in_a_winding_road_no_tree_or_house_stands_on_another_stretch_of_it() -> None:
-    bends = [{"length_m": 60}, {"length_m": 90, "radius_m": 30}, {"length_m": 60}, {"length_m": 94, "radius_m": -30}]
-    road, beside = built(segments=[*bends, {"length_m": 600}])
+    hairpin = {"length_m": 44, "radius_m": 14}  # the way back runs 28 m beside the way there
+    road, beside = built(segments=[{"length_m": 300}, hairpin, {"length_m": 600}])
     course = road.to_world(np.arange(-60.0, 960.0, 1.0), 0.0)[:, :2]
     for thing, pose in zip(beside.things, beside.poses, strict=True):
         if thing.kind in ("tree", "building"):
