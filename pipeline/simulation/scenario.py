@@ -9,6 +9,7 @@ from pathlib import Path
 import yaml
 from pydantic import Field, ValidationError, model_validator
 
+from pipeline.errors import BadInput
 from pipeline.simulation.actors import Actor, Script
 from pipeline.simulation.gnss_model import RTK, GnssModel
 from pipeline.simulation.lens import ORDINARY, CameraModel
@@ -17,10 +18,10 @@ from pipeline.simulation.roads import Road, Strict
 from pipeline.simulation.routes import CrossingActor, Route, route
 
 _FOLDER = Path(__file__).parent / "scenarios"
-_GAP_STEP_S = 0.01
+_GAP_STEP_S, _GAP_HALVINGS = 0.25, 10
 
 
-class ScenarioError(ValueError):
+class ScenarioError(BadInput):
     """A scenario that does not exist or cannot be understood; the text names what is wrong."""
 
 
@@ -76,14 +77,23 @@ class Scenario(Strict):
 def _timed(scenario: Scenario, actor: Actor) -> Actor:
     if actor.brake is None or actor.brake.at_gap_m is None:
         return actor
-    road, ego, wanted = scenario.road, scenario.ego, actor.brake.at_gap_m
-    own_d_m, half = road.lane_offset_m(ego.lane) + ego.offset_m, actor.size()[0] / 2
-    for step in range(ceil(scenario.duration_s / _GAP_STEP_S)):
-        t_s = step * _GAP_STEP_S
-        own_m = road.line.advance(ego.start_m, ego.travelled_m(t_s), own_d_m)
-        if actor.place_m(road, ego.start_m, actor.travelled_m(t_s)) - half - own_m <= wanted:
-            return actor.model_copy(update={"brake": actor.brake.model_copy(update={"at_s": t_s, "at_gap_m": None})})
-    return actor
+    wanted_m = actor.brake.at_gap_m
+    steps = range(ceil(scenario.duration_s / _GAP_STEP_S) + 1)
+    late_s = next((i * _GAP_STEP_S for i in steps if _gap_m(scenario, actor, i * _GAP_STEP_S) <= wanted_m), None)
+    if late_s is None:
+        return actor
+    early_s = max(late_s - _GAP_STEP_S, 0.0)
+    for _ in range(_GAP_HALVINGS):
+        middle_s = (early_s + late_s) / 2
+        early_s, late_s = (early_s, middle_s) if _gap_m(scenario, actor, middle_s) <= wanted_m else (middle_s, late_s)
+    return actor.model_copy(update={"brake": actor.brake.model_copy(update={"at_s": late_s, "at_gap_m": None})})
+
+
+def _gap_m(scenario: Scenario, actor: Actor, t_s: float) -> float:
+    """From the ego origin to an actor's nearest face along the road, before it brakes."""
+    road, ego = scenario.road, scenario.ego
+    own_m = road.line.advance(ego.start_m, ego.travelled_m(t_s), road.lane_offset_m(ego.lane) + ego.offset_m)
+    return actor.place_m(road, ego.start_m, actor.travelled_m(t_s)) - actor.size()[0] / 2 - own_m
 
 
 def names() -> tuple[str, ...]:
