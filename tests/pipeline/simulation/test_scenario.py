@@ -13,7 +13,11 @@ from pipeline.simulation import scenario, world
 from pipeline.simulation.scenario import Scenario, ScenarioError
 from pipeline.simulation.world import ActorState, World
 
-STRAIGHT = (Path(scenario.__file__).parent / "scenarios" / "straight.yaml").read_text(encoding="utf-8")
+FILES = {
+    name: (Path(scenario.__file__).parent / "scenarios" / f"{name}.yaml").read_text(encoding="utf-8")
+    for name in scenario.names()
+}
+STRAIGHT = FILES["straight"]
 
 
 @pytest.mark.parametrize(
@@ -40,11 +44,13 @@ def test_a_wrong_file_is_told_in_one_sentence(change: tuple[str, str], says: str
     assert "\n" not in str(error.value)
 
 
-@settings(max_examples=60, deadline=None)
-@given(st.integers(0, len(STRAIGHT)), st.integers(0, 30), st.text(max_size=12))
-def test_damage_is_survived(at: int, drop: int, extra: str) -> None:
+@settings(max_examples=120, deadline=None)
+@given(st.sampled_from(sorted(FILES)), st.floats(0, 1), st.integers(0, 30), st.text("0123456789.-: ae{[,", max_size=12))
+def test_damage_is_survived(name: str, share: float, drop: int, extra: str) -> None:
+    text = FILES[name]
+    at = int(share * len(text))
     try:
-        parsed = scenario.parse(STRAIGHT[:at] + extra + STRAIGHT[at + drop :], "t.yaml")
+        parsed = scenario.parse(text[:at] + extra + text[at + drop :], "t.yaml")
     except ScenarioError:
         return
     world.at(parsed, 1.0)
