@@ -12,6 +12,7 @@ from typing import Literal
 
 from pipeline.motion import closing_speed_mps
 from pipeline.params import AccParams
+from pipeline.threat import enters_corridor, is_dependable
 from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Path
 
 STANDSTILL_MPS = 0.1
@@ -104,17 +105,9 @@ def avoid(
         and item.ttc_s is not None
         and item.ttc_s < params.ttc_limit_s
         and (closing_speed_mps(item) or 0.0) > STANDSTILL_MPS
+        and is_dependable(item)
         and enters_corridor(item, path)
     ]
-
-
-def enters_corridor(item: FusedObject, path: Path) -> bool:
-    """Whether the object's sideways motion carries it into the corridor before it is reached."""
-    if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None:
-        return False
-    then = item.path_offset_m + item.velocity_mps[1] * item.ttc_s
-    crosses = (then > 0) != (item.path_offset_m > 0)
-    return item.in_path or crosses or abs(then) <= path.half_width_m
 
 
 def pid(state: AccState, error_mps: float, dt_s: float | None, params: AccParams) -> tuple[AccState, float]:

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from math import inf
 from typing import Literal, NamedTuple
 
-from pipeline.acc import STANDSTILL_MPS, enters_corridor
+from pipeline.acc import STANDSTILL_MPS
 from pipeline.motion import closing_speed_mps
 from pipeline.params import AccParams, AebParams
 from pipeline.records import evolve
+from pipeline.threat import enters_corridor, is_dependable
 from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Path
 
 Stage = Literal["warn", "partial_brake", "full_brake"]
@@ -37,11 +38,12 @@ class AebState:
 
 
 class Threat(NamedTuple):
-    """Something on our way that we close in on."""
+    """Something on our way that we close in on. measured: by the LiDAR; else its speed comes from box heights."""
 
     id: int
     ttc_s: float
     required_mps2: float
+    measured: bool
 
 
 def guard(
@@ -78,31 +80,23 @@ def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams
 def find_threats(
     lead: Cipv | None, objects: tuple[FusedObject, ...], path: Path, params: AebParams
 ) -> tuple[Threat, ...]:
-    """The CIPV, and what else heads into the corridor and could be a CIPV but for its place (it must be confirmed as
-    one must: nothing brakes fully for a single blob)."""
+    """The CIPV, and what else is dependable and heads into the corridor: nothing brakes fully for a single blob."""
     found = []
     for item in objects:
         closing = closing_speed_mps(item)
         if closing is None or closing <= STANDSTILL_MPS or not item.distance_m or item.ttc_s is None:
             continue
         is_lead = lead is not None and item.id == lead.id
-        if is_lead or (_could_lead(item) and enters_corridor(item, path)):
+        if (is_lead and not item.carried) or (is_dependable(item) and enters_corridor(item, path)):
             required = required_decel_mps2(item.distance_m, closing, params)
-            found.append(Threat(item.id, item.ttc_s, required))
+            found.append(Threat(item.id, item.ttc_s, required, item.source != "V"))
     return tuple(found)
 
 
-def _could_lead(item: FusedObject) -> bool:
-    """Every test for a lead passed but its place, and seen in this frame."""
-    return not item.carried and all(gate.passed for gate in item.gates if gate.name in _MUST_PASS)
-
-
-_MUST_PASS = frozenset({"vehicle_class", "distance_known", "hits", "seen", "size"})
-
-
 def _level(threat: Threat, params: AebParams) -> int:
+    """The stage asked for. Without a measured distance never the full one: a box height errs by a tenth."""
     if threat.ttc_s < params.full_ttc_s or threat.required_mps2 > params.full_when_mps2:
-        return _FULL
+        return _FULL if threat.measured else _PARTIAL
     if threat.ttc_s < params.partial_ttc_s or threat.required_mps2 > params.partial_when_mps2:
         return _PARTIAL
     return _WARN if threat.ttc_s < params.warn_ttc_s else _NONE

@@ -107,9 +107,7 @@ def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignm
     """The alignment in use: parameters where a person set them, the recording's calibration for the rest. Null when
     neither is known, in which case nothing can be projected. Pinhole needs a calibration; angular needs none."""
     if params.model == "pinhole" and camera is not None:
-        turn = np.eye(4)
-        turn[:3, :3] = rotation(*(np.radians(a) for a in (params.roll_deg, params.pitch_deg, params.yaw_deg)))
-        return Pinhole(camera.K, camera.distortion, camera.T_camera_ego @ inverse(turn))
+        return Pinhole(camera.K, camera.distortion, camera.T_camera_ego @ inverse(_correction(params, camera)))
     measured = angular_from_calibration(camera) if camera is not None else None
     typed = (params.h_res_deg, params.v_res_deg, params.cx_px, params.cy_px)
     if measured is None and any(value is None for value in typed):
@@ -121,6 +119,15 @@ def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignm
     )
     h_deg, v_deg, cx, cy = (b if t is None else t for t, b in zip(typed, base, strict=True))
     return Angular(float(np.radians(h_deg)), float(np.radians(v_deg)), float(cx), float(cy))
+
+
+def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
+    """(4, 4) turn of the camera where it is mounted, in ego axes: its place stays."""
+    turn = rotation(*(np.radians(angle) for angle in (params.roll_deg, params.pitch_deg, params.yaw_deg)))
+    place = inverse(camera.T_camera_ego)[:3, 3]
+    correction = np.eye(4)
+    correction[:3, :3], correction[:3, 3] = turn, place - turn @ place
+    return correction
 
 
 def project_cuboids(alignment: Alignment, corners: F64, width: int, height: int) -> list[Box | None]:

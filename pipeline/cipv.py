@@ -7,7 +7,7 @@ smallest distance. Each test leaves its number and limit on the object; the firs
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import erf, sqrt
+from math import erf, hypot, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +19,7 @@ from pipeline.records import evolve
 from pipeline.types import VEHICLES, Cipv, FusedObject, Gate, Path, Point2, Rejection
 
 SMALLEST_SIGMA_M = 0.1
+AGREEMENT_SIGMAS = 3.0
 
 
 class Candidate(NamedTuple):
@@ -65,12 +66,39 @@ def choose(
             able.append(item)
         else:
             failures[item.id] = failed
-    lead = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
-    if lead is None:
+    nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
+    if nearest is None:
         return tuple(judged), None, tuple(Rejection(k, reason) for k, reason in failures.items())
-    failures |= {item.id: f"behind #{lead.id}" for item in able if item.id != lead.id}
+    lead = _surer(nearest, able)
+    failures |= {item.id: _why_after(item, lead) for item in able if item.id != lead.id}
     rejected = tuple(Rejection(item.id, failures[item.id]) for item in judged if item.id != lead.id)
     return tuple(judged), _named(lead, len(able)), rejected
+
+
+def _surer(nearest: FusedObject, able: list[FusedObject]) -> FusedObject:
+    """The nearest candidate, or the surer one that it may be a doubtful view of: one car can have two rows when its box
+    and its cluster were not joined, or when it was lost and found again under another number. A row that is carried
+    yields to one seen now, one that only the camera has to one the LiDAR measures, when the two distances agree."""
+    rank = _surety(nearest)
+    same_place = [item for item in able if _surety(item) > rank and _agree(nearest, item)]
+    return min(same_place, key=lambda item: (item.distance_m or 0.0, item.id), default=nearest)
+
+
+def _surety(item: FusedObject) -> int:
+    return 0 if item.carried else 1 if item.source == "V" else 2
+
+
+def _agree(a: FusedObject, b: FusedObject) -> bool:
+    """Whether two distances are the same within three standard deviations of both."""
+    if a.distance_m is None or b.distance_m is None:
+        return False
+    sigma = hypot(a.distance_sigma_m or 0.0, b.distance_sigma_m or 0.0)
+    return abs(a.distance_m - b.distance_m) <= AGREEMENT_SIGMAS * sigma
+
+
+def _why_after(item: FusedObject, lead: FusedObject) -> str:
+    doubtful = (item.distance_m or 0.0) < (lead.distance_m or 0.0)
+    return f"taken for #{lead.id}, which is surer" if doubtful else f"behind #{lead.id}"
 
 
 class Place(NamedTuple):
@@ -126,8 +154,8 @@ def _has_distance(who: Candidate) -> Check:
 
 
 def _is_confirmed(who: Candidate) -> Check:
-    """Two sensors agreeing are enough at once; one alone must see it again."""
-    hits, needed = who.item.hits, 1 if who.item.source == "VL" else who.params.confirm_hits
+    """Two sensors that both see it now are enough at once; one alone must see it again. The lead is confirmed."""
+    hits, needed = who.item.hits, 1 if who.item.seen_by == "VL" or who.leads else who.params.confirm_hits
     return Check(Gate("hits", hits, needed, hits >= needed), f"seen {hits} of {needed} times")
 
 
@@ -135,7 +163,7 @@ def _is_seen(who: Candidate) -> Check:
     """A carried object may stay the lead, so that the lead does not flicker; it may not become it, because where it is
     now is only a guess."""
     passed = not who.item.carried or who.leads or who.params.carried_may_become_lead
-    return Check(Gate("seen", float(not who.item.carried), 1.0, passed), "not seen in this frame")
+    return Check(Gate("seen", float(not who.item.carried), 0.0 if who.leads else 1.0, passed), "not seen in this frame")
 
 
 def _is_vehicle_sized(who: Candidate) -> Check:

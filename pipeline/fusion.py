@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -20,6 +21,8 @@ from pipeline.types import Box, FusedObject, Gate, LidarTrack, Point2, VisionTra
 
 LIDAR_RANGE_SIGMA_M = 0.1
 """Uncertainty of a cluster's nearest point: the VLP-16's ±3 cm and the spacing of its beams on a bumper."""
+
+CARRIED_SPEED_SIGMA_MPS, CARRIED_ACCEL_SIGMA_MPS2 = 0.5, 3.0
 
 TYPICAL_SIZE_M = {
     "car": (4.5, 1.8),
@@ -118,7 +121,7 @@ def _gates(
         # boxes of nearly one place and size are one object: there it is the height law that errs, not the LiDAR
         doubtful = params.range_gate and iou < params.sure_iou
         if doubtful and distance is not None and sigma is not None:
-            gap = abs(distance - _range(lidar[j])) / math.hypot(sigma, LIDAR_RANGE_SIGMA_M)
+            gap = abs(distance - _range(lidar[j])) / math.hypot(sigma, _lidar_sigma(lidar[j]))
             tests.append(Gate("range_sigmas", gap, params.range_gate_sigmas, gap <= params.range_gate_sigmas))
         joinable[i, j] = all(test.passed for test in tests)
         gates[int(i), int(j)] = tuple(tests)
@@ -193,9 +196,9 @@ def _row(
             cuboid=hit.obstacle.cuboid,
             closest_point=hit.obstacle.closest_point,
             distance_m=_range(hit),
-            distance_sigma_m=LIDAR_RANGE_SIGMA_M,
+            distance_sigma_m=_lidar_sigma(hit),
             velocity_mps=_velocity(seen, hit),
-            carried=hit.carried,
+            seen_by=_seen_by(seen, hit),
             hits=max(hit.hits, seen.hits) if seen is not None else hit.hits,
             lidar_points=hit.obstacle.points,
             lidar_track=hit.id,
@@ -216,13 +219,21 @@ def _row(
         distance_m=seen.distance_m,
         distance_sigma_m=seen.sigma_m,
         velocity_mps=seen.velocity_mps,
-        carried=seen.carried,
+        seen_by=_seen_by(seen, None),
         hits=seen.hits,
         lidar_points=0,
         lidar_track=None,
         vision_track=seen.id,
         gates=gates,
     )
+
+
+def _seen_by(seen: VisionTrack | None, hit: LidarTrack | None) -> Literal["", "V", "L", "VL"]:
+    """The sensors that saw the object in this frame."""
+    by_camera, by_lidar = seen is not None and not seen.carried, hit is not None and not hit.carried
+    if by_camera and by_lidar:
+        return "VL"
+    return "V" if by_camera else "L" if by_lidar else ""
 
 
 def _velocity(seen: VisionTrack | None, hit: LidarTrack) -> Point2 | None:
@@ -242,6 +253,13 @@ def _typical_footprint(near_face: Point2, label: str) -> F64:
     length, width = TYPICAL_SIZE_M.get(label, TYPICAL_SIZE_M["car"])
     x, y = near_face
     return np.array([[x + length, y + width / 2], [x + length, y - width / 2], [x, y - width / 2], [x, y + width / 2]])
+
+
+def _lidar_sigma(track: LidarTrack) -> float:
+    """Standard deviation of a LiDAR track's distance. It grows while the track is carried, by what the tracked speed
+    may be off and by what the object may do meanwhile."""
+    drift_m = CARRIED_SPEED_SIGMA_MPS * track.unseen_s + CARRIED_ACCEL_SIGMA_MPS2 * track.unseen_s**2 / 2
+    return math.hypot(LIDAR_RANGE_SIGMA_M, drift_m)
 
 
 def _quad(corners: F64) -> tuple[Point2, Point2, Point2, Point2]:

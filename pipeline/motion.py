@@ -14,6 +14,9 @@ from pipeline.params import MotionParams
 from pipeline.records import evolve
 from pipeline.types import EgoState, FusedObject
 
+SMALLEST_CLOSING_MPS = 0.1
+"""A gap that shrinks more slowly does not measurably shrink, and has no TTC."""
+
 
 def closing_speed_mps(item: FusedObject) -> float | None:
     """How fast the gap to the object's nearest point shrinks; null where place or velocity are unknown."""
@@ -32,7 +35,8 @@ def describe(objects: Iterable[FusedObject], ego: EgoState | None, params: Motio
 
 def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) -> FusedObject:
     closing = closing_speed_mps(item)
-    ttc = item.distance_m / closing if closing is not None and closing > 0 and item.distance_m is not None else None
+    shrinks = closing is not None and closing >= SMALLEST_CLOSING_MPS and item.distance_m is not None
+    ttc = item.distance_m / closing if shrinks else None  # type: ignore[operator]
     if ego is None or item.velocity_mps is None or item.closest_point is None:
         return evolve(item, ttc_s=ttc)
     yaw_rate = ego.yaw_rate_radps or 0.0

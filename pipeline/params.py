@@ -35,6 +35,7 @@ class Section(BaseModel):
 class DownsampleParams(Section):
     """Per-channel down-sampling (paper: "down-sampling … points of each channel")."""
 
+    blind_range_m: float = _slider(1.0, 0.0, 5.0, 0.1, "m", "Nearer returns come from the own body and are dropped")
     keep_every: int = _slider(1, 1, 10, 1, "points", "Keep every n-th point of each channel; 1 keeps all")
 
 
@@ -49,7 +50,7 @@ class GroundParams(Section):
     max_slope_deg: float = _slider(10.0, 1.0, 30.0, 0.5, "°", "A plane steeper than this falls back to its neighbour")
     fit_range_m: float = _slider(50.0, 10.0, 100.0, 5.0, "m", "Planes are fitted to points this far ahead and behind")
     fit_half_width_m: float = _slider(10.0, 2.0, 30.0, 0.5, "m", "Planes are fitted to points this far to either side")
-    min_range_m: float = _slider(2.0, 0.0, 5.0, 0.1, "m", "Returns nearer than this come from the ego vehicle itself")
+    min_range_m: float = _slider(2.0, 0.0, 5.0, 0.1, "m", "No plane is fitted to nearer returns: the own body")
 
 
 class ClusterParams(Section):
@@ -147,6 +148,7 @@ class VisionTrackingParams(Section):
     max_size_ratio: float = _slider(2.0, 1.1, 5.0, 0.1, "", "kalman: largest change of a box's width between sightings")
     bearing_sigma_deg: float = _slider(0.3, 0.05, 3.0, 0.05, "°", "Kalman: noise of a box's direction")
     accel_sigma_mps2: float = _slider(3.0, 0.1, 20.0, 0.1, "m/s²", "Kalman: how hard objects may accelerate")
+    ghost_iou: float = _slider(0.4, 0.1, 1.0, 0.05, "", "kalman: a carried box that overlaps a seen one more is dropped")
 
 
 class AlignmentParams(Section):
@@ -173,7 +175,9 @@ class FusionParams(Section):
         2.0, 0.0, 4.0, 0.1, "°", "Angle between rings: an object's edge is taken half a gap beyond the last ring on it"
     )
     range_gate: bool = _choice(True, "Do not join objects whose distances disagree beyond their uncertainty")
-    sure_iou: float = _slider(0.5, 0.1, 1.0, 0.05, "", "Boxes overlapping more are one object whatever their distances")
+    sure_iou: float = _slider(
+        0.3, 0.1, 1.0, 0.05, "", "Boxes overlapping more are one object: cars 1.8 times as far apart cannot overlap so much"
+    )
     range_gate_sigmas: float = _slider(3.0, 0.5, 10.0, 0.1, "σ", "Largest disagreement of the two distances")
 
 

@@ -86,6 +86,7 @@ def _object(each: FusedObject) -> dict[str, Any]:
         "moving": each.moving,
         "ttc_s": _number(each.ttc_s),
         "carried": each.carried,
+        "seen_by": each.seen_by,
         "hits": each.hits,
         "lidar_points": each.lidar_points,
         "gates": [_gate(gate) for gate in each.gates],

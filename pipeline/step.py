@@ -180,7 +180,7 @@ def _health(frame: Frame) -> SensorHealth:
         lidar_age_ms=age(sweep.t_ns if sweep else None),
         lidar_points=len(sweep.points) if sweep else None,
         camera_age_ms=age(picture.t_ns if picture else None),
-        camera_skew_ms=(picture.t_ns - sweep.t_ns) / 1e6 if picture and sweep else None,
+        camera_skew_ms=(picture.t_ns - sweep.t_ns) / 1e6 if picture and picture.t_ns is not None and sweep else None,
         ego_age_ms=age(frame.ego.t_ns if frame.ego else None),
     )
 

@@ -49,9 +49,10 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Picture:
-    """One camera image. bgr: (H, W, 3) uint8. ``encoded`` is the file as the camera gave it (JPEG), if it did."""
+    """One camera image. t_ns: the camera's own stamp, null where the recording has none. bgr: (H, W, 3) uint8.
+    ``encoded`` is the file as the camera gave it (JPEG), if it did."""
 
-    t_ns: int
+    t_ns: int | None
     bgr: U8
     encoded: bytes | None = None
 
@@ -167,7 +168,7 @@ class Obstacle:
 @dataclass(frozen=True)
 class LidarTrack:
     """An obstacle followed over time. ``velocity_mps`` is relative to ego (x, y); null until two sightings.
-    ``obstacle`` is the last one seen, moved by the prediction while ``carried``."""
+    ``obstacle`` is the last one seen, moved by the prediction while ``carried``; ``unseen_s`` says for how long."""
 
     id: int
     obstacle: Obstacle
@@ -175,6 +176,7 @@ class LidarTrack:
     hits: int
     missed: int
     carried: bool
+    unseen_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -209,7 +211,9 @@ class FusedObject:
     """The paper's Table 3 row, widened by what the contract asks for. Frames and units as in the contract.
 
     A V object whose distance nobody knows (no law for its class, box cut by the picture's edge, beyond the law's
-    reach) keeps its row: its place and distance are null, and it cannot be the CIPV."""
+    reach) keeps its row: its place and distance are null, and it cannot be the CIPV.
+
+    source: which sensors' tracks it is made of. seen_by: which of them saw it in this frame; none: it is carried."""
 
     id: int
     source: SourceKind
@@ -222,7 +226,7 @@ class FusedObject:
     distance_m: float | None
     distance_sigma_m: float | None
     velocity_mps: Point2 | None
-    carried: bool
+    seen_by: Literal["", "V", "L", "VL"]
     hits: int
     lidar_points: int
     lidar_track: int | None
@@ -234,6 +238,11 @@ class FusedObject:
     in_path: bool = False
     in_path_probability: float | None = None
     path_offset_m: float | None = None
+
+    @property
+    def carried(self) -> bool:
+        """Not seen in this frame: where it is now is a prediction."""
+        return not self.seen_by
 
 
 @dataclass(frozen=True)

@@ -201,8 +201,9 @@ def _carry(tracked: Tracked, dt_s: float) -> Tracked:
         density=seen.density,
         spread=seen.spread,
     )
-    carried = LidarTrack(last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True)
-    return Tracked(carried, tracked.history, tracked.missed_s + dt_s)
+    unseen_s = tracked.missed_s + dt_s
+    carried = LidarTrack(last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True, unseen_s)
+    return Tracked(carried, tracked.history, unseen_s)
 
 
 def _ended(tracked: Tracked, sweep_lacks_it: bool, params: LidarTrackingParams) -> bool:

@@ -73,7 +73,7 @@ class AstyxSource:
         notes: list[str] = []
         T_ego_lidar, camera = self._calibration_of(name, notes)
         sweep = self._sweep(name, tick, T_ego_lidar, notes)
-        picture = self._picture(name, tick, notes)
+        picture = self._picture(name, notes)
         return Frame(index, name, tick, sweep, picture, camera, notes=tuple(notes))
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
@@ -106,7 +106,7 @@ class AstyxSource:
             notes.append(str(error))
             return None
 
-    def _picture(self, name: str, tick: int, notes: list[str]) -> Picture | None:
+    def _picture(self, name: str, notes: list[str]) -> Picture | None:
         path = self._pictures.get(name)
         if path is None:
             notes.append("no picture for this frame")
@@ -119,7 +119,7 @@ class AstyxSource:
         if (bgr.shape[1], bgr.shape[0]) != self._size:
             notes.append(f"{path.name}: {bgr.shape[1]}×{bgr.shape[0]}, the others are {self._size[0]}×{self._size[1]}")
             return None
-        return Picture(tick, bgr, encoded)
+        return Picture(None, bgr, encoded)
 
     def _picture_size(self) -> tuple[int, int]:
         """Width and height of the first readable picture; the calibration files do not say."""

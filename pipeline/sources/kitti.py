@@ -72,7 +72,7 @@ class KittiSource:
         notes: list[str] = []
         calibration = self._calibration_of(name, notes)
         sweep = self._sweep(name, tick, notes)
-        picture = self._picture(name, tick, notes)
+        picture = self._picture(name, notes)
         ego = self._ego(name, tick, notes)
         return Frame(index, name, tick, sweep, picture, calibration.camera, ego, notes=tuple(notes))
 
@@ -118,7 +118,7 @@ class KittiSource:
             return None
         return Sweep(tick, kept, ring, 16)
 
-    def _picture(self, name: str, tick: int, notes: list[str]) -> Picture | None:
+    def _picture(self, name: str, notes: list[str]) -> Picture | None:
         path = self._files.pictures.get(name)
         if path is None:
             notes.append("no picture for this frame")
@@ -131,7 +131,7 @@ class KittiSource:
         if (bgr.shape[1], bgr.shape[0]) != self._size:
             notes.append(f"{path.name}: {bgr.shape[1]}×{bgr.shape[0]}, the others are {self._size[0]}×{self._size[1]}")
             return None
-        return Picture(_stamp(self._files.camera_stamps, name) or tick, bgr, encoded)
+        return Picture(_stamp(self._files.camera_stamps, name), bgr, encoded)
 
     def _ego(self, name: str, tick: int, notes: list[str]) -> EgoState | None:
         path = self._files.oxts.get(name)

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from pipeline import kalman
-from pipeline.geometry import F64
+from pipeline.geometry import F64, iou_matrix
 from pipeline.kalman import CvState
 from pipeline.params import VisionTrackingParams
 from pipeline.records import evolve
@@ -94,7 +94,25 @@ def track(
         for followed in kept_list
         if followed.track.missed < params.queue_frames and followed.unseen_s <= params.max_missed_s
     )
+    if params.filter == "kalman":
+        alive = _without_ghosts(alive, params)
     return VisionTrackerState(state.next_id + len(fresh), alive), tuple(followed.track for followed in alive)
+
+
+def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -> tuple[Followed, ...]:
+    """Without carried objects whose expected box lies on one that was seen: that is the same car under a new number, or
+    a car that the nearer one hides, and either way nothing is known of it any more."""
+    seen = [followed.track for followed in alive if not followed.track.carried]
+    carried = [followed.track for followed in alive if followed.track.carried]
+    overlap = iou_matrix(np.array([track.bbox for track in carried]), np.array([track.bbox for track in seen]))
+    pairs = np.argwhere(overlap > params.ghost_iou)
+    ghosts = {carried[i].id for i, j in pairs if _same_kind(carried[i].label, seen[j].label)}
+    return tuple(followed for followed in alive if followed.track.id not in ghosts) if ghosts else alive
+
+
+def _same_kind(a: str, b: str) -> bool:
+    """Whether two names may be one object's: a detector mixes up vehicles, not a person and a car."""
+    return a == b or VEHICLES.issuperset((a, b))
 
 
 def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
@@ -149,8 +167,7 @@ def _cost(followed: Followed, seen: VisionMeasurement, params: VisionTrackingPar
 
     queue: distance of the centres (print: of the half widths). kalman: also how much the width changed."""
     old, new = followed.track.bbox, seen.detection.bbox
-    labels = (followed.track.label, seen.detection.label)
-    if labels[0] != labels[1] and not VEHICLES.issuperset(labels):
+    if not _same_kind(followed.track.label, seen.detection.label):
         return math.inf
     moved_px = math.dist(_centre(old), _centre(new))
     if params.filter == "queue":

@@ -58,7 +58,7 @@ def fused(
         distance_m=float(np.hypot(x, y)) if x is not None else None,
         distance_sigma_m=0.1 if x is not None else None,
         velocity_mps=velocity,
-        carried=False,
+        seen_by=source,
         hits=hits,
         lidar_points=0 if source == "V" else 40,
         lidar_track=None,

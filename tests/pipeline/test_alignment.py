@@ -128,6 +128,15 @@ def test_pinhole_correction_turns_the_way_its_name_says() -> None:
     assert pitched[1] < base[1] - 10
 
 
+def test_a_correction_turns_the_camera_where_it_is_mounted() -> None:
+    """A point right before the lens of a camera 1.6 m behind the origin stays there, whatever the turn."""
+    calibration = camera((-1.6, 0.2, 0.9))
+    aligned = resolve(AlignmentParams(yaw_deg=10.0), calibration)
+    assert aligned is not None
+    turned = np.array([-1.6 + 5.0 * np.cos(np.radians(10)), 0.2 + 5.0 * np.sin(np.radians(10)), 0.9])
+    assert aligned.project(turned[None])[0] == pytest.approx([640.0, 360.0], abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("center", "visible"),
     [

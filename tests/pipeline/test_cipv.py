@@ -85,7 +85,7 @@ def test_hysteresis_holds_the_lead_at_the_edge_but_takes_in_nobody_new() -> None
 
 
 def test_a_carried_object_may_stay_the_lead_but_not_become_it() -> None:
-    unseen = dataclasses.replace(fused(1, 20.0), carried=True)
+    unseen = dataclasses.replace(fused(1, 20.0), seen_by="")
     lead, why_not = decide(unseen)
     assert lead is None
     assert why_not == {1: "not seen in this frame"}
@@ -117,3 +117,33 @@ def test_everyone_is_either_the_lead_or_has_a_reason(
     if lead is not None:
         rivals = [o.distance_m for o in objects if why_not.get(o.id, "").startswith("behind #")]
         assert all(distance >= lead.distance_m for distance in rivals if distance is not None)
+
+
+@pytest.mark.parametrize(
+    ("doubtful", "surer"),
+    [
+        pytest.param(
+            dataclasses.replace(fused(1, 20.0, source="V"), distance_sigma_m=2.0),
+            fused(2, 22.8),
+            id="box and cluster of one car",
+        ),
+        pytest.param(
+            dataclasses.replace(fused(1, 21.5), seen_by="", distance_sigma_m=0.6),
+            fused(2, 22.8),
+            id="lost and found again",
+        ),
+    ],
+)
+def test_a_doubtful_view_yields_to_the_surer_one_it_agrees_with(doubtful: FusedObject, surer: FusedObject) -> None:
+    lead, why_not = decide(doubtful, surer, last=1)
+    assert lead is not None
+    assert lead.id == 2
+    assert why_not == {1: "taken for #2, which is surer"}
+
+
+def test_a_nearer_car_that_only_the_camera_sees_still_leads() -> None:
+    near = dataclasses.replace(fused(1, 20.0, source="V"), distance_sigma_m=2.0)
+    lead, why_not = decide(near, fused(2, 40.0))
+    assert lead is not None
+    assert lead.id == 1
+    assert why_not == {2: "behind #1"}

@@ -19,6 +19,7 @@ PARAMS = MotionParams()
         pytest.param((5.0, 0.0), -5.0, None, id="lead pulls away: negative closing speed, no TTC"),
         pytest.param((0.0, 0.0), 0.0, None, id="same speed: no TTC"),
         pytest.param((0.0, 3.0), 0.0, None, id="moving across only"),
+        pytest.param((-0.05, 0.0), 0.05, None, id="too slow to be measured: no TTC of minutes"),
         pytest.param(None, None, None, id="velocity not known: nothing made up"),
     ],
 )

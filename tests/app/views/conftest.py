@@ -103,7 +103,7 @@ def make_result(index: int = 0) -> Result:
     truck = _object(
         9, "V", label="truck", score=0.6, bbox=(10.0, 20.0, 60.0, 70.0), distance_m=45.0, distance_sigma_m=4.0,
         bev=((47.0, 9.0), (47.0, 6.6), (45.0, 6.6), (45.0, 9.0)), closest_point=(45.0, 7.8, -1.2), vision_track=2,
-        carried=True,
+        seen_by="",
     )  # fmt: skip
     person = _object(10, "V", label="person", score=0.4, bbox=(300.0, 40.0, 310.0, 70.0), vision_track=3)
     x = np.linspace(0.0, 60.0, 31)

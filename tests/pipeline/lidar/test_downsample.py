@@ -12,7 +12,14 @@ from pipeline.types import Sweep
 
 
 def _sweep(ring: list[int]) -> Sweep:
-    return Sweep(0, np.zeros((len(ring), 4), np.float32), np.array(ring, np.uint8), 16)
+    points = np.tile(np.array([10.0, 0.0, 0.0, 0.0], np.float32), (len(ring), 1))
+    return Sweep(0, points, np.array(ring, np.uint8), 16)
+
+
+def test_the_own_body_is_dropped() -> None:
+    points = np.array([[0.6, 0.3, 0.0, 0.0], [0.0, -0.9, 0.0, 0.0], [1.1, 0.0, 0.0, 0.0]], np.float32)
+    kept = keep_mask(Sweep(0, points, np.zeros(3, np.uint8), 16), DownsampleParams(blind_range_m=1.0))
+    assert kept.tolist() == [False, False, True]
 
 
 def test_every_second_point_of_each_channel_in_the_order_of_the_sweep() -> None:

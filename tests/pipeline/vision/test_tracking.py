@@ -231,3 +231,13 @@ def test_a_standing_car_ahead_of_a_fast_ego_car_is_soon_known_to_stand() -> None
 
     assert closing_mps(28.0) > 25.0
     assert closing_mps(None) < 24.0
+
+
+def test_a_carried_box_on_a_seen_one_is_a_ghost() -> None:
+    """A car jumps in the picture by more than the gate and gets a new number: the old one must not stay beside it."""
+    gone = [(_car(20.0, 0.0),)] * 3 + [(_car(20.0, 0.0), _car(20.0, 6.0))] * 2
+    shown = _drive([*gone, (_car(21.0, 0.1, label="person"), _car(20.0, 6.0))], KALMAN)
+    assert [track.carried for track in shown[-1]] == [True, False, False], "another kind of object is no ghost's heir"
+    tight = KALMAN.model_copy(update={"gate_px": 5.0, "gate_sizes": 0.1})
+    jumped = _drive([(_car(20.0, 0.0),)] * 3 + [(_car(20.0, 0.45),)], tight)
+    assert [(track.id, track.carried) for track in jumped[-1]] == [(2, False)]

@@ -1,0 +1,33 @@
+"""Which objects beside the CIPV deserve a reaction, for ACC's TTC rule and for emergency braking alike.
+
+A wrong brake is a danger of its own, so an object must be dependable (the LiDAR measures it in this frame, it is
+confirmed and no kerb or post) and its course must really lead into the corridor.
+"""
+
+from __future__ import annotations
+
+from pipeline.types import FusedObject, Path
+
+SIDEWAYS_SIGMA_MPS = 0.5
+"""What a tracked cluster's sideways speed may be off by: only what exceeds it is believed."""
+_MUST_PASS = frozenset({"distance_known", "hits", "seen", "size"})
+
+
+def is_dependable(item: FusedObject) -> bool:
+    """Seen now, by the LiDAR, and every test for a lead passed but class and place. A box height alone says too little
+    about speed to brake for what is not even the lead."""
+    tests = [gate for gate in item.gates if gate.name in _MUST_PASS]
+    return item.source != "V" and not item.carried and bool(tests) and all(gate.passed for gate in tests)
+
+
+def enters_corridor(item: FusedObject, path: Path) -> bool:
+    """Whether the object is in the corridor, or its sideways motion carries it there before it is reached. What stands
+    still beside the road does not swerve: its sideways speed is noise."""
+    if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None:
+        return False
+    if item.in_path or item.moving is False:
+        return item.in_path
+    offset, sideways = item.path_offset_m, item.velocity_mps[1]
+    toward = -sideways if offset > 0 else sideways
+    believed = max(toward - SIDEWAYS_SIGMA_MPS, 0.0)
+    return abs(offset) - believed * item.ttc_s <= path.half_width_m
