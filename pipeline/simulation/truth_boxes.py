@@ -26,10 +26,15 @@ class BoxNoise:
     """A detector's errors. lasting_share, frame_share: standard deviation of each edge, as a share of the box's height,
     that stays with a vehicle and that is new in each frame. edge_px: of each edge, never less. missed: share of clear
     and near vehicles that a frame misses. reach_m, fall_off_m: where half are missed, and over how many metres that
-    comes. visible_share: less of a vehicle than this is not found."""
+    comes. visible_share: less of a vehicle than this is not found.
 
-    lasting_share: float = 0.02
-    frame_share: float = 0.015
+    The defaults are near what the embedded detector does on drawn pictures (six scenarios, 500 clear vehicles): box
+    heights 6 % off to 40 m and 7 % beyond, 1.5 px at least; 2 % missed to 80 m, half beyond 105 m. The reach is set
+    shorter, as real pictures' is.
+    """
+
+    lasting_share: float = 0.03
+    frame_share: float = 0.03
     edge_px: float = 0.7
     missed: float = 0.02
     reach_m: float = 85.0
