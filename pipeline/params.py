@@ -148,7 +148,7 @@ class VisionTrackingParams(Section):
     max_size_ratio: float = _slider(2.0, 1.1, 5.0, 0.1, "", "kalman: largest change of a box's width between sightings")
     bearing_sigma_deg: float = _slider(0.3, 0.05, 3.0, 0.05, "°", "Kalman: noise of a box's direction")
     accel_sigma_mps2: float = _slider(3.0, 0.1, 20.0, 0.1, "m/s²", "Kalman: how hard objects may accelerate")
-    ghost_iou: float = _slider(0.4, 0.1, 1.0, 0.05, "", "kalman: a carried box that overlaps a seen one more is dropped")
+    ghost_iou: float = _slider(0.4, 0.1, 1.0, 0.05, "", "kalman: a carried box this much on a seen one is dropped")
 
 
 class AlignmentParams(Section):

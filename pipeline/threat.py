@@ -10,6 +10,7 @@ from pipeline.types import FusedObject, Path
 
 SIDEWAYS_SIGMA_MPS = 0.5
 """What a tracked cluster's sideways speed may be off by: only what exceeds it is believed."""
+ABREAST_M = 1.0
 _MUST_PASS = frozenset({"distance_known", "hits", "seen", "size"})
 
 
@@ -27,6 +28,8 @@ def enters_corridor(item: FusedObject, path: Path) -> bool:
         return False
     if item.in_path or item.moving is False:
         return item.in_path
+    if item.closest_point is None or item.closest_point[0] < ABREAST_M:
+        return False  # beside us already: braking no longer parts the two
     offset, sideways = item.path_offset_m, item.velocity_mps[1]
     toward = -sideways if offset > 0 else sideways
     believed = max(toward - SIDEWAYS_SIGMA_MPS, 0.0)

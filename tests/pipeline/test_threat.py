@@ -57,6 +57,7 @@ def test_nothing_is_dependable_before_it_was_judged() -> None:
         pytest.param(fused(1, 30.0, 0.5, velocity=(-20.0, 0.0)), 20.0, True, id="a standing obstacle in the corridor"),
         pytest.param(fused(1, 30.0, -8.0, velocity=(-20.0, 6.0)), 20.0, True, id="a crossing car will be there"),
         pytest.param(fused(1, 30.0, 3.5, velocity=(5.0, -2.0)), 20.0, False, id="it pulls away: never reached"),
+        pytest.param(fused(1, 0.1, 2.7, velocity=(-2.0, -1.5)), 20.0, False, id="abreast of us"),
         pytest.param(fused(1, 30.0, 3.5, velocity=(-10.0, -2.0)), None, True, id="ego speed not known"),
     ],
 )
