@@ -11,16 +11,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from statistics import mean
 from typing import Literal
 
 from pipeline.evaluation.experiments.sections import Chart, Experiment, Section, Series, Table
 from pipeline.evaluation.experiments.track import Drive, approach, parameters, scene
 from pipeline.run import Sensors
-from pipeline.simulation.loop import Setup
+from pipeline.simulation.camera import HEIGHT, WIDTH
+from pipeline.simulation.loop import NetworkEyes, Setup, TruthEyes
+from pipeline.vision.detector import Detector, open_detector
+from pipeline.vision.models import EMBEDDED
 
 KMH = 1.0 / 3.6
 Manoeuvre = Literal["CCRs", "CCRm", "CCRb"]
+Boxes = Literal["truth", "network"]
+Key = tuple[Manoeuvre, Sensors, str, Boxes]
 LEAD_DECEL_MPS2 = 6.0
 _LEAD_BRAKES_AT_S = 2.0
 SENSORS: dict[Sensors, str] = {"lidar": "LiDAR", "both": "fused"}
@@ -66,29 +72,47 @@ def needed_behind_braking_mps2(
 
 @dataclass(frozen=True)
 class Case:
+    """boxes: whose the camera's are, projected truth with a detector's errors or the embedded network's."""
+
     manoeuvre: Manoeuvre
     sensors: Sensors
     controller: str
     seed: int
+    boxes: Boxes = "truth"
+
+    @property
+    def key(self) -> Key:
+        """What runs that differ by their seed alone have in common."""
+        return self.manoeuvre, self.sensors, self.controller, self.boxes
 
 
 def cases(short: bool) -> list[Case]:
     manoeuvres: tuple[Manoeuvre, ...] = ("CCRs",) if short else ("CCRs", "CCRm", "CCRb")
-    return [
+    fast = [
         Case(manoeuvre, sensors, controller, seed)
         for manoeuvre in manoeuvres
         for sensors in SENSORS
         for controller in ("ACC", "ACC + AEB")
         for seed in range(1 if short else 10)
     ]
+    if short:
+        return fast
+    return fast + [Case(each, "both", "ACC + AEB", seed, "network") for each in manoeuvres for seed in range(3)]
 
 
 def run(case: Case) -> Drive:
     speed = PAPER[case.manoeuvre].speed_kmh * KMH
     target, duration_s = _target(case.manoeuvre, speed)
     scenario = scene({0.0: speed}, target, duration_s, case.seed)
-    setup = Setup(parameters(case.controller, speed), case.sensors)
+    eyes = TruthEyes() if case.boxes == "truth" else NetworkEyes(_network())
+    setup = Setup(parameters(case.controller, speed), case.sensors, eyes)
     return approach(scenario, setup, stop_when_over=case.manoeuvre != "CCRm")
+
+
+@cache
+def _network() -> Detector:
+    """One a process; it is ready only after a while."""
+    return open_detector(EMBEDDED, (WIDTH, HEIGHT))
 
 
 def _target(manoeuvre: Manoeuvre, speed_mps: float) -> tuple[dict[str, object], float]:
@@ -107,18 +131,16 @@ def _target(manoeuvre: Manoeuvre, speed_mps: float) -> tuple[dict[str, object], 
 
 def report(cases: Sequence[Case], drives: Sequence[Drive]) -> Section:
     done = list(zip(cases, drives, strict=True))
-    groups = dict.fromkeys((case.manoeuvre, case.sensors, case.controller) for case in cases)
-    rows = [
-        _row(key, [drive for case, drive in done if (case.manoeuvre, case.sensors, case.controller) == key])
-        for key in groups
-    ]
+    groups = dict.fromkeys(case.key for case in cases)
+    rows = [_row(key, [drive for case, drive in done if case.key == key]) for key in groups]
     manoeuvres = list(dict.fromkeys(case.manoeuvre for case in cases))
     return Section(
         "braking",
         "Braking: CCRs, CCRm and CCRb in the closed loop",
         (
             "Means over the runs; the smallest gap and the impact are the worst. Impact speed is relative to the "
-            "target. Camera boxes are projected truth with a detector's errors.",
+            "target. Boxes: whose the camera's are, projected truth with a detector's errors or the embedded network's "
+            "on drawn pictures.",
             *(_verdict(manoeuvre, done) for manoeuvre in manoeuvres),
         ),
         (Table("Drives", _COLUMNS, tuple(rows)), closed_forms()),
@@ -130,6 +152,7 @@ _COLUMNS = (
     "manoeuvre",
     "sensors",
     "controller",
+    "boxes",
     "runs",
     "acquired at m",
     "braked from m",
@@ -142,12 +165,13 @@ _COLUMNS = (
 )
 
 
-def _row(key: tuple[Manoeuvre, Sensors, str], drives: list[Drive]) -> tuple[str | float | int | None, ...]:
+def _row(key: Key, drives: list[Drive]) -> tuple[str | float | int | None, ...]:
     impacts = [drive.impact_mps / KMH for drive in drives if drive.impact_mps is not None]
     return (
         key[0],
         SENSORS[key[1]],
         key[2],
+        key[3] if key[1] != "lidar" else None,
         len(drives),
         _mean(drive.acquired_m for drive in drives),
         _mean(drive.brakes_m for drive in drives),
@@ -173,7 +197,7 @@ def _verdict(manoeuvre: Manoeuvre, done: list[tuple[Case, Drive]]) -> str:
         return max(
             (drive.impact_mps or 0.0, -drive.smallest_gap_m)
             for case, drive in done
-            if (case.manoeuvre, case.sensors, case.controller) == (manoeuvre, sensors, "ACC + AEB")
+            if case.key == (manoeuvre, sensors, "ACC + AEB", "truth")
         )
 
     lidar, fused = worst("lidar"), worst("both")
@@ -213,11 +237,12 @@ def closed_forms() -> Table:
 
 def _charts(manoeuvre: Manoeuvre, done: list[tuple[Case, Drive]]) -> tuple[Chart, Chart]:
     first = [(case, drive) for case, drive in done if case.manoeuvre == manoeuvre and case.seed == 0]
+    names = {"truth": "", "network": ", network"}
 
     def lines(values: str, scale: float) -> tuple[Series, ...]:
         return tuple(
             Series(
-                f"{SENSORS[case.sensors]}, {case.controller}",
+                f"{SENSORS[case.sensors]}, {case.controller}{names[case.boxes]}",
                 drive.t_s,
                 tuple(value * scale for value in getattr(drive, values)),
             )

@@ -9,6 +9,7 @@ from pipeline.evaluation.experiments.braking import (
     PAPER,
     Case,
     Manoeuvre,
+    cases,
     closed_forms,
     needed_behind_braking_mps2,
     needed_decel_mps2,
@@ -66,3 +67,23 @@ def test_towards_a_standing_car_both_sensors_brake_earlier_than_the_lidar() -> N
 def test_the_same_case_gives_the_same_drive() -> None:
     case = Case("CCRb", "both", "ACC + AEB", 3)
     assert run(case) == run(case)
+
+
+def test_with_the_embedded_network_in_the_loop_it_stops_behind_a_braking_lead() -> None:
+    drive = run(Case("CCRb", "both", "ACC + AEB", 0, "network"))
+    assert drive.acquired_m is not None
+    assert drive.impact_mps is None
+    assert drive.speed_mps[-1] < 0.1
+    assert "full_brake" in drive.states
+
+
+def test_the_column_of_boxes_says_which_runs_had_the_network() -> None:
+    full = cases(False)
+    assert {case.manoeuvre for case in full if case.boxes == "network"} == set(PAPER)
+    drive = run(Case("CCRb", "lidar", "ACC", 0))
+    section = report([Case("CCRb", "both", "ACC + AEB", 0, "network"), *_pair()], [drive] * 3)
+    assert [row[3] for row in section.tables[0].rows] == ["network", None, "truth"]
+
+
+def _pair() -> list[Case]:
+    return [Case("CCRb", "lidar", "ACC + AEB", 0), Case("CCRb", "both", "ACC + AEB", 0)]
