@@ -58,7 +58,11 @@ def _section(section: Section) -> str:
 
 
 def _table(table: Table) -> str:
-    head = "".join(f"<th>{escape(name)}</th>" for name in table.columns)
+    worded = [all(isinstance(row[n], str | None) for row in table.rows) for n in range(len(table.columns))]
+    head = "".join(
+        f'<th class="{"word" if words else ""}">{escape(name)}</th>'
+        for name, words in zip(table.columns, worded, strict=True)
+    )
     rows = "".join(f"<tr>{''.join(_cell(cell, table.decimals) for cell in row)}</tr>" for row in table.rows)
     caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
     return f'<h3>{escape(table.title)}</h3><div class="wide"><table>{caption}<tr>{head}</tr>{rows}</table></div>'

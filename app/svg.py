@@ -35,7 +35,8 @@ def chart_svg(chart: Chart) -> str:
 
 def ticks(low: float, high: float, about: int = 6) -> list[float]:
     """Round numbers that span low…high: steps of 1, 2 or 5 times a power of ten."""
-    span = high - low if high > low else max(abs(high), 1.0)
+    size = max(abs(low), abs(high), 1.0)
+    span = high - low if high - low > 1e-9 * size else size
     raw = span / about
     power = 10.0 ** floor(log10(raw))
     step = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw)

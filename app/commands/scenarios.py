@@ -13,6 +13,7 @@ from rich.table import Table as RichTable
 
 from app.progress import frames_progress
 from app.report import html, in_words
+from pipeline.errors import BadInput
 from pipeline.evaluation.experiments.runner import count_cases, of_suite, run_all
 from pipeline.evaluation.experiments.sections import Coloured, Section, as_json
 
@@ -42,11 +43,15 @@ class Scenarios:
 
     def __call__(self) -> int:
         experiments = of_suite(self.suite)
+        if self.jobs < 0:
+            raise BadInput(f"--jobs {self.jobs}: a number of processes, or 0 for one a core")
+        if self.report is not None:
+            self.report.parent.mkdir(parents=True, exist_ok=True)
+            self.report.open("a").close()  # a place that cannot be written to is told before the drives, not after
         with frames_progress() as progress:
             bar = progress.add_task("driving", total=count_cases(experiments, self.short))
             sections = run_all(experiments, self.short, self.jobs, lambda: progress.advance(bar))
         if self.report is not None:
-            self.report.parent.mkdir(parents=True, exist_ok=True)
             self.report.write_text(html(sections, f"Experiments: {self.suite}"), encoding="utf-8")
         if self.json:
             print(json.dumps([as_json(section) for section in sections], indent=1, ensure_ascii=False))

@@ -21,8 +21,19 @@ def test_a_short_experiment_as_json_and_as_a_page(tmp_path: Path, capsys: pytest
     assert "CCRs: speed" in page.read_text(encoding="utf-8")
 
 
-def test_a_suite_that_does_not_exist_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        pytest.param(["--suite", "nonsense"], "'nonsense'", id="no such suite"),
+        pytest.param(["--jobs", "-2"], "--jobs -2", id="fewer than no processes"),
+        pytest.param(["--report", "."], "directory", id="a folder as the report"),
+    ],
+)
+def test_bad_usage_is_named_before_anything_is_driven(
+    arguments: list[str], named: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.commands.scenarios.run_all", lambda *_: pytest.fail("it drove"))
     with pytest.raises(SystemExit) as ended:
-        main(["scenarios", "run", "--suite", "nonsense"])
+        main(["scenarios", "run", *arguments])
     assert ended.value.code == 2
-    assert "'nonsense'" in capsys.readouterr().err
+    assert named in capsys.readouterr().err
