@@ -44,7 +44,7 @@ def test_it_runs_as_a_yolox_network_at_the_simulator_s_size(detector: Detector) 
 
 
 def test_the_lead_is_found(random_traffic: list[Bin], built_in: list[Bin]) -> None:
-    for bins, floor in ((random_traffic, 0.93), (built_in, 0.97)):
+    for bins, floor in ((random_traffic, 0.95), (built_in, 0.97)):
         near = _within(bins, 60.0)
         assert near.leads >= 8
         assert near.lead_recall() >= floor
@@ -55,10 +55,10 @@ def test_most_vehicles_are_found_and_little_else(random_traffic: list[Bin], buil
         near = _within(bins, 60.0)
         assert near.vehicles >= 40
         assert near.recall() >= 0.85
-        assert near.precision() >= 0.75
-        assert near.class_accuracy() >= 0.93
+        assert near.precision() >= 0.87
+        assert near.class_accuracy() >= 0.95
 
 
 def test_the_height_of_a_box_tells_the_distance(random_traffic: list[Bin], built_in: list[Bin]) -> None:
     for bins in (random_traffic, built_in):
-        assert _within(bins, 60.0).height_error() <= 0.08
+        assert _within(bins, 60.0).height_error() <= 0.07
