@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pipeline.params import Params
+from pipeline.params import Params, with_changes
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,7 @@ class Control:
 
     def __init__(self, first: Wish) -> None:
         self._wish = first
-        self._condition = threading.Condition()
+        self._condition = threading.Condition(threading.RLock())
         self._changed = first.uri is not None
 
     def change(self, **values: Any) -> Wish:
@@ -54,6 +55,12 @@ class Control:
             revision = old.params_revision + 1
             self._replace(replace(old, params=params, preset=preset or old.preset, params_revision=revision))
             return revision
+
+    def change_params(self, changes: Mapping[str, Any]) -> int:
+        """Change some parameters, by their dotted names, as they stand at this moment: of two callers at once neither
+        undoes the other. ParamsError for a bad one. Returns the revision."""
+        with self._condition:
+            return self.set_params(with_changes(self._wish.params, changes))
 
     def peek(self) -> Wish:
         """The wish as it stands, served or not."""

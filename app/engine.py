@@ -201,7 +201,8 @@ class Engine:
             if kind not in self._detectors:
                 self._detectors[kind] = self._open_detector(source)
         except (DetectorMissing, DetectorError) as error:
-            notices.append(Notice("warning", f"{error} LiDAR goes on alone."))
+            rest = "LiDAR goes on alone." if self._sensors == "both" else "Without one the camera finds nothing."
+            notices.append(Notice("warning", f"{error} {rest}"))
             return None
         detector = self._detectors[kind]
         notices += [Notice("warning", note) for note in detector.notes]

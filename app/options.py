@@ -11,7 +11,7 @@ import tyro
 import yaml
 
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
-from pipeline.run import detector_for
+from pipeline.run import Sensors, detector_for
 from pipeline.sources import open_source
 from pipeline.sources.base import Source
 from pipeline.vision.detector import Detector, DetectorMissing
@@ -58,16 +58,19 @@ class LineOptions:
             name, separator, value = change.partition("=")
             if not separator:
                 raise ParamsError(f"--set {change}: expected NAME=VALUE")
-            changes[name] = yaml.safe_load(value)
+            try:
+                changes[name] = yaml.safe_load(value)
+            except (yaml.YAMLError, RecursionError):
+                raise ParamsError(f"--set {change}: {value!r} is no value") from None
         return with_changes(params, changes)
 
-    def open_detector(self, source: Source) -> Detector | None:
+    def open_detector(self, source: Source, sensors: Sensors = "both") -> Detector | None:
         """The detector for the source's pictures, with what there is to say about it. A named one that is missing is
-        an error; when none is to be had, a sentence says so and LiDAR goes on alone."""
+        an error, and so is none for a camera on its own; else a sentence says so and LiDAR goes on alone."""
         try:
             detector = detector_for(source, self.detector)
         except DetectorMissing as missing:
-            if self.detector is not None:
+            if self.detector is not None or sensors == "camera":
                 raise
             print(f"cipv: {missing}", file=sys.stderr)
             return None

@@ -8,7 +8,7 @@ from typing import Any
 from app.engine import Engine
 from app.snapshot import Snapshot
 from app.views.viser_view import ViserView
-from pipeline.params import ParamsError, with_changes
+from pipeline.params import ParamsError
 
 
 class SceneFeed:
@@ -54,7 +54,7 @@ class SceneFeed:
         """A slider in the 3D view was moved. viser's own bounds are the schema's, so only a race can be refused."""
         control = self._engine.control
         try:
-            control.set_params(with_changes(control.peek().params, {name: value}))
+            control.change_params({name: value})
         except ParamsError:
             self._view.set_params(control.peek().params)
 

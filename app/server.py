@@ -31,6 +31,7 @@ from pipeline.errors import BadInput
 STATIC = Path(__file__).resolve().parent.parent / "static"
 DEFAULT_PORT = 8420
 _PORTS_TO_TRY = 20
+_LAST_PORT = 65535
 
 
 class PortTaken(BadInput):
@@ -68,7 +69,9 @@ def create_app(
 
 def listen_socket(host: str, port: int, *, strict: bool = False) -> socket.socket:
     """A bound socket on ``port`` or, unless ``strict``, the next free one above it. PortTaken when there is none."""
-    candidates = [port] if strict or port == 0 else range(port, min(port + _PORTS_TO_TRY, 65536))
+    if not 0 <= port <= _LAST_PORT:
+        raise PortTaken(f"{port} is no port: 0 to {_LAST_PORT}")
+    candidates = [port] if strict or port == 0 else range(port, min(port + _PORTS_TO_TRY, _LAST_PORT + 1))
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for candidate in candidates:
         # asyncio switches Nagle's delay of 40 ms off only where the protocol is named

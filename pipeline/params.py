@@ -322,7 +322,7 @@ def from_yaml(path: Path, base: Params) -> Params:
         loaded = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
     except OSError as error:
         raise ParamsError(f"{path}: {error.strerror}") from None
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
+    except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise ParamsError(f"{path}: not a parameter file: {str(error).splitlines()[0]}") from None
     if not isinstance(loaded, dict) or not all(isinstance(values, dict) for values in loaded.values()):
         raise ParamsError(f"{path}: expected sections with parameters below them")

@@ -38,7 +38,7 @@ class Prepared:
     chosen: npt.NDArray[np.bool_]
 
 
-def stages(sweeps: list[Sweep], budget_s: float) -> dict[str, dict[str, Any]]:
+def stages(sweeps: list[Sweep], budget_s: float, params: Params) -> dict[str, dict[str, Any]]:
     """``ground``, ``cluster`` and ``lidar_chain`` in the contract's form; every contestant sees every sweep in turn.
 
     A peer that cannot be measured has ``absent`` with the reason in place of its figures' numbers.
@@ -46,7 +46,7 @@ def stages(sweeps: list[Sweep], budget_s: float) -> dict[str, dict[str, Any]]:
     if not sweeps:
         return {}
     warm_up()
-    params = with_changes(Params(), {"cluster.front_only": False})  # the whole rotation, as peers' speeds are quoted
+    params = with_changes(params, {"cluster.front_only": False})  # the whole rotation, as peers' speeds are quoted
     prepared = [_prepare(sweep, params) for sweep in sweeps]
     open3d, reason = _open3d()
     ground: dict[str, Callable[[], object]] = {

@@ -29,7 +29,7 @@ def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, An
     sweeps = [frame.sweep for frame in frames if frame.sweep is not None]
     pictures = [frame.picture.bgr for frame in frames if frame.picture is not None]
     network = _detector(detector_spec, source)
-    figures = lidar_bench.stages(sweeps, BUDGET_S["lidar"])
+    figures = lidar_bench.stages(sweeps, BUDGET_S["lidar"], params)
     figures |= line_bench.stages(frames, params, network, BUDGET_S["line"])
     if network is not None:
         figures |= detector_bench.stages(pictures, network, BUDGET_S["detector"])

@@ -12,7 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from app.progress import bytes_progress
-from pipeline.vision.models import KNOWN, ModelEntry, list_models, pull, register, store
+from pipeline.vision.detector import open_detector
+from pipeline.vision.models import ModelEntry, known_model, list_models, pull, register, store
 
 
 @dataclass(frozen=True)
@@ -46,11 +47,10 @@ class PullModel:
     """Name of a known network"""
 
     def __call__(self) -> int:
-        known = next((model for model in KNOWN if model.name == self.name), None)
-        if known is not None:
-            print(f"{known.url}\n{known.size / 1e6:.1f} MB, licence {known.licence}, SHA-256 {known.sha256}")
+        known = known_model(self.name)
+        print(f"{known.url}\n{known.size / 1e6:.1f} MB, licence {known.licence}, SHA-256 {known.sha256}")
         with bytes_progress() as bar:
-            task = bar.add_task(self.name, total=known.size if known else None)
+            task = bar.add_task(self.name, total=known.size)
             path = pull(self.name, lambda done, total: bar.update(task, completed=done, total=total))
         print(f"{path}: size and checksum are right")
         return 0
@@ -73,6 +73,8 @@ class RegisterModel:
     """Use it when no network is named"""
 
     def __call__(self) -> int:
+        if self.task == "detector":
+            open_detector(str(self.path), None)  # refuse here what no later run could use
         print(f"{register(self.path, self.name, self.task, self.default)}: registered as {self.name}")
         return 0
 

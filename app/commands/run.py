@@ -37,7 +37,7 @@ class Run:
     def __call__(self) -> int:
         params = self.line.parameters()
         source = self.source.open()
-        detector = self.line.open_detector(source) if self.sensors != "lidar" else None
+        detector = self.line.open_detector(source, self.sensors) if self.sensors != "lidar" else None
         tally = _Tally()
         with ExitStack() as stack:
             out = None

@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from app.engine import Engine
 from pipeline.alignment import angular_from_calibration
-from pipeline.params import PRESETS, Params, ParamsError, preset, to_yaml, with_changes
+from pipeline.params import PRESETS, Params, ParamsError, preset, to_yaml
 from pipeline.types import CameraCalibration
 
 
@@ -38,7 +38,7 @@ def params_router(engine: Engine) -> APIRouter:
     def change(body: Changes) -> dict[str, Any]:
         """Change some parameters. The shown frame is run again at once. 422 with one sentence for a bad value."""
         try:
-            engine.control.set_params(with_changes(engine.control.peek().params, body.changes))
+            engine.control.change_params(body.changes)
         except ParamsError as error:
             raise HTTPException(422, str(error)) from None
         return _params_json(engine)

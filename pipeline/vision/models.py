@@ -166,12 +166,18 @@ def register(path: Path, name: str, task: Task = "detector", default: bool = Tru
     return target
 
 
-def pull(name: str, progress: Progress | None = None) -> Path:
-    """Fetch a known network into the folder; size and SHA-256 must be the official ones. A file that is already there
-    and right is kept. ModelError says what went wrong; no part of a failed download stays."""
+def known_model(name: str) -> KnownModel:
+    """The official network of this name. ModelError for any other."""
     known = next((model for model in KNOWN if model.name == name), None)
     if known is None:
         raise ModelError(f"no network named {name!r}; known are {', '.join(model.name for model in KNOWN)}")
+    return known
+
+
+def pull(name: str, progress: Progress | None = None) -> Path:
+    """Fetch a known network into the folder; size and SHA-256 must be the official ones. A file that is already there
+    and right is kept. ModelError says what went wrong; no part of a failed download stays."""
+    known = known_model(name)
     target = store() / f"{name}.onnx"
     if target.is_file() and file_sha256(target) == known.sha256:
         return target

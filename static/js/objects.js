@@ -12,7 +12,7 @@ const COLUMNS = [
   ["source", "Seen", "V camera, L LiDAR, VL both", (o) => o.source, (o) => o.source],
   ["type", "Class", "What the detector calls it, and its score", (o) => (o.type ? `${o.type} ${num(o.type_score, 2)}` : DASH), (o) => o.type ?? "~"],
   ["distance", "Distance", "To its nearest point, with one sigma, metres", distance, (o) => o.distance_m ?? Infinity],
-  ["velocity", "Δ km/h", "Along our heading, relative to us, km/h: negative comes nearer", (o) => (o.velocity_mps ? signed(kmh(o.velocity_mps[0])) : DASH), (o) => o.velocity_mps?.[0] ?? Infinity],
+  ["velocity", "Closing", "Closing speed, km/h: positive while the gap shrinks", (o) => (closing(o) === null ? DASH : signed(kmh(closing(o)))), (o) => -(closing(o) ?? -Infinity)],
   ["ttc", "TTC", "Time to collision, seconds; a dash when the gap does not shrink", (o) => num(o.ttc_s), (o) => o.ttc_s ?? Infinity],
   ["offset", "Offset", "From the middle of the path, metres to the left or right", (o) => side(o.path_offset_m), (o) => Math.abs(o.path_offset_m ?? Infinity)],
   ["inPath", "In path", "Inside our corridor, and how probable that is", inPath, (o) => -(o.in_path_probability ?? Number(o.in_path))],
@@ -34,6 +34,12 @@ export function setUp() {
   body.addEventListener("click", (event) => pick(event.target.closest("tr")));
   body.addEventListener("keydown", onKey);
   reflectSort();
+}
+
+/** m/s towards us along the line to its nearest point, as the banner shows it. @param {FusedObject} o @returns {number | null} */
+function closing(o) {
+  if (!o.velocity_mps || !o.closest_point || !o.distance_m) return null;
+  return -(o.closest_point[0] * o.velocity_mps[0] + o.closest_point[1] * o.velocity_mps[1]) / o.distance_m;
 }
 
 /** @param {FusedObject} o */

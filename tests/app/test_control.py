@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 from app.control import Control, Wish
-from pipeline.params import Params
+from pipeline.params import Params, with_changes
 
 
 def control() -> Control:
@@ -72,3 +72,22 @@ def test_a_seek_supersedes_but_a_parameter_does_not():
     assert not wishes.superseded()
     wishes.seek(1)
     assert wishes.superseded()
+
+
+def test_changes_of_many_callers_at_once_are_all_kept() -> None:
+    control = Control(Wish(Params()))
+    changes = [{"cluster.z_weight": 0.7}, {"path.half_width_m": 2.0}, {"fusion.min_iou": 0.2}, {"acc.kp": 1.0}]
+    start = threading.Barrier(len(changes))
+
+    def change(one: dict[str, float]) -> None:
+        start.wait()
+        control.change_params(one)
+
+    threads = [threading.Thread(target=change, args=(one,)) for one in changes]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    expected = with_changes(Params(), {name: value for one in changes for name, value in one.items()})
+    assert control.peek().params == expected
+    assert control.peek().params_revision == len(changes)

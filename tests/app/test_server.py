@@ -35,6 +35,7 @@ def engine() -> Iterator[Engine]:
     first, second = Recording(), Recording("test:other", count=5)
     engine = Engine(opener(first, second), lambda _: CountingDetector(), Params(), uri=first.uri)
     engine.start()
+    engine.wait_for(lambda shown: shown.tick is not None, WAIT_S)
     yield engine
     engine.stop()
 
@@ -76,9 +77,12 @@ def stream(address: str) -> Callable[..., ClientConnection]:
 @pytest.fixture(autouse=True)
 def _at_the_start(engine: Engine) -> None:
     """Each test begins at the first frame of the first recording with default parameters."""
+    before = engine.snapshot.sequence
     engine.control.set_params(Params(), "default")
     engine.control.change(uri="test:car", playing=False, target=None, steps=0)
-    engine.wait_for(lambda s: s.uri == "test:car" and s.tick is not None and s.index == 0, WAIT_S)
+    engine.wait_for(
+        lambda s: s.sequence > before and s.uri == "test:car" and s.index == 0 and s.tick is not None, WAIT_S
+    )
 
 
 def reach(engine: Engine, condition: Callable[[Snapshot], bool]) -> Snapshot:

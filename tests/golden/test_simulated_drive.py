@@ -15,7 +15,7 @@ import pytest
 
 from pipeline.params import preset
 from pipeline.results import to_json
-from pipeline.run import run
+from pipeline.run import detector_for, run
 from pipeline.sources import open_source
 
 FOLDER = Path(__file__).parent
@@ -62,3 +62,12 @@ def same(a: Any, b: Any) -> bool:
     if isinstance(a, float) and isinstance(b, float):
         return a == pytest.approx(b, abs=0.01, rel=0.002)
     return bool(a == b)
+
+
+def test_nothing_brakes_hard_on_a_drive_that_needs_none() -> None:
+    """With both sensors and the embedded detector: neither ACC's TTC rule nor emergency braking finds a phantom."""
+    source = open_source("sim:straight")
+    states = {frame.name: result.acc for frame, result in run(source, preset("default"), detector_for(source))}
+    assert all(command is not None for command in states.values())
+    phantoms = {name: c.reason for name, c in states.items() if c and c.state not in ("cruise", "follow")}
+    assert not phantoms

@@ -20,7 +20,7 @@ def sweep() -> Sweep:
 
 def test_every_stage_has_its_figures(sweep: Sweep, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lidar, "_open3d", lambda: (None, "no libX11 here"))
-    figures = lidar.stages([sweep], budget_s=0.3)
+    figures = lidar.stages([sweep], 0.3, Params())
     assert list(figures) == ["ground", "cluster", "lidar_chain"]
     for row in figures.values():
         assert 0.0 < row["median_ms"] <= row["p99_ms"]
@@ -31,7 +31,7 @@ def test_every_stage_has_its_figures(sweep: Sweep, monkeypatch: pytest.MonkeyPat
 
 
 def test_no_sweeps_no_figures() -> None:
-    assert lidar.stages([], budget_s=1.0) == {}
+    assert lidar.stages([], 1.0, Params()) == {}
 
 
 def test_a_missing_library_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -63,7 +63,7 @@ def _cloud() -> tuple[np.ndarray, np.ndarray]:
 def _object(number: int, source: str, **known: object) -> FusedObject:
     names = {each.name for each in fields(FusedObject) if each.default is MISSING and each.default_factory is MISSING}
     unknown: dict[str, object] = dict.fromkeys(names)
-    fixed = {"id": number, "source": source, "carried": False, "hits": 4, "lidar_points": 0}
+    fixed = {"id": number, "source": source, "seen_by": source, "hits": 4, "lidar_points": 0}
     return FusedObject(**{**unknown, **fixed, **known})  # type: ignore[arg-type]
 
 
