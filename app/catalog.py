@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from importlib import resources
 from pathlib import Path
+
+from pipeline.data import data_dir
 
 _PROJECT = Path(__file__).resolve().parent.parent
 _FOLDERS = (("lidar_vlp16", "astyx"), ("velodyne", "kitti"), ("velodyne_points", "kitti"))
@@ -23,12 +24,9 @@ def scenarios() -> list[tuple[str, str]]:
 
 
 def recordings() -> list[tuple[str, str]]:
-    """(uri, title) of the folders right below ``CIPV_DATA`` and ``sessions`` that look like a known recording.
-
-    Without the variable, the folder is ``shared/data`` beside the project."""
-    data = Path(os.environ.get("CIPV_DATA") or _PROJECT.parent / "shared" / "data")
+    """(uri, title) of the folders right below the data folder and ``sessions`` that look like a known recording."""
     found = []
-    for root in (data, _PROJECT / "sessions"):
+    for root in (data_dir(), _PROJECT / "sessions"):
         for folder in sorted(root.iterdir()) if root.is_dir() else ():
             scheme = next((scheme for mark, scheme in _FOLDERS if (folder / mark).is_dir()), None)
             if scheme is not None:

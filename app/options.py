@@ -22,7 +22,7 @@ class SourceOptions:
     """Where frames come from."""
 
     source: tyro.conf.Positional[str]
-    """What to open: astyx:<dir>, kitti:<dir> or sim:straight"""
+    """What to open: astyx:<dir>, kitti:<dir> or sim:<scenario or my.yaml>"""
     rings: int = 16
     """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
+
+from pipeline.data import data_dir as recordings
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -13,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
     """The folder of real recordings and models (``CIPV_DATA``); the test is skipped when it is not there."""
-    folder = Path(os.environ.get("CIPV_DATA", ROOT.parent / "shared" / "data"))
+    folder = recordings()
     if not folder.is_dir():
         pytest.skip(f"real recordings not found at {folder} (set CIPV_DATA)")
     return folder

@@ -21,7 +21,7 @@ from pipeline.run import detector_for
 class Calibrate:
     """Fit the line to another car or camera: d = a·h^b, class by class, to a recording's own detections.
 
-    Example: cipv calibrate distance astyx:../shared/data/astyx --out law.yaml
+    Example: cipv calibrate distance astyx:PATH --out law.yaml
     """
 
     what: tyro.conf.Positional[Literal["distance"]]

@@ -22,7 +22,7 @@ from pipeline.types import Result
 class Run:
     """Run the whole line on a recording and write what it believes of each frame.
 
-    Example: cipv run astyx:../shared/data/astyx --out results.jsonl --rrd drive.rrd
+    Example: cipv run astyx:PATH --out results.jsonl --rrd drive.rrd
     """
 
     source: SourceOptions

@@ -50,11 +50,11 @@ class ServerOptions:
 class Serve:
     """Open the dashboard on a recording.
 
-    Example: cipv serve astyx:../shared/data/astyx --port 8420
+    Example: cipv serve astyx:PATH --port 8420
     """
 
     source: tyro.conf.Positional[str]
-    """What to open: astyx:<dir>, kitti:<dir> or sim:straight"""
+    """What to open: astyx:<dir>, kitti:<dir> or sim:<scenario or my.yaml>"""
     server: ServerOptions = field(default_factory=ServerOptions)
     line: LineOptions = field(default_factory=LineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"

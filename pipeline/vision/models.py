@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from pipeline.data import data_dir
 from pipeline.errors import BadInput
 
 Task = Literal["detector", "lanes"]
@@ -90,12 +91,6 @@ def store() -> Path:
     """The folder that keeps networks; it need not exist."""
     home = os.environ.get("CIPV_HOME")
     return (Path(home) if home else Path.home() / ".cache" / "cipv") / "models"
-
-
-def data_models() -> Path:
-    """``$CIPV_DATA/models``; without the variable, the folder ``shared/data`` beside the project."""
-    data = os.environ.get("CIPV_DATA")
-    return (Path(data) if data else Path(__file__).resolve().parents[3] / "shared" / "data") / "models"
 
 
 def list_models() -> tuple[ModelEntry, ...]:
@@ -239,7 +234,7 @@ def _by_hand(known: KnownModel) -> str:
 def _located(name: str) -> Path | None:
     if name == EMBEDDED:
         return _EMBEDDED_FILE
-    candidates = (folder / f"{name}.onnx" for folder in (store(), data_models()))
+    candidates = (folder / f"{name}.onnx" for folder in (store(), data_dir() / "models"))
     return next((path for path in candidates if path.is_file()), None)
 
 
