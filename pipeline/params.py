@@ -176,7 +176,12 @@ class FusionParams(Section):
     )
     range_gate: bool = _choice(True, "Do not join objects whose distances disagree beyond their uncertainty")
     sure_iou: float = _slider(
-        0.3, 0.1, 1.0, 0.05, "", "Boxes overlapping more are one object: cars 1.8 times as far apart cannot overlap so much"
+        0.3,
+        0.1,
+        1.0,
+        0.05,
+        "",
+        "Boxes overlapping more are one object: of cars 1.8 times as far they cannot",
     )
     range_gate_sigmas: float = _slider(3.0, 0.5, 10.0, 0.1, "σ", "Largest disagreement of the two distances")
 
