@@ -49,7 +49,7 @@ def control(
     if ego is None:
         return AccState(), None
     demand = min(
-        (cruise(params), follow(ego, cipv, params), *avoid(ego, cipv, objects, path, params)),
+        (follow(ego, cipv, params), *avoid(ego, cipv, objects, path, params)),
         key=lambda wish: wish.speed_mps,
     )
     state, accel = pid(state, demand.speed_mps - ego.speed_mps, dt_s, params)

@@ -37,7 +37,7 @@ def command(speed_mps: float, gap_m: float | None, *others: FusedObject, state: 
         pytest.param(20.0, 5.0, 0.0, "stop", id="at d_min: stop"),
         pytest.param(20.0, 2.0, 0.0, "stop", id="inside d_min: stop, never a negative speed"),
         pytest.param(0.0, 4.0, 0.0, "stop", id="standing behind a standing lead"),
-        pytest.param(40.0, 64.9, 30.0, "cruise", id="faster than the set speed: never above it"),
+        pytest.param(40.0, 64.9, 30.0, "follow", id="faster than the set speed: never above it"),
     ],
 )
 def test_gap_law(speed_mps: float, gap_m: float | None, desired_mps: float, state: str) -> None:
