@@ -29,6 +29,8 @@ Boxes = Literal["truth", "network"]
 Key = tuple[Manoeuvre, Sensors, str, Boxes]
 LEAD_DECEL_MPS2 = 6.0
 _LEAD_BRAKES_AT_S = 2.0
+_CLEAR_MPS, _CLEAR_M = 0.3, 0.3
+"""Impact speed or gap that must differ by more before one is called better."""
 SENSORS: dict[Sensors, str] = {"lidar": "LiDAR", "both": "fused"}
 
 
@@ -201,7 +203,8 @@ def _verdict(manoeuvre: Manoeuvre, done: list[tuple[Case, Drive]]) -> str:
         )
 
     lidar, fused = worst("lidar"), worst("both")
-    better = "better than" if fused < lidar else "no better than"
+    slower, farther = lidar[0] - fused[0], lidar[1] - fused[1]
+    better = "better than" if slower > _CLEAR_MPS or (slower >= 0.0 and farther > _CLEAR_M) else "no better than"
     return f"{manoeuvre}: with AEB, fused ends {_ends(fused)} at worst, {better} the LiDAR alone ({_ends(lidar)})."
 
 

@@ -17,6 +17,7 @@ from pipeline.evaluation.experiments.braking import (
     report,
     run,
 )
+from pipeline.records import evolve
 
 
 @pytest.mark.parametrize("manoeuvre", list(PAPER))
@@ -83,6 +84,14 @@ def test_the_column_of_boxes_says_which_runs_had_the_network() -> None:
     drive = run(Case("CCRb", "lidar", "ACC", 0))
     section = report([Case("CCRb", "both", "ACC + AEB", 0, "network"), *_pair()], [drive] * 3)
     assert [row[3] for row in section.tables[0].rows] == ["network", None, "truth"]
+
+
+def test_what_differs_by_centimetres_is_no_better() -> None:
+    drive = run(Case("CCRb", "lidar", "ACC + AEB", 0))
+    nearly = evolve(drive, gap_m=tuple(gap + 0.02 for gap in drive.gap_m))
+    clearly = evolve(drive, gap_m=tuple(gap + 2.0 for gap in drive.gap_m))
+    assert "no better than" in report(_pair(), [drive, nearly]).text[1]
+    assert "no better than" not in report(_pair(), [drive, clearly]).text[1]
 
 
 def _pair() -> list[Case]:
