@@ -160,10 +160,12 @@ def _is_confirmed(who: Candidate) -> Check:
 
 
 def _is_seen(who: Candidate) -> Check:
-    """A carried object may stay the lead, so that the lead does not flicker; it may not become it, because where it is
-    now is only a guess."""
-    passed = not who.item.carried or who.leads or who.params.carried_may_become_lead
-    return Check(Gate("seen", float(not who.item.carried), 0.0 if who.leads else 1.0, passed), "not seen in this frame")
+    """An object whose distance was not measured in this frame may stay the lead, so that the lead does not flicker; it
+    may not become it, because where it is now is only a guess."""
+    known = not who.item.carried and who.item.measured
+    passed = known or who.leads or who.params.carried_may_become_lead
+    reason = "not seen in this frame" if who.item.carried else "its distance was not measured in this frame"
+    return Check(Gate("seen", float(known), 0.0 if who.leads else 1.0, passed), reason)
 
 
 def _is_vehicle_sized(who: Candidate) -> Check:

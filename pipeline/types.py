@@ -182,7 +182,8 @@ class LidarTrack:
 @dataclass(frozen=True)
 class VisionTrack:
     """A detected box followed over time. ``distance_m``/``sigma_m``/``position``/``velocity_mps`` are filtered;
-    null where never measured. A carried box was not seen in this frame."""
+    null where never measured. A carried box was not seen in this frame; ``measured`` says whether its distance was (a
+    box that the picture's edge cuts is seen, but not measured)."""
 
     id: int
     bbox: Box
@@ -195,6 +196,7 @@ class VisionTrack:
     hits: int
     missed: int
     carried: bool
+    measured: bool = True
 
 
 class Gate(NamedTuple):
@@ -213,7 +215,8 @@ class FusedObject:
     A V object whose distance nobody knows (no law for its class, box cut by the picture's edge, beyond the law's
     reach) keeps its row: its place and distance are null, and it cannot be the CIPV.
 
-    source: which sensors' tracks it is made of. seen_by: which of them saw it in this frame; none: it is carried."""
+    source: which sensors' tracks it is made of. seen_by: which of them saw it in this frame; none: it is carried.
+    measured: its distance was measured in this frame; else it is a prediction."""
 
     id: int
     source: SourceKind
@@ -238,6 +241,7 @@ class FusedObject:
     in_path: bool = False
     in_path_probability: float | None = None
     path_offset_m: float | None = None
+    measured: bool = True
 
     @property
     def carried(self) -> bool:

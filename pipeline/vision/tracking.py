@@ -119,7 +119,7 @@ def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> F
     """Where the object should be now; carried until a box says that it is there."""
     aged = evolve(
         followed,
-        track=evolve(followed.track, carried=True),
+        track=evolve(followed.track, carried=True, measured=False),
         unseen_s=followed.unseen_s + dt_s,
         unplaced_s=followed.unplaced_s + dt_s,
     )
@@ -200,6 +200,7 @@ def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: Visi
         hits=1,
         missed=0,
         carried=False,
+        measured=seen.distance_m is not None,
     )
     box_filter = kalman.start(_centre(detection.bbox), _box_noise(detection.bbox), _box_speed_sigma(detection.bbox))
     votes = ((detection.label, detection.score),)
@@ -218,6 +219,7 @@ def _seen(followed: Followed, seen: VisionMeasurement, guess: SpeedGuess, params
         hits=followed.track.hits + 1,
         missed=0,
         carried=False,
+        measured=seen.distance_m is not None,
     )
     current = evolve(followed, track=shown, unseen_s=0.0)
     if params.filter == "queue":

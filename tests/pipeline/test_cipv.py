@@ -93,6 +93,14 @@ def test_a_carried_object_may_stay_the_lead_but_not_become_it() -> None:
     assert held is not None
 
 
+def test_a_box_too_near_to_be_measured_does_not_become_the_lead() -> None:
+    """The picture's edge cuts a passing car's box: it is seen, but how far it is now is only predicted."""
+    cut = dataclasses.replace(fused(1, 1.5, source="V"), measured=False)
+    lead, why_not = decide(cut)
+    assert lead is None
+    assert why_not == {1: "its distance was not measured in this frame"}
+
+
 def test_in_path_is_relative_to_a_curved_path() -> None:
     """On a 200 m left arc the car 40 m ahead stands 4 m to the left; the one straight ahead is in the next lane."""
     bent = corridor(EgoState(0, 20.0, 0.1), PathParams(half_width_m=1.5))

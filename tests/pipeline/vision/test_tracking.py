@@ -241,3 +241,15 @@ def test_a_carried_box_on_a_seen_one_is_a_ghost() -> None:
     tight = KALMAN.model_copy(update={"gate_px": 5.0, "gate_sizes": 0.1})
     jumped = _drive([(_car(20.0, 0.0),)] * 3 + [(_car(20.0, 0.45),)], tight)
     assert [(track.id, track.carried) for track in jumped[-1]] == [(2, False)]
+
+
+@BOTH
+def test_a_track_says_whether_its_distance_was_measured_now(params: VisionTrackingParams) -> None:
+    car = _car(20.0)
+    shown = _drive([(car,), (_blind(car.detection.bbox),), (car,), ()], params)
+    assert [(tracks[0].carried, tracks[0].measured) for tracks in shown] == [
+        (False, True),
+        (False, False),
+        (False, True),
+        (True, False),
+    ]
