@@ -34,10 +34,11 @@ fix: install
 bench: install
 	@$(BIN)/cipv bench
 
-# Accuracy on the real recordings, with the table that README quotes. Writes build/accuracy.md.
+# Accuracy on the real recordings, then every experiment of the simulator. Writes build/accuracy.md, build/experiments.*
 suite: install
 	@mkdir -p build
 	@$(BIN)/python -m pytest -q tests/accuracy -s
+	@$(BIN)/cipv scenarios run --suite all --report build/experiments.html --json > build/experiments.json
 
 # Memory over a drive looped 100 times. Writes build/soak.json.
 soak: install

@@ -7,11 +7,13 @@ smallest distance. Each test leaves its number and limit on the object; the firs
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import erf, hypot, sqrt
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
+from pipeline.geometry import F64
 from pipeline.motion import closing_speed_mps
 from pipeline.params import CipvParams
 from pipeline.path.corridor import nearest_on_path
@@ -58,7 +60,7 @@ def choose(
             gates=item.gates + tuple(check.gate for check in checks),
             path_offset_m=place.offset_m if place else None,
             in_path=place is not None and place.within(limit_m),
-            in_path_probability=_probability(place, path) if place else None,
+            in_path_probability=place.probability if place else None,
         )
         judged.append(item)
         failed = next((check.reason for check in checks if not check.gate.passed), None)
@@ -103,10 +105,11 @@ def _why_after(item: FusedObject, lead: FusedObject) -> str:
 
 class Place(NamedTuple):
     """Where the middle of an object's nearest face is against the path: signed offset from the centre line, positive to
-    the left, and path length to its foot."""
+    the left, path length to its foot, and how probably it is in the path."""
 
     offset_m: float
     ahead_m: float
+    probability: float
 
     def within(self, limit_m: float) -> bool:
         return self.ahead_m > 0.0 and abs(self.offset_m) <= limit_m
@@ -118,7 +121,8 @@ def _places(objects: tuple[FusedObject, ...], path: Path) -> list[Place | None]:
     if not faces:
         return [None] * len(objects)
     offsets, reached = nearest_on_path(path, np.array(faces))
-    known = iter(Place(offset, ahead) for offset, ahead in zip(offsets.tolist(), reached.tolist(), strict=True))
+    numbers = (offsets.tolist(), reached.tolist(), _probabilities(offsets, reached, path).tolist())
+    known = iter(Place(*row) for row in zip(*numbers, strict=True))
     return [next(known) if item.bev is not None else None for item in objects]
 
 
@@ -128,15 +132,13 @@ def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
     return (ax + bx) / 2, (ay + by) / 2
 
 
-def _probability(place: Place, path: Path) -> float:
-    """That the true offset lies between the edges, it being normal around the measured one with the path's own sigma at
-    that distance, and never surer than a sensor resolves."""
-    if place.ahead_m <= 0.0:
-        return 0.0
+def _probabilities(offsets: F64, reached: F64, path: Path) -> F64:
+    """(N,) that each true offset lies between the edges, it being normal around the measured one with the path's own
+    sigma at that distance, and never surer than a sensor resolves; 0 for what is not ahead."""
     at = [0.0, *(float(s) for s in path.sigma_m)]
-    sigma = max(float(np.interp(place.ahead_m, at, [0.0, *path.sigma_m.values()])), SMALLEST_SIGMA_M)
-    scale = sigma * sqrt(2)
-    return 0.5 * (erf((path.half_width_m - place.offset_m) / scale) + erf((path.half_width_m + place.offset_m) / scale))
+    sigma = np.maximum(np.interp(reached, at, [0.0, *path.sigma_m.values()]), SMALLEST_SIGMA_M)
+    inside = ndtr((path.half_width_m - offsets) / sigma) - ndtr((-path.half_width_m - offsets) / sigma)
+    return np.asarray(np.where(reached > 0.0, inside, 0.0))
 
 
 # ---------------------------------------------------------------- who may be a lead
@@ -156,7 +158,8 @@ def _has_distance(who: Candidate) -> Check:
 def _is_confirmed(who: Candidate) -> Check:
     """Two sensors that both see it now are enough at once; one alone must see it again. The lead is confirmed."""
     hits, needed = who.item.hits, 1 if who.item.seen_by == "VL" or who.leads else who.params.confirm_hits
-    return Check(Gate("hits", hits, needed, hits >= needed), f"seen {hits} of {needed} times")
+    passed = hits >= needed
+    return Check(Gate("hits", hits, needed, passed), "" if passed else f"seen {hits} of {needed} times")
 
 
 def _is_seen(who: Candidate) -> Check:
@@ -180,7 +183,9 @@ def _is_vehicle_sized(who: Candidate) -> Check:
     if height < params.min_height_m:
         return Check(Gate("size", height, params.min_height_m, False), f"only {height:.1f} m high")
     passed = across <= params.max_size_m
-    return Check(Gate("size", across, params.max_size_m, passed), f"{across:.0f} m long: not a vehicle")
+    return Check(
+        Gate("size", across, params.max_size_m, passed), "" if passed else f"{across:.0f} m long: not a vehicle"
+    )
 
 
 def _is_in_path(who: Candidate) -> Check:

@@ -100,5 +100,6 @@ def _update(mean, cov, z, R):  # type: ignore[no-untyped-def]  # pragma: no cove
 def mahalanobis2(state: CvState, z: npt.ArrayLike, R: F64) -> float:
     """Squared distance of one measured position from the expected one, in standard deviations: χ² with 2 degrees of
     freedom when the model holds (9.21 is its 99 % point)."""
-    innovation = np.asarray(z, dtype=np.float64) - state.mean[:2]
-    return float(innovation @ np.linalg.solve(state.cov[:2, :2] + R, innovation))
+    (a, b), (c, d) = (state.cov[:2, :2] + R).tolist()
+    dx, dy = (np.asarray(z, dtype=np.float64) - state.mean[:2]).tolist()
+    return float((d * dx * dx - (b + c) * dx * dy + a * dy * dy) / (a * d - b * c))

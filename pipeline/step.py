@@ -22,9 +22,6 @@ from pipeline.lidar import warm_up as warm_up_lidar
 from pipeline.params import Params
 from pipeline.path import corridor
 from pipeline.types import (
-    DROPPED,
-    GROUND,
-    UNCLUSTERED,
     CameraCalibration,
     Frame,
     Layers,
@@ -138,8 +135,7 @@ def _perceive_lidar(sweep: Sweep | None, params: Params, clock: _Stopwatch) -> _
     clock.lap("cluster")
     obstacles = boxes.fit_obstacles(sweep.points, labels, plane, params.box)
     clock.lap("boxes")
-    kind = np.where(keep, np.where(plane.mask, GROUND, UNCLUSTERED), DROPPED).astype(np.int32)
-    return _LidarView(obstacles, np.where(labels >= 0, labels, kind))
+    return _LidarView(obstacles, cluster.kinds(labels, keep, plane.mask))
 
 
 def _perceive_picture(

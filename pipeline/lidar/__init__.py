@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.lidar import boxes, cluster, ground
+from pipeline.lidar import boxes, cluster, downsample, ground
 from pipeline.params import Params
+from pipeline.types import Sweep
 
 
 def warm_up() -> None:
@@ -23,3 +24,5 @@ def warm_up() -> None:
         plane = ground.fit_ground(points, keep, params.ground)
         labels = cluster.cluster(points, cluster.candidates(points, plane, keep, params.cluster), params.cluster)
         boxes.fit_obstacles(points, labels, plane, params.box)
+        cluster.kinds(labels, keep, plane.mask)
+        downsample.keep_mask(Sweep(0, points, np.zeros(len(points), np.uint8), 16), params.downsample)

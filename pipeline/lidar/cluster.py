@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from pipeline.lidar.ground import Ground
 from pipeline.params import ClusterParams
-from pipeline.types import F32, F64, I32
+from pipeline.types import DROPPED, F32, F64, GROUND, I32, UNCLUSTERED
 
 Mask = npt.NDArray[np.bool_]
 
@@ -47,6 +47,18 @@ def cluster(points: F32, candidates: Mask, params: ClusterParams) -> I32:
     roots = _components(xyz, column, level, first_cell, shape[1], params.tolerance_m)
     _number(roots, chosen, labels, params.min_points, params.max_points)
     return labels
+
+
+@numba.njit(cache=True, nogil=True)
+def kinds(labels, keep, ground):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(N,) int32 what each point was taken for: its cluster, or ``GROUND``, ``UNCLUSTERED``, ``DROPPED``.
+
+    labels: (N,) int32 as ``cluster`` gives them. keep, ground: (N,) bool."""
+    kind = labels.copy()
+    for i in range(len(kind)):
+        if kind[i] < 0:
+            kind[i] = (GROUND if ground[i] else UNCLUSTERED) if keep[i] else DROPPED
+    return kind
 
 
 @numba.njit(cache=True, nogil=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -17,8 +18,7 @@ def keep_mask(sweep: Sweep, params: DownsampleParams) -> Mask:
 
     Counting is per channel, so every ring is thinned alike whatever order the points come in.
     """
-    x, y = sweep.points[:, 0], sweep.points[:, 1]
-    seen: Mask = x * x + y * y >= np.float32(params.blind_range_m**2)
+    seen: Mask = _beyond(sweep.points, params.blind_range_m)
     return seen & _thinned(sweep, params) if params.keep_every > 1 else seen
 
 
@@ -30,3 +30,12 @@ def _thinned(sweep: Sweep, params: DownsampleParams) -> Mask:
     keep = np.empty(count, dtype=np.bool_)
     keep[by_ring] = place_in_ring % params.keep_every == 0
     return keep
+
+
+@numba.njit(cache=True, nogil=True)
+def _beyond(points, range_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(N,) bool: the points at least this far away, horizontally."""
+    far, limit2 = np.empty(len(points), dtype=np.bool_), np.float32(range_m * range_m)
+    for i in range(len(points)):
+        far[i] = points[i, 0] * points[i, 0] + points[i, 1] * points[i, 1] >= limit2
+    return far

@@ -19,8 +19,8 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from pipeline import kalman
-from pipeline.geometry import Cuboid
 from pipeline.params import LidarTrackingParams
+from pipeline.records import evolve
 from pipeline.types import F64, LidarTrack, Obstacle, Point2
 
 NEVER = 1e6
@@ -193,17 +193,11 @@ def _carry(tracked: Tracked, dt_s: float) -> Tracked:
     last, seen = tracked.track, tracked.track.obstacle
     vx, vy = last.velocity_mps or (0.0, 0.0)
     (cx, cy, cz), (px, py, pz) = seen.cuboid.center, seen.closest_point
-    moved = Obstacle(
-        cluster=-1,
-        cuboid=Cuboid((cx + vx * dt_s, cy + vy * dt_s, cz), seen.cuboid.size, seen.cuboid.yaw_rad),
-        closest_point=(px + vx * dt_s, py + vy * dt_s, pz),
-        points=seen.points,
-        density=seen.density,
-        spread=seen.spread,
-    )
+    cuboid = evolve(seen.cuboid, center=(cx + vx * dt_s, cy + vy * dt_s, cz))
+    moved = evolve(seen, cluster=-1, cuboid=cuboid, closest_point=(px + vx * dt_s, py + vy * dt_s, pz))
     unseen_s = tracked.missed_s + dt_s
-    carried = LidarTrack(last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True, unseen_s)
-    return Tracked(carried, tracked.history, unseen_s)
+    carried = evolve(last, obstacle=moved, missed=last.missed + 1, carried=True, unseen_s=unseen_s)
+    return evolve(tracked, track=carried, missed_s=unseen_s)
 
 
 def _ended(tracked: Tracked, sweep_lacks_it: bool, params: LidarTrackingParams) -> bool:

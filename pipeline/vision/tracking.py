@@ -157,25 +157,31 @@ def _match(
     when the first leaves the picture.)"""
     if not expected or not measurements:
         return {}
-    cost = np.array([[_cost(followed, seen, params) for seen in measurements] for followed in expected])
+    cost = _costs(expected, measurements, params)
     rows, columns = linear_sum_assignment(np.minimum(cost, 1.0))
     return {int(row): int(column) for row, column in zip(rows, columns, strict=True) if cost[row, column] < 1.0}
 
 
-def _cost(followed: Followed, seen: VisionMeasurement, params: VisionTrackingParams) -> float:
-    """How unlike a box is to the one expected: 0 the same, 1 at the gate, infinite for another kind of object.
+def _costs(expected: list[Followed], measurements: tuple[VisionMeasurement, ...], params: VisionTrackingParams) -> F64:
+    """(n, m) how unlike each box is to each expected one: 0 the same, 1 at the gate, infinite for another kind.
 
     queue: distance of the centres (print: of the half widths). kalman: also how much the width changed."""
-    old, new = followed.track.bbox, seen.detection.bbox
-    if not _same_kind(followed.track.label, seen.detection.label):
-        return math.inf
-    moved_px = math.dist(_centre(old), _centre(new))
+    old = np.array([followed.track.bbox for followed in expected])
+    new = np.array([seen.detection.bbox for seen in measurements])
+    apart = (old[:, None, :2] + old[:, None, 2:] - new[:, :2] - new[:, 2:]) / 2
+    moved_px = np.hypot(apart[..., 0], apart[..., 1])
     if params.filter == "queue":
-        return moved_px / params.gate_px
-    growth = min(max(followed.unseen_s / _NOMINAL_DT_S, 1.0), _MAX_GROWTH)
-    moved = moved_px / (max(params.gate_px, params.gate_sizes * _width(old)) * growth)
-    resized = abs(math.log(max(_width(new), 1.0) / max(_width(old), 1.0))) / math.log(params.max_size_ratio)
-    return math.hypot(moved, resized)
+        cost = moved_px / params.gate_px
+    else:
+        old_width, new_width = old[:, 2] - old[:, 0], new[:, 2] - new[:, 0]
+        unseen_s = np.array([followed.unseen_s for followed in expected])
+        growth = np.clip(unseen_s / _NOMINAL_DT_S, 1.0, _MAX_GROWTH)
+        moved = moved_px / (np.maximum(params.gate_px, params.gate_sizes * old_width) * growth)[:, None]
+        ratio = np.maximum(new_width, 1.0) / np.maximum(old_width, 1.0)[:, None]
+        cost = np.hypot(moved, np.abs(np.log(ratio)) / math.log(params.max_size_ratio))
+    kinds = [followed.track.label for followed in expected]
+    named = [seen.detection.label for seen in measurements]
+    return np.where([[_same_kind(a, b) for b in named] for a in kinds], cost, np.inf)
 
 
 def _first_guess(ego_speed_mps: float | None) -> SpeedGuess:
@@ -261,10 +267,10 @@ def _show(followed: Followed, share: float | None = None) -> Followed:
     """
     if followed.place_filter is None:
         return followed
-    x, y, vx, vy = (float(value) for value in followed.place_filter.mean)
+    x, y, vx, vy = followed.place_filter.mean.tolist()
+    (xx, xy), (_, yy) = followed.place_filter.cov[:2, :2].tolist()
     range_m = math.hypot(x, y)
-    ray = np.array([x, y]) / range_m
-    filter_sigma = math.sqrt(float(ray @ followed.place_filter.cov[:2, :2] @ ray))
+    filter_sigma = math.sqrt(x * x * xx + 2 * x * y * xy + y * y * yy) / range_m  # along the ray
     if share is None:
         before = followed.track
         share = before.sigma_m / before.distance_m if before.sigma_m and before.distance_m else 0.0
@@ -282,8 +288,10 @@ def place_noise(position: tuple[float, float], range_sigma_m: float, bearing_sig
     """(2, 2) covariance of a place seen by a camera: long along the ray, narrow across it."""
     bearing = math.atan2(position[1], position[0])
     across_m = math.hypot(*position) * math.radians(bearing_sigma_deg)
-    turn = np.array([[math.cos(bearing), -math.sin(bearing)], [math.sin(bearing), math.cos(bearing)]])
-    return turn @ np.diag([range_sigma_m**2, across_m**2]) @ turn.T
+    c, s = math.cos(bearing), math.sin(bearing)
+    along, across = range_sigma_m**2, across_m**2
+    off = c * s * (along - across)
+    return np.array([[c * c * along + s * s * across, off], [off, s * s * along + c * c * across]])
 
 
 def _box_noise(box: Box) -> F64:
