@@ -26,7 +26,6 @@ VOXEL_M = 0.2
 RANSAC_POINTS, RANSAC_ITERATIONS = 3, 1000
 """As in Open3D's own tutorial."""
 SYSTEM_LIBRARIES = "on slim systems Open3D needs libegl1 libgl1 libx11-6 libusb-1.0-0"
-RATE_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -84,14 +83,18 @@ def _each(prepared: list[Prepared], run: Callable[[Prepared], object]) -> Callab
 
 
 def _chain(prepared: list[Prepared], params: Params) -> Callable[[], object]:
-    """Our line from points to tracks, the tracker's state carried from call to call."""
+    """Our line from points to tracks, the tracker's state carried from sweep to sweep by their own stamps."""
     turn = cycle(prepared)
     state = LidarTrackerState()
 
+    last_ns = 0
+
     def run() -> object:
-        nonlocal state
-        obstacles = obstacles_of(next(turn).sweep, params)
-        state, tracks = track(state, obstacles, RATE_S, params.lidar_tracking)
+        nonlocal state, last_ns
+        sweep = next(turn).sweep
+        dt_s, last_ns = (sweep.t_ns - last_ns) / 1e9, sweep.t_ns
+        continues = 0.0 < dt_s <= params.time.reset_gap_s
+        state, tracks = track(state, obstacles_of(sweep, params), dt_s if continues else None, params.lidar_tracking)
         return tracks
 
     return run
