@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.lidar import boxes, cluster, downsample, ground
+from pipeline.lidar import boxes, cluster, downsample, ground, tracking
 from pipeline.params import Params
 from pipeline.types import Sweep
 
@@ -23,6 +23,8 @@ def warm_up() -> None:
         points.flags.writeable = writeable
         plane = ground.fit_ground(points, keep, params.ground)
         labels = cluster.cluster(points, cluster.candidates(points, plane, keep, params.cluster), params.cluster)
-        boxes.fit_obstacles(points, labels, plane, params.box)
+        obstacles = boxes.fit_obstacles(points, labels, plane, params.box)
+        state, _ = tracking.track(tracking.LidarTrackerState(), obstacles, None, params.lidar_tracking)
+        tracking.track(state, obstacles, 0.1, params.lidar_tracking)
         cluster.kinds(labels, keep, plane.mask)
         downsample.keep_mask(Sweep(0, points, np.zeros(len(points), np.uint8), 16), params.downsample)

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
@@ -117,18 +118,47 @@ def associate(
         return {}
     kalman_filter = params.filter == "kalman"
     expected = filters.mean[:, :2] if kalman_filter else np.array([_extrapolate(t, dt_s) for t in tracks])
-    distance = np.linalg.norm(expected[:, None] - places, axis=2)
     new = np.array([t.track.hits < 2 for t in tracks])
     gate = params.gate_m + new * params.start_speed_mps * dt_s
     before, now = _shape([t.track.obstacle for t in tracks]), _shape(list(obstacles))
-    allowed = (
-        (distance <= gate[:, None])
-        & (_ratio(before[:, 0], now[:, 0]) <= params.max_count_ratio)
-        & (_ratio(before[:, 1], now[:, 1]) <= params.max_density_ratio)
-        & np.all(np.abs(before[:, None, 2:] - now[:, 2:]) <= params.max_spread_change_m, axis=2)
+    cost = _gated(
+        expected,
+        places,
+        gate,
+        before,
+        now,
+        params.max_count_ratio,
+        params.max_density_ratio,
+        params.max_spread_change_m,
     )
-    rows, columns = linear_sum_assignment(np.where(allowed, distance, NEVER))
-    return {int(i): int(j) for i, j in zip(rows, columns, strict=True) if allowed[i, j]}
+    rows, columns = linear_sum_assignment(cost)
+    return {int(i): int(j) for i, j in zip(rows, columns, strict=True) if cost[i, j] < NEVER}
+
+
+@numba.njit(cache=True, nogil=True)
+def _gated(
+    expected: F64,
+    places: F64,
+    gate: F64,
+    before: F64,
+    now: F64,
+    max_count_ratio: float,
+    max_density_ratio: float,
+    max_spread_change_m: float,
+) -> F64:
+    """(n, m) distance of each obstacle from each expected place; ``NEVER`` where a gate keeps the two apart. before,
+    now: (n, 5) and (m, 5) as ``_shape`` gives them."""
+    cost = np.full((len(expected), len(places)), NEVER)
+    for i in range(len(expected)):
+        for j in range(len(places)):
+            distance = np.hypot(expected[i, 0] - places[j, 0], expected[i, 1] - places[j, 1])
+            like = max(before[i, 0], now[j, 0]) <= max_count_ratio * min(before[i, 0], now[j, 0])
+            like &= max(before[i, 1], now[j, 1]) <= max_density_ratio * min(before[i, 1], now[j, 1])
+            for axis in range(2, 5):
+                like &= abs(before[i, axis] - now[j, axis]) <= max_spread_change_m
+            if like and distance <= gate[i]:
+                cost[i, j] = distance
+    return cost
 
 
 def _shape(obstacles: list[Obstacle]) -> F64:
@@ -137,11 +167,6 @@ def _shape(obstacles: list[Obstacle]) -> F64:
         (max(o.points, MIN_GATE_POINTS), o.density * max(1.0, MIN_GATE_POINTS / o.points), *o.spread) for o in obstacles
     ]
     return np.array(rows, dtype=np.float64)
-
-
-def _ratio(a: F64, b: F64) -> F64:
-    """(n, m) the larger over the smaller of each pair of positive values."""
-    return np.maximum(a[:, None], b) / np.minimum(a[:, None], b)
 
 
 def _extrapolate(tracked: Tracked, dt_s: float) -> Point2:
@@ -177,7 +202,10 @@ def _sight(
     history = (*tracked.history, (clock_s, float(place[0]), float(place[1])))[-params.trajectory_frames :]
     velocity = (float(mean[2]), float(mean[3])) if params.filter == "kalman" else slope(history)
     last = tracked.track
-    return Tracked(LidarTrack(last.id, obstacle, velocity, last.hits + 1, 0, False), history)
+    seen = evolve(
+        last, obstacle=obstacle, velocity_mps=velocity, hits=last.hits + 1, missed=0, carried=False, unseen_s=0.0
+    )
+    return evolve(tracked, track=seen, history=history, missed_s=0.0)
 
 
 def slope(history: tuple[tuple[float, float, float], ...]) -> Point2 | None:

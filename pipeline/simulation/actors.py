@@ -168,7 +168,8 @@ def _speed_mps(corners: list[tuple[float, float]], t_s: float) -> float:
     before_s, before = corners[0]
     for after_s, after in corners:
         if t_s <= after_s:
-            return before + (after - before) * (t_s - before_s) / (after_s - before_s) if after_s > before_s else after
+            share = (t_s - before_s) / (after_s - before_s) if after_s > before_s else 1.0
+            return before + (after - before) * share
         before_s, before = after_s, after
     return before
 
