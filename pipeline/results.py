@@ -14,7 +14,7 @@ from dataclasses import fields
 from typing import Any, TextIO
 
 from pipeline.geometry import Cuboid
-from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Gate, Path, Result, SensorHealth
+from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Gate, Path, Result, SensorHealth, StreamHealth
 
 VERSION = 1
 _DECIMALS = 4
@@ -23,18 +23,18 @@ _DECIMALS = 4
 def to_json(result: Result) -> dict[str, Any]:
     """The result in the contract's form: plain dicts, lists, strings, booleans, finite numbers and nulls.
 
-    ``Result.layers`` stays out: it is for views. ``next_cipv`` is null until a stage names one.
+    ``Result.layers`` stays out: it is for views.
     """
     return {
         "version": VERSION,
         "frame": result.frame,
         "t_ns": result.t_ns,
-        "sensors": _sensors(result.sensors),
+        "sensors": _sensors(result.sensors, result.streams),
         "ego": _ego(result.ego),
         "objects": [_object(each) for each in result.objects],
         "path": _path(result.path),
         "cipv": _cipv(result.cipv),
-        "next_cipv": None,
+        "next_cipv": _cipv(result.next_cipv),
         "rejected": [{"id": each.id, "reason": each.reason} for each in result.rejected],
         "acc": _acc(result.acc),
         "notes": list(result.notes),
@@ -52,12 +52,22 @@ def write_line(stream: TextIO, result: Result) -> None:
     stream.write(to_line(result))
 
 
-def _sensors(health: SensorHealth) -> dict[str, Any]:
-    return {
+def _sensors(health: SensorHealth, streams: tuple[StreamHealth, ...]) -> dict[str, Any]:
+    """What the frame held of each sensor; of live ones also how their streams do."""
+    sensors: dict[str, dict[str, Any]] = {
         "lidar": {"age_ms": _number(health.lidar_age_ms), "points": health.lidar_points},
         "camera": {"age_ms": _number(health.camera_age_ms), "skew_ms": _number(health.camera_skew_ms)},
         "ego": {"age_ms": _number(health.ego_age_ms)},
     }
+    for stream in streams:
+        sensors.setdefault(stream.sensor, {"age_ms": _number(stream.age_ms)}).update(
+            state=stream.state,
+            rate_hz=_number(stream.rate_hz),
+            jitter_ms=_number(stream.jitter_ms),
+            lost=stream.lost,
+            note=stream.note,
+        )
+    return sensors
 
 
 def _ego(ego: EgoState | None) -> dict[str, Any] | None:

@@ -91,6 +91,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         rejected=rejected,
         acc=command,
         notes=frame.notes,
+        streams=frame.streams,
         timing_ms=clock.total(),
         layers=Layers(
             points=frame.sweep.points if frame.sweep else np.zeros((0, 4), np.float32),

@@ -114,6 +114,47 @@ class RawBoxes:
 
 
 @dataclass(frozen=True)
+class RawLanes:
+    """What a lane detector saw in one picture, before any geometry: like ``RawBoxes`` it is cached per image and model.
+
+    points: (M, 2) float32 ``u v``, pixels of the raw image, on painted lines. scores: (M,) float32, 0–1.
+    line: (M,) int32, which line a point belongs to, −1 where the detector does not group its points.
+    """
+
+    model: str
+    points: F32
+    scores: F32
+    line: I32
+
+
+@dataclass(frozen=True)
+class Route:
+    """A road driven or planned before, as a line on the Earth (WGS 84), in driving order.
+
+    lat_deg, lon_deg: (K,) float64. sigma_m: standard deviation of each point, each way.
+    """
+
+    name: str
+    lat_deg: F64
+    lon_deg: F64
+    sigma_m: float
+
+
+@dataclass(frozen=True)
+class StreamHealth:
+    """How one live sensor does. rate_hz and jitter_ms: over the last seconds, null until enough messages came. age_ms: of
+    its newest message, against now. lost: messages known to be missing since the start. note: what a person can do."""
+
+    sensor: Literal["lidar", "camera", "gnss", "ego"]
+    state: Literal["ok", "stale", "silent", "absent"]
+    rate_hz: float | None
+    age_ms: float | None
+    jitter_ms: float | None
+    lost: int
+    note: str = ""
+
+
+@dataclass(frozen=True)
 class Frame:
     """Everything known at one tick. Any branch may be missing; ``notes`` says why, in words a person can act on."""
 
@@ -127,6 +168,9 @@ class Frame:
     raw_boxes: RawBoxes | None = None
     notes: tuple[str, ...] = ()
     gnss: GnssFix | None = None
+    raw_lanes: RawLanes | None = None
+    route: Route | None = None
+    streams: tuple[StreamHealth, ...] = ()
 
 
 # ---------------------------------------------------------------- what stages hand on
@@ -342,3 +386,5 @@ class Result:
     notes: tuple[str, ...]
     timing_ms: dict[str, float]
     layers: Layers
+    next_cipv: Cipv | None = None
+    streams: tuple[StreamHealth, ...] = ()

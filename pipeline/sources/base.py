@@ -51,6 +51,31 @@ class Source(Protocol):
         ...
 
 
+class LiveSource(Protocol):
+    """Devices that are read as they deliver. There is no way back: what nobody took in time is dropped and counted.
+
+    notes: what a person should know about the whole, as with ``Source``; a frame's own troubles are in its notes.
+    """
+
+    uri: str
+    title: str
+    rate_hz: float
+    notes: tuple[str, ...]
+
+    def start(self) -> None:
+        """Open the devices; one that is not there yet is waited for in the background."""
+        ...
+
+    def next(self, timeout_s: float) -> Frame | None:
+        """The newest tick not given yet; null when none came in time. A tick is a whole LiDAR sweep with the nearest
+        picture, or, while the LiDAR is silent, a picture."""
+        ...
+
+    def close(self) -> None:
+        """Give the devices back. Safe to call twice."""
+        ...
+
+
 def is_simulated(source: Source) -> bool:
     """Whether its pictures are drawn, which a detector may have to know."""
     return source.uri.startswith("sim:")
