@@ -142,7 +142,7 @@ class Route:
 
 @dataclass(frozen=True)
 class StreamHealth:
-    """How one live sensor does. rate_hz and jitter_ms: over the last seconds, null until enough messages came. age_ms: of
+    """How one live sensor does. rate_hz and jitter_ms: over the last seconds, null until enough came. age_ms: of
     its newest message, against now. lost: messages known to be missing since the start. note: what a person can do."""
 
     sensor: Literal["lidar", "camera", "gnss", "ego"]
