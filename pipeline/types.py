@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.geometry import Cuboid
+from pipeline.path.lane_types import EgoLane
 
 F32 = npt.NDArray[np.float32]
 F64 = npt.NDArray[np.float64]
@@ -358,7 +359,7 @@ class Layers:
 
     points: (N, 4) float32, the sweep before down-sampling. kind: (N,) int32, ``GROUND``, ``UNCLUSTERED``,
     ``DROPPED`` or the cluster index (``Obstacle.cluster``). lidar_boxes / vision_boxes: the two boxes that fusion
-    compared, by fused object id.
+    compared, by fused object id. lanes: the ego lane's lines, null where no lane detector runs.
     """
 
     points: F32
@@ -368,6 +369,7 @@ class Layers:
     vision_tracks: tuple[VisionTrack, ...] = ()
     lidar_boxes: dict[int, Box] = field(default_factory=dict)
     vision_boxes: dict[int, Box] = field(default_factory=dict)
+    lanes: EgoLane | None = None
 
 
 @dataclass(frozen=True)
