@@ -13,13 +13,14 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from app.control import Control, Wish
-from app.line import DetectionCache, Detects, Line, Tick
+from app.line import DetectionCache, Line, Tick
 from app.playback import PlaybackClock
 from app.snapshot import Notice, Snapshot
 from pipeline.params import Params
-from pipeline.run import Sensors, picture_size
+from pipeline.run import Detectors, Detects, Sensors, picture_size
 from pipeline.sources.base import Source, SourceError, is_simulated
 from pipeline.step import warm_up
+from pipeline.types import RawBoxes
 from pipeline.vision.detector import DetectorError, DetectorMissing
 
 logger = logging.getLogger("cipv.engine")
@@ -28,7 +29,7 @@ _PATIENCE_S = 10.0
 """A read that hangs must not keep the program from ending; the worker is a daemon."""
 
 OpenSource = Callable[[str], Source]
-OpenDetector = Callable[[Source], Detects]
+OpenDetector = Callable[[Source], Detects[RawBoxes]]
 Listener = Callable[[Snapshot], None]
 
 
@@ -53,7 +54,7 @@ class Engine:
         self._open_detector = open_detector
         self._sensors: Sensors = sensors
         self._detections = DetectionCache()
-        self._detectors: dict[tuple[bool, tuple[int, int] | None], Detects] = {}
+        self._detectors: dict[tuple[bool, tuple[int, int] | None], Detects[RawBoxes]] = {}
         self._line: Line | None = None
         self._clock: PlaybackClock | None = None
         self._skipped = 0
@@ -172,7 +173,7 @@ class Engine:
             return False
         notices = [Notice("info", text) for text in source.notes]
         detector = self._detector_for(source, notices) if self._sensors != "lidar" else None
-        self._line = Line(source, detector, self._detections, self._sensors)
+        self._line = Line(source, Detectors(detector), self._detections, self._sensors)
         self._clock = None
         self._skipped = 0
         self._publish(
@@ -192,7 +193,7 @@ class Engine:
         )
         return True
 
-    def _detector_for(self, source: Source, notices: list[Notice]) -> Detects | None:
+    def _detector_for(self, source: Source, notices: list[Notice]) -> Detects[RawBoxes] | None:
         """The detector for the source's pictures; where there is none, LiDAR goes on alone and a notice says so."""
         if self._open_detector is None:
             return None

@@ -9,32 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Protocol
+from typing import cast
 
 from app.lru import BoundedCache
 from app.playback import timeline_s
 from pipeline.params import Params
-from pipeline.run import Sensors, only
+from pipeline.run import Detectors, Detects, Look, Seen, Sensors, advance
 from pipeline.sources.base import Source
 from pipeline.step import State, step
-from pipeline.types import U8, Frame, RawBoxes, Result
+from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result
 
 WARM_UP_FRAMES = 10
 """A seek runs this many frames before its target, so that trackers there have their history and confirmations."""
 _CACHED_FRAMES_BYTES = 192e6
-_CACHED_BOXES = 4096
-
-
-class Detects(Protocol):
-    """What the line needs of a detector. notes: what a person should know about it."""
-
-    @property
-    def name(self) -> str: ...
-
-    @property
-    def notes(self) -> tuple[str, ...]: ...
-
-    def detect(self, bgr: U8) -> RawBoxes: ...
+_CACHED_ANSWERS = 8192
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,34 +38,40 @@ class Tick:
 
 
 class DetectionCache:
-    """Raw boxes by (source, frame, detector), bounded; it outlives the source, so reopening costs no network."""
+    """What detectors answered, by (source, frame, detector), bounded; it outlives the source, so reopening costs no
+    network. spent_ms: how long the detectors have run in all."""
 
-    def __init__(self, limit: int = _CACHED_BOXES) -> None:
-        self._boxes: BoundedCache[tuple[str, int, str], RawBoxes] = BoundedCache(limit, lambda _: 1)
+    def __init__(self, limit: int = _CACHED_ANSWERS) -> None:
+        self.spent_ms = 0.0
+        self._answers: BoundedCache[tuple[str, int, str], RawBoxes | RawLanes] = BoundedCache(limit, lambda _: 1)
 
-    def boxes(self, uri: str, frame: Frame, detector: Detects) -> tuple[RawBoxes | None, float]:
-        """The boxes and the milliseconds that the network took for them; null when there is no picture."""
-        if frame.picture is None:
-            return None, 0.0
-        key = (uri, frame.index, detector.name)
-        held = self._boxes.get(key)
-        if held is not None:
-            return held, 0.0
-        start = perf_counter()
-        found = detector.detect(frame.picture.bgr)
-        self._boxes.put(key, found)
-        return found, (perf_counter() - start) * 1e3
+    def asker(self, uri: str) -> Look:
+        """How to ask about the pictures of one source."""
+
+        def ask(detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
+            key = (uri, frame.index, detector.name)
+            held = self._answers.get(key)
+            if held is not None:
+                return cast("Seen", held)
+            start = perf_counter()
+            found = detector.detect(bgr)
+            self.spent_ms += (perf_counter() - start) * 1e3
+            self._answers.put(key, found)
+            return found
+
+        return ask
 
 
 class Line:
-    """A source, the detector for its pictures, and their caches. Used by one thread."""
+    """A source, the detectors for its pictures, and their caches. Used by one thread."""
 
-    def __init__(self, source: Source, detector: Detects | None, detections: DetectionCache, sensors: Sensors) -> None:
+    def __init__(self, source: Source, detectors: Detectors, detections: DetectionCache, sensors: Sensors) -> None:
         self.source = source
         self.timeline_s = timeline_s([source.t_ns(i) for i in range(len(source))], source.rate_hz)
         self.tick: Tick | None = None
-        self._detector = detector if sensors != "lidar" else None
+        self._detectors = detectors
         self._detections = detections
+        self._ask = detections.asker(source.uri)
         self._sensors = sensors
         self._frames: BoundedCache[int, Frame] = BoundedCache(_CACHED_FRAMES_BYTES, _frame_bytes)
 
@@ -108,13 +102,9 @@ class Line:
         return self.tick
 
     def _run(self, state: State, index: int, params: Params) -> Tick:
-        frame = self._read(index)
-        boxes, detect_ms = None, 0.0
-        if self._detector is not None:
-            boxes, detect_ms = self._detections.boxes(self.source.uri, frame, self._detector)
-        frame = only(replace(frame, raw_boxes=boxes), self._sensors)
-        after, result = step(state, frame, params)
-        return Tick(state, frame, after, result, params, detect_ms)
+        spent_ms = self._detections.spent_ms
+        frame, after, result = advance(state, self._read(index), params, self._detectors, self._sensors, self._ask)
+        return Tick(state, frame, after, result, params, self._detections.spent_ms - spent_ms)
 
     def _read(self, index: int) -> Frame:
         held = self._frames.get(index)

@@ -1,19 +1,60 @@
-"""source → detector → step: every frame of a recording, in order, with its result."""
+"""source → detectors → step: every frame of a recording, in order, with its result."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol, TypeVar
 
 from pipeline.params import Params
 from pipeline.sources.base import Source, is_simulated
 from pipeline.step import State, step, warm_up
-from pipeline.types import Frame, Result
+from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result
 from pipeline.vision.detector import Detector, open_detector
 from pipeline.vision.models import EMBEDDED
 
 Sensors = Literal["lidar", "camera", "both"]
+Seen = TypeVar("Seen", RawBoxes, RawLanes)
+Seen_co = TypeVar("Seen_co", bound=RawBoxes | RawLanes, covariant=True)
+
+
+class Detects(Protocol[Seen_co]):
+    """Looks at one picture. name: equal names give equal answers, the key of caches. notes: what a person should know
+    about it."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def notes(self) -> tuple[str, ...]: ...
+
+    def detect(self, bgr: U8) -> Seen_co:
+        """What is in a picture (H, W, 3) uint8."""
+        ...
+
+
+@dataclass(frozen=True)
+class Detectors:
+    """What looks at the pictures before the line runs; null: nothing does.
+
+    boxes: finds vehicles. lanes: finds lane lines, in every ``lanes_every``-th frame; between, the lane tracker counts
+    their age.
+    """
+
+    boxes: Detects[RawBoxes] | None = None
+    lanes: Detects[RawLanes] | None = None
+    lanes_every: int = 1
+
+
+class Look(Protocol):
+    """How a detector is asked about a frame's picture: straight away, or through a cache."""
+
+    def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen: ...
+
+
+def look(detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
+    """Ask straight away."""
+    return detector.detect(bgr)
 
 
 def detector_for(source: Source, spec: str | None = None) -> Detector:
@@ -35,30 +76,43 @@ def picture_size(source: Source) -> tuple[int, int] | None:
     return (frame.camera.width, frame.camera.height) if frame.camera is not None else None
 
 
-def detect(frame: Frame, detector: Detector | None) -> Frame:
-    """The frame with the network's boxes in it. The network runs here and nowhere else."""
-    if detector is None or frame.picture is None:
+def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
+    """The frame with what the detectors see in its picture. Networks run here and nowhere else."""
+    if frame.picture is None:
         return frame
-    return replace(frame, raw_boxes=detector.detect(frame.picture.bgr))
+    bgr = frame.picture.bgr
+    if detectors.boxes is not None:
+        frame = replace(frame, raw_boxes=ask(detectors.boxes, frame, bgr))
+    if detectors.lanes is not None and frame.index % detectors.lanes_every == 0:
+        frame = replace(frame, raw_lanes=ask(detectors.lanes, frame, bgr))
+    return frame
 
 
 def only(frame: Frame, sensors: Sensors) -> Frame:
     """The frame as a car without the other sensor would have it. The picture stays: people still want to see it."""
     if sensors == "lidar":
-        return replace(frame, raw_boxes=None)
+        return replace(frame, raw_boxes=None, raw_lanes=None)
     if sensors == "camera":
         return replace(frame, sweep=None)
     return frame
 
 
+def advance(
+    state: State, frame: Frame, params: Params, detectors: Detectors, sensors: Sensors = "both", ask: Look = look
+) -> tuple[Frame, State, Result]:
+    """One frame as its source gave it through detectors and line: the frame that the line saw, the state after it and
+    its result."""
+    frame = only(frame if sensors == "lidar" else detect(frame, detectors, ask), sensors)
+    state, result = step(state, frame, params)
+    return frame, state, result
+
+
 def run(
-    source: Source, params: Params, detector: Detector | None, sensors: Sensors = "both"
+    source: Source, params: Params, detectors: Detectors, sensors: Sensors = "both"
 ) -> Iterator[tuple[Frame, Result]]:
-    """Each frame with its result. ``detector`` null: LiDAR goes on alone."""
+    """Each frame with its result. Without detectors LiDAR goes on alone."""
     warm_up()
     state = State()
     for index in range(len(source)):
-        frame = source.frame(index)
-        frame = only(detect(frame, detector if sensors != "lidar" else None), sensors)
-        state, result = step(state, frame, params)
+        frame, state, result = advance(state, source.frame(index), params, detectors, sensors)
         yield frame, result

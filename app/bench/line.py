@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.params import Params
-from pipeline.run import detect
+from pipeline.run import Detectors, detect
 from pipeline.step import State, step, warm_up
 from pipeline.types import Frame
 from pipeline.vision.detector import Detector
@@ -24,7 +24,7 @@ def stages(
     frames: consecutive, with pictures, without boxes. budget_s: wall time for all of it, seconds.
     """
     warm_up()
-    seen = [detect(frame, detector) for frame in frames]
+    seen = [detect(frame, Detectors(detector)) for frame in frames]
     share_s = budget_s / (3 if detector else 1)
     idle = _times(seen, params, share_s)
     figures = {"step": _row(idle)}
@@ -52,7 +52,7 @@ def _times(frames: list[Frame], params: Params, budget_s: float, detector: Detec
         start = perf_counter()
         if start > end:
             break
-        state, _ = step(state, detect(frame, detector), params)
+        state, _ = step(state, detect(frame, Detectors(detector)), params)
         times.append(perf_counter() - start)
     return times
 
@@ -75,4 +75,4 @@ class _Busy:
         for frame in cycle(frames):
             if self._ended.is_set():
                 return
-            detect(frame, detector)
+            detect(frame, Detectors(detector))

@@ -14,7 +14,7 @@ import tyro
 from app.options import LineOptions, SourceOptions
 from app.progress import frames_progress
 from pipeline.results import write_line
-from pipeline.run import run
+from pipeline.run import Detectors, run
 from pipeline.types import Result
 
 
@@ -51,7 +51,7 @@ class Run:
                 replay = stack.enter_context(RerunSink(self.rrd, source.title, params.alignment))
             bar = stack.enter_context(frames_progress())
             task = bar.add_task(source.title, total=len(source))
-            for frame, result in run(source, params, detector, self.sensors):
+            for frame, result in run(source, params, Detectors(detector), self.sensors):
                 if out is not None:
                     write_line(out, result)
                 elif replay is None:

@@ -14,8 +14,8 @@ from typing import Protocol
 
 from pipeline.params import Params
 from pipeline.records import evolve
+from pipeline.run import Detectors, detect, only
 from pipeline.run import Sensors as Sensed
-from pipeline.run import detect, only
 from pipeline.simulation import actors, truth_boxes, vehicle, world
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import Sensors
@@ -60,7 +60,7 @@ class NetworkEyes:
     needs_picture: bool = True
 
     def look(self, frame: Frame, now: World, seed: int) -> Frame:
-        return detect(frame, self.detector)
+        return detect(frame, Detectors(self.detector))
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from app.snapshot import Snapshot
 from pipeline.alignment import resolve
 from pipeline.params import Params, with_changes
 from pipeline.results import to_json
+from pipeline.run import Detectors
 from pipeline.types import DROPPED, GROUND, UNCLUSTERED, Picture
 from tests.app.recording import GROUND_M, CountingDetector, Recording
 
@@ -27,7 +28,7 @@ def snapshot(params: Params | None = None, index: int = 3, **frame_changes: Any)
     recording = Recording()
     original = recording.frame
     recording.frame = lambda i: replace(original(i), **frame_changes)  # type: ignore[method-assign]
-    line = Line(recording, CountingDetector(), DetectionCache(), "both")
+    line = Line(recording, Detectors(CountingDetector()), DetectionCache(), "both")
     return Snapshot(
         params, uri=recording.uri, count=len(recording), index=index, sequence=1, tick=line.seek(index, params)
     )

@@ -13,6 +13,7 @@ from app.line import WARM_UP_FRAMES, DetectionCache, Line
 from app.snapshot import Snapshot
 from pipeline.params import Params, with_changes
 from pipeline.results import to_json
+from pipeline.run import Detectors
 from pipeline.sources.base import Source
 from pipeline.step import State, step
 from pipeline.types import Result
@@ -291,7 +292,7 @@ def test_a_view_that_fails_takes_nothing_with_it(start: Start, caplog: pytest.Lo
 
 
 def test_a_line_abandons_a_seek_and_keeps_its_tick():
-    line = Line(Recording(), CountingDetector(), DetectionCache(), "both")
+    line = Line(Recording(), Detectors(CountingDetector()), DetectionCache(), "both")
     first = line.seek(4, Params())
     assert line.seek(20, Params(), superseded=lambda: True) is None
     assert line.tick is first

@@ -15,7 +15,7 @@ import pytest
 
 from pipeline.params import preset
 from pipeline.results import to_json
-from pipeline.run import detector_for, run
+from pipeline.run import Detectors, detector_for, run
 from pipeline.sources import open_source
 
 FOLDER = Path(__file__).parent
@@ -25,7 +25,7 @@ EVERY = 5
 def summary(name: str) -> list[dict[str, Any]]:
     """Every fifth frame of the drive with the LiDAR alone: who leads, how far, why, and what ACC does."""
     kept = []
-    for frame, result in run(open_source("sim:straight"), preset(name), None):
+    for frame, result in run(open_source("sim:straight"), preset(name), Detectors()):
         if frame.index % EVERY == 0:
             kept.append(_decisions(to_json(result)))
     return kept
@@ -67,7 +67,9 @@ def same(a: Any, b: Any) -> bool:
 def test_nothing_brakes_hard_on_a_drive_that_needs_none() -> None:
     """With both sensors and the embedded detector: neither ACC's TTC rule nor emergency braking finds a phantom."""
     source = open_source("sim:straight")
-    states = {frame.name: result.acc for frame, result in run(source, preset("default"), detector_for(source))}
+    states = {
+        frame.name: result.acc for frame, result in run(source, preset("default"), Detectors(detector_for(source)))
+    }
     assert all(command is not None for command in states.values())
     phantoms = {name: c.reason for name, c in states.items() if c and c.state not in ("cruise", "follow")}
     assert not phantoms

@@ -13,6 +13,7 @@ from app.encode import Encoder
 from app.line import DetectionCache, Line
 from app.snapshot import Snapshot
 from pipeline.params import Params
+from pipeline.run import Detectors
 from pipeline.sources import open_source
 from pipeline.vision.detector import Detector, open_detector
 from tests.conftest import ROOT
@@ -41,7 +42,7 @@ def play(line: Line, encoder: Encoder, frames: range) -> int:
 def growth(uri: str, detector: Detector | None, frames: int | None, warm_up: int, rounds: int) -> tuple[float, int]:
     """Bytes grown after the first ``warm_up`` rounds, and the resident size then."""
     source = open_source(uri)
-    line, encoder = Line(source, detector, DetectionCache(), "both"), Encoder()
+    line, encoder = Line(source, Detectors(detector), DetectionCache(), "both"), Encoder()
     shown = range(min(frames or len(source), len(source)))
     for _ in range(warm_up):
         assert play(line, encoder, shown) > 10_000 * len(shown)
