@@ -1,22 +1,36 @@
 /** Requests to the server. What moves fast (sliders) goes through `newestOnly`. */
 
-/** @returns {Promise<any>} The answer; rejects with the server's own sentence. */
+/**
+ * The server's answer; rejects with the server's own sentence.
+ * @param {string} path @param {string} [method] @param {unknown} [body] @returns {Promise<any>}
+ */
 export async function request(path, method = "GET", body = undefined) {
-  const headers = body === undefined ? {} : { "content-type": "application/json" };
-  const response = await fetch(path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body) });
+  /** @type {RequestInit} */
+  const options = { method };
+  if (body !== undefined) {
+    options.headers = { "content-type": "application/json" };
+    options.body = JSON.stringify(body);
+  }
+  const response = await fetch(path, options);
   const answer = await response.json().catch(() => null);
   if (!response.ok) throw new Error(answer?.detail ?? `the server answered ${response.status}`);
   return answer;
 }
 
+/** @template T @param {T} _ @param {T} newer */
+const newerOf = (_, newer) => newer;
+
 /**
  * One request at a time; while it is under way only the newest of the next ones is kept.
- * @param {(body: any) => Promise<void>} send
- * @param {(waiting: any, newer: any) => any} merge  what to keep of two that wait
+ * @template T
+ * @param {(body: T) => Promise<void>} send
+ * @param {(waiting: T, newer: T) => T} merge  what to keep of two that wait
  */
-export function newestOnly(send, merge = (_, newer) => newer) {
+export function newestOnly(send, merge = newerOf) {
   let busy = false;
+  /** @type {T|undefined} */
   let waiting;
+  /** @param {T} body */
   return async function submit(body) {
     if (busy) {
       waiting = waiting === undefined ? body : merge(waiting, body);
@@ -34,7 +48,11 @@ export function newestOnly(send, merge = (_, newer) => newer) {
   };
 }
 
+/** @typedef {{playing?: boolean, seek?: number, step?: number, speed?: number, loop?: boolean}} PlaybackChange */
+
+/** @param {PlaybackChange} waiting @param {PlaybackChange} newer */
 const merged = (waiting, newer) => ({ ...waiting, ...newer, ...(newer.step ? { step: (waiting.step ?? 0) + newer.step } : {}) });
 
-/** Change playback: {playing, seek, step, speed, loop}. */
-export const playback = newestOnly((body) => request("api/playback", "POST", body).catch(() => {}), merged);
+/** Change playback. */
+export const playback = newestOnly(
+  (/** @type {PlaybackChange} */ body) => request("api/playback", "POST", body).catch(() => {}), merged);

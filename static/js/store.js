@@ -1,27 +1,44 @@
 /** The page's only state. A pane subscribes to the keys it draws; whoever learns something sets a key. */
 
-/** @typedef {"state"|"frame"|"selection"|"layers"|"link"|"params"|"theme"} Key */
+/**
+ * Null until first set.
+ * @typedef {object} Values
+ * @property {import("./types.js").State} state
+ * @property {import("./types.js").Frame} frame
+ * @property {number} selection  id of the object selected everywhere
+ * @property {Record<string, boolean>} layers
+ * @property {{status: "live"|"lost", since: number}} link
+ * @property {import("./types.js").ParamsAnswer} params
+ * @property {string} theme
+ * @property {import("./types.js").Drive} drive  the whole recording, as the timeline shows it
+ * @property {import("./types.js").ObjectCurve} curve  the selected object over the recording
+ * @property {number} scrub  the frame asked for and not shown yet
+ * @property {{first: number, last: number}} clip  what is marked for export
+ * @property {{on: boolean, blend: number, edges: boolean}} align  alignment mode
+ */
+/** @typedef {keyof Values} Key */
 
-const values = new Map();
+/** @type {Partial<Values>} */
+const values = {};
 /** @type {Map<Key, Set<(value: any) => void>>} */
 const listeners = new Map();
 
-/** @param {Key} key */
+/** @template {Key} K @param {K} key @returns {Values[K]|null} */
 export function get(key) {
-  return values.get(key) ?? null;
+  return /** @type {Values[K]|undefined} */ (values[key]) ?? null;
 }
 
-/** @param {Key} key @param {any} value */
+/** @template {Key} K @param {K} key @param {Values[K]|null} value */
 export function set(key, value) {
-  values.set(key, value);
+  values[key] = /** @type {any} */ (value);
   for (const listener of listeners.get(key) ?? []) listener(value);
 }
 
 /** Call `listener` whenever one of the keys is set. @param {Key[]} keys @param {() => void} listener */
 export function on(keys, listener) {
   for (const key of keys) {
-    if (!listeners.has(key)) listeners.set(key, new Set());
-    listeners.get(key).add(listener);
+    const held = listeners.get(key) ?? new Set();
+    listeners.set(key, held.add(listener));
   }
 }
 

@@ -1,31 +1,284 @@
 /**
- * Shapes of what the server sends; see app/encode.py for the message and the contract for the result.
+ * Shapes of what the server sends. `tests/app/test_page_types.py` holds every key here against real messages.
+ * The message is laid out in app/encode.py, the result in the contract, the drive in app/routes/.
  *
  * @typedef {[number, number]} Point2
- * @typedef {{name: string, value: number|null, limit: number|null, passed: boolean}} Gate
- * @typedef {{id: number, source: "V"|"L"|"VL", type: string|null, type_score: number|null, bbox: number[]|null,
- *   bev: Point2[]|null, cuboid: object|null, closest_point: number[]|null, distance_m: number|null,
- *   distance_sigma_m: number|null, velocity_mps: Point2|null, speed_over_ground_mps: number|null, in_path: boolean,
- *   in_path_probability: number|null, path_offset_m: number|null, moving: boolean|null, ttc_s: number|null,
- *   carried: boolean, hits: number, lidar_points: number, gates: Gate[]}} FusedObject
- * @typedef {{id: number, distance_m: number, closing_speed_mps: number|null, ttc_s: number|null, reason: string}} Cipv
- * @typedef {{source: string, center: Point2[], left: Point2[], right: Point2[]}} Path
- * @typedef {{state: string, desired_speed_mps: number, accel_mps2: number, accelerator: number, brake: number,
- *   reason: string}} Acc
- * @typedef {{frame: string, t_ns: number, objects: FusedObject[], path: Path, cipv: Cipv|null,
- *   rejected: {id: number, reason: string}[], acc: Acc|null, notes: string[], timing_ms: Record<string, number>,
- *   ego: {speed_mps: number, yaw_rate_radps: number|null}|null, sensors: Record<string, Record<string, number|null>>
- *   }} Result
- * @typedef {{uri: string|null, title: string, rate_hz: number, count: number, index: number, frame: string|null,
- *   time_s: number, duration_s: number, playing: boolean, speed: number, loop: boolean, busy: string|null,
- *   detector: string|null, preset: string, params_revision: number, sequence: number, skipped: number,
- *   notices: {level: string, text: string}[]}} State
  * @typedef {(Point2|null)[]} Pixels
- * @typedef {{lidar_boxes: Record<string, number[]>, vision_boxes: Record<string, number[]>,
- *   cuboids: Record<string, Pixels>, path: {center: Pixels, left: Pixels, right: Pixels}|null}} Display
- * @typedef {{madeUnixMs: number, detectMs: number, state: State, result: Result, display: Display,
- *   isLate?: boolean,
- *   picture: {width: number, height: number, scale: number}|null, bitmap: ImageBitmap|null,
- *   count: number, xyz: Int16Array, uv: Int16Array, owner: Uint16Array, kind: Uint8Array}} Frame
+ * @typedef {"V"|"L"|"VL"} SourceKind
+ *
+ * @typedef {object} Gate
+ * @property {string} name
+ * @property {number|null} value
+ * @property {number|null} limit
+ * @property {boolean} passed
+ *
+ * @typedef {object} FusedObject
+ * @property {number} id
+ * @property {SourceKind} source
+ * @property {string|null} type
+ * @property {number|null} type_score
+ * @property {[number, number, number, number]|null} bbox
+ * @property {Point2[]|null} bev
+ * @property {{center: number[], size: number[], yaw_rad: number}|null} cuboid
+ * @property {[number, number, number]|null} closest_point
+ * @property {number|null} distance_m
+ * @property {number|null} distance_sigma_m
+ * @property {Point2|null} velocity_mps
+ * @property {number|null} speed_over_ground_mps
+ * @property {boolean} in_path
+ * @property {number|null} in_path_probability
+ * @property {number|null} path_offset_m
+ * @property {boolean|null} moving
+ * @property {number|null} ttc_s
+ * @property {boolean} carried
+ * @property {""|SourceKind} seen_by
+ * @property {number} hits
+ * @property {number} lidar_points
+ * @property {Gate[]} gates
+ *
+ * @typedef {object} Cipv
+ * @property {number} id
+ * @property {number} distance_m
+ * @property {number|null} closing_speed_mps
+ * @property {number|null} ttc_s
+ * @property {string} reason
+ *
+ * @typedef {object} Path
+ * @property {string} source
+ * @property {Point2[]} center
+ * @property {Point2[]} left
+ * @property {Point2[]} right
+ * @property {Record<string, number|null>} sigma_m
+ * @property {Record<string, number|null>} weights
+ *
+ * @typedef {"cruise"|"follow"|"stop"|"warn"|"partial_brake"|"full_brake"} AccState
+ *
+ * @typedef {object} Acc
+ * @property {AccState} state
+ * @property {number} desired_speed_mps
+ * @property {number} accel_mps2
+ * @property {number} accelerator
+ * @property {number} brake
+ * @property {string} reason
+ *
+ * @typedef {object} Result
+ * @property {number} version
+ * @property {string} frame
+ * @property {number} t_ns
+ * @property {Record<string, Record<string, any>>} sensors
+ * @property {{speed_mps: number, yaw_rate_radps: number|null}|null} ego
+ * @property {FusedObject[]} objects
+ * @property {Path} path
+ * @property {Cipv|null} cipv
+ * @property {Cipv|null} next_cipv
+ * @property {{id: number, reason: string}[]} rejected
+ * @property {Acc|null} acc
+ * @property {string[]} notes
+ * @property {Record<string, number|null>} timing_ms
+ *
+ * @typedef {object} Notice
+ * @property {"info"|"warning"|"error"} level
+ * @property {string} text
+ *
+ * @typedef {object} State
+ * @property {string|null} uri
+ * @property {string} title
+ * @property {number} rate_hz
+ * @property {number} count
+ * @property {number} index
+ * @property {string|null} frame
+ * @property {number} time_s
+ * @property {number} duration_s
+ * @property {boolean} playing
+ * @property {number} speed
+ * @property {boolean} loop
+ * @property {string|null} busy
+ * @property {string|null} detector
+ * @property {string} preset
+ * @property {number} params_revision
+ * @property {number} sequence
+ * @property {number} skipped
+ * @property {Notice[]} notices
+ * @property {boolean} [live]
+ * @property {boolean} [provisional]
+ * @property {DriveState|null} [drive]
+ * @property {boolean} [can_undo]
+ * @property {boolean} [can_redo]
+ *
+ * @typedef {object} DriveState
+ * @property {number} revision
+ * @property {number|null} run
+ * @property {number|null} base
+ * @property {number} done
+ * @property {number} total
+ * @property {boolean} running
+ * @property {"detect"|"run"|"done"|"failed"} phase
+ * @property {string} note
+ *
+ * @typedef {object} Display
+ * @property {Record<string, [number, number, number, number]>} lidar_boxes
+ * @property {Record<string, [number, number, number, number]>} vision_boxes
+ * @property {Record<string, Pixels>} cuboids
+ * @property {{center: Pixels, left: Pixels, right: Pixels}|null} path
+ * @property {Ranked[]} [ranking]
+ *
+ * @typedef {object} Ranked  a candidate for CIPV: the lead is order 1; `stopped_by` is the first gate it failed
+ * @property {number} id
+ * @property {number} order
+ * @property {number|null} distance_m
+ * @property {string|null} stopped_by
+ * @property {number|null} value
+ * @property {number|null} limit
+ * @property {string} reason
+ *
+ * @typedef {object} Frame  one decoded message: see protocol.js
+ * @property {number} madeUnixMs
+ * @property {number} detectMs
+ * @property {State} state
+ * @property {Result} result
+ * @property {Display} display
+ * @property {boolean} [isLate]
+ * @property {{width: number, height: number, scale: number, bytes: number}|null} picture
+ * @property {ImageBitmap|null} bitmap
+ * @property {number} count
+ * @property {Int16Array} xyz
+ * @property {Int16Array} uv
+ * @property {Uint16Array} owner
+ * @property {Uint8Array} kind
+ *
+ * @typedef {number|string|boolean|null} ParamValue
+ *
+ * @typedef {object} Param
+ * @property {string} key
+ * @property {string} help
+ * @property {"number"|"integer"|"boolean"|"choice"} kind
+ * @property {number} [min]
+ * @property {number} [max]
+ * @property {number} [step]
+ * @property {string} [unit]
+ * @property {string[]} [choices]
+ * @property {boolean} nullable
+ *
+ * @typedef {object} ParamsAnswer
+ * @property {string} preset
+ * @property {string[]} presets
+ * @property {number} revision
+ * @property {{name: string, help: string, params: Param[]}[]} sections
+ * @property {Record<string, ParamValue>} values
+ * @property {Record<string, ParamValue>} base
+ * @property {Record<string, number>} effective
+ * @property {boolean} [can_undo]
+ * @property {boolean} [can_redo]
+ *
+ * @typedef {object} Columns  one entry a frame; the CIPV's figures are null without one
+ * @property {(number|null)[]} cipv_id
+ * @property {(SourceKind|null)[]} source
+ * @property {(boolean|null)[]} carried
+ * @property {(number|null)[]} distance_m
+ * @property {(number|null)[]} closing_speed_mps
+ * @property {(number|null)[]} ttc_s
+ * @property {(number|null)[]} path_offset_m
+ * @property {(number|null)[]} speed_mps
+ * @property {(number|null)[]} desired_speed_mps
+ * @property {(number|null)[]} accel_mps2
+ * @property {(number|null)[]} brake
+ * @property {(AccState|null)[]} acc_state
+ * @property {(number|null)[]} next_cipv_id
+ * @property {number[]} objects
+ * @property {string[]} gaps
+ * @property {(number|null)[]} vl_disagreement_m
+ * @property {number[]} notes
+ *
+ * @typedef {object} ColumnsAnswer
+ * @property {number} run
+ * @property {string} uri
+ * @property {number} count
+ * @property {number} from
+ * @property {number} done
+ * @property {number[]} t_s
+ * @property {Columns} columns
+ *
+ * @typedef {object} DriveEvent
+ * @property {string} kind
+ * @property {number} index
+ * @property {number} t_s
+ * @property {string} text
+ * @property {number[]} ids
+ * @property {"info"|"notice"|"warning"|"alarm"} severity
+ * @property {number|null} mark
+ *
+ * @typedef {object} ObjectCurve
+ * @property {number} id
+ * @property {number} run
+ * @property {number[]} index
+ * @property {SourceKind[]} source
+ * @property {(number|null)[]} distance_m
+ * @property {(number|null)[]} closing_speed_mps
+ * @property {(number|null)[]} ttc_s
+ * @property {(number|null)[]} path_offset_m
+ * @property {boolean[]} in_path
+ * @property {boolean[]} carried
+ *
+ * @typedef {object} Run
+ * @property {number} id
+ * @property {string} name
+ * @property {string} label
+ * @property {string} preset
+ * @property {Record<string, [ParamValue, ParamValue]>} changes
+ * @property {number} done
+ * @property {number} total
+ * @property {string} phase
+ * @property {string} note
+ * @property {boolean} kept
+ * @property {number|null} seconds
+ *
+ * @typedef {object} Metric
+ * @property {string} name
+ * @property {string} unit
+ * @property {number|null} base
+ * @property {number|null} run
+ * @property {"higher"|"lower"|null} better
+ *
+ * @typedef {object} Comparison
+ * @property {number} base
+ * @property {number} run
+ * @property {number} done
+ * @property {[number, number][]} differing
+ * @property {number} frames_differing
+ * @property {Record<string, string>} first
+ * @property {Metric[]} metrics
+ * @property {"labels"|"simulator"|null} truth
+ * @property {number} judged
+ *
+ * @typedef {object} Job
+ * @property {string} id
+ * @property {string} kind
+ * @property {number} first
+ * @property {number} last
+ * @property {"waiting"|"running"|"done"|"failed"|"cancelled"} state
+ * @property {number} progress
+ * @property {string} note
+ * @property {string|null} file
+ * @property {number|null} bytes
+ *
+ * @typedef {object} AlignmentScore
+ * @property {number|null} score
+ * @property {number} pairs
+ * @property {number|null} median_px
+ * @property {string} text
+ *
+ * @typedef {object} Series  the columns of one run, as far as it has come
+ * @property {number} run
+ * @property {number} done
+ * @property {Columns} columns
+ *
+ * @typedef {object} Drive  put together by drive/data.js
+ * @property {string|null} uri
+ * @property {number} count
+ * @property {number[]} t_s
+ * @property {Series|null} now
+ * @property {Series|null} base  null when there is nothing to compare
+ * @property {DriveEvent[]} events
+ * @property {Comparison|null} comparison
  */
 export {};
