@@ -258,6 +258,18 @@ class TimeParams(Section):
     )
 
 
+class SyncParams(Section):
+    """How live sensors are put together; recordings are together already."""
+
+    camera_offset_ms: float = _slider(0.0, -500.0, 500.0, 1.0, "ms", "Added to the camera's times: negative, it lags")
+    ego_offset_ms: float = _slider(0.0, -500.0, 500.0, 1.0, "ms", "Added to the times of speed and yaw rate")
+    gnss_offset_ms: float = _slider(0.0, -500.0, 500.0, 1.0, "ms", "Added to the times of GNSS fixes")
+    max_skew_ms: float = _slider(60.0, 5.0, 200.0, 1.0, "ms", "A picture farther than this from the sweep is left out")
+    wait_ms: float = _slider(
+        25.0, 0.0, 100.0, 1.0, "ms", "A sweep waits this long at most for a picture taken after it"
+    )
+
+
 class Params(Section):
     """All parameters of the line, by stage."""
 
@@ -277,6 +289,7 @@ class Params(Section):
     acc: AccParams = AccParams()
     aeb: AebParams = AebParams()
     time: TimeParams = TimeParams()
+    sync: SyncParams = SyncParams()
 
 
 PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {

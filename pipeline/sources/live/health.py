@@ -1,0 +1,74 @@
+"""How a live sensor does: rate, age, jitter and loss, from what arrived and nothing else."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Literal
+
+import numpy as np
+
+from pipeline.types import StreamHealth
+
+SILENT_NS = 1_000_000_000
+"""Nothing for this long: the sensor is silent."""
+_STALE_NS = 250_000_000
+_WINDOW_NS = 3_000_000_000
+_FEWEST = 3
+_KEPT = 1024
+
+Sensor = Literal["lidar", "camera", "gnss", "ego"]
+
+
+class StreamStats:
+    """Counts one sensor's messages. Times are of the host's timeline. note: what its reader has to say (why a device
+    cannot be opened, where its times come from)."""
+
+    def __init__(self, sensor: Sensor) -> None:
+        self.sensor: Sensor = sensor
+        self.note = ""
+        self.lost = 0
+        self.refused = 0
+        self._arrived: deque[int] = deque(maxlen=_KEPT)
+        self._newest_ns: int | None = None
+
+    def arrived(self, now_ns: int, t_ns: int) -> None:
+        """A message came now, measured at ``t_ns``."""
+        self._arrived.append(now_ns)
+        self._newest_ns = t_ns
+
+    def since_ns(self, now_ns: int) -> int | None:
+        """How long ago the last message came; null before the first."""
+        return now_ns - self._arrived[-1] if self._arrived else None
+
+    def period_ns(self) -> int | None:
+        """Middle of the last gaps between messages; null until enough came."""
+        times = np.array(self._arrived)[-16:]
+        return int(np.median(np.diff(times))) if len(times) >= _FEWEST else None
+
+    def health(self, now_ns: int) -> StreamHealth:
+        """As of now. Rate and jitter are over the last three seconds and null while fewer than three messages came in
+        them; jitter is the standard deviation of the gaps between arrivals."""
+        times = np.array([t for t in self._arrived if now_ns - t <= _WINDOW_NS], dtype=np.int64)
+        gaps_ms = np.diff(times) / 1e6
+        enough = len(times) >= _FEWEST and gaps_ms.sum() > 0
+        return StreamHealth(
+            self.sensor,
+            self._state(now_ns),
+            rate_hz=len(gaps_ms) / (gaps_ms.sum() / 1e3) if enough else None,
+            age_ms=(now_ns - self._newest_ns) / 1e6 if self._newest_ns is not None else None,
+            jitter_ms=float(gaps_ms.std()) if enough else None,
+            lost=self.lost,
+            note=self._said(),
+        )
+
+    def _state(self, now_ns: int) -> Literal["ok", "stale", "silent", "absent"]:
+        since = self.since_ns(now_ns)
+        if since is None:
+            return "absent"
+        if since >= SILENT_NS:
+            return "silent"
+        return "stale" if since >= max(_STALE_NS, 3 * (self.period_ns() or 0)) else "ok"
+
+    def _said(self) -> str:
+        refused = f"{self.refused} messages refused" if self.refused else ""
+        return "; ".join(text for text in (self.note, refused) if text)

@@ -1,0 +1,175 @@
+"""Which messages belong together: a tick is a LiDAR sweep with the picture and own motion nearest to it in time.
+
+Without LiDAR the camera ticks, without camera the LiDAR goes on. Nothing is queued: a tick that nobody took is replaced
+by the next. No thread and no clock in here; whoever calls says what time it is, on the host's timeline.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from pipeline.params import SyncParams
+from pipeline.types import EgoState, GnssFix, Sweep
+
+T = TypeVar("T")
+P = TypeVar("P")
+
+_PAST_NS, _FUTURE_NS = 2_000_000_000, 200_000_000
+"""A message stamped outside these bounds around now is of a clock that was set, or damaged."""
+_PATIENCE_NS, _LONGEST_PATIENCE_NS = 250_000_000, 1_000_000_000
+"""The LiDAR is waited for three of its periods, within these bounds, before the camera ticks instead."""
+_KEPT = 64
+_OWN_MOTION_WITHIN_NS = 500_000_000
+
+
+@dataclass(frozen=True)
+class Stamped(Generic[T]):
+    """What a sensor gave, when it measured it and when it arrived."""
+
+    t_ns: int
+    value: T
+    arrived_ns: int
+
+
+class Stream(Generic[T]):
+    """What one sensor gave lately, in order of time. taken: messages kept, of them ``late`` ones that were overtaken.
+    duplicates, implausible: messages refused, by reason."""
+
+    def __init__(self) -> None:
+        self._kept: list[Stamped[T]] = []
+        self.taken = self.late = self.duplicates = self.implausible = 0
+
+    def add(self, t_ns: int, value: T, now_ns: int) -> bool:
+        """Take a message; false when it was there already or its time cannot be. One that was overtaken on the way is
+        put where it belongs."""
+        if not now_ns - _PAST_NS <= t_ns <= now_ns + _FUTURE_NS:
+            self.implausible += 1
+            return False
+        place = bisect_left(self._kept, t_ns, key=lambda item: item.t_ns)
+        if place < len(self._kept) and self._kept[place].t_ns == t_ns:
+            self.duplicates += 1
+            return False
+        self.taken += 1
+        self.late += place < len(self._kept)
+        self._kept.insert(place, Stamped(t_ns, value, now_ns))
+        del self._kept[:-_KEPT]
+        while self._kept and self._kept[0].t_ns < now_ns - _PAST_NS:
+            del self._kept[0]
+        return True
+
+    def newest(self) -> Stamped[T] | None:
+        return self._kept[-1] if self._kept else None
+
+    def nearest(self, t_ns: int) -> Stamped[T] | None:
+        """The message whose time is nearest; of two as near the later."""
+        place = bisect_left(self._kept, t_ns, key=lambda item: item.t_ns)
+        around = self._kept[max(0, place - 1) : place + 1]
+        return min(reversed(around), key=lambda item: abs(item.t_ns - t_ns), default=None)
+
+
+@dataclass(frozen=True)
+class Together(Generic[P]):
+    """The messages of one tick. skew_ns: picture minus sweep. replaced: ticks before it that nobody took in time.
+    arrived_ns: when the message that ticks was complete. notes: what is missing and why."""
+
+    t_ns: int
+    arrived_ns: int
+    sweep: Stamped[Sweep] | None
+    picture: Stamped[P] | None
+    skew_ns: int | None
+    ego: EgoState | None
+    gnss: GnssFix | None
+    replaced: int
+    notes: tuple[str, ...]
+
+
+class Synchroniser(Generic[P]):
+    """``P`` is what a picture is here: anything. A sensor that is not configured is simply never added."""
+
+    def __init__(self) -> None:
+        self.sweeps: Stream[Sweep] = Stream()
+        self.pictures: Stream[P] = Stream()
+        self.egos: Stream[EgoState] = Stream()
+        self.fixes: Stream[GnssFix] = Stream()
+        self._ticked_ns: int | None = None
+        self._taken = (0, 0)
+
+    def tick(self, now_ns: int, params: SyncParams) -> Together[P] | None:
+        """The newest tick not given yet; null when there is none, or its picture is still on the way."""
+        sweep = self._newer(self.sweeps.newest())
+        if sweep is not None:
+            if self._picture_is_coming(sweep, now_ns, params):
+                return None
+            return self._together(sweep, self._picture_near(sweep.t_ns, params), params)
+        if self.lidar_is_silent(now_ns):
+            picture = self._shifted(self.pictures.newest(), params)
+            if self._newer(picture) is not None:
+                return self._together(None, picture, params)
+        return None
+
+    def lidar_is_silent(self, now_ns: int) -> bool:
+        """No sweep for three of its periods, or never one."""
+        last = self.sweeps.newest()
+        if last is None:
+            return True
+        before = self.sweeps.nearest(last.t_ns - 1)
+        period_ns = last.t_ns - before.t_ns if before is not None else 0
+        return now_ns - last.arrived_ns > min(max(3 * period_ns, _PATIENCE_NS), _LONGEST_PATIENCE_NS)
+
+    def _newer(self, item: Stamped[T] | None) -> Stamped[T] | None:
+        """The message if it is later than the last tick: time never runs back."""
+        is_new = item is not None and (self._ticked_ns is None or item.t_ns > self._ticked_ns)
+        return item if is_new else None
+
+    def _picture_is_coming(self, sweep: Stamped[Sweep], now_ns: int, params: SyncParams) -> bool:
+        """The camera delivers, and none of its pictures is from after the sweep yet; worth a short wait."""
+        newest = self._shifted(self.pictures.newest(), params)
+        if newest is None or newest.t_ns >= sweep.t_ns or now_ns - newest.arrived_ns > _PATIENCE_NS:
+            return False
+        return now_ns - sweep.arrived_ns < params.wait_ms * 1e6
+
+    def _picture_near(self, t_ns: int, params: SyncParams) -> Stamped[P] | None:
+        offset_ns = round(params.camera_offset_ms * 1e6)
+        return self._shifted(self.pictures.nearest(t_ns - offset_ns), params)
+
+    def _shifted(self, picture: Stamped[P] | None, params: SyncParams) -> Stamped[P] | None:
+        """The picture with the camera's offset added to its time."""
+        if picture is None:
+            return None
+        return Stamped(picture.t_ns + round(params.camera_offset_ms * 1e6), picture.value, picture.arrived_ns)
+
+    def _together(self, sweep: Stamped[Sweep] | None, picture: Stamped[P] | None, params: SyncParams) -> Together[P]:
+        leader: Stamped[Sweep] | Stamped[P] | None = sweep or picture
+        assert leader is not None
+        self._ticked_ns = t_ns = leader.t_ns
+        notes = []
+        skew_ns = picture.t_ns - t_ns if picture is not None and sweep is not None else None
+        if picture is not None and skew_ns is not None and abs(skew_ns) > params.max_skew_ms * 1e6:
+            notes.append(f"no picture within {params.max_skew_ms:g} ms: the nearest is {skew_ns / 1e6:+.0f} ms off")
+            picture = skew_ns = None
+        return Together(
+            t_ns,
+            leader.arrived_ns,
+            sweep,
+            picture,
+            skew_ns,
+            ego=_own_motion_at(self.egos, t_ns, params.ego_offset_ms),
+            gnss=_own_motion_at(self.fixes, t_ns, params.gnss_offset_ms),
+            replaced=self._count_replaced(leader_is_sweep=sweep is not None),
+            notes=tuple(notes),
+        )
+
+    def _count_replaced(self, leader_is_sweep: bool) -> int:
+        """How many of what ticks came since the last tick and were not taken in time. Remembers where it counted."""
+        sweeps, pictures = self._taken
+        self._taken = (self.sweeps.taken, self.pictures.taken)
+        return max(0, self.sweeps.taken - sweeps - 1 if leader_is_sweep else self.pictures.taken - pictures - 1)
+
+
+def _own_motion_at(stream: Stream[T], t_ns: int, offset_ms: float) -> T | None:
+    """What a speedometer or receiver said nearest to a moment; null when that is over half a second away."""
+    at_ns = t_ns - round(offset_ms * 1e6)
+    item = stream.nearest(at_ns)
+    return item.value if item is not None and abs(item.t_ns - at_ns) <= _OWN_MOTION_WITHIN_NS else None
