@@ -1,0 +1,21 @@
+"""VLP-16 packets as a Velodyne sends them over UDP: guarded, put in order, cut into sweeps and decoded."""
+
+from __future__ import annotations
+
+from pipeline.sources.velodyne.clock import SensorClock
+from pipeline.sources.velodyne.decoder import DecoderCounts, Vlp16Decoder
+from pipeline.sources.velodyne.packet import PACKET_BYTES, BadPacket, Packet, read_packet
+from pipeline.sources.velodyne.position import POSITION_BYTES, Position, read_position
+
+__all__ = [
+    "PACKET_BYTES",
+    "POSITION_BYTES",
+    "BadPacket",
+    "DecoderCounts",
+    "Packet",
+    "Position",
+    "SensorClock",
+    "Vlp16Decoder",
+    "read_packet",
+    "read_position",
+]

@@ -1,0 +1,226 @@
+"""VLP-16 packets → sweeps, packet by packet: each is checked, put in its place, and a whole rotation is decoded at once
+by velodyne-decoder.
+
+A sweep is cut behind the car, so that what is ahead is never in two, and its tick is the moment the head looks straight
+ahead. Where a packet belongs follows from its time and its azimuth together: the two must agree with the packets before
+it, so one spoiled packet cannot cut a sweep short or move its time.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from operator import attrgetter
+from typing import NamedTuple
+
+import numpy as np
+from velodyne_decoder import Config, Model, PacketVector, ScanDecoder, VelodynePacket
+
+from pipeline.sources.velodyne.clock import SensorClock
+from pipeline.sources.velodyne.packet import HOUR_US, ROTATION_CDEG, BadPacket, Packet, read_packet
+from pipeline.sources.velodyne.position import Position, read_position
+from pipeline.types import F32, F64, Sweep
+
+CHANNELS = 16
+MIN_RANGE_M, MAX_RANGE_M = 0.1, 200.0
+_CONTINUES_US = 100_000  # packets further apart do not tell how often the head went round
+_PAUSE_AGREES_US = 50_000
+_AZIMUTH_TOLERANCE_CDEG, _AZIMUTH_TOLERANCE_SHARE = 300.0, 0.02
+_WHOLE_SHARE = 0.9
+_X, _Y, _Z, _INTENSITY, _TIME, _RING = 0, 1, 2, 3, 4, 6
+
+
+@dataclass
+class DecoderCounts:
+    """What came so far. refused: packets by reason. models: other Velodynes that sent packets. lost: packets that the
+    time between their neighbours says are missing. sweeps: given. partial: rotations seen in part only (the first, the
+    last, one cut by a pause), not given."""
+
+    packets: int = 0
+    refused: Counter[str] = field(default_factory=Counter)
+    models: Counter[str] = field(default_factory=Counter)
+    lost: int = 0
+    sweeps: int = 0
+    partial: int = 0
+
+    def about_refused(self) -> str:
+        """``3 packets refused: 2 all zero, 1 not 1206 bytes``; empty when none was."""
+        if not self.refused:
+            return ""
+        reasons = ", ".join(f"{count} {reason}" for reason, count in sorted(self.refused.items()))
+        return f"{sum(self.refused.values())} packets refused: {reasons}"
+
+
+class _Placed(NamedTuple):
+    """A packet on the clock that counts on over the hours, and on the circle that begins behind the car."""
+
+    time_us: int
+    phase_cdeg: float
+    packet: Packet
+    t_host_ns: int | None
+
+
+_TIME_OF = attrgetter("time_us")
+
+
+class Vlp16Decoder:
+    """One sensor's stream. T_ego_lidar: (4, 4), where the sensor sits; by default the ego frame is the sensor's own."""
+
+    def __init__(self, T_ego_lidar: F64 | None = None, clock: SensorClock | None = None) -> None:
+        T = np.eye(4) if T_ego_lidar is None else np.asarray(T_ego_lidar, dtype=np.float64)
+        self.counts = DecoderCounts()
+        self.clock = clock or SensorClock()
+        self._R, self._origin = T[:3, :3].astype(np.float32), T[:3, 3].astype(np.float32)
+        self._is_moved = not np.array_equal(T, np.eye(4))
+        ahead = T[:3, :3].T @ np.array([1.0, 0.0, 0.0])  # ego forward in the sensor's axes; azimuth runs clockwise
+        ahead_cdeg = -np.degrees(np.arctan2(ahead[1], ahead[0])) * 100.0
+        self._behind_cdeg = float((ahead_cdeg + ROTATION_CDEG / 2) % ROTATION_CDEG)
+        self._library = ScanDecoder(Config(model=Model.VLP16, min_range=MIN_RANGE_M, max_range=MAX_RANGE_M))
+        self._sweep: list[_Placed] = []
+        self._times: set[int] = set()
+        self._last: _Placed | None = None
+        self._suspect: _Placed | None = None
+
+    def push(self, packet: bytes, t_host_ns: int | None = None) -> Sweep | None:
+        """Take one data packet; the sweep that it completes, if it is the first of the next rotation.
+
+        t_host_ns: when it was received (or, in a file, captured); null where nobody knows. Never raises: what is no
+        packet of a VLP-16 is refused and counted by reason.
+        """
+        self.counts.packets += 1
+        try:
+            placed = self._place(read_packet(packet), t_host_ns)
+            turned = self._accept(placed)
+        except BadPacket as bad:
+            self.counts.refused[bad.reason] += 1
+            if bad.model is not None:
+                self.counts.models[bad.model] += 1
+            return None
+        if t_host_ns is not None:
+            self.clock.observe(placed.time_us, t_host_ns)
+        done = self._finish() if turned else None
+        self._sweep.append(placed)
+        self._times.add(placed.time_us)
+        return done
+
+    def push_position(self, packet: bytes) -> Position | None:
+        """Take one position packet: from here on the sensor's time is UTC, or it is not. Null when it is none."""
+        try:
+            position = read_position(packet)
+        except BadPacket as bad:
+            self.counts.refused[f"position: {bad.reason}"] += 1
+            return None
+        self.clock.follow_gps(position.locked)
+        return position
+
+    def flush(self) -> Sweep | None:
+        """The sweep under way at the end of a stream, if it is whole. The next packet starts anew."""
+        done = self._finish()
+        self._last = self._suspect = None
+        return done
+
+    def _place(self, packet: Packet, t_host_ns: int | None) -> _Placed:
+        time_us = packet.time_us
+        if self._last is not None:
+            time_us += round((self._last.time_us - time_us) / HOUR_US) * HOUR_US
+        return _Placed(time_us, (packet.azimuth_cdeg - self._behind_cdeg) % ROTATION_CDEG, packet, t_host_ns)
+
+    def _accept(self, placed: _Placed) -> bool:
+        """Whether the packet begins a new sweep. BadPacket when it does not fit to those before it.
+
+        What does not fit is not believed at once: it becomes the beginning only when the next packet follows on it.
+        """
+        last, suspect = self._last, self._suspect
+        self._suspect = None
+        if last is None:
+            self._last = placed
+            return False
+        ahead_us = placed.time_us - last.time_us
+        if placed.time_us in self._times:
+            raise BadPacket("doubled")
+        if 0 < ahead_us <= _CONTINUES_US and (turns := _turns(last, placed)) is not None:
+            self._last = placed
+            return turns > 0
+        if -_CONTINUES_US <= ahead_us < 0 and _turns(placed, last) is not None:
+            if self._sweep and placed.time_us > self._sweep[0].time_us:
+                return False
+            raise BadPacket("late")
+        paused = ahead_us > _CONTINUES_US and _host_agrees(last, placed, ahead_us)
+        follows = suspect is not None and _follows(suspect, placed)
+        if paused or follows:
+            self._last = placed
+            return True
+        self._suspect = placed
+        raise BadPacket("time or azimuth out of order")
+
+    def _finish(self) -> Sweep | None:
+        """Decode the packets at hand, if they are a whole rotation."""
+        packets = sorted(self._sweep, key=_TIME_OF)
+        self._sweep, self._times = [], set()
+        if not packets:
+            return None
+        self.counts.lost += _missing(packets)
+        edge = (1.0 - _WHOLE_SHARE) * ROTATION_CDEG
+        if packets[0].phase_cdeg > edge or packets[-1].phase_cdeg < ROTATION_CDEG - edge:
+            self.counts.partial += 1
+            return None
+        sweep = self._decode(packets)
+        self.counts.sweeps += 1 if sweep is not None else 0
+        return sweep
+
+    def _decode(self, packets: list[_Placed]) -> Sweep | None:
+        """The sweep of packets in order of time; null when it holds no return."""
+        base_us = packets[0].time_us // HOUR_US * HOUR_US
+        vector = PacketVector(
+            [VelodynePacket((placed.time_us - base_us) * 1e-6, list(placed.packet.data)) for placed in packets]
+        )
+        _, cloud = self._library.decode(vector)
+        cloud = cloud[np.isfinite(cloud[:, _X])] if not np.isfinite(cloud[:, _X]).all() else cloud
+        if not len(cloud):
+            return None
+        ahead = min(packets, key=lambda placed: abs(placed.phase_cdeg - ROTATION_CDEG / 2))
+        ahead_us = ahead.time_us + (ROTATION_CDEG / 2 - ahead.phase_cdeg) / ahead.packet.rate_cdeg_us
+        time_s = cloud[:, _TIME] + np.float32((packets[-1].time_us - ahead_us) * 1e-6)
+        return Sweep(
+            self.clock.to_ns(ahead_us),
+            self._to_ego(cloud),
+            cloud[:, _RING].astype(np.uint8),
+            CHANNELS,
+            time_s=time_s.astype(np.float32, copy=False),
+        )
+
+    def _to_ego(self, cloud: F32) -> F32:
+        points = np.ascontiguousarray(cloud[:, : _INTENSITY + 1])
+        if self._is_moved:
+            points[:, :3] = points[:, :3] @ self._R.T + self._origin
+        return points
+
+
+def _turns(earlier: _Placed, later: _Placed) -> int | None:
+    """How often the head passed behind the car between two packets; null when their azimuths disagree with their
+    times."""
+    advance = (later.time_us - earlier.time_us) * later.packet.rate_cdeg_us
+    expected = earlier.phase_cdeg + advance
+    turns = round((expected - later.phase_cdeg) / ROTATION_CDEG)
+    off = abs(expected - later.phase_cdeg - turns * ROTATION_CDEG)
+    return turns if off <= _AZIMUTH_TOLERANCE_CDEG + _AZIMUTH_TOLERANCE_SHARE * advance else None
+
+
+def _follows(suspect: _Placed, placed: _Placed) -> bool:
+    """Whether two packets that fit to nothing else fit to each other."""
+    ahead_us = (placed.time_us - suspect.time_us + HOUR_US // 2) % HOUR_US - HOUR_US // 2
+    moved = suspect._replace(time_us=placed.time_us - ahead_us)
+    return 0 < ahead_us <= _CONTINUES_US and _turns(moved, placed) is not None
+
+
+def _host_agrees(last: _Placed, placed: _Placed, ahead_us: int) -> bool:
+    if last.t_host_ns is None or placed.t_host_ns is None:
+        return False
+    return abs((placed.t_host_ns - last.t_host_ns) // 1000 - ahead_us) < _PAUSE_AGREES_US
+
+
+def _missing(packets: list[_Placed]) -> int:
+    """Packets that must have been sent between those at hand."""
+    span_us = packets[0].packet.span_us
+    gaps = np.diff([placed.time_us for placed in packets]) / span_us
+    return int(np.maximum(np.rint(gaps) - 1, 0).sum())
