@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,8 +11,7 @@ import numpy.typing as npt
 F64 = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Cuboid:
+class Cuboid(NamedTuple):
     """A box standing upright on the ground. center: x y z of its middle; size: length width height along its own
     axes; yaw_rad: turn of its length axis from ego x, positive to the left."""
 

@@ -41,8 +41,7 @@ def fit_obstacles(points: F32, labels: I32, ground: Ground, params: BoxParams) -
     count = int(labels.max(initial=-1)) + 1
     if count == 0:
         return ()
-    step_rad = np.radians(params.yaw_step_deg) if params.method == "l_shape" else np.inf
-    boxes, sizes = _boxes(points, labels, count, step_rad)
+    boxes, sizes = _boxes(points, labels, count, turns(params))
     floor = ground.height(boxes[:, :2])
     bottom = np.where(np.abs(boxes[:, 5] - floor) <= params.ground_gap_m, np.minimum(floor, boxes[:, 5]), boxes[:, 5])
     area = np.maximum(boxes[:, 2] * boxes[:, 3], MIN_AREA_M2)
@@ -62,9 +61,15 @@ def fit_obstacles(points: F32, labels: I32, ground: Ground, params: BoxParams) -
     )
 
 
+def turns(params: BoxParams) -> F64:
+    """(K,) the turns in [0, π/2) that a box may have."""
+    step_rad = np.radians(params.yaw_step_deg)
+    return np.arange(np.ceil(np.pi / 2 / step_rad - 1e-9)) * step_rad if params.method == "l_shape" else np.zeros(1)
+
+
 @numba.njit(cache=True, nogil=True)
-def _boxes(points: F32, labels: I32, count: int, step_rad: float) -> tuple[F64, I32]:
-    """boxes (count, 13) float64: center x, y, length, width, yaw, lowest z, highest z, closest point x, y, z, spread
+def _boxes(points: F32, labels: I32, count: int, turns: F64) -> tuple[F64, I32]:
+    """turns: (K,) as ``turns`` gives them. boxes (count, 13) float64: center x, y, length, width, yaw, lowest z, highest z, closest point x, y, z, spread
     x, y, z. sizes (count,) int32."""
     size = np.zeros(count, dtype=np.int32)
     for i in range(len(labels)):
@@ -81,9 +86,10 @@ def _boxes(points: F32, labels: I32, count: int, step_rad: float) -> tuple[F64, 
                 xyz[a, place[labels[i]]] = points[i, a]
             place[labels[i]] += 1
     boxes = np.empty((count, 13))
+    cos, sin = np.cos(turns).astype(np.float32), np.sin(turns).astype(np.float32)
     for c in range(count):
         x, y, z = xyz[0, start[c] : start[c + 1]], xyz[1, start[c] : start[c + 1]], xyz[2, start[c] : start[c + 1]]
-        _rectangle(x, y, _best_turn(x, y, step_rad), boxes[c])
+        _rectangle(x, y, turns[_best_turn(x, y, cos, sin)], boxes[c])
         nearest = np.argmin(x * x + y * y)
         boxes[c, 5], boxes[c, 6] = z.min(), z.max()
         boxes[c, 7], boxes[c, 8], boxes[c, 9] = x[nearest], y[nearest], z[nearest]
@@ -92,41 +98,45 @@ def _boxes(points: F32, labels: I32, count: int, step_rad: float) -> tuple[F64, 
 
 
 @numba.njit(cache=True, nogil=True)
-def _best_turn(x: F64, y: F64, step_rad: float) -> float:
-    """The turn in [0, π/2) of the best closeness; 0 for an infinite step."""
-    if not step_rad < np.pi / 2 or len(x) < 3:
-        return 0.0
+def _best_turn(x: F64, y: F64, cos: F32, sin: F32) -> int:
+    """Place of the turn of the best closeness, the first of several."""
+    if len(cos) < 2 or len(x) < 3:
+        return 0
     stride = (len(x) + SEARCH_POINTS - 1) // SEARCH_POINTS
     near_x, near_y = (x[::stride] - x[0]).astype(np.float32), (y[::stride] - y[0]).astype(np.float32)
-    u, v = np.empty_like(near_x), np.empty_like(near_y)
-    best, best_score = 0.0, -1.0
-    for k in range(int(np.ceil(np.pi / 2 / step_rad - 1e-9))):
-        score = _closeness(near_x, near_y, k * step_rad, u, v)
+    best, best_score = 0, np.float32(-1.0)
+    for k in range(len(cos)):
+        score = _closeness(near_x, near_y, cos[k], sin[k])
         if score > best_score:
-            best, best_score = k * step_rad, score
+            best, best_score = k, score
     return best
 
 
-@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz", "nnan"})
-def _closeness(x: F32, y: F32, turn: float, u: F32, v: F32) -> float:
+# Neither loop below stores into an array or can raise: then the compiler vectorises them.
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "nnan"})
+def _closeness(x: F32, y: F32, cos: float, sin: float) -> float:
     """Σ 1/max(d, d0), d the distance of a point to the nearer of two sides of the box with this turn: of each pair of
-    parallel sides the one that the points gather at (Zhang 2017, Algorithm 4). ``u``, ``v``: room to work in."""
-    cos, sin = np.float32(np.cos(turn)), np.float32(np.sin(turn))
-    u_low = u_high = x[0] * cos + y[0] * sin
-    v_low = v_high = y[0] * cos - x[0] * sin
-    u_sum = v_sum = np.float32(0.0)
-    for i in range(len(x)):
-        u[i], v[i] = x[i] * cos + y[i] * sin, y[i] * cos - x[i] * sin
-        u_low, u_high = min(u_low, u[i]), max(u_high, u[i])
-        v_low, v_high = min(v_low, v[i]), max(v_high, v[i])
-        u_sum += u[i]
-        v_sum += v[i]
-    u_side = u_high if 2 * u_sum > len(x) * (u_low + u_high) else u_low
-    v_side = v_high if 2 * v_sum > len(x) * (v_low + v_high) else v_low
+    parallel sides the one that the points gather at (Zhang 2017, Algorithm 4)."""
+    u_side, v_side = _side(x, y, cos, sin), _side(y, x, cos, -sin)
     score, nearest = np.float32(0.0), np.float32(NEAREST_M)
     for i in range(len(x)):
-        score += np.float32(1.0) / max(min(abs(u[i] - u_side), abs(v[i] - v_side)), nearest)
-    return float(score)
+        u, v = x[i] * cos + y[i] * sin - u_side, y[i] * cos - x[i] * sin - v_side
+        score += np.float32(1.0) / max(min(abs(u), abs(v)), nearest)
+    return score
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "nnan"})
+def _side(x: F32, y: F32, cos: float, sin: float) -> float:
+    """The end of x·cos + y·sin that the points gather at."""
+    low = high = x[0] * cos + y[0] * sin
+    total = np.float32(0.0)
+    for i in range(len(x)):
+        u = x[i] * cos + y[i] * sin
+        low, high = min(low, u), max(high, u)
+        total += u
+    return high if 2 * total > len(x) * (low + high) else low
 
 
 @numba.njit(cache=True, nogil=True)

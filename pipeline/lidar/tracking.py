@@ -3,7 +3,7 @@
 Predict, associate one-to-one under gates (place, number of points, density, spread), then add, keep or delete tracks.
 Time is the sensors' own: nothing here assumes a rate.
 
-What is followed is the middle of a box's rear: the side that faces back along ego x (``reference_points``). The centre
+What is followed is the middle of a box's rear: the side that faces back along ego x (``looks``). The centre
 of a cluster moves by metres when a vehicle's flank goes in or out of view, the nearest point jumps from one corner to
 the other; the rear of a vehicle ahead stays in both x and y. For oncoming traffic the same side is its front.
 
@@ -13,7 +13,8 @@ The paper computes velocity "from the trajectory": ``trajectory`` fits a line to
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -21,8 +22,7 @@ from scipy.optimize import linear_sum_assignment
 
 from pipeline import kalman
 from pipeline.params import LidarTrackingParams
-from pipeline.records import evolve
-from pipeline.types import F64, LidarTrack, Obstacle, Point2
+from pipeline.types import F64, I64, LidarTrack, Obstacle, Point3
 
 NEVER = 1e6
 """Cost of a pair that a gate forbids: more than all allowed ones together."""
@@ -30,25 +30,29 @@ MIN_GATE_POINTS = 10
 """Counts and densities below this many points are noise: one ring more or less doubles them."""
 
 
+class Looks(NamedTuple):
+    """Of many obstacles what association goes by. place: (M, 2) the reference points. shape: (M, 5) points, density,
+    spread x, y, z, as the gates compare them."""
+
+    place: F64
+    shape: F64
+
+
 _NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
 
 
 @dataclass(frozen=True)
-class Tracked:
-    """One track and its past. ``history``: (t_s, x, y) of the last sightings' reference points, oldest first."""
-
-    track: LidarTrack
-    history: tuple[tuple[float, float, float], ...]
-    missed_s: float = 0.0
-
-
-@dataclass(frozen=True)
 class LidarTrackerState:
-    """All that one frame leaves to the next. ``filters``: one state a track, in the order of ``tracks``, mean (T, 4),
-    cov (T, 4, 4). ``clock_s`` runs from the first frame."""
+    """All that one frame leaves to the next; the arrays have one row a track, in the order of ``tracks``.
 
-    tracks: tuple[Tracked, ...] = ()
+    filters: mean (T, 4), cov (T, 4, 4). shape: (T, 5) of the last sighting, as in ``Looks``. history: (T, H, 3)
+    ``t_s x y`` of the last sightings' reference points, newest last, NaN before the first. ``clock_s`` runs from the
+    first frame."""
+
+    tracks: tuple[LidarTrack, ...] = ()
     filters: kalman.CvState = _NO_FILTERS
+    shape: F64 = field(default_factory=lambda: np.zeros((0, 5)))
+    history: F64 = field(default_factory=lambda: np.zeros((0, 1, 3)))
     next_id: int = 1
     clock_s: float = 0.0
 
@@ -67,72 +71,83 @@ def track(
     if dt_s is None:
         state, dt_s = LidarTrackerState(next_id=state.next_id, clock_s=state.clock_s), 0.0
     clock_s = state.clock_s + dt_s
+    sweep, has_sweep = obstacles or (), obstacles is not None
+    seen = looks(sweep)
     filters = kalman.predict(state.filters, dt_s, params.accel_sigma_mps2)
-    places = reference_points(obstacles or ())
-    partner = associate(state.tracks, filters, obstacles or (), places, dt_s, params)
-    filters = _correct(filters, places, partner, params)
+    partner = associate(state, filters, seen, dt_s, params)
+    filters = _correct(filters, seen.place, partner, params)
+    history = _recorded(state.history, partner, seen.place, clock_s, params.trajectory_frames)
+    velocity = filters.mean[:, 2:] if params.filter == "kalman" else slopes(history)
 
     tracks, rows = [], []
-    for i, tracked in enumerate(state.tracks):
-        seen = partner.get(i)
-        if obstacles is not None and seen is not None:
-            after = _sight(tracked, filters.mean[i], obstacles[seen], places[seen], clock_s, params)
+    for i, (last, j, speed) in enumerate(zip(state.tracks, partner.tolist(), velocity.tolist(), strict=True)):
+        if j >= 0:
+            known = (speed[0], speed[1]) if speed[0] == speed[0] else None
+            tracks.append(LidarTrack(last.id, sweep[j], known, last.hits + 1, 0, False))
+        elif _lives_on(last, last.unseen_s + dt_s, has_sweep, params):
+            tracks.append(_carried(last, dt_s))
         else:
-            after = _carry(tracked, dt_s)
-            if _ended(after, obstacles is not None, params):
-                continue
-        tracks.append(after)
+            continue
         rows.append(i)
-    taken = set(partner.values())
-    fresh = [j for j in range(len(places)) if j not in taken]
-    tracks += [_begin(state.next_id + k, (obstacles or ())[j], places[j], clock_s) for k, j in enumerate(fresh)]
-    begun = kalman.start(places[fresh], _noise(params), params.start_speed_mps)
-    filters = kalman.CvState(
-        np.concatenate([filters.mean[rows], begun.mean]), np.concatenate([filters.cov[rows], begun.cov])
+    fresh = np.setdiff1d(np.arange(len(sweep)), partner)
+    tracks += [LidarTrack(state.next_id + k, sweep[j], None, 1, 0, False) for k, j in enumerate(fresh)]
+    shape = state.shape.copy()
+    shape[partner >= 0] = seen.shape[partner[partner >= 0]]
+    begun = kalman.start(seen.place[fresh], _noise(params), params.start_speed_mps)
+    next_state = LidarTrackerState(
+        tracks=tuple(tracks),
+        filters=kalman.CvState(
+            np.concatenate([filters.mean[rows], begun.mean]), np.concatenate([filters.cov[rows], begun.cov])
+        ),
+        shape=np.concatenate([shape[rows], seen.shape[fresh]]),
+        history=np.concatenate([history[rows], _first(seen.place[fresh], clock_s, history.shape[1])]),
+        next_id=state.next_id + len(fresh),
+        clock_s=clock_s,
     )
-    next_state = LidarTrackerState(tuple(tracks), filters, state.next_id + len(fresh), clock_s)
-    return next_state, tuple(t.track for t in tracks)
+    return next_state, next_state.tracks
 
 
-def reference_points(obstacles: tuple[Obstacle, ...]) -> F64:
-    """(M, 2) the middle of each footprint's rear: of its two axes the one closer to ego x, at the end of smaller x."""
-    rows = [(*o.cuboid.center[:2], *o.cuboid.size[:2], o.cuboid.yaw_rad) for o in obstacles]
-    x, y, length, width, yaw = np.array(rows, dtype=np.float64).reshape(-1, 5).T
+def looks(obstacles: tuple[Obstacle, ...]) -> Looks:
+    """Place and shape of each. The reference point is the middle of the footprint's rear: of its two axes the one
+    closer to ego x, at the end of smaller x."""
+    rows = [(*o.cuboid.center, *o.cuboid.size, o.cuboid.yaw_rad, o.points, o.density, *o.spread) for o in obstacles]
+    table = np.array(rows, dtype=np.float64).reshape(-1, 12)
+    x, y, _, length, width, _, yaw, points, density = table.T[:9]
     across = np.abs(np.cos(yaw)) < np.sqrt(0.5)
     heading = np.where(across, yaw + np.pi / 2, yaw)
     reach = np.where(across, width, length) / 2 * np.where(np.cos(heading) >= 0.0, 1.0, -1.0)
-    return np.column_stack([x - reach * np.cos(heading), y - reach * np.sin(heading)])
+    place = np.column_stack([x - reach * np.cos(heading), y - reach * np.sin(heading)])
+    shape = table[:, 7:].copy()
+    shape[:, 0] = np.maximum(points, MIN_GATE_POINTS)
+    shape[:, 1] = density * np.maximum(1.0, MIN_GATE_POINTS / np.maximum(points, 1.0))
+    return Looks(place, shape)
 
 
 def associate(
-    tracks: tuple[Tracked, ...],
-    filters: kalman.CvState,
-    obstacles: tuple[Obstacle, ...],
-    places: F64,
-    dt_s: float,
-    params: LidarTrackingParams,
-) -> dict[int, int]:
-    """Index of a track → index of its obstacle, one-to-one, of least total distance, gated pairs only. The filters
+    state: LidarTrackerState, filters: kalman.CvState, seen: Looks, dt_s: float, params: LidarTrackingParams
+) -> I64:
+    """(T,) the obstacle of each track, −1 for none: one-to-one, of least total distance, gated pairs only. The filters
     stand at the present time already."""
-    if not tracks or not obstacles:
-        return {}
-    kalman_filter = params.filter == "kalman"
-    expected = filters.mean[:, :2] if kalman_filter else np.array([_extrapolate(t, dt_s) for t in tracks])
-    new = np.array([t.track.hits < 2 for t in tracks])
+    partner = np.full(len(state.tracks), -1)
+    if not state.tracks or not len(seen.place):
+        return partner
+    expected = filters.mean[:, :2] if params.filter == "kalman" else _extrapolated(state, dt_s)
+    new = np.array([t.hits < 2 for t in state.tracks])
     gate = params.gate_m + new * params.start_speed_mps * dt_s
-    before, now = _shape([t.track.obstacle for t in tracks]), _shape(list(obstacles))
     cost = _gated(
         expected,
-        places,
+        seen.place,
         gate,
-        before,
-        now,
+        state.shape,
+        seen.shape,
         params.max_count_ratio,
         params.max_density_ratio,
         params.max_spread_change_m,
     )
     rows, columns = linear_sum_assignment(cost)
-    return {int(i): int(j) for i, j in zip(rows, columns, strict=True) if cost[i, j] < NEVER}
+    allowed = cost[rows, columns] < NEVER
+    partner[rows[allowed]] = columns[allowed]
+    return partner
 
 
 @numba.njit(cache=True, nogil=True)
@@ -147,11 +162,14 @@ def _gated(
     max_spread_change_m: float,
 ) -> F64:
     """(n, m) distance of each obstacle from each expected place; ``NEVER`` where a gate keeps the two apart. before,
-    now: (n, 5) and (m, 5) as ``_shape`` gives them."""
+    now: (n, 5) and (m, 5) as in ``Looks.shape``."""
     cost = np.full((len(expected), len(places)), NEVER)
     for i in range(len(expected)):
         for j in range(len(places)):
-            distance = np.hypot(expected[i, 0] - places[j, 0], expected[i, 1] - places[j, 1])
+            dx, dy = expected[i, 0] - places[j, 0], expected[i, 1] - places[j, 1]
+            if abs(dx) > gate[i] or abs(dy) > gate[i]:
+                continue
+            distance = np.hypot(dx, dy)
             like = max(before[i, 0], now[j, 0]) <= max_count_ratio * min(before[i, 0], now[j, 0])
             like &= max(before[i, 1], now[j, 1]) <= max_density_ratio * min(before[i, 1], now[j, 1])
             for axis in range(2, 5):
@@ -161,31 +179,19 @@ def _gated(
     return cost
 
 
-def _shape(obstacles: list[Obstacle]) -> F64:
-    """(M, 5) points, density, spread x, y, z, as the gates compare them."""
-    rows = [
-        (max(o.points, MIN_GATE_POINTS), o.density * max(1.0, MIN_GATE_POINTS / o.points), *o.spread) for o in obstacles
-    ]
-    return np.array(rows, dtype=np.float64)
+def _extrapolated(state: LidarTrackerState, dt_s: float) -> F64:
+    """(T, 2) where the trajectories lead to now."""
+    since_s = np.array([[t.unseen_s + dt_s] for t in state.tracks])
+    velocity = np.array([t.velocity_mps or (0.0, 0.0) for t in state.tracks])
+    return np.asarray(state.history[:, -1, 1:] + velocity * since_s)
 
 
-def _extrapolate(tracked: Tracked, dt_s: float) -> Point2:
-    """Where the trajectory leads to now."""
-    vx, vy = tracked.track.velocity_mps or (0.0, 0.0)
-    _, x, y = tracked.history[-1]
-    since_s = tracked.missed_s + dt_s
-    return (x + vx * since_s, y + vy * since_s)
-
-
-def _correct(
-    filters: kalman.CvState, places: F64, partner: dict[int, int], params: LidarTrackingParams
-) -> kalman.CvState:
+def _correct(filters: kalman.CvState, place: F64, partner: I64, params: LidarTrackingParams) -> kalman.CvState:
     """The filters after their measurements; as predicted where there is none."""
-    if not partner:
+    rows = np.flatnonzero(partner >= 0)
+    if not len(rows):
         return filters
-    rows = sorted(partner)
-    z = places[[partner[i] for i in rows]]
-    after = kalman.update(kalman.CvState(filters.mean[rows], filters.cov[rows]), z, _noise(params))
+    after = kalman.update(kalman.CvState(filters.mean[rows], filters.cov[rows]), place[partner[rows]], _noise(params))
     mean, cov = filters.mean.copy(), filters.cov.copy()
     mean[rows], cov[rows] = after.mean, after.cov
     return kalman.CvState(mean, cov)
@@ -195,46 +201,56 @@ def _noise(params: LidarTrackingParams) -> F64:
     return np.eye(2) * params.position_sigma_m**2
 
 
-def _sight(
-    tracked: Tracked, mean: F64, obstacle: Obstacle, place: F64, clock_s: float, params: LidarTrackingParams
-) -> Tracked:
-    """Seen again."""
-    history = (*tracked.history, (clock_s, float(place[0]), float(place[1])))[-params.trajectory_frames :]
-    velocity = (float(mean[2]), float(mean[3])) if params.filter == "kalman" else slope(history)
-    last = tracked.track
-    seen = evolve(
-        last, obstacle=obstacle, velocity_mps=velocity, hits=last.hits + 1, missed=0, carried=False, unseen_s=0.0
+def _recorded(history: F64, partner: I64, place: F64, clock_s: float, frames: int) -> F64:
+    """(T, frames, 3) the history with this tick's sightings at its end."""
+    kept: F64 = np.full((len(history), frames, 3), np.nan)
+    common = min(frames, history.shape[1])
+    kept[:, frames - common :] = history[:, history.shape[1] - common :]
+    rows = np.flatnonzero(partner >= 0)
+    kept[rows, :-1] = kept[rows, 1:]
+    kept[rows, -1, 0] = clock_s
+    kept[rows, -1, 1:] = place[partner[rows]]
+    return kept
+
+
+def _first(place: F64, clock_s: float, frames: int) -> F64:
+    """(N, frames, 3) the histories of tracks seen once, now."""
+    history: F64 = np.full((len(place), frames, 3), np.nan)
+    history[:, -1, 0], history[:, -1, 1:] = clock_s, place
+    return history
+
+
+def slopes(history: F64) -> F64:
+    """(T, 2) velocity in m/s of the least-squares line through each (H, 3) ``t_s x y``; NaN where all are of one
+    time."""
+    known = ~np.isnan(history[:, :, :1])
+    table = np.where(known, history, 0.0)
+    mean = table.sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1)
+    t, xy = (table - mean)[:, :, :1] * known, (table - mean)[:, :, 1:]
+    spread = np.sum(t * t, axis=1)
+    return np.asarray(
+        np.divide(np.sum(t * xy, axis=1), spread, out=np.full((len(history), 2), np.nan), where=spread > 0.0)
     )
-    return evolve(tracked, track=seen, history=history, missed_s=0.0)
 
 
-def slope(history: tuple[tuple[float, float, float], ...]) -> Point2 | None:
-    """Velocity in m/s of the least-squares line through (t_s, x, y); null when all are of one time."""
-    t, x, y = np.array(history).T
-    t = t - t.mean()
-    spread = float(t @ t)
-    return (float(t @ x) / spread, float(t @ y) / spread) if spread > 0.0 else None
+def _lives_on(last: LidarTrack, unseen_s: float, has_sweep: bool, params: LidarTrackingParams) -> bool:
+    """Whether a track not seen now is carried on. One seen only once or twice does not outlive a sweep that lacks it:
+    its velocity is the difference of two noisy places, and would send a ghost across the road."""
+    too_young = has_sweep and last.hits < params.carry_hits
+    return not too_young and unseen_s <= params.max_missed_s + 1e-9
 
 
-def _carry(tracked: Tracked, dt_s: float) -> Tracked:
+def _carried(last: LidarTrack, dt_s: float) -> LidarTrack:
     """Not seen: the obstacle as it was, moved on by its velocity. It belongs to no cluster of this sweep (−1)."""
-    last, seen = tracked.track, tracked.track.obstacle
     vx, vy = last.velocity_mps or (0.0, 0.0)
-    (cx, cy, cz), (px, py, pz) = seen.cuboid.center, seen.closest_point
-    cuboid = evolve(seen.cuboid, center=(cx + vx * dt_s, cy + vy * dt_s, cz))
-    moved = evolve(seen, cluster=-1, cuboid=cuboid, closest_point=(px + vx * dt_s, py + vy * dt_s, pz))
-    unseen_s = tracked.missed_s + dt_s
-    carried = evolve(last, obstacle=moved, missed=last.missed + 1, carried=True, unseen_s=unseen_s)
-    return evolve(tracked, track=carried, missed_s=unseen_s)
+    seen = last.obstacle
+    moved = seen._replace(
+        cluster=-1,
+        cuboid=seen.cuboid._replace(center=_moved(seen.cuboid.center, vx * dt_s, vy * dt_s)),
+        closest_point=_moved(seen.closest_point, vx * dt_s, vy * dt_s),
+    )
+    return LidarTrack(last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True, last.unseen_s + dt_s)
 
 
-def _ended(tracked: Tracked, sweep_lacks_it: bool, params: LidarTrackingParams) -> bool:
-    """Whether a carried track is given up. One seen only once or twice does not outlive a sweep that lacks it: its
-    velocity is the difference of two noisy places, and would send a ghost across the road."""
-    too_young = sweep_lacks_it and tracked.track.hits < params.carry_hits
-    return too_young or tracked.missed_s > params.max_missed_s + 1e-9
-
-
-def _begin(track_id: int, obstacle: Obstacle, place: F64, clock_s: float) -> Tracked:
-    """A track for an obstacle that continues none."""
-    return Tracked(LidarTrack(track_id, obstacle, None, 1, 0, False), ((clock_s, float(place[0]), float(place[1])),))
+def _moved(point: Point3, dx: float, dy: float) -> Point3:
+    return point[0] + dx, point[1] + dy, point[2]

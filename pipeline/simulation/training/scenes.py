@@ -57,7 +57,7 @@ def moments(seed: int, count: int) -> Iterator[Moment]:
 def _turned(rng: np.random.Generator, now: world.World) -> world.World:
     """The same world with some of its cars turned any way, as crossings and turns show them."""
     actors = tuple(
-        replace(state, cuboid=replace(state.cuboid, yaw_rad=float(rng.uniform(-np.pi, np.pi))))
+        replace(state, cuboid=state.cuboid._replace(yaw_rad=float(rng.uniform(-np.pi, np.pi))))
         if state.cuboid.size[0] < _SHORT_M and rng.random() < _TURNED
         else state
         for state in now.actors

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.geometry import Cuboid
-from pipeline.lidar.tracking import LidarTrackerState, reference_points, track
+from pipeline.lidar.tracking import LidarTrackerState, looks, track
 from pipeline.params import LidarTrackingParams
 from pipeline.types import LidarTrack, Obstacle
 
@@ -96,12 +95,12 @@ GATES: dict[str, tuple[Obstacle, Obstacle, Callable[[LidarTrackingParams], Lidar
     "count": (_car(20.0), _car(20.0, points=400), lambda p: p.model_copy(update={"max_count_ratio": 20.0})),
     "density": (
         _car(20.0),
-        replace(_car(20.0), density=750.0),
+        _car(20.0)._replace(density=750.0),
         lambda p: p.model_copy(update={"max_density_ratio": 50.0}),
     ),
     "spread": (
         _car(20.0),
-        replace(_car(20.0), spread=(3.0, 0.5, 0.4)),
+        _car(20.0)._replace(spread=(3.0, 0.5, 0.4)),
         lambda p: p.model_copy(update={"max_spread_change_m": 5.0}),
     ),
 }
@@ -156,7 +155,7 @@ def test_the_filter_may_be_changed_between_two_frames() -> None:
     ids=["ahead", "crossing", "turned left", "mostly across"],
 )
 def test_what_is_followed_is_the_middle_of_the_rear(cuboid: Cuboid, expected: tuple[float, float]) -> None:
-    (found,) = reference_points((replace(_car(0.0), cuboid=cuboid),))
+    (found,) = looks((_car(0.0)._replace(cuboid=cuboid),)).place
     assert found == pytest.approx(expected)
 
 
