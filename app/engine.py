@@ -21,7 +21,7 @@ from pipeline.run import Detectors, Detects, Sensors, picture_size
 from pipeline.sources.base import Source, SourceError, is_simulated
 from pipeline.step import warm_up
 from pipeline.types import RawBoxes
-from pipeline.vision.detector import DetectorError, DetectorMissing
+from pipeline.vision.runtime import DetectorError, DetectorMissing
 
 logger = logging.getLogger("cipv.engine")
 

@@ -14,7 +14,8 @@ from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
 from pipeline.run import Sensors, detector_for
 from pipeline.sources import open_source
 from pipeline.sources.base import Source
-from pipeline.vision.detector import Detector, DetectorMissing
+from pipeline.vision.detector import Detector
+from pipeline.vision.runtime import DetectorMissing
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,19 @@ import numpy as np
 import onnx
 import onnxruntime as ort
 
-from pipeline.errors import BadInput
 from pipeline.types import F32, U8, RawBoxes
 from pipeline.vision import models
 from pipeline.vision.decode import Decoder, Size, UnknownHead, pick_decoder
 from pipeline.vision.graph import MULTIPLE, fitting_size, input_size, with_input_size
 from pipeline.vision.labels import class_names
+from pipeline.vision.runtime import (
+    DetectorError,
+    DetectorMissing,
+    find_graph,
+    open_session,
+    read_graph,
+    run_session,
+)
 
 FLOOR_SCORE = 0.05
 """Candidates scored lower are not even kept; ``detection.min_score`` cannot go below it."""
@@ -30,15 +37,6 @@ _FREE_SIZE: Size = (384, 640)
 _SIMULATED_ONLY = (
     "using the embedded detector, which knows simulated cars only; pull a real one with `cipv models pull yolox_nano`"
 )
-_PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
-
-
-class DetectorMissing(BadInput):
-    """There is no network to run. The text is a sentence with the remedy."""
-
-
-class DetectorError(BadInput):
-    """A network that cannot be run, or a picture that is none. The text is a sentence for a person."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ class Detector:
         """
         if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
             raise DetectorError(f"a picture is (H, W, 3) uint8, this is {bgr.shape} {bgr.dtype}")
-        return self.decode(_run(self._session, self.blob(bgr)), (bgr.shape[0], bgr.shape[1]))
+        return self.decode(run_session(self._session, self.blob(bgr)), (bgr.shape[0], bgr.shape[1]))
 
     def blob(self, bgr: U8) -> F32:
         """The picture as the network takes it: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey."""
@@ -106,7 +104,7 @@ def open_detector(
     """
     path = _locate(spec)
     notes = (_SIMULATED_ONLY,) if spec is None and path == models.find(models.EMBEDDED) else ()
-    model = _read(path)
+    model = read_graph(path)
     own = _own_size(model, path)
     if input_size is not None:
         if min(input_size) < MULTIPLE or any(side % MULTIPLE for side in input_size):
@@ -124,21 +122,11 @@ def open_detector(
 
 
 def _locate(spec: str | None) -> Path:
-    try:
-        path = models.find(spec) if spec else models.default_model("detector")
-    except models.ModelError as error:
-        raise DetectorMissing(str(error)) from None
+    path = find_graph(spec, "detector")
     if path is not None:
         return path
     what = f"No detector {spec!r}" if spec else "No detector is installed"
     raise DetectorMissing(f"{what}: run `cipv models pull yolox_nano`, or give an ONNX file with `--detector PATH`.")
-
-
-def _read(path: Path) -> onnx.ModelProto:
-    try:
-        return onnx.load(path)
-    except Exception as error:  # protobuf's own errors have no common base class
-        raise DetectorError(f"{path} is not an ONNX file: {str(error).splitlines()[0]}") from None
 
 
 def _own_size(model: onnx.ModelProto, path: Path) -> Size | None:
@@ -153,9 +141,9 @@ def _at_size(
 ) -> Detector:
     """The detector at one input size, proven by a run on a grey picture."""
     graph = (model if own == size else with_input_size(model, size)).SerializeToString()
-    session = _session(graph, path, threads)
+    session = open_session(graph, path, threads)
     metadata = {entry.key: entry.value for entry in model.metadata_props}
-    probe = _run(session, np.full((1, 3, *size), PADDING, np.float32))
+    probe = run_session(session, np.full((1, 3, *size), PADDING, np.float32))
     try:
         decoder = pick_decoder(probe, size, metadata)
     except UnknownHead as error:
@@ -170,35 +158,6 @@ def _at_size(
     )
 
 
-def _session(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
-    options = ort.SessionOptions()
-    options.intra_op_num_threads = threads
-    options.inter_op_num_threads = 1
-    options.log_severity_level = 4
-    # Spinning workers starve the LiDAR chain between two pictures.
-    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    available = [name for name in _PROVIDERS if name in ort.get_available_providers()]
-    refusal: Exception | None = None
-    for first in range(len(available)):
-        try:
-            return ort.InferenceSession(graph, options, providers=available[first:])
-        except Exception as error:  # onnxruntime raises a class for each status code, without a common base
-            refusal = error
-    raise DetectorError(f"{path.name} cannot be run: {_first_line(refusal)}")
-
-
 def _scale(picture: Size, size: Size) -> float:
     """Input pixels per picture pixel, both (height, width)."""
     return min(size[0] / picture[0], size[1] / picture[1])
-
-
-def _run(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
-    try:
-        outputs = session.run(None, {session.get_inputs()[0].name: blob})
-    except Exception as error:
-        raise DetectorError(f"the network failed: {_first_line(error)}") from None
-    return [np.asarray(output) for output in outputs]
-
-
-def _first_line(error: Exception | None) -> str:
-    return (str(error).splitlines() or ["no reason given"])[0]

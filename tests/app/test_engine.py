@@ -17,7 +17,7 @@ from pipeline.run import Detectors
 from pipeline.sources.base import Source
 from pipeline.step import State, step
 from pipeline.types import Result
-from pipeline.vision.detector import DetectorMissing
+from pipeline.vision.runtime import DetectorMissing
 from tests.app.recording import CountingDetector, Recording, opener
 
 WAIT_S = 60.0

@@ -18,7 +18,8 @@ from pipeline.params import Params
 from pipeline.run import detector_for
 from pipeline.sources import Source, open_source
 from pipeline.types import U8, RawBoxes
-from pipeline.vision.detector import Detector, DetectorMissing
+from pipeline.vision.detector import Detector
+from pipeline.vision.runtime import DetectorMissing
 
 CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = [

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from pipeline.params import DetectionParams
-from pipeline.vision.detector import FLOOR_SCORE, DetectorError, DetectorMissing, open_detector
+from pipeline.vision.detector import FLOOR_SCORE, open_detector
 from pipeline.vision.graph import fitting_size
 from pipeline.vision.models import register
+from pipeline.vision.runtime import DetectorError, DetectorMissing
 from pipeline.vision.select import select
 from tests.pipeline.vision import networks
 

@@ -1,0 +1,72 @@
+"""Running an ONNX graph: which provider, how many threads, and one clear error for whatever goes wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import onnx
+import onnxruntime as ort
+
+from pipeline.errors import BadInput
+from pipeline.types import F32
+from pipeline.vision import models
+
+_PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
+
+
+class DetectorMissing(BadInput):
+    """There is no network to run. The text is a sentence with the remedy."""
+
+
+class DetectorError(BadInput):
+    """A network that cannot be run, or a picture that is none. The text is a sentence for a person."""
+
+
+def find_graph(spec: str | None, task: models.Task) -> Path | None:
+    """The file of a name or path; without either the task's default. Null when it is not here; DetectorMissing when
+    the folder of networks itself is damaged."""
+    try:
+        return models.find(spec) if spec else models.default_model(task)
+    except models.ModelError as error:
+        raise DetectorMissing(str(error)) from None
+
+
+def read_graph(path: Path) -> onnx.ModelProto:
+    """The graph in a file. DetectorError when it holds none."""
+    try:
+        return onnx.load(path)
+    except Exception as error:  # protobuf's own errors have no common base class
+        raise DetectorError(f"{path} is not an ONNX file: {str(error).splitlines()[0]}") from None
+
+
+def open_session(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
+    """The graph on the best provider that takes it: TensorRT, CUDA, CPU. path: for the error alone."""
+    options = ort.SessionOptions()
+    options.intra_op_num_threads = threads
+    options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    # Spinning workers starve the LiDAR chain between two pictures.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    available = [name for name in _PROVIDERS if name in ort.get_available_providers()]
+    refusal: Exception | None = None
+    for first in range(len(available)):
+        try:
+            return ort.InferenceSession(graph, options, providers=available[first:])
+        except Exception as error:  # onnxruntime raises a class for each status code, without a common base
+            refusal = error
+    raise DetectorError(f"{path.name} cannot be run: {_first_line(refusal)}")
+
+
+def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
+    """Every output for one input. DetectorError when the network fails on it."""
+    try:
+        outputs = session.run(None, {session.get_inputs()[0].name: blob})
+    except Exception as error:
+        raise DetectorError(f"the network failed: {_first_line(error)}") from None
+    return [np.asarray(output) for output in outputs]
+
+
+def _first_line(error: Exception | None) -> str:
+    return (str(error).splitlines() or ["no reason given"])[0]
