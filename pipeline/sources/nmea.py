@@ -1,0 +1,148 @@
+"""NMEA 0183 sentences of a GNSS receiver → fixes. GGA says where and how good, RMC when, how fast and which way, GST
+how sure (IEC 61162-1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from datetime import UTC, date, datetime, time, timedelta
+from typing import Any
+
+import pynmea2
+
+from pipeline.types import GnssFix, GnssQuality
+
+_KNOT_MPS = 1852.0 / 3600.0
+_SLOWEST_COURSE_MPS = 0.5
+"""Slower than this a course is the receiver's noise."""
+_QUALITY: Mapping[int, GnssQuality] = {1: "single", 2: "dgnss", 3: "single", 4: "rtk_fixed", 5: "rtk_float"}
+"""GGA's quality indicator; 0 is no fix, 6 to 8 are dead reckoning, typed in or simulated."""
+_RANGE_ERROR_M: Mapping[GnssQuality, float] = {"single": 3.0, "dgnss": 1.0, "rtk_float": 0.3, "rtk_fixed": 0.015}
+"""Usual error of a range, which times the dilution gives the error of a place where no GST says it."""
+_LONGEST_SENTENCE = 256
+
+
+class BadSentence(ValueError):
+    """A line that is no whole sentence; the text is why."""
+
+
+class NmeaReader:
+    """Puts the sentences of one moment together. bad: lines that were no sentence. no_fix: moments without a place."""
+
+    def __init__(self) -> None:
+        self.bad = self.no_fix = 0
+        self._moment: time | None = None
+        self._said: dict[str, Any] = {}
+        self._expected = {"GGA", "RMC"}
+        self._date: date | None = None
+
+    def push(self, line: str, near_ns: int) -> GnssFix | None:
+        """Take one line; the fix of a moment once all its sentences are there. Never raises.
+
+        near_ns: about now, unix; it says the day while no RMC did. The fix's ``t_ns`` is the receiver's own UTC; its
+        height is not a number where the receiver sends no GGA.
+        """
+        try:
+            sentence = _parse(line)
+        except BadSentence:
+            self.bad += 1
+            return None
+        kind, moment = sentence.sentence_type, getattr(sentence, "timestamp", None)
+        if kind not in ("GGA", "RMC", "GST") or not isinstance(moment, time):
+            return None
+        done = None
+        if moment != self._moment:
+            done = self._close(near_ns)
+            self._moment = moment
+        self._said[kind] = sentence
+        if self._said.keys() >= self._expected:
+            done = self._fix(near_ns)
+            self._said = {"done": None}
+        return done
+
+    def _close(self, near_ns: int) -> GnssFix | None:
+        """A new moment begins: what the last one had is what can be expected; its fix, if it was not given."""
+        said, self._said = self._said, {}
+        if not said or "done" in said:
+            return None
+        self._expected = set(said) & {"GGA", "RMC"} or self._expected
+        self._said = said
+        fix = self._fix(near_ns)
+        self._said = {}
+        return fix
+
+    def _fix(self, near_ns: int) -> GnssFix | None:
+        gga, rmc, gst = (self._said.get(kind) for kind in ("GGA", "RMC", "GST"))
+        try:
+            fix = self._fix_of(gga, rmc, gst, near_ns)
+        except (ValueError, TypeError, AttributeError, OverflowError):
+            self.bad += 1
+            return None
+        self.no_fix += fix is None
+        return fix
+
+    def _fix_of(self, gga: Any, rmc: Any, gst: Any, near_ns: int) -> GnssFix | None:
+        quality = _quality(gga, rmc)
+        place = gga if gga is not None else rmc
+        if quality is None or place is None or not place.lat or not place.lon:
+            return None
+        if rmc is not None and isinstance(rmc.datestamp, date):
+            self._date = rmc.datestamp
+        speed_mps = float(rmc.spd_over_grnd) * _KNOT_MPS if rmc is not None and rmc.spd_over_grnd is not None else None
+        if speed_mps is None or self._moment is None:
+            return None
+        course = rmc.true_course
+        is_moving = course is not None and speed_mps >= _SLOWEST_COURSE_MPS
+        lat_deg, lon_deg = float(place.latitude), float(place.longitude)
+        if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
+            raise ValueError("a place that is not on the Earth")
+        return GnssFix(
+            _unix_ns(self._date, self._moment, near_ns),
+            lat_deg,
+            lon_deg,
+            alt_m=_height_m(gga),
+            course_rad=math.radians(float(course)) if is_moving else None,
+            speed_mps=speed_mps,
+            quality=quality,
+            sigma_m=_sigma_m(gga, gst, quality),
+        )
+
+
+def _parse(line: str) -> Any:
+    """pynmea2's sentence. BadSentence when the line is damaged or has no checksum: garbage often looks like text."""
+    if len(line) > _LONGEST_SENTENCE or "*" not in line:
+        raise BadSentence("no whole sentence")
+    try:
+        return pynmea2.parse(line.strip(), check=True)
+    except (pynmea2.ParseError, ValueError, TypeError, IndexError, AttributeError) as error:
+        raise BadSentence(str(error)) from None
+
+
+def _quality(gga: Any, rmc: Any) -> GnssQuality | None:
+    if gga is not None:
+        return _QUALITY.get(int(gga.gps_qual)) if gga.gps_qual is not None else None
+    return "single" if rmc is not None and rmc.status == "A" else None
+
+
+def _height_m(gga: Any) -> float:
+    """Above the ellipsoid: above the geoid, plus what lies between."""
+    if gga is None or gga.altitude is None:
+        return math.nan
+    return float(gga.altitude) + float(gga.geo_sep or 0.0)
+
+
+def _sigma_m(gga: Any, gst: Any, quality: GnssQuality) -> float:
+    if gst is not None and gst.std_dev_latitude is not None and gst.std_dev_longitude is not None:
+        return max(float(gst.std_dev_latitude), float(gst.std_dev_longitude))
+    dilution = float(gga.horizontal_dil) if gga is not None and gga.horizontal_dil else 1.0
+    return _RANGE_ERROR_M[quality] * max(dilution, 0.5)
+
+
+def _unix_ns(day: date | None, moment: time, near_ns: int) -> int:
+    """The moment on ``day``; without a day, on that which brings it nearest to ``near_ns``."""
+    near = datetime.fromtimestamp(near_ns / 1e9, UTC)
+    at = datetime.combine(day or near.date(), moment.replace(tzinfo=None), UTC)
+    if day is None:
+        at = min((at + timedelta(days=shift) for shift in (-1, 0, 1)), key=lambda each: abs(each - near))
+    since = at - datetime(1970, 1, 1, tzinfo=UTC)
+    return (since.days * 86_400 + since.seconds) * 1_000_000_000 + since.microseconds * 1000
