@@ -69,8 +69,8 @@ def turns(params: BoxParams) -> F64:
 
 @numba.njit(cache=True, nogil=True)
 def _boxes(points: F32, labels: I32, count: int, turns: F64) -> tuple[F64, I32]:
-    """turns: (K,) as ``turns`` gives them. boxes (count, 13) float64: center x, y, length, width, yaw, lowest z, highest z, closest point x, y, z, spread
-    x, y, z. sizes (count,) int32."""
+    """turns: (K,) as ``turns`` gives them. boxes (count, 13) float64: center x, y, length, width, yaw, lowest z,
+    highest z, closest point x, y, z, spread x, y, z. sizes (count,) int32."""
     size = np.zeros(count, dtype=np.int32)
     for i in range(len(labels)):
         if labels[i] >= 0:
@@ -104,7 +104,7 @@ def _best_turn(x: F64, y: F64, cos: F32, sin: F32) -> int:
         return 0
     stride = (len(x) + SEARCH_POINTS - 1) // SEARCH_POINTS
     near_x, near_y = (x[::stride] - x[0]).astype(np.float32), (y[::stride] - y[0]).astype(np.float32)
-    best, best_score = 0, np.float32(-1.0)
+    best, best_score = 0, -1.0
     for k in range(len(cos)):
         score = _closeness(near_x, near_y, cos[k], sin[k])
         if score > best_score:
@@ -124,7 +124,7 @@ def _closeness(x: F32, y: F32, cos: float, sin: float) -> float:
     for i in range(len(x)):
         u, v = x[i] * cos + y[i] * sin - u_side, y[i] * cos - x[i] * sin - v_side
         score += np.float32(1.0) / max(min(abs(u), abs(v)), nearest)
-    return score
+    return float(score)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "nnan"})
