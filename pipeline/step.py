@@ -24,6 +24,7 @@ from pipeline.path import corridor
 from pipeline.types import (
     CameraCalibration,
     Frame,
+    Ground,
     Layers,
     Obstacle,
     Result,
@@ -101,6 +102,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
             vision_tracks=vision_tracks,
             lidar_boxes=fused.lidar_boxes,
             vision_boxes=fused.vision_boxes,
+            ground=seen.ground,
         ),
     )
     lead_id = lead.id if lead is not None else None
@@ -121,12 +123,13 @@ class _LidarView:
 
     obstacles: tuple[Obstacle, ...]
     kind: np.ndarray
+    ground: Ground | None
 
 
 def _perceive_lidar(sweep: Sweep | None, params: Params, clock: _Stopwatch) -> _LidarView:
     """down-sample → ground → cluster → boxes (paper, Point Cloud Segmentation)."""
     if sweep is None:
-        return _LidarView((), np.zeros(0, np.int32))
+        return _LidarView((), np.zeros(0, np.int32), None)
     keep = downsample.keep_mask(sweep, params.downsample)
     clock.lap("downsample")
     plane = ground.fit_ground(sweep.points, keep, params.ground)
@@ -136,7 +139,7 @@ def _perceive_lidar(sweep: Sweep | None, params: Params, clock: _Stopwatch) -> _
     clock.lap("cluster")
     obstacles = boxes.fit_obstacles(sweep.points, labels, plane, params.box)
     clock.lap("boxes")
-    return _LidarView(obstacles, cluster.kinds(labels, keep, plane.mask))
+    return _LidarView(obstacles, cluster.kinds(labels, keep, plane.mask), plane)
 
 
 def _perceive_picture(

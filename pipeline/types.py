@@ -21,6 +21,7 @@ F64 = npt.NDArray[np.float64]
 I32 = npt.NDArray[np.int32]
 I64 = npt.NDArray[np.int64]
 U8 = npt.NDArray[np.uint8]
+Mask = npt.NDArray[np.bool_]
 Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]
 Box = tuple[float, float, float, float]
@@ -178,6 +179,35 @@ class Frame:
 
 
 # ---------------------------------------------------------------- what stages hand on
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The road under the sweep.
+
+    mask: (N,) bool, kept points that are ground. planes: (S, 4) float64 ``nx ny nz d`` with n·p + d = 0, |n| = 1,
+    n_z > 0; all NaN where no ground was found. edges: (S + 1,) float64, bounds of the segments along x in metres;
+    the outer segments reach on beyond theirs. fitted: (S,) bool, false where the plane is a neighbour's.
+    """
+
+    mask: Mask
+    planes: F64
+    edges: F64
+    fitted: Mask
+
+    def height(self, xy: npt.NDArray[np.floating]) -> F64:
+        """(M,) ground z in metres at (M, 2) ego places; NaN where no ground was found."""
+        xy = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
+        plane = self.planes[self._segment(xy[:, 0])]
+        return np.asarray(-(plane[:, 3] + plane[:, 0] * xy[:, 0] + plane[:, 1] * xy[:, 1]) / plane[:, 2])
+
+    def above(self, points: npt.NDArray[np.floating]) -> F64:
+        """(M,) height in metres of (M, 3+) ego points over the ground, along its normal; NaN without ground."""
+        plane = self.planes[self._segment(points[:, 0])]
+        return np.asarray(np.sum(plane[:, :3] * points[:, :3], axis=1) + plane[:, 3])
+
+    def _segment(self, x: npt.NDArray[np.floating]) -> npt.NDArray[np.intp]:
+        return np.searchsorted(self.edges[1:-1], x, side="right")
 
 
 @dataclass(frozen=True)
@@ -361,6 +391,7 @@ class Layers:
     points: (N, 4) float32, the sweep before down-sampling. kind: (N,) int32, ``GROUND``, ``UNCLUSTERED``,
     ``DROPPED`` or the cluster index (``Obstacle.cluster``). lidar_boxes / vision_boxes: the two boxes that fusion
     compared, by fused object id. lanes: the ego lane's lines, null where no lane detector runs.
+    ground: the road under the sweep, null without one.
     """
 
     points: F32
@@ -371,6 +402,7 @@ class Layers:
     lidar_boxes: dict[int, Box] = field(default_factory=dict)
     vision_boxes: dict[int, Box] = field(default_factory=dict)
     lanes: EgoLane | None = None
+    ground: Ground | None = None
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.lidar.ground import Ground
+from pipeline.lidar.ground import Ground, no_higher_than
 from pipeline.params import ClusterParams
 from pipeline.types import DROPPED, F32, F64, GROUND, I32, UNCLUSTERED
 
@@ -25,7 +25,7 @@ UNLABELLED = -1
 def candidates(points: F32, ground: Ground, keep: Mask, params: ClusterParams) -> Mask:
     """(N,) bool: kept points that may belong to an object: not ground, and no higher above it than ``max_height_m``
     (bridges and signs are no obstacles). Where no ground was found every kept point may."""
-    return ground.no_higher_than(points, keep & ~ground.mask, params.max_height_m)
+    return no_higher_than(ground, points, keep & ~ground.mask, params.max_height_m)
 
 
 def cluster(points: F32, candidates: Mask, params: ClusterParams) -> I32:

@@ -18,49 +18,20 @@ Choices that the two papers leave open, made on real 16-channel sweeps:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from pipeline.lidar import ground_kernels as kernels
 from pipeline.params import GroundParams
-from pipeline.types import F32, F64
+from pipeline.types import F32
+from pipeline.types import Ground as Ground
 
 Mask = npt.NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
-class Ground:
-    """The road under the sweep.
-
-    mask: (N,) bool, kept points that are ground. planes: (S, 4) float64 ``nx ny nz d`` with n·p + d = 0, |n| = 1,
-    n_z > 0; all NaN where no ground was found. edges: (S + 1,) float64, bounds of the segments along x in metres;
-    the outer segments reach on beyond theirs. fitted: (S,) bool, false where the plane is a neighbour's.
-    """
-
-    mask: Mask
-    planes: F64
-    edges: F64
-    fitted: Mask
-
-    def height(self, xy: npt.NDArray[np.floating]) -> F64:
-        """(M,) ground z in metres at (M, 2) ego places; NaN where no ground was found."""
-        xy = np.asarray(xy, dtype=np.float64).reshape(-1, 2)
-        plane = self.planes[self._segment(xy[:, 0])]
-        return np.asarray(-(plane[:, 3] + plane[:, 0] * xy[:, 0] + plane[:, 1] * xy[:, 1]) / plane[:, 2])
-
-    def above(self, points: npt.NDArray[np.floating]) -> F64:
-        """(M,) height in metres of (M, 3+) ego points over the ground, along its normal; NaN without ground."""
-        plane = self.planes[self._segment(points[:, 0])]
-        return np.asarray(np.sum(plane[:, :3] * points[:, :3], axis=1) + plane[:, 3])
-
-    def no_higher_than(self, points: F32, of: Mask, height_m: float) -> Mask:
-        """(N,) bool: those points of the mask ``of`` that are at most this high above the ground, or have none."""
-        return np.asarray(kernels.no_higher_than(*kernels.axes(points), of, self.planes, self.edges, height_m))
-
-    def _segment(self, x: npt.NDArray[np.floating]) -> npt.NDArray[np.intp]:
-        return np.searchsorted(self.edges[1:-1], x, side="right")
+def no_higher_than(ground: Ground, points: F32, of: Mask, height_m: float) -> Mask:
+    """(N,) bool: those points of the mask ``of`` that are at most this high above the ground, or have none."""
+    return np.asarray(kernels.no_higher_than(*kernels.axes(points), of, ground.planes, ground.edges, height_m))
 
 
 def fit_ground(points: F32, keep: Mask, params: GroundParams) -> Ground:

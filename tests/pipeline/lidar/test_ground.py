@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.bench.ground_reference import fit_ground_numpy
-from pipeline.lidar.ground import Ground, fit_ground
+from pipeline.lidar.ground import Ground, fit_ground, no_higher_than
 from pipeline.params import GroundParams
 from pipeline.types import F32
 from tests.pipeline.lidar.scenes import Block, real_frames, road_height, scan
@@ -48,7 +48,7 @@ def test_heights_are_over_the_plane_of_the_places_own_segment() -> None:
     assert ground.height(np.array([[-5.0, 0.0], [5.0, 0.0], [99.0, 0.0]])) == pytest.approx([-2.0, -1.0, -1.0])
     points = np.array([[-5.0, 0.0, 0.0, 0.0], [5.0, 0.0, 0.0, 0.0]], np.float32)
     assert ground.above(points) == pytest.approx([2.0, 1.0])
-    assert ground.no_higher_than(points, np.ones(2, np.bool_), 1.5).tolist() == [False, True]
+    assert no_higher_than(ground, points, np.ones(2, np.bool_), 1.5).tolist() == [False, True]
 
 
 @pytest.mark.parametrize("count", [0, 1, 5, 19])
@@ -58,7 +58,7 @@ def test_too_few_points_are_no_ground_rather_than_a_wrong_one(count: int) -> Non
     assert not ground.fitted.any()
     assert not ground.mask.any()
     assert np.isnan(ground.height(np.array([[5.0, 0.0]]))).all()
-    assert ground.no_higher_than(points, np.ones(count, np.bool_), 1.0).all()
+    assert no_higher_than(ground, points, np.ones(count, np.bool_), 1.0).all()
 
 
 def test_one_ring_across_the_road_carries_no_plane_of_its_own() -> None:
