@@ -10,9 +10,12 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 
 from app.control import Control, Wish
+from app.drive.drives import Drives, DriveState
+from app.drive.recording import Recipe
 from app.line import DetectionCache, Line, Tick
 from app.playback import PlaybackClock
 from app.snapshot import Notice, Snapshot
@@ -35,7 +38,8 @@ Listener = Callable[[Snapshot], None]
 
 class Engine:
     """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
-    one for a source's pictures; null runs without a camera's detector and says nothing about it."""
+    one for a source's pictures; null runs without a camera's detector and says nothing about it. ``whole_drives``: a
+    recording's whole drive is computed in the background (``drives``), so that any frame is shown as it is in it."""
 
     def __init__(
         self,
@@ -47,6 +51,7 @@ class Engine:
         uri: str | None = None,
         sensors: Sensors = "both",
         playing: bool = False,
+        whole_drives: bool = False,
     ) -> None:
         self.control = Control(Wish(params, preset, uri=uri, playing=playing))
         self.snapshot = Snapshot(params, preset)
@@ -54,6 +59,7 @@ class Engine:
         self._open_detector = open_detector
         self._sensors: Sensors = sensors
         self._detections = DetectionCache()
+        self.drives = Drives(open_source, self._detections) if whole_drives else None
         self._detectors: dict[tuple[bool, tuple[int, int] | None], Detects[RawBoxes]] = {}
         self._line: Line | None = None
         self._clock: PlaybackClock | None = None
@@ -63,11 +69,16 @@ class Engine:
         self._thread = threading.Thread(target=self._work, name="cipv-engine", daemon=True)
 
     def start(self) -> None:
+        if self.drives is not None:
+            self.drives.on_change = self.control.change
+            self.drives.start()
         self._thread.start()
 
     def stop(self) -> None:
         """End the worker. A network run or a read in progress is finished first."""
         self.control.change(stop=True)
+        if self.drives is not None:
+            self.drives.stop()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
 
@@ -97,7 +108,8 @@ class Engine:
             if wish.stop:
                 return
             try:
-                self._serve(wish)
+                with self._in_front():
+                    self._serve(wish)
             except Exception as error:  # the worker outlives whatever a recording or a network does
                 logger.exception("while serving %s", self.snapshot.uri)
                 self._fail(f"{type(error).__name__}: {_first_line(error)}")
@@ -117,8 +129,10 @@ class Engine:
             tick = self._step(min(last, index + wish.steps), wish)
         elif wish.params is not shown.params:
             tick = self._line.rerun(wish.params)
+        elif wish.playing and shown.playing:
+            tick = self._play(wish)
         else:
-            tick = self._play(wish) if wish.playing and shown.playing else None
+            tick = self._line.rerun(wish.params) if self._line.can_be_exact() else None
         self._show(wish, tick)
 
     def _seek(self, index: int, wish: Wish) -> Tick | None:
@@ -173,7 +187,7 @@ class Engine:
             return False
         notices = [Notice("info", text) for text in source.notes]
         detector = self._detector_for(source, notices) if self._sensors != "lidar" else None
-        self._line = Line(source, Detectors(detector), self._detections, self._sensors)
+        self._line = self._line_of(source, Detectors(detector))
         self._clock = None
         self._skipped = 0
         self._publish(
@@ -192,6 +206,14 @@ class Engine:
             )
         )
         return True
+
+    def _line_of(self, source: Source, detectors: Detectors) -> Line:
+        """The line for a recording, whose whole drive is computed beside it from now on."""
+        if self.drives is None:
+            return Line(source, detectors, self._detections, self._sensors)
+        line = Line(source, detectors, self._detections, self._sensors, self.drives.state_before)
+        self.drives.open(Recipe(source.uri, len(source), line.timeline_s, detectors, self._sensors))
+        return line
 
     def _detector_for(self, source: Source, notices: list[Notice]) -> Detects[RawBoxes] | None:
         """The detector for the source's pictures; where there is none, LiDAR goes on alone and a notice says so."""
@@ -229,8 +251,13 @@ class Engine:
             self._clock = PlaybackClock(
                 line.timeline_s, time.monotonic(), float(line.timeline_s[index]), standing.speed
             )
+        if self.drives is not None:
+            self._tell_drives(self.drives, wish, tick)
         shown = replace(
             shown,
+            drive=self.drives.state if self.drives is not None else DriveState(),
+            can_undo=self.control.can_undo,
+            can_redo=self.control.can_redo,
             params=wish.params,
             preset=wish.preset,
             params_revision=wish.params_revision,
@@ -250,6 +277,17 @@ class Engine:
                 notices=tuple(n for n in shown.notices if n.level != "error"),
             )
         self._publish(shown)
+
+    def _tell_drives(self, drives: Drives, wish: Wish, tick: Tick | None) -> None:
+        drives.turn.playing(self._clock is not None)
+        if tick is not None:
+            drives.offer(tick.frame)
+        if wish.settled:
+            drives.want(wish.params, wish.preset)
+
+    def _in_front(self) -> AbstractContextManager[None]:
+        """What is done meanwhile goes before the computing of whole drives."""
+        return self.drives.turn.foreground() if self.drives is not None else nullcontext()
 
     def _publish(self, snapshot: Snapshot) -> None:
         with self._shown:

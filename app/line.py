@@ -6,6 +6,7 @@ be run again: ``step(tick.before, tick.frame, other_params)``.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
@@ -14,7 +15,7 @@ from typing import cast
 from app.lru import BoundedCache
 from app.playback import timeline_s
 from pipeline.params import Params
-from pipeline.run import Detectors, Detects, Look, Seen, Sensors, advance
+from pipeline.run import Detectors, Detects, Seen, Sensors, advance
 from pipeline.sources.base import Source
 from pipeline.step import State, step
 from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result
@@ -27,7 +28,10 @@ _CACHED_ANSWERS = 8192
 
 @dataclass(frozen=True, eq=False)
 class Tick:
-    """One frame, what the line believed before it and after it, and what it believes at it."""
+    """One frame, what the line believed before it and after it, and what it believes at it.
+
+    exact: ``before`` is the state of a run through the whole drive from its first frame, so that the result is the one
+    that ``cipv run`` gives; else it comes from a short warm-up, and numbers of objects may differ."""
 
     before: State
     frame: Frame
@@ -35,76 +39,130 @@ class Tick:
     result: Result
     params: Params
     detect_ms: float
+    exact: bool = False
 
 
 class DetectionCache:
     """What detectors answered, by (source, frame, detector), bounded; it outlives the source, so reopening costs no
-    network. spent_ms: how long the detectors have run in all."""
+    network. Any thread."""
 
     def __init__(self, limit: int = _CACHED_ANSWERS) -> None:
-        self.spent_ms = 0.0
+        self._lock = threading.Lock()
         self._answers: BoundedCache[tuple[str, int, str], RawBoxes | RawLanes] = BoundedCache(limit, lambda _: 1)
 
-    def asker(self, uri: str) -> Look:
+    def asker(self, uri: str) -> Asker:
         """How to ask about the pictures of one source."""
+        return Asker(self, uri)
 
-        def ask(detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
-            key = (uri, frame.index, detector.name)
-            held = self._answers.get(key)
-            if held is not None:
-                return cast("Seen", held)
-            start = perf_counter()
-            found = detector.detect(bgr)
-            self.spent_ms += (perf_counter() - start) * 1e3
-            self._answers.put(key, found)
-            return found
+    def get(self, key: tuple[str, int, str]) -> RawBoxes | RawLanes | None:
+        with self._lock:
+            return self._answers.get(key)
 
-        return ask
+    def put(self, key: tuple[str, int, str], answer: RawBoxes | RawLanes) -> None:
+        with self._lock:
+            self._answers.put(key, answer)
+
+
+class Asker:
+    """Asks the cache first. Used by one thread; spent_ms: how long detectors have run for it in all."""
+
+    def __init__(self, cache: DetectionCache, uri: str) -> None:
+        self.spent_ms = 0.0
+        self._cache, self._uri = cache, uri
+
+    def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
+        key = (self._uri, frame.index, detector.name)
+        held = self._cache.get(key)
+        if held is not None:
+            return cast("Seen", held)
+        start = perf_counter()
+        found = detector.detect(bgr)
+        self.spent_ms += (perf_counter() - start) * 1e3
+        self._cache.put(key, found)
+        return found
+
+
+def _nothing_known(index: int, params: Params) -> State | None:
+    return None
 
 
 class Line:
-    """A source, the detectors for its pictures, and their caches. Used by one thread."""
+    """A source, the detectors for its pictures, and their caches. Used by one thread.
 
-    def __init__(self, source: Source, detectors: Detectors, detections: DetectionCache, sensors: Sensors) -> None:
+    state_before: the state in which a run through the whole drive with these parameters comes to a frame, null where
+    nobody knows it."""
+
+    def __init__(
+        self,
+        source: Source,
+        detectors: Detectors,
+        detections: DetectionCache,
+        sensors: Sensors,
+        state_before: Callable[[int, Params], State | None] = _nothing_known,
+    ) -> None:
         self.source = source
         self.timeline_s = timeline_s([source.t_ns(i) for i in range(len(source))], source.rate_hz)
         self.tick: Tick | None = None
         self._detectors = detectors
-        self._detections = detections
+        self._state_before = state_before
         self._ask = detections.asker(source.uri)
         self._sensors = sensors
         self._frames: BoundedCache[int, Frame] = BoundedCache(_CACHED_FRAMES_BYTES, _frame_bytes)
 
     def seek(self, index: int, params: Params, superseded: Callable[[], bool] = lambda: False) -> Tick | None:
-        """Jump to ``index``, from a fresh state ``WARM_UP_FRAMES`` before it. The answer depends on nothing but the
-        recording, the index and the parameters. Null, and nothing changed, when ``superseded`` said so on the way."""
+        """Jump to ``index``: exactly where the state there is known, else from a fresh state ``WARM_UP_FRAMES`` before
+        it. Either way the answer depends on nothing but the recording, the index and the parameters. Null, and nothing
+        changed, when ``superseded`` said so on the way."""
+        known = self._known(index, params)
+        if known is not None:
+            self.tick = self._run(known, index, params, exact=True)
+            return self.tick
+        first = max(0, index - WARM_UP_FRAMES)
         state, tick = State(), None
-        for i in range(max(0, index - WARM_UP_FRAMES), index + 1):
+        for i in range(first, index + 1):
             if superseded():
                 return None
-            tick = self._run(state, i, params)
+            tick = self._run(state, i, params, exact=first == 0)
             state = tick.after
         self.tick = tick
         return tick
 
     def advance(self, index: int, params: Params) -> Tick:
-        """Run ``index`` after the shown frame. Frames skipped between are simply not seen; time is real."""
-        state = self.tick.after if self.tick is not None else State()
-        self.tick = self._run(state, index, params)
+        """Run ``index`` after the shown frame. Where the state there is not known, frames skipped between are simply
+        not seen; time is real."""
+        shown, known = self.tick, self._known(index, params)
+        if known is not None:
+            self.tick = self._run(known, index, params, exact=True)
+        elif shown is None:
+            self.tick = self._run(State(), index, params, exact=False)
+        else:
+            is_next = index == shown.frame.index + 1 and params == shown.params
+            self.tick = self._run(shown.after, index, params, exact=shown.exact and is_next)
         return self.tick
 
     def rerun(self, params: Params) -> Tick | None:
-        """The shown frame with other parameters, from the state it started with. No network, no reading."""
+        """The shown frame with other parameters, from the state that they lead to where it is known, else from the one
+        it started with. No network, no reading."""
         if self.tick is None:
             return None
-        after, result = step(self.tick.before, self.tick.frame, params)
-        self.tick = replace(self.tick, after=after, result=result, params=params)
+        known = self._known(self.tick.frame.index, params)
+        before, exact = (self.tick.before, False) if known is None else (known, True)
+        after, result = step(before, self.tick.frame, params)
+        self.tick = replace(self.tick, before=before, after=after, result=result, params=params, exact=exact)
         return self.tick
 
-    def _run(self, state: State, index: int, params: Params) -> Tick:
-        spent_ms = self._detections.spent_ms
+    def can_be_exact(self) -> bool:
+        """Whether the shown frame is not what a run through the whole drive gives, and now could be."""
+        shown = self.tick
+        return shown is not None and not shown.exact and self._known(shown.frame.index, shown.params) is not None
+
+    def _known(self, index: int, params: Params) -> State | None:
+        return State() if index == 0 else self._state_before(index, params)
+
+    def _run(self, state: State, index: int, params: Params, *, exact: bool) -> Tick:
+        spent_ms = self._ask.spent_ms
         frame, after, result = advance(state, self._read(index), params, self._detectors, self._sensors, self._ask)
-        return Tick(state, frame, after, result, params, self._detections.spent_ms - spent_ms)
+        return Tick(state, frame, after, result, params, self._ask.spent_ms - spent_ms, exact)
 
     def _read(self, index: int) -> Frame:
         held = self._frames.get(index)

@@ -54,7 +54,7 @@ class SceneFeed:
         """A slider in the 3D view was moved. viser's own bounds are the schema's, so only a race can be refused."""
         control = self._engine.control
         try:
-            control.change_params({name: value})
+            control.change_params({name: value}, merge=True)
         except ParamsError:
             self._view.set_params(control.peek().params)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from app.drive.drives import DriveState
 from app.line import Tick
 from pipeline.params import Params
 
@@ -45,6 +46,9 @@ class Snapshot:
     skipped: int = 0
     made_unix_s: float = 0.0
     tick: Tick | None = None
+    drive: DriveState = DriveState()
+    can_undo: bool = False
+    can_redo: bool = False
 
     def state_json(self) -> dict[str, Any]:
         """The state without the result, as the page and ``/api/state`` read it."""
@@ -66,5 +70,9 @@ class Snapshot:
             "params_revision": self.params_revision,
             "sequence": self.sequence,
             "skipped": self.skipped,
+            "provisional": self.tick is not None and not self.tick.exact,
+            "drive": self.drive.to_json(),
+            "can_undo": self.can_undo,
+            "can_redo": self.can_redo,
             "notices": [{"level": n.level, "text": n.text} for n in self.notices],
         }

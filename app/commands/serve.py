@@ -73,6 +73,7 @@ class Serve:
             uri=self.source,
             sensors=self.sensors,
             playing=True,
+            whole_drives=True,
         )
         return self.server.serve(engine)
 

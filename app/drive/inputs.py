@@ -1,0 +1,66 @@
+"""What whole drives are computed from again and again: their frames without the pictures' pixels.
+
+The networks have looked at a picture before the line runs (``pipeline.run.detect``), and no stage needs its pixels. So
+a frame of 300 KB is all that another run with other parameters asks for, and no network, disk or simulator.
+"""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.types import Frame, Picture
+
+_LIMIT_BYTES = 384e6
+"""About 1200 frames of a real VLP-16. What does not fit is read from the source again, in every run."""
+
+
+def without_pixels(frame: Frame) -> Frame:
+    """The frame with a picture of the same size and stamp that takes no memory and shows nothing."""
+    if frame.picture is None:
+        return frame
+    blank = np.broadcast_to(np.zeros((), np.uint8), frame.picture.bgr.shape)
+    return replace(frame, picture=Picture(frame.picture.t_ns, blank))
+
+
+class InputStore:
+    """The frames of one recording as the line takes them, by index. Any thread.
+
+    It fills until it is full and then keeps what it has: runs go through a drive from its beginning, and a store that
+    let the oldest go would, for a drive that does not fit, never have the frame that is asked for next."""
+
+    def __init__(self, limit_bytes: float = _LIMIT_BYTES) -> None:
+        self._limit = limit_bytes
+        self._lock = threading.Lock()
+        self._bytes = 0
+        self._frames: dict[int, Frame] = {}
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def get(self, index: int) -> Frame | None:
+        """The frame without pixels; null when it is not held."""
+        return self._frames.get(index)
+
+    def offer(self, frame: Frame) -> None:
+        """Hold a frame that the detectors have looked at, if there is room and it is not held yet."""
+        if frame.index in self._frames:
+            return
+        light = without_pixels(frame)
+        cost = _bytes_of(light)
+        with self._lock:
+            if light.index not in self._frames and self._bytes + cost <= self._limit:
+                self._frames[light.index] = light
+                self._bytes += cost
+
+
+def _bytes_of(frame: Frame) -> int:
+    sweep, boxes, lanes = frame.sweep, frame.raw_boxes, frame.raw_lanes
+    arrays: list[npt.NDArray[Any]] = [sweep.points, sweep.ring] if sweep else []
+    arrays += [boxes.boxes, boxes.scores] if boxes else []
+    arrays += [lanes.points, lanes.scores, lanes.line] if lanes else []
+    return 2000 + sum(array.nbytes for array in arrays)

@@ -1,0 +1,94 @@
+"""One open recording for whole-drive runs: its frames as inputs, its truth, its runs."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from app.drive.book import RunBook
+from app.drive.inputs import InputStore
+from app.drive.run import DriveRun, digest
+from app.line import DetectionCache
+from pipeline.evaluation.lead import LeadRule
+from pipeline.params import Params
+from pipeline.run import Detectors, Sensors, detect, only
+from pipeline.sources.base import Source, TruthObject
+from pipeline.step import State, step
+from pipeline.types import F64, Frame
+
+RULE = LeadRule()
+Truth = tuple[TruthObject, ...] | None
+
+
+@dataclass(frozen=True, eq=False)
+class Recipe:
+    """What every run of a recording is made from. timeline_s: (total,) each frame's place on the playback timeline."""
+
+    uri: str
+    total: int
+    timeline_s: F64
+    detectors: Detectors
+    sensors: Sensors
+
+
+class Recording:
+    """It opens the source a second time: the one that is shown may be reading at the same moment."""
+
+    def __init__(
+        self, recipe: Recipe, open_source: Callable[[str], Source], detections: DetectionCache, next_number: int
+    ) -> None:
+        self.recipe = recipe
+        self.book = RunBook(lambda number, params, preset: DriveRun(number, params, preset, recipe.total), next_number)
+        self.inputs = InputStore()
+        self._open_source = open_source
+        self._source: Source | None = None
+        self._ask = detections.asker(recipe.uri)
+        self._truths: dict[int, Truth] = {}
+        self._reading = threading.Lock()
+
+    def advance(self, run: DriveRun) -> None:
+        """The next frame of a run. Whatever a source or a network raises."""
+        index = run.done
+        run.add(self.input(index), self.truth(index), RULE)
+
+    def state_before(self, index: int, params: Params) -> State | None:
+        """The state in which the run of these parameters came to a frame; null where it has not come that far."""
+        run = self.book.of(params)
+        kept = run.nearest_state(index) if run is not None else None
+        if kept is None:
+            return None
+        state = kept.state
+        for between in range(kept.at, index):
+            state, _ = step(state, self.input(between), params)
+        return state
+
+    def input(self, index: int) -> Frame:
+        """A frame as the line takes it; its picture may be without pixels."""
+        held = self.inputs.get(index)
+        if held is not None:
+            return held
+        with self._reading:
+            frame = self._opened().frame(index)
+        detectors = Detectors() if self.recipe.sensors == "lidar" else self.recipe.detectors
+        frame = only(detect(frame, detectors, self._ask), self.recipe.sensors)
+        self.inputs.offer(frame)
+        return frame
+
+    def truth(self, index: int) -> Truth:
+        """The labelled objects of a frame; null when it is not labelled."""
+        if index not in self._truths:
+            with self._reading:
+                self._truths[index] = self._opened().truth(index)
+        return self._truths[index]
+
+    def digest(self, params: Params) -> str:
+        """What a run is made from, as twelve characters."""
+        detectors = self.recipe.detectors
+        names = [each.name for each in (detectors.boxes, detectors.lanes) if each is not None]
+        return digest(self.recipe.uri, names, self.recipe.sensors, params)
+
+    def _opened(self) -> Source:
+        if self._source is None:
+            self._source = self._open_source(self.recipe.uri)
+        return self._source
