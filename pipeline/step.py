@@ -93,7 +93,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         acc=command,
         notes=frame.notes,
         streams=frame.streams,
-        timing_ms=clock.total(),
+        timing_ms={**frame.timing_ms, **clock.total()},
         layers=Layers(
             points=frame.sweep.points if frame.sweep else np.zeros((0, 4), np.float32),
             kind=seen.kind,

@@ -7,6 +7,7 @@ treated as read-only. What a frame makes by the hundred is a named tuple, which 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -161,7 +162,8 @@ class StreamHealth:
 
 @dataclass(frozen=True)
 class Frame:
-    """Everything known at one tick. Any branch may be missing; ``notes`` says why, in words a person can act on."""
+    """Everything known at one tick. Any branch may be missing; ``notes`` says why, in words a person can act on.
+    ``timing_ms``: of a live source, how long what it holds was under way, by stage."""
 
     index: int
     name: str
@@ -176,6 +178,7 @@ class Frame:
     raw_lanes: RawLanes | None = None
     route: Route | None = None
     streams: tuple[StreamHealth, ...] = ()
+    timing_ms: Mapping[str, float] = field(default_factory=dict)
 
 
 # ---------------------------------------------------------------- what stages hand on
