@@ -11,6 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from pipeline.params import MotionParams
+from pipeline.path.yaw_rate import usable_rate
 from pipeline.records import evolve
 from pipeline.types import EgoState, FusedObject
 
@@ -39,7 +40,7 @@ def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) ->
     ttc = item.distance_m / closing if shrinks else None  # type: ignore[operator]
     if ego is None or item.velocity_mps is None or item.closest_point is None:
         return evolve(item, ttc_s=ttc)
-    yaw_rate = ego.yaw_rate_radps or 0.0
+    yaw_rate = usable_rate(ego) or 0.0
     x, y, _ = item.closest_point
     vx = item.velocity_mps[0] + ego.speed_mps - yaw_rate * y
     vy = item.velocity_mps[1] + yaw_rate * x

@@ -193,12 +193,52 @@ class MotionParams(Section):
 
 
 class PathParams(Section):
-    """The ego corridor."""
+    """The ego corridor: which sources bend it, and what each is worth."""
 
-    half_width_m: float = _slider(1.5, 0.5, 4.0, 0.05, "m", "Half the width of the corridor")
+    half_width_m: float = _slider(1.5, 0.5, 4.0, 0.05, "m", "Half the width of the corridor where no lane lines say it")
     length_m: float = _slider(100.0, 20.0, 200.0, 5.0, "m", "How far ahead the corridor is drawn")
+    use_lanes: bool = _choice(True, "Lay the corridor between the lane lines where they are seen")
+    use_gnss: bool = _choice(True, "Lay the corridor along the route where one is given and GNSS says where we are")
     use_yaw_rate: bool = _choice(True, "Bend the corridor with the yaw rate where it is known")
-    min_speed_mps: float = _slider(2.0, 0.0, 10.0, 0.5, "m/s", "Below this speed the yaw rate says nothing: straight")
+    min_speed_mps: float = _slider(2.0, 0.0, 10.0, 0.5, "m/s", "Below this speed yaw rate and course say nothing")
+    yaw_rate_sigma_radps: float = _slider(
+        0.0045, 0.0005, 0.05, 0.0005, "rad/s", "Noise of one yaw rate, the driver's small corrections included"
+    )
+    lateral_jerk_mps3: float = _slider(
+        0.5, 0.05, 3.0, 0.05, "m/s³", "How fast a road's lateral acceleration changes: sets how far an arc is good for"
+    )
+    lateral_accel_mps2: float = _slider(
+        1.5, 0.1, 6.0, 0.1, "m/s²", "Lateral acceleration that a straight guess leaves open"
+    )
+    lane_keeping_sigma_m: float = _slider(0.2, 0.0, 1.0, 0.05, "m", "How far a driver is off the middle of the lane")
+    lane_keeping_sigma_mps: float = _slider(0.1, 0.0, 1.0, 0.05, "m/s", "Sideways speed within the lane")
+    route_reach_m: float = _slider(8.0, 1.0, 50.0, 1.0, "m", "Farther from the route than this we are not on it")
+    gnss_gate_sigmas: float = _slider(3.7, 1.0, 10.0, 0.1, "σ", "A fix farther from the expected place is refused")
+    gnss_restart_s: float = _slider(2.0, 0.2, 30.0, 0.1, "s", "Fixes refused for this long are believed, with doubt")
+    outlier_sigmas: float = _slider(3.0, 1.0, 10.0, 0.1, "σ", "A source that disagrees more is left out")
+    smoothing_s: float = _slider(0.2, 0.0, 2.0, 0.05, "s", "How slowly the corridor follows its sources; 0 at once")
+    good_sigma_m: float = _slider(1.0, 0.1, 3.0, 0.1, "m", "The path is good as far as its sigma stays below this")
+    usable_s: float = _slider(1.5, 0.2, 5.0, 0.1, "s", "The path must be good for this time ahead to be driven after")
+
+
+class LaneParams(Section):
+    """Lane lines: from the picture to the ground, and over time."""
+
+    max_range_m: float = _slider(60.0, 15.0, 100.0, 5.0, "m", "Paint farther away is left out")
+    mount_height_m: float = _slider(
+        0.6, 0.0, 3.0, 0.05, "m", "Height of the ego origin above the road, where no sweep shows the road"
+    )
+    bearing_sigma_deg: float = _slider(0.1, 0.01, 1.0, 0.01, "°", "Noise of a point's direction in the picture")
+    min_quality: float = _slider(0.3, 0.05, 0.95, 0.01, "", "Lines supported less are not believed")
+    min_width_m: float = _slider(2.4, 1.5, 4.0, 0.1, "m", "Two lines nearer than this are no lane")
+    max_width_m: float = _slider(4.8, 3.0, 8.0, 0.1, "m", "Two lines farther apart than this are no lane")
+    max_heading_deg: float = _slider(
+        7.0, 1.0, 30.0, 0.5, "°", "A line turned further away from the car is no lane line"
+    )
+    gate_m: float = _slider(0.7, 0.1, 2.0, 0.05, "m", "A line farther from the expected place is another one")
+    max_age_s: float = _slider(1.0, 0.1, 5.0, 0.1, "s", "A line not seen for longer ends")
+    pitch_sigma_deg: float = _slider(0.8, 0.0, 3.0, 0.1, "°", "How far the camera's pitch may be off its calibration")
+    pitch_drift_deg: float = _slider(0.15, 0.01, 2.0, 0.01, "°/√s", "How fast the pitch changes: load and springs")
 
 
 class CipvParams(Section):
@@ -284,6 +324,7 @@ class Params(Section):
     alignment: AlignmentParams = AlignmentParams()
     fusion: FusionParams = FusionParams()
     motion: MotionParams = MotionParams()
+    lanes: LaneParams = LaneParams()
     path: PathParams = PathParams()
     cipv: CipvParams = CipvParams()
     acc: AccParams = AccParams()

@@ -125,6 +125,13 @@ def _path(path: Path) -> dict[str, Any]:
         "right": _line(path.right),
         "sigma_m": {at_m: _number(value) for at_m, value in path.sigma_m.items()},
         "weights": {source: _number(value) for source, value in path.weights.items()},
+        "carried_by": {
+            at_m: {source: _number(value) for source, value in shares.items()}
+            for at_m, shares in path.carried_by.items()
+        },
+        "reach_m": _number(path.reach_m),
+        "usable": path.usable,
+        "confidence": _number(path.confidence),
     }
 
 

@@ -44,6 +44,7 @@ class State:
     lidar: lidar_tracking.LidarTrackerState = lidar_tracking.LidarTrackerState()
     vision: vision_tracking.VisionTrackerState = vision_tracking.VisionTrackerState()
     fusion: fusion.FusionState = fusion.FusionState()
+    path: corridor.PathState = corridor.PathState()
     acc: acc.AccState = acc.AccState()
     aeb: aeb.AebState = aeb.AebState()
     lead_id: int | None = None
@@ -73,7 +74,10 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     )
     clock.lap("fusion")
     objects = motion.describe(fused.objects, frame.ego, params.motion)
-    path = corridor.corridor(frame.ego, params.path)
+    path_state, path = corridor.predict(
+        state.path, frame.ego, None, frame.gnss, frame.route, frame.t_ns, dt_s, params.path
+    )
+    clock.lap("path")
     objects, lead, rejected = cipv.choose(objects, path, state.lead_id, params.cipv)
     clock.lap("cipv")
     acc_state, command = acc.control(state.acc, frame.ego, lead, objects, path, dt_s, params.acc)
@@ -91,7 +95,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         cipv=lead,
         rejected=rejected,
         acc=command,
-        notes=frame.notes,
+        notes=(*frame.notes, *path.notes),
         streams=frame.streams,
         timing_ms={**frame.timing_ms, **clock.total()},
         layers=Layers(
@@ -106,7 +110,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         ),
     )
     lead_id = lead.id if lead is not None else None
-    return State(frame.t_ns, lidar_state, vision_state, fusion_state, acc_state, aeb_state, lead_id), result
+    return State(frame.t_ns, lidar_state, vision_state, fusion_state, path_state, acc_state, aeb_state, lead_id), result
 
 
 def warm_up() -> None:
@@ -114,7 +118,7 @@ def warm_up() -> None:
     warm_up_lidar()
     one = np.eye(2)
     kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)
-    corridor.nearest_on_path(corridor.corridor(None, Params().path), np.zeros((1, 2)))
+    corridor.warm_up()
 
 
 @dataclass(frozen=True)

@@ -328,17 +328,31 @@ class FusedObject:
         return not self.seen_by
 
 
+PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "fused"]
+
+
 @dataclass(frozen=True)
 class Path:
-    """Where the car is going. center, left, right: (K, 2) float64 ego x, y, from the bumper outwards."""
+    """Where the car is going. center, left, right: (K, 2) float64 ego x, y, from the bumper outwards; the edges need
+    not be parallel to the centre. source: which one carries it at 30 m, or ``fused`` when none does alone. sigma_m: of
+    the centre's sideways place at 10, 30, 60 m; profile_m: (K,) float64, the same at every point, empty where nobody
+    worked it out. weights: each source's share over the whole; carried_by: at 10, 30, 60 m. reach_m: how far it is good
+    enough to drive after. usable: that is far enough at this speed. confidence: 0–1, that the true centre lies within
+    the corridor there. notes: what is wrong with the sources, for a person."""
 
-    source: Literal["lane", "gnss", "yaw_rate", "straight", "fused"]
+    source: PathSource
     center: F64
     left: F64
     right: F64
     half_width_m: float
     sigma_m: dict[str, float]
     weights: dict[str, float]
+    profile_m: F64 = field(default_factory=lambda: np.zeros(0))
+    carried_by: dict[str, dict[str, float]] = field(default_factory=dict)
+    reach_m: float = 0.0
+    usable: bool = True
+    confidence: float = 1.0
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

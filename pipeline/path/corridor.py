@@ -1,67 +1,155 @@
 """The ego corridor: where the car is going, as a centre line with a left and a right edge (paper, section CIPV).
 
-The paper takes lane centres on straights and a GPS path in curves. Where neither is there, the car's own yaw rate bends
-the corridor along its true arc: at path length s the heading has turned by θ = s/r and the car has moved aside by
-r(1 − cos θ).
+    lane lines ───────────┐
+    GNSS on a route ──────┼─► compare, weigh ─► blend with the frame before ─► Path
+    yaw rate's arc ───────┤
+    (else straight ahead) ┘
+
+The paper takes lane centres on straights and a GPS path in curves, by hand. Here every source says how sure it is at
+each distance, and the sigmas decide. The path of the frame before is moved by the car's own motion and takes part, so
+that nothing jumps when a source comes or goes.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from math import erf, exp, isfinite, pi, sqrt
 
 import numba
 import numpy as np
 
 from pipeline.geometry import F64
 from pipeline.params import PathParams
-from pipeline.types import EgoState, Path
+from pipeline.path import fusing, gnss, yaw_rate
+from pipeline.path.estimates import SOURCES, STEP_M, between_lines, straight
+from pipeline.path.fusing import FusedPath
+from pipeline.path.gnss import GnssState
+from pipeline.path.lane_types import EgoLane
+from pipeline.path.yaw_rate import YawRate
+from pipeline.types import EgoState, GnssFix, Path, PathSource, Route
 
-STEP_M = 1.0
-_STRAIGHT_CURVATURE = 1e-6
-_LOOK_AHEAD_M = (10.0, 30.0, 60.0)
+_LOOK_AHEAD_M = (10, 30, 60)
+_CARRIES_ALONE = 0.7
+_FASTEST_SHIFT_MPS = 3.0
+"""No point of the corridor moves sideways faster than this, its own uncertainty apart: a lane change takes a second."""
+_USABLE_WITHOUT_SPEED_M = 20.0
+_USABLE_AT_STANDSTILL_M = 5.0
 
-STRAIGHT_CURVATURE_SIGMA = 1.0 / 500.0
-"""Curvature a straight guess leaves open: a 500 m radius is the tightest curve of a road driven at 100 km/h."""
-YAW_RATE_SIGMA_RADPS = 0.01
-"""Noise of an automotive yaw-rate sensor together with the driver's small corrections."""
+
+@dataclass(frozen=True, eq=False)
+class PathState:
+    """What one frame's path leaves to the next. last: the fused path; null where nothing can be carried over."""
+
+    yaw: YawRate | None = None
+    gnss: GnssState = GnssState()
+    last: FusedPath | None = None
+
+
+def predict(
+    state: PathState,
+    ego: EgoState | None,
+    lane: EgoLane | None,
+    fix: GnssFix | None,
+    route: Route | None,
+    t_ns: int,
+    dt_s: float | None,
+    params: PathParams,
+) -> tuple[PathState, Path]:
+    """The path ahead. Whatever is missing is left out; with nothing at all it is straight and says how little that is
+    worth."""
+    ego = ego if ego is not None and isfinite(ego.speed_mps) else None
+    yaw = yaw_rate.follow(state.yaw, ego, dt_s, params) if params.use_yaw_rate else None
+    placed, wrong_fix = gnss.follow(state.gnss, route, fix, ego, t_ns, dt_s, params)
+    placed, along_route, wrong_route = gnss.ahead(placed, params)
+    seen = (
+        between_lines(lane, params) if params.use_lanes else None,
+        along_route,
+        yaw_rate.ahead(yaw, ego, params),
+    )
+    estimates = [each for each in seen if each is not None] or [straight(ego, params)]
+    expected = _expected(state.last, yaw, ego, dt_s, len(estimates[0].center))
+    fresh, left_out = fusing.fuse(estimates, expected, params.half_width_m, params.outlier_sigmas)
+    path = fresh
+    if expected is not None and dt_s:
+        keep = exp(-dt_s / params.smoothing_s) if params.smoothing_s > 0.0 else 0.0
+        path = fusing.blend(fresh, expected, keep, _FASTEST_SHIFT_MPS * dt_s)
+    notes = (*_about_yaw_rate(ego), *wrong_fix, *wrong_route, *left_out)
+    return PathState(yaw, placed, path if ego is not None else None), _as_path(path, ego, notes, params)
 
 
 def corridor(ego: EgoState | None, params: PathParams) -> Path:
-    """The path in ego coordinates. Without ego speed or yaw rate, or too slow for the yaw rate to mean a curve, it is
-    straight, and its uncertainty says so."""
-    bends = (
-        params.use_yaw_rate
-        and ego is not None
-        and ego.yaw_rate_radps is not None
-        and ego.speed_mps >= params.min_speed_mps
-    )
-    if bends and ego is not None and ego.yaw_rate_radps is not None:
-        curvature = ego.yaw_rate_radps / ego.speed_mps
-        curvature_sigma = YAW_RATE_SIGMA_RADPS / ego.speed_mps
-    else:
-        curvature, curvature_sigma = 0.0, STRAIGHT_CURVATURE_SIGMA
-    center, heading = arc(curvature, np.arange(0.0, params.length_m + STEP_M / 2, STEP_M))
-    normal = np.column_stack([-np.sin(heading), np.cos(heading)])
-    source = "yaw_rate" if bends else "straight"
+    """The path of a single moment that has no lane lines, route or history."""
+    return predict(PathState(), ego, None, None, None, 0, None, params)[1]
+
+
+def warm_up() -> None:
+    """Compile the path's kernels: two frames of a made-up drive along a route."""
+    place = np.array([0.0, 0.001])
+    route, params, state = Route("warm-up", place, place, 0.01), PathParams(), PathState()
+    for k in range(2):
+        t_ns = k * 100_000_000
+        fix = GnssFix(t_ns, 0.0, k * 1e-5, 0.0, pi / 4, 10.0, "rtk_fixed", 0.01)
+        state, path = predict(state, EgoState(t_ns, 10.0, 0.0), None, fix, route, t_ns, 0.1 if k else None, params)
+    nearest_on_path(path, np.zeros((1, 2)))
+
+
+def _expected(
+    last: FusedPath | None, yaw: YawRate | None, ego: EgoState | None, dt_s: float | None, size: int
+) -> FusedPath | None:
+    """The last path where it should be now; null when there is none, or when the car's own motion is not known."""
+    if last is None or ego is None or not dt_s or len(last.center) != size:
+        return None
+    rate = yaw_rate.usable_rate(ego)
+    if rate is None:
+        rate = yaw.rate_radps if yaw is not None else 0.0
+    return fusing.moved(last, max(ego.speed_mps, 0.0) * dt_s, rate * dt_s, dt_s)
+
+
+def _about_yaw_rate(ego: EgoState | None) -> tuple[str, ...]:
+    broken = ego is not None and ego.yaw_rate_radps is not None and yaw_rate.usable_rate(ego) is None
+    return ("the yaw rate is not one that a car can have: left out",) if broken else ()
+
+
+def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], params: PathParams) -> Path:
+    normal = fusing.normals(path.center)
+    at = np.minimum(np.array(_LOOK_AHEAD_M) / STEP_M, len(path.center) - 1).astype(np.intp)
+    shares = path.shares[at]
+    carried_by: dict[str, dict[str, float]] = {
+        f"{s}": {str(name): share for name, share in zip(SOURCES, row, strict=True) if share > 0.005}
+        for s, row in zip(_LOOK_AHEAD_M, shares.tolist(), strict=True)
+    }
+    overall = shares.mean(axis=0)
+    main = int(np.argmax(shares[1]))
+    source: PathSource = SOURCES[main] if shares[1, main] >= _CARRIES_ALONE else "fused"
+    too_vague = np.flatnonzero(~(path.sigma_m <= params.good_sigma_m))
+    reach_m = float(too_vague[0] - 1) * STEP_M if len(too_vague) else params.length_m
+    needed_m = _needed_m(ego, params)
+    sigma = float(path.sigma_m[min(int(needed_m / STEP_M), len(path.sigma_m) - 1)])
+    usable = reach_m >= min(needed_m, params.length_m)
+    if not usable:
+        notes = (*notes, f"the path is known well enough for {max(reach_m, 0.0):.0f} m only")
     return Path(
-        source=source,  # type: ignore[arg-type]
-        center=center,
-        left=center + params.half_width_m * normal,
-        right=center - params.half_width_m * normal,
+        source=source,
+        center=path.center,
+        left=path.center + path.left_m[:, None] * normal,
+        right=path.center - path.right_m[:, None] * normal,
         half_width_m=params.half_width_m,
-        sigma_m={f"{s:.0f}": 0.5 * curvature_sigma * s * s for s in _LOOK_AHEAD_M},
-        weights={source: 1.0},
+        sigma_m={f"{s}": float(sigma) for s, sigma in zip(_LOOK_AHEAD_M, path.sigma_m[at].tolist(), strict=True)},
+        weights={name: float(share) for name, share in zip(SOURCES, overall.tolist(), strict=True) if share > 0.005},
+        profile_m=path.sigma_m,
+        carried_by=carried_by,
+        reach_m=max(reach_m, 0.0),
+        usable=usable,
+        confidence=erf(params.half_width_m / sigma / sqrt(2.0)) if sigma > 0.0 else 1.0,
+        notes=notes,
     )
 
 
-def arc(curvature: float, s: F64) -> tuple[F64, F64]:
-    """(K, 2) points and (K,) headings at path lengths ``s`` of an arc from the origin along +x; curvature is positive
-    to the left. It stops turning at a quarter circle: no corridor leads behind the car."""
-    theta = np.clip(curvature * s, -np.pi / 2, np.pi / 2)
-    if abs(curvature) < _STRAIGHT_CURVATURE:
-        return np.column_stack([s, 0.5 * curvature * s * s]), theta
-    beyond = s - np.abs(theta) / abs(curvature)
-    x = np.sin(theta) / curvature + beyond * np.cos(theta)
-    y = (1.0 - np.cos(theta)) / curvature + beyond * np.sin(theta)
-    return np.column_stack([x, y]), theta
+def _needed_m(ego: EgoState | None, params: PathParams) -> float:
+    """How far ahead a path must be known to be driven after."""
+    if ego is None:
+        return _USABLE_WITHOUT_SPEED_M
+    return max(params.usable_s * ego.speed_mps, _USABLE_AT_STANDSTILL_M)
 
 
 def offset(path: Path, points: F64) -> F64:

@@ -110,7 +110,7 @@ def test_in_path_is_relative_to_a_curved_path() -> None:
     assert on_arc.in_path
     assert not straight.in_path
     assert straight.path_offset_m == pytest.approx(-4.0, abs=0.2)
-    assert on_arc.in_path_probability > 0.95 > 0.05 > straight.in_path_probability  # type: ignore[operator]
+    assert on_arc.in_path_probability > 0.8 > 0.1 > straight.in_path_probability  # type: ignore[operator]
 
 
 @given(st.lists(st.tuples(st.floats(1, 90), st.floats(-6, 6), st.sampled_from(["V", "L", "VL"]), st.integers(1, 5))))

@@ -40,7 +40,7 @@ FIELDS = {
     "lidar_points gates",
     "objects.0.cuboid": "center size yaw_rad",
     "objects.0.gates.0": "name value limit passed",
-    "path": "source center left right sigma_m weights",
+    "path": "source center left right sigma_m weights carried_by reach_m usable confidence",
     "cipv": "id distance_m closing_speed_mps ttc_s reason",
     "rejected.0": "id reason",
     "acc": "state desired_speed_mps accel_mps2 accelerator brake reason",

@@ -1,0 +1,125 @@
+"""What one source says of the path ahead, and the two simplest sources: a straight guess, and the middle between lines.
+
+Every estimate is sampled at the same path lengths s = 0, 1, 2, … m, as points in the ego frame: a line x → y would
+fold up in a tight bend, points do not. Its sigma is that of the sideways place, along the normal, at each point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from pipeline.geometry import F64
+from pipeline.params import PathParams
+from pipeline.path.lane_types import EgoLane, LaneLine
+from pipeline.types import EgoState
+
+SourceName = Literal["lane", "gnss", "yaw_rate", "straight"]
+SOURCES: tuple[SourceName, ...] = ("lane", "gnss", "yaw_rate", "straight")
+STEP_M = 1.0
+UNKNOWN_SIGMA_M = 1e3
+"""Sigma of a place about which a source says nothing."""
+
+_STRAIGHT_CURVATURE = 1e-6
+_FASTEST_CURVATURE_PER_M = 1.0 / 500.0
+"""Curvature a straight guess leaves open where the speed is not known: a 500 m radius is the tightest curve of a road
+driven at 100 km/h."""
+_TIGHTEST_CURVATURE_PER_M = 0.02
+_LANE_WIDTH_SIGMA_M = 0.3
+"""How far a lane's width may be off where only one of its lines is seen."""
+_USUAL_LANE_M = 3.5
+
+
+@dataclass(frozen=True, eq=False)
+class PathEstimate:
+    """center: (K, 2) float64 ego x, y at s = 0, 1, … m. sigma_m: (K,) float64, of the sideways place. left_m, right_m:
+    (K,) float64 distances from the centre to the lane's edges; null where the source does not see edges."""
+
+    source: SourceName
+    center: F64
+    sigma_m: F64
+    left_m: F64 | None = None
+    right_m: F64 | None = None
+
+
+@lru_cache(maxsize=8)
+def samples(length_m: float) -> F64:
+    """(K,) path lengths at which every estimate is given, read-only."""
+    s = np.arange(0.0, length_m + STEP_M / 2, STEP_M)
+    s.flags.writeable = False
+    return s
+
+
+def arc(curvature: float, s: F64) -> tuple[F64, F64]:
+    """(K, 2) points and (K,) headings at path lengths ``s`` of an arc from the origin along +x; curvature is positive
+    to the left. At path length s the heading has turned by θ = s/r and the place has moved aside by r(1 − cos θ). It
+    stops turning at a quarter circle: no corridor leads behind the car."""
+    theta = np.clip(curvature * s, -np.pi / 2, np.pi / 2)
+    if abs(curvature) < _STRAIGHT_CURVATURE:
+        return np.column_stack([s, 0.5 * curvature * s * s]), theta
+    beyond = s - np.abs(theta) / abs(curvature)
+    x = np.sin(theta) / curvature + beyond * np.cos(theta)
+    y = (1.0 - np.cos(theta)) / curvature + beyond * np.sin(theta)
+    return np.column_stack([x, y]), theta
+
+
+def straight(ego: EgoState | None, params: PathParams) -> PathEstimate:
+    """Straight ahead, which is always there to fall back on. It leaves open every curvature that the speed allows."""
+    s = samples(params.length_m)
+    if ego is None:
+        curvature_sigma = _FASTEST_CURVATURE_PER_M
+    else:
+        speed2 = max(ego.speed_mps, params.min_speed_mps, 0.1) ** 2
+        curvature_sigma = min(params.lateral_accel_mps2 / speed2, _TIGHTEST_CURVATURE_PER_M)
+    center = np.column_stack([s, np.zeros_like(s)])
+    return PathEstimate("straight", center, np.hypot(params.lane_keeping_sigma_m, 0.5 * curvature_sigma * s * s))
+
+
+def between_lines(lane: EgoLane | None, params: PathParams) -> PathEstimate | None:
+    """The middle between the lane's two lines, or half a lane beside the one that is seen; null without any. The lines
+    need not be parallel. Where a line ends, its own covariance grows, and so does the sigma here."""
+    if lane is None or (lane.left is None and lane.right is None):
+        return None
+    x, reach = _along(lane, params)
+    left, right = _places(lane.left, x), _places(lane.right, x)
+    half = 0.5 * (lane.width_m or _USUAL_LANE_M)
+    if left is not None and right is not None:
+        y, sigma = 0.5 * (left[0] + right[0]), 0.5 * np.hypot(left[1], right[1])
+        half_left = half_right = np.maximum(0.5 * (left[0] - right[0]), 0.1)
+    else:
+        (y, sigma), side = (left, -1.0) if left is not None else (right, 1.0)  # type: ignore[misc]
+        y, sigma = y + side * half, np.hypot(sigma, 0.5 * _LANE_WIDTH_SIGMA_M)
+        half_left = half_right = np.full(len(x), half)
+    return _as_estimate(x, y, sigma, half_left, half_right, reach, params)
+
+
+def _places(line: LaneLine | None, x: F64) -> tuple[F64, F64] | None:
+    return None if line is None else (line.y_m(x), line.sigma_m(x))
+
+
+def _along(lane: EgoLane, params: PathParams) -> tuple[F64, float]:
+    """x at which the lines are read, and how far paint supports either of them."""
+    reach = max(line.x_max_m for line in (lane.left, lane.right) if line is not None)
+    return samples(params.length_m), reach
+
+
+def _as_estimate(
+    x: F64, y: F64, sigma: F64, left: F64, right: F64, reach: float, params: PathParams
+) -> PathEstimate | None:
+    """Places y(x) as samples along the path, edges and sigma along its normal. What lies beyond the paint is less
+    sure by how far a road may bend away meanwhile."""
+    slope = np.gradient(y, STEP_M)
+    stretch = np.sqrt(1.0 + slope * slope)
+    travelled = np.concatenate([[0.0], np.cumsum(0.5 * (stretch[1:] + stretch[:-1]) * STEP_M)])
+    across = 1.0 / stretch
+    beyond = np.maximum(x - reach, 0.0)
+    sigma = np.hypot(sigma * across, 0.5 * _FASTEST_CURVATURE_PER_M * beyond**2)
+    if not (np.isfinite(y).all() and np.isfinite(sigma).all()):
+        return None
+    s = samples(params.length_m)
+    at = np.interp(s, travelled, x)
+    rows = [np.interp(at, x, row) for row in (y, sigma, left * across, right * across)]
+    return PathEstimate("lane", np.column_stack([at, rows[0]]), rows[1], rows[2], rows[3])

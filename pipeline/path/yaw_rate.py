@@ -1,0 +1,79 @@
+"""The path that the car's own turning predicts: the arc of its yaw rate, smoothed, and how far ahead it is good for.
+
+Two noises set what an arc is worth. One yaw rate errs (sensor, and the driver's small corrections), which bends the arc
+wrongly by σ·s²/(2v). And a road does not keep its curvature: between a straight and a bend the lateral acceleration
+changes by some lateral jerk j, so after the path length s the arc is off by j·s³/(6v³). The second term is a law of
+time, s/v: an arc is good for about two seconds at any speed, which is the look-ahead that grows with speed.
+
+Measured on 60 s of a real drive (comma2k19, 8–20 m/s, nearly straight): yaw rate as sampled 0.0046 rad/s around zero
+(of which 0.0024 white, 0.0005 bias), lateral jerk 0.1 m/s³. Curves are entered at 0.3–0.9 m/s³ (AASHTO, *A Policy on
+Geometric Design*, length of spirals): the default lies in between, since the same code must hold on both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from pipeline.params import PathParams
+from pipeline.path.estimates import PathEstimate, arc, samples
+from pipeline.types import EgoState
+
+_FASTEST_RADPS = 2.0
+
+
+@dataclass(frozen=True)
+class YawRate:
+    """A smoothed yaw rate, rad/s, and its variance, which grows while none is measured."""
+
+    rate_radps: float
+    variance: float
+
+
+def follow(before: YawRate | None, ego: EgoState | None, dt_s: float | None, params: PathParams) -> YawRate | None:
+    """The yaw rate now: a random walk that changes with the lateral jerk of roads, j/v in rad/s² (Kalman, one state).
+
+    What is not finite, or faster than any car turns, is as good as not measured. Null before the first one, and where
+    ego speed is unknown or so slow that turning means no curve."""
+    if ego is None or not isfinite(ego.speed_mps) or ego.speed_mps < params.min_speed_mps:
+        return None
+    if before is not None and dt_s:
+        change = params.lateral_jerk_mps3 / ego.speed_mps * dt_s
+        before = YawRate(before.rate_radps, before.variance + change * change)
+    measured = usable_rate(ego)
+    if measured is None:
+        return before
+    noise = params.yaw_rate_sigma_radps**2
+    if before is None:
+        return YawRate(measured, noise)
+    gain = before.variance / (before.variance + noise)
+    return YawRate(before.rate_radps + gain * (measured - before.rate_radps), (1.0 - gain) * before.variance)
+
+
+def usable_rate(ego: EgoState | None) -> float | None:
+    """The measured yaw rate, or null when there is none that a car can have."""
+    rate = ego.yaw_rate_radps if ego is not None else None
+    return rate if rate is not None and isfinite(rate) and abs(rate) <= _FASTEST_RADPS else None
+
+
+def ahead(yaw: YawRate | None, ego: EgoState | None, params: PathParams) -> PathEstimate | None:
+    """The arc ahead, r(1 − cos θ) aside at path length s = rθ; null where no yaw rate is known.
+
+    Its sigma adds up where the car is in its lane, its sideways speed there, the yaw rate's error and the lateral jerk
+    of roads. A yaw rate not measured any more is one whose variance has grown."""
+    if yaw is None or ego is None or ego.speed_mps < params.min_speed_mps:
+        return None
+    s, speed = samples(params.length_m), ego.speed_mps
+    time_s = s / speed
+    center, _ = arc(yaw.rate_radps / speed, s)
+    # a driver's corrections last for seconds: smoothing does not make the yaw rate surer than they are
+    rate_sigma = max(yaw.variance**0.5, 0.75 * params.yaw_rate_sigma_radps)
+    variance = (
+        params.lane_keeping_sigma_m**2
+        + (params.lane_keeping_sigma_mps * time_s) ** 2
+        + (0.5 * rate_sigma * speed * time_s**2) ** 2
+        + (params.lateral_jerk_mps3 / 6.0 * time_s**3) ** 2
+    )
+    return PathEstimate("yaw_rate", center, np.sqrt(variance))
