@@ -6,11 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.sources.astyx import AstyxSource
-from pipeline.sources.base import Source, SourceError, TruthObject
+from pipeline.sources.base import LiveSource, Source, SourceError, TruthObject
 from pipeline.sources.kitti import KittiSource
 from pipeline.sources.simulated import SimulatedSource
 
-__all__ = ["Source", "SourceError", "TruthObject", "open_source"]
+__all__ = ["LiveSource", "Source", "SourceError", "TruthObject", "is_live", "open_live", "open_source"]
+
+_LIVE = "live:"
 
 _OPENERS: dict[str, Callable[[str, str, int], Source]] = {
     "astyx": lambda uri, rest, rings: AstyxSource(uri, rest),
@@ -32,9 +34,24 @@ def open_source(uri: str, *, rings: int = 16) -> Source:
     is_drive_letter = len(scheme) == 1
     if not colon or is_drive_letter or not scheme.isalnum():
         raise SourceError(_about_bare_path(uri))
+    if is_live(uri):
+        raise SourceError(f"{uri}: live sensors have no frames to choose from; a recording is needed here")
     if scheme not in _OPENERS:
         raise SourceError(f"{uri}: no kind of source named {scheme!r}; there are {', '.join(_OPENERS)}")
     return _OPENERS[scheme](uri, rest, rings)
+
+
+def is_live(uri: str) -> bool:
+    """Whether it names devices that are read as they deliver, which ``open_live`` opens."""
+    return uri.startswith(_LIVE)
+
+
+def open_live(uri: str) -> LiveSource:
+    """Open ``live:<config.yaml>``; ``start`` it to read. SourceError when the file cannot be used."""
+    from pipeline.sources.live.config import load  # drivers of sensors: only who has sensors pays for them
+    from pipeline.sources.live.source import LiveSensors
+
+    return LiveSensors(uri, load(uri.removeprefix(_LIVE)))
 
 
 def _about_bare_path(path: str) -> str:

@@ -7,7 +7,8 @@ from typing import Protocol
 
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
-from pipeline.types import Frame
+from pipeline.params import SyncParams
+from pipeline.types import CameraCalibration, Frame, StreamHealth
 
 
 class SourceError(BadInput):
@@ -55,20 +56,27 @@ class LiveSource(Protocol):
     """Devices that are read as they deliver. There is no way back: what nobody took in time is dropped and counted.
 
     notes: what a person should know about the whole, as with ``Source``; a frame's own troubles are in its notes.
+    camera: calibration of the pictures, null without one. dropped: ticks that nobody took in time.
     """
 
     uri: str
     title: str
     rate_hz: float
     notes: tuple[str, ...]
+    camera: CameraCalibration | None
+    dropped: int
 
     def start(self) -> None:
         """Open the devices; one that is not there yet is waited for in the background."""
         ...
 
-    def next(self, timeout_s: float) -> Frame | None:
+    def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
         """The newest tick not given yet; null when none came in time. A tick is a whole LiDAR sweep with the nearest
-        picture, or, while the LiDAR is silent, a picture."""
+        picture, or, while the LiDAR is silent, a picture. ``params``: how sensors are put together, as it stands."""
+        ...
+
+    def health(self) -> tuple[StreamHealth, ...]:
+        """How each sensor does now, also while none ticks."""
         ...
 
     def close(self) -> None:

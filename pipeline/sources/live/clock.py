@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import time
 
+_LONGEST_AGE_NS = 1_000_000_000
+
 
 class HostClock:
     """Nanoseconds since 1970, steady."""
@@ -19,9 +21,9 @@ class HostClock:
         return time.monotonic_ns() + self._unix_ns
 
     def of_wall_ns(self, wall_ns: int) -> int:
-        """A stamp that the system's clock gave within the last second, on this timeline."""
-        age_ns = min(max(0, time.time_ns() - wall_ns), 1_000_000_000)
-        return self.now_ns() - age_ns
+        """A stamp that the system's clock gave within the last second, on this timeline; now where it did not."""
+        age_ns = time.time_ns() - wall_ns
+        return self.now_ns() - (age_ns if 0 <= age_ns <= _LONGEST_AGE_NS else 0)
 
     def ahead_ns(self) -> int:
         """How far the system's clock is ahead of this timeline by now: it was set in between."""

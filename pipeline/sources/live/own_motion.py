@@ -1,4 +1,4 @@
-"""Own speed and yaw rate from a GNSS receiver: it measures speed and course, the yaw rate is how fast the course turns."""
+"""Own speed and yaw rate from a GNSS receiver: it measures speed and course, and the course turns as the car does."""
 
 from __future__ import annotations
 

@@ -20,7 +20,8 @@ _PAST_NS, _FUTURE_NS = 2_000_000_000, 200_000_000
 """A message stamped outside these bounds around now is of a clock that was set, or damaged."""
 _PATIENCE_NS, _LONGEST_PATIENCE_NS = 250_000_000, 1_000_000_000
 """The LiDAR is waited for three of its periods, within these bounds, before the camera ticks instead."""
-_KEPT = 64
+_KEPT, _PICTURES_KEPT = 64, 24
+"""Pictures are large; so many are 0.4 s of a 60 Hz camera, and a sweep is 0.05 s old when it is whole."""
 _OWN_MOTION_WITHIN_NS = 500_000_000
 
 
@@ -37,7 +38,8 @@ class Stream(Generic[T]):
     """What one sensor gave lately, in order of time. taken: messages kept, of them ``late`` ones that were overtaken.
     duplicates, implausible: messages refused, by reason."""
 
-    def __init__(self) -> None:
+    def __init__(self, keep: int = _KEPT) -> None:
+        self._keep = keep
         self._kept: list[Stamped[T]] = []
         self.taken = self.late = self.duplicates = self.implausible = 0
 
@@ -54,7 +56,7 @@ class Stream(Generic[T]):
         self.taken += 1
         self.late += place < len(self._kept)
         self._kept.insert(place, Stamped(t_ns, value, now_ns))
-        del self._kept[:-_KEPT]
+        del self._kept[: -self._keep]
         while self._kept and self._kept[0].t_ns < now_ns - _PAST_NS:
             del self._kept[0]
         return True
@@ -90,7 +92,7 @@ class Synchroniser(Generic[P]):
 
     def __init__(self) -> None:
         self.sweeps: Stream[Sweep] = Stream()
-        self.pictures: Stream[P] = Stream()
+        self.pictures: Stream[P] = Stream(_PICTURES_KEPT)
         self.egos: Stream[EgoState] = Stream()
         self.fixes: Stream[GnssFix] = Stream()
         self._ticked_ns: int | None = None

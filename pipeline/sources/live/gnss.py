@@ -1,0 +1,116 @@
+"""A GNSS receiver's sentences, by serial line, TCP or UDP."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+from collections.abc import Callable
+from dataclasses import replace
+
+import serial
+
+from pipeline.sources.live.clock import HostClock
+from pipeline.sources.live.config import GnssConfig
+from pipeline.sources.live.health import StreamStats
+from pipeline.sources.live.inputs import Deliver
+from pipeline.sources.live.reader import CONNECT_S, POLL_S, DeviceLost, Read, Reader, Stop
+from pipeline.sources.live.udp import read_datagrams
+from pipeline.sources.nmea import NmeaReader
+from pipeline.sources.velodyne import SensorClock
+from pipeline.types import GnssFix
+
+_SILENT_POLLS = 10
+"""Polls of a TCP connection without a byte, two seconds, before it is opened anew; receivers send once a second."""
+_LONGEST = 4096
+
+
+class GnssInput:
+    """utc_to_host_ns: a better way from UTC to the host's timeline than this receiver's delays, while there is one: a
+    LiDAR that follows GPS."""
+
+    def __init__(
+        self,
+        config: GnssConfig,
+        clock: HostClock,
+        deliver: Deliver[GnssFix],
+        utc_to_host_ns: Callable[[int, int], int | None] = lambda utc_ns, near_ns: None,
+    ) -> None:
+        self.stats = StreamStats("gnss")
+        self._clock, self._deliver, self._utc_to_host_ns = clock, deliver, utc_to_host_ns
+        self._offset_ns = round(config.time_offset_ms * 1e6)
+        self._own = SensorClock()
+        self._sentences = NmeaReader()
+        self._rest = b""
+        self.readers: tuple[Reader, ...] = (Reader("gnss", self._read(config), self._say),)
+
+    def clock_offset_ms(self) -> float | None:
+        return None if self._own.offset_ns is None else self._own.offset_ns / 1e6
+
+    def _read(self, config: GnssConfig) -> Read:
+        if config.udp_port is not None:
+            port, interface = config.udp_port, config.interface
+            return lambda stop: read_datagrams(port, interface, None, self._datagram, stop)
+        if config.tcp is not None:
+            host, _, number = config.tcp.rpartition(":")
+            return lambda stop: _read_tcp(host, int(number), self._bytes, stop)
+        device = config.serial or ""
+        return lambda stop: _read_serial(device, config.baud, self._bytes, stop)
+
+    def _datagram(self, data: bytes, wall_ns: int) -> None:
+        self._lines(data.splitlines(), self._clock.of_wall_ns(wall_ns))
+
+    def _bytes(self, data: bytes) -> None:
+        """A piece of a stream: whole lines are read, the rest waits for its end; a rest that grows is garbage."""
+        *lines, rest = (self._rest + data).split(b"\n")
+        self._rest = rest if len(rest) < _LONGEST else b""
+        self._lines(lines, self._clock.now_ns())
+
+    def _lines(self, lines: list[bytes], arrived_ns: int) -> None:
+        for line in lines:
+            if not line.strip():
+                continue
+            utc_near_ns = arrived_ns + self._clock.ahead_ns()
+            fix = self._sentences.push(line.decode("ascii", errors="replace"), utc_near_ns)
+            self.stats.lost = self._sentences.bad
+            if fix is not None:
+                self._give(fix, arrived_ns)
+        self.stats.note = "no fix yet" if self._sentences.no_fix and self.stats.since_ns(arrived_ns) is None else ""
+
+    def _give(self, fix: GnssFix, arrived_ns: int) -> None:
+        self._own.observe(fix.t_ns // 1000, arrived_ns)
+        t_ns = self._utc_to_host_ns(fix.t_ns, arrived_ns)
+        if t_ns is None:
+            t_ns = self._own.to_ns(fix.t_ns / 1000)
+        t_ns += self._offset_ns
+        self.stats.arrived(arrived_ns, t_ns)
+        self._deliver(t_ns, replace(fix, t_ns=t_ns), arrived_ns)
+
+    def _say(self, text: str) -> None:
+        self.stats.note = text
+
+
+def _read_tcp(host: str, port: int, receive: Callable[[bytes], None], stop: Stop) -> None:
+    try:
+        connection = socket.create_connection((host, port), timeout=CONNECT_S)
+    except (OSError, OverflowError) as error:
+        raise DeviceLost(f"{host}:{port}: {getattr(error, 'strerror', None) or error}") from None
+    silent = 0
+    with connection:
+        connection.settimeout(POLL_S)
+        while not stop and silent < _SILENT_POLLS:
+            silent += 1
+            with contextlib.suppress(TimeoutError):
+                data = connection.recv(_LONGEST)
+                if not data:
+                    raise DeviceLost(f"{host}:{port}: the receiver closed the connection")
+                silent = 0
+                receive(data)
+
+
+def _read_serial(device: str, baud: int, receive: Callable[[bytes], None], stop: Stop) -> None:
+    try:
+        with serial.Serial(device, baud, timeout=POLL_S) as line:
+            while not stop:
+                receive(line.read(max(1, line.in_waiting)))
+    except (serial.SerialException, OSError, ValueError) as error:
+        raise DeviceLost(f"{device}: {getattr(error, 'strerror', None) or error}") from None

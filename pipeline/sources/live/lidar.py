@@ -1,0 +1,71 @@
+"""A VLP-16 on the network: data packets to sweeps, position packets to what its clock follows."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from pipeline.sources.live.clock import HostClock
+from pipeline.sources.live.config import LidarConfig
+from pipeline.sources.live.health import StreamStats
+from pipeline.sources.live.inputs import Deliver, whole_hours_off
+from pipeline.sources.live.reader import Reader
+from pipeline.sources.live.udp import read_datagrams
+from pipeline.sources.velodyne import BadPacket, Vlp16Decoder, read_position
+from pipeline.types import Sweep
+
+_HOUR_NS = 3_600_000_000_000
+
+
+class LidarInput:
+    """pps: what the last position packet said of the pulse per second; null before one came. follows_gps: the sensor's
+    time is UTC past the hour."""
+
+    def __init__(self, config: LidarConfig, clock: HostClock, deliver: Deliver[Sweep]) -> None:
+        self.stats = StreamStats("lidar")
+        self.pps: str | None = None
+        self.follows_gps = False
+        self._clock, self._deliver = clock, deliver
+        self._offset_ns = round(config.time_offset_ms * 1e6)
+        self._decoder = Vlp16Decoder(config.mount.T_ego_sensor())
+        listen = partial(read_datagrams, interface=config.interface, group=config.multicast_group)
+        readers = [Reader("lidar", lambda stop: listen(config.data_port, receive=self._data, stop=stop), self._say)]
+        if config.position_port is not None:
+            port = config.position_port
+            readers.append(Reader("lidar-position", lambda stop: listen(port, receive=self._pps, stop=stop), self._say))
+        self.readers: tuple[Reader, ...] = tuple(readers)
+
+    def clock_offset_ms(self) -> float | None:
+        offset_ns = self._decoder.clock.offset_ns
+        return None if offset_ns is None else whole_hours_off(offset_ns)
+
+    def utc_to_host_ns(self, utc_ns: int, near_ns: int) -> int | None:
+        """UTC on the host's timeline, by the LiDAR's clock; null while that does not follow GPS."""
+        offset_ns = self._decoder.clock.offset_ns
+        if not self.follows_gps or offset_ns is None:
+            return None
+        return near_ns + round(whole_hours_off(utc_ns + offset_ns - near_ns) * 1e6)
+
+    def _data(self, packet: bytes, wall_ns: int) -> None:
+        """The decoder's own clock maps to the host's timeline; it is not told of GPS, whose time is not the host's."""
+        arrived_ns = self._clock.of_wall_ns(wall_ns)
+        sweep = self._decoder.push(packet, arrived_ns)
+        counts = self._decoder.counts
+        self.stats.lost, self.stats.refused = counts.lost, sum(counts.refused.values())
+        if counts.models and self.stats.since_ns(arrived_ns) is None:
+            self.stats.note = f"packets of a {', '.join(counts.models)}, not of a VLP-16"
+        if sweep is not None:
+            self.stats.note = ""
+            t_ns = sweep.t_ns + self._offset_ns
+            self.stats.arrived(arrived_ns, t_ns)
+            self._deliver(t_ns, sweep, arrived_ns)
+
+    def _pps(self, packet: bytes, wall_ns: int) -> None:
+        try:
+            position = read_position(packet)
+        except BadPacket:
+            self.stats.refused += 1
+            return
+        self.pps, self.follows_gps = position.pps, position.locked
+
+    def _say(self, text: str) -> None:
+        self.stats.note = text

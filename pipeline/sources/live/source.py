@@ -1,0 +1,202 @@
+"""``live:<config.yaml>``: the sensors of one car as a source of ticks, the newest only.
+
+Readers' threads put what comes into the synchroniser; whoever wants a frame takes the newest tick out of it. There is
+no queue between them, so what is shown is never older than the sensors and the line make it.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import replace
+from typing import TypeVar
+
+from pipeline.params import SyncParams
+from pipeline.sources.live.camera import CameraInput
+from pipeline.sources.live.can import CanInput
+from pipeline.sources.live.clock import HostClock
+from pipeline.sources.live.config import LiveConfig
+from pipeline.sources.live.gnss import GnssInput
+from pipeline.sources.live.health import StreamStats
+from pipeline.sources.live.inputs import Input
+from pipeline.sources.live.lidar import LidarInput
+from pipeline.sources.live.own_motion import MotionFromGnss
+from pipeline.sources.live.pictures import Shot
+from pipeline.sources.live.sync import Stream, Synchroniser, Together
+from pipeline.types import CameraCalibration, Frame, GnssFix, Picture, StreamHealth, Sweep
+
+T = TypeVar("T")
+
+_LOOK_AGAIN_S = 0.005
+"""How often a tick that waits for its picture, or for the LiDAR's silence, is looked at when nothing arrives."""
+
+
+class LiveSensors:
+    """See ``pipeline.sources.base.LiveSource``. SourceError when a DBC file does not hold what the config names.
+
+    A frame's index counts the ticks, those that nobody took in time too, so a gap in it is a drop."""
+
+    def __init__(self, uri: str, config: LiveConfig) -> None:
+        self.uri, self.title = uri, config.title
+        self.rate_hz = 10.0 if config.lidar is not None else 30.0
+        self.dropped = 0
+        self._index = -1
+        self._clock = HostClock()
+        self._sync: Synchroniser[Shot] = Synchroniser()
+        self._came = threading.Condition()
+        self._is_open = False
+        self._wire(config)
+        self.notes = _about(config)
+
+    def _wire(self, config: LiveConfig) -> None:
+        """An input for each sensor of the config, each delivering to its own stream."""
+        self.inputs: dict[str, Input] = {}
+        self._ego_stats: StreamStats | None = None
+        self._motion = MotionFromGnss()
+        calibration = config.camera.calibration if config.camera is not None else None
+        self.camera = calibration.calibration() if calibration is not None else None
+        lidar = None
+        if config.lidar is not None:
+            self.inputs["lidar"] = lidar = LidarInput(config.lidar, self._clock, self._into(self._sync.sweeps))
+        if config.camera is not None:
+            self.inputs["camera"] = CameraInput(config.camera, self._clock, self._into(self._sync.pictures))
+        if config.gnss is not None:
+            utc = {} if lidar is None else {"utc_to_host_ns": lidar.utc_to_host_ns}
+            self.inputs["gnss"] = GnssInput(config.gnss, self._clock, self._take_fix, **utc)
+        if config.ego is not None and config.ego.can is not None:
+            offset_ms, can = config.ego.time_offset_ms, config.ego.can
+            self.inputs["ego"] = CanInput(can, offset_ms, self._clock, self._into(self._sync.egos))
+        elif config.ego is not None:
+            self._ego_stats = StreamStats("ego")
+            self._ego_offset_ns = round(config.ego.time_offset_ms * 1e6)
+
+    def start(self) -> None:
+        """Open the devices; one that is not there yet is tried again until it is."""
+        self._is_open = True
+        for each in self.inputs.values():
+            for reader in each.readers:
+                reader.start()
+
+    def close(self) -> None:
+        """Give the devices back. Safe to call twice."""
+        if self._is_open:
+            self._is_open = False
+            for each in self.inputs.values():
+                for reader in each.readers:
+                    reader.close()
+
+    def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
+        """The newest tick not given yet; null when none came in time."""
+        together = self._wait(timeout_s, params or SyncParams())
+        return self._frame(together) if together is not None else None
+
+    def health(self) -> tuple[StreamHealth, ...]:
+        """How each configured sensor does now."""
+        now_ns = self._clock.now_ns()
+        stats = [each.stats for each in self.inputs.values()]
+        if self._ego_stats is not None:
+            stats.append(self._ego_stats)
+        with self._came:
+            return tuple(each.health(now_ns) for each in stats)
+
+    def _wait(self, timeout_s: float, params: SyncParams) -> Together[Shot] | None:
+        end_s = time.monotonic() + timeout_s
+        with self._came:
+            while True:
+                together = self._sync.tick(self._clock.now_ns(), params)
+                left_s = end_s - time.monotonic()
+                if together is not None or left_s <= 0.0:
+                    return together
+                self._came.wait(min(left_s, _LOOK_AGAIN_S))
+
+    def _into(self, stream: Stream[T]):  # type: ignore[no-untyped-def]
+        """What an input delivers to: the stream, under the lock."""
+
+        def deliver(t_ns: int, value: T, arrived_ns: int) -> None:
+            with self._came:
+                stream.add(t_ns, value, arrived_ns)
+                self._came.notify_all()
+
+        return deliver
+
+    def _take_fix(self, t_ns: int, fix: GnssFix, arrived_ns: int) -> None:
+        with self._came:
+            self._sync.fixes.add(t_ns, fix, arrived_ns)
+            if self._ego_stats is not None:
+                ego = self._motion.push(fix)
+                ego = replace(ego, t_ns=ego.t_ns + self._ego_offset_ns)
+                self._ego_stats.arrived(arrived_ns, ego.t_ns)
+                self._sync.egos.add(ego.t_ns, ego, arrived_ns)
+            self._came.notify_all()
+
+    def _frame(self, together: Together[Shot]) -> Frame:
+        taken_ns = self._clock.now_ns()
+        self.dropped += together.replaced
+        self._index += 1 + together.replaced
+        notes = list(together.notes)
+        picture = self._picture(together, notes)
+        decoded_ns = self._clock.now_ns()
+        streams = self.health()
+        notes += [_missing(each) for each in streams if each.state != "ok"]
+        return Frame(
+            self._index,
+            f"{self._index:06d}",
+            together.t_ns,
+            sweep=_sweep(together),
+            picture=picture,
+            camera=self._calibration_for(picture, notes),
+            ego=together.ego,
+            notes=tuple(notes),
+            gnss=together.gnss,
+            streams=streams,
+            timing_ms={
+                "arrival": (together.arrived_ns - together.t_ns) / 1e6,
+                "waiting": (taken_ns - together.arrived_ns) / 1e6,
+                "picture": (decoded_ns - taken_ns) / 1e6,
+            },
+        )
+
+    def _picture(self, together: Together[Shot], notes: list[str]) -> Picture | None:
+        if together.picture is None:
+            return None
+        shot = together.picture.value
+        bgr = shot.bgr()
+        if bgr is None:
+            notes.append("the picture is damaged")
+            return None
+        return Picture(together.picture.t_ns, bgr, shot.encoded)
+
+    def _calibration_for(self, picture: Picture | None, notes: list[str]) -> CameraCalibration | None:
+        """The calibration, if it is this picture's."""
+        camera = self.camera
+        if camera is None or picture is None:
+            return camera
+        height, width = picture.bgr.shape[:2]
+        if (width, height) == (camera.width, camera.height):
+            return camera
+        notes.append(f"pictures are {width}×{height}, the calibration is for {camera.width}×{camera.height}: not used")
+        return None
+
+
+def _sweep(together: Together[Shot]) -> Sweep | None:
+    return None if together.sweep is None else replace(together.sweep.value, t_ns=together.sweep.t_ns)
+
+
+def _missing(stream: StreamHealth) -> str:
+    since = f" for {stream.age_ms / 1e3:.1f} s" if stream.age_ms is not None and stream.state != "absent" else ""
+    why = f" ({stream.note})" if stream.note else ""
+    return f"{stream.sensor} {stream.state}{since}{why}"
+
+
+def _about(config: LiveConfig) -> tuple[str, ...]:
+    """What a person should know about this set of sensors."""
+    notes = []
+    if config.lidar is None:
+        notes.append("no LiDAR: the camera ticks")
+    if config.camera is None:
+        notes.append("no camera: LiDAR goes on alone")
+    elif config.camera.calibration is None:
+        notes.append("the camera has no calibration: LiDAR and camera are not fused")
+    if config.ego is None:
+        notes.append("no own speed: neither gnss nor CAN gives it")
+    return tuple(notes)
