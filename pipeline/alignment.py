@@ -4,6 +4,7 @@ Both answer the same two questions, so that every stage and view works with eith
 
 ``project``    (N, 3) ego points → (N, 2) pixels u, v; NaN for points that the camera cannot see (behind it).
 ``unproject``  (N, 2) pixels and (N,) horizontal ranges from the ego origin → (N, 3) ego points.
+``rays``       (N, 2) pixels → the (3,) place they are seen from, and (N, 3) directions, not normalised.
 
 Paper: section "The Alignment Method of the Camera and LiDAR point cloud" and "Transform the Image pixel to the BEV".
 The printed inverse y = x_img·tan(x_img·h_res) has the wrong dimension; from the forward equation
@@ -29,6 +30,8 @@ class Alignment(Protocol):
     def project(self, points: F64) -> F64: ...
 
     def unproject(self, pixels: F64, range_m: F64) -> F64: ...
+
+    def rays(self, pixels: F64) -> tuple[F64, F64]: ...
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,9 @@ class Angular:
         elevation = (self.cy - pixels[:, 1]) * self.v_res_rad
         return np.column_stack([range_m * np.cos(azimuth), -range_m * np.sin(azimuth), range_m * np.tan(elevation)])
 
+    def rays(self, pixels: F64) -> tuple[F64, F64]:
+        return np.zeros(3), self.unproject(pixels, np.ones(len(pixels)))
+
 
 @dataclass(frozen=True)
 class Pinhole:
@@ -79,20 +85,23 @@ class Pinhole:
 
     def unproject(self, pixels: F64, range_m: F64) -> F64:
         """The point on the pixel's ray whose horizontal range from the ego origin is ``range_m``."""
-        pixels = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
-        if self.distortion.size and len(pixels):
-            flat = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.K, self.distortion).reshape(-1, 2)
-        else:
-            flat = (pixels - self.K[:2, 2]) / [self.K[0, 0], self.K[1, 1]]
-        T_ego_camera = inverse(self.T_camera_ego)
-        ray = np.column_stack([flat, np.ones(len(flat))]) @ T_ego_camera[:3, :3].T
-        start = T_ego_camera[:3, 3]
+        start, ray = self.rays(pixels)
         # |start_xy + t ray_xy| = range: the larger root is the one ahead of the camera
         a = np.sum(ray[:, :2] ** 2, axis=1)
         b = ray[:, :2] @ start[:2]
         c = float(start[:2] @ start[:2]) - np.asarray(range_m, dtype=np.float64) ** 2
         t = (-b + np.sqrt(np.maximum(b * b - a * c, 0.0))) / a
         return start + t[:, None] * ray
+
+    def rays(self, pixels: F64) -> tuple[F64, F64]:
+        pixels = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        if self.distortion.size and len(pixels):
+            flat = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.K, self.distortion).reshape(-1, 2)
+        else:
+            flat = (pixels - self.K[:2, 2]) / [self.K[0, 0], self.K[1, 1]]
+        T_ego_camera = inverse(self.T_camera_ego)
+        directions = np.column_stack([flat, np.ones(len(flat))]) @ T_ego_camera[:3, :3].T
+        return T_ego_camera[:3, 3], directions
 
 
 def angular_from_calibration(camera: CameraCalibration) -> Angular:

@@ -121,5 +121,3 @@ def _paint(bgr, rows, paint_px, min_contrast, full_contrast):  # type: ignore[no
 def warm_up() -> None:
     """Compile the kernel before the first picture."""
     open_classical(None).detect(np.zeros((72, 128, 3), np.uint8))
-
-

@@ -55,7 +55,8 @@ class EgoLane:
 
     source: the lane detector's name; ``classical`` for the one without a network. age_s: since the detector last
     delivered anything. pitch_rad: the estimated pitch of the camera against its calibration, positive downwards, that
-    the ground mapping used. width_m: between the lines at x = 0 … 20 m, null without both.
+    the ground mapping used. width_m: between the lines at x = 0 … 20 m, null without both. plane: (3,) a, b, c of
+    the road z = a·x + b·y + c that the mapping used.
     """
 
     left: LaneLine | None
@@ -64,3 +65,4 @@ class EgoLane:
     age_s: float
     pitch_rad: float
     width_m: float | None = None
+    plane: F64 | None = None

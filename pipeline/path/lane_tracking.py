@@ -1,0 +1,213 @@
+"""Lane lines from frame to frame: a Kalman filter on each line's polynomial, moved by the car's own motion.
+
+A line y(x) seen from a car that has driven Δs and turned by Δψ is y(x + Δs) − x·Δψ − Δs·Δψ/2: linear in the
+coefficients, so prediction is exact for small turns. Every line near the car is tracked, not only the two of the ego
+lane, so that in a lane change the lines pass through and the ego lane is simply another pair of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.geometry import F64
+from pipeline.params import LaneParams
+from pipeline.path.lane_fit import FittedLine, Shape
+from pipeline.path.lane_types import EgoLane, LaneLine, Side, powers
+from pipeline.types import EgoState
+
+_COMPARE_AT = powers([5.0, 15.0])
+_SIDE_AT_M = 4.0
+"""Which side of the car a line is on is judged here: where the front wheels will be."""
+_FURTHEST_M = 5.0
+_USUAL_WIDTH_M = 3.5
+_SEEN_GAIN = 0.35
+"""Share by which a sighting moves a line's quality."""
+_FADE_S = 0.8
+"""The quality of a line that is not seen falls to a third in this time."""
+_FORGOTTEN = 0.1
+_UNKNOWN_DRIFT_MPS = 0.5
+"""How fast lines may move sideways where the car's own motion is not known."""
+_YAW_RATE_SIGMA_RADPS = 0.01
+_UNKNOWN_YAW_RATE_RADPS = 0.06
+_UNKNOWN_SPEED_MPS = 20.0
+_CLOTHOID_PER_M2 = 1.0 / 150.0**2
+"""How fast roads change their curvature: a clothoid of parameter A = 150 m, that of a road for 80 km/h."""
+
+
+@dataclass(frozen=True, eq=False)
+class LineTrack:
+    """One painted line. coefficients (4,), covariance (4, 4); seen: how often; unseen_s: since it was last seen."""
+
+    coefficients: F64
+    covariance: F64
+    x_min_m: float
+    x_max_m: float
+    quality: float
+    seen: int = 1
+    unseen_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class LaneTracks:
+    """Every line that is followed. source: the detector's name, null before it first delivered; age_s: since then."""
+
+    lines: tuple[LineTrack, ...] = ()
+    source: str | None = None
+    age_s: float = 0.0
+
+
+def predict(tracks: LaneTracks, ego: EgoState | None, dt_s: float | None, params: LaneParams) -> LaneTracks:
+    """The lines ``dt_s`` later, seen from the moved car; those not seen for too long end."""
+    if dt_s is None:
+        return tracks
+    speed = ego.speed_mps if ego is not None else 0.0
+    yaw_rate = ego.yaw_rate_radps if ego is not None else None
+    way, turn = speed * dt_s, (yaw_rate or 0.0) * dt_s
+    move, offset = shifted(way), np.array([-0.5 * way * turn, -turn, 0.0, 0.0])
+    noise = _noise(ego, dt_s)
+    moved = [
+        replace(
+            line,
+            coefficients=move @ line.coefficients + offset,
+            covariance=move @ line.covariance @ move.T + noise,
+            x_min_m=line.x_min_m - way,
+            x_max_m=line.x_max_m - way,
+            unseen_s=line.unseen_s + dt_s,
+        )
+        for line in tracks.lines
+    ]
+    kept = tuple(line for line in moved if line.unseen_s <= params.max_age_s and line.x_max_m > 0.0)
+    return LaneTracks(kept, tracks.source, tracks.age_s + dt_s)
+
+
+def update(tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], params: LaneParams) -> LaneTracks:
+    """The lines after a picture. One that was not found in it fades; one that is new is born with its own quality."""
+    pairs = _pairs(tracks.lines, measured, params.gate_m)
+    lines = [_joined(line, measured[pairs[i]]) if i in pairs else _faded(line) for i, line in enumerate(tracks.lines)]
+    new = [found for j, found in enumerate(measured) if j not in pairs.values()]
+    lines += [LineTrack(f.coefficients, f.covariance, f.x_min_m, f.x_max_m, f.quality) for f in new]
+    return LaneTracks(tuple(line for line in lines if line.quality >= _FORGOTTEN), source, 0.0)
+
+
+def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParams) -> EgoLane | None:
+    """The pair of lines that the car is most likely between; null before a detector ever delivered.
+
+    Each side takes a believed line or none. A pair whose width is no lane's is not taken: one of the two is wrong, or
+    the calibration is, and if no other line says which, the better supported one stands alone.
+    """
+    if tracks.source is None:
+        return None
+    believed = [line for line in tracks.lines if _quality_now(line) >= params.min_quality]
+    places = [float(powers(_SIDE_AT_M) @ line.coefficients) for line in believed]
+    left = [line for line, y in zip(believed, places, strict=True) if 0.0 < y < _FURTHEST_M]
+    right = [line for line, y in zip(believed, places, strict=True) if -_FURTHEST_M < y <= 0.0]
+    pairs = [(a, b) for a in [*left, None] for b in [*right, None]]
+    a, b = max(pairs, key=lambda pair: _worth(pair[0], pair[1], params))
+    width = _width_m(a, b) if a is not None and b is not None else None
+    return EgoLane(_as_line("left", a), _as_line("right", b), tracks.source, tracks.age_s, pitch_rad, width, plane)
+
+
+def expected_shape(tracks: LaneTracks) -> Shape | None:
+    """Heading and curvature of the best line, to search around; null when none is sure."""
+    best = max(tracks.lines, key=lambda line: line.quality, default=None)
+    if best is None or best.quality < 0.5 or best.seen < 3:
+        return None
+    return Shape(
+        float(best.coefficients[1]),
+        float(2.0 * best.coefficients[2]),
+        heading_reach_rad=0.045,
+        curvature_reach_per_m=0.003,
+    )
+
+
+def shifted(way_m: float) -> F64:
+    """(4, 4) that takes the coefficients of y(x) to those of y(x + way)."""
+    w = way_m
+    return np.array(
+        [[1.0, w, w * w, w**3], [0.0, 1.0, 2.0 * w, 3.0 * w * w], [0.0, 0.0, 1.0, 3.0 * w], [0.0, 0.0, 0.0, 1.0]]
+    )
+
+
+def _noise(ego: EgoState | None, dt_s: float) -> F64:
+    """What the car's motion and the road's bending leave open in a step: place, heading, half
+    a curvature, its change."""
+    knows_turn = ego is not None and ego.yaw_rate_radps is not None
+    way = (ego.speed_mps if ego is not None else _UNKNOWN_SPEED_MPS) * dt_s
+    turn = (_YAW_RATE_SIGMA_RADPS if knows_turn else _UNKNOWN_YAW_RATE_RADPS) * dt_s
+    place = 0.1 * dt_s + 0.5 * way * turn if ego is not None else _UNKNOWN_DRIFT_MPS * dt_s
+    bend = 0.5 * _CLOTHOID_PER_M2 * way
+    return np.diag(np.square([place, turn, bend, bend / 60.0]))
+
+
+def _pairs(lines: tuple[LineTrack, ...], measured: tuple[FittedLine, ...], gate_m: float) -> dict[int, int]:
+    """Which track is which measured line: nearest first, one-to-one, within the gate at 5 and 15 m."""
+    if not lines or not measured:
+        return {}
+    old = np.array([_COMPARE_AT @ line.coefficients for line in lines])
+    new = np.array([_COMPARE_AT @ line.coefficients for line in measured])
+    gaps = np.abs(old[:, None] - new[None]) @ np.array([0.6, 0.4])
+    pairs: dict[int, int] = {}
+    for i, j in np.argwhere(gaps < gate_m)[np.argsort(gaps[gaps < gate_m], kind="stable")].tolist():
+        if i not in pairs and j not in pairs.values():
+            pairs[i] = j
+    return pairs
+
+
+def _joined(line: LineTrack, found: FittedLine) -> LineTrack:
+    gain = np.linalg.solve(line.covariance + found.covariance, line.covariance).T
+    keep = np.eye(4) - gain
+    mean = line.coefficients + gain @ (found.coefficients - line.coefficients)
+    cov = keep @ line.covariance @ keep.T + gain @ found.covariance @ gain.T
+    return LineTrack(
+        mean,
+        (cov + cov.T) / 2.0,
+        min(line.x_min_m, found.x_min_m) if line.seen > 1 else found.x_min_m,
+        max(line.x_max_m, found.x_max_m),
+        line.quality + _SEEN_GAIN * (found.quality - line.quality),
+        line.seen + 1,
+    )
+
+
+def _faded(line: LineTrack) -> LineTrack:
+    return replace(line, quality=line.quality * (1.0 - _SEEN_GAIN))
+
+
+def _quality_now(line: LineTrack) -> float:
+    return line.quality * float(np.exp(-line.unseen_s / _FADE_S))
+
+
+def _worth(left: LineTrack | None, right: LineTrack | None, params: LaneParams) -> float:
+    """How good a pair is: well supported, as wide as a lane, and the nearest to the car."""
+    worth = sum(_quality_now(line) for line in (left, right) if line is not None)
+    if left is not None and right is not None:
+        width = _width_m(left, right)
+        if not params.min_width_m <= width <= params.max_width_m:
+            return -1.0
+        return worth + 0.5 * float(np.exp(-0.5 * ((width - _USUAL_WIDTH_M) / 0.5) ** 2))
+    alone = left or right
+    if alone is not None:
+        worth -= 0.1 * abs(float(powers(_SIDE_AT_M) @ alone.coefficients))
+    return worth
+
+
+def _width_m(left: LineTrack, right: LineTrack) -> float:
+    """Mean over the first 20 m, square to the lines."""
+    apart = float(np.mean(powers([0.0, 10.0, 20.0]) @ (left.coefficients - right.coefficients)))
+    heading = np.arctan((left.coefficients[1] + right.coefficients[1]) / 2.0)
+    return apart * float(np.cos(heading))
+
+
+def _as_line(side: Side, line: LineTrack | None) -> LaneLine | None:
+    if line is None:
+        return None
+    return LaneLine(
+        side,
+        line.coefficients,
+        line.covariance,
+        max(line.x_min_m, 0.0),
+        line.x_max_m,
+        _quality_now(line),
+        line.unseen_s,
+    )

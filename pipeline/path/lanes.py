@@ -1,0 +1,243 @@
+"""What a lane detector saw in the picture, as lines on the road in metres.
+
+``measure``    points of one picture → ground → lines, with the pitch that makes them parallel
+``follow``     the same, and the lines tracked from frame to frame: what the rest of the line calls
+``polylines``  an ``EgoLane`` as points on the road, and ``in_picture`` as pixels, for views
+
+The road is a plane: the one that the LiDAR's ground points show, else the mount's height below the ego origin. Lines
+of a road are parallel, so the pitch of the camera against its calibration shows in how their distance seems to change
+with range, and is tracked as a slow state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.alignment import Alignment
+from pipeline.geometry import F64
+from pipeline.lidar.ground import Ground
+from pipeline.params import LaneParams
+from pipeline.path import lane_fit, lane_tracking
+from pipeline.path.lane_fit import FittedLine, Shape, Sightings
+from pipeline.path.lane_types import EgoLane, LaneLine, powers
+from pipeline.types import I32, EgoState, RawLanes
+
+Seed = tuple[float, Sightings]
+
+_MIN_POINTS = 12
+_NEAR_M, _FAR_M = 6.0, 20.0
+"""Where the LiDAR's ground is asked for the road's height."""
+_UNPARALLEL = 0.004
+"""Real lines of one road differ this much in heading, radians."""
+_FLATNESS_RAD = 0.003
+"""A road that bends up or down ahead looks like this much pitch."""
+_STRAY_M = 9.0
+"""Farther aside no line concerns the car."""
+_HOPELESS = 0.05
+_BEYOND = 0.6
+"""Points that seem farther than ``max_range_m`` may be nearer under another pitch: this much of the inverse."""
+_POLYLINE_STEP_M = 1.0
+_DRAWN_FROM_M = 1.0
+
+
+@dataclass(frozen=True)
+class Pitch:
+    """The camera's pitch against its calibration, positive downwards, radians."""
+
+    rad: float
+    sigma_rad: float
+
+
+@dataclass(frozen=True, eq=False)
+class LaneMeasurement:
+    """The lines of one picture in the ego frame, strongest first, and the pitch under which they were mapped."""
+
+    source: str
+    lines: tuple[FittedLine, ...]
+    pitch: Pitch
+    shape: Shape
+
+
+@dataclass(frozen=True, eq=False)
+class LaneState:
+    """What one frame leaves to the next. plane: (3,) a, b, c of the road z = a·x + b·y + c as last seen."""
+
+    tracks: lane_tracking.LaneTracks = lane_tracking.LaneTracks()
+    pitch: Pitch | None = None
+    plane: F64 | None = None
+
+
+def follow(
+    state: LaneState,
+    raw: RawLanes | None,
+    aligned: Alignment | None,
+    ground: Ground | None,
+    ego: EgoState | None,
+    dt_s: float | None,
+    params: LaneParams,
+) -> tuple[LaneState, EgoLane | None]:
+    """One frame: measure if a lane detector has looked at it, and track. Null until one has. ground: of this frame's
+    sweep, if any. dt_s: since the frame before; null at the start."""
+    plane = road_plane(ground)
+    plane = plane if plane is not None else state.plane
+    road = plane if plane is not None else np.array([0.0, 0.0, -params.mount_height_m])
+    pitch = _drifted(state.pitch, dt_s, params)
+    measured = None
+    if raw is not None and aligned is not None:
+        measured = measure(raw, aligned, road, pitch, params, lane_tracking.expected_shape(state.tracks))
+        pitch = measured.pitch
+    tracks = lane_tracking.predict(state.tracks, ego, dt_s, params)
+    if measured is not None:
+        tracks = lane_tracking.update(tracks, measured.source, measured.lines, params)
+    lane = lane_tracking.ego_lane(tracks, pitch.rad, road, params)
+    return LaneState(tracks, pitch, plane), lane
+
+
+def measure(
+    raw: RawLanes, aligned: Alignment, plane: F64, pitch: Pitch, params: LaneParams, expected: Shape | None = None
+) -> LaneMeasurement:
+    """Lines on the road from points in the picture; none where too few points lie on it.
+
+    plane: (3,) as in ``LaneState``. pitch: as believed before this picture. expected: the shape of the tracked lines,
+    around which the search is then narrow; null searches wide.
+    """
+    nothing = LaneMeasurement(raw.model, (), pitch, Shape())
+    eye, rays = aligned.rays(np.asarray(raw.points, np.float64))
+    height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))
+    if height_m <= 0.1:
+        return nothing
+    seen, line = _on_road(raw, rays, plane, height_m, params.max_range_m)
+    if len(line) < _MIN_POINTS:
+        return nothing
+    reach = float(np.clip(2.5 * pitch.sigma_rad, 0.004, 0.045))
+    around = replace(expected or Shape(), pitch_rad=pitch.rad, pitch_reach_rad=reach)
+    shape, histogram = lane_fit.shared_shape(seen, around)
+    sigma = float(np.radians(params.bearing_sigma_deg))
+    first = _fitted(_seeds(line, seen, shape, histogram), shape, sigma)
+    pitch = _parallel([found for found, _ in first], height_m, shape.pitch_rad, pitch)
+    shape = replace(shape, pitch_rad=pitch.rad)
+    again = [(float(found.coefficients[0]), points) for found, points in first]
+    lines = [found for found, _ in _fitted(again, shape, sigma)]
+    lines = [_in_ego(found, eye, height_m, pitch) for found in _distinct(lines) if _plausible(found, params)]
+    return LaneMeasurement(raw.model, tuple(lines), pitch, shape)
+
+
+def road_plane(ground: Ground | None) -> F64 | None:
+    """(3,) a, b, c of the road's height z = a·x + b·y + c ahead, from the LiDAR's ground; null without one."""
+    if ground is None:
+        return None
+    z = ground.height(np.array([[_NEAR_M, 0.0], [_FAR_M, 0.0], [_NEAR_M, 2.0], [_NEAR_M, -2.0]]))
+    if not np.all(np.isfinite(z)):
+        return None
+    along = (z[1] - z[0]) / (_FAR_M - _NEAR_M)
+    return np.array([along, (z[2] - z[3]) / 4.0, z[0] - along * _NEAR_M])
+
+
+def polylines(lane: EgoLane) -> dict[str, F64]:
+    """``left`` and ``right`` as (K, 2) ego x, y every metre as far as paint supports them; no key without a line."""
+    both = {"left": lane.left, "right": lane.right}
+    return {side: _polyline(line) for side, line in both.items() if line is not None}
+
+
+def in_picture(lane: EgoLane, aligned: Alignment) -> dict[str, F64]:
+    """``left`` and ``right`` as (K, 2) pixels u, v where the lines were seen, NaN behind the camera; empty without a
+    plane. The alignment does not know of the pitch, so each point is put where the pitch made it seem to be."""
+    plane = lane.plane
+    if plane is None:
+        return {}
+    eye, _ = aligned.rays(np.zeros((0, 2)))
+    height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))
+    drawn = {}
+    for side, line in polylines(lane).items():
+        ahead = line[line[:, 0] > eye[0] + _DRAWN_FROM_M] - eye[:2]
+        seemed = ahead / (1.0 - ahead[:, :1] * lane.pitch_rad / height_m) + eye[:2]
+        drawn[side] = aligned.project(np.column_stack([seemed, seemed @ plane[:2] + plane[2]]))
+    return drawn
+
+
+def _polyline(line: LaneLine) -> F64:
+    x = np.append(np.arange(line.x_min_m, line.x_max_m, _POLYLINE_STEP_M), line.x_max_m)
+    return np.column_stack([x, line.y_m(x)])
+
+
+def _drifted(pitch: Pitch | None, dt_s: float | None, params: LaneParams) -> Pitch:
+    """The pitch as believed now: towards its calibration and less sure as time passes."""
+    start = float(np.radians(params.pitch_sigma_deg))
+    if pitch is None or dt_s is None:
+        return Pitch(0.0, start)
+    grown = float(np.hypot(pitch.sigma_rad, np.radians(params.pitch_drift_deg) * np.sqrt(dt_s)))
+    return Pitch(pitch.rad, min(grown, start))
+
+
+def _on_road(raw: RawLanes, rays: F64, plane: F64, height_m: float, max_range_m: float) -> tuple[Sightings, I32]:
+    """Where each ray meets the road ahead, and which line its point belongs to; rays that do not are left out. In
+    inverse distance a ray near the horizon is no special case."""
+    forward = np.maximum(rays[:, 0], 1e-6)
+    slope = rays[:, 1] / forward
+    inverse = (plane[0] + plane[1] * slope - rays[:, 2] / forward) / height_m
+    ahead = (rays[:, 0] > 0) & (inverse > _BEYOND / max_range_m)
+    return Sightings(slope[ahead], inverse[ahead], raw.scores[ahead].astype(np.float64), height_m), raw.line[ahead]
+
+
+def _seeds(line: I32, seen: Sightings, shape: Shape, histogram: F64) -> list[Seed]:
+    """Where each line lies at x = 0, and which points it may be made of: those that the detector says are one line, or,
+    where it does not say, any that are near a peak of the histogram."""
+    groups = np.unique(line[line >= 0]).tolist()
+    if not groups:
+        return [(y0, seen) for y0 in lane_fit.peaks(histogram)]
+    x = seen.x_m(shape.pitch_rad)
+    y0 = x * (seen.slope - shape.heading_rad - 0.5 * shape.curvature_per_m * x)
+    return [(float(np.median(y0[line == group])), seen.only(line == group)) for group in groups]
+
+
+def _fitted(seeds: list[Seed], shape: Shape, bearing_sigma_rad: float) -> list[tuple[FittedLine, Sightings]]:
+    """The line through each seed's points, with those points; without the hopeless ones."""
+    fits = [(lane_fit.fit_line(points, y0, shape, bearing_sigma_rad), points) for y0, points in seeds]
+    return [(found, points) for found, points in fits if found is not None and found.quality > _HOPELESS]
+
+
+def _parallel(lines: list[FittedLine], height_m: float, tried_rad: float, before: Pitch) -> Pitch:
+    """The pitch under which the lines are parallel, joined with what was believed before.
+
+    Under a pitch error p a line at lateral place c0 seems turned by c0·p/h, so p/h is the slope of heading over place.
+    """
+    if len(lines) < 2:
+        return before
+    place = np.array([line.coefficients[0] for line in lines])
+    heading = np.array([line.coefficients[1] for line in lines])
+    trust = np.array([line.quality / (line.covariance[1, 1] + _UNPARALLEL**2) for line in lines])
+    middle = np.average(place, weights=trust)
+    spread = float(np.sum(trust * (place - middle) ** 2))
+    if spread <= 0.0:
+        return before
+    measured = tried_rad + height_m * float(np.sum(trust * (place - middle) * heading)) / spread
+    variance = height_m**2 / spread + _FLATNESS_RAD**2
+    gain = before.sigma_rad**2 / (before.sigma_rad**2 + variance)
+    return Pitch(before.rad + gain * (measured - before.rad), float(np.sqrt((1.0 - gain) * before.sigma_rad**2)))
+
+
+def _distinct(lines: list[FittedLine]) -> list[FittedLine]:
+    """Without those that slid onto a better one while they were fitted."""
+    kept: list[FittedLine] = []
+    row = powers(10.0)
+    for line in sorted(lines, key=lambda each: -each.quality):
+        if all(abs(row @ (line.coefficients - other.coefficients)) > 0.6 for other in kept):
+            kept.append(line)
+    return kept
+
+
+def _plausible(line: FittedLine, params: LaneParams) -> bool:
+    turned = abs(np.arctan(line.coefficients[1]))
+    return bool(turned <= np.radians(params.max_heading_deg) and abs(line.coefficients[0]) <= _STRAY_M)
+
+
+def _in_ego(line: FittedLine, eye: F64, height_m: float, pitch: Pitch) -> FittedLine:
+    """From the foot of the camera to the ego origin; what the pitch leaves open goes into the covariance."""
+    c0, _, c2, _ = line.coefficients
+    by_pitch = np.array([0.0, -c0, 0.0, c2]) / height_m * pitch.sigma_rad
+    moved = lane_tracking.shifted(-float(eye[0]))
+    mean = moved @ line.coefficients + np.array([float(eye[1]), 0.0, 0.0, 0.0])
+    cov = moved @ (line.covariance + np.outer(by_pitch, by_pitch)) @ moved.T
+    return FittedLine(mean, cov, line.x_min_m + float(eye[0]), line.x_max_m + float(eye[0]), line.quality)
