@@ -38,7 +38,7 @@ bench: install
 suite: install
 	@mkdir -p build
 	@$(BIN)/python -m pytest -q tests/accuracy -s
-	@$(BIN)/cipv scenarios run --suite all --report build/experiments.html --json > build/experiments.json
+	@$(BIN)/cipv scenarios run --suite all --report build/experiments.html --drives build/drives --json > build/experiments.json
 
 # Memory over a drive looped 100 times. Writes build/soak.json.
 soak: install

@@ -32,46 +32,54 @@ svg text { fill: var(--soft); font-size: 11px; } .grid { stroke: var(--edge); } 
 .fill4 { fill: var(--c4); } .fill5 { fill: var(--c5); }
 .green { background: #2e9e4f; color: #fff; } .yellow { background: #f5d90a; color: #222; }
 .orange { background: #ef8b17; color: #222; } .brown { background: #8d5524; color: #fff; }
+td a { color: inherit; text-decoration-style: dotted; } code { font-size: 13px; }
 .red { background: #c62828; color: #fff; } .grey { background: #8a949b; color: #fff; }
 """
 
 
-def html(sections: Iterable[Section], title: str) -> str:
-    """The whole page."""
+def html(sections: Iterable[Section], title: str, replays: str = "") -> str:
+    """The whole report. replays: what leads from it to the folder of the drives behind it, where they were kept."""
     sections = list(sections)
     links = "".join(f'<a href="#{escape(each.name)}">{escape(each.name)}</a>' for each in sections)
+    return page(title, f"<nav>{links}</nav>{''.join(_section(each, replays) for each in sections)}")
+
+
+def page(title: str, body: str) -> str:
+    """An HTML file that loads nothing."""
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body><h1>{escape(title)}</h1>"
-        f"<nav>{links}</nav>{''.join(_section(each) for each in sections)}</body></html>\n"
+        f"<title>{escape(title)}</title><style>{_STYLE}</style></head><body><h1>{escape(title)}</h1>{body}</body></html>\n"
     )
 
 
-def _section(section: Section) -> str:
+def _section(section: Section, replays: str) -> str:
     return (
         f'<section id="{escape(section.name)}"><h2>{escape(section.title)}</h2>'
         + "".join(f"<p>{escape(paragraph)}</p>" for paragraph in section.text)
-        + "".join(_table(table) for table in section.tables)
+        + "".join(_table(table, replays) for table in section.tables)
         + f'<div class="charts">{"".join(chart_svg(chart) for chart in section.charts)}</div></section>'
     )
 
 
-def _table(table: Table) -> str:
+def _table(table: Table, replays: str) -> str:
     worded = [all(isinstance(row[n], str | None) for row in table.rows) for n in range(len(table.columns))]
     head = "".join(
         f'<th class="{"word" if words else ""}">{escape(name)}</th>'
         for name, words in zip(table.columns, worded, strict=True)
     )
-    rows = "".join(f"<tr>{''.join(_cell(cell, table.decimals) for cell in row)}</tr>" for row in table.rows)
+    rows = "".join(f"<tr>{''.join(_cell(cell, table.decimals, replays) for cell in row)}</tr>" for row in table.rows)
     caption = f"<caption>{escape(table.caption)}</caption>" if table.caption else ""
     return f'<h3>{escape(table.title)}</h3><div class="wide"><table>{caption}<tr>{head}</tr>{rows}</table></div>'
 
 
-def _cell(cell: Cell | Coloured, decimals: int) -> str:
-    value, tone = (cell.value, cell.tone) if isinstance(cell, Coloured) else (cell, "")
+def _cell(cell: Cell | Coloured, decimals: int, replays: str) -> str:
+    value, tone, replay = (cell.value, cell.tone, cell.replay) if isinstance(cell, Coloured) else (cell, "", "")
     kind = "word" if isinstance(value, str) and not tone else tone
-    return f'<td class="{kind}">{escape(in_words(value, decimals))}</td>'
+    text = escape(in_words(value, decimals))
+    if replay and replays:
+        text = f'<a href="{escape(replays + replay)}.html" title="See this drive">{text}</a>'
+    return f'<td class="{kind}">{text}</td>'
 
 
 def in_words(value: Cell, decimals: int) -> str:

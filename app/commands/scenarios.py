@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table as RichTable
 
 from app.progress import frames_progress
+from app.replays import ReplayFolder
 from app.report import html, in_words
 from pipeline.errors import BadInput
 from pipeline.evaluation.experiments.runner import count_cases, of_suite, run_all
@@ -25,7 +26,7 @@ _FILE_WIDTH = 160
 class Scenarios:
     """Drive experiments in the closed loop and report their figures beside the printed ones.
 
-    Example: cipv scenarios run --suite paper --report paper.html
+    Example: cipv scenarios run --suite euroncap --report ncap.html --drives ncap-drives
     """
 
     what: tyro.conf.Positional[Literal["run"]]
@@ -38,6 +39,8 @@ class Scenarios:
     """Processes; 0 is one a core"""
     report: Path | None = None
     """Write an HTML file with tables and charts"""
+    drives: Path | None = None
+    """Keep the closed-loop drives in this folder: each opens as sim:<file>, and the report's cells link to them"""
     json: bool = False
     """Print the figures as JSON"""
 
@@ -48,11 +51,15 @@ class Scenarios:
         if self.report is not None:
             self.report.parent.mkdir(parents=True, exist_ok=True)
             self.report.open("a").close()  # a place that cannot be written to is told before the drives, not after
+        folder = ReplayFolder(self.drives) if self.drives is not None else None
         with frames_progress() as progress:
             bar = progress.add_task("driving", total=count_cases(experiments, self.short))
-            sections = run_all(experiments, self.short, self.jobs, lambda: progress.advance(bar))
+            sections = run_all(
+                experiments, self.short, self.jobs, lambda: progress.advance(bar), folder.keep if folder else None
+            )
         if self.report is not None:
-            self.report.write_text(html(sections, f"Experiments: {self.suite}"), encoding="utf-8")
+            drives = folder.link_from(self.report) if folder else ""
+            self.report.write_text(html(sections, f"Experiments: {self.suite}", drives), encoding="utf-8")
         if self.json:
             print(json.dumps([as_json(section) for section in sections], indent=1, ensure_ascii=False))
         else:

@@ -136,7 +136,7 @@ def _at_start(scenario: Scenario) -> VehicleState:
 
 
 def _scripted(scenario: Scenario, t_s: float) -> VehicleState:
-    own = actors.motion(scenario.ego, scenario.road, t_s)
+    own = scenario.own_motion(t_s)
     return VehicleState(t_s, own.travelled_m, own.speed_mps, own.accel_mps2, own.d_m, own.d_rate_mps, own.d_accel_mps2)
 
 

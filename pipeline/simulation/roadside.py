@@ -43,16 +43,16 @@ class Thing:
 
 
 def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, ...]:
-    """Everything beside the road from s = start to end, in order of s."""
-    rng = np.random.default_rng([seed, 1])
+    """Everything beside the road from s = start to end, in order of s. What stands at a place depends on the seed and
+    the start, not on the end: each kind has dice of its own."""
     right = road.edges_m()[0][0] - road.shoulder_m
     left = road.edges_m()[-1][1] + road.shoulder_m
     things = [
         *_rails(road, start_m, end_m),
         *_posts(start_m, end_m, right, left),
         *_gantries(start_m, end_m, right),
-        *_trees(rng, start_m, end_m, right, left),
-        *_buildings(rng, start_m, end_m, right, left),
+        *_trees(np.random.default_rng([seed, 1]), start_m, end_m, right, left),
+        *_buildings(np.random.default_rng([seed, 1, 1]), start_m, end_m, right, left),
     ]
     return tuple(sorted(_off_the_road(things, road, start_m, end_m), key=lambda thing: thing.s_m))
 

@@ -10,8 +10,8 @@ import yaml
 from pydantic import Field, ValidationError, model_validator
 
 from pipeline.errors import BadInput
-from pipeline.simulation.actors import Actor, Script
-from pipeline.simulation.gnss_model import RTK, GnssModel
+from pipeline.simulation.actors import Actor, Motion, Script, motion
+from pipeline.simulation.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
 from pipeline.simulation.lens import ORDINARY, CameraModel
 from pipeline.simulation.lidar_model import VLP16, LidarModel
 from pipeline.simulation.roads import Road, Strict
@@ -31,7 +31,14 @@ class Ego(Script):
     start_m: float = 100.0
 
 
+Moment = tuple[float, float, float, float, float, float]
+"""A ``Motion``: travelled_m, d_m, speed_mps, accel_mps2, d_rate_mps, d_accel_mps2."""
+
+
 class Scenario(Strict):
+    """driven: the ego vehicle's motion as a closed loop drove it, a moment a tick; where it is given, the ego
+    vehicle moves so and not by its script."""
+
     title: str
     seed: int = Field(default=0, ge=0)
     duration_s: float = Field(gt=0.0, le=3600.0)
@@ -40,9 +47,11 @@ class Scenario(Strict):
     lidar: LidarModel = VLP16
     camera: CameraModel = ORDINARY
     gnss: GnssModel = RTK
+    odometry: OdometryModel = MEASURED
     ego: Ego
     actors: tuple[Actor, ...] = ()
     crossing_actors: tuple[CrossingActor, ...] = ()
+    driven: tuple[Moment, ...] = ()
 
     @model_validator(mode="after")
     def _lanes_and_ids(self) -> Scenario:
@@ -62,6 +71,16 @@ class Scenario(Strict):
 
     def frame_count(self) -> int:
         return max(1, round(self.duration_s * self.rate_hz))
+
+    def own_motion(self, t_s: float) -> Motion:
+        """Of the ego vehicle at time t: as driven, between two ticks in proportion, else by its script."""
+        if not self.driven:
+            return motion(self.ego, self.road, t_s)
+        at = min(max(t_s * self.rate_hz, 0.0), len(self.driven) - 1.0)
+        before, share = int(at), at - int(at)
+        after = min(before + 1, len(self.driven) - 1)
+        pairs = zip(self.driven[before], self.driven[after], strict=True)
+        return Motion(*(a + share * (b - a) if share > 1e-9 else a for a, b in pairs))
 
     @cached_property
     def cast(self) -> tuple[Actor, ...]:

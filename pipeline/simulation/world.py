@@ -55,9 +55,9 @@ class World:
 
 def at(scenario: Scenario, t_s: float, ego: Motion | None = None) -> World:
     """The world at time t; nothing is carried from one moment to the next. ``ego`` given: the ego vehicle moves as
-    that says (closed loop), else as its script says. The others follow their scripts either way."""
+    that says (closed loop), else as the scenario says. The others follow their scripts either way."""
     road = scenario.road
-    own = ego if ego is not None else motion(scenario.ego, road, t_s)
+    own = ego if ego is not None else scenario.own_motion(t_s)
     lane_d_m = road.lane_offset_m(scenario.ego.lane) + scenario.ego.offset_m
     s_m = road.line.advance(scenario.ego.start_m, own.travelled_m, lane_d_m)
     x, y, road_heading = road.to_world(s_m, own.d_m)[0].tolist()

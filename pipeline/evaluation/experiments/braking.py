@@ -11,21 +11,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from statistics import mean
 from typing import Literal
 
-from pipeline.evaluation.experiments.sections import Chart, Experiment, Section, Series, Table
-from pipeline.evaluation.experiments.track import Drive, approach, parameters, scene
+from pipeline.evaluation.experiments.network import embedded
+from pipeline.evaluation.experiments.sections import Boxes, Chart, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.experiments.track import Drive, approach, drive_charts, parameters, scene
+from pipeline.params import Params
 from pipeline.run import Sensors
-from pipeline.simulation.camera import HEIGHT, WIDTH
 from pipeline.simulation.loop import NetworkEyes, Setup, TruthEyes
-from pipeline.vision.detector import Detector, open_detector
-from pipeline.vision.models import EMBEDDED
+from pipeline.simulation.replay import as_driven
+from pipeline.simulation.scenario import Scenario
 
 KMH = 1.0 / 3.6
 Manoeuvre = Literal["CCRs", "CCRm", "CCRb"]
-Boxes = Literal["truth", "network"]
 Key = tuple[Manoeuvre, Sensors, str, Boxes]
 LEAD_DECEL_MPS2 = 6.0
 _LEAD_BRAKES_AT_S = 2.0
@@ -74,8 +73,6 @@ def needed_behind_braking_mps2(
 
 @dataclass(frozen=True)
 class Case:
-    """boxes: whose the camera's are, projected truth with a detector's errors or the embedded network's."""
-
     manoeuvre: Manoeuvre
     sensors: Sensors
     controller: str
@@ -103,18 +100,37 @@ def cases(short: bool) -> list[Case]:
 
 
 def run(case: Case) -> Drive:
+    """One manoeuvre, driven."""
+    eyes = TruthEyes() if case.boxes == "truth" else NetworkEyes(embedded())
+    setup = Setup(_params(case), case.sensors, eyes)
+    return approach(_scenario(case), setup, stop_when_over=case.manoeuvre != "CCRm")
+
+
+def _scenario(case: Case) -> Scenario:
     speed = PAPER[case.manoeuvre].speed_kmh * KMH
     target, duration_s = _target(case.manoeuvre, speed)
-    scenario = scene({0.0: speed}, target, duration_s, case.seed)
-    eyes = TruthEyes() if case.boxes == "truth" else NetworkEyes(_network())
-    setup = Setup(parameters(case.controller, speed), case.sensors, eyes)
-    return approach(scenario, setup, stop_when_over=case.manoeuvre != "CCRm")
+    return scene({0.0: speed}, target, duration_s, case.seed)
 
 
-@cache
-def _network() -> Detector:
-    """One a process; it is ready only after a while."""
-    return open_detector(EMBEDDED, (WIDTH, HEIGHT))
+def _params(case: Case) -> Params:
+    return parameters(case.controller, PAPER[case.manoeuvre].speed_kmh * KMH)
+
+
+def replay(case: Case, drive: Drive) -> Replay:
+    """The drive of one run."""
+    controller, sensors = case.controller.replace(" + ", "+"), SENSORS[case.sensors]
+    title = f"{case.manoeuvre}: {sensors}, {case.controller}, run {case.seed}"
+    impact = f"Impact at {drive.impact_mps / KMH:.0f} km/h." if drive.impact_mps is not None else "No impact."
+    return Replay(
+        f"{case.manoeuvre}_{sensors}_{controller}_{case.boxes}_{case.seed}".lower(),
+        title,
+        (impact, f"Smallest gap {drive.smallest_gap_m:.1f} m."),
+        as_driven(_scenario(case), drive.motions, title),
+        _params(case),
+        case.sensors,
+        case.boxes,
+        drive_charts(drive),
+    )
 
 
 def _target(manoeuvre: Manoeuvre, speed_mps: float) -> tuple[dict[str, object], float]:
@@ -258,4 +274,4 @@ def _charts(manoeuvre: Manoeuvre, done: list[tuple[Case, Drive]]) -> tuple[Chart
     )
 
 
-BRAKING = Experiment("braking", "paper", "Braking: CCRs, CCRm and CCRb", cases, run, report)
+BRAKING = Experiment("braking", "paper", "Braking: CCRs, CCRm and CCRb", cases, run, report, replay)

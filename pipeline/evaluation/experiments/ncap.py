@@ -9,13 +9,17 @@ speed until AEB acts; a run whose approach left the protocol's tolerance is void
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
-from pipeline.evaluation.experiments.sections import Cell, Coloured, Experiment, Section, Table, Tone
-from pipeline.evaluation.experiments.track import Drive, approach, parameters, scene
+from pipeline.evaluation.experiments.network import embedded
+from pipeline.evaluation.experiments.sections import Boxes, Cell, Coloured, Experiment, Replay, Section, Table, Tone
+from pipeline.evaluation.experiments.track import Drive, approach, drive_charts, parameters, scene
+from pipeline.params import Params
 from pipeline.run import Sensors
-from pipeline.simulation.loop import Setup
+from pipeline.simulation.loop import NetworkEyes, Setup, TruthEyes
+from pipeline.simulation.replay import as_driven
+from pipeline.simulation.scenario import Scenario
 
 KMH = 1.0 / 3.6
 Test = Literal["CCRs", "CCRm", "CCRb"]
@@ -31,19 +35,28 @@ BANDS: tuple[tuple[float, Tone], ...] = ((5.0, "green"), (15.0, "yellow"), (25.0
 """Relative impact speeds, km/h, below which a cell has the colour; red from there on."""
 R152_LIMITS: tuple[tuple[float, float], ...] = ((42.0, 0.0), (45.0, 15.0), (50.0, 25.0), (55.0, 30.0), (60.0, 35.0))
 """UN R152, 5.2.1.4, category M1 unladen: up to this relative speed, km/h, the impact may be no faster than that."""
-SETUPS: tuple[tuple[Sensors, str], ...] = (
-    ("both", "AEB"),
-    ("lidar", "AEB"),
-    ("both", "ACC"),
-    ("lidar", "ACC"),
-    ("both", "ACC + AEB"),
+Kind = tuple[Sensors, str, Boxes]
+SETUPS: tuple[Kind, ...] = (
+    ("both", "AEB", "truth"),
+    ("lidar", "AEB", "truth"),
+    ("both", "ACC", "truth"),
+    ("lidar", "ACC", "truth"),
+    ("both", "ACC + AEB", "truth"),
 )
+NETWORK: Kind = ("both", "AEB", "network")
+NETWORK_SAMPLE: tuple[tuple[Test, float, int], ...] = (
+    *(("CCRs", speed, 100) for speed in (20.0, 40.0, 60.0, 80.0)),
+    *(("CCRs", 40.0, overlap) for overlap in (-50, 50)),
+    *(("CCRm", speed, 100) for speed in (40.0, 60.0, 80.0)),
+)
+"""What is driven with the embedded network on drawn pictures too, beside the lead that brakes at 6 m/s² 40 m ahead."""
 _NAMES = {"both": "fused", "lidar": "LiDAR", "camera": "camera"}
 
 
 @dataclass(frozen=True)
 class Case:
-    """speed_kmh: of the ego car. overlap: %. gap_m, decel_mps2: CCRb only."""
+    """speed_kmh: of the ego car. overlap: %. gap_m, decel_mps2: CCRb only. boxes: whose the camera's
+    are."""
 
     test: Test
     speed_kmh: float
@@ -52,6 +65,18 @@ class Case:
     controller: str
     gap_m: float = 0.0
     decel_mps2: float = 0.0
+    boxes: Boxes = "truth"
+
+    @property
+    def kind(self) -> Kind:
+        return self.sensors, self.controller, self.boxes
+
+    @property
+    def name(self) -> str:
+        """Fit for a file."""
+        what = f"gap{self.gap_m:.0f}_brake{self.decel_mps2:.0f}" if self.test == "CCRb" else f"overlap{self.overlap}"
+        kind = "_".join((_NAMES[self.sensors], self.controller.replace(" + ", "+"), self.boxes))
+        return f"{self.test}_{self.speed_kmh:.0f}kmh_{what}_{kind}".lower()
 
     def closing_mps(self) -> float:
         return (self.speed_kmh - (MOVING_KMH if self.test == "CCRm" else 0.0)) * KMH
@@ -63,13 +88,14 @@ class Result:
 
     impact_kmh: float
     void: str
+    drive: Drive | None = field(default=None, compare=False)
 
 
 def cases(short: bool) -> list[Case]:
     speeds = {"CCRs": range(10, 81, 5), "CCRm": range(30, 81, 5)} if not short else {"CCRs": (30, 60), "CCRm": (50,)}
     overlaps = (-50, 100) if short else OVERLAPS
     found = []
-    for sensors, controller in SETUPS[:2] if short else SETUPS:
+    for sensors, controller, _ in SETUPS[:2] if short else SETUPS:
         grid: list[tuple[Test, float, int]] = [
             (test, float(speed), overlap) for test in ("CCRs", "CCRm") for speed in speeds[test] for overlap in overlaps
         ]
@@ -80,10 +106,25 @@ def cases(short: bool) -> list[Case]:
             for gap in (12.0, 40.0)
             if not short or (decel, gap) == (6.0, 40.0)
         ]
-    return found
+    if short:
+        return found
+    sensors, controller, boxes = NETWORK
+    sample = [Case(*each, sensors, controller, boxes=boxes) for each in NETWORK_SAMPLE]
+    return [*found, *sample, Case("CCRb", BRAKED_KMH, 100, sensors, controller, 40.0, 6.0, boxes)]
 
 
 def run(case: Case) -> Result:
+    """One approach, driven."""
+    eyes = TruthEyes() if case.boxes == "truth" else NetworkEyes(embedded())
+    drive = approach(_scenario(case), Setup(_params(case), case.sensors, eyes))
+    return Result((drive.impact_mps or 0.0) / KMH, _void(case, drive), drive)
+
+
+def _params(case: Case) -> Params:
+    return parameters(case.controller, case.speed_kmh * KMH)
+
+
+def _scenario(case: Case) -> Scenario:
     speed = case.speed_kmh * KMH
     aside = (1.0 - abs(case.overlap) / 100.0) * EGO_WIDTH_M * (1.0 if case.overlap < 0 else -1.0)
     target: dict[str, object] = {"offset_m": aside, "colour": "#8e9aa3"}
@@ -98,9 +139,30 @@ def run(case: Case) -> Result:
             "ahead_m": case.closing_mps() * (START_TTC_S + _RUN_UP_S),
             "speed_mps": {0.0: MOVING_KMH * KMH if case.test == "CCRm" else 0.0},
         }
-    scenario = scene({0.0: speed}, target, _RUN_UP_S + 14.0, seed=0)
-    drive = approach(scenario, Setup(parameters(case.controller, speed), case.sensors))
-    return Result((drive.impact_mps or 0.0) / KMH, _void(case, drive))
+    return scene({0.0: speed}, target, _RUN_UP_S + 14.0, seed=0)
+
+
+def replay(case: Case, result: Result) -> Replay:
+    """The drive of one cell."""
+    assert result.drive is not None
+    ended = f"Impact at {result.impact_kmh:.0f} km/h." if result.impact_kmh else "The impact was avoided."
+    at = f"{case.gap_m:.0f} m, −{case.decel_mps2:.0f} m/s²" if case.test == "CCRb" else f"overlap {case.overlap} %"
+    title = f"{case.test}, {case.speed_kmh:.0f} km/h, {at}: {_label(case.kind)}"
+    return Replay(
+        case.name,
+        title,
+        (f"Void: {result.void}." if result.void else ended,),
+        as_driven(_scenario(case), result.drive.motions, title),
+        _params(case),
+        case.sensors,
+        case.boxes,
+        drive_charts(result.drive),
+    )
+
+
+def _label(kind: Kind) -> str:
+    sensors, controller, boxes = kind
+    return f"{_NAMES[sensors]}, {controller}" + (", network" if boxes == "network" else "")
 
 
 def _void(case: Case, drive: Drive) -> str:
@@ -126,21 +188,19 @@ def tone(result: Result) -> Tone:
 
 def report(cases: Sequence[Case], results: Sequence[Result]) -> Section:
     done = dict(zip(cases, results, strict=True))
-    setups = list(dict.fromkeys((case.sensors, case.controller) for case in cases))
-    tables = [_summary(setups, done), _r152(done)]
-    for sensors, controller in setups:
-        mine = {
-            case: result for case, result in done.items() if (case.sensors, case.controller) == (sensors, controller)
-        }
-        name = f"{_NAMES[sensors]}, {controller}"
-        tables += [_grid(test, name, mine) for test in ("CCRs", "CCRm")]
-        tables.append(_braked(name, mine))
+    kinds = list(dict.fromkeys(case.kind for case in cases))
+    tables = [_summary(kinds, done), _r152(done)]
+    for kind in kinds:
+        mine = {case: result for case, result in done.items() if case.kind == kind}
+        tables += [_grid(test, _label(kind), mine) for test in ("CCRs", "CCRm")]
+        tables.append(_braked(_label(kind), mine))
     return Section(
         "ncap",
         "Euro NCAP car-to-car rear grid",
         (
             f"Every run starts {_RUN_UP_S:g} s before TTC {START_TTC_S:g} s with the speed held; the camera's boxes "
-            "are projected truth with a detector's errors. AEB: a robot holds the speed and only AEB brakes. ACC: the "
+            "are projected truth with a detector's errors, and in a sample of the cells (network) the embedded "
+            "network's on drawn pictures. AEB: a robot holds the speed and only AEB brakes. ACC: the "
             "paper's speed law alone, set to the test speed. Cells are relative impact speeds in km/h; 0 is avoided. "
             "Grey: the approach was not as the protocol wants it.",
             _verdict(done),
@@ -149,25 +209,23 @@ def report(cases: Sequence[Case], results: Sequence[Result]) -> Section:
     )
 
 
-def _summary(setups: list[tuple[Sensors, str]], done: dict[Case, Result]) -> Table:
+def _summary(kinds: list[Kind], done: dict[Case, Result]) -> Table:
     rows: list[tuple[Cell, ...]] = []
-    for sensors, controller in setups:
+    for kind in kinds:
         for test in ("CCRs", "CCRm", "CCRb"):
             valid = [
-                result
-                for case, result in done.items()
-                if (case.sensors, case.controller, case.test) == (sensors, controller, test) and not result.void
+                result for case, result in done.items() if (case.kind, case.test) == (kind, test) and not result.void
             ]
             avoided = sum(result.impact_kmh == 0.0 for result in valid)
             mean = sum(result.impact_kmh for result in valid) / len(valid) if valid else None
             worst = max((result.impact_kmh for result in valid), default=None)
-            rows.append((_NAMES[sensors], controller, test, len(valid), avoided, mean, worst))
-    columns = ("sensors", "controller", "test", "valid runs", "avoided", "mean impact km/h", "worst km/h")
+            rows.append((_NAMES[kind[0]], kind[1], kind[2], test, len(valid), avoided, mean, worst))
+    columns = ("sensors", "controller", "boxes", "test", "valid runs", "avoided", "mean impact km/h", "worst km/h")
     return Table("What each gives", columns, tuple(rows), decimals=1)
 
 
 def _grid(test: Test, name: str, done: dict[Case, Result]) -> Table:
-    mine = {(case.speed_kmh, case.overlap): result for case, result in done.items() if case.test == test}
+    mine = {(case.speed_kmh, case.overlap): (case, result) for case, result in done.items() if case.test == test}
     overlaps = [overlap for overlap in OVERLAPS if any(key[1] == overlap for key in mine)]
     rows = tuple(
         (f"{speed:.0f} km/h", *(_cell(mine.get((speed, overlap))) for overlap in overlaps))
@@ -177,7 +235,7 @@ def _grid(test: Test, name: str, done: dict[Case, Result]) -> Table:
 
 
 def _braked(name: str, done: dict[Case, Result]) -> Table:
-    mine = {(case.decel_mps2, case.gap_m): result for case, result in done.items() if case.test == "CCRb"}
+    mine = {(case.decel_mps2, case.gap_m): (case, result) for case, result in done.items() if case.test == "CCRb"}
     gaps = sorted({gap for _, gap in mine})
     rows = tuple(
         (f"−{decel:.0f} m/s²", *(_cell(mine.get((decel, gap))) for gap in gaps))
@@ -186,10 +244,11 @@ def _braked(name: str, done: dict[Case, Result]) -> Table:
     return Table(f"CCRb at 50 km/h: {name}", ("lead brakes", *(f"{gap:.0f} m" for gap in gaps)), rows, decimals=0)
 
 
-def _cell(result: Result | None) -> Cell | Coloured:
-    if result is None:
+def _cell(found: tuple[Case, Result] | None) -> Cell | Coloured:
+    if found is None:
         return None
-    return Coloured(result.void or result.impact_kmh, tone(result))
+    case, result = found
+    return Coloured(result.void or result.impact_kmh, tone(result), case.name)
 
 
 def _r152(done: dict[Case, Result]) -> Table:
@@ -201,10 +260,10 @@ def _r152(done: dict[Case, Result]) -> Table:
             if limit is None:
                 continue
             cells = [
-                _passes(result, limit)
+                _passes(case, result, limit)
                 for sensors in ("both", "lidar")
                 for case, result in done.items()
-                if (case.test, case.sensors, case.controller, case.overlap) == (test, sensors, "AEB", 100)
+                if (case.test, case.kind, case.overlap) == (test, (sensors, "AEB", "truth"), 100)
                 and round(case.closing_mps() / KMH) == closing
             ]
             rows.append((test, f"{closing} km/h", limit, *cells))
@@ -218,8 +277,8 @@ def r152_limit_kmh(relative_kmh: float) -> float | None:
     return next((limit for up_to, limit in R152_LIMITS if relative_kmh <= up_to), None)
 
 
-def _passes(result: Result, limit_kmh: float) -> Coloured:
-    return Coloured(result.impact_kmh, "green" if result.impact_kmh <= limit_kmh else "red")
+def _passes(case: Case, result: Result, limit_kmh: float) -> Coloured:
+    return Coloured(result.impact_kmh, "green" if result.impact_kmh <= limit_kmh else "red", case.name)
 
 
 def _verdict(done: dict[Case, Result]) -> str:
@@ -227,7 +286,7 @@ def _verdict(done: dict[Case, Result]) -> str:
     pairs = [
         (result, done[other])
         for case, result in done.items()
-        if (case.sensors, case.controller) == ("both", "AEB")
+        if case.kind == ("both", "AEB", "truth")
         and (other := Case(case.test, case.speed_kmh, case.overlap, "lidar", "AEB", case.gap_m, case.decel_mps2))
         in done
     ]
@@ -240,4 +299,4 @@ def _verdict(done: dict[Case, Result]) -> str:
     )
 
 
-NCAP = Experiment("ncap", "euroncap", "Euro NCAP car-to-car rear grid", cases, run, report)
+NCAP = Experiment("ncap", "euroncap", "Euro NCAP car-to-car rear grid", cases, run, report, replay)

@@ -17,7 +17,7 @@ from pipeline.evaluation.experiments.iso import ISO
 from pipeline.evaluation.experiments.ncap import NCAP
 from pipeline.evaluation.experiments.ranging import RANGING
 from pipeline.evaluation.experiments.regression import REGRESSION
-from pipeline.evaluation.experiments.sections import Experiment, Section
+from pipeline.evaluation.experiments.sections import Experiment, Replay, Section
 
 EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, BRAKING, NCAP, ISO)
 SUITES = ("paper", "euroncap", "iso", "all")
@@ -45,33 +45,33 @@ def run_all(
     short: bool = False,
     jobs: int = 0,
     done: Callable[[], None] = lambda: None,
+    keep: Callable[[Replay], None] | None = None,
 ) -> list[Section]:
     """Each experiment's report. jobs: processes; 0 is one a core, 1 none but this one. ``done`` is called after every
-    case."""
+    case, ``keep`` with every drive that can be seen again."""
     jobs = jobs or os.cpu_count() or 1
     if jobs == 1:
-        return [_run_here(each, short, done) for each in experiments]
+        return [_reported(each, short, map(each.run, each.cases(short)), done, keep) for each in experiments]
     # spawn: a forked child would inherit numba's and onnxruntime's threads half alive
     pool = ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn"))
     try:
-        return [_run_in(pool, each, short, done) for each in experiments]
+        return [_reported(each, short, pool.map(each.run, each.cases(short)), done, keep) for each in experiments]
     finally:
         pool.shutdown(cancel_futures=True)  # a person who interrupts does not want the rest driven first
 
 
-def _run_here(experiment: Experiment[Any, Any], short: bool, done: Callable[[], None]) -> Section:
-    cases, outcomes = experiment.cases(short), []
-    for case in cases:
-        outcomes.append(experiment.run(case))
-        done()
-    return experiment.report(cases, outcomes)
-
-
-def _run_in(
-    pool: ProcessPoolExecutor, experiment: Experiment[Any, Any], short: bool, done: Callable[[], None]
+def _reported(
+    experiment: Experiment[Any, Any],
+    short: bool,
+    outcomes: Iterable[Any],
+    done: Callable[[], None],
+    keep: Callable[[Replay], None] | None,
 ) -> Section:
-    cases, outcomes = experiment.cases(short), []
-    for outcome in pool.map(experiment.run, cases):
-        outcomes.append(outcome)
+    """The report of outcomes that come one by one, in the order of the cases."""
+    cases, got = experiment.cases(short), []
+    for case, outcome in zip(cases, outcomes, strict=True):
+        got.append(outcome)
+        if keep is not None and experiment.replay is not None:
+            keep(experiment.replay(case, outcome))
         done()
-    return experiment.report(cases, outcomes)
+    return experiment.report(cases, got)

@@ -6,17 +6,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
+from pipeline.params import Params
+from pipeline.run import Sensors
+from pipeline.simulation.scenario import Scenario
+
 Suite = Literal["paper", "euroncap", "iso"]
 Tone = Literal["green", "yellow", "orange", "brown", "red", "grey"]
+Boxes = Literal["truth", "network"]
+"""Whose the camera's boxes are: projected truth with a detector's errors, or the embedded network's on drawn
+pictures."""
 Cell = str | float | int | None
 
 
 @dataclass(frozen=True)
 class Coloured:
-    """A cell with a colour that means something; the table's caption says what."""
+    """A cell with a colour that means something; the table's caption says what. replay: name of the drive behind it,
+    where one is kept."""
 
     value: Cell
     tone: Tone
+    replay: str = ""
 
 
 @dataclass(frozen=True)
@@ -59,6 +68,21 @@ class Section:
     charts: tuple[Chart, ...] = ()
 
 
+@dataclass(frozen=True)
+class Replay:
+    """A drive that can be seen again. name: fit for a file. scenario: with the ego vehicle as driven. text: what came
+    of it."""
+
+    name: str
+    title: str
+    text: tuple[str, ...]
+    scenario: Scenario
+    params: Params
+    sensors: Sensors
+    boxes: Boxes
+    charts: tuple[Chart, ...]
+
+
 Case = TypeVar("Case")
 Outcome = TypeVar("Outcome")
 
@@ -66,7 +90,8 @@ Outcome = TypeVar("Outcome")
 @dataclass(frozen=True)
 class Experiment(Generic[Case, Outcome]):
     """cases: what is to be driven, in short or in full; each can be sent to another process. run: one case to its
-    outcome, a pure function at a module's top level. report: all of them, in order, to a section."""
+    outcome, a pure function at a module's top level. report: all of them, in order, to a section. replay: the drive
+    behind an outcome, where an experiment keeps its drives."""
 
     name: str
     suite: Suite
@@ -74,6 +99,7 @@ class Experiment(Generic[Case, Outcome]):
     cases: Callable[[bool], Sequence[Case]]
     run: Callable[[Case], Outcome]
     report: Callable[[Sequence[Case], Sequence[Outcome]], Section]
+    replay: Callable[[Case, Outcome], Replay] | None = None
 
 
 def as_json(section: Section) -> dict[str, Any]:

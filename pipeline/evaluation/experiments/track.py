@@ -6,8 +6,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.evaluation.experiments.sections import Chart, Series
 from pipeline.geometry import closest_on_polygon
 from pipeline.params import Params, with_changes
+from pipeline.simulation.actors import Motion
 from pipeline.simulation.loop import Setup, Tick, drive
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.world import ActorState
@@ -54,7 +56,7 @@ def parameters(controller: str, set_speed_mps: float, changes: Mapping[str, Any]
 class Drive:
     """A drive towards the target, one value a tick. gap_m: from the bumper to the target's rear. acquired_m: the gap
     when the target first was the CIPV; brakes_m: when any braking was first asked for. impact_mps: relative speed at
-    contact, null without. All null or empty where it did not happen."""
+    contact, null without. motions: the ego vehicle's. All null or empty where it did not happen."""
 
     t_s: tuple[float, ...]
     speed_mps: tuple[float, ...]
@@ -66,6 +68,7 @@ class Drive:
     acquired_m: float | None
     brakes_m: float | None
     impact_mps: float | None
+    motions: tuple[Motion, ...] = ()
 
     @property
     def smallest_gap_m(self) -> float:
@@ -99,6 +102,7 @@ def approach(scenario: Scenario, setup: Setup, stop_when_over: bool = True) -> D
 
 def record(ticks: Iterable[Tick], stop_when_over: bool = True) -> Drive:
     rows: list[tuple[float, float, float, float, float, float | None, str]] = []
+    motions: list[Motion] = []
     acquired = brakes = impact = None
     for tick in ticks:
         target = target_of(tick)
@@ -111,11 +115,28 @@ def record(ticks: Iterable[Tick], stop_when_over: bool = True) -> Drive:
         state = command.state if command is not None else "off"
         acquired = gap if acquired is None and measured is not None else acquired
         brakes = gap if brakes is None and command is not None and command.brake > _PEDAL_TOUCHED else brakes
+        motions.append(tick.vehicle.motion())
         rows.append((tick.t_s, speed, tick.vehicle.accel_mps2, gap, target.speed_mps, measured, state))
         if stop_when_over and _over(tick, target):
             break
     times, speeds, accels, gaps, targets, measures, states = tuple(zip(*rows, strict=True)) or ((),) * 7
-    return Drive(times, speeds, accels, gaps, targets, measures, states, acquired, brakes, impact)
+    return Drive(times, speeds, accels, gaps, targets, measures, states, acquired, brakes, impact, tuple(motions))
+
+
+def drive_charts(drive: Drive) -> tuple[Chart, ...]:
+    """Speeds, gap and acceleration over time, as one looks at a drive."""
+    t_s = drive.t_s
+    seen = [(t, range_m) for t, range_m in zip(t_s, drive.measured_m, strict=True) if range_m is not None]
+    seen_s, seen_m = zip(*seen, strict=True) if seen else ((), ())
+    own, target = (
+        Series(name, t_s, tuple(v * 3.6 for v in speeds))
+        for name, speeds in (("own", drive.speed_mps), ("target", drive.target_mps))
+    )
+    return (
+        Chart("Speed", "time s", "km/h", (own, target)),
+        Chart("Gap", "time s", "m", (Series("true gap", t_s, drive.gap_m), Series("CIPV", seen_s, seen_m, True))),
+        Chart("Acceleration", "time s", "m/s²", (Series("own", t_s, drive.accel_mps2),)),
+    )
 
 
 def _over(tick: Tick, target: ActorState) -> bool:

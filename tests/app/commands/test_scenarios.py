@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
 
 from app.cli import main
+from pipeline.params import Params, from_yaml
+from pipeline.sources import open_source
 
 
 def test_a_short_experiment_as_json_and_as_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -19,6 +22,21 @@ def test_a_short_experiment_as_json_and_as_a_page(tmp_path: Path, capsys: pytest
     assert section["name"] == "braking"
     assert {row[1] for row in section["tables"][0]["rows"]} == {"LiDAR", "fused"}
     assert "CCRs: speed" in page.read_text(encoding="utf-8")
+
+
+def test_cells_of_the_report_lead_to_the_drives_behind_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report, drives = tmp_path / "ncap.html", tmp_path / "drives"
+    with pytest.raises(SystemExit) as ended:
+        main(["scenarios", "run", "--suite", "ncap", "--short", "--report", str(report), "--drives", str(drives)])
+    assert ended.value.code == 0
+    links = re.findall(r'href="(drives/[^"#]+)\.html"', report.read_text(encoding="utf-8"))
+    assert links
+    for link in links:
+        page = (tmp_path / f"{link}.html").read_text(encoding="utf-8")
+        assert "<svg" in page
+        assert "cipv serve" in page
+        assert len(open_source(f"sim:{tmp_path / link}.yaml")) > 10
+        assert from_yaml(tmp_path / f"{link}.params.yaml", Params()).acc.brake_limit_mps2 == 0.0, "AEB alone"
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,70 @@
+"""A closed-loop drive kept as a scenario: the same moments, the same sweeps, the same results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline.params import Params
+from pipeline.results import to_json
+from pipeline.run import only
+from pipeline.simulation.loop import Setup, drive
+from pipeline.simulation.replay import as_driven, to_yaml
+from pipeline.simulation.scenario import Scenario, load, parse
+from pipeline.sources import open_source
+from pipeline.step import State, step
+from pipeline.types import Result
+
+TICKS = 25
+
+
+@pytest.fixture(scope="module")
+def braking() -> Scenario:
+    """Closing in on a standing car: the loop brakes, which the script does not."""
+    return load("ccrs_100")
+
+
+def believed(result: Result) -> dict[str, Any]:
+    """All but how long it took, and that the replay has a picture too."""
+    return {key: value for key, value in to_json(result).items() if key not in ("timing_ms", "sensors")}
+
+
+def test_a_kept_drive_gives_the_very_frames_and_results_of_the_loop(braking: Scenario, tmp_path: Path) -> None:
+    ticks = [tick for tick, _ in zip(drive(braking, Setup(sensors="lidar")), range(TICKS), strict=False)]
+    kept = tmp_path / "drive.yaml"
+    kept.write_text(to_yaml(as_driven(braking, [tick.vehicle.motion() for tick in ticks]), "a drive"))
+    source = open_source(f"sim:{kept}")
+    assert len(source) == TICKS
+    state = State()
+    for index, tick in enumerate(ticks):
+        frame = only(source.frame(index), "lidar")
+        assert frame.sweep is not None
+        assert tick.frame.sweep is not None
+        np.testing.assert_array_equal(frame.sweep.points, tick.frame.sweep.points)
+        state, result = step(state, frame, Params())
+        assert believed(result) == believed(tick.result)
+        truth = source.truth(index)
+        assert truth
+        assert truth[0].cuboid == tick.world.actors[-1].cuboid
+
+
+def test_the_drive_is_not_the_script(braking: Scenario) -> None:
+    ticks = [tick for tick, _ in zip(drive(braking, Setup()), range(60), strict=False)]
+    kept = as_driven(braking, [tick.vehicle.motion() for tick in ticks])
+    assert kept.own_motion(5.9).speed_mps == pytest.approx(ticks[-1].vehicle.speed_mps, abs=1e-6)
+    assert abs(kept.own_motion(5.9).speed_mps - braking.own_motion(5.9).speed_mps) > 0.1
+
+
+def test_between_two_ticks_the_motion_is_in_proportion_and_it_stays_at_the_end(braking: Scenario) -> None:
+    row = (0.0, -1.75, 10.0, 0.0, 0.0, 0.0)
+    kept = braking.model_copy(update={"driven": (row, (1.0, -1.75, 12.0, 2.0, 0.0, 0.0))})
+    assert kept.own_motion(0.05).speed_mps == pytest.approx(11.0)
+    assert kept.own_motion(9.0).travelled_m == 1.0
+
+
+def test_what_is_written_is_read_back_whole(braking: Scenario) -> None:
+    kept = as_driven(braking, [braking.own_motion(k / 10) for k in range(5)], "as driven")
+    assert parse(to_yaml(kept), "kept.yaml") == kept
