@@ -14,9 +14,19 @@ __all__ = ["LiveSource", "Source", "SourceError", "TruthObject", "is_live", "ope
 
 _LIVE = "live:"
 
+_SESSION_SUFFIX = ".mcap"
+
+
+def _open_session(uri: str, path: str, rings: int) -> Source:
+    from pipeline.recording.session import SessionSource  # half a second of imports: only who opens one pays
+
+    return SessionSource(uri, path)
+
+
 _OPENERS: dict[str, Callable[[str, str, int], Source]] = {
     "astyx": lambda uri, rest, rings: AstyxSource(uri, rest),
     "kitti": lambda uri, rest, rings: KittiSource(uri, rest, rings),
+    "mcap": _open_session,
     "sim": lambda uri, rest, rings: SimulatedSource(uri, rest),
 }
 """Scheme → what opens it, given the whole URI, the part after the colon and how many LiDAR rings to keep."""
@@ -26,13 +36,15 @@ _MARKS = {"lidar_vlp16": "astyx", "camera_front": "astyx", "velodyne": "kitti", 
 
 
 def open_source(uri: str, *, rings: int = 16) -> Source:
-    """Open ``scheme:rest``. ``rings``: how many rings to keep of a LiDAR that has more (KITTI's HDL-64).
+    """Open ``scheme:rest``, or the path of a session. ``rings``: how many rings to keep of a LiDAR that has more (KITTI's HDL-64).
 
     SourceError, in one sentence, when the scheme is unknown or the recording cannot be opened.
     """
     scheme, colon, rest = uri.partition(":")
     is_drive_letter = len(scheme) == 1
     if not colon or is_drive_letter or not scheme.isalnum():
+        if uri.lower().endswith(_SESSION_SUFFIX):
+            return _open_session(uri, uri, rings)
         raise SourceError(_about_bare_path(uri))
     if is_live(uri):
         raise SourceError(f"{uri}: live sensors have no frames to choose from; a recording is needed here")

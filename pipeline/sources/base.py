@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
@@ -84,6 +84,13 @@ class LiveSource(Protocol):
         ...
 
 
+@runtime_checkable
+class Recorded(Protocol):
+    """A source that was made from another one. origin: that one's URI."""
+
+    origin: str
+
+
 def is_simulated(source: Source) -> bool:
     """Whether its pictures are drawn, which a detector may have to know."""
-    return source.uri.startswith("sim:")
+    return (source.origin if isinstance(source, Recorded) else source.uri).startswith("sim:")

@@ -1,0 +1,153 @@
+"""Recording beside the line: a thread of its own writes, and nothing ever waits for the disk.
+
+What is put goes into a bounded queue. When the disk is too slow, what does not fit is dropped, counted, logged, and
+noted in the session itself. A chunk goes to the system when it is full and at least every ``FLUSH_S``, and is forced to
+the disk every ``SYNC_S``: death of the process costs a second at most, loss of power ``SYNC_S``.
+"""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.params import Params
+from pipeline.recording.segments import NEVER, Rotation, Segments
+from pipeline.recording.writer import About
+from pipeline.types import Frame, Result
+
+logger = logging.getLogger("cipv.recording")
+
+FLUSH_S, SYNC_S = 1.0, 5.0
+_QUEUED = 64
+"""Six seconds of frames at 10 Hz; with pictures of 1280×720 that is 200 MB at worst."""
+
+_Job = Callable[[Segments], None]
+
+
+@dataclass(frozen=True)
+class RecordingState:
+    """How a recording does. file: the newest of ``files``. seconds, bytes: over all of them. dropped: frames and
+    batches of packets that did not fit. error: why it ended by itself, null while all is well."""
+
+    file: Path
+    files: tuple[Path, ...]
+    frames: int
+    seconds: float
+    bytes: int
+    dropped: int
+    error: str | None
+
+
+class Recorder:
+    """Starts at once. BadInput when there is such a file already, OSError when it cannot be made. ``stop`` it in the
+    end. ``queued``: how many frames may wait for the disk."""
+
+    def __init__(self, path: Path, about: About, rotation: Rotation = NEVER, *, queued: int = _QUEUED) -> None:
+        self._segments = Segments(path, about, rotation, "lz4")
+        self._jobs: queue.Queue[_Job | None] = queue.Queue(queued)
+        self._marks: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._dropped = 0
+        self._error: str | None = None
+        self._thread = threading.Thread(target=self._work, name="cipv-recorder", daemon=True)
+        self._thread.start()
+
+    def put(
+        self,
+        frame: Frame,
+        result: Result | None = None,
+        params: Params | None = None,
+        *,
+        received_ns: int | None = None,
+    ) -> bool:
+        """Record a frame, what was believed of it and with which parameters. Returns at once; false when it was
+        dropped. received_ns: when a live frame was made, by the host's clock; null for one from a recording."""
+        return self._put(lambda segments: segments.write(frame, result, params, received_ns))
+
+    def put_packets(self, packets: list[tuple[int, bytes]]) -> bool:
+        """Record raw LiDAR packets, (when received in ns, payload) each, oldest first; best a sweep's at a time.
+        Returns at once; false when they were dropped."""
+        return self._put(lambda segments: segments.write_packets(packets))
+
+    def mark(self, text: str) -> None:
+        """ "Something happened here": never dropped. Returns at once."""
+        self._marks.put(text)
+
+    @property
+    def state(self) -> RecordingState:
+        segments = self._segments
+        files = tuple(segments.files)
+        return RecordingState(
+            files[-1],
+            files,
+            segments.frames,
+            segments.seconds,
+            segments.bytes_written,
+            self._dropped,
+            self._error,
+        )
+
+    def stop(self) -> RecordingState:
+        """Write what is queued, close the file, and say how it went. Safe to call twice."""
+        if self._thread.is_alive():
+            self._jobs.put(None)
+            self._thread.join()
+        return self.state
+
+    def _put(self, job: _Job) -> bool:
+        if self._error is not None:
+            return False
+        try:
+            self._jobs.put_nowait(job)
+        except queue.Full:
+            self._dropped += 1
+            if self._dropped == 1:
+                logger.warning("%s: the disk is too slow, frames are dropped", self._segments.files[-1])
+            return False
+        return True
+
+    # ------------------------------------------------------------ the writer's thread
+
+    def _work(self) -> None:
+        try:
+            self._write_all()
+            self._segments.close()
+        except Exception as error:
+            self._fail(error)
+
+    def _write_all(self) -> None:
+        dropped = 0
+        flushed_s = synced_s = time.monotonic()
+        while True:
+            try:
+                job = self._jobs.get(timeout=FLUSH_S)
+                if job is None:
+                    return self._write_marks()
+                job(self._segments)
+            except queue.Empty:
+                pass
+            self._write_marks()
+            if self._dropped > dropped:
+                self._segments.write_note(f"{self._dropped - dropped} frames were dropped here: the disk was too slow")
+                dropped = self._dropped
+            now_s = time.monotonic()
+            if now_s - flushed_s >= FLUSH_S:
+                is_due = now_s - synced_s >= SYNC_S
+                self._segments.flush(to_disk=is_due)
+                flushed_s, synced_s = now_s, now_s if is_due else synced_s
+
+    def _write_marks(self) -> None:
+        while not self._marks.empty():
+            self._segments.write_mark(self._marks.get_nowait())
+
+    def _fail(self, error: Exception) -> None:
+        """Recording ends here; the line goes on."""
+        reason = (error.strerror if isinstance(error, OSError) else None) or f"{type(error).__name__}: {error}"
+        self._error = f"recording stopped: {reason}; {self._segments.frames} frames until then are kept"
+        logger.error("%s: %s", self._segments.files[-1], self._error)
+        while not self._jobs.empty():  # the frames that wait hold memory
+            self._jobs.get_nowait()

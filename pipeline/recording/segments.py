@@ -1,0 +1,95 @@
+"""A recording over one file or, by size and time, several in a row; each is a session that can be read alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.params import Params
+from pipeline.recording.clock import SessionClock
+from pipeline.recording.output import Compression
+from pipeline.recording.writer import About, SessionWriter
+from pipeline.types import Frame, Result
+
+
+@dataclass(frozen=True)
+class Rotation:
+    """When a recording goes on in a new file; null is never. max_s: of recorded time."""
+
+    max_bytes: float | None = None
+    max_s: float | None = None
+
+
+NEVER = Rotation()
+
+
+class Segments:
+    """Writes to ``path`` and, after rotation, to ``<stem>_001.mcap`` and so on beside it. Not for several threads.
+
+    frames, seconds: over all files, seconds by log time. BadInput when a file exists; OSError when one can take no
+    more: nothing can be written after that, and what was written before is whole.
+    """
+
+    def __init__(self, path: Path, about: About, rotation: Rotation = NEVER, compression: Compression = "zstd") -> None:
+        self._about, self._rotation, self._compression = about, rotation, compression
+        self._clock = SessionClock()
+        self._earlier_frames, self._earlier_bytes = 0, 0
+        self._earlier_s = 0.0
+        self.files = [path]
+        self._writer = self._open(path)
+
+    @property
+    def frames(self) -> int:
+        return self._earlier_frames + self._writer.frames
+
+    @property
+    def bytes_written(self) -> int:
+        return self._earlier_bytes + self._writer.bytes_written
+
+    @property
+    def seconds(self) -> float:
+        return self._earlier_s + self._writer.span_s
+
+    def write(self, frame: Frame, result: Result | None, params: Params | None, received_ns: int | None) -> None:
+        """See ``SessionWriter.write``."""
+        if self._is_full():
+            self._rotate()
+        self._writer.write(frame, result, params, received_ns=received_ns)
+
+    def write_packets(self, packets: list[tuple[int, bytes]]) -> None:
+        """See ``SessionWriter.write_packets``."""
+        self._writer.write_packets(packets)
+
+    def write_mark(self, text: str) -> None:
+        """See ``SessionWriter.write_mark``."""
+        self._writer.write_mark(text)
+
+    def write_note(self, text: str) -> None:
+        """See ``SessionWriter.write_note``."""
+        self._writer.write_note(text)
+
+    def flush(self, *, to_disk: bool = False) -> None:
+        """See ``Output.flush``."""
+        self._writer.flush(to_disk=to_disk)
+
+    def close(self) -> None:
+        """Safe to call twice."""
+        self._writer.close()
+
+    def _is_full(self) -> bool:
+        limit = self._rotation
+        too_large = limit.max_bytes is not None and self._writer.bytes_written >= limit.max_bytes
+        return self._writer.frames > 0 and (
+            too_large or (limit.max_s is not None and self._writer.span_s >= limit.max_s)
+        )
+
+    def _rotate(self) -> None:
+        self._writer.close()
+        self._earlier_frames, self._earlier_bytes, self._earlier_s = self.frames, self.bytes_written, self.seconds
+        first = self.files[0]
+        path = first.with_name(f"{first.stem}_{len(self.files):03d}{first.suffix}")
+        self._writer = self._open(path)
+        self.files.append(path)
+
+    def _open(self, path: Path) -> SessionWriter:
+        return SessionWriter(path, self._about, compression=self._compression, clock=self._clock)

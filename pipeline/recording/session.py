@@ -1,0 +1,209 @@
+"""A session as a ``Source``: any frame within a few chunks' reading, whatever the length of the file."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.params import Params, ParamsError, with_changes
+from pipeline.recording import topics
+from pipeline.recording.container import McapFile, NotMcap
+from pipeline.recording.messages import Damaged, log_text, picture_from, sweep_from
+from pipeline.recording.tick import PictureRef, SweepRef, Tick, route_from, tick_from
+from pipeline.recording.writer import VERSION, About
+from pipeline.sources.base import SourceError, TruthObject
+from pipeline.types import CameraCalibration, Frame, Picture, Route, Sweep
+
+_T = TypeVar("_T")
+I64 = npt.NDArray[np.int64]
+
+
+class Mark(NamedTuple):
+    """A moment that a person marked: its header time and their words."""
+
+    t_ns: int
+    text: str
+
+
+class SessionSource:
+    """An MCAP session. SourceError when the file cannot be read, is none, or holds no frames.
+
+    origin: the URI of what was recorded.
+    """
+
+    def __init__(self, uri: str, path: str) -> None:
+        try:
+            self.file = McapFile(Path(path).expanduser())
+        except (NotMcap, OSError, RuntimeError, ValueError) as error:
+            raise SourceError(str(error)) from None
+        try:
+            about = self._about(path)
+            self._log_ns, self._t_ns = self._frames()
+            if not len(self._t_ns):
+                raise SourceError(f"{path}: the session holds no frames")
+        except SourceError:
+            self.file.close()
+            raise
+        self.uri, self.origin, self.title, self.rate_hz = uri, about.origin, about.title, about.rate_hz
+        self.notes = (*about.notes, *self._problems(path))
+        self._picture: tuple[PictureRef, Picture] | None = None
+        self._route: tuple[int, Route] | None = None
+
+    def __len__(self) -> int:
+        return len(self._t_ns)
+
+    def t_ns(self, index: int) -> int:
+        return int(self._t_ns[self._checked(index)])
+
+    def log_time_ns(self, index: int) -> int:
+        """When the frame was received, by the recorder's clock; also what its messages are found by."""
+        return int(self._log_ns[self._checked(index)])
+
+    def frame(self, index: int) -> Frame:
+        notes: list[str] = []
+        tick = self._read_tick(index, notes)
+        if tick is None:
+            return Frame(index, f"{index:06d}", self.t_ns(index), notes=tuple(notes))
+        return Frame(
+            index,
+            tick.name,
+            tick.t_ns,
+            _or_note(lambda: self._sweep(tick.sweep), notes),
+            _or_note(lambda: self._read_picture(tick.picture), notes),
+            _or_note(lambda: _camera(tick), notes),
+            tick.ego,
+            notes=(*tick.notes, *notes),
+            gnss=tick.gnss,
+            route=_or_note(lambda: self._read_route(tick.route_at_ns), notes),
+            streams=tick.streams,
+            timing_ms=tick.timing_ms,
+        )
+
+    def truth(self, index: int) -> tuple[TruthObject, ...] | None:
+        tick = self._read_tick(index, [])
+        return tick.truth if tick is not None else None
+
+    def params(self, index: int) -> Params | None:
+        """What the frame was run with when it was recorded; null when a session holds inputs alone."""
+        tick = self._read_tick(index, [])
+        if tick is None or tick.params_at_ns is None:
+            return None
+        try:
+            return _params_from(self.file.message(topics.PARAMS, tick.params_at_ns).data)
+        except (Damaged, ValueError, AttributeError, RecursionError, ParamsError):
+            return None
+
+    def result(self, index: int) -> dict[str, Any] | None:
+        """What was believed of the frame when it was recorded, in the contract's JSON; null when nothing was."""
+        try:
+            found = json.loads(self.file.message(topics.RESULTS, self.log_time_ns(index)).data)
+        except (Damaged, ValueError, RecursionError):
+            return None
+        return found if isinstance(found, dict) else None
+
+    def marks(self) -> tuple[Mark, ...]:
+        """Every moment that was marked while it was recorded."""
+        found = []
+        for stored in self.file.messages((topics.MARKS,)):
+            try:
+                found.append(Mark(stored.publish_time_ns, log_text(topics.MARKS, stored.data)))
+            except Damaged:
+                continue
+        return tuple(found)
+
+    def close(self) -> None:
+        self.file.close()
+
+    # ------------------------------------------------------------ opening
+
+    def _about(self, path: str) -> About:
+        metadata = self.file.metadata(topics.METADATA)
+        if metadata is None:
+            kind = self.file.directory.profile or "unknown"
+            hint = f"; try rosbag:{path}" if kind.startswith("ros") else ""
+            raise SourceError(f"{path}: an MCAP file, but no session of ours (its profile is {kind!r}){hint}")
+        try:
+            about = About.from_metadata(metadata)
+        except ValueError as error:
+            raise SourceError(f"{path}: a session that cannot be read: {error}") from None
+        if about.version > VERSION:
+            raise SourceError(f"{path}: a session of version {about.version}; this program reads up to {VERSION}")
+        return about
+
+    def _frames(self) -> tuple[I64, I64]:
+        """Log time and header time of every frame: from the list at the file's end, else from the frames."""
+        listed = self.file.attachment(topics.INDEX)
+        if listed is not None and len(listed) % 16 == 0:
+            pairs = np.frombuffer(listed, dtype="<i8").reshape(-1, 2)
+            return pairs[:, 0].astype(np.int64), pairs[:, 1].astype(np.int64)
+        stamps = []
+        for stored in self.file.messages((topics.FRAMES,)):
+            try:
+                stamps.append((stored.log_time_ns, tick_from(stored.data).t_ns))
+            except Damaged:
+                continue
+        pairs = np.array(stamps, dtype=np.int64).reshape(-1, 2)
+        return pairs[:, 0], pairs[:, 1]
+
+    def _problems(self, path: str) -> list[str]:
+        notes = []
+        if self.file.directory.problem is not None:
+            notes.append(f"{self.file.directory.problem}; `cipv recover {path}` makes a whole file of it")
+        if self.file.damaged:
+            notes.append(f"{len(self.file.damaged)} parts of the file are damaged")
+        return notes
+
+    # ------------------------------------------------------------ one frame
+
+    def _checked(self, index: int) -> int:
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        return index
+
+    def _read_tick(self, index: int, notes: list[str]) -> Tick | None:
+        at_ns = self.log_time_ns(index)
+        return _or_note(lambda: tick_from(self.file.message(topics.FRAMES, at_ns).data), notes)
+
+    def _sweep(self, ref: SweepRef | None) -> Sweep | None:
+        return sweep_from(self.file.message(topics.POINTS, ref.at_ns).data, ref.t_ns, ref.channels) if ref else None
+
+    def _read_picture(self, ref: PictureRef | None) -> Picture | None:
+        """One picture may serve several ticks, and is the same object then."""
+        if ref is None:
+            return None
+        if self._picture is None or self._picture[0] != ref:
+            self._picture = ref, picture_from(self.file.message(topics.IMAGE, ref.at_ns).data, ref.t_ns)
+        return self._picture[1]
+
+    def _read_route(self, at_ns: int | None) -> Route | None:
+        if at_ns is None:
+            return None
+        if self._route is None or self._route[0] != at_ns:
+            self._route = at_ns, route_from(self.file.message(topics.ROUTE, at_ns).data)
+        return self._route[1]
+
+
+def _params_from(data: bytes) -> Params:
+    """A parameter that did not exist yet has its default."""
+    sections = json.loads(data).items()
+    return with_changes(
+        Params(), {f"{name}.{key}": value for name, values in sections for key, value in values.items()}
+    )
+
+
+def _camera(tick: Tick) -> CameraCalibration | None:
+    return tick.camera.calibration() if tick.camera is not None else None
+
+
+def _or_note(read: Callable[[], _T], notes: list[str]) -> _T | None:
+    """What ``read`` gives; null, and a note, when it is damaged."""
+    try:
+        return read()
+    except Damaged as damage:
+        notes.append(str(damage))
+        return None

@@ -1,0 +1,117 @@
+"""The topics of a session and their schemas, in one place.
+
+Sensor data is in Foxglove's well-known protobuf schemas, so that Foxglove and rerun draw a session as it is; what they
+have no schema for is JSON with a JSON schema beside it. The schemas come from foxglove-sdk, the messages are made and
+read by protobuf.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+from foxglove import messages as foxglove
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory  # type: ignore[import-untyped]
+
+FRAMES = "/frames"
+POINTS = "/lidar/points"
+PACKETS = "/lidar/packets"
+IMAGE = "/camera/image"
+CALIBRATION = "/camera/calibration"
+GNSS = "/gnss"
+EGO = "/ego"
+TF = "/tf"
+ROUTE = "/route"
+PARAMS = "/params"
+RESULTS = "/results"
+MARKS = "/marks"
+NOTES = "/notes"
+HEALTH = "/health"
+
+EGO_FRAME, CAMERA_FRAME = "ego", "camera"
+"""Names of the frames of reference: points are in ``ego``; ``camera`` is the optical frame (z ahead, x right)."""
+
+PROFILE = "cipv"
+"""The MCAP header's profile; what tells a session from anyone else's file."""
+
+METADATA = "cipv"
+"""Name of the metadata record that says where a session came from."""
+
+INDEX = "cipv-frames"
+"""Name of the attachment that lists all frames: pairs of little-endian int64, log time and header time, in order."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What MCAP wants to know of a topic. ``metadata``: (key, value) pairs."""
+
+    topic: str
+    message_encoding: str
+    schema_name: str
+    schema_encoding: str
+    schema_data: bytes
+    metadata: tuple[tuple[str, str], ...] = ()
+
+
+_WELL_KNOWN: dict[str, Any] = {
+    POINTS: foxglove.PointCloud,
+    IMAGE: foxglove.CompressedImage,
+    CALIBRATION: foxglove.CameraCalibration,
+    GNSS: foxglove.LocationFix,
+    TF: foxglove.FrameTransform,
+    MARKS: foxglove.Log,
+    NOTES: foxglove.Log,
+}
+
+VELODYNE_SCAN = "velodyne_msgs/msg/VelodyneScan"
+
+VELODYNE_SCAN_DEFINITION = "std_msgs/Header header\nvelodyne_msgs/VelodynePacket[] packets\n"
+VELODYNE_PACKET_DEFINITION = "builtin_interfaces/Time stamp\nuint8[1206] data\n"
+
+_SCAN_SCHEMA = f"\n{'=' * 80}\n".join(
+    (
+        VELODYNE_SCAN_DEFINITION,
+        f"MSG: velodyne_msgs/VelodynePacket\n{VELODYNE_PACKET_DEFINITION}",
+        "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
+        "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
+    )
+)
+"""ROS 2's schema for raw packets with all that it is made of, as MCAP wants it."""
+
+_JSON_TITLES = {
+    FRAMES: "cipv.Frame",
+    EGO: "cipv.Ego",
+    ROUTE: "cipv.Route",
+    PARAMS: "cipv.Params",
+    RESULTS: "cipv.Result",
+    HEALTH: "cipv.Health",
+}
+
+
+@cache
+def channel(topic: str) -> Channel:
+    """The channel of one of this module's topics. KeyError for another."""
+    if topic in _WELL_KNOWN:
+        schema = _WELL_KNOWN[topic].get_schema()
+        return Channel(topic, "protobuf", schema.name, schema.encoding, schema.data)
+    if topic == PACKETS:
+        return Channel(topic, "cdr", VELODYNE_SCAN, "ros2msg", _SCAN_SCHEMA.encode())
+    schema_data = json.dumps({"title": _JSON_TITLES[topic], "type": "object"}).encode()
+    return Channel(topic, "json", _JSON_TITLES[topic], "jsonschema", schema_data)
+
+
+@cache
+def message_class(topic: str) -> Any:
+    """The protobuf class of a topic in a well-known schema."""
+    schema = _WELL_KNOWN[topic].get_schema()
+    return protobuf_class(schema.name, schema.data)
+
+
+def protobuf_class(name: str, file_descriptor_set: bytes) -> Any:
+    """The class of message ``name``, from a schema as MCAP stores it."""
+    pool = descriptor_pool.DescriptorPool()
+    for file in descriptor_pb2.FileDescriptorSet.FromString(file_descriptor_set).file:
+        pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName(name))

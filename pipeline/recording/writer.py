@@ -1,0 +1,240 @@
+"""Frames and results into one session file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+
+from pipeline.params import Params
+from pipeline.recording import topics
+from pipeline.recording.clock import SessionClock
+from pipeline.recording.messages import (
+    calibration_message,
+    image_message,
+    location_message,
+    log_message,
+    points_message,
+    transform_messages,
+)
+from pipeline.recording.output import Compression, Output
+from pipeline.recording.packets import scan_message
+from pipeline.recording.tick import (
+    CameraRecord,
+    PictureRef,
+    SweepRef,
+    Tick,
+    ego_message,
+    health_message,
+    route_message,
+    tick_message,
+)
+from pipeline.results import to_json
+from pipeline.sources.base import TruthObject
+from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Result, Route, Sweep
+
+VERSION = 1
+
+
+@dataclass(frozen=True)
+class About:
+    """Where a session came from. origin: the URI that was recorded. notes: what to know about the whole."""
+
+    origin: str
+    title: str
+    rate_hz: float
+    notes: tuple[str, ...] = ()
+    version: int = VERSION
+
+    def to_metadata(self) -> dict[str, str]:
+        """As MCAP keeps it: text to text."""
+        return {key: json.dumps(value, ensure_ascii=False) for key, value in asdict(self).items()}
+
+    @staticmethod
+    def from_metadata(metadata: dict[str, str]) -> About:
+        """ValueError when it is no such metadata."""
+        try:
+            return _ABOUT.validate_python({key: json.loads(value) for key, value in metadata.items()})
+        except (ValidationError, RecursionError) as error:
+            raise ValueError(str(error).splitlines()[0]) from None
+
+
+_ABOUT = TypeAdapter(About)
+
+
+class SessionWriter:
+    """Writes one file. Not for several threads; ``Recorder`` is. OSError when the file can take no more.
+
+    What stays the same from frame to frame (calibration, route, parameters, a picture shown twice) is written once.
+    """
+
+    def __init__(
+        self, path: Path, about: About, *, compression: Compression = "zstd", clock: SessionClock | None = None
+    ) -> None:
+        self._output = Output(path, compression)
+        self._output.add_metadata(topics.METADATA, about.to_metadata())
+        self._clock = clock or SessionClock()
+        self._index: list[tuple[int, int]] = []
+        self._header_ns = 0
+        self._tick: Tick | None = None
+        self._picture: Picture | None = None
+        self._camera: CameraCalibration | None = None
+        self._route: Route | None = None
+        self._params: Params | None = None
+        self._ego: EgoState | None = None
+        self._gnss: GnssFix | None = None
+
+    @property
+    def path(self) -> Path:
+        return self._output.path
+
+    @property
+    def bytes_written(self) -> int:
+        return self._output.bytes_written
+
+    @property
+    def frames(self) -> int:
+        return len(self._index)
+
+    @property
+    def span_s(self) -> float:
+        """Log time from the first frame to the last."""
+        return (self._index[-1][0] - self._index[0][0]) / 1e9 if self._index else 0.0
+
+    def write(
+        self,
+        frame: Frame,
+        result: Result | dict[str, Any] | None = None,
+        params: Params | None = None,
+        *,
+        received_ns: int | None = None,
+        truth: tuple[TruthObject, ...] | None = None,
+    ) -> None:
+        """Append a frame with what was believed of it, if anything. A result may be in the contract's JSON already.
+
+        received_ns: when the frame was made, by the recorder's clock; null for one that comes from a recording.
+        """
+        at_ns = self._clock.log_time(frame.t_ns, received_ns)
+        self._header_ns = frame.t_ns
+        tick = Tick(
+            name=frame.name,
+            t_ns=frame.t_ns,
+            notes=frame.notes,
+            sweep=self._put_sweep(frame.sweep, at_ns),
+            picture=self._put_picture(frame.picture, at_ns),
+            camera=self._put_camera(frame.camera, at_ns),
+            ego=frame.ego,
+            gnss=frame.gnss,
+            streams=frame.streams,
+            timing_ms=dict(frame.timing_ms),
+            route_at_ns=self._put_route(frame.route, at_ns),
+            params_at_ns=self._put_params(params, at_ns),
+            truth=truth,
+        )
+        self._put_small(frame, at_ns)
+        if result is not None:
+            self._put_result(result, at_ns)
+        self._add(topics.FRAMES, at_ns, tick_message(tick))
+        self._index.append((at_ns, frame.t_ns))
+        self._tick = tick
+
+    def write_packets(self, packets: list[tuple[int, bytes]]) -> None:
+        """Raw LiDAR packets, (when received in ns, payload) each, oldest first, as one ``VelodyneScan``."""
+        received_ns = packets[-1][0]
+        at_ns = self._clock.log_time(received_ns, received_ns)
+        self._add(topics.PACKETS, at_ns, scan_message(packets), packets[0][0])
+
+    def write_mark(self, text: str) -> None:
+        """ "Something happened here", by a person, right after the last frame."""
+        self._add(topics.MARKS, self._clock.now(), log_message(topics.MARKS, text, self._header_ns))
+
+    def write_note(self, text: str) -> None:
+        """What a person who opens the session should know happened here."""
+        self._add(topics.NOTES, self._clock.now(), log_message(topics.NOTES, text, self._header_ns, warning=True))
+
+    def flush(self, *, to_disk: bool = False) -> None:
+        """See ``Output.flush``."""
+        self._output.flush(to_disk=to_disk)
+
+    def close(self) -> None:
+        """Write the list of frames and the summary. Safe to call twice."""
+        if self._output.is_open:
+            data = np.array(self._index, dtype="<i8").tobytes()
+            self._output.add_attachment(topics.INDEX, "application/octet-stream", data)
+        self._output.close()
+
+    def _add(self, topic: str, at_ns: int, data: bytes, t_ns: int | None = None) -> None:
+        self._output.add(topics.channel(topic), at_ns, self._header_ns if t_ns is None else t_ns, data)
+
+    def _put_sweep(self, sweep: Sweep | None, at_ns: int) -> SweepRef | None:
+        if sweep is None:
+            return None
+        self._add(topics.POINTS, at_ns, points_message(sweep), sweep.t_ns)
+        return SweepRef(at_ns, sweep.t_ns, sweep.channels)
+
+    def _put_picture(self, picture: Picture | None, at_ns: int) -> PictureRef | None:
+        if picture is None:
+            return None
+        if picture is self._picture and self._tick is not None and self._tick.picture is not None:
+            return self._tick.picture
+        self._picture = picture
+        self._add(topics.IMAGE, at_ns, image_message(picture, self._header_ns), picture.t_ns)
+        return PictureRef(at_ns, picture.t_ns)
+
+    def _put_camera(self, camera: CameraCalibration | None, at_ns: int) -> CameraRecord | None:
+        before = self._tick.camera if self._tick is not None else None
+        if camera is not None and camera is self._camera and before is not None:
+            return before
+        self._camera = camera
+        record = CameraRecord.of(camera, at_ns) if camera is not None else None
+        if record is not None and before is not None and replace(record, at_ns=before.at_ns) == before:
+            return before
+        if record != before or self._tick is None:
+            for data in transform_messages(camera, self._header_ns):
+                self._add(topics.TF, at_ns, data)
+        if camera is not None:
+            self._add(topics.CALIBRATION, at_ns, calibration_message(camera, self._header_ns))
+        return record
+
+    def _put_route(self, route: Route | None, at_ns: int) -> int | None:
+        if route is None:
+            return None
+        if route is self._route and self._tick is not None and self._tick.route_at_ns is not None:
+            return self._tick.route_at_ns
+        self._route = route
+        self._add(topics.ROUTE, at_ns, route_message(route))
+        return at_ns
+
+    def _put_params(self, params: Params | None, at_ns: int) -> int | None:
+        if params is None:
+            return None
+        if (
+            self._tick is not None
+            and self._tick.params_at_ns is not None
+            and (params is self._params or params == self._params)
+        ):
+            return self._tick.params_at_ns
+        self._params = params
+        self._add(topics.PARAMS, at_ns, params.model_dump_json().encode())
+        return at_ns
+
+    def _put_small(self, frame: Frame, at_ns: int) -> None:
+        """What a tick holds itself, once more for viewers, on topics of its own."""
+        if frame.ego is not None and frame.ego is not self._ego:
+            self._add(topics.EGO, at_ns, ego_message(frame.ego), frame.ego.t_ns)
+        if frame.gnss is not None and frame.gnss is not self._gnss:
+            self._add(topics.GNSS, at_ns, location_message(frame.gnss), frame.gnss.t_ns)
+        if frame.streams:
+            self._add(topics.HEALTH, at_ns, health_message(frame.streams))
+        for note in frame.notes:
+            self._add(topics.NOTES, at_ns, log_message(topics.NOTES, note, frame.t_ns, warning=True))
+        self._ego, self._gnss = frame.ego, frame.gnss
+
+    def _put_result(self, result: Result | dict[str, Any], at_ns: int) -> None:
+        content = to_json(result) if isinstance(result, Result) else result
+        text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+        self._add(topics.RESULTS, at_ns, text.encode())
