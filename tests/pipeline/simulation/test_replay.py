@@ -15,6 +15,7 @@ from pipeline.simulation.loop import Setup, drive
 from pipeline.simulation.replay import as_driven, to_yaml
 from pipeline.simulation.scenario import Scenario, load, parse
 from pipeline.sources import open_source
+from pipeline.sources.simulated import truth_of
 from pipeline.step import State, step
 from pipeline.types import Result
 
@@ -46,9 +47,7 @@ def test_a_kept_drive_gives_the_very_frames_and_results_of_the_loop(braking: Sce
         np.testing.assert_array_equal(frame.sweep.points, tick.frame.sweep.points)
         state, result = step(state, frame, Params())
         assert believed(result) == believed(tick.result)
-        truth = source.truth(index)
-        assert truth
-        assert truth[0].cuboid == tick.world.actors[-1].cuboid
+        assert source.truth(index) == truth_of(tick.world)
 
 
 def test_the_drive_is_not_the_script(braking: Scenario) -> None:
