@@ -54,7 +54,7 @@ class StreamStats:
         return StreamHealth(
             self.sensor,
             self._state(now_ns),
-            rate_hz=len(gaps_ms) / (gaps_ms.sum() / 1e3) if enough else None,
+            rate_hz=float(len(gaps_ms) / (gaps_ms.sum() / 1e3)) if enough else None,
             age_ms=(now_ns - self._newest_ns) / 1e6 if self._newest_ns is not None else None,
             jitter_ms=float(gaps_ms.std()) if enough else None,
             lost=self.lost,

@@ -1,0 +1,83 @@
+"""What goes wrong with sensors in a car, put on the wire at chosen moments: for tests of whatever listens."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
+
+from pipeline.errors import BadInput
+from pipeline.replay.messages import Sensor
+from pipeline.replay.wire import WireEvent
+
+Kind = Literal["silence", "garbage", "duplicate", "out_of_order", "clock_jump", "disconnect"]
+
+
+class Fault(BaseModel):
+    """One trouble of one sensor, seconds after the start. disconnect: nothing is sent, and a connection is closed and
+    not taken. clock_jump: the sensor's own clock is off by ``by_s`` while it lasts. garbage: random bytes come between.
+    out_of_order, duplicate: every fifth message."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    sensor: Sensor
+    kind: Kind
+    from_s: float = Field(ge=0.0)
+    to_s: float = Field(gt=0.0)
+    by_s: float = 7.0
+
+    @model_validator(mode="after")
+    def _check(self) -> Fault:
+        if self.to_s <= self.from_s:
+            raise ValueError("to_s must be after from_s")
+        return self
+
+
+def load(path: Path) -> tuple[Fault, ...]:
+    """A YAML list of faults. BadInput names what is wrong."""
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        return tuple(TypeAdapter(list[Fault]).validate_python(data))
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise BadInput(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        raise BadInput(f"{path}: not YAML: {str(error).splitlines()[0]}") from None
+
+
+def disturb(events: Iterable[WireEvent], faults: Sequence[Fault], start_ns: int, seed: int = 1) -> Iterator[WireEvent]:
+    """The events as a car with these faults sends them. The same seed gives the same garbage."""
+    rng = random.Random(seed)
+    held: dict[Sensor, WireEvent] = {}
+    for count, event in enumerate(events):
+        at_s = (event.send_ns - start_ns) / 1e9
+        kinds = {fault.kind: fault for fault in faults if _is_on(fault, event.sensor, at_s)}
+        if "silence" in kinds or "disconnect" in kinds:
+            continue
+        if "clock_jump" in kinds:
+            event = event._replace(stamp_ns=event.stamp_ns + round(kinds["clock_jump"].by_s * 1e9))
+        if "garbage" in kinds:
+            yield event._replace(payload=rng.randbytes(rng.choice((1, 17, 1206, 1206, 1400))))
+        if "out_of_order" in kinds and count % 5 == 0 and event.sensor not in held:
+            held[event.sensor] = event
+            continue
+        yield event
+        if "duplicate" in kinds and count % 5 == 0:
+            yield event
+        if event.sensor in held:
+            yield held.pop(event.sensor)._replace(send_ns=event.send_ns)
+
+
+def disconnected(faults: Iterable[Fault], sensor: Sensor, at_s: float) -> bool:
+    """Whether the sensor's plug is out at a moment."""
+    return any(fault.kind == "disconnect" and _is_on(fault, sensor, at_s) for fault in faults)
+
+
+def _is_on(fault: Fault, sensor: Sensor, at_s: float) -> bool:
+    return fault.sensor == sensor and fault.from_s <= at_s < fault.to_s

@@ -1,0 +1,51 @@
+"""What each sensor measured and when, in order of time: a recording taken apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal, NamedTuple
+
+import cv2
+
+from pipeline.sources.base import Source
+from pipeline.types import EgoState, Frame, GnssFix, Picture, Sweep
+
+Sensor = Literal["lidar", "camera", "gnss", "ego"]
+_JPEG_QUALITY = 95
+
+
+class Message(NamedTuple):
+    """value: a ``Sweep``, a JPEG, a ``GnssFix`` or an ``EgoState``, measured at ``t_ns`` of the recording."""
+
+    t_ns: int
+    sensor: Sensor
+    value: Sweep | bytes | GnssFix | EgoState
+
+
+def of_recording(source: Source, first: int = 0, last: int | None = None) -> Iterator[Message]:
+    """Frames ``first`` to ``last`` as messages. A picture without a stamp is taken at its frame's tick."""
+    for index in range(first, len(source) if last is None else min(last + 1, len(source))):
+        yield from of_frame(source.frame(index))
+
+
+def of_frame(frame: Frame) -> Iterator[Message]:
+    """The frame's messages, ordered by time."""
+    found: list[Message] = []
+    if frame.sweep is not None:
+        found.append(Message(frame.sweep.t_ns, "lidar", frame.sweep))
+    if frame.picture is not None:
+        t_ns = frame.picture.t_ns if frame.picture.t_ns is not None else frame.t_ns
+        found.append(Message(t_ns, "camera", jpeg_of(frame.picture)))
+    if frame.gnss is not None:
+        found.append(Message(frame.gnss.t_ns, "gnss", frame.gnss))
+    if frame.ego is not None:
+        found.append(Message(frame.ego.t_ns, "ego", frame.ego))
+    return iter(sorted(found, key=lambda message: message.t_ns))
+
+
+def jpeg_of(picture: Picture) -> bytes:
+    """As the camera gave it where that is a JPEG, else encoded."""
+    if picture.encoded is not None and picture.encoded.startswith(b"\xff\xd8"):
+        return picture.encoded
+    _, jpeg = cv2.imencode(".jpg", picture.bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    return bytes(jpeg.tobytes())

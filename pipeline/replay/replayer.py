@@ -1,0 +1,120 @@
+"""Sends what is due when it is due. Everything is made a little ahead in a thread of its own, so that making a frame
+holds up no packet."""
+
+from __future__ import annotations
+
+import queue
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+
+from pipeline.replay.faults import Fault, disconnected, disturb
+from pipeline.replay.messages import Message, Sensor
+from pipeline.replay.senders import Sender
+from pipeline.replay.wire import WireEvent, to_wire
+from pipeline.types import F64
+
+_AHEAD = 400
+"""Events made ahead: half a second of a VLP-16."""
+_START_IN_NS = 300_000_000
+_LATE_NS = 20_000_000
+
+
+@dataclass
+class Sent:
+    """What was sent, by sensor, and how many events over 20 ms late: then this machine was too slow to say anything."""
+
+    events: dict[Sensor, int] = field(default_factory=dict)
+    late: int = 0
+
+
+def replay(
+    messages: Iterable[Message],
+    senders: Mapping[Sensor, Sender],
+    *,
+    speed: float = 1.0,
+    T_ego_lidar: F64 | None = None,
+    faults: Sequence[Fault] = (),
+    stopped: Callable[[], bool] = lambda: False,
+    on_sent: Callable[[WireEvent], None] = lambda event: None,
+) -> Sent:
+    """Play to the end, or until ``stopped``. A sensor that nobody listens to is left out."""
+    wanted = (message for message in messages if message.sensor in senders)
+    first = next(iter(wanted), None)
+    if first is None:
+        return Sent()
+    start_ns = time.time_ns() + _START_IN_NS
+    events = to_wire(chain([first], wanted), start_ns, speed, T_ego_lidar)
+    sent = Sent()
+    plugged = dict.fromkeys(senders, True)
+    for event in _made_ahead(disturb(events, faults, start_ns), stopped):
+        if not _wait_until(event.send_ns, senders, faults, start_ns, plugged, stopped):
+            break
+        sent.late += time.time_ns() - event.send_ns > _LATE_NS
+        senders[event.sensor].send(event.payload, event.stamp_ns)
+        sent.events[event.sensor] = sent.events.get(event.sensor, 0) + 1
+        on_sent(event)
+    return sent
+
+
+def _wait_until(
+    at_ns: int,
+    senders: Mapping[Sensor, Sender],
+    faults: Sequence[Fault],
+    start_ns: int,
+    plugged: dict[Sensor, bool],
+    stopped: Callable[[], bool],
+) -> bool:
+    """Wait for the moment, pulling and putting in plugs on the way. False when it was stopped."""
+    while not stopped():
+        now_ns = time.time_ns()
+        for sensor, sender in senders.items():
+            is_in = not disconnected(faults, sensor, (now_ns - start_ns) / 1e9)
+            if is_in != plugged[sensor]:
+                sender.plug(is_in)
+                plugged[sensor] = is_in
+        left_s = (at_ns - now_ns) / 1e9
+        if left_s <= 0.0:
+            return True
+        time.sleep(min(left_s, 0.05))
+    return False
+
+
+def _made_ahead(events: Iterator[WireEvent], stopped: Callable[[], bool]) -> Iterator[WireEvent]:
+    """The events, made by a thread up to ``_AHEAD`` of them early. What that thread raises is raised here."""
+    made: queue.Queue[WireEvent | BaseException | None] = queue.Queue(_AHEAD)
+    done = threading.Event()
+
+    def put(item: WireEvent | BaseException | None) -> None:
+        while not done.is_set():
+            try:
+                return made.put(item, timeout=0.2)
+            except queue.Full:
+                continue
+
+    def make() -> None:
+        try:
+            for event in events:
+                put(event)
+                if done.is_set():
+                    return
+            put(None)
+        except Exception as error:  # handed to whoever waits for the events
+            put(error)
+
+    threading.Thread(target=make, name="cipv-replay-maker", daemon=True).start()
+    try:
+        while not stopped():
+            try:
+                item = made.get(timeout=0.2)
+            except queue.Empty:
+                continue
+            if item is None:
+                return
+            if isinstance(item, BaseException):
+                raise item
+            yield item
+    finally:
+        done.set()

@@ -1,0 +1,61 @@
+"""Messages → what goes over the wire and when: a sweep becomes 75 packets, each sent when its last laser has fired."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from pipeline.replay.messages import Message, Sensor
+from pipeline.sources.velodyne.encode import PACKETS_A_ROTATION, packets_of
+from pipeline.sources.velodyne.packet import BLOCK_US
+from pipeline.types import F64, Sweep
+
+_PACKET_NS = round(12 * BLOCK_US * 1000)
+ROTATION_NS = PACKETS_A_ROTATION * _PACKET_NS
+_AHEAD_NS = ROTATION_NS // 2 + 20_000_000
+"""What belongs to a message is sent at most this much before its time; recordings may be that much out of order."""
+
+
+class WireEvent(NamedTuple):
+    """send_ns: when to send it, unix. stamp_ns: the sensor's own time that goes with it. payload: a packet without its
+    stamp, a JPEG, a ``GnssFix`` or an ``EgoState``; bytes of any other kind are garbage and sent as they are."""
+
+    send_ns: int
+    sensor: Sensor
+    stamp_ns: int
+    payload: Any
+
+
+def to_wire(
+    messages: Iterable[Message], start_ns: int, speed: float = 1.0, T_ego_lidar: F64 | None = None
+) -> Iterator[WireEvent]:
+    """Events in order of time, the first at ``start_ns``. At another speed than 1 the world runs faster or slower, the
+    sensors do not: the head turns as it does, and a sweep that falls into another is left out."""
+    waiting: list[tuple[int, int, WireEvent]] = []
+    first_ns: int | None = None
+    busy_until_ns, count = 0, 0
+    for message in messages:
+        first_ns = message.t_ns if first_ns is None else first_ns
+        at_ns = start_ns + _AHEAD_NS + round((message.t_ns - first_ns) / speed)
+        while waiting and waiting[0][0] <= at_ns - _AHEAD_NS:
+            yield heapq.heappop(waiting)[2]
+        if message.sensor == "lidar":
+            if at_ns - ROTATION_NS // 2 < busy_until_ns:
+                continue
+            busy_until_ns = at_ns + ROTATION_NS // 2
+        for event in _events(message, at_ns, T_ego_lidar):
+            heapq.heappush(waiting, (event.send_ns, count := count + 1, event))
+    while waiting:
+        yield heapq.heappop(waiting)[2]
+
+
+def _events(message: Message, at_ns: int, T_ego_lidar: F64 | None) -> Iterator[WireEvent]:
+    if not isinstance(message.value, Sweep):
+        yield WireEvent(at_ns, message.sensor, at_ns, message.value)
+        return
+    packets = packets_of(replace(message.value, t_ns=at_ns), T_ego_lidar)
+    for number, packet in enumerate(packets):
+        fired_ns = at_ns - ROTATION_NS // 2 + number * _PACKET_NS
+        yield WireEvent(fired_ns + _PACKET_NS, "lidar", fired_ns, packet)
