@@ -7,6 +7,9 @@
                         ``points`` × int16 u v     pixels of the sent picture; -32768 where the camera cannot see it
                         ``points`` × uint16        1 + place in ``result.objects``; 0 belongs to none
                         ``points`` × uint8         0 ground, 1 unclustered, 2 cluster, 3 dropped
+                        ``points`` × uint8         intensity
+                        ``points`` × uint8         ring, 0 = lowest beam
+                        ``points`` × uint8         ms before the sweep's newest point; 255 unknown
 
 The header holds ``state`` (playback), ``result`` (the contract's object) and ``display``: geometry projected by the
 alignment in use, in pixels of the sent picture, so that no view projects anything.
@@ -14,49 +17,35 @@ alignment in use, in pixels of the sent picture, so that no view projects anythi
 
 from __future__ import annotations
 
-import json
 import struct
-from dataclasses import dataclass
 from typing import Any
 
-import cv2
+import msgspec
 import numpy as np
-import numpy.typing as npt
 
+from app.sent_picture import MAX_WIDTH_PX, SentPicture, encode_picture
+from app.sent_points import point_arrays
 from app.snapshot import Snapshot
 from pipeline.alignment import Alignment, resolve
+from pipeline.path.lane_types import LaneLine
 from pipeline.results import to_json
-from pipeline.types import DROPPED, F32, F64, GROUND, I32, UNCLUSTERED, Box, Frame, Path, Picture, Result
+from pipeline.types import F64, Box, Frame, Ground, Picture, Result
 
-MAX_WIDTH_PX = 1280
-JPEG_QUALITY = 80
-UNSEEN = -32768
-_GROUND_NEAR_M, _GROUND_SIDE_M = 40.0, 8.0
-_GROUND_MIN_POINTS = 30
-
-
-@dataclass(frozen=True)
-class SentPicture:
-    """The JPEG of a picture and its size; scale is sent pixels per picture pixel."""
-
-    jpeg: bytes
-    width: int
-    height: int
-    scale: float
+_LANE_STEP_M = 2.0
 
 
 class Encoder:
     """Keeps the JPEG of the last picture: while a slider moves on a paused frame, the picture is not encoded again."""
 
     def __init__(self) -> None:
-        self._last: tuple[Picture, SentPicture] | None = None
+        self._last: tuple[Picture, int, SentPicture] | None = None
 
-    def message(self, snapshot: Snapshot) -> bytes | None:
-        """The message for the snapshot's tick; null when there is none."""
+    def message(self, snapshot: Snapshot, width_px: int = MAX_WIDTH_PX) -> bytes | None:
+        """The message for the snapshot's tick, its picture at most ``width_px`` wide; null when there is no tick."""
         if snapshot.tick is None:
             return None
         frame, result = snapshot.tick.frame, snapshot.tick.result
-        picture = self._picture(frame)
+        picture = self._picture(frame, width_px)
         scale = picture.scale if picture else 1.0
         aligned = resolve(snapshot.params.alignment, frame.camera)
         header = {
@@ -64,120 +53,97 @@ class Encoder:
             "made_unix_ms": snapshot.made_unix_s * 1e3,
             "detect_ms": snapshot.tick.detect_ms,
             "state": snapshot.state_json(),
-            "picture": _picture_json(picture),
+            "picture": _picture_json(picture, frame),
             "points": len(result.layers.points),
             "result": to_json(result),
             "display": display_json(result, aligned, scale),
         }
-        return pack(header, picture.jpeg if picture else b"", point_arrays(result, aligned, scale))
+        return pack(header, picture.jpeg if picture else b"", point_arrays(frame, result, aligned, scale))
 
-    def _picture(self, frame: Frame) -> SentPicture | None:
+    def _picture(self, frame: Frame, width_px: int) -> SentPicture | None:
         if frame.picture is None:
             return None
-        if self._last is None or self._last[0] is not frame.picture:
-            self._last = (frame.picture, encode_picture(frame.picture))
-        return self._last[1]
-
-
-def encode_picture(picture: Picture) -> SentPicture:
-    """The camera's own JPEG where it is one and small enough; else encoded, at most ``MAX_WIDTH_PX`` wide."""
-    height, width = picture.bgr.shape[:2]
-    if picture.encoded is not None and picture.encoded[:2] == b"\xff\xd8" and width <= MAX_WIDTH_PX:
-        return SentPicture(picture.encoded, width, height, 1.0)
-    bgr, scale = picture.bgr, 1.0
-    if width > MAX_WIDTH_PX:
-        scale = MAX_WIDTH_PX / width
-        small = cv2.resize(bgr, (MAX_WIDTH_PX, round(height * scale)), interpolation=cv2.INTER_AREA)
-        bgr = small.astype(np.uint8, copy=False)
-    _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    return SentPicture(jpeg.tobytes(), bgr.shape[1], bgr.shape[0], scale)
+        if self._last is None or self._last[0] is not frame.picture or self._last[1] != width_px:
+            self._last = (frame.picture, width_px, encode_picture(frame.picture, width_px))
+        return self._last[2]
 
 
 def pack(header: dict[str, Any], jpeg: bytes, arrays: bytes) -> bytes:
     """The message as this module's first lines lay it out."""
-    text = json.dumps(header, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+    text = msgspec.json.encode(header)
     text += b" " * (-len(text) % 4)
     return b"".join([struct.pack("<I", len(text)), text, jpeg, b"\0" * (-len(jpeg) % 4), arrays])
 
 
-def point_arrays(result: Result, aligned: Alignment | None, scale: float) -> bytes:
-    """Every point of the sweep, as the message's last part."""
-    points, kind = result.layers.points, result.layers.kind
-    places = points[:, :3].astype(np.float64)
-    xyz = np.clip(np.round(places * 100.0), -32767, 32767).astype("<i2")
-    uv: npt.NDArray[np.int16] = np.full((len(points), 2), UNSEEN, "<i2")
-    if aligned is not None and len(points):
-        uv = _pixels_i2(aligned.project(places) * scale)
-    classes: npt.NDArray[np.uint8] = np.full(len(points), 2, np.uint8)
-    for value, code in ((GROUND, 0), (UNCLUSTERED, 1), (DROPPED, 3)):
-        classes[kind == value] = code
-    return xyz.tobytes() + uv.tobytes() + _owners(result, kind).tobytes() + classes.tobytes()
-
-
 def display_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, Any]:
     """What is drawn over the picture. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom first;
-    ``path`` is the corridor laid on the ground that the sweep shows, null where it shows none."""
+    ``path`` is the corridor and ``lanes`` the ego lane's lines, laid on the ground that the sweep shows, null where
+    there is none. ``plan_lanes`` are the same lines in the plan, x y in metres; ``ground`` the planes under the sweep,
+    n·p + d = 0, and the segments of x that they hold in."""
     layers = result.layers
-    cuboids = {}
-    if aligned is not None:
-        for item in result.objects:
-            if item.cuboid is not None:
-                cuboids[str(item.id)] = _pixel_list(aligned.project(item.cuboid.corners()) * scale)
+    lanes = {"left": _lane(layers.lanes.left), "right": _lane(layers.lanes.right)} if layers.lanes else {}
+    path = {"center": result.path.center, "left": result.path.left, "right": result.path.right}
     return {
         "lidar_boxes": _boxes_json(layers.lidar_boxes, scale),
         "vision_boxes": _boxes_json(layers.vision_boxes, scale),
-        "cuboids": cuboids,
-        "path": _path_json(result.path, ground_plane(layers.points, layers.kind), aligned, scale),
+        "cuboids": _cuboids_json(result, aligned, scale),
+        "path": _on_ground(path, layers.ground, aligned, scale),
+        "lanes": _on_ground(lanes, layers.ground, aligned, scale) if lanes else None,
+        "plan_lanes": {side: np.round(line, 3).tolist() for side, line in lanes.items()} if lanes else None,
+        "ground": _ground_json(layers.ground),
     }
 
 
-def ground_plane(points: F32, kind: I32) -> F64 | None:
-    """(3,) a, b, c of z = a·x + b·y + c: least squares through the ground points ahead; null with too few."""
-    near = (kind == GROUND) & (points[:, 0] > 0) & (points[:, 0] < _GROUND_NEAR_M)
-    near &= np.abs(points[:, 1]) < _GROUND_SIDE_M
-    ground = points[near, :3].astype(np.float64)
-    if len(ground) < _GROUND_MIN_POINTS:
+def _cuboids_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, list[list[float] | None]]:
+    """By object, the pixels of its cuboid's corners; all are projected at once, a sweep has dozens."""
+    boxed = [(item.id, item.cuboid) for item in result.objects if item.cuboid is not None]
+    if aligned is None or not boxed:
+        return {}
+    pixels = _pixel_list(aligned.project(np.concatenate([cuboid.corners() for _, cuboid in boxed])) * scale)
+    return {str(number): pixels[8 * place : 8 * place + 8] for place, (number, _) in enumerate(boxed)}
+
+
+def _on_ground(
+    lines: dict[str, F64], ground: Ground | None, aligned: Alignment | None, scale: float
+) -> dict[str, list[list[float] | None]] | None:
+    """Each (K, 2) ego line as pixels, one a point; null as a whole where no ground or no camera is known."""
+    if ground is None or aligned is None or not ground.fitted.any():
         return None
-    design = np.column_stack([ground[:, :2], np.ones(len(ground))])
-    return np.asarray(np.linalg.lstsq(design, ground[:, 2], rcond=None)[0])
+    return {
+        name: _pixel_list(aligned.project(np.column_stack([line, ground.height(line)])) * scale)
+        for name, line in lines.items()
+    }
 
 
-def _path_json(path: Path, plane: F64 | None, aligned: Alignment | None, scale: float) -> dict[str, Any] | None:
-    if plane is None or aligned is None:
+def _lane(line: LaneLine | None) -> F64:
+    """(K, 2) ego x y where paint supports the line; (0, 2) without one."""
+    if line is None:
+        return np.zeros((0, 2))
+    x = np.arange(line.x_min_m, line.x_max_m + 1e-6, _LANE_STEP_M)
+    return np.column_stack([x, line.y_m(x)])
+
+
+def _ground_json(ground: Ground | None) -> dict[str, Any] | None:
+    if ground is None or not ground.fitted.any():
         return None
-
-    def on_ground(line: F64) -> list[list[float] | None]:
-        xyz = np.column_stack([line, line @ plane[:2] + plane[2]])
-        return _pixel_list(aligned.project(xyz) * scale)
-
-    return {"center": on_ground(path.center), "left": on_ground(path.left), "right": on_ground(path.right)}
-
-
-def _owners(result: Result, kind: I32) -> npt.NDArray[np.uint16]:
-    """(N,) for each point, 1 + the place of its object in ``result.objects``."""
-    cluster_of_track = {t.id: t.obstacle.cluster for t in result.layers.lidar_tracks if not t.carried}
-    owner: npt.NDArray[np.uint16] = np.zeros(int(kind.max(initial=-1)) + 2, "<u2")
-    for place, item in enumerate(result.objects):
-        cluster = cluster_of_track.get(item.lidar_track) if item.lidar_track is not None else None
-        if cluster is not None and 0 <= cluster < len(owner) - 1:
-            owner[cluster] = place + 1
-    return owner[np.where(kind >= 0, kind, len(owner) - 1)]
-
-
-def _pixels_i2(uv: F64) -> npt.NDArray[np.int16]:
-    seen = ~np.isnan(uv[:, :1])
-    return np.where(seen, np.clip(np.nan_to_num(uv), -32767, 32767), UNSEEN).round().astype("<i2")
+    return {"edges": np.round(ground.edges, 2).tolist(), "planes": np.round(ground.planes, 5).tolist()}
 
 
 def _pixel_list(uv: F64) -> list[list[float] | None]:
-    return [None if np.isnan(u) else [round(float(u), 1), round(float(v), 1)] for u, v in uv]
+    return [None if u != u else [u, v] for u, v in np.round(uv, 1).tolist()]
 
 
 def _boxes_json(boxes: dict[int, Box], scale: float) -> dict[str, list[float]]:
     return {str(number): [round(value * scale, 1) for value in box] for number, box in sorted(boxes.items())}
 
 
-def _picture_json(picture: SentPicture | None) -> dict[str, Any] | None:
-    if picture is None:
+def _picture_json(picture: SentPicture | None, frame: Frame) -> dict[str, Any] | None:
+    if picture is None or frame.picture is None:
         return None
-    return {"width": picture.width, "height": picture.height, "scale": picture.scale, "bytes": len(picture.jpeg)}
+    return {
+        "width": picture.width,
+        "height": picture.height,
+        "scale": picture.scale,
+        "bytes": len(picture.jpeg),
+        "full_width": frame.picture.bgr.shape[1],
+    }

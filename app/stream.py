@@ -3,9 +3,12 @@
 Each client has one place for a frame and one for a state. A newer message replaces an older one that was not sent yet,
 so a slow client skips frames and hurts nobody; one that joins late gets the current frame at once.
 
+A frame carries the state too, so the state goes out on its own only when it is newer than the newest frame.
+
 Buffers of the system between here and a page hold many frames, which would be a queue after all. A page therefore asks
 for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no more than ``FRAMES_UNDER_WAY`` are sent
-ahead of that.
+ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the picture: the one that all get is
+as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.encode import Encoder
+from app.sent_picture import MAX_WIDTH_PX, width_for
 from app.snapshot import Snapshot
 
 FRAMES_UNDER_WAY = 2
@@ -26,14 +30,16 @@ FRAMES_UNDER_WAY = 2
 
 _LARGEST_PING = 1e15
 """Milliseconds; a page sends its own clock."""
+_WIDEST_PX = 4096
 
 
 class Slot:
     """The newest unsent messages of one client, by kind. Lives on the server's event loop.
 
-    ``paced``: frames wait for ``painted``."""
+    ``paced``: frames wait for ``painted``. picture_px: how wide it shows the picture, null until it says so."""
 
     def __init__(self, paced: bool = False) -> None:
+        self.picture_px: int | None = None
         self._paced = paced
         self._under_way = 0
         self._unsent: dict[str, str | bytes] = {}
@@ -45,6 +51,7 @@ class Slot:
         if order < self._newest.get(kind, order):
             return
         self._newest[kind] = order
+        self._unsent.pop(kind, None)  # so that the kinds stand in the order in which they came
         self._unsent[kind] = message
         self._filled.set()
 
@@ -62,6 +69,9 @@ class Slot:
             ready = {kind: message for kind, message in self._unsent.items() if not (is_full and kind == "frame")}
             self._under_way += "frame" in ready
             self._unsent = {kind: message for kind, message in self._unsent.items() if kind not in ready}
+            kinds = list(ready)
+            if "frame" in kinds and "state" in kinds and kinds.index("state") < kinds.index("frame"):
+                del ready["state"]  # the frame came after it and says the same
             if ready:
                 return list(ready.values())
 
@@ -75,6 +85,7 @@ class Stream:
         self._encoder = Encoder()
         self._lock = threading.Lock()
         self._frame: tuple[int, bytes | None] = (-1, None)
+        self._width_px = MAX_WIDTH_PX
         self._snapshot: Snapshot | None = None
 
     def publish(self, snapshot: Snapshot) -> None:
@@ -95,27 +106,60 @@ class Stream:
         await socket.accept()
         self._loop = asyncio.get_running_loop()
         slot = Slot(paced=socket.query_params.get("paced") == "1")
+        slot.picture_px = _width(socket.query_params.get("picture_px"))
         self._slots.append(slot)
+        self._fit_width()
         try:
             if self._snapshot is not None:
-                slot.put("state", state_message(self._snapshot))
-                sequence, frame = await asyncio.to_thread(self._encoded, self._snapshot)
-                if frame is not None:
-                    slot.put("frame", frame, sequence)
+                shown = self._snapshot
+                await self._put_newest(slot, shown)
+                slot.put("state", state_message(shown))  # may be newer than the one in a frame made before
             async with asyncio.TaskGroup() as both:
                 sender = both.create_task(_send(socket, slot))
-                await _receive(socket, slot)
+                await self._receive(socket, slot)
                 sender.cancel()
         except* (WebSocketDisconnect, RuntimeError):
             pass  # the client left while something was being sent to it
         finally:
             self._slots.remove(slot)
+            self._fit_width()
+
+    async def _receive(self, socket: WebSocket, slot: Slot) -> None:
+        """Hear the client until it leaves; what is nothing we know is ignored."""
+        while True:
+            message = await socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            said = _object(message.get("text"))
+            if (ping := _number(said.get("ping"), _LARGEST_PING)) is not None:
+                slot.put("pong", _dump({"type": "pong", "ping": ping, "server_unix_ms": time.time() * 1e3}))
+            if (wanted := _width(said.get("picture_px"))) is not None:
+                slot.picture_px = wanted
+                if self._fit_width() and self._snapshot is not None:
+                    await self._put_newest(slot, self._snapshot)
+            if said.get("painted") is True:
+                slot.painted()
+
+    async def _put_newest(self, slot: Slot, snapshot: Snapshot) -> None:
+        sequence, frame = await asyncio.to_thread(self._encoded, snapshot)
+        if frame is not None:
+            slot.put("frame", frame, sequence)
+
+    def _fit_width(self) -> bool:
+        """Take the width that the widest client needs. True when it has grown: the newest frame is then too narrow."""
+        wanted = max((slot.picture_px or MAX_WIDTH_PX for slot in self._slots), default=MAX_WIDTH_PX)
+        with self._lock:
+            has_grown = wanted > self._width_px
+            self._width_px = wanted
+            if has_grown:
+                self._frame = (-1, None)
+        return has_grown
 
     def _encoded(self, snapshot: Snapshot) -> tuple[int, bytes | None]:
         """The message of this or a newer snapshot, and its sequence."""
         with self._lock:
             if self._frame[0] < snapshot.sequence and snapshot.tick is not None:
-                self._frame = (snapshot.sequence, self._encoder.message(snapshot))
+                self._frame = (snapshot.sequence, self._encoder.message(snapshot, self._width_px))
             return self._frame
 
     def _distribute(self, state: str, frame: bytes | None, sequence: int) -> None:
@@ -138,26 +182,23 @@ async def _send(socket: WebSocket, slot: Slot) -> None:
                 await socket.send_text(message)
 
 
-async def _receive(socket: WebSocket, slot: Slot) -> None:
-    """Hear the client until it leaves; what is nothing we know is ignored."""
-    while True:
-        message = await socket.receive()
-        if message["type"] == "websocket.disconnect":
-            return
-        said = _object(message.get("text"))
-        ping = said.get("ping")
-        if isinstance(ping, int | float) and -_LARGEST_PING < ping < _LARGEST_PING:
-            slot.put("pong", _dump({"type": "pong", "ping": ping, "server_unix_ms": time.time() * 1e3}))
-        if said.get("painted") is True:
-            slot.painted()
-
-
 def _object(text: str | None) -> dict[str, Any]:
     try:
         value = json.loads(text or "null")
     except (ValueError, RecursionError):
         return {}
     return value if isinstance(value, dict) else {}
+
+
+def _number(value: Any, limit: float) -> float | None:
+    """A number within ±limit; else null. What a client says is not to be trusted."""
+    return value if isinstance(value, int | float) and -limit < value < limit else None
+
+
+def _width(shown_px: Any) -> int | None:
+    """The width to send to who shows it so wide; null for what is no width."""
+    shown = _number(float(shown_px) if isinstance(shown_px, str) and shown_px.isdigit() else shown_px, _WIDEST_PX)
+    return None if shown is None or shown <= 0 else width_for(shown)
 
 
 def _dump(value: Any) -> str:

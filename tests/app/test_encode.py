@@ -11,15 +11,28 @@ import cv2
 import numpy as np
 import pytest
 
-from app.encode import MAX_WIDTH_PX, UNSEEN, Encoder, encode_picture, ground_plane
+from app.encode import Encoder
 from app.line import DetectionCache, Line
+from app.sent_picture import MAX_WIDTH_PX, encode_picture, width_for
+from app.sent_points import UNKNOWN_AGE, UNSEEN
 from app.snapshot import Snapshot
 from pipeline.alignment import resolve
 from pipeline.params import Params, with_changes
+from pipeline.path.lane_types import EgoLane, LaneLine, Side
 from pipeline.results import to_json
 from pipeline.run import Detectors
-from pipeline.types import DROPPED, GROUND, UNCLUSTERED, Picture
+from pipeline.types import DROPPED, GROUND, U8, UNCLUSTERED, Picture
 from tests.app.recording import GROUND_M, CountingDetector, Recording
+
+_ARRAYS = (
+    ("xyz", "<i2", 3),
+    ("uv", "<i2", 2),
+    ("owner", "<u2", 1),
+    ("kind", "u1", 1),
+    ("intensity", "u1", 1),
+    ("ring", "u1", 1),
+    ("age", "u1", 1),
+)
 
 
 def snapshot(params: Params | None = None, index: int = 3, **frame_changes: Any) -> Snapshot:
@@ -41,7 +54,7 @@ def taken_apart(message: bytes) -> tuple[dict[str, Any], bytes, dict[str, np.nda
     size = header["picture"]["bytes"] if header["picture"] else 0
     n, at = header["points"], start + -(-size // 4) * 4
     arrays = {}
-    for name, kind, width in (("xyz", "<i2", 3), ("uv", "<i2", 2), ("owner", "<u2", 1), ("kind", "u1", 1)):
+    for name, kind, width in _ARRAYS:
         arrays[name] = np.frombuffer(message, kind, n * width, at).reshape(n, width).squeeze()
         at += arrays[name].nbytes
     assert at == len(message), "nothing is left over"
@@ -116,10 +129,15 @@ def test_a_picture_is_encoded_when_it_must_be_and_never_too_wide(width: int, own
     assert made.scale == pytest.approx(sent / width)
 
 
+def _wide() -> U8:
+    """A picture of twice the width that is sent, with one red car."""
+    bgr: U8 = np.zeros((360, 2560, 3), np.uint8)
+    bgr[100:200, 600:900] = (20, 20, 220)
+    return bgr
+
+
 def test_boxes_are_in_pixels_of_the_sent_picture():
-    wide = Picture(0, np.zeros((360, 2560, 3), np.uint8))
-    wide.bgr[100:200, 600:900] = (20, 20, 220)
-    header, _, _ = taken_apart(Encoder().message(snapshot(picture=wide, index=0)) or b"")
+    header, _, _ = taken_apart(Encoder().message(snapshot(picture=Picture(0, _wide()), index=0)) or b"")
     assert header["picture"]["scale"] == 0.5
     [box] = header["display"]["vision_boxes"].values()
     assert box == pytest.approx([300, 50, 450, 100], abs=1.0)
@@ -133,19 +151,86 @@ def test_a_frame_that_lacks_something_still_makes_a_message(missing: str):
     assert (header["display"]["path"] is None) == (missing in ("sweep", "camera"))
 
 
-def test_the_corridor_lies_on_the_ground_that_the_sweep_shows():
+def test_the_corridor_lies_on_the_ground_that_was_fitted():
     shown = snapshot()
     assert shown.tick is not None
-    layers = shown.tick.result.layers
-    plane = ground_plane(layers.points, layers.kind)
-    assert plane is not None
-    np.testing.assert_allclose(plane, [0.0, 0.0, GROUND_M], atol=0.02)
-    assert ground_plane(layers.points, np.full_like(layers.kind, UNCLUSTERED)) is None
+    result = shown.tick.result
+    aligned = resolve(shown.params.alignment, shown.tick.frame.camera)
+    assert aligned is not None
+    header, _, _ = taken_apart(Encoder().message(shown) or b"")
+    flat = np.column_stack([result.path.left, np.full(len(result.path.left), GROUND_M)])
+    pixels = aligned.project(flat)
+    for sent, (u, v) in zip(header["display"]["path"]["left"], pixels, strict=True):
+        assert sent == (None if np.isnan(u) else pytest.approx([u, v], abs=3.0))
+    nx, ny, nz, d = header["display"]["ground"]["planes"][0]
+    assert -(d + 20.0 * nx + 0.0 * ny) / nz == pytest.approx(GROUND_M, abs=0.05)
+
+
+def lane_line(side: Side, offset_m: float) -> LaneLine:
+    return LaneLine(side, np.array([offset_m, 0.0, 1e-3, 0.0]), np.eye(4), 4.0, 30.0, 1.0, 0.0)
+
+
+def test_lane_lines_are_drawn_in_the_picture_and_in_the_plan():
+    shown = snapshot()
+    assert shown.tick is not None
+    lane = EgoLane(lane_line("left", 1.8), None, "classical", 0.0, 0.0)
+    layers = replace(shown.tick.result.layers, lanes=lane)
+    tick = replace(shown.tick, result=replace(shown.tick.result, layers=layers))
+    display = taken_apart(Encoder().message(replace(shown, tick=tick)) or b"")[0]["display"]
+    left = display["plan_lanes"]["left"]
+    assert left[0] == pytest.approx([4.0, 1.8 + 0.016])
+    assert left[-1] == pytest.approx([30.0, 1.8 + 0.9])
+    assert display["plan_lanes"]["right"] == display["lanes"]["right"] == []
+    aligned = resolve(shown.params.alignment, shown.tick.frame.camera)
+    assert aligned is not None
+    expected = aligned.project(np.array([[30.0, 2.7, GROUND_M]]))[0]
+    assert display["lanes"]["left"][-1] == pytest.approx(expected.tolist(), abs=3.0)
+    assert taken_apart(Encoder().message(shown) or b"")[0]["display"]["lanes"] is None
+
+
+def test_points_keep_their_intensity_ring_and_age():
+    original = snapshot()
+    assert original.tick is not None
+    sweep = original.tick.frame.sweep
+    assert sweep is not None
+    _, _, untimed = taken_apart(Encoder().message(original) or b"")
+    np.testing.assert_array_equal(untimed["ring"], sweep.ring)
+    assert np.all(untimed["age"] == UNKNOWN_AGE)
+    time_s = np.linspace(-0.1, 0.0, len(sweep.points), dtype=np.float32)
+    points = sweep.points.copy()
+    points[:, 3] = np.arange(len(points)) % 200 + 1.0
+    _, _, arrays = taken_apart(Encoder().message(snapshot(sweep=replace(sweep, points=points, time_s=time_s))) or b"")
+    np.testing.assert_array_equal(arrays["intensity"], points[:, 3])
+    assert arrays["age"][0] == pytest.approx(100, abs=1)
+    assert arrays["age"][-1] == 0
+
+
+def test_reflectance_between_0_and_1_uses_all_shades():
+    sweep = snapshot().tick.frame.sweep  # type: ignore[union-attr]
+    assert sweep is not None
+    points = sweep.points.copy()
+    points[:, 3] = np.linspace(0.0, 1.0, len(points))
+    _, _, arrays = taken_apart(Encoder().message(snapshot(sweep=replace(sweep, points=points))) or b"")
+    assert (arrays["intensity"].min(), arrays["intensity"].max()) == (0, 255)
+
+
+@pytest.mark.parametrize(("shown_px", "sent"), [(0, 320), (100.5, 320), (640, 640), (833, 960), (1600, 1600)])
+def test_pictures_are_sent_as_wide_as_they_are_shown_in_steps(shown_px: float, sent: int):
+    assert width_for(shown_px) == sent
+
+
+def test_a_wider_picture_is_encoded_when_somebody_shows_it_wider():
+    shown = snapshot(picture=Picture(0, _wide()), index=0)
+    encoder = Encoder()
+    widths = [taken_apart(encoder.message(shown, width) or b"")[0]["picture"]["width"] for width in (640, 960, 640)]
+    assert widths == [640, 960, 640]
 
 
 def test_the_picture_is_encoded_once_while_a_parameter_changes(monkeypatch: pytest.MonkeyPatch):
     made: list[Picture] = []
-    monkeypatch.setattr("app.encode.encode_picture", lambda picture: made.append(picture) or encode_picture(picture))
+    monkeypatch.setattr(
+        "app.encode.encode_picture", lambda picture, width: made.append(picture) or encode_picture(picture, width)
+    )
     encoder, shown = Encoder(), snapshot()
     for _ in range(3):
         assert encoder.message(shown)

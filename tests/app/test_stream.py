@@ -34,8 +34,19 @@ def test_a_slow_client_gets_only_the_newest_of_each_kind(taken: Taken):
     for number in range(5):
         slot.put("state", f"state {number}")
         slot.put("frame", b"frame %d" % number, number)
-    assert taken(slot) == ["state 4", b"frame 4"]
+        slot.put("pong", f"pong {number}")
+    assert taken(slot) == [b"frame 4", "pong 4"]
     assert taken(slot) is None
+
+
+def test_a_state_goes_out_only_when_it_is_newer_than_the_frame(taken: Taken):
+    slot = Slot()
+    slot.put("state", "playing")
+    slot.put("frame", b"which says so too", 1)
+    assert taken(slot) == [b"which says so too"]
+    slot.put("frame", b"next", 2)
+    slot.put("state", "paused on it")
+    assert taken(slot) == [b"next", "paused on it"]
 
 
 def test_an_older_frame_never_replaces_a_newer_one(taken: Taken):
