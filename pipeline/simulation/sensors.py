@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from functools import cached_property
 
+import numpy as np
+
 from pipeline.simulation import gnss
 from pipeline.simulation.camera import DrawnCamera, calibration
 from pipeline.simulation.lidar import Lidar
+from pipeline.simulation.planned_route import planned_route
 from pipeline.simulation.roadside import Roadside
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.world import World
-from pipeline.types import CameraCalibration, EgoState, Frame, Picture
+from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Route
 
 _BEFORE_M, _BEYOND_M = 100.0, 600.0
 
@@ -39,9 +42,21 @@ class Sensors:
             sweep=self._lidar.sweep(now, self._roadside, self._scenario.seed, index, t_ns),
             picture=Picture(t_ns, self._camera.picture(now)) if picture else None,
             camera=self.camera,
-            ego=EgoState(t_ns, now.speed_mps, now.yaw_rate_radps),
+            ego=self._odometry(now, index, t_ns),
             gnss=gnss.fix(now, self._scenario.gnss, self._scenario.seed, index, t_ns),
+            route=self._route,
         )
+
+    def _odometry(self, now: World, index: int, t_ns: int) -> EgoState:
+        model = self._scenario.odometry
+        noise = np.random.default_rng([self._scenario.seed, 9, index]).standard_normal(2)
+        speed_mps = now.speed_mps + model.sigma_speed_mps * float(noise[0]) if now.speed_mps > 0.0 else 0.0
+        turning = model.bias_yaw_rate_radps + model.sigma_yaw_rate_radps * float(noise[1])
+        return EgoState(t_ns, max(speed_mps, 0.0), now.yaw_rate_radps + turning)
+
+    @cached_property
+    def _route(self) -> Route:
+        return planned_route(self._scenario)
 
     @cached_property
     def camera(self) -> CameraCalibration:
