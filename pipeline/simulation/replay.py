@@ -14,19 +14,10 @@ import yaml
 from pipeline.simulation.actors import Motion
 from pipeline.simulation.scenario import Scenario
 
-_DECIMALS = 9
-"""Of what is written, in metres and seconds: far below what any sensor resolves."""
-
 
 def as_driven(scenario: Scenario, motions: Sequence[Motion], title: str | None = None) -> Scenario:
     """The scenario, as long as the drive, with the ego vehicle moving as ``motions`` say, one a tick."""
-    moments = tuple(
-        tuple(
-            round(value, _DECIMALS)
-            for value in (m.travelled_m, m.d_m, m.speed_mps, m.accel_mps2, m.d_rate_mps, m.d_accel_mps2)
-        )
-        for m in motions
-    )
+    moments = tuple((m.travelled_m, m.d_m, m.speed_mps, m.accel_mps2, m.d_rate_mps, m.d_accel_mps2) for m in motions)
     return scenario.model_copy(
         update={
             "driven": moments,
@@ -42,5 +33,9 @@ def to_yaml(scenario: Scenario, heading: str = "") -> str:
     heading: lines for a person, put before it."""
     comment = "".join(f"# {line}\n" for line in heading.splitlines())
     return comment + yaml.safe_dump(
-        scenario.model_dump(mode="json", exclude_defaults=True), sort_keys=False, width=120, allow_unicode=True
+        scenario.model_dump(mode="json", exclude_defaults=True),
+        sort_keys=False,
+        width=120,
+        allow_unicode=True,
+        default_flow_style=None,
     )
