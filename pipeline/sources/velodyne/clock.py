@@ -44,8 +44,12 @@ class SensorClock:
         """What the last position packet says: whether the sensor's time is UTC."""
         self._follows_gps = locked
 
+    def restart(self) -> None:
+        """The sensor's own time begins anew: what is known about its beginning is void."""
+        self._offset_ns = self._stepped_since_us = None
+
     def observe(self, sensor_us: int, t_host_ns: int) -> None:
-        """A packet fired at ``sensor_us`` (counted on over the hours) and was received at ``t_host_ns``."""
+        """A packet whose last laser fired at ``sensor_us`` (counted on over the hours) came at ``t_host_ns``."""
         seen = float(t_host_ns - sensor_us * 1000)
         if self._offset_ns is None:
             self._offset_ns, self._anchor_us = seen, sensor_us

@@ -8,9 +8,10 @@ it, so one spoiled packet cannot cut a sweep short or move its time.
 
 from __future__ import annotations
 
+from bisect import bisect
 from collections import Counter
 from dataclasses import dataclass, field
-from operator import attrgetter
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
@@ -24,9 +25,11 @@ from pipeline.types import F32, F64, Sweep
 CHANNELS = 16
 MIN_RANGE_M, MAX_RANGE_M = 0.1, 200.0
 _CONTINUES_US = 100_000  # packets further apart do not tell how often the head went round
+_SEEN_PASSING_US = 20_000  # packets nearer than this on both sides of the cut: what is missing lies behind the car
 _PAUSE_AGREES_US = 50_000
 _AZIMUTH_TOLERANCE_CDEG, _AZIMUTH_TOLERANCE_SHARE = 300.0, 0.02
-_WHOLE_SHARE = 0.9
+_APART_SHARE = 0.5  # of a packet's span: nearer in time, two packets are one
+_EDGE_CDEG = 3_600.0
 _X, _Y, _Z, _INTENSITY, _TIME, _RING = 0, 1, 2, 3, 4, 6
 
 
@@ -60,7 +63,11 @@ class _Placed(NamedTuple):
     t_host_ns: int | None
 
 
-_TIME_OF = attrgetter("time_us")
+class _Place(Enum):
+    """Where a packet belongs: to the sweep under way, to the next one, to one after a gap in which nobody saw the head
+    pass behind the car, or to a new beginning of the sensor's own time."""
+
+    HERE, NEXT, AFTER_GAP, ANEW = range(4)
 
 
 class Vlp16Decoder:
@@ -76,8 +83,8 @@ class Vlp16Decoder:
         ahead_cdeg = -np.degrees(np.arctan2(ahead[1], ahead[0])) * 100.0
         self._behind_cdeg = float((ahead_cdeg + ROTATION_CDEG / 2) % ROTATION_CDEG)
         self._library = ScanDecoder(Config(model=Model.VLP16, min_range=MIN_RANGE_M, max_range=MAX_RANGE_M))
-        self._sweep: list[_Placed] = []
-        self._times: set[int] = set()
+        self._sweep: list[_Placed] = []  # in order of time
+        self._began_at_cut = False
         self._last: _Placed | None = None
         self._suspect: _Placed | None = None
 
@@ -89,18 +96,19 @@ class Vlp16Decoder:
         """
         self.counts.packets += 1
         try:
-            placed = self._place(read_packet(packet), t_host_ns)
-            turned = self._accept(placed)
+            placed = self._placed(read_packet(packet), t_host_ns)
+            place = self._accept(placed)
         except BadPacket as bad:
             self.counts.refused[bad.reason] += 1
             if bad.model is not None:
                 self.counts.models[bad.model] += 1
             return None
+        done = self._finish(place is _Place.NEXT) if place is not _Place.HERE else None
+        if place is _Place.ANEW:
+            self.clock.restart()
         if t_host_ns is not None:
-            self.clock.observe(placed.time_us, t_host_ns)
-        done = self._finish() if turned else None
-        self._sweep.append(placed)
-        self._times.add(placed.time_us)
+            self.clock.observe(round(placed.time_us + placed.packet.span_us), t_host_ns)
+        self._sweep.insert(bisect(self._sweep, placed.time_us, key=_time_us), placed)
         return done
 
     def push_position(self, packet: bytes) -> Position | None:
@@ -115,18 +123,20 @@ class Vlp16Decoder:
 
     def flush(self) -> Sweep | None:
         """The sweep under way at the end of a stream, if it is whole. The next packet starts anew."""
-        done = self._finish()
+        done = self._finish(False)
         self._last = self._suspect = None
         return done
 
-    def _place(self, packet: Packet, t_host_ns: int | None) -> _Placed:
+    def _placed(self, packet: Packet, t_host_ns: int | None) -> _Placed:
+        """The packet in the hour that is nearest to when it must have been sent."""
         time_us = packet.time_us
         if self._last is not None:
-            time_us += round((self._last.time_us - time_us) / HOUR_US) * HOUR_US
+            passed_us = (_host_gap_us(self._last, t_host_ns) or 0) + self._last.time_us
+            time_us += round((passed_us - time_us) / HOUR_US) * HOUR_US
         return _Placed(time_us, (packet.azimuth_cdeg - self._behind_cdeg) % ROTATION_CDEG, packet, t_host_ns)
 
-    def _accept(self, placed: _Placed) -> bool:
-        """Whether the packet begins a new sweep. BadPacket when it does not fit to those before it.
+    def _accept(self, placed: _Placed) -> _Place:
+        """Where the packet belongs. BadPacket when it does not fit to those before it.
 
         What does not fit is not believed at once: it becomes the beginning only when the next packet follows on it.
         """
@@ -134,34 +144,47 @@ class Vlp16Decoder:
         self._suspect = None
         if last is None:
             self._last = placed
-            return False
-        ahead_us = placed.time_us - last.time_us
-        if placed.time_us in self._times:
+            return _Place.HERE
+        if self._is_doubled(placed):
             raise BadPacket("doubled")
+        ahead_us = placed.time_us - last.time_us
         if 0 < ahead_us <= _CONTINUES_US and (turns := _turns(last, placed)) is not None:
             self._last = placed
-            return turns > 0
+            if turns == 0:
+                return _Place.HERE
+            return _Place.NEXT if ahead_us <= _SEEN_PASSING_US else _Place.AFTER_GAP
         if -_CONTINUES_US <= ahead_us < 0 and _turns(placed, last) is not None:
-            if self._sweep and placed.time_us > self._sweep[0].time_us:
-                return False
+            first = self._sweep[0]
+            if placed.time_us > first.time_us or _turns(placed, first) == 0:
+                return _Place.HERE
             raise BadPacket("late")
-        paused = ahead_us > _CONTINUES_US and _host_agrees(last, placed, ahead_us)
-        follows = suspect is not None and _follows(suspect, placed)
-        if paused or follows:
+        host_gap_us = _host_gap_us(last, placed.t_host_ns)
+        if host_gap_us is not None and ahead_us > _CONTINUES_US and abs(host_gap_us - ahead_us) < _PAUSE_AGREES_US:
             self._last = placed
-            return True
+            return _Place.AFTER_GAP
+        if suspect is not None and _follows(suspect, placed):
+            self._last = placed
+            return _Place.ANEW
         self._suspect = placed
         raise BadPacket("time or azimuth out of order")
 
-    def _finish(self) -> Sweep | None:
-        """Decode the packets at hand, if they are a whole rotation."""
-        packets = sorted(self._sweep, key=_TIME_OF)
-        self._sweep, self._times = [], set()
+    def _is_doubled(self, placed: _Placed) -> bool:
+        """Whether a packet of this time is there already; only some µs off, one of the two is spoiled."""
+        at = bisect(self._sweep, placed.time_us, key=_time_us)
+        nearest = self._sweep[max(0, at - 1) : at + 1]
+        return any(abs(it.time_us - placed.time_us) < _APART_SHARE * placed.packet.span_us for it in nearest)
+
+    def _finish(self, seen_passing: bool) -> Sweep | None:
+        """Decode the packets at hand, if they are a whole rotation. seen_passing: the head was seen to pass behind the
+        car at its end, and the next sweep begins there."""
+        packets, self._sweep = self._sweep, []
+        began_there, self._began_at_cut = self._began_at_cut, seen_passing
         if not packets:
             return None
         self.counts.lost += _missing(packets)
-        edge = (1.0 - _WHOLE_SHARE) * ROTATION_CDEG
-        if packets[0].phase_cdeg > edge or packets[-1].phase_cdeg < ROTATION_CDEG - edge:
+        begins = began_there or packets[0].phase_cdeg <= _EDGE_CDEG
+        ends = seen_passing or packets[-1].phase_cdeg >= ROTATION_CDEG - _EDGE_CDEG
+        if not (begins and ends):
             self.counts.partial += 1
             return None
         sweep = self._decode(packets)
@@ -213,10 +236,13 @@ def _follows(suspect: _Placed, placed: _Placed) -> bool:
     return 0 < ahead_us <= _CONTINUES_US and _turns(moved, placed) is not None
 
 
-def _host_agrees(last: _Placed, placed: _Placed, ahead_us: int) -> bool:
-    if last.t_host_ns is None or placed.t_host_ns is None:
-        return False
-    return abs((placed.t_host_ns - last.t_host_ns) // 1000 - ahead_us) < _PAUSE_AGREES_US
+def _host_gap_us(last: _Placed, t_host_ns: int | None) -> int | None:
+    """By the host's clock, how long after ``last`` a packet came; null when one of them has no host time."""
+    return None if last.t_host_ns is None or t_host_ns is None else (t_host_ns - last.t_host_ns) // 1000
+
+
+def _time_us(placed: _Placed) -> int:
+    return placed.time_us
 
 
 def _missing(packets: list[_Placed]) -> int:

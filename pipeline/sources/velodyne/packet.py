@@ -41,7 +41,7 @@ class BadPacket(Exception):
 
 class Packet(NamedTuple):
     """time_us: past the hour, when the first block's first laser fired. azimuth_cdeg: of the first block, hundredths of
-    a degree, clockwise from straight ahead. rate_cdeg_us: how fast the head turns. span_us: time from this packet to the
+    a degree, clockwise from straight ahead. rate_cdeg_us: how fast the head turns. span_us: time from it to the
     next. data: all 1206 bytes."""
 
     time_us: int
@@ -65,7 +65,7 @@ def read_packet(data: bytes) -> Packet:
         raise _bad_flags(data, fields)
     if product != _VLP16:
         model = _OTHER_MODELS.get(product)
-        raise BadPacket(f"product {product:#04x} ({model or 'unknown'}), not a VLP-16", model)
+        raise BadPacket(f"not a VLP-16 but {model or 'another product'}", model)
     if mode not in (_STRONGEST, _LAST, _DUAL):
         raise BadPacket("unknown return mode")
     if time_us >= HOUR_US:
@@ -100,5 +100,5 @@ def _bad_flags(data: bytes, fields: tuple[int, ...]) -> BadPacket:
     if not any(data):
         return BadPacket("all zero")
     if _LOWER_BLOCK_OF_HDL64 in fields[0:24:2]:
-        return BadPacket("blocks of an HDL-64E, not a VLP-16", "HDL-64E")
+        return BadPacket("not a VLP-16 but HDL-64E", "HDL-64E")
     return BadPacket("block without its flag FF EE")
