@@ -22,8 +22,7 @@ def chart_svg(chart: Chart) -> str:
     scale = _Scale(x_ticks, y_ticks)
     parts = [_grid(scale, chart.x_label, chart.y_label), *(_line(scale, line, n) for n, line in enumerate(drawn))]
     legend = "".join(
-        f'<span class="key"><svg width="26" height="8"><line x1="0" y1="4" x2="26" y2="4" {_stroke(n)}/></svg>'
-        f"{escape(line.name)}</span>"
+        f'<span class="key"><svg width="26" height="8">{_sample(line, n)}</svg>{escape(line.name)}</span>'
         for n, line in enumerate(drawn)
     )
     return (
@@ -85,6 +84,13 @@ def _line(scale: _Scale, line: Series, index: int) -> str:
     if line.points_only:
         return "".join(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2" class="fill{index % 6}"/>' for x, y in points)
     return f'<polyline points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in points)}" {_stroke(index)}/>'
+
+
+def _sample(line: Series, index: int) -> str:
+    """What the legend shows of a line."""
+    if line.points_only:
+        return f'<circle cx="13" cy="4" r="2.5" class="fill{index % 6}"/>'
+    return f'<line x1="0" y1="4" x2="26" y2="4" {_stroke(index)}/>'
 
 
 def _stroke(index: int) -> str:
