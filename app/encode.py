@@ -27,11 +27,10 @@ from app.sent_picture import MAX_WIDTH_PX, SentPicture, encode_picture
 from app.sent_points import point_arrays
 from app.snapshot import Snapshot
 from pipeline.alignment import Alignment, resolve
-from pipeline.path.lane_types import LaneLine
+from pipeline.path.lane_types import EgoLane
+from pipeline.path.lanes import in_picture, polylines
 from pipeline.results import to_json
 from pipeline.types import F64, Box, Frame, Ground, Picture, Result
-
-_LANE_STEP_M = 2.0
 
 
 class Encoder:
@@ -77,19 +76,17 @@ def pack(header: dict[str, Any], jpeg: bytes, arrays: bytes) -> bytes:
 
 def display_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, Any]:
     """What is drawn over the picture. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom first;
-    ``path`` is the corridor and ``lanes`` the ego lane's lines, laid on the ground that the sweep shows, null where
-    there is none. ``plan_lanes`` are the same lines in the plan, x y in metres; ``ground`` the planes under the sweep,
-    n·p + d = 0, and the segments of x that they hold in."""
+    ``path`` is the corridor laid on the ground that the sweep shows, null where there is none. ``lanes`` are the ego
+    lane's lines where the camera saw them, null without a lane detector; ``plan_lanes`` the same in the plan, x y in
+    metres; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x that they hold in."""
     layers = result.layers
-    lanes = {"left": _lane(layers.lanes.left), "right": _lane(layers.lanes.right)} if layers.lanes else {}
     path = {"center": result.path.center, "left": result.path.left, "right": result.path.right}
     return {
         "lidar_boxes": _boxes_json(layers.lidar_boxes, scale),
         "vision_boxes": _boxes_json(layers.vision_boxes, scale),
         "cuboids": _cuboids_json(result, aligned, scale),
         "path": _on_ground(path, layers.ground, aligned, scale),
-        "lanes": _on_ground(lanes, layers.ground, aligned, scale) if lanes else None,
-        "plan_lanes": {side: np.round(line, 3).tolist() for side, line in lanes.items()} if lanes else None,
+        **_lanes_json(layers.lanes, aligned, scale),
         "ground": _ground_json(layers.ground),
     }
 
@@ -115,12 +112,15 @@ def _on_ground(
     }
 
 
-def _lane(line: LaneLine | None) -> F64:
-    """(K, 2) ego x y where paint supports the line; (0, 2) without one."""
-    if line is None:
-        return np.zeros((0, 2))
-    x = np.arange(line.x_min_m, line.x_max_m + 1e-6, _LANE_STEP_M)
-    return np.column_stack([x, line.y_m(x)])
+def _lanes_json(lane: EgoLane | None, aligned: Alignment | None, scale: float) -> dict[str, Any]:
+    """The ego lane's lines where the camera saw them, and in the plan."""
+    if lane is None:
+        return {"lanes": None, "plan_lanes": None}
+    seen = in_picture(lane, aligned) if aligned is not None else None
+    return {
+        "lanes": {side: _pixel_list(uv * scale) for side, uv in seen.items()} if seen is not None else None,
+        "plan_lanes": {side: np.round(line, 3).tolist() for side, line in polylines(lane).items()},
+    }
 
 
 def _ground_json(ground: Ground | None) -> dict[str, Any] | None:

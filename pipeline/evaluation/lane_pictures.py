@@ -62,7 +62,7 @@ def misses(name: str, lane: EgoLane | None, aligned: Alignment, marks: Marks) ->
     for row, sides in marks[name].items():
         for side, marked in zip(("left", "right"), sides, strict=True):
             if marked is not None:
-                column = _column(lines[side], row) if side in lines else None
+                column = _column(lines[side], row) if len(lines.get(side, ())) > 1 else None
                 found.append(Miss(name, row, side, None if column is None else column - marked))
     return found
 

@@ -64,5 +64,5 @@ class EgoLane:
     source: str
     age_s: float
     pitch_rad: float
-    width_m: float | None = None
-    plane: F64 | None = None
+    width_m: float | None
+    plane: F64

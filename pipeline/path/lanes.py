@@ -136,17 +136,14 @@ def road_plane(ground: Ground | None) -> F64 | None:
 
 
 def polylines(lane: EgoLane) -> dict[str, F64]:
-    """``left`` and ``right`` as (K, 2) ego x, y every metre as far as paint supports them; no key without a line."""
-    both = {"left": lane.left, "right": lane.right}
-    return {side: _polyline(line) for side, line in both.items() if line is not None}
+    """``left`` and ``right`` as (K, 2) ego x, y every metre as far as paint supports them; (0, 2) without a line."""
+    return {"left": _polyline(lane.left), "right": _polyline(lane.right)}
 
 
 def in_picture(lane: EgoLane, aligned: Alignment) -> dict[str, F64]:
-    """``left`` and ``right`` as (K, 2) pixels u, v where the lines were seen, NaN behind the camera; empty without a
-    plane. The alignment does not know of the pitch, so each point is put where the pitch made it seem to be."""
+    """``left`` and ``right`` as (K, 2) pixels u, v where the lines were seen, NaN behind the camera. The alignment does
+    not know of the pitch, so each point is put where the pitch made it seem to be."""
     plane = lane.plane
-    if plane is None:
-        return {}
     eye, _ = aligned.rays(np.zeros((0, 2)))
     height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))
     drawn = {}
@@ -157,7 +154,9 @@ def in_picture(lane: EgoLane, aligned: Alignment) -> dict[str, F64]:
     return drawn
 
 
-def _polyline(line: LaneLine) -> F64:
+def _polyline(line: LaneLine | None) -> F64:
+    if line is None:
+        return np.zeros((0, 2))
     x = np.append(np.arange(line.x_min_m, line.x_max_m, _POLYLINE_STEP_M), line.x_max_m)
     return np.column_stack([x, line.y_m(x)])
 

@@ -173,7 +173,7 @@ def lane_line(side: Side, offset_m: float) -> LaneLine:
 def test_lane_lines_are_drawn_in_the_picture_and_in_the_plan():
     shown = snapshot()
     assert shown.tick is not None
-    lane = EgoLane(lane_line("left", 1.8), None, "classical", 0.0, 0.0)
+    lane = EgoLane(lane_line("left", 1.8), None, "classical", 0.0, 0.0, None, np.array([0.0, 0.0, GROUND_M]))
     layers = replace(shown.tick.result.layers, lanes=lane)
     tick = replace(shown.tick, result=replace(shown.tick.result, layers=layers))
     display = taken_apart(Encoder().message(replace(shown, tick=tick)) or b"")[0]["display"]
