@@ -2,36 +2,46 @@
 
 The rule, in one place: among the objects that may be a lead at all (``_ELIGIBILITY``), the one in the path with the
 smallest distance. Each test leaves its number and limit on the object; the first that fails is the reason given.
+
+Being in the path is decided over time: every sighting gives log-odds, a running mean of them decides, so that neither a
+swaying distance nor one bad box makes the lead flicker. Which one will be next is said as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import hypot
+from dataclasses import dataclass, field
+from math import exp, hypot
 from typing import NamedTuple
 
-import numpy as np
-from scipy.special import ndtr
-
-from pipeline.geometry import F64
 from pipeline.motion import closing_speed_mps
 from pipeline.params import CipvParams
-from pipeline.path.corridor import nearest_on_path
+from pipeline.path.placing import Place, place
 from pipeline.records import evolve
-from pipeline.types import VEHICLES, Cipv, FusedObject, Gate, Path, Point2, Rejection
+from pipeline.types import VEHICLES, Cipv, EgoState, FusedObject, Gate, Path, Rejection
 
-SMALLEST_SIGMA_M = 0.1
 AGREEMENT_SIGMAS = 3.0
+STAYS_AT = 0.5
+"""The lead stays it while its probability to be in the path is above this share of what a new one needs."""
+
+
+@dataclass(frozen=True)
+class CipvState:
+    """What one frame leaves to the next. lead_id: the CIPV. odds: of each object, the running mean of its log-odds."""
+
+    lead_id: int | None = None
+    odds: dict[int, float] = field(default_factory=dict)
 
 
 class Candidate(NamedTuple):
-    """An object with what its tests need to know: its place against the path, whether it led in the frame before, and
-    how far from the path's centre it may be."""
+    """An object with what its tests need to know: its place against the path, the running log-odds of being in it,
+    whether it led in the frame before, and the path."""
 
     item: FusedObject
     place: Place | None
+    odds: float
     leads: bool
-    limit_m: float
+    path: Path
     params: CipvParams
 
 
@@ -42,25 +52,44 @@ class Check(NamedTuple):
     reason: str
 
 
-def choose(
-    objects: tuple[FusedObject, ...], path: Path, last_lead: int | None, params: CipvParams
-) -> tuple[tuple[FusedObject, ...], Cipv | None, tuple[Rejection, ...]]:
-    """The objects with their place against the path and every gate, the CIPV with its reason, and a reason for each
-    other object. ``last_lead`` is the CIPV's id in the frame before.
+class Choice(NamedTuple):
+    """objects: with their place against the path and every gate. lead: the CIPV with its reason. next_lead: who will be
+    it next. rejected: a reason for each other object."""
 
-    An object is in the path when the middle of its nearest face lies between the two edges. The last lead stays in the
-    path until it is ``hysteresis_m`` outside, so that a lead at the edge does not flicker."""
-    judged, able, failures = [], [], {}
-    for item, place in zip(objects, _places(objects, path), strict=True):
-        leads = item.id == last_lead
-        limit_m = path.half_width_m + (params.hysteresis_m if leads else 0.0)
-        checks = [ask(Candidate(item, place, leads, limit_m, params)) for ask in _ELIGIBILITY]
+    objects: tuple[FusedObject, ...]
+    lead: Cipv | None
+    next_lead: Cipv | None
+    rejected: tuple[Rejection, ...]
+
+
+def choose(
+    state: CipvState,
+    objects: tuple[FusedObject, ...],
+    path: Path,
+    ego: EgoState | None,
+    dt_s: float | None,
+    params: CipvParams,
+) -> tuple[CipvState, Choice]:
+    """The CIPV of this frame, the next one, and a reason for each other object."""
+    judged, able, failures, odds = [], [], {}, {}
+    fresh = 1.0 - exp(-dt_s / params.decide_s) if dt_s and params.decide_s > 0.0 else 1.0
+    for item, placed in zip(objects, place(objects, path, ego, params), strict=True):
+        where, crossing_s = placed if placed is not None else (None, None)
+        leads = item.id == state.lead_id
+        if where is not None:
+            now = where.log_odds(_widening_m(leads, params))
+            before = state.odds.get(item.id, now)
+            odds[item.id] = before + fresh * (now - before)
+        candidate = Candidate(item, where, odds.get(item.id, 0.0), leads, path, params)
+        checks = [ask(candidate) for ask in _ELIGIBILITY]
         item = evolve(
             item,
             gates=item.gates + tuple(check.gate for check in checks),
-            path_offset_m=place.offset_m if place else None,
-            in_path=place is not None and place.within(limit_m),
-            in_path_probability=place.probability if place else None,
+            path_offset_m=where.offset_m if where else None,
+            in_path=_in_path(candidate),
+            in_path_probability=where.probability() if where else None,
+            lateral_mps=where.sideways_mps if where else None,
+            crossing_s=crossing_s,
         )
         judged.append(item)
         failed = next((check.reason for check in checks if not check.gate.passed), None)
@@ -69,12 +98,13 @@ def choose(
         else:
             failures[item.id] = failed
     nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
-    if nearest is None:
-        return tuple(judged), None, tuple(Rejection(k, reason) for k, reason in failures.items())
-    lead = _surer(nearest, able)
-    failures |= {item.id: _why_after(item, lead) for item in able if item.id != lead.id}
-    rejected = tuple(Rejection(item.id, failures[item.id]) for item in judged if item.id != lead.id)
-    return tuple(judged), _named(lead, len(able)), rejected
+    lead = _surer(nearest, able) if nearest is not None else None
+    if lead is not None:
+        failures |= {item.id: _why_after(item, lead) for item in able if item.id != lead.id}
+    rejected = tuple(Rejection(item.id, failures[item.id]) for item in judged if item.id in failures)
+    named = _named(lead, _why(lead, len(able))) if lead is not None else None
+    choice = Choice(tuple(judged), named, _next_lead(judged, able, lead, params), rejected)
+    return CipvState(lead.id if lead is not None else None, odds), choice
 
 
 def _surer(nearest: FusedObject, able: list[FusedObject]) -> FusedObject:
@@ -103,42 +133,34 @@ def _why_after(item: FusedObject, lead: FusedObject) -> str:
     return f"taken for #{lead.id}, which is surer" if doubtful else f"behind #{lead.id}"
 
 
-class Place(NamedTuple):
-    """Where the middle of an object's nearest face is against the path: signed offset from the centre line, positive to
-    the left, path length to its foot, and how probably it is in the path."""
-
-    offset_m: float
-    ahead_m: float
-    probability: float
-
-    def within(self, limit_m: float) -> bool:
-        return self.ahead_m > 0.0 and abs(self.offset_m) <= limit_m
+# ---------------------------------------------------------------- who will be next
 
 
-def _places(objects: tuple[FusedObject, ...], path: Path) -> list[Place | None]:
-    """Each object's place; null where it is not known."""
-    faces = [near_face_middle(item.bev) for item in objects if item.bev is not None]
-    if not faces:
-        return [None] * len(objects)
-    offsets, reached = nearest_on_path(path, np.array(faces))
-    numbers = (offsets.tolist(), reached.tolist(), _probabilities(offsets, reached, path).tolist())
-    known = iter(Place(*row) for row in zip(*numbers, strict=True))
-    return [next(known) if item.bev is not None else None for item in objects]
-
-
-def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
-    """The middle of the side that faces the ego origin: between the two nearest corners."""
-    (ax, ay), (bx, by) = sorted(bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)[:2]
-    return (ax + bx) / 2, (ay + by) / 2
-
-
-def _probabilities(offsets: F64, reached: F64, path: Path) -> F64:
-    """(N,) that each true offset lies between the edges, it being normal around the measured one with the path's own
-    sigma at that distance, and never surer than a sensor resolves; 0 for what is not ahead."""
-    at = [0.0, *(float(s) for s in path.sigma_m)]
-    sigma = np.maximum(np.interp(reached, at, [0.0, *path.sigma_m.values()]), SMALLEST_SIGMA_M)
-    inside = ndtr((path.half_width_m - offsets) / sigma) - ndtr((-path.half_width_m - offsets) / sigma)
-    return np.asarray(np.where(reached > 0.0, inside, 0.0))
+def _next_lead(
+    judged: list[FusedObject], able: list[FusedObject], lead: FusedObject | None, params: CipvParams
+) -> Cipv | None:
+    """The next-to-be CIPV: the vehicle that will be first over the edge of the path, nearer than the lead; else the one
+    behind a lead that leaves, or simply behind it."""
+    lead_m = lead.distance_m if lead is not None and lead.distance_m is not None else float("inf")
+    cutting_in = [
+        item
+        for item in judged
+        if not item.in_path
+        and item.crossing_s is not None
+        and item.crossing_s <= params.cut_in_s
+        and (item.distance_m or 0.0) < lead_m
+        and all(gate.passed for gate in item.gates if gate.name in _BESIDE_PLACE)
+    ]
+    if cutting_in:
+        first = min(cutting_in, key=lambda item: (item.crossing_s or 0.0, item.id))
+        return _named(first, f"cuts in: over the edge of the path in {first.crossing_s:.1f} s")
+    behind = [item for item in able if lead is not None and item.id != lead.id and (item.distance_m or 0.0) > lead_m]
+    if lead is None or not behind:
+        return None
+    second = min(behind, key=lambda item: (item.distance_m or 0.0, item.id))
+    if lead.crossing_s is not None and lead.crossing_s <= params.cut_in_s:
+        return _named(second, f"#{lead.id} leaves the path in {lead.crossing_s:.1f} s")
+    return _named(second, f"next behind #{lead.id}")
 
 
 # ---------------------------------------------------------------- who may be a lead
@@ -188,12 +210,45 @@ def _is_vehicle_sized(who: Candidate) -> Check:
     )
 
 
-def _is_in_path(who: Candidate) -> Check:
+def _is_ahead(who: Candidate) -> Check:
     if who.place is None:
-        return Check(Gate("path_offset", None, who.limit_m, False), "place not known")
-    aside = abs(who.place.offset_m)
-    reason = f"out of path by {aside - who.limit_m:.1f} m" if aside > who.limit_m else "beside or behind the bumper"
-    return Check(Gate("path_offset", aside, who.limit_m, who.place.within(who.limit_m)), reason)
+        return Check(Gate("ahead", None, 0.0, False), "place not known")
+    return Check(Gate("ahead", who.place.ahead_m, 0.0, who.place.ahead_m > 0.0), "beside or behind the bumper")
+
+
+def _is_in_path(who: Candidate) -> Check:
+    """By the running mean of what the sightings say; the reason is in metres, as of now."""
+    outside_m = -who.place.margin_m(_widening_m(who.leads, who.params)) if who.place is not None else 0.0
+    reason = f"out of path by {outside_m:.1f} m" if outside_m > 0.0 else "in path for a moment only"
+    return Check(Gate("path_odds", who.odds, 0.0, _in_path(who)), reason)
+
+
+def _widening_m(leads: bool, params: CipvParams) -> float:
+    """The last lead leaves the path only this far outside it, so that a lead at the edge does not flicker."""
+    return params.hysteresis_m if leads else 0.0
+
+
+def _in_path(who: Candidate) -> bool:
+    return who.place is not None and who.place.ahead_m > 0.0 and who.odds > 0.0
+
+
+def _is_probable(who: Candidate) -> Check:
+    """So far ahead that the path's own uncertainty is wider than a lane, nobody can be said to be in it."""
+    needed = who.params.min_probability * (STAYS_AT if who.leads else 1.0)
+    probability = who.place.probability() if who.place is not None else 0.0
+    return Check(
+        Gate("path_probability", probability, needed, probability >= needed),
+        f"in path with {100 * probability:.0f} % only: path not known that far",
+    )
+
+
+def _is_within_reach(who: Candidate) -> Check:
+    """On a path that is too vague to be driven after, only what lies where it is still known may become the lead."""
+    if who.path.usable or who.place is None:
+        return Check(Gate("path_reach", None, who.path.reach_m, True), "")
+    ahead = who.place.ahead_m
+    passed = ahead <= who.path.reach_m or who.leads
+    return Check(Gate("path_reach", ahead, who.path.reach_m, passed), f"path known for {who.path.reach_m:.0f} m only")
 
 
 _ELIGIBILITY: tuple[Callable[[Candidate], Check], ...] = (
@@ -202,12 +257,16 @@ _ELIGIBILITY: tuple[Callable[[Candidate], Check], ...] = (
     _is_confirmed,
     _is_seen,
     _is_vehicle_sized,
+    _is_ahead,
     _is_in_path,
+    _is_probable,
+    _is_within_reach,
 )
+_BESIDE_PLACE = frozenset({"vehicle_class", "distance_known", "hits", "seen", "size"})
+"""The gates that one which is not in the path yet must pass all the same."""
 
 
-def _named(lead: FusedObject, candidates: int) -> Cipv:
-    closing = closing_speed_mps(lead)
+def _why(lead: FusedObject, candidates: int) -> str:
     seen_by = {"V": "camera only", "L": "LiDAR only", "VL": "both sensors"}[lead.source]
     what = f"{lead.label or 'obstacle'} seen by {seen_by}"
     others = f", nearest of {candidates} in path" if candidates > 1 else ", alone in path"
@@ -217,5 +276,9 @@ def _named(lead: FusedObject, candidates: int) -> Cipv:
         if abs(offset) >= 0.05
         else "on its centre"
     )
-    assert lead.distance_m is not None
-    return Cipv(lead.id, lead.distance_m, closing, lead.ttc_s, f"{what}{others}, {side}")
+    return f"{what}{others}, {side}"
+
+
+def _named(item: FusedObject, reason: str) -> Cipv:
+    assert item.distance_m is not None
+    return Cipv(item.id, item.distance_m, closing_speed_mps(item), item.ttc_s, reason)

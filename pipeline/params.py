@@ -32,6 +32,20 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
+class DeskewParams(Section):
+    """Motion compensation of the sweep by own speed and yaw rate."""
+
+    enabled: bool = _choice(
+        False, "Put points where standing things would be at the tick; what drives along gains none"
+    )
+
+
+class DeskewParams(Section):
+    """Motion compensation of the sweep by own speed and yaw rate."""
+
+    enabled: bool = _choice(False, "Put points where standing things would be at the tick; what drives along gains none")
+
+
 class DownsampleParams(Section):
     """Per-channel down-sampling (paper: "down-sampling … points of each channel")."""
 
@@ -247,6 +261,17 @@ class CipvParams(Section):
     confirm_hits: int = _slider(3, 1, 20, 1, "frames", "Sightings before an object seen by one sensor counts")
     carried_may_become_lead: bool = _choice(False, "An object that is not seen in this frame may take over as CIPV")
     hysteresis_m: float = _slider(0.3, 0.0, 2.0, 0.05, "m", "The lead leaves the path only this far outside it")
+    min_overlap_m: float = _slider(
+        0.9,
+        0.0,
+        2.0,
+        0.05,
+        "m",
+        "In path: this much of its width reaches between the edges, or half of what is narrower",
+    )
+    decide_s: float = _slider(0.3, 0.0, 2.0, 0.05, "s", "In path: over how long sightings are weighed; 0: each alone")
+    min_probability: float = _slider(0.35, 0.0, 0.95, 0.05, "", "A lead is in the path at least this probably")
+    cut_in_s: float = _slider(3.0, 0.5, 6.0, 0.1, "s", "Lane crossings are told this long before")
     min_width_m: float = _slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest extent across, a vehicle's rear or side")
     min_height_m: float = _slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest height")
     max_size_m: float = _slider(15.0, 3.0, 40.0, 0.5, "m", "L objects: largest extent; walls and hedges are longer")
@@ -313,6 +338,7 @@ class SyncParams(Section):
 class Params(Section):
     """All parameters of the line, by stage."""
 
+    deskew: DeskewParams = DeskewParams()
     downsample: DownsampleParams = DownsampleParams()
     ground: GroundParams = GroundParams()
     cluster: ClusterParams = ClusterParams()
@@ -350,7 +376,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
         "vision_tracking": {"filter": "queue"},
         "alignment": {"model": "angular"},
         "fusion": {"assignment": "greedy", "min_iou": 0.0, "ring_gap_deg": 0.0, "range_gate": False},
-        "cipv": {"confirm_hits": 1, "carried_may_become_lead": True, "hysteresis_m": 0.0},
+        "cipv": {"confirm_hits": 1, "carried_may_become_lead": True, "hysteresis_m": 0.0, "decide_s": 0.0},
         "aeb": {"enabled": False},
     },
 }

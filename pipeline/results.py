@@ -59,15 +59,24 @@ def _sensors(health: SensorHealth, streams: tuple[StreamHealth, ...]) -> dict[st
         "camera": {"age_ms": _number(health.camera_age_ms), "skew_ms": _number(health.camera_skew_ms)},
         "ego": {"age_ms": _number(health.ego_age_ms)},
     }
-    for stream in streams:
-        sensors.setdefault(stream.sensor, {"age_ms": _number(stream.age_ms)}).update(
-            state=stream.state,
-            rate_hz=_number(stream.rate_hz),
-            jitter_ms=_number(stream.jitter_ms),
-            lost=stream.lost,
-            note=stream.note,
-        )
+    for name, stream in streams_json(streams).items():
+        sensors[name] = {**stream, **sensors.get(name, {})}
     return sensors
+
+
+def streams_json(streams: tuple[StreamHealth, ...]) -> dict[str, Any]:
+    """How live sensors do, by sensor."""
+    return {
+        stream.sensor: {
+            "age_ms": _number(stream.age_ms),
+            "state": stream.state,
+            "rate_hz": _number(stream.rate_hz),
+            "jitter_ms": _number(stream.jitter_ms),
+            "lost": stream.lost,
+            "note": stream.note,
+        }
+        for stream in streams
+    }
 
 
 def _ego(ego: EgoState | None) -> dict[str, Any] | None:
@@ -93,6 +102,8 @@ def _object(each: FusedObject) -> dict[str, Any]:
         "in_path": each.in_path,
         "in_path_probability": _number(each.in_path_probability),
         "path_offset_m": _number(each.path_offset_m),
+        "lateral_mps": _number(each.lateral_mps),
+        "crossing_s": _number(each.crossing_s),
         "moving": each.moving,
         "ttc_s": _number(each.ttc_s),
         "carried": each.carried,

@@ -1,8 +1,8 @@
 """The straight line: one frame in, one result out, state in and state out.
 
-    LiDAR:  down-sample → ground → cluster → boxes → tracks ─┐
-    camera: (raw boxes) → select → distance → tracks ────────┼→ fuse → motion → path → CIPV → ACC, AEB
-    ego ─────────────────────────────────────────────────────┘
+    LiDAR:  deskew → down-sample → ground → cluster → boxes → tracks ─┐
+    camera: (raw boxes) → select → distance → tracks ─────────────────┼→ fuse → motion → path → CIPV → ACC, AEB
+    ego ──────────────────────────────────────────────────────────────┘
 
 No stage keeps anything of its own: what must be remembered is in ``State``, so a frame can be run again from the same
 state with other parameters, and the same inputs give the same bytes. A branch that a frame lacks predicts, and says so.
@@ -16,7 +16,7 @@ from time import perf_counter_ns
 import numpy as np
 
 from pipeline import acc, aeb, alignment, cipv, fusion, kalman, motion
-from pipeline.lidar import boxes, cluster, downsample, ground
+from pipeline.lidar import boxes, cluster, deskew, downsample, ground
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.lidar import warm_up as warm_up_lidar
 from pipeline.params import Params
@@ -45,9 +45,9 @@ class State:
     vision: vision_tracking.VisionTrackerState = vision_tracking.VisionTrackerState()
     fusion: fusion.FusionState = fusion.FusionState()
     path: corridor.PathState = corridor.PathState()
+    cipv: cipv.CipvState = cipv.CipvState()
     acc: acc.AccState = acc.AccState()
     aeb: aeb.AebState = aeb.AebState()
-    lead_id: int | None = None
 
 
 def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
@@ -56,7 +56,9 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     clock = _Stopwatch()
     aligned = alignment.resolve(params.alignment, frame.camera)
 
-    seen = _perceive_lidar(frame.sweep, params, clock)
+    sweep = deskew.deskew(frame.sweep, frame.ego, params.deskew)
+    clock.lap("deskew")
+    seen = _perceive_lidar(sweep, params, clock)
     lidar_state, lidar_tracks = lidar_tracking.track(
         state.lidar, seen.obstacles if frame.sweep else None, dt_s, params.lidar_tracking
     )
@@ -78,7 +80,8 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         state.path, frame.ego, None, frame.gnss, frame.route, frame.t_ns, dt_s, params.path
     )
     clock.lap("path")
-    objects, lead, rejected = cipv.choose(objects, path, state.lead_id, params.cipv)
+    cipv_state, chosen = cipv.choose(state.cipv, objects, path, frame.ego, dt_s, params.cipv)
+    objects, lead = chosen.objects, chosen.lead
     clock.lap("cipv")
     acc_state, command = acc.control(state.acc, frame.ego, lead, objects, path, dt_s, params.acc)
     clock.lap("acc")
@@ -93,13 +96,14 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         objects=objects,
         path=path,
         cipv=lead,
-        rejected=rejected,
+        next_cipv=chosen.next_lead,
+        rejected=chosen.rejected,
         acc=command,
         notes=(*frame.notes, *path.notes),
         streams=frame.streams,
         timing_ms={**frame.timing_ms, **clock.total()},
         layers=Layers(
-            points=frame.sweep.points if frame.sweep else np.zeros((0, 4), np.float32),
+            points=sweep.points if sweep else np.zeros((0, 4), np.float32),
             kind=seen.kind,
             obstacles=seen.obstacles,
             lidar_tracks=lidar_tracks,
@@ -109,8 +113,9 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
             ground=seen.ground,
         ),
     )
-    lead_id = lead.id if lead is not None else None
-    return State(frame.t_ns, lidar_state, vision_state, fusion_state, path_state, acc_state, aeb_state, lead_id), result
+    return State(
+        frame.t_ns, lidar_state, vision_state, fusion_state, path_state, cipv_state, acc_state, aeb_state
+    ), result
 
 
 def warm_up() -> None:

@@ -6,10 +6,9 @@ confirmed and no kerb or post) and its course must really lead into the corridor
 
 from __future__ import annotations
 
+from pipeline.path.placing import believed_mps
 from pipeline.types import FusedObject, Path
 
-SIDEWAYS_SIGMA_MPS = 0.5
-"""What a tracked cluster's sideways speed may be off by: only what exceeds it is believed."""
 ABREAST_M = 1.0
 _MUST_PASS = frozenset({"distance_known", "hits", "seen", "size"})
 
@@ -30,7 +29,6 @@ def enters_corridor(item: FusedObject, path: Path) -> bool:
         return item.in_path
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
         return False  # beside us already: braking no longer parts the two
-    offset, sideways = item.path_offset_m, item.velocity_mps[1]
-    toward = -sideways if offset > 0 else sideways
-    believed = max(toward - SIDEWAYS_SIGMA_MPS, 0.0)
-    return abs(offset) - believed * item.ttc_s <= path.half_width_m
+    sideways = believed_mps(item.lateral_mps, item)
+    toward = -sideways if item.path_offset_m > 0 else sideways
+    return abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s <= path.half_width_m

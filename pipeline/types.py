@@ -295,7 +295,9 @@ class FusedObject:
     reach) keeps its row: its place and distance are null, and it cannot be the CIPV.
 
     source: which sensors' tracks it is made of. seen_by: which of them saw it in this frame; none: it is carried.
-    measured: its distance was measured in this frame; else it is a prediction."""
+    measured: its distance was measured in this frame; else it is a prediction.
+    lateral_mps: how fast it moves to the left of the path, over ground. crossing_s: until it is over the edge of it, or
+    out of it where it is in; null when its sideways speed leads nowhere."""
 
     id: int
     source: SourceKind
@@ -321,6 +323,8 @@ class FusedObject:
     in_path_probability: float | None = None
     path_offset_m: float | None = None
     measured: bool = True
+    lateral_mps: float | None = None
+    crossing_s: float | None = None
 
     @property
     def carried(self) -> bool:

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.cipv import near_face_middle
 from pipeline.geometry import closest_on_polygon
+from pipeline.path.placing import near_face_middle
 from pipeline.sources.base import TruthObject
 from pipeline.types import VEHICLES, Point2, Result
 

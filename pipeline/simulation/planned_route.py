@@ -1,4 +1,4 @@
-"""The road that a scenario's ego vehicle means to drive, as a route on the Earth: what a map or an earlier drive gives."""
+"""The road that a scenario's ego vehicle means to drive, as a route on the Earth: what a map or an old drive gives."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.acc import AccState, control, desired_gap_m, pid
-from pipeline.cipv import choose
+from pipeline.cipv import CipvState, choose
 from pipeline.motion import describe
 from pipeline.params import AccParams, CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
@@ -21,7 +21,7 @@ PATH = corridor(None, PathParams(half_width_m=1.5))
 def command(speed_mps: float, gap_m: float | None, *others: FusedObject, state: AccState | None = None) -> AccCommand:
     lead = None if gap_m is None else Cipv(99, gap_m, None, None, "")
     ego = EgoState(0, speed_mps)
-    objects, _, _ = choose(describe(others, ego, MotionParams()), PATH, None, CipvParams())
+    objects = choose(CipvState(), describe(others, ego, MotionParams()), PATH, ego, None, CipvParams())[1].objects
     _, result = control(state or AccState(), ego, lead, objects, PATH, 0.1, PARAMS)
     assert result is not None
     return result

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.aeb import AebState, guard, required_decel_mps2
-from pipeline.cipv import choose
+from pipeline.cipv import CipvState, choose
 from pipeline.motion import describe
 from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams, preset
 from pipeline.path.corridor import corridor
@@ -30,7 +30,7 @@ def decide(
     params: AebParams = PARAMS,
 ) -> tuple[AebState, AccCommand]:
     ego, state = EgoState(0, speed_mps), state or AebState()
-    judged, lead, _ = choose(describe(objects, ego, MotionParams()), PATH, None, CipvParams())
+    judged, lead, _, _ = choose(CipvState(), describe(objects, ego, MotionParams()), PATH, ego, None, CipvParams())[1]
     for _ in range(frames):
         state, command = guard(state, acc, ego, lead, judged, PATH, 0.1, params, AccParams())
     assert command is not None

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.cipv import choose
+from pipeline.cipv import CipvState, choose
 from pipeline.params import CipvParams, PathParams
 from pipeline.path.corridor import corridor
 from pipeline.types import Cipv, EgoState, FusedObject
@@ -19,7 +19,7 @@ PATH = corridor(None, PathParams(half_width_m=1.5))
 
 
 def decide(*objects: FusedObject, last: int | None = None) -> tuple[Cipv | None, dict[int, str]]:
-    _, lead, rejected = choose(objects, PATH, last, PARAMS)
+    _, lead, _, rejected = choose(CipvState(last), objects, PATH, None, None, PARAMS)[1]
     return lead, {row.id: row.reason for row in rejected}
 
 
@@ -70,10 +70,11 @@ def test_who_may_lead(item: FusedObject) -> None:
 
 
 def test_the_gate_that_stopped_it_carries_number_and_limit() -> None:
-    (item,), lead, _ = choose((fused(1, 20.0, 3.0),), PATH, None, PARAMS)
+    (item,), lead, _, _ = choose(CipvState(), (fused(1, 20.0, 3.0),), PATH, None, None, PARAMS)[1]
     assert lead is None
-    failed = [gate for gate in item.gates if not gate.passed]
-    assert [(gate.name, gate.value, gate.limit) for gate in failed] == [("path_offset", pytest.approx(3.0), 1.5)]
+    failed = {gate.name: (gate.value, gate.limit) for gate in item.gates if not gate.passed}
+    assert failed["path_odds"] == (-4.0, 0.0)
+    assert failed["path_probability"] == (pytest.approx(0.0, abs=1e-3), 0.35)
 
 
 def test_hysteresis_holds_the_lead_at_the_edge_but_takes_in_nobody_new() -> None:
@@ -104,7 +105,9 @@ def test_a_box_too_near_to_be_measured_does_not_become_the_lead() -> None:
 def test_in_path_is_relative_to_a_curved_path() -> None:
     """On a 200 m left arc the car 40 m ahead stands 4 m to the left; the one straight ahead is in the next lane."""
     bent = corridor(EgoState(0, 20.0, 0.1), PathParams(half_width_m=1.5))
-    (on_arc, straight), lead, _ = choose((fused(1, 40.0, 4.0), fused(2, 40.0, 0.0)), bent, None, PARAMS)
+    (on_arc, straight), lead, _, _ = choose(
+        CipvState(), (fused(1, 40.0, 4.0), fused(2, 40.0, 0.0)), bent, None, None, PARAMS
+    )[1]
     assert lead is not None
     assert lead.id == 1
     assert on_arc.in_path

@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from pipeline.cipv import choose
+from pipeline.cipv import CipvState, choose
 from pipeline.motion import describe
 from pipeline.params import CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
@@ -20,7 +20,7 @@ PATH = corridor(None, PathParams(half_width_m=1.5))
 def judged(item: FusedObject, ego_mps: float | None = 20.0) -> FusedObject:
     """The object as the line describes it before anybody reacts."""
     ego = EgoState(0, ego_mps) if ego_mps is not None else None
-    (item,), _, _ = choose(describe([item], ego, MotionParams()), PATH, None, CipvParams())
+    (item,) = choose(CipvState(), describe([item], ego, MotionParams()), PATH, ego, None, CipvParams())[1].objects
     return item
 
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipeline.cipv import near_face_middle
 from pipeline.evaluation.experiments.layouts import LAYOUTS, Case, cases, scenario
 from pipeline.evaluation.experiments.sections import Cell, Chart, Experiment, Section, Series, Table
 from pipeline.evaluation.experiments.track import parameters, target_of, true_range_m
+from pipeline.path.placing import near_face_middle
 from pipeline.simulation.loop import Setup, Tick, drive
 
 MAX_M = 60.0

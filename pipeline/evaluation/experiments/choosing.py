@@ -13,11 +13,11 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.cipv import near_face_middle
 from pipeline.evaluation.experiments.sections import Cell, Chart, Experiment, Section, Series, Table
 from pipeline.evaluation.experiments.track import SCENE_LAW
 from pipeline.params import Params, PathParams, with_changes
 from pipeline.path.corridor import nearest_on_path
+from pipeline.path.placing import near_face_middle
 from pipeline.run import Sensors
 from pipeline.simulation import scenario, world
 from pipeline.simulation.loop import Setup, Tick, drive

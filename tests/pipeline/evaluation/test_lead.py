@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from pipeline.cipv import choose
+from pipeline.cipv import CipvState, choose
 from pipeline.evaluation.lead import Judged, LeadRule, judge, score, true_lead
 from pipeline.params import CipvParams, Params, PathParams
 from pipeline.path.corridor import corridor
@@ -24,7 +24,7 @@ def labelled(x: float, y: float, label: str = "Car") -> TruthObject:
 
 
 def believed(*objects: FusedObject) -> Result:
-    judged, lead, rejected = choose(objects, PATH, None, CipvParams())
+    judged, lead, _, rejected = choose(CipvState(), objects, PATH, None, None, CipvParams())[1]
     _, empty = step(State(), Frame(0, "000000", 0), Params())
     return dataclasses.replace(empty, objects=judged, cipv=lead, rejected=rejected)
 

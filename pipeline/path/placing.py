@@ -1,0 +1,195 @@
+"""Where each object is against the path: its extent across it, how surely it is in it, and when it will cross the edge.
+
+An object is in the path when enough of its width reaches between the two edges: as much as stops a car, or half of
+what is narrower. For a car that is the paper's rule, the middle of its rear between the lines; a wide truck whose
+middle is outside but which leaves no room is in the path too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+from scipy.special import ndtr
+
+from pipeline.geometry import F64
+from pipeline.params import CipvParams
+from pipeline.path.corridor import nearest_on_path
+from pipeline.path.yaw_rate import usable_rate
+from pipeline.types import EgoState, FusedObject, Path, Point2
+
+LIDAR_SIDEWAYS_SIGMA_M = 0.15
+"""How well a cluster's sides are known: a beam's width, and what of the car was hit."""
+BEARING_SIGMA_RAD = 0.005
+"""How well a box's middle is known sideways (0.3°, ``vision_tracking.bearing_sigma_deg``)."""
+SIDEWAYS_SIGMA_MPS = 0.5
+"""What a tracked cluster's sideways speed may be off by: only what exceeds it is believed."""
+CAMERA_SIDEWAYS_PER_S = 0.02
+"""The same of a box, a metre of distance: it is placed by its bearing, and swings with its estimated distance."""
+SURE = 4.0
+"""Log-odds beyond which nothing gets surer: the sigmas themselves are not known that well."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """One object against the path. offset_m: of the middle of its nearest face, positive to the left of the centre;
+    ahead_m: path length to its foot. low_m, high_m: from where to where it reaches across the path. left_m, right_m:
+    how far its middle may lie to either side and still be in the path. sigma_m: of its sideways place against the path,
+    both errors together. sideways_mps: how fast it moves to the left of the path, over ground; null where its velocity
+    is not known."""
+
+    offset_m: float
+    ahead_m: float
+    low_m: float
+    high_m: float
+    left_m: float
+    right_m: float
+    sigma_m: float
+    sideways_mps: float | None
+
+    @property
+    def middle_m(self) -> float:
+        return 0.5 * (self.low_m + self.high_m)
+
+    @property
+    def limit_m(self) -> float:
+        """The limit on the side it is on."""
+        return self.left_m if self.middle_m >= 0.0 else self.right_m
+
+    def margin_m(self, extra_m: float = 0.0) -> float:
+        """How far inside the path it is; negative: how far outside. extra_m widens the path."""
+        return min(self.left_m + extra_m - self.middle_m, self.right_m + extra_m + self.middle_m)
+
+    def probability(self) -> float:
+        """That it is in the path, its place being normal around the measured one; 0 for what is not ahead."""
+        if self.ahead_m <= 0.0:
+            return 0.0
+        high, low = (self.left_m - self.middle_m) / self.sigma_m, (-self.right_m - self.middle_m) / self.sigma_m
+        return float(ndtr(high) - ndtr(low))
+
+    def log_odds(self, extra_m: float) -> float:
+        """What this sighting says for (positive) or against its being in the path: the log of the likelihood ratio of
+        where it was seen against the nearest place on the other side of the edge, ±4 at most."""
+        if self.ahead_m <= 0.0:
+            return -SURE
+        margin = self.margin_m(extra_m)
+        surety = min(0.5 * (margin / self.sigma_m) ** 2, SURE)
+        return surety if margin >= 0.0 else -surety
+
+    def crossing_s(self, believed_mps: float, half_left_m: float, half_right_m: float) -> float | None:
+        """Seconds until an object that is out of the path has its nearer side over the edge, or until one that is in it
+        has left it; null when its believed sideways speed (positive to the left) leads nowhere. 0: on the edge."""
+        if believed_mps == 0.0 or self.ahead_m <= 0.0:
+            return None
+        inside = self.margin_m() >= 0.0
+        if inside:
+            way = self.left_m - self.middle_m if believed_mps > 0.0 else self.right_m + self.middle_m
+        elif self.middle_m > 0.0 and believed_mps < 0.0:
+            way = self.low_m - half_left_m
+        elif self.middle_m < 0.0 and believed_mps > 0.0:
+            way = -half_right_m - self.high_m
+        else:
+            return None
+        return max(way, 0.0) / abs(believed_mps)
+
+
+def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
+    """The part of a sideways speed that its noise does not explain."""
+    if sideways_mps is None or item.moving is False:
+        return 0.0
+    doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * (item.distance_m or 0.0) if item.source == "V" else 0.0)
+    return float(np.sign(sideways_mps)) * max(abs(sideways_mps) - doubt, 0.0)
+
+
+def place(
+    objects: Sequence[FusedObject], path: Path, ego: EgoState | None, params: CipvParams
+) -> list[tuple[Place, float | None] | None]:
+    """Each object's place with its ``crossing_s``; null where it is not known where it is."""
+    known = [item for item in objects if item.bev is not None]
+    if not known:
+        return [None] * len(objects)
+    points = np.array([_outline(item) for item in known])  # (N, 5, 2): middle of the near face, four corners
+    offsets, reached = (row.reshape(-1, 5) for row in nearest_on_path(path, points.reshape(-1, 2)))
+    low, high = offsets[:, 1:].min(axis=1), offsets[:, 1:].max(axis=1)
+    ahead = reached[:, 0]
+    k = np.clip(ahead.astype(np.intp), 0, len(path.center) - 2)
+    way = path.center[k + 1] - path.center[k]
+    heading = np.arctan2(way[:, 1], way[:, 0])
+    half_left, half_right = _half_widths(path, k)
+    needed = np.minimum(params.min_overlap_m, 0.5 * (high - low))
+    spare = 0.5 * (high - low) - needed
+    path_sigma = path.profile_m[k] if len(path.profile_m) else np.zeros(len(k))
+    rows = zip(
+        known,
+        points[:, 0].tolist(),
+        heading.tolist(),
+        path_sigma.tolist(),
+        half_left.tolist(),
+        half_right.tolist(),
+        zip(offsets[:, 0].tolist(), ahead.tolist(), low.tolist(), high.tolist(), strict=True),
+        (half_left + spare).tolist(),
+        (half_right + spare).tolist(),
+        strict=True,
+    )
+    placed = []
+    for item, near, direction, sigma, edge_left, edge_right, where, left, right in rows:
+        sideways = _sideways_mps(item, near, direction, ego)
+        there = Place(*where, left, right, hypot(sigma, _sigma_m(item, near, direction)), sideways)
+        placed.append((there, there.crossing_s(believed_mps(sideways, item), edge_left, edge_right)))
+    following = iter(placed)
+    return [next(following) if item.bev is not None else None for item in objects]
+
+
+def near_face(bev: tuple[Point2, Point2, Point2, Point2]) -> tuple[Point2, Point2]:
+    """The two corners of the side that faces the ego origin."""
+    a, b = sorted(bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)[:2]
+    return a, b
+
+
+def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
+    """The middle of the side that faces the ego origin: between the two nearest corners."""
+    (ax, ay), (bx, by) = near_face(bev)
+    return (ax + bx) / 2, (ay + by) / 2
+
+
+def _outline(item: FusedObject) -> list[Point2]:
+    """The middle of the nearest face, and what the object reaches over: all its corners where the LiDAR measured them;
+    else the nearest face alone, since how a vehicle that only the camera sees is turned is a guess."""
+    assert item.bev is not None
+    a, b = near_face(item.bev)
+    middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+    return [middle, a, b, a, b] if item.source == "V" else [middle, *item.bev]
+
+
+def _half_widths(path: Path, k: np.ndarray) -> tuple[F64, F64]:
+    """Distances from the centre to either edge at points k."""
+    if len(path.left) != len(path.center) or len(path.right) != len(path.center) or path.left is path.center:
+        usual = np.full(len(k), path.half_width_m)
+        return usual, usual
+    return np.hypot(*(path.left[k] - path.center[k]).T), np.hypot(*(path.right[k] - path.center[k]).T)
+
+
+def _sigma_m(item: FusedObject, near: list[float], heading: float) -> float:
+    """Of the object's place across the path. A wrong distance moves it along the line of sight, which in a bend is not
+    the way the path goes there."""
+    distance = hypot(*near)
+    slant = abs(near[1] * np.cos(heading) - near[0] * np.sin(heading)) / max(distance, 0.1)
+    along = (item.distance_sigma_m or 0.0) * slant
+    across = BEARING_SIGMA_RAD * distance if item.source == "V" else LIDAR_SIDEWAYS_SIGMA_M
+    if item.carried:
+        across = max(across, item.distance_sigma_m or 0.0)
+    return hypot(along, across)
+
+
+def _sideways_mps(item: FusedObject, near: list[float], heading: float, ego: EgoState | None) -> float | None:
+    """Speed to the left of the path, which lies still on the ground: over ground, so that a car that follows the bend
+    has none. Without ego speed, relative to ego."""
+    if item.velocity_mps is None:
+        return None
+    vx, vy = item.velocity_mps
+    if ego is not None:
+        turning = usable_rate(ego) or 0.0
+        vx, vy = vx + ego.speed_mps - turning * near[1], vy + turning * near[0]
+    return float(vy * np.cos(heading) - vx * np.sin(heading)) if ego is not None else vy
