@@ -1,4 +1,4 @@
-"""Raw LiDAR packets as ``velodyne_msgs/VelodyneScan``, the message that ROS's Velodyne driver writes and others read."""
+"""Raw LiDAR packets as ``velodyne_msgs/VelodyneScan``: what ROS's Velodyne driver records, and many programs read."""
 
 from __future__ import annotations
 

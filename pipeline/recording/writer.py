@@ -167,6 +167,10 @@ class SessionWriter:
             self._output.add_attachment(topics.INDEX, "application/octet-stream", data)
         self._output.close()
 
+    def discard(self) -> None:
+        """Remove the file: what it was to hold could not be made."""
+        self._output.discard()
+
     def _add(self, topic: str, at_ns: int, data: bytes, t_ns: int | None = None) -> None:
         self._output.add(topics.channel(topic), at_ns, self._header_ns if t_ns is None else t_ns, data)
 

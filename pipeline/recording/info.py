@@ -1,0 +1,123 @@
+"""What a recording holds, for a person: topics, rates, gaps, duration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.recording import topics
+from pipeline.recording.container import McapFile
+from pipeline.recording.session import SessionSource
+from pipeline.recording.writer import About
+from pipeline.sources.base import Source, SourceError
+
+_GAP_STEPS = 3.0
+"""A gap is a step of more than so many usual ones."""
+
+
+@dataclass(frozen=True)
+class Rhythm:
+    """How something came over time. rate_hz: by the median step, null for fewer than two or all at once. gaps: steps of
+    more than three usual ones; longest_gap_s: the longest step of all."""
+
+    count: int
+    first_ns: int | None
+    last_ns: int | None
+    rate_hz: float | None
+    gaps: int
+    longest_gap_s: float | None
+
+
+@dataclass(frozen=True)
+class TopicInfo:
+    """rhythm: by log time, that is when its messages were received."""
+
+    topic: str
+    schema: str
+    encoding: str
+    rhythm: Rhythm
+
+
+@dataclass(frozen=True)
+class Info:
+    """about: null for a file that is no session of ours. frames: by header time, where there are frames. problem: null
+    for a whole file."""
+
+    path: str
+    bytes: int
+    profile: str
+    duration_s: float
+    about: About | None
+    frames: Rhythm | None
+    topics: tuple[TopicInfo, ...]
+    chunks: int
+    damaged_chunks: int
+    marks: tuple[str, ...]
+    problem: str | None
+
+
+def info(path: Path) -> Info:
+    """Of any MCAP file; reads message indexes, not messages. BadInput when it is none."""
+    with McapFile(path) as file:
+        times = file.log_times()
+        listed = tuple(
+            TopicInfo(channel.topic, channel.schema_name, channel.message_encoding, rhythm(stamps))
+            for channel, stamps in sorted(times.items(), key=lambda item: item[0].topic)
+        )
+        ends = [(stamps[0], stamps[-1]) for stamps in times.values() if len(stamps)]
+        duration_s = (max(last for _, last in ends) - min(first for first, _ in ends)) / 1e9 if ends else 0.0
+        about, frames, marks = _about_session(path, file)
+        return Info(
+            path=str(path),
+            bytes=file.size,
+            profile=file.directory.profile,
+            duration_s=float(duration_s),
+            about=about,
+            frames=frames,
+            topics=listed,
+            chunks=len(file.directory.chunks),
+            damaged_chunks=len(file.damaged),
+            marks=marks,
+            problem=file.directory.problem,
+        )
+
+
+def info_of_source(source: Source) -> Rhythm:
+    """Of any other recording: its frames by header time."""
+    return rhythm(np.array([source.t_ns(index) for index in range(len(source))], dtype=np.int64))
+
+
+def rhythm(stamps_ns: npt.NDArray[np.int64]) -> Rhythm:
+    """Of (N,) times in ns, in the order in which they came; steps back in time count as no step."""
+    steps = np.diff(stamps_ns)
+    steps = steps[steps > 0]
+    usual_ns = float(np.median(steps)) if len(steps) else None
+    return Rhythm(
+        count=len(stamps_ns),
+        first_ns=int(stamps_ns[0]) if len(stamps_ns) else None,
+        last_ns=int(stamps_ns[-1]) if len(stamps_ns) else None,
+        rate_hz=round(1e9 / usual_ns, 3) if usual_ns else None,
+        gaps=int(np.count_nonzero(steps > _GAP_STEPS * usual_ns)) if usual_ns else 0,
+        longest_gap_s=float(steps.max() / 1e9) if len(steps) else None,
+    )
+
+
+def _about_session(path: Path, file: McapFile) -> tuple[About | None, Rhythm | None, tuple[str, ...]]:
+    metadata = file.metadata(topics.METADATA)
+    if metadata is None:
+        return None, None, ()
+    try:
+        about = About.from_metadata(metadata)
+    except ValueError:
+        return None, None, ()
+    try:
+        session = SessionSource(str(path), str(path))
+    except SourceError:
+        return about, None, ()
+    try:
+        return about, info_of_source(session), tuple(mark.text for mark in session.marks())
+    finally:
+        session.close()

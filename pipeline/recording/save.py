@@ -1,0 +1,40 @@
+"""Any recording, or a part of it, as a session."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.recording.rewrite import Progress, clip
+from pipeline.recording.session import SessionSource
+from pipeline.recording.writer import About, SessionWriter
+from pipeline.sources.base import Recorded, Source
+
+
+def save(
+    source: Source, out: Path, first: int = 0, last: int | None = None, progress: Progress = lambda done, total: None
+) -> None:
+    """Write frames ``first`` to ``last`` (both included; null: to the end) to a new file, inputs and labels.
+
+    A part of a session keeps all that is in it: results, marks, parameters. Run on either, the line gives the same
+    results. BadInput when ``out`` exists; whatever ends this early leaves no file behind.
+    """
+    last = len(source) - 1 if last is None else last
+    if isinstance(source, SessionSource):
+        clip(source, first, last, out)
+        progress(last + 1 - first, last + 1 - first)
+        return
+    writer = SessionWriter(out, about(source))
+    try:
+        for index in range(first, last + 1):
+            writer.write(source.frame(index), truth=source.truth(index))
+            progress(index + 1 - first, last + 1 - first)
+        writer.close()
+    except BaseException:
+        writer.discard()
+        raise
+
+
+def about(source: Source) -> About:
+    """Where a session made of this source came from: in the end from what was recorded first."""
+    origin = source.origin if isinstance(source, Recorded) else source.uri
+    return About(origin, source.title, source.rate_hz, source.notes)
