@@ -10,30 +10,33 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
+from typing import cast
 
 from app.control import Control, Wish
-from app.drive.drives import Drives, DriveState
+from app.detector_pool import DetectorPool, OpenDetector
+from app.drive.drives import Drives
 from app.drive.recording import Recipe
 from app.line import DetectionCache, Line, Tick
+from app.live_line import LiveLine, rerun
 from app.playback import PlaybackClock
+from app.showing import Showing
 from app.snapshot import Notice, Snapshot
 from pipeline.params import Params
-from pipeline.run import Detectors, Detects, Sensors, picture_size
-from pipeline.sources.base import Source, SourceError, is_simulated
+from pipeline.run import Detectors, Sensors
+from pipeline.sources.base import AnySource, LiveSource, Source, SourceError, is_live_source, is_simulated
 from pipeline.step import warm_up
-from pipeline.types import RawBoxes
-from pipeline.vision.runtime import DetectorError, DetectorMissing
 
 logger = logging.getLogger("cipv.engine")
 
 _PATIENCE_S = 10.0
 """A read that hangs must not keep the program from ending; the worker is a daemon."""
 
-OpenSource = Callable[[str], Source]
-OpenDetector = Callable[[Source], Detects[RawBoxes]]
-Listener = Callable[[Snapshot], None]
+_LIVE_WAIT_S = 0.02
+"""How long a live line waits for a tick before it looks for new wishes."""
+_HEALTH_EVERY_S = 0.5
+
+OpenSource = Callable[[str], AnySource]
 
 
 class Engine:
@@ -54,31 +57,30 @@ class Engine:
         whole_drives: bool = False,
     ) -> None:
         self.control = Control(Wish(params, preset, uri=uri, playing=playing))
-        self.snapshot = Snapshot(params, preset)
+        self._showing = Showing(Snapshot(params, preset))
+        self.listen, self.wait_for = self._showing.listen, self._showing.wait_for
         self._open_source = open_source
-        self._open_detector = open_detector
         self._sensors: Sensors = sensors
         self._detections = DetectionCache()
-        self.drives = Drives(open_source, self._detections) if whole_drives else None
-        self._detectors: dict[tuple[bool, tuple[int, int] | None], Detects[RawBoxes]] = {}
+        self.drives = Drives(_recordings_of(open_source), self._detections)
+        self._whole_drives = whole_drives
+        self._detectors = DetectorPool(open_detector, sensors)
         self._line: Line | None = None
+        self._live: LiveLine | None = None
+        self._health_told_s = 0.0
         self._clock: PlaybackClock | None = None
         self._skipped = 0
-        self._listeners: list[Listener] = []
-        self._shown = threading.Condition()
         self._thread = threading.Thread(target=self._work, name="cipv-engine", daemon=True)
 
     def start(self) -> None:
-        if self.drives is not None:
-            self.drives.on_change = self.control.change
-            self.drives.start()
+        self.drives.on_change = self.control.change
+        self.drives.start()
         self._thread.start()
 
     def stop(self) -> None:
         """End the worker. A network run or a read in progress is finished first."""
         self.control.change(stop=True)
-        if self.drives is not None:
-            self.drives.stop()
+        self.drives.stop()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
 
@@ -87,17 +89,10 @@ class Engine:
         """False when the worker has ended."""
         return self._thread.is_alive()
 
-    def listen(self, listener: Listener) -> Callable[[], None]:
-        """Call ``listener`` on the worker's thread after every change; it must be quick. Returns how to end that."""
-        self._listeners.append(listener)
-        return lambda: self._listeners.remove(listener)
-
-    def wait_for(self, condition: Callable[[Snapshot], bool], timeout_s: float) -> Snapshot:
-        """The first snapshot that satisfies ``condition``; TimeoutError when none came."""
-        with self._shown:
-            if not self._shown.wait_for(lambda: condition(self.snapshot), timeout_s):
-                raise TimeoutError(f"nothing of the kind within {timeout_s:g} s; last: {self.snapshot.state_json()}")
-            return self.snapshot
+    @property
+    def snapshot(self) -> Snapshot:
+        """What is shown now. ``listen`` and ``wait_for`` tell what is shown next."""
+        return self._showing.snapshot
 
     # ------------------------------------------------------------ the worker
 
@@ -106,9 +101,9 @@ class Engine:
         while True:
             wish = self.control.take(self._wait_s())
             if wish.stop:
-                return
+                return self._close_live()
             try:
-                with self._in_front():
+                with self.drives.turn.foreground():
                     self._serve(wish)
             except Exception as error:  # the worker outlives whatever a recording or a network does
                 logger.exception("while serving %s", self.snapshot.uri)
@@ -117,6 +112,8 @@ class Engine:
     def _serve(self, wish: Wish) -> None:
         if wish.uri is not None and not self._open(wish.uri):
             return None
+        if self._live is not None:
+            return self._serve_live(self._live, wish)
         if self._line is None:
             return self._show(wish, None)
         shown = self.snapshot
@@ -167,8 +164,24 @@ class Engine:
         self.control.change(playing=False)
         return None
 
+    def _serve_live(self, live: LiveLine, wish: Wish) -> None:
+        """The line goes on whether or not it is shown: paused, the shown tick is held and can be run again with other
+        parameters; playing on jumps to now."""
+        came = live.look(wish.params, _LIVE_WAIT_S)
+        held = self.snapshot.tick
+        if came is not None and wish.playing:
+            tick: Tick | None = came
+        elif held is not None and wish.params is not self.snapshot.params:
+            tick = rerun(held, wish.params)
+        else:
+            tick = None
+        self._skipped = live.source.dropped
+        self._show(wish, tick)
+
     def _wait_s(self) -> float | None:
         """Seconds until playback needs the worker; null while nothing is playing."""
+        if self._live is not None:
+            return 0.0  # it waits for its sensors instead
         if self._clock is None or self._line is None:
             return None
         return self._clock.wait_s(self.snapshot.index, time.monotonic())
@@ -177,27 +190,33 @@ class Engine:
 
     def _open(self, uri: str) -> bool:
         """Replace the recording; when it cannot be opened the old one stays, a notice says why, and this is false."""
-        self._publish(replace(self.snapshot, busy=f"Opening {uri} …"))
+        self._showing.publish(replace(self.snapshot, busy=f"Opening {uri} …"))
         try:
             source = self._open_source(uri)
-            if len(source) == 0:
+            if not is_live_source(source) and len(cast("Source", source)) == 0:
                 raise SourceError(f"{uri}: holds no frames")
         except SourceError as error:
             self._fail(str(error))
             return False
         notices = [Notice("info", text) for text in source.notes]
-        detector = self._detector_for(source, notices) if self._sensors != "lidar" else None
-        self._line = self._line_of(source, Detectors(detector))
+        detector = self._detectors.boxes_for(source, notices)
+        self._close_live()
+        if is_live_source(source):
+            self._open_live(source, Detectors(detector))
+        else:
+            self._line = self._line_of(cast("Source", source), Detectors(detector))
         self._clock = None
         self._skipped = 0
-        self._publish(
+        self._showing.publish(
             replace(
                 self.snapshot,
                 uri=uri,
                 title=source.title,
                 rate_hz=source.rate_hz,
-                count=len(source),
-                duration_s=float(self._line.timeline_s[-1]),
+                live=self._live is not None,
+                streams=(),
+                count=len(self._line.source) if self._line is not None else 0,
+                duration_s=float(self._line.timeline_s[-1]) if self._line is not None else 0.0,
                 index=0,
                 detector=detector.name if detector else None,
                 notices=tuple(notices),
@@ -207,38 +226,38 @@ class Engine:
         )
         return True
 
+    def _open_live(self, source: LiveSource, detectors: Detectors) -> None:
+        """Sensors instead of a recording, shown from the first tick on."""
+        self._line = None
+        self.drives.open(None)
+        self._live = LiveLine(source, detectors, self._sensors)
+        self._live.open()
+        self.control.change(playing=True)
+
+    def _close_live(self) -> None:
+        if self._live is not None:
+            self._live.close()
+            self._live = None
+
     def _line_of(self, source: Source, detectors: Detectors) -> Line:
         """The line for a recording, whose whole drive is computed beside it from now on."""
-        if self.drives is None:
-            return Line(source, detectors, self._detections, self._sensors)
         line = Line(source, detectors, self._detections, self._sensors, self.drives.state_before)
-        self.drives.open(Recipe(source.uri, len(source), line.timeline_s, detectors, self._sensors))
+        recipe = Recipe(source.uri, len(source), line.timeline_s, detectors, self._sensors, is_simulated(source))
+        self.drives.open(recipe if self._whole_drives else None)
         return line
-
-    def _detector_for(self, source: Source, notices: list[Notice]) -> Detects[RawBoxes] | None:
-        """The detector for the source's pictures; where there is none, LiDAR goes on alone and a notice says so."""
-        if self._open_detector is None:
-            return None
-        kind = (is_simulated(source), picture_size(source))
-        try:
-            if kind not in self._detectors:
-                self._detectors[kind] = self._open_detector(source)
-        except (DetectorMissing, DetectorError) as error:
-            rest = "LiDAR goes on alone." if self._sensors == "both" else "Without one the camera finds nothing."
-            notices.append(Notice("warning", f"{error} {rest}"))
-            return None
-        detector = self._detectors[kind]
-        notices += [Notice("warning", note) for note in detector.notes]
-        return detector
 
     # ------------------------------------------------------------ showing
 
     def _fail(self, text: str) -> None:
-        """Say what went wrong, and stop playing into it."""
+        """Say what went wrong, and stop playing into it; live sensors go on, and their next tick may do."""
         self._clock = None
-        self.control.change(playing=False)
+        playing = self._live is not None and self.snapshot.playing
+        if not playing:
+            self.control.change(playing=False)
         notices = tuple(n for n in self.snapshot.notices if n.level != "error")
-        self._publish(replace(self.snapshot, busy=None, playing=False, notices=(*notices, Notice("error", text))))
+        self._showing.publish(
+            replace(self.snapshot, busy=None, playing=playing, notices=(*notices, Notice("error", text)))
+        )
 
     def _show(self, wish: Wish, tick: Tick | None) -> None:
         """The next snapshot: the new tick if there is one, and the wishes as they stand."""
@@ -251,11 +270,10 @@ class Engine:
             self._clock = PlaybackClock(
                 line.timeline_s, time.monotonic(), float(line.timeline_s[index]), standing.speed
             )
-        if self.drives is not None:
-            self._tell_drives(self.drives, wish, tick)
+        self._tell_drives(wish, tick)
         shown = replace(
             shown,
-            drive=self.drives.state if self.drives is not None else DriveState(),
+            drive=self.drives.state,
             can_undo=self.control.can_undo,
             can_redo=self.control.can_redo,
             params=wish.params,
@@ -265,44 +283,39 @@ class Engine:
             speed=standing.speed,
             loop=standing.loop,
         )
-        if tick is not None and line is not None:
+        if self._live is not None and time.monotonic() - self._health_told_s > _HEALTH_EVERY_S:
+            self._health_told_s = time.monotonic()
+            shown = replace(shown, streams=self._live.source.health())
+        if tick is not None:
             shown = replace(
                 shown,
                 tick=tick,
                 index=tick.frame.index,
-                time_s=float(line.timeline_s[tick.frame.index]),
+                time_s=self._time_s(tick),
                 sequence=shown.sequence + 1,
                 skipped=self._skipped,
                 made_unix_s=time.time(),
                 notices=tuple(n for n in shown.notices if n.level != "error"),
             )
-        self._publish(shown)
+        self._showing.publish(shown)
 
-    def _tell_drives(self, drives: Drives, wish: Wish, tick: Tick | None) -> None:
-        drives.turn.playing(self._clock is not None)
+    def _time_s(self, tick: Tick) -> float:
+        """Where the tick is on the timeline."""
+        if self._live is not None:
+            return self._live.time_s(tick)
+        return float(self._line.timeline_s[tick.frame.index]) if self._line is not None else 0.0
+
+    def _tell_drives(self, wish: Wish, tick: Tick | None) -> None:
+        self.drives.turn.playing(self._clock is not None)
         if tick is not None:
-            drives.offer(tick.frame)
+            self.drives.offer(tick.frame)
         if wish.settled:
-            drives.want(wish.params, wish.preset)
+            self.drives.want(wish.params, wish.preset)
 
-    def _in_front(self) -> AbstractContextManager[None]:
-        """What is done meanwhile goes before the computing of whole drives."""
-        return self.drives.turn.foreground() if self.drives is not None else nullcontext()
 
-    def _publish(self, snapshot: Snapshot) -> None:
-        with self._shown:
-            changed = snapshot != self.snapshot
-            self.snapshot = snapshot
-            self._shown.notify_all()
-        if changed:
-            for listener in tuple(self._listeners):
-                self._tell(listener, snapshot)
-
-    def _tell(self, listener: Listener, snapshot: Snapshot) -> None:
-        try:
-            listener(snapshot)
-        except Exception:  # a view that fails takes neither the line nor the other views with it
-            logger.exception("a view failed on frame %s", snapshot.index)
+def _recordings_of(open_source: OpenSource) -> Callable[[str], Source]:
+    """Opens again what was opened as a recording before."""
+    return lambda uri: cast("Source", open_source(uri))
 
 
 def _first_line(error: BaseException) -> str:

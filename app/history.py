@@ -9,6 +9,9 @@ from typing import Any
 from app.snapshot import Snapshot
 from pipeline.types import Cipv
 
+_MOST = 36_000
+"""An hour at 10 Hz."""
+
 
 @dataclass(frozen=True)
 class Sample:
@@ -32,6 +35,8 @@ class History:
             if snapshot.uri != self._uri:
                 self._uri, self._samples = snapshot.uri, {}
             if snapshot.tick is not None:
+                if len(self._samples) >= _MOST:  # a live drive has no end; the oldest was put in first
+                    del self._samples[next(iter(self._samples))]
                 self._samples[snapshot.index] = Sample(snapshot.params_revision, snapshot.tick.result.cipv)
 
     def to_json(self) -> dict[str, Any]:

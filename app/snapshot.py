@@ -8,6 +8,8 @@ from typing import Any, Literal
 from app.drive.drives import DriveState
 from app.line import Tick
 from pipeline.params import Params
+from pipeline.results import streams_json
+from pipeline.types import StreamHealth
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,8 @@ class Snapshot:
     """Playback, source and the newest tick.
 
     sequence grows whenever a new result was made; time_s is the shown frame's place on the playback timeline.
-    made_unix_s is the wall clock when the result was ready. busy is a sentence while the engine cannot answer.
+    made_unix_s is the wall clock when the result was ready. live: devices, not a recording; streams: how each of them
+    does, now and then, also while none ticks. busy is a sentence while the engine cannot answer.
     """
 
     params: Params
@@ -49,6 +52,8 @@ class Snapshot:
     drive: DriveState = DriveState()
     can_undo: bool = False
     can_redo: bool = False
+    live: bool = False
+    streams: tuple[StreamHealth, ...] = ()
 
     def state_json(self) -> dict[str, Any]:
         """The state without the result, as the page and ``/api/state`` read it."""
@@ -74,5 +79,7 @@ class Snapshot:
             "drive": self.drive.to_json(),
             "can_undo": self.can_undo,
             "can_redo": self.can_redo,
+            "live": self.live,
+            "streams": streams_json(self.streams),
             "notices": [{"level": n.level, "text": n.text} for n in self.notices],
         }

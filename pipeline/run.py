@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol, TypeVar
+from typing import Literal, Protocol, TypeVar, cast
 
 from pipeline.params import Params
-from pipeline.sources.base import Source, is_simulated
+from pipeline.sources.base import AnySource, Source, is_live_source, is_simulated
 from pipeline.step import State, step, warm_up
 from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result
 from pipeline.vision.detector import Detector, open_detector
@@ -57,7 +57,7 @@ def look(detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
     return detector.detect(bgr)
 
 
-def detector_for(source: Source, spec: str | None = None) -> Detector:
+def detector_for(source: AnySource, spec: str | None = None) -> Detector:
     """The named network, its input fitted to the source's pictures. Without a name: the embedded one for the
     simulator, which it was trained on and where a network for real pictures does worse; else the default one.
 
@@ -68,9 +68,12 @@ def detector_for(source: Source, spec: str | None = None) -> Detector:
     return open_detector(spec, picture_size(source))
 
 
-def picture_size(source: Source) -> tuple[int, int] | None:
-    """(width, height) of the source's pictures, from its first frame; null without picture and calibration."""
-    frame = source.frame(0)
+def picture_size(source: AnySource) -> tuple[int, int] | None:
+    """(width, height) of the source's pictures, from its first frame, of live ones from the calibration; null without
+    picture and calibration."""
+    if is_live_source(source):
+        return (source.camera.width, source.camera.height) if source.camera is not None else None
+    frame = cast("Source", source).frame(0)
     if frame.picture is not None:
         return frame.picture.bgr.shape[1], frame.picture.bgr.shape[0]
     return (frame.camera.width, frame.camera.height) if frame.camera is not None else None

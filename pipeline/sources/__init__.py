@@ -6,13 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.sources.astyx import AstyxSource
-from pipeline.sources.base import LiveSource, Source, SourceError, TruthObject
+from pipeline.sources.base import LIVE, AnySource, LiveSource, Source, SourceError, TruthObject
 from pipeline.sources.kitti import KittiSource
 from pipeline.sources.simulated import SimulatedSource
 
-__all__ = ["LiveSource", "Source", "SourceError", "TruthObject", "is_live", "open_live", "open_source"]
-
-_LIVE = "live:"
+__all__ = ["LiveSource", "Source", "SourceError", "TruthObject", "is_live", "open_any", "open_live", "open_source"]
 
 _SESSION_SUFFIX = ".mcap"
 
@@ -36,7 +34,8 @@ _MARKS = {"lidar_vlp16": "astyx", "camera_front": "astyx", "velodyne": "kitti", 
 
 
 def open_source(uri: str, *, rings: int = 16) -> Source:
-    """Open ``scheme:rest``, or the path of a session. ``rings``: how many rings to keep of a LiDAR that has more (KITTI's HDL-64).
+    """Open ``scheme:rest``, or the path of a session. ``rings``: how many rings to keep of a LiDAR that has more
+    (KITTI's HDL-64).
 
     SourceError, in one sentence, when the scheme is unknown or the recording cannot be opened.
     """
@@ -55,7 +54,7 @@ def open_source(uri: str, *, rings: int = 16) -> Source:
 
 def is_live(uri: str) -> bool:
     """Whether it names devices that are read as they deliver, which ``open_live`` opens."""
-    return uri.startswith(_LIVE)
+    return uri.startswith(LIVE)
 
 
 def open_live(uri: str) -> LiveSource:
@@ -63,7 +62,12 @@ def open_live(uri: str) -> LiveSource:
     from pipeline.sources.live.config import load  # drivers of sensors: only who has sensors pays for them
     from pipeline.sources.live.source import LiveSensors
 
-    return LiveSensors(uri, load(uri.removeprefix(_LIVE)))
+    return LiveSensors(uri, load(uri.removeprefix(LIVE)))
+
+
+def open_any(uri: str, *, rings: int = 16) -> AnySource:
+    """Devices or a recording, whichever it names. SourceError as of the two."""
+    return open_live(uri) if is_live(uri) else open_source(uri, rings=rings)
 
 
 def _about_bare_path(path: str) -> str:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeGuard, runtime_checkable
 
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.params import SyncParams
 from pipeline.types import CameraCalibration, Frame, StreamHealth
+
+
+LIVE = "live:"
+"""Scheme of what is read from devices."""
 
 
 class SourceError(BadInput):
@@ -91,6 +95,14 @@ class Recorded(Protocol):
     origin: str
 
 
-def is_simulated(source: Source) -> bool:
+AnySource = Source | LiveSource
+
+
+def is_live_source(source: AnySource) -> TypeGuard[LiveSource]:
+    """Whether it is devices, which have no frames to choose from."""
+    return source.uri.startswith(LIVE)
+
+
+def is_simulated(source: AnySource) -> bool:
     """Whether its pictures are drawn, which a detector may have to know."""
     return (source.origin if isinstance(source, Recorded) else source.uri).startswith("sim:")

@@ -1,0 +1,68 @@
+"""Live sensors on the line: the newest tick through detectors and step, each once, none twice.
+
+There is no way back. What nobody took in time is dropped, so that what is shown is never older than sensors and line
+make it. Used by one thread.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import perf_counter
+
+from app.line import Tick
+from pipeline.params import Params
+from pipeline.run import Detectors, Detects, Seen, Sensors, advance
+from pipeline.sources.base import LiveSource
+from pipeline.step import State, step
+from pipeline.types import U8, Frame
+
+
+class LiveLine:
+    """``open`` sensors, ``look`` again and again, ``close``. tick: the newest."""
+
+    def __init__(self, source: LiveSource, detectors: Detectors, sensors: Sensors) -> None:
+        self.source = source
+        self.tick: Tick | None = None
+        self._detectors, self._sensors = detectors, sensors
+        self._first_ns: int | None = None
+
+    def open(self) -> None:
+        self.source.start()
+
+    def close(self) -> None:
+        self.source.close()
+
+    def look(self, params: Params, timeout_s: float) -> Tick | None:
+        """The newest tick through the line; null when none came in time."""
+        frame = self.source.next(timeout_s, params.sync)
+        if frame is None:
+            return None
+        self._first_ns = frame.t_ns if self._first_ns is None else self._first_ns
+        before = self.tick.after if self.tick is not None else State()
+        ask = _TimedLook()
+        frame, after, result = advance(before, frame, params, self._detectors, self._sensors, ask)
+        self.tick = Tick(before, frame, after, result, params, ask.spent_ms, exact=True)
+        return self.tick
+
+    def time_s(self, tick: Tick) -> float:
+        """Seconds since the first tick."""
+        return (tick.frame.t_ns - (self._first_ns or tick.frame.t_ns)) / 1e9
+
+
+def rerun(shown: Tick, params: Params) -> Tick:
+    """A held tick with other parameters, from the state it started with. No network; the line's own state stays."""
+    after, result = step(shown.before, shown.frame, params)
+    return replace(shown, after=after, result=result, params=params)
+
+
+class _TimedLook:
+    """Asks detectors straight away. spent_ms: how long they took."""
+
+    def __init__(self) -> None:
+        self.spent_ms = 0.0
+
+    def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
+        start = perf_counter()
+        found = detector.detect(bgr)
+        self.spent_ms += (perf_counter() - start) * 1e3
+        return found
