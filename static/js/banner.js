@@ -2,91 +2,88 @@
 import { get, on } from "./store.js";
 import { $, el, mark, text } from "./dom.js";
 import { DASH, kmh, num, signed } from "./format.js";
-import { addStrip } from "./trends.js";
+
+/** @typedef {import("./types.js").Result} Result */
 
 const TTC_DANGER_S = 2.5, TTC_WARN_S = 5;
+/** @type {Record<import("./types.js").AccState, string>} */
 const ACC_WORDS = {
   cruise: "Cruise", follow: "Follow", stop: "Stop", warn: "Warn", partial_brake: "Partial brake", full_brake: "Full brake",
 };
 
-const parts = {};
+const source = el("span", { class: "pill" }), name = el("span"), reason = el("p", { class: "reason" });
+const lead = el("div", { class: "card lead" }, el("div", { class: "title", aria: { live: "polite" } }, source, name), reason);
+const distance = figure("distance", "Distance", "m"), closing = figure("closing", "Closing speed", "km/h"), ttc = figure("ttc", "Time to collision", "s");
+const state = el("span", { class: "state" }), desired = el("span"), note = el("p", { class: "note" });
+const pedals = { accelerator: bar("--ok"), brake: bar("--danger") };
+const acc = el("div", { class: "card acc" },
+  el("div", { class: "top" }, el("span", { class: "label", textContent: "ACC" }), state, desired),
+  el("div", { class: "pedals" }, el("span", { textContent: "accel" }), pedals.accelerator.node, pedals.accelerator.value,
+    el("span", { textContent: "brake" }), pedals.brake.node, pedals.brake.value), note);
 
 export function setUp() {
-  $("#banner").append(lead(), figure("distance", "Distance", "m"), figure("closing", "Closing speed", "km/h"), figure("ttc", "Time to collision", "s"), acc());
+  $("#banner").append(lead, distance.card, closing.card, ttc.card, acc);
   on(["frame"], update);
 }
 
-function lead() {
-  parts.source = el("span", { class: "pill" });
-  parts.name = el("span");
-  parts.title = el("div", { class: "title", aria: { live: "polite" } }, parts.source, parts.name);
-  parts.reason = el("p", { class: "reason" });
-  return (parts.lead = el("div", { class: "card lead" }, parts.title, parts.reason));
-}
-
+/** @param {string} key @param {string} label @param {string} unit */
 function figure(key, label, unit) {
   const value = el("span", { textContent: DASH });
-  const canvas = el("canvas", { title: `${label} over the recording; click to go there`, aria: { hidden: "true" } });
-  addStrip(key, canvas);
   const card = el("div", { class: "card", data: { figure: key } }, el("div", { class: "label", textContent: label }),
-    el("div", { class: "value" }, value, el("small", { textContent: unit })), canvas);
-  parts[key] = { card, value };
-  return card;
+    el("div", { class: "value" }, value, el("small", { textContent: unit })));
+  return { card, value };
 }
 
-function acc() {
-  parts.state = el("span", { class: "state" });
-  parts.desired = el("span");
-  parts.accelerator = bar("--ok");
-  parts.brake = bar("--danger");
-  parts.accNote = el("p", { class: "note" });
-  return (parts.acc = el("div", { class: "card acc" },
-    el("div", { class: "top" }, el("span", { class: "label", textContent: "ACC" }), parts.state, parts.desired),
-    el("div", { class: "pedals" }, el("span", { textContent: "accel" }), parts.accelerator.node, parts.accelerator.value,
-      el("span", { textContent: "brake" }), parts.brake.node, parts.brake.value), parts.accNote));
-}
-
-function bar(color) {
-  const fill = el("i", { style: { "--bar": `var(${color})` } });
+/** @param {string} colour */
+function bar(colour) {
+  const fill = el("i", { style: { "--bar": `var(${colour})` } });
   return { node: el("div", { class: "bar" }, fill), fill, value: el("span") };
 }
 
 function update() {
-  const { result } = get("frame");
+  const result = get("frame")?.result;
+  if (!result) return;
   const { cipv } = result;
-  const item = cipv && result.objects.find(({ id }) => id === cipv.id);
-  mark(parts.lead, "lead", cipv ? "yes" : "no");
-  parts.source.hidden = !item;
+  const item = result.objects.find(({ id }) => id === cipv?.id);
+  mark(lead, "lead", cipv ? "yes" : "no");
+  source.hidden = !item;
   if (item) {
-    mark(parts.source, "source", item.source);
-    text(parts.source, item.source);
+    mark(source, "source", item.source);
+    text(source, item.source);
   }
-  text(parts.name, cipv ? `#${cipv.id} ${item?.type ?? "obstacle"}` : "No vehicle in path");
-  text(parts.reason, cipv ? cipv.reason : whyNone(result));
-  parts.reason.title = parts.reason.textContent;
-  text(parts.distance.value, num(cipv?.distance_m));
-  text(parts.closing.value, cipv ? signed(kmh(cipv.closing_speed_mps)) : DASH);
-  text(parts.ttc.value, num(cipv?.ttc_s));
-  const ttc = cipv?.ttc_s ?? Infinity;
-  mark(parts.ttc.card, "alarm", ttc < TTC_DANGER_S ? "danger" : ttc < TTC_WARN_S ? "warn" : "none");
+  text(name, cipv ? `#${cipv.id} ${item?.type ?? "obstacle"}` : "No vehicle in path");
+  say(reason, cipv ? cipv.reason : whyNone(result));
+  text(distance.value, num(cipv?.distance_m));
+  text(closing.value, cipv ? signed(kmh(cipv.closing_speed_mps)) : DASH);
+  text(ttc.value, num(cipv?.ttc_s));
+  const left_s = cipv?.ttc_s ?? Infinity;
+  mark(ttc.card, "alarm", left_s < TTC_DANGER_S ? "danger" : left_s < TTC_WARN_S ? "warn" : "none");
   updateAcc(result);
 }
 
+/** @param {Result} result */
 function whyNone(result) {
   const n = result.rejected.length;
   return n ? `${n} object${n > 1 ? "s" : ""} considered; the reasons are in the table.` : "Nothing was seen in this frame.";
 }
 
-function updateAcc({ acc, ego }) {
-  mark(parts.acc, "state", acc?.state ?? "off");
-  text(parts.state, acc ? ACC_WORDS[acc.state] : "Off");
+/** @param {Result} result */
+function updateAcc({ acc: command, ego }) {
+  mark(acc, "state", command?.state ?? "off");
+  text(state, command ? ACC_WORDS[command.state] : "Off");
   const own = ego ? `${num(kmh(ego.speed_mps), 0)} → ` : "";
-  text(parts.desired, acc ? `${own}${num(kmh(acc.desired_speed_mps), 0)} km/h` : "");
-  for (const pedal of ["accelerator", "brake"]) {
-    const value = acc?.[pedal] ?? null;
-    parts[pedal].fill.style.setProperty("--part", `${100 * (value ?? 0)}%`);
-    text(parts[pedal].value, value === null ? DASH : `${Math.round(100 * value)} %`);
+  text(desired, command ? `${own}${num(kmh(command.desired_speed_mps), 0)} km/h` : "");
+  for (const pedal of /** @type {const} */ (["accelerator", "brake"])) {
+    const value = command?.[pedal] ?? null;
+    pedals[pedal].fill.style.setProperty("--part", `${100 * (value ?? 0)}%`);
+    text(pedals[pedal].value, value === null ? DASH : `${Math.round(100 * value)} %`);
   }
-  text(parts.accNote, acc ? acc.reason : "Own speed is unknown in this recording.");
-  parts.accNote.title = parts.accNote.textContent;
+  say(note, command ? command.reason : "Own speed is unknown in this recording.");
+}
+
+/** Words that may be cut off, so they are the tooltip too. @param {HTMLElement} node @param {string} words */
+function say(node, words) {
+  if (node.title === words) return;
+  text(node, words);
+  node.title = words;
 }

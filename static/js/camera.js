@@ -16,12 +16,24 @@ const GROUND_TINTS = RANGE_COLORS.map(([r, g, b]) => pack(r, g, b, 0.7));
 const canvas = $("#camera");
 const raster = new DotRaster();
 /** Where the picture lies in the pane. */
-let place = { x: 0, y: 0, scale: 1 };
+let laid = { x: 0, y: 0, scale: 1 };
+/** @typedef {{x: number, y: number, scale: number}} Place */
+/** @typedef {(ctx: CanvasRenderingContext2D, frame: import("./types.js").Frame, place: Place) => void} Layer */
+/** @type {Layer[]} */
+const extra = [];
+
+/** Have something drawn over the picture and under points and boxes. @param {Layer} draw */
+export function addLayer(draw) {
+  extra.push(draw);
+}
+
+/** Where the picture lies: canvas pixel = x + u·scale, for a pixel u of the sent picture. @returns {Place} */
+export const place = () => laid;
 
 export function setUp() {
-  const invalidate = paint(["frame", "layers", "selection", "theme"], draw);
+  const invalidate = paint(["frame", "layers", "selection", "theme", "align"], draw);
   new ResizeObserver(invalidate).observe(canvas);
-  canvas.addEventListener("click", (event) => select(objectAt(event.offsetX, event.offsetY)));
+  canvas.addEventListener("click", (event) => !get("align")?.on && select(objectAt(event.offsetX, event.offsetY)));
 }
 
 function draw() {
@@ -33,17 +45,27 @@ function draw() {
   const { picture } = frame;
   fitPane(picture);
   const scale = Math.min(width / picture.width, height / picture.height);
-  place = { x: (width - picture.width * scale) / 2, y: (height - picture.height * scale) / 2, scale };
+  laid = { x: (width - picture.width * scale) / 2, y: (height - picture.height * scale) / 2, scale };
   ctx.save();
   ctx.beginPath();
-  ctx.rect(place.x, place.y, picture.width * scale, picture.height * scale);
+  ctx.rect(laid.x, laid.y, picture.width * scale, picture.height * scale);
   ctx.clip();
-  if (frame.bitmap) ctx.drawImage(frame.bitmap, place.x, place.y, picture.width * scale, picture.height * scale);
+  const align = get("align"), blend = align?.on ? align.blend : null;
+  if (blend !== null) ctx.globalAlpha = Math.min(1, 2 * (1 - blend));
+  if (frame.bitmap) ctx.drawImage(frame.bitmap, laid.x, laid.y, picture.width * scale, picture.height * scale);
   else message(ctx, width, height, "The picture of this frame could not be decoded");
   const layers = get("layers");
-  if (layers.path && frame.display.path) drawPath(ctx, frame.display.path);
-  if (layers.points) drawPoints(ctx, frame, width, height);
-  drawObjects(ctx, frame, layers);
+  ctx.globalAlpha = 1;
+  for (const layer of extra) layer(ctx, frame, laid);
+  if (blend !== null) {
+    ctx.globalAlpha = Math.min(1, 2 * blend);
+    drawPoints(ctx, frame, width, height);
+    ctx.globalAlpha = 1;
+  } else {
+    if (layers.path && frame.display.path) drawPath(ctx, frame.display.path);
+    if (layers.points) drawPoints(ctx, frame, width, height);
+    drawObjects(ctx, frame, layers);
+  }
   ctx.restore();
 }
 
@@ -62,8 +84,8 @@ function describe(frame) {
   text($("#camera-facts"), facts.join(" · "));
 }
 
-const X = (u) => place.x + u * place.scale;
-const Y = (v) => place.y + v * place.scale;
+const X = (u) => laid.x + u * laid.scale;
+const Y = (v) => laid.y + v * laid.scale;
 
 function drawPath(ctx, path) {
   const outline = [...path.left, ...[...path.right].reverse()].filter(Boolean);
@@ -142,13 +164,13 @@ const deservesTag = (item) => !item.carried && (item.source !== "L" || item.in_p
 function box(ctx, [x1, y1, x2, y2], tint, width) {
   ctx.strokeStyle = tint;
   ctx.lineWidth = width;
-  ctx.strokeRect(X(x1), Y(y1), (x2 - x1) * place.scale, (y2 - y1) * place.scale);
+  ctx.strokeRect(X(x1), Y(y1), (x2 - x1) * laid.scale, (y2 - y1) * laid.scale);
 }
 
 function halo(ctx, [x1, y1, x2, y2]) {
   ctx.strokeStyle = "#fff";
   ctx.lineWidth = 1.5;
-  ctx.strokeRect(X(x1) - 4, Y(y1) - 4, (x2 - x1) * place.scale + 8, (y2 - y1) * place.scale + 8);
+  ctx.strokeRect(X(x1) - 4, Y(y1) - 4, (x2 - x1) * laid.scale + 8, (y2 - y1) * laid.scale + 8);
 }
 
 function cuboid(ctx, corners, tint, width) {
@@ -175,7 +197,7 @@ function message(ctx, width, height, words) {
 function objectAt(px, py) {
   const frame = get("frame");
   if (!frame) return null;
-  const u = (px - place.x) / place.scale, v = (py - place.y) / place.scale;
+  const u = (px - laid.x) / laid.scale, v = (py - laid.y) / laid.scale;
   const hits = frame.result.objects
     .map(({ id }) => ({ id, b: frame.display.vision_boxes[id] ?? frame.display.lidar_boxes[id] }))
     .filter(({ b }) => b && u >= b[0] - 3 && u <= b[2] + 3 && v >= b[1] - 3 && v <= b[3] + 3)

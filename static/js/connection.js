@@ -1,58 +1,84 @@
 /** The stream: newest frame in, reconnecting for ever, and the server's clock. */
 import { decode } from "./protocol.js";
-import { set } from "./store.js";
+import { get, set } from "./store.js";
 
 const PING_MS = 2000;
 const RETRY_MS = [300, 600, 1200, 2500, 5000];
+/** The server makes pictures in steps of this width (app/sent_picture.py): within one there is nothing to tell. */
+const WIDTH_STEP_PX = 160;
 
 /** Server clock minus ours, milliseconds. */
 let clockOffset = 0;
 let attempts = 0;
 let lastSequence = -1;
 let isFirst = true;
-/** @typedef {{buffer: ArrayBuffer, done: () => void}} Received */
+/** Messages so far: of a frame's state and one told on its own, the one that came later holds. */
+let received = 0;
+let stateNumber = 0;
+/** @typedef {{buffer: ArrayBuffer, number: number, done: () => void}} Received */
 /** @type {Received|null} */
 let waiting = null;
 let decoding = false;
+/** @type {WebSocket|null} */
+let socket = null;
+let pictureSteps = 0;
 
 /** The server's clock now, Unix milliseconds. */
 export function serverNow() {
   return Date.now() + clockOffset;
 }
 
+/** Say how wide the picture is shown: no wider one has to be sent. @param {number} width device pixels */
+export function showPictureAt(width) {
+  const steps = Math.ceil(width / WIDTH_STEP_PX);
+  if (steps === pictureSteps || steps <= 0) return;
+  pictureSteps = steps;
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ picture_px: steps * WIDTH_STEP_PX }));
+}
+
 export function connect() {
   const url = new URL("api/stream?paced=1", location.href);
+  if (pictureSteps) url.searchParams.set("picture_px", String(pictureSteps * WIDTH_STEP_PX));
   url.protocol = url.protocol.replace("http", "ws");
-  const socket = new WebSocket(url);
-  socket.binaryType = "arraybuffer";
+  const opened = new WebSocket(url);
+  socket = opened;
+  opened.binaryType = "arraybuffer";
   let pinging = 0;
-  socket.onopen = () => {
+  opened.onopen = () => {
     attempts = 0;
     lastSequence = -1;
     isFirst = true;
     set("link", { status: "live", since: Date.now() });
-    const ping = () => socket.send(JSON.stringify({ ping: Date.now() }));
+    const ping = () => opened.send(JSON.stringify({ ping: Date.now() }));
     ping();
     pinging = setInterval(ping, PING_MS);
   };
-  const done = () => socket.readyState === WebSocket.OPEN && socket.send('{"painted":true}');
-  socket.onmessage = ({ data }) => (typeof data === "string" ? onText(JSON.parse(data)) : onBinary({ buffer: data, done }));
-  socket.onclose = () => {
+  const done = () => opened.readyState === WebSocket.OPEN && opened.send('{"painted":true}');
+  opened.onmessage = ({ data }) => {
+    const number = ++received;
+    if (typeof data === "string") onText(JSON.parse(data), number);
+    else onBinary({ buffer: data, number, done });
+  };
+  opened.onclose = () => {
     clearInterval(pinging);
     if (attempts === 0) set("link", { status: "lost", since: Date.now() });
     setTimeout(connect, RETRY_MS[Math.min(attempts++, RETRY_MS.length - 1)]);
   };
 }
 
-function onText(message) {
-  if (message.type === "state") set("state", message.state);
+/** @param {{type: string, state: import("./types.js").State, ping: number, server_unix_ms: number}} message @param {number} number */
+function onText(message, number) {
+  if (message.type === "state") {
+    stateNumber = number;
+    set("state", message.state);
+  }
   if (message.type === "pong") clockOffset = message.server_unix_ms - (Date.now() + message.ping) / 2;
 }
 
-/** Keep only the newest message while a picture is being decoded. @param {Received} received */
-async function onBinary(received) {
+/** Keep only the newest message while a picture is being decoded. @param {Received} message */
+async function onBinary(message) {
   waiting?.done();
-  waiting = received;
+  waiting = message;
   if (decoding) return;
   decoding = true;
   while (waiting) {
@@ -63,14 +89,22 @@ async function onBinary(received) {
   decoding = false;
 }
 
-/** @param {Received} received */
-async function show({ buffer, done }) {
+/** @param {Received} message */
+async function show({ buffer, number, done }) {
   const { frame, jpeg } = decode(buffer);
   if (frame.state.sequence < lastSequence) return done();
   lastSequence = frame.state.sequence;
   frame.isLate = isFirst;
   isFirst = false;
   if (jpeg.length) frame.bitmap = await createImageBitmap(new Blob([jpeg], { type: "image/jpeg" })).catch(() => null);
+  const before = get("frame");
+  if (number > stateNumber) {
+    stateNumber = number;
+    set("state", frame.state);
+  }
   set("frame", frame);
-  requestAnimationFrame(done);
+  requestAnimationFrame(() => {
+    before?.bitmap?.close();
+    done();
+  });
 }

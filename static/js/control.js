@@ -1,15 +1,19 @@
 /** One parameter: its name, its slider, number box, switch or choice, and a way back to the preset's value. */
-import { el } from "./dom.js";
+import { el, press } from "./dom.js";
 import { attachTooltip } from "./tooltip.js";
 
 /** A slider of a number that is null by default spans this much around what the recording says. */
 const AROUND = 2;
 
+/** @typedef {import("./types.js").Param} Param */
+/** @typedef {import("./types.js").ParamValue} ParamValue */
+/** `isFinal` is false while a slider is being dragged. @typedef {(value: ParamValue, isFinal: boolean) => void} Change */
+/** @typedef {{node: HTMLElement, show: (value: any, effective: number|null) => void}} Input */
+
 /**
  * @param {string} name dotted
- * @param {{key: string, help: string, kind: string, min?: number, max?: number, step?: number, unit?: string,
- *   choices?: string[], nullable: boolean}} param
- * @param {(value: any) => void} change
+ * @param {Param} param
+ * @param {Change} change
  */
 export function control(name, param, change) {
   const id = `param-${name}`;
@@ -21,12 +25,13 @@ export function control(name, param, change) {
   if (param.kind === "boolean") head.append(input.node);
   const node = el("div", { class: "param", data: { param: name } }, head, param.kind === "boolean" ? null : input.node);
   attachTooltip(label, `${param.help}. ${name}`);
+  /** @type {ParamValue} */
   let base = null;
-  reset.addEventListener("click", () => change(base));
+  reset.addEventListener("click", () => change(base, true));
   return {
     node,
     help: param.help,
-    /** @param {any} value @param {any} preset @param {number|null} effective what null stands for @param {boolean} idle */
+    /** @param {ParamValue} value @param {ParamValue} preset @param {number|null} effective what null stands for @param {boolean} idle */
     show(value, preset, effective, idle) {
       base = preset;
       node.classList.toggle("is-changed", value !== preset);
@@ -37,35 +42,38 @@ export function control(name, param, change) {
   };
 }
 
-/** "min_score" → "min score", but a symbol like h_res stays one. The unit stands beside it. */
+/** "min_score" → "min score", but a symbol like h_res stays one. The unit stands beside it. @param {string} key */
 function words(key) {
   const bare = key.replace(/_(m|s|px|deg|mps|mps2|kmh)$/, "");
   return /^.(_|$)/.test(bare) ? bare : bare.replaceAll("_", " ");
 }
 
+/** @param {string} id @param {Param} param @param {Change} change @returns {Input} */
 function slider(id, param, change) {
-  const range = el("input", { type: "range", id, step: param.step ?? "any", min: param.min, max: param.max });
-  const box = el("input", { type: "number", step: param.step ?? "any", min: param.min, max: param.max, aria: { label: `${words(param.key)}, number` } });
-  const read = (text) => (param.kind === "integer" ? Math.round(Number(text)) : Number(text));
+  const low = param.min ?? 0, high = param.max ?? 1, step = String(param.step ?? "any");
+  const range = el("input", { type: "range", id, step, min: String(low), max: String(high) });
+  const box = el("input", { type: "number", step, min: String(low), max: String(high), aria: { label: `${words(param.key)}, number` } });
+  const read = (/** @type {string} */ text) => (param.kind === "integer" ? Math.round(Number(text)) : Number(text));
   range.addEventListener("input", () => {
     box.value = range.value;
     fill(range);
-    change(read(range.value));
+    change(read(range.value), false);
   });
+  range.addEventListener("change", () => change(read(range.value), true));
   box.addEventListener("change", () => {
-    if (box.value !== "") change(Math.min(param.max, Math.max(param.min, read(box.value))));
-    else if (param.nullable) change(null);
+    if (box.value !== "") change(Math.min(high, Math.max(low, read(box.value))), true);
+    else if (param.nullable) change(null, true);
   });
   return {
     node: el("div", { class: "control" }, range, box),
     show(value, effective) {
       const now = value ?? effective;
       if (param.nullable && effective) {
-        range.min = String(Math.max(param.min, Math.min(effective / AROUND, effective * AROUND)));
-        range.max = String(Math.min(param.max, Math.max(effective / AROUND, effective * AROUND)));
+        range.min = String(Math.max(low, Math.min(effective / AROUND, effective * AROUND)));
+        range.max = String(Math.min(high, Math.max(effective / AROUND, effective * AROUND)));
       }
       range.disabled = now === null;
-      if (document.activeElement !== range) range.value = String(now ?? param.min);
+      if (document.activeElement !== range) range.value = String(now ?? low);
       if (document.activeElement !== box) box.value = value === null ? "" : String(value);
       box.placeholder = effective === null ? "unknown" : String(effective);
       fill(range);
@@ -73,18 +81,23 @@ function slider(id, param, change) {
   };
 }
 
+/** @param {HTMLInputElement} range */
 function fill(range) {
-  const share = (range.value - range.min) / (range.max - range.min || 1);
+  const low = Number(range.min), share = (Number(range.value) - low) / (Number(range.max) - low || 1);
   range.style.setProperty("--fill", `${100 * share}%`);
 }
 
+/** @param {string} id @param {Param} _ @param {Change} change @returns {Input} */
 function toggle(id, _, change) {
-  const box = el("input", { type: "checkbox", id, onchange: () => change(box.checked) });
+  const box = el("input", { type: "checkbox", id });
+  box.addEventListener("change", () => change(box.checked, true));
   return { node: box, show: (value) => (box.checked = value) };
 }
 
+/** @param {string} id @param {Param} param @param {Change} change @returns {Input} */
 function choices(id, param, change) {
-  const buttons = param.choices.map((choice) => el("button", { type: "button", textContent: choice.replaceAll("_", " "), onclick: () => change(choice) }));
+  const names = param.choices ?? [];
+  const buttons = names.map((choice) => el("button", { type: "button", textContent: choice.replaceAll("_", " "), onclick: () => change(choice, true) }));
   const node = el("div", { class: "control single" }, el("div", { class: "choices", id, aria: { role: "group", label: words(param.key) } }, ...buttons));
-  return { node, show: (value) => buttons.forEach((button, i) => button.setAttribute("aria-pressed", String(param.choices[i] === value))) };
+  return { node, show: (value) => buttons.forEach((button, i) => press(button, names[i] === value)) };
 }

@@ -50,6 +50,28 @@ export function mark(node, name, value) {
   if (node.dataset[name] !== value) node.dataset[name] = value;
 }
 
+/** @type {WeakMap<Element, Map<string, any>>} */
+const kept = new WeakMap();
+
+/**
+ * Children of `parent`, one an item, in the items' order. A child is made once and changed after that, so that it is not
+ * replaced under a finger while frames go by.
+ * @template T @template {HTMLElement} N
+ * @param {HTMLElement} parent @param {T[]} items @param {(item: T) => string} keyOf
+ * @param {(item: T) => N} create @param {(node: N, item: T) => void} update
+ */
+export function keyed(parent, items, keyOf, create, update) {
+  const before = kept.get(parent) ?? new Map(), now = new Map();
+  items.forEach((item, place) => {
+    const key = keyOf(item), node = before.get(key) ?? create(item);
+    now.set(key, node);
+    update(node, item);
+    if (parent.children[place] !== node) parent.insertBefore(node, parent.children[place] ?? null);
+  });
+  while (parent.children.length > items.length) parent.lastElementChild?.remove();
+  kept.set(parent, now);
+}
+
 /** @param {Element} button @param {boolean} pressed */
 export function press(button, pressed) {
   button.setAttribute("aria-pressed", String(pressed));

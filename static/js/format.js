@@ -2,26 +2,27 @@
 
 export const DASH = "–";
 
-/** @param {number|null|undefined} value */
+/** @param {number|null|undefined} value @param {number} [digits] */
 export function num(value, digits = 1) {
   return value === null || value === undefined ? DASH : value.toFixed(digits).replace(/^-(?=0(\.0*)?$)/, "").replace("-", "−");
 }
 
+/** With its sign, unless it is shown as 0. @param {number|null|undefined} value @param {number} [digits] */
 export function signed(value, digits = 1) {
-  const text = num(value, digits);
-  return value > 0 && Number(value.toFixed(digits)) !== 0 ? `+${text}` : text;
+  const isPositive = value !== null && value !== undefined && Number(value.toFixed(digits)) > 0;
+  return `${isPositive ? "+" : ""}${num(value, digits)}`;
 }
 
-/** m/s → km/h */
+/** m/s → km/h @param {number|null|undefined} mps */
 export const kmh = (mps) => (mps === null || mps === undefined ? null : mps * 3.6);
 
-/** Seconds as m:ss.s */
+/** Seconds as m:ss.s @param {number} seconds */
 export function clock(seconds) {
   const minutes = Math.floor(seconds / 60);
   return `${minutes}:${(seconds - 60 * minutes).toFixed(1).padStart(4, "0")}`;
 }
 
-/** Left or right of the path's centre, in metres: "1.2 L". */
+/** Left or right of the path's centre, in metres: "1.2 L". @param {number|null|undefined} offset */
 export function side(offset) {
   if (offset === null || offset === undefined) return DASH;
   return `${Math.abs(offset).toFixed(1)} ${offset >= 0 ? "L" : "R"}`;

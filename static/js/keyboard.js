@@ -1,47 +1,31 @@
-/** Keys of the whole page; not while somebody types, and a focused slider keeps its arrows. */
-import { playback } from "./api.js";
-import * as help from "./help.js";
-import { toggle as toggleLayer } from "./layers.js";
-import * as sources from "./sources.js";
-import { get, set } from "./store.js";
-import { shiftSpeed, toggleLoop, togglePlay } from "./transport.js";
-import { grow, toggleParams, toggleTheme, toggleThree } from "./window.js";
-
-const CAMERA_LAYERS = ["points", "cuboids", "lidarBoxes", "visionBoxes", "path"];
-const ACTIONS = {
-  " ": togglePlay,
-  ArrowLeft: (event) => playback({ step: event.shiftKey ? -10 : -1 }),
-  ArrowRight: (event) => playback({ step: event.shiftKey ? 10 : 1 }),
-  Home: () => playback({ seek: 0 }),
-  End: () => playback({ seek: Math.max(0, (get("state")?.count ?? 1) - 1) }),
-  "[": () => shiftSpeed(-1),
-  "]": () => shiftSpeed(1),
-  l: toggleLoop,
-  b: toggleThree,
-  m: () => grow("bev"),
-  p: toggleParams,
-  o: sources.open,
-  d: toggleTheme,
-  "?": help.show,
-  Escape: () => set("selection", null),
-};
+/** Keys of the whole page (keymap.js); not while somebody types, and a focused slider keeps its arrows. */
+import { keymap } from "./keymap.js";
 
 export function setUp() {
+  const actions = new Map(keymap().flatMap(({ bindings }) => bindings.flatMap(({ keys, act }) => keys.map((key) => [key, act]))));
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented || isTaken(event)) return;
-    const layer = CAMERA_LAYERS[Number(event.key) - 1];
-    const action = layer ? () => toggleLayer(layer) : ACTIONS[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-    if (!action) return;
+    if (event.altKey || event.defaultPrevented || isTaken(event)) return;
+    const act = actions.get(nameOf(event));
+    if (!act) return;
     event.preventDefault();
-    action(event);
+    act();
   });
 }
 
-/** True when the focused element means the key for itself. */
-function isTaken({ target, key }) {
+/** "Shift+1" whatever the keyboard prints there, "Ctrl+z", "?", "Space". @param {KeyboardEvent} event */
+function nameOf({ key, code, shiftKey, ctrlKey, metaKey }) {
+  const digit = /^Digit(\d)$/.exec(code)?.[1];
+  const bare = key === " " ? "Space" : shiftKey && digit ? digit : key.length === 1 && !shiftKey ? key.toLowerCase() : key;
+  const isSaid = shiftKey && (digit !== undefined || bare.length > 1 || bare.toLowerCase() !== bare.toUpperCase());
+  return `${ctrlKey || metaKey ? "Ctrl+" : ""}${isSaid ? "Shift+" : ""}${bare}`;
+}
+
+/** True when the focused element means the key for itself. @param {KeyboardEvent} event */
+function isTaken({ target, key, ctrlKey, metaKey }) {
   if (document.querySelector("dialog[open]")) return true;
   if (!(target instanceof HTMLElement)) return false;
   if (target.matches("select, textarea, input:not([type=range]):not([type=checkbox])")) return true;
+  if (ctrlKey || metaKey) return false;
   if (target.matches("input[type=range]")) return key.startsWith("Arrow") || key === "Home" || key === "End";
-  return key === " " && target.matches("button, summary, input");
+  return key === " " && target.matches("button, summary, input, a");
 }

@@ -3,57 +3,69 @@ import { newestOnly, request } from "./api.js";
 import { $, el, memory } from "./dom.js";
 import { control } from "./control.js";
 import { get, on, set } from "./store.js";
+import { toggle } from "./workspace/panes.js";
+
+/** @typedef {import("./types.js").ParamValue} ParamValue */
+/** @typedef {import("./types.js").ParamsAnswer} ParamsAnswer */
+/** @typedef {{changes: Record<string, ParamValue>, final: boolean}} Changes */
 
 const OPEN_AT_FIRST = ["alignment", "cluster"];
 const FIRST_SECTION = "alignment";
-/** Moving one of these means: use the model that it belongs to. */
+/** Moving one of these means: use the model that it belongs to. @type {Record<string, string>} */
 const MODEL_OF = {
   "alignment.h_res_deg": "angular", "alignment.v_res_deg": "angular", "alignment.cx_px": "angular", "alignment.cy_px": "angular",
   "alignment.yaw_deg": "pinhole", "alignment.pitch_deg": "pinhole", "alignment.roll_deg": "pinhole",
 };
 const PROMINENT = new Set(["alignment.h_res_deg", "alignment.v_res_deg"]);
 
-const panel = $("#params");
 const error = el("p", { class: "params-error", aria: { role: "alert" }, hidden: true });
 const list = el("div", { class: "params-list" });
-const presets = el("select", { aria: { label: "Preset" }, onchange: () => choosePreset(presets.value) });
+const presets = el("select", { aria: { label: "Preset" } });
 const search = el("input", { type: "search", placeholder: "Search parameters", aria: { label: "Search parameters" }, oninput: filter });
 /** @type {Map<string, ReturnType<typeof control>>} */
 const controls = new Map();
 /** @type {Map<string, {node: HTMLDetailsElement, count: HTMLElement, help: string}>} */
 const sections = new Map();
 let knownRevision = -1;
+/** @type {string|null} */
 let knownUri = null;
 
 const submit = newestOnly(
-  (changes) => request("api/params", "PATCH", { changes }).then(accept, refuse),
-  (waiting, newer) => ({ ...waiting, ...newer }),
+  (/** @type {Changes} */ body) => request("api/params", "PATCH", body).then(accept, refuse),
+  (waiting, newer) => ({ changes: { ...waiting.changes, ...newer.changes }, final: waiting.final || newer.final }),
 );
 
 export function setUp() {
-  const download = el("a", { href: "api/params.yaml", textContent: "Save YAML", title: "A file for `cipv run --params FILE`" });
+  const download = el("a", { href: "api/params.yaml", textContent: "Save preset", title: "A file for `cipv run --params FILE`" });
   download.setAttribute("download", "cipv-params.yaml");
-  panel.append(
-    el("div", { class: "pane-bar" }, el("h2", { textContent: "Parameters" }), el("span", { class: "spacer" }), download),
+  presets.addEventListener("change", () => choosePreset(presets.value));
+  $("#params").append(
     el("div", { class: "params-top" }, el("div", { class: "row" }, el("span", { class: "facts", textContent: "Preset" }), presets,
-      el("button", { type: "button", textContent: "Reset all", title: "Back to the preset's values", onclick: () => choosePreset(presets.value) })), search, error),
+      el("button", { type: "button", textContent: "Reset", title: "Every parameter back to the preset's value", onclick: () => choosePreset(presets.value) }), download), search, error),
     list);
   on(["state"], refreshIfForeign);
+  on(["params"], show);
 }
 
 /** Another browser, the 3D view or another recording changed what is true: read it again. */
 function refreshIfForeign() {
-  const { params_revision: revision, uri, frame } = get("state");
-  if (frame === null || (revision <= knownRevision && uri === knownUri)) return;
-  knownRevision = revision;
-  knownUri = uri;
+  const state = get("state");
+  if (!state || state.frame === null || (state.params_revision <= knownRevision && state.uri === knownUri)) return;
+  knownRevision = state.params_revision;
+  knownUri = state.uri;
   request("api/params").then(accept, refuse);
 }
 
+/** @param {ParamsAnswer} answer */
 function accept(answer) {
   error.hidden = true;
-  knownRevision = Math.max(knownRevision, answer.revision);
   set("params", answer);
+}
+
+function show() {
+  const answer = get("params");
+  if (!answer) return;
+  knownRevision = Math.max(knownRevision, answer.revision);
   if (!controls.size) build(answer);
   presets.value = answer.preset;
   for (const [name, one] of controls) {
@@ -66,11 +78,13 @@ function accept(answer) {
   }
 }
 
+/** @param {Error} problem */
 function refuse(problem) {
   error.textContent = problem.message;
   error.hidden = false;
 }
 
+/** @param {ParamsAnswer} answer */
 function build({ sections: described, presets: names }) {
   presets.append(...names.map((name) => el("option", { value: name, textContent: name })));
   const open = new Set(memory.read("sections", OPEN_AT_FIRST));
@@ -83,7 +97,7 @@ function build({ sections: described, presets: names }) {
     sections.set(section.name, { node, count, help: section.help });
     for (const param of section.params) {
       const name = `${section.name}.${param.key}`;
-      const one = control(name, param, (value) => change(name, value));
+      const one = control(name, param, (value, isFinal) => change({ [name]: value }, isFinal));
       one.node.classList.toggle("is-prominent", PROMINENT.has(name));
       controls.set(name, one);
       node.append(one.node);
@@ -92,11 +106,30 @@ function build({ sections: described, presets: names }) {
   }
 }
 
-function change(name, value) {
-  const model = MODEL_OF[name];
-  submit({ [name]: value, ...(model && value !== null ? { "alignment.model": model } : {}) });
+/**
+ * Change parameters by their dotted names. While a hand still moves, `isFinal` is false: the shown frame follows, and
+ * the whole recording waits for the last value.
+ * @param {Record<string, ParamValue>} changes @param {boolean} isFinal
+ */
+export function change(changes, isFinal) {
+  const model = Object.entries(changes).map(([name, value]) => (value === null ? undefined : MODEL_OF[name])).find(Boolean);
+  submit({ changes: { ...changes, ...(model ? { "alignment.model": model } : {}) }, final: isFinal });
 }
 
+/** Show one parameter and give it the focus. @param {string} name */
+export function reveal(name) {
+  toggle("params", true);
+  $("#tab-params").click();
+  search.value = "";
+  filter();
+  const section = sections.get(name.split(".")[0]), node = controls.get(name)?.node;
+  if (!section || !node) return;
+  section.node.open = true;
+  node.scrollIntoView({ block: "center" });
+  $("input, .choices button", HTMLElement, node).focus();
+}
+
+/** @param {string} name */
 function choosePreset(name) {
   request("api/params/preset", "POST", { name }).then(accept, refuse);
 }

@@ -2,20 +2,20 @@
  * Thousands of dots, written straight into pixels and put on a canvas at once. One fillRect each would take tens of
  * milliseconds where the canvas is drawn without a graphics card.
  */
+import { context } from "./dom.js";
+
 export class DotRaster {
   #canvas = document.createElement("canvas");
-  #ctx = this.#canvas.getContext("2d", { willReadFrequently: true });
-  /** @type {ImageData|null} */
-  #image = null;
-  /** @type {Uint32Array} */
-  #pixels = new Uint32Array(0);
+  #ctx = context(this.#canvas, { willReadFrequently: true });
+  #image = new ImageData(1, 1);
+  #pixels = new Uint32Array(this.#image.data.buffer);
   #ratio = 1;
 
   /** Begin with nothing on it. @param {number} width @param {number} height CSS pixels */
   begin(width, height) {
     this.#ratio = window.devicePixelRatio || 1;
     const w = Math.max(1, Math.round(width * this.#ratio)), h = Math.max(1, Math.round(height * this.#ratio));
-    if (this.#image?.width !== w || this.#image?.height !== h) {
+    if (this.#image.width !== w || this.#image.height !== h) {
       this.#canvas.width = w;
       this.#canvas.height = h;
       this.#image = new ImageData(w, h);
@@ -24,7 +24,7 @@ export class DotRaster {
     this.#pixels.fill(0);
   }
 
-  /** A square of `size` CSS pixels around (x, y), in a colour of `rgba`. */
+  /** A square around (x, y), in a colour of `rgba`. @param {number} x @param {number} y @param {number} size CSS pixels @param {number} colour */
   dot(x, y, size, colour) {
     const side = Math.max(1, Math.round(size * this.#ratio));
     const { width, height } = this.#image;
@@ -35,10 +35,10 @@ export class DotRaster {
     }
   }
 
-  /** Put the dots onto a canvas that is as large, in CSS pixels. @param {CanvasRenderingContext2D} ctx */
-  drawOn(ctx) {
+  /** Put the dots onto a canvas, its upper left corner at (x, y). @param {CanvasRenderingContext2D} ctx */
+  drawOn(ctx, x = 0, y = 0) {
     this.#ctx.putImageData(this.#image, 0, 0);
-    ctx.drawImage(this.#canvas, 0, 0, this.#image.width / this.#ratio, this.#image.height / this.#ratio);
+    ctx.drawImage(this.#canvas, x, y, this.#image.width / this.#ratio, this.#image.height / this.#ratio);
   }
 }
 

@@ -14,6 +14,7 @@
  * @property {import("./types.js").ObjectCurve} curve  the selected object over the recording
  * @property {number} scrub  the frame asked for and not shown yet
  * @property {{first: number, last: number}} clip  what is marked for export
+ * @property {import("./workspace/panes.js").Layout} layout
  * @property {{on: boolean, blend: number, edges: boolean}} align  alignment mode
  */
 /** @typedef {keyof Values} Key */

@@ -1,0 +1,71 @@
+/**
+ * Alignment mode: LiDAR and picture are laid over each other by hand. Dragging shifts the cloud, the wheel scales it, and
+ * every move is a change of the alignment's parameters: the server projects, as always. What fits automatically belongs
+ * beside the score, in the bar.
+ */
+import { newestOnly, request } from "../api.js";
+import { $, el, press, text } from "../dom.js";
+import { get, on, set } from "../store.js";
+import { reveal } from "../params.js";
+import { followHand } from "./hand.js";
+import { drawEdges } from "./edges.js";
+import { addLayer } from "../camera.js";
+
+const OFF = { on: false, blend: 0.5, edges: true };
+
+const bar = $("#align-bar"), button = $("#align-button");
+const score = el("b", { class: "score", title: "How well the LiDAR's depth edges lie on the picture's edges" });
+const how = el("span", { class: "facts" });
+
+const fetchScore = newestOnly(async () => {
+  const found = /** @type {import("../types.js").AlignmentScore|null} */ (await request("api/alignment/score").catch(() => null));
+  text(score, found === null || found.score === null ? "no score" : `${Math.round(100 * found.score)} %${found.median_px === null ? "" : ` · ${found.median_px.toFixed(1)} px`}`);
+  score.title = found?.text ?? "";
+});
+
+export function setUp() {
+  set("align", OFF);
+  button.addEventListener("click", toggleAlign);
+  bar.append(model("angular"), model("pinhole"), blendSlider(), edgesButton(), el("span", { class: "spacer" }), how, el("span", { class: "facts", textContent: "Match" }), score);
+  followHand($("#camera", HTMLCanvasElement), isOn);
+  addLayer((ctx, frame, place) => isOn() && get("align")?.edges && drawEdges(ctx, frame, place));
+  on(["frame"], () => isOn() && fetchScore(undefined));
+  on(["align", "params"], reflect);
+}
+
+const isOn = () => get("align")?.on === true;
+
+export function toggleAlign() {
+  set("align", { ...(get("align") ?? OFF), on: !isOn() });
+  if (!isOn()) return;
+  reveal("alignment.h_res_deg");
+  fetchScore(undefined);
+}
+
+function reflect() {
+  bar.hidden = !isOn();
+  press(button, isOn());
+  document.body.classList.toggle("is-aligning", isOn());
+  const isAngular = get("params")?.values["alignment.model"] === "angular";
+  text(how, isAngular ? "Drag: origin · wheel: h_res and v_res · shift wheel: v_res" : "Drag: yaw and pitch · wheel: roll");
+  for (const choice of bar.querySelectorAll("[data-model]")) press(choice, /** @type {HTMLElement} */ (choice).dataset.model === get("params")?.values["alignment.model"]);
+}
+
+/** @param {string} name */
+function model(name) {
+  const choose = () => request("api/params", "PATCH", { changes: { "alignment.model": name }, final: true }).then((answer) => set("params", answer), () => {});
+  return el("button", { type: "button", textContent: name, data: { model: name }, onclick: choose });
+}
+
+function blendSlider() {
+  const range = el("input", { type: "range", min: "0", max: "1", step: "0.01", value: String(OFF.blend), aria: { label: "Blend of picture and cloud" } });
+  range.addEventListener("input", () => set("align", { ...(get("align") ?? OFF), blend: Number(range.value) }));
+  return el("label", { class: "blend" }, "Picture", range, "Cloud");
+}
+
+function edgesButton() {
+  const edges = el("button", { type: "button", textContent: "Edges", title: "Edges of the picture" });
+  edges.addEventListener("click", () => set("align", { ...(get("align") ?? OFF), edges: !get("align")?.edges }));
+  on(["align"], () => press(edges, get("align")?.edges === true));
+  return edges;
+}

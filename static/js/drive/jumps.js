@@ -1,0 +1,27 @@
+/** From event to event, and from difference to difference. */
+import { get } from "../store.js";
+import { seekTo } from "./seek.js";
+
+/** The frame that jumps start from: where a seek is going, else the shown one. */
+const here = () => get("scrub") ?? get("state")?.index ?? 0;
+
+/** @param {number[]} places ascending @param {number} from @param {1|-1} direction */
+export function next(places, from, direction) {
+  return direction > 0 ? places.find((at) => at > from) : places.findLast((at) => at < from);
+}
+
+/** @param {1|-1} direction */
+export function toEvent(direction) {
+  go((get("drive")?.events ?? []).map(({ index }) => index), direction);
+}
+
+/** To the start of a stretch in which the two runs differ. @param {1|-1} direction */
+export function toDifference(direction) {
+  go((get("drive")?.comparison?.differing ?? []).map(([first]) => first), direction);
+}
+
+/** @param {number[]} places @param {1|-1} direction */
+function go(places, direction) {
+  const at = next(places, here(), direction);
+  if (at !== undefined) seekTo(at);
+}

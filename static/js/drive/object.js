@@ -1,0 +1,23 @@
+/** The selected object over the whole recording, for the charts. */
+import { newestOnly, request } from "../api.js";
+import { get, on, set } from "../store.js";
+
+let known = "";
+
+const fetchCurve = newestOnly(async (/** @type {{id: number, run: number}} */ { id, run }) => {
+  const curve = await request(`api/drive/object/${id}?run=${run}`).catch(() => null);
+  if (get("selection") === id) set("curve", curve);
+});
+
+export function setUp() {
+  on(["selection", "drive"], follow);
+}
+
+function follow() {
+  const id = get("selection"), now = get("drive")?.now;
+  const key = `${id} ${now?.run} ${now?.done}`;
+  if (key === known) return;
+  known = key;
+  if (get("curve")?.id !== id) set("curve", null);
+  if (id !== null && now) fetchCurve({ id, run: now.run });
+}

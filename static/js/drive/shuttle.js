@@ -1,0 +1,56 @@
+/** J, K and L as on a cutting table: back, stop, on; pressed again, faster. */
+import { playback } from "../api.js";
+import { get, on } from "../store.js";
+import { seekTo } from "./seek.js";
+
+const FASTEST = 4;
+/** How often the picture moves while running backwards. */
+const TICK_MS = 100;
+
+/** @type {{speed: number, from: number, since: number}|null} */
+let reverse = null;
+let timer = 0;
+
+export function setUp() {
+  on(["state"], () => get("state")?.playing && stopReverse());
+}
+
+export function forward() {
+  const state = get("state");
+  if (!state) return;
+  stopReverse();
+  if (!state.playing) playback({ playing: true, speed: 1 });
+  else playback({ speed: Math.min(FASTEST, Math.max(1, state.speed * 2)) });
+}
+
+export function stop() {
+  stopReverse();
+  playback({ playing: false });
+}
+
+/** The server plays forwards only: backwards is a row of seeks, as many as it can show. */
+export function backward() {
+  const state = get("state");
+  if (!state?.count) return;
+  const speed = reverse ? Math.min(FASTEST, reverse.speed * 2) : 1;
+  stopReverse();
+  if (state.playing) playback({ playing: false });
+  reverse = { speed, from: state.index, since: performance.now() };
+  timer = setInterval(() => rewind(state.rate_hz), TICK_MS);
+}
+
+/** True while running backwards. */
+export const isReversing = () => reverse !== null;
+
+export function stopReverse() {
+  clearInterval(timer);
+  reverse = null;
+}
+
+/** @param {number} rate_hz */
+function rewind(rate_hz) {
+  if (!reverse) return;
+  const target = reverse.from - Math.round(((performance.now() - reverse.since) / 1000) * rate_hz * reverse.speed);
+  seekTo(target);
+  if (target <= 0) stopReverse();
+}

@@ -1,0 +1,43 @@
+/**
+ * A canvas as large as its box, at the screen's resolution. It is drawn by the processor: a picture, some lines and
+ * thousands of dots ten times a second are quick there, and where a page is composed without a graphics card they cost
+ * half of what they do as textures. Its size comes from an observer: asking for it would have the page laid out anew.
+ */
+import { context } from "./dom.js";
+
+export class Surface {
+  /** CSS pixels; 0 while the pane is hidden. */
+  width = 0;
+  height = 0;
+  ratio = 1;
+  #canvas;
+  #ctx;
+
+  /** @param {HTMLCanvasElement} canvas @param {() => void} changed called when it has another size */
+  constructor(canvas, changed) {
+    this.#canvas = canvas;
+    this.#ctx = context(canvas, { willReadFrequently: true });
+    new ResizeObserver(([{ contentRect }]) => {
+      this.width = contentRect.width;
+      this.height = contentRect.height;
+      changed();
+    }).observe(canvas);
+  }
+
+  get isHidden() {
+    return this.width === 0 || this.height === 0;
+  }
+
+  /** The context, in CSS pixels, with nothing drawn. */
+  begin() {
+    this.ratio = window.devicePixelRatio || 1;
+    const width = Math.round(this.width * this.ratio), height = Math.round(this.height * this.ratio);
+    if (this.#canvas.width !== width || this.#canvas.height !== height) {
+      this.#canvas.width = width;
+      this.#canvas.height = height;
+    }
+    this.#ctx.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
+    this.#ctx.clearRect(0, 0, this.width, this.height);
+    return this.#ctx;
+  }
+}

@@ -1,0 +1,45 @@
+/** Marking a stretch of the recording: in, out, and none. */
+import { $, text } from "../dom.js";
+import { clock } from "../format.js";
+import { get, on, set } from "../store.js";
+
+const here = () => get("scrub") ?? get("state")?.index ?? 0;
+
+export function setUp() {
+  $("#clip-in").addEventListener("click", markIn);
+  $("#clip-out").addEventListener("click", markOut);
+  $("#clip-clear").addEventListener("click", clear);
+  on(["clip", "drive"], reflect);
+  let uri = get("state")?.uri;
+  on(["state"], () => {
+    if (get("state")?.uri === uri) return;
+    uri = get("state")?.uri;
+    clear();
+  });
+  reflect();
+}
+
+export function markIn() {
+  const last = get("clip")?.last ?? Math.max(0, (get("state")?.count ?? 1) - 1);
+  set("clip", { first: here(), last: Math.max(here(), last) });
+}
+
+export function markOut() {
+  set("clip", { first: Math.min(here(), get("clip")?.first ?? 0), last: here() });
+}
+
+export function clear() {
+  if (get("clip")) set("clip", null);
+}
+
+/** What would be exported: the marked stretch, else everything. @returns {{first: number, last: number}} */
+export function chosen() {
+  return get("clip") ?? { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
+}
+
+function reflect() {
+  const clip = get("clip"), times = get("drive")?.t_s;
+  $("#clip-clear").hidden = !clip;
+  const lasts = clip && times?.length ? ` · ${clock(times[clip.last] - times[clip.first])}` : "";
+  text($("#clip-facts"), clip ? `frames ${clip.first + 1}–${clip.last + 1}${lasts}` : "");
+}

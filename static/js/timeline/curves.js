@@ -1,0 +1,69 @@
+/** The curves below the ribbon: what each shows, in which unit and on which scale, and how it is drawn. */
+
+/** @typedef {import("../types.js").Columns} Columns */
+/** @typedef {import("./span.js").Span} Span */
+/** @typedef {{top: number, height: number}} Row */
+/** @typedef {{key: keyof Columns, unit: string, label: string, title: string, factor: number, low: number, high: number,
+ *   most?: number, digits: number, role: string, also?: keyof Columns, isArea?: boolean, limit?: number}} Curve */
+
+/** low and high: what the scale reaches at least; most: what is higher is drawn there. also: a second, fainter line. */
+export const CURVES = /** @type {Curve[]} */ ([
+  { key: "distance_m", label: "Distance", unit: "m", title: "Distance to the CIPV's nearest point", factor: 1, low: 0, high: 20, digits: 1, role: "cipv" },
+  { key: "closing_speed_mps", label: "Closing", unit: "km/h", title: "Closing speed of the CIPV: positive while the gap shrinks", factor: 3.6, low: -5, high: 5, digits: 1, role: "cipv" },
+  { key: "ttc_s", label: "TTC", unit: "s", title: "Time to collision with the CIPV, at most 15 s; the line is the 2.5 s limit", factor: 1, low: 0, high: 5, most: 15, digits: 1, role: "cipv", limit: 2.5 },
+  { key: "path_offset_m", label: "Offset", unit: "m", title: "The CIPV's offset from the middle of the path, left is up", factor: 1, low: -1, high: 1, digits: 2, role: "cipv" },
+  { key: "desired_speed_mps", label: "Desired", unit: "km/h", title: "Speed that ACC asks for, over our own speed", factor: 3.6, low: 0, high: 30, digits: 0, role: "path", also: "speed_mps" },
+  { key: "brake", label: "Brake", unit: "%", title: "Brake pedal", factor: 100, low: 0, high: 100, digits: 0, role: "warning", isArea: true },
+]);
+
+/**
+ * The scale that all of these values fit on.
+ * @param {Curve} curve @param {(number|null)[][]} lines in the columns' own unit @returns {{low: number, high: number}}
+ */
+export function scaleOf({ low, high, most, factor }, lines) {
+  for (const line of lines) {
+    for (const value of line) {
+      if (value === null) continue;
+      const shown = Math.min(most ?? Infinity, value * factor);
+      if (shown < low) low = shown;
+      if (shown > high) high = shown;
+    }
+  }
+  return { low, high };
+}
+
+/**
+ * A line through what is known; it is broken where nothing is, and where one object gives way to another. Where several
+ * frames share a pixel column, the line covers their whole range.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {(i: number) => number|null} value of the i-th sample, in the curve's unit
+ * @param {{count: number, index: (i: number) => number, joined: (i: number) => boolean}} samples `joined`: sample i goes on from i − 1
+ * @param {Span} span @param {(value: number) => number} y
+ */
+export function traceLine(ctx, value, samples, span, y) {
+  ctx.beginPath();
+  let pen = false;
+  for (let i = 0; i < samples.count; i++) {
+    const index = samples.index(i);
+    if (index < span.first - 1 || index > span.end) {
+      pen = false;
+      continue;
+    }
+    const now = value(i);
+    if (now === null) {
+      pen = false;
+      continue;
+    }
+    const x = span.middle(index), isAlone = !pen && (i + 1 >= samples.count || value(i + 1) === null || !samples.joined(i + 1));
+    if (pen && samples.joined(i)) ctx.lineTo(x, y(now));
+    else ctx.moveTo(isAlone ? x - 1 : x, y(now));
+    if (isAlone) ctx.lineTo(x + 1, y(now));
+    pen = true;
+  }
+}
+
+/** @param {Row} row @param {{low: number, high: number}} scale @param {number} [most] @returns {(value: number) => number} */
+export function yOf({ top, height }, { low, high }, most = Infinity) {
+  const room = height - 6;
+  return (value) => top + 3 + room - ((Math.min(value, most) - low) / (high - low || 1)) * room;
+}

@@ -1,0 +1,63 @@
+/** The list of events; a click goes there, and what is at the shown frame stands out. */
+import { request } from "../api.js";
+import { $, el, text } from "../dom.js";
+import { seekTo } from "../drive/seek.js";
+import { clock } from "../format.js";
+import { get, on, paint, set } from "../store.js";
+import { nameOf, tintOf } from "./flags.js";
+
+/** @typedef {import("../types.js").DriveEvent} DriveEvent */
+
+const list = $("#events-list");
+/** @type {{event: DriveEvent, row: HTMLElement}[]} */
+let rows = [];
+/** @type {DriveEvent[]|null} */
+let shown = null;
+
+export function setUp() {
+  paint(["drive", "theme"], build);
+  on(["state"], reflect);
+  $("#mark-button").addEventListener("click", addMark);
+}
+
+/** Mark the shown frame. */
+export function addMark() {
+  request("api/marks", "POST", { index: get("state")?.index ?? 0, text: "" }).catch(() => {});
+}
+
+function build() {
+  const events = get("drive")?.events ?? [];
+  text($("#events-facts"), String(events.length));
+  if (events === shown) return;
+  shown = events;
+  rows = events.map((event) => ({ event, row: rowOf(event) }));
+  list.replaceChildren(...rows.map(({ row }) => row));
+  if (!rows.length) list.append(el("p", { class: "facts pad", textContent: get("state")?.drive?.running ? "Looking …" : "No events in this recording." }));
+  reflect();
+}
+
+/** @param {DriveEvent} event */
+function rowOf(event) {
+  const go = el("button", { type: "button", class: "event", title: event.text, style: { "--flag": tintOf(event) }, onclick: () => jump(event) },
+    el("i"), el("span", { class: "when", textContent: clock(event.t_s) }), el("b", { textContent: nameOf(event) }), el("span", { class: "what", textContent: event.text }));
+  if (event.mark === null) return go;
+  const remove = el("button", { type: "button", class: "drop", textContent: "✕", aria: { label: `Remove the mark at ${clock(event.t_s)}` },
+    onclick: () => request(`api/marks/${event.mark}`, "DELETE").catch(() => {}) });
+  return el("div", { class: "event-row" }, go, remove);
+}
+
+/** To the event, with the object it is about selected. @param {DriveEvent} event */
+function jump({ index, ids }) {
+  seekTo(index);
+  if (ids.length) set("selection", ids[0]);
+}
+
+function reflect() {
+  const index = get("state")?.index;
+  for (const { event, row } of rows) {
+    const isHere = event.index === index;
+    if (row.classList.contains("is-here") === isHere) continue;
+    row.classList.toggle("is-here", isHere);
+    if (isHere) row.scrollIntoView({ block: "nearest" });
+  }
+}

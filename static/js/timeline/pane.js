@@ -1,0 +1,110 @@
+/** The timeline: the whole recording at a glance. Its still part and its moving part lie on two canvases. */
+import { ui } from "../colors.js";
+import { $, el, fitted, memory, press, text } from "../dom.js";
+import { clock, num } from "../format.js";
+import { get, on, paint, painter } from "../store.js";
+import { drawBack } from "./back.js";
+import * as clip from "./clip.js";
+import { CURVES } from "./curves.js";
+import * as events from "./events.js";
+import { nameOf } from "./flags.js";
+import { drawFront } from "./front.js";
+import { followPointer } from "./pointer.js";
+import { shareOut } from "./rows.js";
+import { Span } from "./span.js";
+
+const LABELS_PX = 122;
+const EDGE_PX = 8;
+
+const back = $("#timeline-back", HTMLCanvasElement), front = $("#timeline-front", HTMLCanvasElement);
+const span = new Span();
+const curves = new Set(memory.read("curves", CURVES.map(({ key }) => key)));
+/** @type {number|null} */
+let hover = null;
+
+const redraw = painter(draw);
+const redrawFront = painter(drawMoving);
+
+export function setUp() {
+  $("#timeline-curves").append(...CURVES.map(chip));
+  on(["drive", "curve", "selection", "theme"], redraw);
+  on(["state", "scrub", "clip"], redrawFront);
+  paint(["state", "drive"], describe);
+  new ResizeObserver(redraw).observe(back);
+  followPointer(front, { span, rows, zoomed: redraw, hovered });
+  $("#timeline-fit").addEventListener("click", fit);
+  clip.setUp();
+  events.setUp();
+}
+
+/** Show the whole recording. */
+export function fit() {
+  span.fit();
+  redraw();
+}
+
+/** @param {1|-1} direction in or out, around the cursor */
+export function zoom(direction) {
+  span.zoom(direction > 0 ? 0.6 : 1 / 0.6, span.middle(get("state")?.index ?? 0));
+  redraw();
+}
+
+/** @param {import("./curves.js").Curve} curve */
+function chip({ key, label, title, role }) {
+  const button = el("button", { type: "button", textContent: label, title, style: { "--chip": `var(--cipv-${role})` }, onclick: flip });
+  press(button, curves.has(key));
+  function flip() {
+    if (!curves.delete(key)) curves.add(key);
+    memory.write("curves", [...curves]);
+    press(button, curves.has(key));
+    redraw();
+  }
+  return button;
+}
+
+const rows = () => shareOut(back.clientHeight, get("drive")?.base !== null && get("drive")?.base !== undefined, curves);
+const isLight = () => getComputedStyle(document.documentElement).colorScheme === "light";
+
+function draw() {
+  const { ctx, width, height } = fitted(back);
+  span.setCount(get("state")?.count ?? 1);
+  span.left = LABELS_PX;
+  span.width = Math.max(1, width - LABELS_PX - EDGE_PX);
+  drawBack(ctx, { width, height }, span, rows(), isLight());
+  $("#timeline-fit").hidden = span.isWhole;
+  drawMoving();
+}
+
+function drawMoving() {
+  const state = get("state");
+  if (!state) return;
+  if (state.playing && span.reveal(state.index)) return redraw();
+  const { ctx, width, height } = fitted(front);
+  drawFront(ctx, { width, height }, span, rows(), { isLight: isLight(), hover });
+  front.setAttribute("aria-valuemax", String(Math.max(0, state.count - 1)));
+  front.setAttribute("aria-valuenow", String(get("scrub") ?? state.index));
+  front.setAttribute("aria-valuetext", `frame ${state.frame ?? ""}, ${clock(state.time_s)}`);
+}
+
+/** @param {number|null} index */
+function hovered(index) {
+  if (index === hover) return;
+  hover = index;
+  const drive = get("drive");
+  const here = index === null ? [] : (drive?.events ?? []).filter((event) => Math.abs(event.index - index) * span.perFrame < 8);
+  const differs = index === null ? undefined : drive?.comparison?.differing.find(([first, last]) => index >= first && index <= last);
+  const why = differs ? drive?.comparison?.first[differs[0]] : undefined;
+  front.title = [...here.map((event) => `${nameOf(event)}: ${event.text}`), why].filter(Boolean).join("\n");
+  redrawFront();
+}
+
+/** How far the computing has come, and how much the two runs differ. */
+function describe() {
+  const state = get("state")?.drive, drive = get("drive");
+  const words = [];
+  if (state?.running) words.push(`${state.phase === "detect" ? "detecting" : "computing"} ${Math.round((100 * state.done) / Math.max(1, state.total))} %`);
+  if (state?.note) words.push(state.note);
+  if (drive?.comparison) words.push(drive.comparison.frames_differing ? `${num(drive.comparison.frames_differing, 0)} of ${drive.count} frames differ` : "no frame differs");
+  text($("#timeline-facts"), words.join(" · "));
+  $("#timeline-facts").style.color = drive?.comparison?.frames_differing ? ui("warn") : "";
+}

@@ -1,0 +1,110 @@
+/** The hand on the timeline: press or drag to go to a frame, wheel to zoom, shift or two fingers to move along. */
+import { seekTo } from "../drive/seek.js";
+import { get, set } from "../store.js";
+import { flagAt } from "./flags.js";
+
+/** @typedef {import("./span.js").Span} Span */
+/** @typedef {import("./rows.js").Rows} Rows */
+
+const CLICK_PX = 4;
+const ZOOM_PER_PX = 0.0018;
+const GRAB_PX = 8;
+
+/**
+ * @typedef {object} Hand
+ * @property {Span} span
+ * @property {() => Rows} rows
+ * @property {() => void} zoomed
+ * @property {(index: number|null) => void} hovered
+ */
+
+/** @param {HTMLCanvasElement} canvas @param {Hand} hand */
+export function followPointer(canvas, hand) {
+  /** @type {Map<number, {x: number, y: number}>} */
+  const down = new Map();
+  /** @type {{x: number, y: number, moved: boolean, act: (x: number, dx: number) => void}|null} */
+  let drag = null;
+
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    down.set(event.pointerId, { x: event.offsetX, y: event.offsetY });
+    if (down.size > 1) return void (drag = null);
+    drag = { x: event.offsetX, y: event.offsetY, moved: false, act: actionAt(hand, event) };
+    drag.act(event.offsetX, 0);
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const was = down.get(event.pointerId);
+    if (!was) return hand.hovered(event.offsetX >= hand.span.left ? hand.span.index(event.offsetX) : null);
+    down.set(event.pointerId, { x: event.offsetX, y: event.offsetY });
+    if (down.size === 2) pinch(hand, [...down.values()], was, { x: event.offsetX, y: event.offsetY });
+    else if (drag) {
+      drag.moved ||= Math.abs(event.offsetX - drag.x) >= CLICK_PX;
+      drag.act(event.offsetX, event.offsetX - was.x);
+    }
+  });
+  const lift = (/** @type {PointerEvent} */ event) => {
+    down.delete(event.pointerId);
+    if (drag && !drag.moved && event.type === "pointerup") click(hand, drag.x, drag.y);
+    if (!down.size) drag = null;
+  };
+  for (const name of /** @type {const} */ (["pointerup", "pointercancel"])) canvas.addEventListener(name, lift);
+  canvas.addEventListener("pointerleave", () => hand.hovered(null));
+  canvas.addEventListener("dblclick", () => {
+    hand.span.fit();
+    hand.zoomed();
+  });
+  canvas.addEventListener("wheel", (event) => onWheel(hand, event), { passive: false });
+}
+
+/** What a drag that begins here does. @param {Hand} hand @param {PointerEvent} event @returns {(x: number, dx: number) => void} */
+function actionAt({ span, rows, zoomed }, event) {
+  const { axis, bar } = rows(), clip = get("clip");
+  if (event.offsetY >= bar.top && !span.isWhole) {
+    return (_, dx) => {
+      span.pan((dx / span.width) * span.count);
+      zoomed();
+    };
+  }
+  if (event.button === 1 || event.altKey) {
+    return (_, dx) => {
+      span.pan(-dx / span.perFrame);
+      zoomed();
+    };
+  }
+  if (clip && event.offsetY <= axis.top + axis.height) {
+    if (Math.abs(event.offsetX - span.x(clip.first)) < GRAB_PX) return (x) => set("clip", { first: Math.min(span.index(x), clip.last), last: clip.last });
+    if (Math.abs(event.offsetX - span.x(clip.last + 1)) < GRAB_PX) return (x) => set("clip", { first: clip.first, last: Math.max(span.index(x), clip.first) });
+  }
+  return (x) => seekTo(span.index(x));
+}
+
+/** A click on a flag goes to its event; on a ribbon, it selects who was the CIPV there. @param {Hand} hand @param {number} x @param {number} y */
+function click({ span, rows }, x, y) {
+  const drive = get("drive"), { flags, ribbon, base } = rows();
+  const isIn = (/** @type {{top: number, height: number}|null} */ row) => row !== null && y >= row.top && y < row.top + row.height;
+  const event = isIn(flags) ? flagAt(drive?.events ?? [], span, x) : null;
+  if (event) seekTo(event.index);
+  const series = isIn(ribbon) ? drive?.now : isIn(base) ? drive?.base : null;
+  const id = series?.columns.cipv_id[span.index(x)];
+  if (id !== undefined && id !== null) set("selection", id);
+}
+
+/** @param {Hand} hand @param {WheelEvent} event */
+function onWheel({ span, zoomed }, event) {
+  event.preventDefault();
+  const along = event.shiftKey ? event.deltaY : event.deltaX;
+  if (Math.abs(along) > Math.abs(event.shiftKey ? 0 : event.deltaY)) span.pan(along / span.perFrame);
+  else span.zoom(Math.exp(event.deltaY * ZOOM_PER_PX), event.offsetX);
+  zoomed();
+}
+
+/**
+ * @param {Hand} hand @param {{x: number, y: number}[]} fingers both, after the move @param {{x: number}} was @param {{x: number, y: number}} now the one that moved
+ */
+function pinch({ span, zoomed }, fingers, was, now) {
+  const other = fingers.find(({ x }) => x !== now.x) ?? now;
+  const before = Math.abs(was.x - other.x), after = Math.abs(now.x - other.x);
+  if (before > 1 && after > 1) span.zoom(before / after, (now.x + other.x) / 2);
+  span.pan(-(now.x - was.x) / 2 / span.perFrame);
+  zoomed();
+}

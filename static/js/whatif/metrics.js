@@ -1,0 +1,27 @@
+/** Figures before and after: what got better, and what worse. */
+import { el } from "../dom.js";
+import { DASH, num, signed } from "../format.js";
+
+/** @typedef {import("../types.js").Metric} Metric */
+
+/** @param {import("../types.js").Comparison} comparison @returns {HTMLElement} */
+export function metricsTable({ metrics, truth, judged }) {
+  const judge = truth ? `Judged in ${judged} frames against ${truth === "labels" ? "labels" : "the simulator's truth"}` : "Without labels: what needs none";
+  const head = ["", "before", "after", "change"].map((words) => el("th", { scope: "col", textContent: words }));
+  return el("div", {}, el("table", { class: "metrics" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...metrics.map(row))), el("p", { class: "facts", textContent: judge }));
+}
+
+/** @param {Metric} metric */
+function row(metric) {
+  const { name, unit, base, run } = metric;
+  const digits = [base, run].every((value) => value === null || Number.isInteger(value)) ? 0 : 2;
+  const change = base === null || run === null ? null : run - base;
+  return el("tr", { data: { change: verdict(metric, change) } }, el("th", { scope: "row", textContent: unit ? `${name}, ${unit}` : name }),
+    el("td", { textContent: num(base, digits) }), el("td", { textContent: num(run, digits) }), el("td", { textContent: change === null ? DASH : change === 0 ? "=" : signed(change, digits) }));
+}
+
+/** @param {Metric} metric @param {number|null} change */
+function verdict({ better }, change) {
+  if (!better || !change) return "same";
+  return change > 0 === (better === "higher") ? "better" : "worse";
+}

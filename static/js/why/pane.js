@@ -1,0 +1,85 @@
+/** Why the selected object, or else the CIPV, is what it is. For the CIPV: how all candidates rank. For another: the one
+ * gate that stopped it. */
+import { $, el, keyed, mark, text } from "../dom.js";
+import { DASH, num } from "../format.js";
+import { get, paint, set } from "../store.js";
+import { gateRow, kindOf, quantity, showGate } from "./gates.js";
+
+/** @typedef {import("../types.js").Ranked} Ranked */
+/** @typedef {import("../types.js").Result} Result */
+
+const number = el("b", { class: "id" }), source = el("span", { class: "pill" }), lead = el("span", { class: "pill cipv", textContent: "CIPV" });
+const type = el("span"), verdict = el("p", { class: "verdict", aria: { live: "polite" } });
+const gates = el("div", { class: "gates" }), ranking = el("div", { class: "ranking" });
+const rankingTitle = el("h3", { textContent: "Ranking of candidates" });
+const content = el("div", { class: "why-content" }, el("div", { class: "line" }, number, source, lead, type), verdict, gates, rankingTitle, ranking);
+const nothing = el("p", { class: "facts pad" });
+
+export function setUp() {
+  $("#why").append(nothing, content);
+  paint(["frame", "selection"], update);
+}
+
+function update() {
+  const frame = get("frame");
+  if (!frame) return;
+  const { result, display } = frame;
+  const id = get("selection") ?? result.cipv?.id ?? null;
+  const item = result.objects.find((each) => each.id === id);
+  const isLead = id !== null && result.cipv?.id === id;
+  content.hidden = !item;
+  nothing.hidden = Boolean(item);
+  text($("#why-facts"), item ? (isLead ? "why it is the CIPV" : "why it is not the CIPV") : "");
+  text(nothing, id === null ? "No CIPV in this frame. Select an object to see what stopped it." : `#${id} is not in this frame.`);
+  const ranked = display.ranking ?? [];
+  const list = isLead || !item ? ranked : [];
+  rankingTitle.hidden = list.length === 0;
+  if (!item) content.hidden = list.length === 0;
+  keyed(ranking, list, (each) => String(each.id), rankedRow, (row, each) => showRanked(row, each, result));
+  if (!item) return void hideObject(true);
+  hideObject(false);
+  text(number, `#${item.id}`);
+  text(source, item.source);
+  mark(source, "source", item.source);
+  lead.hidden = !isLead;
+  text(type, `${item.type ?? "obstacle"}${item.distance_m === null ? "" : ` at ${num(item.distance_m)} m`}`);
+  text(verdict, sentence(result, ranked.find((each) => each.id === id), item.id, isLead));
+  keyed(gates, item.gates, (gate) => gate.name, gateRow, showGate);
+}
+
+/** @param {boolean} hidden */
+function hideObject(hidden) {
+  for (const node of [number.parentElement, verdict, gates]) if (node) node.hidden = hidden;
+}
+
+/** The reason, with the number and limit of the gate that stopped it. @param {Result} result @param {Ranked|undefined} ranked @param {number} id @param {boolean} isLead */
+function sentence({ cipv, rejected }, ranked, id, isLead) {
+  if (isLead) return cipv?.reason ?? "";
+  const reason = ranked?.reason ?? rejected.find((each) => each.id === id)?.reason ?? "";
+  if (!ranked?.stopped_by || ranked.stopped_by === "behind") return `Not the CIPV: ${reason}.`;
+  return `Not the CIPV: ${reason}${measured(ranked)}.`;
+}
+
+/** @param {Ranked} ranked @returns {string} " (from the path's middle 2.31 m, limit 1.5 m)" */
+function measured({ stopped_by, value, limit }) {
+  const kind = kindOf(stopped_by ?? "");
+  if (value === null || limit === null || kind.test === "flag") return "";
+  return ` (${kind.label.toLowerCase()} ${quantity(value, kind)}, limit ${quantity(limit, kind)})`;
+}
+
+/** @param {Ranked} ranked */
+function rankedRow({ id }) {
+  return el("button", { type: "button", class: "ranked", title: `Select #${id}`, onclick: () => set("selection", id) },
+    el("span", { class: "order" }), el("b"), el("span", { class: "far" }), el("span", { class: "what" }));
+}
+
+/** @param {HTMLElement} row @param {Ranked} ranked @param {Result} result */
+function showRanked(row, { id, order, distance_m, stopped_by, reason }, { cipv }) {
+  const [place, name, far, what] = row.children;
+  text(place, stopped_by && stopped_by !== "behind" ? "✕" : String(order));
+  text(name, `#${id}`);
+  text(far, distance_m === null ? DASH : `${num(distance_m)} m`);
+  text(what, id === cipv?.id ? "the CIPV" : reason);
+  mark(row, "passed", stopped_by && stopped_by !== "behind" ? "no" : "yes");
+  row.setAttribute("aria-current", String(id === get("selection")));
+}

@@ -1,0 +1,45 @@
+/** One menu for the page: it opens below its button, and closes by itself. */
+import { $ } from "../dom.js";
+
+const GAP_PX = 4;
+const menu = $("#menu");
+/** @type {HTMLElement|null} */
+let owner = null;
+
+/**
+ * @param {HTMLElement} button @param {string} label @param {() => (Node|string)[]} fill called at every opening
+ */
+export function attachMenu(button, label, fill) {
+  button.setAttribute("aria-expanded", "false");
+  button.addEventListener("click", () => {
+    if (owner === button && menu.matches(":popover-open")) return menu.hidePopover();
+    owner = button;
+    menu.setAttribute("aria-label", label);
+    menu.replaceChildren(...fill());
+    menu.showPopover();
+    place(button);
+    button.setAttribute("aria-expanded", "true");
+  });
+  menu.addEventListener("toggle", (event) => {
+    if (/** @type {ToggleEvent} */ (event).newState === "closed") button.setAttribute("aria-expanded", "false");
+  });
+}
+
+/** Show other contents while it is open. @param {HTMLElement} button @param {() => (Node|string)[]} fill */
+export function refill(button, fill) {
+  if (owner !== button || !menu.matches(":popover-open")) return;
+  menu.replaceChildren(...fill());
+  place(button);
+}
+
+export function close() {
+  if (menu.matches(":popover-open")) menu.hidePopover();
+}
+
+/** @param {HTMLElement} button */
+function place(button) {
+  const at = button.getBoundingClientRect(), own = menu.getBoundingClientRect();
+  const below = at.bottom + GAP_PX;
+  menu.style.left = `${Math.max(GAP_PX, Math.min(at.right - own.width, innerWidth - own.width - GAP_PX))}px`;
+  menu.style.top = `${below + own.height > innerHeight ? Math.max(GAP_PX, at.top - own.height - GAP_PX) : below}px`;
+}

@@ -1,0 +1,26 @@
+/** Dark or light: as the system says, until a person chooses. */
+import { forget } from "../colors.js";
+import { $, memory } from "../dom.js";
+import { set } from "../store.js";
+
+const root = document.documentElement;
+const SYSTEM = matchMedia("(prefers-color-scheme: light)");
+
+export function setUp() {
+  const theme = memory.read("theme", "");
+  if (theme) root.dataset.theme = theme;
+  SYSTEM.addEventListener("change", repaint);
+  $("#theme-button").addEventListener("click", toggleTheme);
+}
+
+export function toggleTheme() {
+  const isLight = root.dataset.theme ? root.dataset.theme === "light" : SYSTEM.matches;
+  root.dataset.theme = isLight ? "dark" : "light";
+  memory.write("theme", root.dataset.theme);
+  repaint();
+}
+
+function repaint() {
+  forget();
+  set("theme", root.dataset.theme ?? "system");
+}
