@@ -18,10 +18,13 @@ from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 
 from app.access import Access, Guard
+from app.drive.marks import Marks
 from app.engine import Engine
 from app.history import History
+from app.routes.drive import drive_router
 from app.routes.params import params_router
 from app.routes.playback import playback_router
+from app.routes.runs import runs_router
 from app.snapshot import Snapshot
 from app.stream import Stream
 from app.views.colors import palette_css
@@ -29,6 +32,8 @@ from app.views.viser_proxy import viser_router
 from pipeline.errors import BadInput
 
 STATIC = Path(__file__).resolve().parent.parent / "static"
+SESSIONS = STATIC.parent / "sessions"
+"""What this machine keeps: recordings, marks."""
 DEFAULT_PORT = 8420
 _PORTS_TO_TRY = 20
 _LAST_PORT = 65535
@@ -39,9 +44,13 @@ class PortTaken(BadInput):
 
 
 def create_app(
-    engine: Engine, viser_port: Callable[[], int | None] = lambda: None, hosts: Iterable[str] = ()
+    engine: Engine,
+    viser_port: Callable[[], int | None] = lambda: None,
+    hosts: Iterable[str] = (),
+    marks: Marks | None = None,
 ) -> FastAPI:
-    """The application over a running engine. ``hosts``: names other than loopback it may be called by."""
+    """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
+    marked moments are kept; null forgets them at the end."""
     access = Access(hosts)
     stream, history = Stream(), History()
 
@@ -61,6 +70,8 @@ def create_app(
     app.add_exception_handler(RequestValidationError, _one_sentence)
     app.include_router(playback_router(engine, stream, history))
     app.include_router(params_router(engine))
+    app.include_router(drive_router(engine, engine.drives, marks or Marks()))
+    app.include_router(runs_router(engine, engine.drives))
     app.include_router(viser_router(viser_port, access.allowed))
     app.add_api_route("/palette.css", _palette, include_in_schema=False)
     app.mount("/", _Pages(directory=STATIC, html=True), name="pages")
@@ -108,7 +119,7 @@ def serve(
     if port not in (0, number):
         print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
     named = f"[{host}]" if ":" in host else host
-    app = create_app(engine, viser_port, (*hosts, host))
+    app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"))
     engine.start()
     try:
         Server(app, f"http://{named}:{number}", on_ready).run(sockets=[bound])

@@ -23,13 +23,15 @@ Truth = tuple[TruthObject, ...] | None
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """What every run of a recording is made from. timeline_s: (total,) each frame's place on the playback timeline."""
+    """What every run of a recording is made from. timeline_s: (total,) each frame's place on the playback timeline.
+    simulated: its truth is the simulator's."""
 
     uri: str
     total: int
     timeline_s: F64
     detectors: Detectors
     sensors: Sensors
+    simulated: bool = False
 
 
 class Recording:

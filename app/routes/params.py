@@ -11,7 +11,7 @@ from pydantic.fields import FieldInfo
 
 from app.engine import Engine
 from pipeline.alignment import angular_from_calibration
-from pipeline.params import PRESETS, Params, ParamsError, preset, to_yaml
+from pipeline.params import PRESETS, Params, ParamsError, preset, to_yaml, with_changes
 from pipeline.types import CameraCalibration
 
 
@@ -19,6 +19,14 @@ class Changes(BaseModel):
     """Dotted names with their new values; null takes the recording's calibration where the parameter permits it."""
 
     changes: dict[str, Any] = Field(min_length=1, examples=[{"cluster.z_weight": 0.4}])
+    final: bool = Field(True, description="False while a slider is dragged: shown, but no step and no whole-drive run")
+
+
+class Replacement(BaseModel):
+    """A preset, and what differs from it."""
+
+    preset: str = Field("default", examples=list(PRESETS))
+    values: dict[str, Any] = Field(default_factory=dict, examples=[{"cluster.z_weight": 0.4}])
 
 
 class PresetChoice(BaseModel):
@@ -38,9 +46,32 @@ def params_router(engine: Engine) -> APIRouter:
     def change(body: Changes) -> dict[str, Any]:
         """Change some parameters. The shown frame is run again at once. 422 with one sentence for a bad value."""
         try:
-            engine.control.change_params(body.changes)
+            engine.control.change_params(body.changes, final=body.final)
         except ParamsError as error:
             raise HTTPException(422, str(error)) from None
+        return _params_json(engine)
+
+    @router.post("/params")
+    def replace_all(body: Replacement) -> dict[str, Any]:
+        """Replace every parameter: a preset's values, then those that are given."""
+        try:
+            engine.control.set_params(with_changes(preset(body.preset), body.values), body.preset)
+        except ParamsError as error:
+            raise HTTPException(422, str(error)) from None
+        return _params_json(engine)
+
+    @router.post("/params/undo")
+    def undo() -> dict[str, Any]:
+        """Back to the parameters before the last change. 409 when there is none."""
+        if not engine.control.undo():
+            raise HTTPException(409, "there is nothing to undo")
+        return _params_json(engine)
+
+    @router.post("/params/redo")
+    def redo() -> dict[str, Any]:
+        """The change that was undone last, again. 409 when there is none."""
+        if not engine.control.redo():
+            raise HTTPException(409, "there is nothing to redo")
         return _params_json(engine)
 
     @router.post("/params/preset")
@@ -92,6 +123,8 @@ def _params_json(engine: Engine) -> dict[str, Any]:
         "preset": wish.preset,
         "presets": list(PRESETS),
         "revision": wish.params_revision,
+        "can_undo": engine.control.can_undo,
+        "can_redo": engine.control.can_redo,
         "sections": describe(),
         "values": flat(wish.params),
         "base": flat(preset(wish.preset)),

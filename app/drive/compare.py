@@ -1,0 +1,139 @@
+"""Two runs of one drive side by side: in which frames they differ, and what that is worth.
+
+Numbers of objects mean nothing across runs; two leads are one when they are in the same place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+from app.drive.columns import Row
+from pipeline.evaluation.lead import score
+
+SAME_PLACE_M = 0.5
+"""Distances, or offsets from the path, that differ by less are one place."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One figure of both runs. better: which way is good; null where neither is."""
+
+    name: str
+    unit: str
+    base: float | None
+    run: float | None
+    better: Literal["higher", "lower"] | None = None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """differing: first and last frame of each range. sentences: what differs at the first of each. judged: frames with
+    truth."""
+
+    frames: int
+    differing: tuple[tuple[int, int], ...]
+    sentences: dict[int, str]
+    metrics: tuple[Metric, ...]
+    judged: int
+
+    @property
+    def frames_differing(self) -> int:
+        return sum(last - first + 1 for first, last in self.differing)
+
+
+def compare(base: Sequence[Row], run: Sequence[Row]) -> Comparison:
+    """The frames that both have."""
+    frames = min(len(base), len(run))
+    base, run = base[:frames], run[:frames]
+    differs = [index for index in range(frames) if not same_lead(base[index], run[index])]
+    ranges = tuple(_ranges(differs))
+    sentences = {first: f"base: {_lead(base[first])}; now: {_lead(run[first])}" for first, _ in ranges}
+    judged = sum(row.judged is not None for row in base)
+    metrics = (*(_against_truth(base, run) if judged else ()), *_by_themselves(base, run))
+    return Comparison(frames, ranges, sentences, metrics, judged)
+
+
+def same_lead(a: Row, b: Row) -> bool:
+    """Whether two runs have the same lead in one frame, or both none."""
+    if a.cipv_id is None or b.cipv_id is None:
+        return a.cipv_id is b.cipv_id
+    return _near(a.distance_m, b.distance_m) and _near(a.path_offset_m, b.path_offset_m)
+
+
+def _near(a: float | None, b: float | None) -> bool:
+    if a is None or b is None:
+        return a is b
+    return abs(a - b) <= SAME_PLACE_M
+
+
+def _ranges(indices: Sequence[int]) -> list[tuple[int, int]]:
+    ranges: list[tuple[int, int]] = []
+    for index in indices:
+        if ranges and index == ranges[-1][1] + 1:
+            ranges[-1] = (ranges[-1][0], index)
+        else:
+            ranges.append((index, index))
+    return ranges
+
+
+def _lead(row: Row) -> str:
+    if row.cipv_id is None:
+        return "none"
+    return f"#{row.cipv_id}" + (f" at {row.distance_m:.1f} m" if row.distance_m is not None else "")
+
+
+def _against_truth(base: Sequence[Row], run: Sequence[Row]) -> tuple[Metric, ...]:
+    """``pipeline.evaluation.lead``'s figures over the frames that have truth."""
+    a, b = (score(row.judged for row in rows if row.judged is not None) for rows in (base, run))
+    return (
+        Metric("CIPV correct", "frames", a.correct, b.correct, "higher"),
+        Metric("lead missed", "frames", a.missed, b.missed, "lower"),
+        Metric("CIPV without a lead", "frames", a.false, b.false, "lower"),
+        Metric("wrong vehicle", "frames", a.wrong, b.wrong, "lower"),
+        Metric("mean distance error", "m", a.mean_error_m, b.mean_error_m, "lower"),
+        Metric("largest distance error", "m", a.max_error_m, b.max_error_m, "lower"),
+    )
+
+
+def _by_themselves(base: Sequence[Row], run: Sequence[Row]) -> tuple[Metric, ...]:
+    """What can be said without truth; more is not better by itself."""
+    return (
+        Metric("frames with a CIPV", "frames", _count(base, _leads), _count(run, _leads)),
+        Metric("CIPV changes", "", _changes(base), _changes(run)),
+        Metric("CIPV carried", "frames", _count(base, _is_carried), _count(run, _is_carried)),
+        Metric("CIPV seen by both", "frames", _count(base, _is_seen_by_both), _count(run, _is_seen_by_both)),
+        Metric("shortest TTC", "s", _least(r.ttc_s for r in base), _least(r.ttc_s for r in run)),
+        Metric("hardest braking", "m/s²", _hardest(base), _hardest(run)),
+    )
+
+
+def _leads(row: Row) -> bool:
+    return row.cipv_id is not None
+
+
+def _is_carried(row: Row) -> bool:
+    return bool(row.carried)
+
+
+def _is_seen_by_both(row: Row) -> bool:
+    return row.source == "VL"
+
+
+def _count(rows: Sequence[Row], holds: Callable[[Row], bool]) -> int:
+    return sum(map(holds, rows))
+
+
+def _changes(rows: Sequence[Row]) -> int:
+    return sum(a.cipv_id != b.cipv_id for a, b in pairwise(rows))
+
+
+def _least(values: Iterable[float | None]) -> float | None:
+    return min((value for value in values if value is not None), default=None)
+
+
+def _hardest(rows: Sequence[Row]) -> float | None:
+    accel = _least(row.accel_mps2 for row in rows)
+    return None if accel is None else max(0.0, -accel)

@@ -1,0 +1,96 @@
+"""Moments that a person marked, kept beside the recordings so that they are still there tomorrow."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import threading
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from pipeline.errors import BadInput
+
+MOST_MARKS = 1000
+LONGEST_TEXT = 200
+
+
+class MarkRefused(BadInput):
+    """A mark that cannot be made or kept; the text says why."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A marked frame of one recording; ``id`` is its number there."""
+
+    id: int
+    index: int
+    text: str = ""
+
+
+class Marks:
+    """By recording. Any thread. folder: one small file a recording is kept there; null keeps them in memory only."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self._folder = folder
+        self._lock = threading.Lock()
+        self._marks: dict[str, list[Mark]] = {}
+
+    def of(self, uri: str) -> list[Mark]:
+        """By frame."""
+        with self._lock:
+            return sorted(self._loaded(uri), key=lambda mark: (mark.index, mark.id))
+
+    def add(self, uri: str, index: int, text: str = "") -> Mark:
+        """MarkRefused when there are too many, or when they cannot be kept."""
+        with self._lock:
+            marks = self._loaded(uri)
+            if len(marks) >= MOST_MARKS:
+                raise MarkRefused(f"a recording holds {MOST_MARKS} marks at most")
+            mark = Mark(max((each.id for each in marks), default=0) + 1, index, " ".join(text.split())[:LONGEST_TEXT])
+            self._save(uri, [*marks, mark])
+            return mark
+
+    def remove(self, uri: str, number: int) -> bool:
+        """False when there is no such mark."""
+        with self._lock:
+            marks = self._loaded(uri)
+            rest = [mark for mark in marks if mark.id != number]
+            if len(rest) < len(marks):
+                self._save(uri, rest)
+            return len(rest) < len(marks)
+
+    def _loaded(self, uri: str) -> list[Mark]:
+        if uri not in self._marks:
+            self._marks[uri] = _read(self._file(uri))
+        return self._marks[uri]
+
+    def _save(self, uri: str, marks: list[Mark]) -> None:
+        file = self._file(uri)
+        if file is not None:
+            text = json.dumps({"uri": uri, "marks": [asdict(mark) for mark in marks]}, ensure_ascii=False)
+            try:
+                file.parent.mkdir(parents=True, exist_ok=True)
+                partial = file.with_suffix(".part")
+                partial.write_text(text, encoding="utf-8")
+                os.replace(partial, file)
+            except OSError as error:
+                raise MarkRefused(f"{file}: the mark cannot be kept: {error.strerror}") from None
+        self._marks[uri] = marks
+
+    def _file(self, uri: str) -> Path | None:
+        """Named by a digest: a URI is never used as a path."""
+        if self._folder is None:
+            return None
+        return self._folder / f"{hashlib.sha256(uri.encode()).hexdigest()[:16]}.json"
+
+
+def _read(file: Path | None) -> list[Mark]:
+    """What was kept; a file that is missing or damaged holds no marks."""
+    if file is None:
+        return []
+    try:
+        rows = json.loads(file.read_text(encoding="utf-8"))["marks"]
+        return [Mark(int(row["id"]), int(row["index"]), str(row["text"])) for row in rows]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []

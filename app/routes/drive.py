@@ -1,0 +1,176 @@
+"""/api/drive: the whole drive as columns, one object's curve, events and marks."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from fastapi import APIRouter, HTTPException, Query
+from pydantic import BaseModel, Field
+
+from app.drive.columns import columns_json, object_json
+from app.drive.drives import Drives
+from app.drive.events import Event, Kind, Severity, find_events
+from app.drive.marks import LONGEST_TEXT, MarkRefused, Marks
+from app.drive.recording import Recording
+from app.drive.run import DriveRun
+from app.engine import Engine
+from app.routes.refusals import open_recording, refusing
+
+
+class Columns(BaseModel):
+    """Each column is a list for frames ``from`` … done−1; t_s has every frame of the drive, when ``from`` is 0."""
+
+    run: int
+    uri: str
+    count: int
+    first: int = Field(serialization_alias="from")
+    done: int
+    t_s: list[float]
+    columns: dict[str, list[Any]]
+
+
+class Curve(BaseModel):
+    """One object's values at the frames in which it was, whose numbers are in ``index``."""
+
+    id: int
+    run: int
+    index: list[int]
+    source: list[Literal["V", "L", "VL"]]
+    carried: list[bool]
+    in_path: list[bool]
+    distance_m: list[float | None]
+    closing_speed_mps: list[float | None]
+    ttc_s: list[float | None]
+    path_offset_m: list[float | None]
+    vl_gap_m: list[float | None]
+
+
+class EventJson(BaseModel):
+    kind: Kind
+    index: int
+    t_s: float
+    text: str
+    ids: list[int]
+    severity: Severity
+    mark: int | None
+
+
+class Events(BaseModel):
+    run: int | None
+    events: list[EventJson]
+
+
+class NewMark(BaseModel):
+    """``index`` absent: the shown frame."""
+
+    index: int | None = Field(None, ge=0)
+    text: str = Field("", max_length=LONGEST_TEXT)
+
+
+class MarkJson(BaseModel):
+    id: int
+    index: int
+    text: str
+
+
+def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
+    """Routes over the whole-drive runs."""
+    router = APIRouter(prefix="/api", tags=["drive"])
+    known = _EventsOnce()
+
+    @router.get("/drive")
+    def drive(first: int = Query(0, alias="from", ge=0)) -> Columns:
+        """The run of the present parameters, from a frame on; ask again from ``done`` while ``run`` stays the same."""
+        recording = open_recording(drives)
+        return columns_of(recording, current(recording), first)
+
+    @router.get("/drive/object/{object_id}")
+    def curve(object_id: int, run: int | None = None) -> Curve:
+        """One object over the drive; numbers of objects are those of the run."""
+        recording = open_recording(drives)
+        with refusing():
+            of = current(recording) if run is None else recording.book.get(run)
+        return Curve(id=object_id, run=of.number, **object_json(of.objects(), object_id))
+
+    @router.get("/drive/events")
+    def events() -> Events:
+        """What happened, by frame, marks among it. While a run goes on, only what it has come to."""
+        recording = drives.recording
+        run = recording.book.current if recording is not None else None
+        if recording is None or run is None:
+            return Events(run=None, events=[])
+        marked = [
+            Event("mark", mark.index, mark.text or "marked", mark=mark.id) for mark in marks.of(recording.recipe.uri)
+        ]
+        times = recording.recipe.timeline_s
+        found = sorted([*known.of(run), *marked], key=lambda event: event.index)
+        return Events(
+            run=run.number,
+            events=[
+                EventJson(**event.to_json(float(times[event.index]))) for event in found if event.index < len(times)
+            ],
+        )
+
+    @router.post("/marks", status_code=201)
+    def mark(body: NewMark) -> MarkJson:
+        """Mark a moment; it is kept with the recording."""
+        shown = engine.snapshot
+        if shown.uri is None:
+            raise HTTPException(409, "no recording is open")
+        index = shown.index if body.index is None else body.index
+        if index >= max(shown.count, 1):
+            raise HTTPException(422, f"index: the recording has {shown.count} frames")
+        try:
+            made = marks.add(shown.uri, index, body.text)
+        except MarkRefused as error:
+            raise HTTPException(409, str(error)) from None
+        drives.changed()
+        return MarkJson(id=made.id, index=made.index, text=made.text)
+
+    @router.delete("/marks/{number}")
+    def unmark(number: int) -> dict[str, str]:
+        """Take a mark away."""
+        uri = engine.snapshot.uri
+        if uri is None or not marks.remove(uri, number):
+            raise HTTPException(404, f"there is no mark {number}")
+        drives.changed()
+        return {"status": "removed"}
+
+    return router
+
+
+def current(recording: Recording) -> DriveRun:
+    """The run of the present parameters; 404 while there is none."""
+    run = recording.book.current
+    if run is None:
+        raise HTTPException(404, "no run has begun yet")
+    return run
+
+
+def columns_of(recording: Recording, run: DriveRun, first: int) -> Columns:
+    """A run's columns from a frame on."""
+    rows = run.rows(first)
+    return Columns(
+        run=run.number,
+        uri=recording.recipe.uri,
+        count=run.total,
+        first=min(first, run.done),
+        done=first + len(rows) if rows else min(first, run.done),
+        t_s=[round(float(t), 4) for t in recording.recipe.timeline_s] if first == 0 else [],
+        columns=columns_json(rows),
+    )
+
+
+class _EventsOnce:
+    """The events of the run that was asked for last, found again only when it has come further."""
+
+    def __init__(self) -> None:
+        self._held: tuple[DriveRun, int, list[Event]] | None = None
+
+    def of(self, run: DriveRun) -> list[Event]:
+        rows, held = run.rows(), self._held
+        if held is not None and held[0] is run and held[1] == len(rows):
+            return held[2]
+        found = find_events(rows, [records for _, records in run.objects()[: len(rows)]], run.params)
+        self._held = (run, len(rows), found)
+        return found

@@ -1,0 +1,31 @@
+"""How what cannot be done becomes an HTTP answer of one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from fastapi import HTTPException
+
+from app.drive.book import NoSuchRun
+from app.drive.drives import Drives
+from app.drive.recording import Recording
+from pipeline.errors import BadInput
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """404 for a run that is not there, 409 for what is refused."""
+    try:
+        yield
+    except NoSuchRun as error:
+        raise HTTPException(404, str(error)) from None
+    except BadInput as error:
+        raise HTTPException(409, str(error)) from None
+
+
+def open_recording(drives: Drives) -> Recording:
+    """The recording whose whole drive is computed; 404 when there is none, as with live sensors."""
+    if drives.recording is None:
+        raise HTTPException(404, "no recording is open whose whole drive could be computed")
+    return drives.recording

@@ -1,0 +1,203 @@
+"""/api/runs: what other parameters would have made of the drive. Keep, name, compare, take, delete."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, Field
+
+from app.drive.book import LONGEST_NAME
+from app.drive.compare import compare
+from app.drive.drives import Drives, Phase
+from app.drive.recording import Recording
+from app.drive.run import DriveRun
+from app.engine import Engine
+from app.routes.drive import Columns, columns_of, current
+from app.routes.params import flat
+from app.routes.refusals import open_recording, refusing
+from pipeline.params import Params, to_yaml
+
+_MOST_SENTENCES = 100
+_NAMED_CHANGES = 3
+
+
+class Run(BaseModel):
+    """name: a person's. label: what it changes against the base. digest: equal when it is made from the same."""
+
+    id: int
+    name: str
+    label: str
+    digest: str
+    preset: str
+    changes: dict[str, tuple[Any, Any]]
+    done: int
+    total: int
+    phase: Phase
+    note: str
+    kept: bool
+    seconds: float
+
+
+class Runs(BaseModel):
+    """run: of the present parameters. base: what it is compared against."""
+
+    base: int | None
+    run: int | None
+    runs: list[Run]
+
+
+class Name(BaseModel):
+    name: str = Field("", max_length=LONGEST_NAME)
+
+
+class MetricJson(BaseModel):
+    name: str
+    unit: str
+    base: float | None
+    run: float | None
+    better: Literal["higher", "lower"] | None
+
+
+class ComparisonJson(BaseModel):
+    """differing: first and last frame of ranges whose lead differs; first: what differs where a range begins."""
+
+    base: int
+    run: int
+    done: int
+    differing: list[tuple[int, int]]
+    frames_differing: int
+    first: dict[int, str]
+    metrics: list[MetricJson]
+    truth: Literal["labels", "simulator"] | None
+    judged: int
+
+
+def runs_router(engine: Engine, drives: Drives) -> APIRouter:
+    """Routes over the runs of the open recording."""
+    router = APIRouter(prefix="/api", tags=["what if"])
+
+    @router.get("/runs")
+    def runs() -> Runs:
+        """Every run of the open recording, the oldest first."""
+        return _runs_json(drives.recording)
+
+    @router.get("/runs/{number}/columns")
+    def columns(number: int, first: int = Query(0, alias="from", ge=0)) -> Columns:
+        """A run's columns from a frame on."""
+        recording = open_recording(drives)
+        with refusing():
+            return columns_of(recording, recording.book.get(number), first)
+
+    @router.post("/runs/{number}/keep")
+    def keep(number: int, body: Name) -> Runs:
+        """Keep a run under a name, or rename it. Others go when newer ones come."""
+        recording = open_recording(drives)
+        with refusing():
+            recording.book.keep(number, body.name)
+        drives.changed()
+        return _runs_json(recording)
+
+    @router.post("/runs/{number}/base")
+    def base(number: int) -> Runs:
+        """Compare against this one from now on."""
+        recording = open_recording(drives)
+        with refusing():
+            recording.book.compare_with(number)
+        drives.changed()
+        return _runs_json(recording)
+
+    @router.post("/runs/{number}/use")
+    def use(number: int) -> Runs:
+        """Take a run's parameters: a change that can be undone."""
+        recording = open_recording(drives)
+        with refusing():
+            run = recording.book.get(number)
+        engine.control.set_params(run.params, run.preset)
+        drives.want(run.params, run.preset)
+        return _runs_json(recording)
+
+    @router.delete("/runs/{number}")
+    def delete(number: int) -> Runs:
+        """Forget a run. The present one and the base stay."""
+        recording = open_recording(drives)
+        with refusing():
+            recording.book.delete(number)
+        drives.changed()
+        return _runs_json(recording)
+
+    @router.get("/runs/{number}/params.yaml", response_class=Response)
+    def preset_file(number: int) -> Response:
+        """A run's parameters as a file for `cipv run --params`."""
+        with refusing():
+            params = open_recording(drives).book.get(number).params
+        headers = {"content-disposition": f'attachment; filename="cipv-run-{number}.yaml"'}
+        return Response(to_yaml(params), media_type="application/yaml", headers=headers)
+
+    @router.get("/compare")
+    def comparison(base: int | None = None, run: int | None = None) -> ComparisonJson:
+        """Two runs side by side; without numbers the base and the present one."""
+        recording = open_recording(drives)
+        with refusing():
+            new = recording.book.get(run) if run is not None else current(recording)
+            old = recording.book.get(base) if base is not None else recording.book.base or new
+        found = compare(old.rows(), new.rows())
+        truth: Literal["labels", "simulator"] = "simulator" if recording.recipe.simulated else "labels"
+        return ComparisonJson(
+            base=old.number,
+            run=new.number,
+            done=found.frames,
+            differing=list(found.differing),
+            frames_differing=found.frames_differing,
+            first=dict(list(found.sentences.items())[:_MOST_SENTENCES]),
+            metrics=[MetricJson(**vars(metric)) for metric in found.metrics],
+            truth=truth if found.judged else None,
+            judged=found.judged,
+        )
+
+    return router
+
+
+def changes_of(base: Params, params: Params) -> dict[str, tuple[Any, Any]]:
+    """``{"cluster.z_weight": (0.4, 0.3)}``: what differs, before and after."""
+    before, after = flat(base), flat(params)
+    return {name: (before[name], value) for name, value in after.items() if value != before[name]}
+
+
+def label_of(changes: dict[str, tuple[Any, Any]], preset: str) -> str:
+    """A run's name by itself: what it changes, or where it started."""
+    if not changes:
+        return f"preset {preset}"
+    named = [f"{name} {old} → {new}" for name, (old, new) in list(changes.items())[:_NAMED_CHANGES]]
+    rest = len(changes) - len(named)
+    return ", ".join(named) + (f" and {rest} more" if rest else "")
+
+
+def _runs_json(recording: Recording | None) -> Runs:
+    if recording is None:
+        return Runs(base=None, run=None, runs=[])
+    book = recording.book
+    base, run = book.base, book.current
+    return Runs(
+        base=base.number if base else None,
+        run=run.number if run else None,
+        runs=[_run_json(recording, each, base or each) for each in book.all()],
+    )
+
+
+def _run_json(recording: Recording, run: DriveRun, base: DriveRun) -> Run:
+    changes = changes_of(base.params, run.params)
+    return Run(
+        id=run.number,
+        name=run.name,
+        label=label_of(changes, run.preset),
+        digest=recording.digest(run.params),
+        preset=run.preset,
+        changes=changes,
+        done=run.done,
+        total=run.total,
+        phase="failed" if run.note else "done" if run.is_complete else "run",
+        note=run.note,
+        kept=run.kept,
+        seconds=round(run.seconds, 3),
+    )
