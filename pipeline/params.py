@@ -35,15 +35,7 @@ class Section(BaseModel):
 class DeskewParams(Section):
     """Motion compensation of the sweep by own speed and yaw rate."""
 
-    enabled: bool = _choice(
-        False, "Put points where standing things would be at the tick; what drives along gains none"
-    )
-
-
-class DeskewParams(Section):
-    """Motion compensation of the sweep by own speed and yaw rate."""
-
-    enabled: bool = _choice(False, "Put points where standing things would be at the tick; what drives along gains none")
+    enabled: bool = _choice(False, "Put points where what stands would be at the tick; what drives along is distorted")
 
 
 class DownsampleParams(Section):

@@ -1,12 +1,13 @@
-"""The LiDAR branch: down-sample, ground, cluster, boxes, tracking (paper, Point Cloud Segmentation, LiDAR Tracking)."""
+"""The LiDAR branch: deskew, down-sample, ground, cluster, boxes, tracking (paper, Point Cloud Segmentation, LiDAR
+Tracking)."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pipeline.lidar import boxes, cluster, downsample, ground, tracking
-from pipeline.params import Params
-from pipeline.types import Sweep
+from pipeline.lidar import boxes, cluster, deskew, downsample, ground, tracking
+from pipeline.params import DeskewParams, Params
+from pipeline.types import EgoState, Sweep
 
 
 def warm_up() -> None:
@@ -19,12 +20,15 @@ def warm_up() -> None:
     wall = np.column_stack([np.full(20, 15.0), np.linspace(-1.0, 1.0, 20), np.full(20, -0.5), np.zeros(20)])
     points = np.vstack([road, wall]).astype(np.float32)
     keep = np.ones(len(points), dtype=np.bool_)
+    time_s = np.zeros(len(points), np.float32)
+    sweep = Sweep(0, points, np.zeros(len(points), np.uint8), 16, time_s)
     for writeable in (True, False):
-        points.flags.writeable = writeable
+        points.flags.writeable = time_s.flags.writeable = writeable
         plane = ground.fit_ground(points, keep, params.ground)
         labels = cluster.cluster(points, cluster.candidates(points, plane, keep, params.cluster), params.cluster)
         obstacles = boxes.fit_obstacles(points, labels, plane, params.box)
         state, _ = tracking.track(tracking.LidarTrackerState(), obstacles, None, params.lidar_tracking)
         tracking.track(state, obstacles, 0.1, params.lidar_tracking)
         cluster.kinds(labels, keep, plane.mask)
-        downsample.keep_mask(Sweep(0, points, np.zeros(len(points), np.uint8), 16), params.downsample)
+        deskew.deskew(sweep, EgoState(0, 10.0, 0.0), DeskewParams(enabled=True))
+        downsample.keep_mask(sweep, params.downsample)

@@ -76,4 +76,4 @@ class Lidar:
         points: F32 = np.empty((len(column), 4), dtype=np.float32)
         points[:, :3] = self._beams.start + self._beams.rays[column, ring] * measured[:, None]
         points[:, 3] = np.clip(intensity[kept] * reach[kept] ** 2 * (1.0 + 0.1 * scatter), 0.0, 255.0)
-        return Sweep(t_ns, points, ring.astype(np.uint8), CHANNELS)
+        return Sweep(t_ns, points, ring.astype(np.uint8), CHANNELS, self._times_s[column].astype(np.float32))
