@@ -25,6 +25,7 @@ import numpy as np
 
 from app.sent_picture import MAX_WIDTH_PX, SentPicture, encode_picture
 from app.sent_points import point_arrays
+from app.ranking import ranking_json
 from app.snapshot import Snapshot
 from pipeline.alignment import Alignment, resolve
 from pipeline.path.lane_types import EgoLane
@@ -78,7 +79,8 @@ def display_json(result: Result, aligned: Alignment | None, scale: float) -> dic
     """What is drawn over the picture. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom first;
     ``path`` is the corridor laid on the ground that the sweep shows, null where there is none. ``lanes`` are the ego
     lane's lines where the camera saw them, null without a lane detector; ``plan_lanes`` the same in the plan, x y in
-    metres; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x that they hold in."""
+    metres; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x that they hold in; ``ranking``
+    every object in the order in which it could have led."""
     layers = result.layers
     path = {"center": result.path.center, "left": result.path.left, "right": result.path.right}
     return {
@@ -88,6 +90,8 @@ def display_json(result: Result, aligned: Alignment | None, scale: float) -> dic
         "path": _on_ground(path, layers.ground, aligned, scale),
         **_lanes_json(layers.lanes, aligned, scale),
         "ground": _ground_json(layers.ground),
+        "vision_ranges": _vision_ranges(result),
+        "ranking": ranking_json(result),
     }
 
 
@@ -127,6 +131,16 @@ def _ground_json(ground: Ground | None) -> dict[str, Any] | None:
     if ground is None or not ground.fitted.any():
         return None
     return {"edges": np.round(ground.edges, 2).tolist(), "planes": np.round(ground.planes, 5).tolist()}
+
+
+def _vision_ranges(result: Result) -> dict[str, dict[str, float]]:
+    tracks = {track.id: track for track in result.layers.vision_tracks}
+    seen = ((item.id, tracks.get(item.vision_track)) for item in result.objects if item.vision_track is not None)
+    return {
+        str(number): {"distance_m": round(track.distance_m, 3), "sigma_m": round(track.sigma_m, 3)}
+        for number, track in seen
+        if track is not None and track.distance_m is not None and track.sigma_m is not None
+    }
 
 
 def _pixel_list(uv: F64) -> list[list[float] | None]:

@@ -243,7 +243,7 @@ def sensor_gaps(drive: Drive) -> Iterator[Event]:
 
 
 def _time_gaps(t_ns: Sequence[int]) -> Iterator[Event]:
-    steps: F64 = np.diff(np.asarray(t_ns, dtype=np.int64)) / 1e9
+    steps: F64 = np.diff(np.asarray(t_ns, dtype=np.int64)).astype(np.float64) / 1e9
     if not len(steps):
         return
     usual = float(np.median(steps))

@@ -1,0 +1,74 @@
+"""Every object of a frame in the order in which it could have been the CIPV, and the one test that stopped it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from pipeline.types import FusedObject, Gate, Result
+
+_OF_FUSION = frozenset({"iou", "range_sigmas"})
+"""Gates between two sensors' objects: failing one makes two rows of a pair, and stops neither from leading."""
+BEHIND = "behind"
+"""What stops an object that passed every test: another one is nearer, or surer in the same place."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """order counts from 1, the CIPV first. stopped_by: the first gate that failed, with its number and limit, or
+    ``BEHIND``; null for the CIPV."""
+
+    id: int
+    order: int
+    distance_m: float | None
+    stopped_by: str | None
+    value: float | None
+    limit: float | None
+    reason: str
+
+
+def ranking(result: Result) -> list[Ranked]:
+    """The CIPV, then the other candidates by distance, then what a gate stopped, by distance."""
+    reasons = {each.id: each.reason for each in result.rejected}
+    lead = result.cipv
+    if lead is not None:
+        reasons[lead.id] = lead.reason
+    lead_id = lead.id if lead is not None else None
+    gates = {item.id: stopping_gate(item) for item in result.objects}
+    order = sorted(
+        result.objects,
+        key=lambda item: (
+            item.id != lead_id,
+            gates[item.id] is not None,
+            item.distance_m is None,
+            item.distance_m or 0.0,
+            item.id,
+        ),
+    )
+    return [
+        Ranked(item.id, place, item.distance_m, *_stop(gates[item.id], item.id == lead_id), reasons.get(item.id, ""))
+        for place, item in enumerate(order, 1)
+    ]
+
+
+def stopping_gate(item: FusedObject) -> Gate | None:
+    """The first test that kept an object from being a candidate; null when it passed all."""
+    return next((gate for gate in item.gates if not gate.passed and gate.name not in _OF_FUSION), None)
+
+
+def ranking_json(result: Result) -> list[dict[str, Any]]:
+    """As the page reads it."""
+    return [{name: _plain(value) for name, value in asdict(each).items()} for each in ranking(result)]
+
+
+def _stop(gate: Gate | None, leads: bool) -> tuple[str | None, float | None, float | None]:
+    if leads:
+        return None, None, None
+    return (BEHIND, None, None) if gate is None else (gate.name, gate.value, gate.limit)
+
+
+def _plain(value: Any) -> Any:
+    if not isinstance(value, float):
+        return value
+    return round(value, 4) if math.isfinite(value) else None
