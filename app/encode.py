@@ -23,9 +23,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from app.ranking import ranking_json
 from app.sent_picture import MAX_WIDTH_PX, SentPicture, encode_picture
 from app.sent_points import point_arrays
-from app.ranking import ranking_json
 from app.snapshot import Snapshot
 from pipeline.alignment import Alignment, resolve
 from pipeline.path.lane_types import EgoLane
