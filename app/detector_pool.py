@@ -1,25 +1,53 @@
-"""The detectors for a source's pictures: opened once for each kind of picture, and what there is to say about them."""
+"""The detectors for a source's pictures: opened once for each kind of picture, and what there is to say about them.
+
+Lane detectors are opened anew for each source, because the classical one knows the camera; that takes a moment only."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from app.snapshot import Notice
-from pipeline.run import Detects, Sensors, picture_size
+from pipeline.run import Detectors, Detects, Sensors, picture_size
 from pipeline.sources.base import AnySource, is_simulated
-from pipeline.types import RawBoxes
+from pipeline.types import RawBoxes, RawLanes
 from pipeline.vision.runtime import DetectorError, DetectorMissing
 
 OpenDetector = Callable[[AnySource], Detects[RawBoxes]]
+OpenLanes = Callable[[AnySource], Detects[RawLanes] | None]
 
 
 class DetectorPool:
-    """``open_detector`` gives the one for a source's pictures; null: none, and nothing is said about it."""
+    """``open_detector`` and ``open_lanes`` give those for a source's pictures; null: none, and nothing is said about
+    it. lanes_every: lanes are looked for in every n-th frame."""
 
-    def __init__(self, open_detector: OpenDetector | None, sensors: Sensors) -> None:
+    def __init__(
+        self,
+        open_detector: OpenDetector | None,
+        sensors: Sensors,
+        open_lanes: OpenLanes | None = None,
+        lanes_every: int = 1,
+    ) -> None:
+        self._open_lanes = open_lanes if sensors != "lidar" else None
+        self._lanes_every = lanes_every
         self._open = open_detector if sensors != "lidar" else None
         self._without = "LiDAR goes on alone." if sensors == "both" else "Without one the camera finds nothing."
         self._opened: dict[tuple[bool, tuple[int, int] | None], Detects[RawBoxes]] = {}
+
+    def both_for(self, source: AnySource, notices: list[Notice]) -> Detectors:
+        """What looks at the source's pictures; what is missing is null, and a notice says so."""
+        return Detectors(self.boxes_for(source, notices), self.lanes_for(source, notices), self._lanes_every)
+
+    def lanes_for(self, source: AnySource, notices: list[Notice]) -> Detects[RawLanes] | None:
+        """The lane detector, which a notice names."""
+        if self._open_lanes is None:
+            return None
+        try:
+            lanes = self._open_lanes(source)
+        except (DetectorMissing, DetectorError) as error:
+            notices.append(Notice("warning", f"{error} Lane lines are not looked for."))
+            return None
+        notices += [Notice("info", note) for note in lanes.notes] if lanes is not None else []
+        return lanes
 
     def boxes_for(self, source: AnySource, notices: list[Notice]) -> Detects[RawBoxes] | None:
         """The detector of vehicles; where there is none, LiDAR goes on alone and a notice says so."""

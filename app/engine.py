@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import cast
 
 from app.control import Control, Wish
-from app.detector_pool import DetectorPool, OpenDetector
+from app.detector_pool import DetectorPool, OpenDetector, OpenLanes
 from app.drive.drives import Drives
 from app.drive.recording import Recipe
 from app.line import DetectionCache, Line, Tick
@@ -41,8 +41,9 @@ OpenSource = Callable[[str], AnySource]
 
 class Engine:
     """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
-    one for a source's pictures; null runs without a camera's detector and says nothing about it. ``whole_drives``: a
-    recording's whole drive is computed in the background (``drives``), so that any frame is shown as it is in it."""
+    one for a source's pictures; null runs without a camera's detector and says nothing about it; ``open_lanes`` gives
+    the lane detector, which looks at every ``lanes_every``-th frame. ``whole_drives``: a recording's whole drive is
+    computed in the background (``drives``), so that any frame is shown as it is in it."""
 
     def __init__(
         self,
@@ -55,6 +56,8 @@ class Engine:
         sensors: Sensors = "both",
         playing: bool = False,
         whole_drives: bool = False,
+        open_lanes: OpenLanes | None = None,
+        lanes_every: int = 1,
     ) -> None:
         self.control = Control(Wish(params, preset, uri=uri, playing=playing))
         self._showing = Showing(Snapshot(params, preset))
@@ -64,7 +67,7 @@ class Engine:
         self._detections = DetectionCache()
         self.drives = Drives(_recordings_of(open_source), self._detections)
         self._whole_drives = whole_drives
-        self._detectors = DetectorPool(open_detector, sensors)
+        self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every)
         self._line: Line | None = None
         self._live: LiveLine | None = None
         self._health_told_s = 0.0
@@ -199,12 +202,12 @@ class Engine:
             self._fail(str(error))
             return False
         notices = [Notice("info", text) for text in source.notes]
-        detector = self._detectors.boxes_for(source, notices)
+        detectors = self._detectors.both_for(source, notices)
         self._close_live()
         if is_live_source(source):
-            self._open_live(source, Detectors(detector))
+            self._open_live(source, detectors)
         else:
-            self._line = self._line_of(cast("Source", source), Detectors(detector))
+            self._line = self._line_of(cast("Source", source), detectors)
         self._clock = None
         self._skipped = 0
         self._showing.publish(
@@ -218,7 +221,8 @@ class Engine:
                 count=len(self._line.source) if self._line is not None else 0,
                 duration_s=float(self._line.timeline_s[-1]) if self._line is not None else 0.0,
                 index=0,
-                detector=detector.name if detector else None,
+                detector=detectors.boxes.name if detectors.boxes else None,
+                lane_detector=detectors.lanes.name if detectors.lanes else None,
                 notices=tuple(notices),
                 tick=None,
                 busy=None,

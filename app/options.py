@@ -5,17 +5,20 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 import tyro
 import yaml
 
+from pipeline.errors import BadInput
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
-from pipeline.run import Sensors, detector_for
-from pipeline.sources import open_source
-from pipeline.sources.base import Source
+from pipeline.run import Detectors, Sensors, detector_for, lanes_for
+from pipeline.sources import is_live, open_live, open_source
+from pipeline.sources.base import AnySource, LiveSource, Source
 from pipeline.vision.detector import Detector
 from pipeline.vision.runtime import DetectorMissing
+
+S = TypeVar("S", Source, LiveSource)
 
 
 @dataclass(frozen=True)
@@ -23,13 +26,20 @@ class SourceOptions:
     """Where frames come from."""
 
     source: tyro.conf.Positional[str]
-    """What to open: astyx:<dir>, kitti:<dir> or sim:<scenario or my.yaml>"""
+    """What to open: astyx:<dir>, kitti:<dir>, sim:<scenario or my.yaml>, live:<config.yaml>, …"""
     rings: int = 16
     """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
 
     def open(self) -> Source:
-        """SourceError says in one sentence what is wrong."""
-        source = open_source(self.source, rings=self.rings)
+        """A recording. SourceError says in one sentence what is wrong."""
+        return self._with_notes(open_source(self.source, rings=self.rings))
+
+    def open_live(self) -> LiveSource | None:
+        """The sensors, if it names some; they are not started yet. SourceError as with ``open``."""
+        return self._with_notes(open_live(self.source)) if is_live(self.source) else None
+
+    def _with_notes(self, source: S) -> S:
+        """The source, after what there is to say about it."""
         for note in source.notes:
             print(f"cipv: {note}", file=sys.stderr)
         return source
@@ -48,6 +58,11 @@ class LineOptions:
     detector: str | None = None
     """Name or path of an ONNX detector; else the registered default, then $CIPV_DATA/models, then the
     embedded one, which knows simulated cars only and is the default for sim:"""
+    lanes: str | None = None
+    """Name or path of an ONNX lane network, `classical` for the detector without one, or `off`; else the registered
+    default, then $CIPV_DATA/models, then the classical one, which is the default for sim:"""
+    lanes_every: Annotated[int, tyro.conf.arg(metavar="N")] = 1
+    """Run the lane detector in every N-th frame only; between, its lines are predicted and their age counted"""
 
     def parameters(self) -> Params:
         """preset, then --params, then each --set. ParamsError names the first that is wrong."""
@@ -65,7 +80,27 @@ class LineOptions:
                 raise ParamsError(f"--set {change}: {value!r} is no value") from None
         return with_changes(params, changes)
 
-    def open_detector(self, source: Source, sensors: Sensors = "both") -> Detector | None:
+    def changes_parameters(self) -> bool:
+        """Whether a person asked for other parameters than the default ones."""
+        return self.preset != "default" or self.params is not None or bool(self.set)
+
+    def every(self) -> int:
+        """Checked ``lanes_every``."""
+        if self.lanes_every < 1:
+            raise BadInput(f"--lanes-every {self.lanes_every}: a number of frames, at least 1")
+        return self.lanes_every
+
+    def open_detectors(self, source: AnySource, sensors: Sensors = "both") -> Detectors:
+        """Everything that looks at the source's pictures, with what there is to say about it. None for LiDAR alone."""
+        every = self.every()
+        if sensors == "lidar":
+            return Detectors()
+        lanes = lanes_for(source, self.lanes)
+        for note in lanes.notes if lanes is not None else ():
+            print(f"cipv: {note}", file=sys.stderr)
+        return Detectors(self.open_detector(source, sensors), lanes, every)
+
+    def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
         """The detector for the source's pictures, with what there is to say about it. A named one that is missing is
         an error, and so is none for a camera on its own; else a sentence says so and LiDAR goes on alone."""
         try:

@@ -44,6 +44,7 @@ class Snapshot:
     loop: bool = True
     busy: str | None = None
     detector: str | None = None
+    lane_detector: str | None = None
     notices: tuple[Notice, ...] = ()
     sequence: int = 0
     skipped: int = 0
@@ -71,6 +72,7 @@ class Snapshot:
             "loop": self.loop,
             "busy": self.busy,
             "detector": self.detector,
+            "lane_detector": self.lane_detector,
             "preset": self.preset,
             "params_revision": self.params_revision,
             "sequence": self.sequence,

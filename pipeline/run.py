@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, TypeVar, cast
 
 from pipeline.params import Params
-from pipeline.sources.base import AnySource, Source, is_live_source, is_simulated
+from pipeline.path.lane_detector import LaneDetector, open_lanes
+from pipeline.sources.base import AnySource, LiveSource, Source, is_live_source, is_simulated
 from pipeline.step import State, step, warm_up
 from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result
 from pipeline.vision.detector import Detector, open_detector
 from pipeline.vision.models import EMBEDDED
+
+_SILENCE_S = 0.5
 
 Sensors = Literal["lidar", "camera", "both"]
 Seen = TypeVar("Seen", RawBoxes, RawLanes)
@@ -68,6 +71,12 @@ def detector_for(source: AnySource, spec: str | None = None) -> Detector:
     return open_detector(spec, picture_size(source))
 
 
+def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None:
+    """The lane detector for the source's pictures, as ``pipeline.path.lane_detector.open_lanes`` chooses it."""
+    camera = source.camera if is_live_source(source) else cast("Source", source).frame(0).camera
+    return open_lanes(spec, camera, is_simulated(source))
+
+
 def picture_size(source: AnySource) -> tuple[int, int] | None:
     """(width, height) of the source's pictures, from its first frame, of live ones from the calibration; null without
     picture and calibration."""
@@ -113,9 +122,41 @@ def advance(
 def run(
     source: Source, params: Params, detectors: Detectors, sensors: Sensors = "both"
 ) -> Iterator[tuple[Frame, Result]]:
-    """Each frame with its result. Without detectors LiDAR goes on alone."""
+    """Each frame of a recording with its result. Without detectors LiDAR goes on alone."""
+    return through((source.frame(index) for index in range(len(source))), params, detectors, sensors)
+
+
+def run_live(
+    source: LiveSource,
+    params: Params,
+    detectors: Detectors,
+    sensors: Sensors = "both",
+    on_silence: Callable[[], None] = lambda: None,
+) -> Iterator[tuple[Frame, Result]]:
+    """Each tick with its result, the newest only, for as long as it is asked for; the sensors are given back then.
+    on_silence: called while no sensor ticks, every half second."""
+    return through(_ticks(source, params, on_silence), params, detectors, sensors)
+
+
+def through(
+    frames: Iterable[Frame], params: Params, detectors: Detectors, sensors: Sensors = "both"
+) -> Iterator[tuple[Frame, Result]]:
+    """Each frame through the line, one after the other."""
     warm_up()
     state = State()
-    for index in range(len(source)):
-        frame, state, result = advance(state, source.frame(index), params, detectors, sensors)
-        yield frame, result
+    for frame in frames:
+        seen, state, result = advance(state, frame, params, detectors, sensors)
+        yield seen, result
+
+
+def _ticks(source: LiveSource, params: Params, on_silence: Callable[[], None]) -> Iterator[Frame]:
+    source.start()
+    try:
+        while True:
+            frame = source.next(_SILENCE_S, params.sync)
+            if frame is not None:
+                yield frame
+            else:
+                on_silence()
+    finally:
+        source.close()

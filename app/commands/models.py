@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.progress import bytes_progress
+from pipeline.path.lane_network import open_lane_network
 from pipeline.vision.detector import open_detector
 from pipeline.vision.models import ModelEntry, known_model, list_models, pull, register, store
 
@@ -48,7 +49,8 @@ class PullModel:
 
     def __call__(self) -> int:
         known = known_model(self.name)
-        print(f"{known.url}\n{known.size / 1e6:.1f} MB, licence {known.licence}, SHA-256 {known.sha256}")
+        if known.size is not None:
+            print(f"{known.url}\n{known.size / 1e6:.1f} MB, licence {known.licence}, SHA-256 {known.sha256}")
         with bytes_progress() as bar:
             task = bar.add_task(self.name, total=known.size)
             path = pull(self.name, lambda done, total: bar.update(task, completed=done, total=total))
@@ -75,6 +77,8 @@ class RegisterModel:
     def __call__(self) -> int:
         if self.task == "detector":
             open_detector(str(self.path), None)  # refuse here what no later run could use
+        else:
+            open_lane_network(str(self.path))
         print(f"{register(self.path, self.name, self.task, self.default)}: registered as {self.name}")
         return 0
 

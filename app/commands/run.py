@@ -4,18 +4,24 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import tyro
 
 from app.options import LineOptions, SourceOptions
 from app.progress import frames_progress
+from pipeline.params import Params
 from pipeline.results import write_line
-from pipeline.run import Detectors, run
-from pipeline.types import Result
+from pipeline.run import Detectors, run, run_live
+from pipeline.sources.base import AnySource, LiveSource, Source, is_live_source
+from pipeline.types import Frame, Result
+
+Ran = tuple[Frame, Result]
 
 
 @dataclass(frozen=True)
@@ -31,13 +37,16 @@ class Run:
     """Ablation: what a car with only this sensor would believe"""
     out: Path | None = None
     """Write one JSON object a frame here; - writes to standard output"""
+    frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Stop after so many frames; live sensors are run until Ctrl-C without it"""
     rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Write a rerun recording here"""
 
     def __call__(self) -> int:
         params = self.line.parameters()
-        source = self.source.open()
-        detector = self.line.open_detector(source, self.sensors) if self.sensors != "lidar" else None
+        live = self.source.open_live()
+        source: AnySource = live or self.source.open()
+        detectors = self.line.open_detectors(source, self.sensors)
         tally = _Tally()
         with ExitStack() as stack:
             out = None
@@ -50,8 +59,9 @@ class Run:
 
                 replay = stack.enter_context(RerunSink(self.rrd, source.title, params.alignment))
             bar = stack.enter_context(frames_progress())
-            task = bar.add_task(source.title, total=len(source))
-            for frame, result in run(source, params, Detectors(detector), self.sensors):
+            total = self.frames if is_live_source(source) else len(cast("Source", source))
+            task = bar.add_task(source.title, total=total)
+            for frame, result in _until_interrupted(self._results(source, params, detectors), live is not None):
                 if out is not None:
                     write_line(out, result)
                 elif replay is None:
@@ -62,6 +72,29 @@ class Run:
                 bar.advance(task)
         print(tally.sentence(), file=sys.stderr)
         return 0
+
+    def _results(self, source: AnySource, params: Params, detectors: Detectors) -> Iterator[Ran]:
+        """Frames with their results, as many as are wanted."""
+        if is_live_source(source):
+            live = source
+            every = run_live(live, params, detectors, self.sensors, lambda: _say_waiting(live))
+        else:
+            every = run(cast("Source", source), params, detectors, self.sensors)
+        return islice(every, self.frames)
+
+
+def _until_interrupted(results: Iterator[Ran], is_live: bool) -> Iterator[Ran]:
+    """All of them. Live sensors have no end of their own: there Ctrl-C is it, and all is well."""
+    try:
+        yield from results
+    except KeyboardInterrupt:
+        if not is_live:
+            raise
+
+
+def _say_waiting(live: LiveSource) -> None:
+    states = [f"{each.sensor} {each.state}" + (f" ({each.note})" if each.note else "") for each in live.health()]
+    print(f"cipv: waiting for sensors: {', '.join(states)}", file=sys.stderr)
 
 
 def _sentence(result: Result) -> str:

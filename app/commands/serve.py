@@ -13,8 +13,8 @@ from app.engine import Engine
 from app.options import LineOptions
 from app.scene_feed import SceneFeed
 from app.server import DEFAULT_PORT, serve
-from pipeline.run import detector_for
-from pipeline.sources import open_source
+from pipeline.run import detector_for, lanes_for
+from pipeline.sources import open_any
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Serve:
     """
 
     source: tyro.conf.Positional[str]
-    """What to open: astyx:<dir>, kitti:<dir> or sim:<scenario or my.yaml>"""
+    """What to open: astyx:<dir>, kitti:<dir>, sim:<scenario or my.yaml>, live:<config.yaml>, …"""
     server: ServerOptions = field(default_factory=ServerOptions)
     line: LineOptions = field(default_factory=LineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"
@@ -64,9 +64,9 @@ class Serve:
 
     def __call__(self) -> int:
         params = self.line.parameters()
-        open_source(self.source, rings=self.rings)  # a typing mistake is said here, not on the page
+        open_any(self.source, rings=self.rings)  # a typing mistake is said here, not on the page
         engine = Engine(
-            lambda uri: open_source(uri, rings=self.rings),
+            lambda uri: open_any(uri, rings=self.rings),
             lambda source: detector_for(source, self.line.detector),
             params,
             preset=self.line.preset,
@@ -74,6 +74,8 @@ class Serve:
             sensors=self.sensors,
             playing=True,
             whole_drives=True,
+            open_lanes=lambda source: lanes_for(source, self.line.lanes),
+            lanes_every=self.line.every(),
         )
         return self.server.serve(engine)
 

@@ -73,8 +73,8 @@ class Export:
             raise BadInput("nothing to write; say --rrd FILE, --mcap FILE or --csv FILE")
         source = self.source.open()
         first, last = _between(source, self.from_s, self.to_s)
-        params = self.line.parameters() if self.line != LineOptions(detector=self.line.detector) else None
-        detectors = Detectors(self.line.open_detector(source)) if wanted.keys() - {"mcap"} else Detectors()
+        params = self.line.parameters() if self.line.changes_parameters() else None
+        detectors = self.line.open_detectors(source) if wanted.keys() - {"mcap"} else Detectors()
         with frames_progress() as bar:
             for kind, path in wanted.items():
                 task = bar.add_task(path.name, total=last + 1 - first)

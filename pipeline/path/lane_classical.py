@@ -16,9 +16,7 @@ from pipeline.geometry import F64
 from pipeline.types import U8, CameraCalibration, RawLanes
 
 NAME = "classical"
-_NOTE = (
-    "lane lines by colour and gradient, without a network; for real roads pull one with `cipv models pull twinlitenet`"
-)
+_NOTE = "lane lines by colour and gradient (classical), without a network"
 _UNCALIBRATED_HORIZON = 0.57
 """Share of the picture's height at which a dashboard camera sees the horizon, where no calibration says it."""
 _CAMERA_HEIGHT_M = 1.4

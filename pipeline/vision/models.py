@@ -38,13 +38,14 @@ class ModelError(BadInput):
 
 @dataclass(frozen=True)
 class KnownModel:
-    """An official file. size in bytes."""
+    """An official file, size in bytes; or, where size and checksum are null, the project that has it: such a network is
+    fetched, or exported to ONNX, by hand and registered."""
 
     name: str
     task: Task
     url: str
-    size: int
-    sha256: str
+    size: int | None
+    sha256: str | None
     licence: str
     note: str
 
@@ -70,6 +71,18 @@ KNOWN: tuple[KnownModel, ...] = (
         "twinlitenet", "lanes", "https://github.com/harrylal/TwinLiteNet-onnx-opencv-dnn/raw/main/models/best.onnx",
         1_800_549, "f505b56bd7c9e4e38b2928373aa4daa191a9a398e07e1fb340024b9ce84d4285",
         "MIT", "BDD100K, lane lines and drivable area",
+    ),
+    KnownModel(
+        "yolop", "lanes", "https://github.com/hustvl/YOLOP", None, None,
+        "MIT", "BDD100K, lane lines, drivable area and cars; its weights/ folder has ONNX files",
+    ),
+    KnownModel(
+        "ufld", "lanes", "https://github.com/cfzd/Ultra-Fast-Lane-Detection", None, None,
+        "MIT", "CULane or TuSimple, up to four lines; export it to ONNX",
+    ),
+    KnownModel(
+        "enet_sad", "lanes", "https://github.com/InhwanBae/ENet-SAD_Pytorch", None, None,
+        "MIT", "BDD100K or CULane, the paper's network; export it to ONNX",
     ),
 )  # fmt: skip
 
@@ -173,6 +186,8 @@ def pull(name: str, progress: Progress | None = None) -> Path:
     """Fetch a known network into the folder; size and SHA-256 must be the official ones. A file that is already there
     and right is kept. ModelError says what went wrong; no part of a failed download stays."""
     known = known_model(name)
+    if known.size is None or known.sha256 is None:
+        raise ModelError(f"{name} has no official ONNX file; make one with {known.url} and use {_by_hand(known)}")
     target = store() / f"{name}.onnx"
     if target.is_file() and file_sha256(target) == known.sha256:
         return target
@@ -182,7 +197,7 @@ def pull(name: str, progress: Progress | None = None) -> Path:
         raise ModelError(f"{target.parent} cannot be made: {error.strerror or error}") from None
     part = target.with_suffix(".part")
     try:
-        _download(known, part, progress)
+        _download(known, known.size, part, progress)
         part.replace(target)
     finally:
         part.unlink(missing_ok=True)
@@ -195,18 +210,18 @@ def file_sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _download(known: KnownModel, part: Path, progress: Progress | None) -> None:
+def _download(known: KnownModel, size: int, part: Path, progress: Progress | None) -> None:
     digest, done = hashlib.sha256(), 0
     try:
         with urllib.request.urlopen(known.url, timeout=_TIMEOUT_S) as response, part.open("wb") as file:
             while chunk := response.read(_CHUNK):
                 done += len(chunk)
-                if done > known.size:
+                if done > size:
                     break
                 file.write(chunk)
                 digest.update(chunk)
                 if progress is not None:
-                    progress(done, known.size)
+                    progress(done, size)
     except urllib.error.HTTPError as error:
         error.close()
         raise ModelError(
@@ -217,10 +232,8 @@ def _download(known: KnownModel, part: Path, progress: Progress | None) -> None:
         raise ModelError(
             f"{known.name} cannot be fetched ({why}); without a network connection use {_by_hand(known)}"
         ) from None
-    if done != known.size:
-        raise ModelError(
-            f"{known.url} gave {'more than ' if done > known.size else f'{done} of '}{known.size} bytes; try again"
-        )
+    if done != size:
+        raise ModelError(f"{known.url} gave {'more than ' if done > size else f'{done} of '}{size} bytes; try again")
     if digest.hexdigest() != known.sha256:
         raise ModelError(
             f"{known.url} is not the official file: its SHA-256 is {digest.hexdigest()}, not {known.sha256}"
@@ -228,7 +241,8 @@ def _download(known: KnownModel, part: Path, progress: Progress | None) -> None:
 
 
 def _by_hand(known: KnownModel) -> str:
-    return f"`cipv models register PATH {known.name}`"
+    task = "" if known.task == "detector" else f" --task {known.task}"
+    return f"`cipv models register PATH {known.name}{task}`"
 
 
 def _located(name: str) -> Path | None:

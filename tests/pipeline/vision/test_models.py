@@ -192,9 +192,25 @@ def test_the_data_folder_is_looked_in_last(tmp_path: Path) -> None:
 def test_the_list_names_every_known_network_and_what_is_here(tmp_path: Path) -> None:
     *entries, embedded = models.list_models()
     assert embedded.name == "embedded"
-    assert [entry.name for entry in entries] == ["yolox_nano", "yolox_tiny", "yolox_s", "twinlitenet"]
+    assert [entry.name for entry in entries] == [
+        "yolox_nano",
+        "yolox_tiny",
+        "yolox_s",
+        "twinlitenet",
+        "yolop",
+        "ufld",
+        "enet_sad",
+    ]
     assert all(entry.path is None and not entry.default for entry in entries)
     assert all(entry.licence and entry.url and entry.url.startswith("https://github.com/") for entry in entries)
+
+
+def test_a_network_without_an_official_file_says_how_to_get_one() -> None:
+    with pytest.raises(
+        models.ModelError, match=r"make one with https://\S+ and use `cipv models register PATH ufld --task lanes`"
+    ):
+        models.pull("ufld")
+    assert _files() == []
 
 
 def test_a_damaged_registry_is_named(tmp_path: Path) -> None:

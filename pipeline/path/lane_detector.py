@@ -1,0 +1,34 @@
+"""Which lane detector looks at pictures: a network where one is named or installed, else the classical one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pipeline.path.lane_classical import NAME as CLASSICAL
+from pipeline.path.lane_classical import ClassicalLanes, open_classical
+from pipeline.path.lane_network import LaneNetwork, open_lane_network
+from pipeline.types import CameraCalibration
+from pipeline.vision.runtime import find_graph
+
+OFF = "off"
+LaneDetector = LaneNetwork | ClassicalLanes
+_REMEDY = "; for real roads pull a network with `cipv models pull twinlitenet`"
+
+
+def open_lanes(spec: str | None, camera: CameraCalibration | None, drawn: bool = False) -> LaneDetector | None:
+    """The named lane detector: a network's name or file, ``classical``, or ``off``, which is none. Without a name: the
+    default network if one is here, except for drawn pictures, whose paint the classical one sees as well at a tenth of
+    the cost. camera: of the pictures; null where it is not known.
+
+    DetectorMissing when the named one is not here, DetectorError when it cannot be run.
+    """
+    if spec == OFF:
+        return None
+    if spec is not None and spec != CLASSICAL:
+        return open_lane_network(spec)
+    if spec is None and not drawn and find_graph(None, "lanes") is not None:
+        return open_lane_network(None)
+    classical = open_classical(camera)
+    if spec is None and not drawn:
+        return replace(classical, notes=tuple(note + _REMEDY for note in classical.notes))
+    return classical
