@@ -2,6 +2,9 @@
 import { $, el, text } from "./dom.js";
 import { get, on } from "./store.js";
 
+/** @typedef {import("./types.js").Notice & {fixed?: boolean}} Shown  fixed: it goes by itself, not by hand */
+
+/** @type {Set<string>} */
 const dismissed = new Set();
 let shown = "";
 
@@ -24,13 +27,14 @@ function update() {
   $("#notices").replaceChildren(...notices.map(notice));
 }
 
+/** @param {{status: string, since: number}|null} link @returns {Shown[]} */
 function lost(link) {
   if (link?.status !== "lost") return [];
   const seconds = Math.round((Date.now() - link.since) / 1000);
   return [{ level: "error", text: `Connection lost ${seconds} s ago. What you see is old; trying to reach the server again.`, fixed: true }];
 }
 
-/** What holds for the whole recording; plain information shares one line. */
+/** What holds for the whole recording; plain information shares one line. @returns {Shown[]} */
 function standing() {
   const notices = get("state")?.notices ?? [];
   const infos = notices.filter(({ level }) => level === "info").map(({ text: words }) => words);
@@ -38,11 +42,12 @@ function standing() {
   return infos.length ? [...rest, { level: "info", text: infos.join(" · ") }] : rest;
 }
 
-/** What the shown frame lacks; it goes with the frame. */
+/** What the shown frame lacks; it goes with the frame. @returns {Shown[]} */
 function ofFrame() {
   return (get("frame")?.result.notes ?? []).map((words) => ({ level: "warning", text: words, fixed: true }));
 }
 
+/** @param {Shown} notice */
 function notice({ level, text: words, fixed }) {
   const close = () => {
     dismissed.add(words);

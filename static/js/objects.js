@@ -1,37 +1,47 @@
 /** The table of fused objects: one row each, sorted, with the reason why it is the CIPV or why not. */
 import { cipvId } from "./colors.js";
-import { $, el, text } from "./dom.js";
+import { $, el, mark, text, within } from "./dom.js";
 import { DASH, kmh, num, side, signed } from "./format.js";
 import { get, on, paint, select, set } from "./store.js";
 
 /** @typedef {import("./types.js").FusedObject} FusedObject */
+/**
+ * @typedef {object} Column
+ * @property {string} key
+ * @property {string} label
+ * @property {string} help
+ * @property {(o: FusedObject) => string} words  what a cell says
+ * @property {(o: FusedObject) => string|number} by  what it is sorted by
+ */
 
-/** key, heading, help, text of a cell, what it is sorted by. */
+/** @type {Column[]} */
 const COLUMNS = [
-  ["id", "#", "Number of the object; it keeps it while it is tracked", (o) => `#${o.id}`, (o) => o.id],
-  ["source", "Seen", "V camera, L LiDAR, VL both", (o) => o.source, (o) => o.source],
-  ["type", "Class", "What the detector calls it, and its score", (o) => (o.type ? `${o.type} ${num(o.type_score, 2)}` : DASH), (o) => o.type ?? "~"],
-  ["distance", "Distance", "To its nearest point, with one sigma, metres", distance, (o) => o.distance_m ?? Infinity],
-  ["velocity", "Closing", "Closing speed, km/h: positive while the gap shrinks", (o) => (closing(o) === null ? DASH : signed(kmh(closing(o)))), (o) => -(closing(o) ?? -Infinity)],
-  ["ttc", "TTC", "Time to collision, seconds; a dash when the gap does not shrink", (o) => num(o.ttc_s), (o) => o.ttc_s ?? Infinity],
-  ["offset", "Offset", "From the middle of the path, metres to the left or right", (o) => side(o.path_offset_m), (o) => Math.abs(o.path_offset_m ?? Infinity)],
-  ["inPath", "In path", "Inside our corridor, and how probable that is", inPath, (o) => -(o.in_path_probability ?? Number(o.in_path))],
-  ["hits", "Hits", "Sightings so far", (o) => String(o.hits), (o) => -o.hits],
-  ["points", "Points", "LiDAR points on it", (o) => (o.lidar_points ? String(o.lidar_points) : DASH), (o) => -o.lidar_points],
-  ["reason", "Why, or why not", "", null, null],
+  { key: "id", label: "#", help: "Number of the object; it keeps it while it is tracked", words: (o) => `#${o.id}`, by: (o) => o.id },
+  { key: "source", label: "Seen", help: "V camera, L LiDAR, VL both", words: (o) => o.source, by: (o) => o.source },
+  { key: "type", label: "Class", help: "What the detector calls it, and its score", words: (o) => (o.type ? `${o.type} ${num(o.type_score, 2)}` : DASH), by: (o) => o.type ?? "~" },
+  { key: "distance", label: "Distance", help: "To its nearest point, with one sigma, metres", words: distance, by: (o) => o.distance_m ?? Infinity },
+  { key: "velocity", label: "Closing", help: "Closing speed, km/h: positive while the gap shrinks", words: (o) => signed(kmh(closing(o))), by: (o) => -(closing(o) ?? -Infinity) },
+  { key: "ttc", label: "TTC", help: "Time to collision, seconds; a dash when the gap does not shrink", words: (o) => num(o.ttc_s), by: (o) => o.ttc_s ?? Infinity },
+  { key: "offset", label: "Offset", help: "From the middle of the path, metres to the left or right", words: (o) => side(o.path_offset_m), by: (o) => Math.abs(o.path_offset_m ?? Infinity) },
+  { key: "inPath", label: "In path", help: "Inside our corridor, and how probable that is", words: inPath, by: (o) => -(o.in_path_probability ?? Number(o.in_path)) },
+  { key: "hits", label: "Hits", help: "Sightings so far", words: (o) => String(o.hits), by: (o) => -o.hits },
+  { key: "points", label: "Points", help: "LiDAR points on it", words: (o) => (o.lidar_points ? String(o.lidar_points) : DASH), by: (o) => -o.lidar_points },
 ];
+const TEXTS = new Set(["id", "source", "type"]);
 
-/** Null key: what matters first. */
+/** Null key: what matters first. @type {{key: string|null, down: boolean}} */
 let sort = { key: null, down: false };
-/** @type {Map<number, {row: HTMLTableRowElement, cells: Record<string, HTMLElement>}>} */
+/** @typedef {{row: HTMLTableRowElement, cells: Record<string, HTMLElement>, reason: HTMLElement}} Row */
+/** @type {Map<number, Row>} */
 const rows = new Map();
 const body = $("#objects tbody");
 
 export function setUp() {
-  $("#objects thead").append(el("tr", {}, ...COLUMNS.map(heading)));
+  const last = el("th", { scope: "col", class: "left reason" }, el("button", { type: "button", textContent: "Why, or why not", disabled: true }));
+  $("#objects thead").append(el("tr", {}, ...COLUMNS.map(heading), last));
   paint(["frame", "selection"], update);
-  on(["selection"], () => rows.get(get("selection"))?.row.scrollIntoView({ block: "nearest" }));
-  body.addEventListener("click", (event) => pick(event.target.closest("tr")));
+  on(["selection"], () => rows.get(get("selection") ?? -1)?.row.scrollIntoView({ block: "nearest" }));
+  body.addEventListener("click", (event) => pick(within(event, "tr")));
   body.addEventListener("keydown", onKey);
   reflectSort();
 }
@@ -54,13 +64,13 @@ function inPath(o) {
   return `${o.in_path ? "yes" : "no"}${share}`;
 }
 
-function heading([key, label, help, , by]) {
-  const isText = ["id", "source", "type", "reason"].includes(key);
-  if (!by) return el("th", { scope: "col", class: "left" }, el("button", { type: "button", textContent: label, disabled: true }));
+/** @param {Column} column */
+function heading({ key, label, help }) {
   const button = el("button", { type: "button", textContent: label, title: help, onclick: () => sortBy(key) });
-  return el("th", { scope: "col", class: isText ? "left" : "", data: { key } }, button);
+  return el("th", { scope: "col", class: TEXTS.has(key) ? "left" : "", data: { key } }, button);
 }
 
+/** @param {string} key */
 function sortBy(key) {
   if (sort.key !== key) sort = { key, down: false };
   else sort = sort.down ? { key: null, down: false } : { key, down: true };
@@ -70,7 +80,7 @@ function sortBy(key) {
 
 function reflectSort() {
   for (const th of document.querySelectorAll("#objects th[data-key]")) {
-    if (th.dataset.key === sort.key) th.setAttribute("aria-sort", sort.down ? "descending" : "ascending");
+    if (/** @type {HTMLElement} */ (th).dataset.key === sort.key) th.setAttribute("aria-sort", sort.down ? "descending" : "ascending");
     else th.removeAttribute("aria-sort");
   }
 }
@@ -81,7 +91,7 @@ function update() {
   const { objects, rejected, cipv } = frame.result;
   const reasons = new Map(rejected.map(({ id, reason }) => [id, reason]));
   if (cipv) reasons.set(cipv.id, cipv.reason);
-  const by = COLUMNS.find(([key]) => key === sort.key)?.[4] ?? ((o) => relevance(o, cipv?.id));
+  const by = COLUMNS.find(({ key }) => key === sort.key)?.by ?? ((/** @type {FusedObject} */ o) => relevance(o, cipv?.id));
   const order = [...objects].sort((a, b) => compare(by(a), by(b)) * (sort.down ? -1 : 1) || a.id - b.id);
   const present = new Set(objects.map(({ id }) => id));
   for (const [id, { row }] of rows) {
@@ -93,57 +103,64 @@ function update() {
     const { row } = fill(item, reasons.get(item.id) ?? "");
     if (body.children[place] !== row) body.insertBefore(row, body.children[place] ?? null);
   });
-  const count = (source) => objects.filter((o) => o.source === source).length;
+  const count = (/** @type {string} */ source) => objects.filter((o) => o.source === source).length;
   text($("#object-facts"), `${objects.length}: ${count("VL")} VL · ${count("V")} V · ${count("L")} L`);
 }
 
-/** The CIPV, then what is in the path, then what a camera sees, then the rest; nearer first among equals. */
+/** The CIPV, then what is in the path, then what a camera sees, then the rest; nearer first among equals. @param {FusedObject} item @param {number|undefined} lead */
 function relevance(item, lead) {
   const group = item.id === lead ? 0 : item.in_path ? 1 : item.source !== "L" && !item.carried ? 2 : 3;
   return group * 1000 + Math.min(item.distance_m ?? 999, 999);
 }
 
+/** @param {string|number} a @param {string|number} b */
 const compare = (a, b) => (a < b ? -1 : a > b ? 1 : 0);
 
-/** @param {FusedObject} item @param {string} reason */
-function fill(item, reason) {
+/** @param {FusedObject} item @param {string} why */
+function fill(item, why) {
   const held = rows.get(item.id) ?? create(item.id);
-  const { row, cells } = held;
+  const { row, cells, reason } = held;
   row.classList.toggle("is-cipv", item.id === cipvId());
   row.classList.toggle("is-selected", item.id === get("selection"));
   row.classList.toggle("is-carried", item.carried);
   row.setAttribute("aria-selected", String(item.id === get("selection")));
-  for (const [key, , , words] of COLUMNS) if (words) text(cells[key], words(item));
-  cells.source.dataset.source = item.source;
+  for (const { key, words } of COLUMNS) text(cells[key], words(item));
+  mark(cells.source, "source", item.source);
   cells.inPath.className = item.in_path ? "yes" : "no";
-  text(cells.reason, item.carried ? `carried, not seen in this frame · ${reason}` : reason);
-  cells.reason.title = cells.reason.textContent;
+  const words = item.carried ? `carried, not seen in this frame · ${why}` : why;
+  if (reason.title !== words) {
+    text(reason, words);
+    reason.title = words;
+  }
   return held;
 }
 
+/** @param {number} id @returns {Row} */
 function create(id) {
+  /** @type {Record<string, HTMLElement>} */
   const cells = {};
-  const row = el("tr", { tabIndex: 0, data: { id } }, ...COLUMNS.map(([key]) => {
+  const reason = el("td", { class: "reason" });
+  const row = el("tr", { tabIndex: 0, data: { id } }, ...COLUMNS.map(({ key }) => {
     if (key === "source") return el("td", { class: "left" }, (cells[key] = el("span", { class: "pill" })));
-    const isLeft = key === "type";
-    const kind = key === "reason" ? "reason" : key === "id" ? "id" : isLeft ? "left" : "";
-    return (cells[key] = el("td", { class: kind, data: { key } }));
-  }));
-  const held = { row, cells };
+    return (cells[key] = el("td", { class: key === "id" ? "id" : TEXTS.has(key) ? "left" : "", data: { key } }));
+  }), reason);
+  const held = { row, cells, reason };
   rows.set(id, held);
   return held;
 }
 
+/** @param {HTMLElement|null} row */
 function pick(row) {
   if (row) select(Number(row.dataset.id));
 }
 
+/** @param {KeyboardEvent} event */
 function onKey(event) {
-  const row = event.target.closest("tr");
+  const row = within(event, "tr");
   if (!row) return;
   if (event.key === "Enter") pick(row);
-  const next = { ArrowDown: row.nextElementSibling, ArrowUp: row.previousElementSibling }[event.key];
-  if (next) {
+  const next = event.key === "ArrowDown" ? row.nextElementSibling : event.key === "ArrowUp" ? row.previousElementSibling : null;
+  if (next instanceof HTMLElement) {
     next.focus();
     set("selection", Number(next.dataset.id));
     event.preventDefault();

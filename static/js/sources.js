@@ -3,14 +3,15 @@ import { request } from "./api.js";
 import { $, el, text } from "./dom.js";
 import { get, on } from "./store.js";
 
-const dialog = $("#source-dialog");
+const dialog = $("#source-dialog", HTMLDialogElement);
 
 export function setUp() {
   $("#source-button").addEventListener("click", open);
-  on(["state"], () => text($("#source-title"), get("state").title || get("state").uri || "no recording"));
+  on(["state"], () => text($("#source-title"), get("state")?.title || get("state")?.uri || "no recording"));
 }
 
 export async function open() {
+  /** @type {{sources: {uri: string, title: string}[], open: string|null}} */
   const { sources, open: current } = await request("api/sources").catch(() => ({ sources: [], open: null }));
   const field = el("input", { type: "text", name: "uri", value: current ?? "", placeholder: "astyx:<folder>, kitti:<folder>, sim:<scenario>", aria: { label: "Address of a recording" }, spellcheck: false });
   const form = el("form", { class: "open-row", method: "dialog" }, field, el("button", { textContent: "Open" }));
@@ -25,6 +26,7 @@ export async function open() {
   field.select();
 }
 
+/** @param {string} uri */
 function choose(uri) {
   dialog.close();
   if (uri.trim()) request("api/source", "POST", { uri }).catch(() => {});

@@ -8,10 +8,11 @@ const tip = $("#tooltip");
 export function attachTooltip(node, words) {
   node.addEventListener("pointerenter", () => show(node, words));
   node.addEventListener("pointerleave", hide);
-  const field = node instanceof HTMLLabelElement ? node.parentElement.parentElement : node;
+  const field = node instanceof HTMLLabelElement ? node.parentElement?.parentElement : node;
   field?.addEventListener("focusout", hide);
 }
 
+/** @param {HTMLElement} node @param {string} words */
 function show(node, words) {
   tip.textContent = words;
   tip.hidden = false;

@@ -10,6 +10,7 @@ const ITEMS = [
   ["line", "line", "Milliseconds that the stages took, without the network", "optional"],
   ["net", "net", "Milliseconds of the network; 0 when its boxes were cached", "optional"],
 ];
+/** @type {Record<string, HTMLElement>} */
 const values = {};
 /** @type {number[]} */
 let painted = [];
@@ -23,6 +24,7 @@ export function setUp() {
 
 function afterPaint() {
   const frame = get("frame");
+  if (!frame) return;
   painted.push(performance.now());
   text(values.age, frame.isLate ? "–" : num(Math.max(0, serverNow() - frame.madeUnixMs), 0));
   text(values.line, num(frame.result.timing_ms.total, 1));
