@@ -20,7 +20,7 @@ from pipeline.lidar import boxes, cluster, deskew, downsample, ground
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.lidar import warm_up as warm_up_lidar
 from pipeline.params import Params
-from pipeline.path import corridor
+from pipeline.path import corridor, lanes
 from pipeline.types import (
     CameraCalibration,
     Frame,
@@ -44,6 +44,7 @@ class State:
     lidar: lidar_tracking.LidarTrackerState = lidar_tracking.LidarTrackerState()
     vision: vision_tracking.VisionTrackerState = vision_tracking.VisionTrackerState()
     fusion: fusion.FusionState = fusion.FusionState()
+    lanes: lanes.LaneState = lanes.LaneState()
     path: corridor.PathState = corridor.PathState()
     cipv: cipv.CipvState = cipv.CipvState()
     acc: acc.AccState = acc.AccState()
@@ -76,8 +77,10 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     )
     clock.lap("fusion")
     objects = motion.describe(fused.objects, frame.ego, params.motion)
+    lane_state, lane = lanes.follow(state.lanes, frame.raw_lanes, aligned, seen.ground, frame.ego, dt_s, params.lanes)
+    clock.lap("lanes")
     path_state, path = corridor.predict(
-        state.path, frame.ego, None, frame.gnss, frame.route, frame.t_ns, dt_s, params.path
+        state.path, frame.ego, lane, frame.gnss, frame.route, frame.t_ns, dt_s, params.path
     )
     clock.lap("path")
     cipv_state, chosen = cipv.choose(state.cipv, objects, path, frame.ego, dt_s, params.cipv)
@@ -111,10 +114,11 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
             lidar_boxes=fused.lidar_boxes,
             vision_boxes=fused.vision_boxes,
             ground=seen.ground,
+            lanes=lane,
         ),
     )
     return State(
-        frame.t_ns, lidar_state, vision_state, fusion_state, path_state, cipv_state, acc_state, aeb_state
+        frame.t_ns, lidar_state, vision_state, fusion_state, lane_state, path_state, cipv_state, acc_state, aeb_state
     ), result
 
 
@@ -123,6 +127,7 @@ def warm_up() -> None:
     warm_up_lidar()
     one = np.eye(2)
     kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)
+    lanes.warm_up()
     corridor.warm_up()
 
 

@@ -161,6 +161,13 @@ def _polyline(line: LaneLine | None) -> F64:
     return np.column_stack([x, line.y_m(x)])
 
 
+def warm_up() -> None:
+    """Compile the kernels before the first picture."""
+    seen = Sightings(np.zeros(20), np.linspace(0.05, 0.2, 20), np.ones(20), 1.0)
+    shape, _ = lane_fit.shared_shape(seen, Shape())
+    lane_fit.fit_line(seen, 0.0, shape, 1e-3)
+
+
 def _drifted(pitch: Pitch | None, dt_s: float | None, params: LaneParams) -> Pitch:
     """The pitch as believed now: towards its calibration and less sure as time passes."""
     start = float(np.radians(params.pitch_sigma_deg))
