@@ -16,11 +16,13 @@ from typing import NamedTuple
 
 from pipeline.motion import closing_speed_mps
 from pipeline.params import CipvParams
-from pipeline.path.placing import Place, place
+from pipeline.path.placing import Place, believed_mps, place
 from pipeline.records import evolve
 from pipeline.types import VEHICLES, Cipv, EgoState, FusedObject, Gate, Path, Rejection
 
 AGREEMENT_SIGMAS = 3.0
+_HALF_WAY = 0.7
+"""A running mean has turned half way after 0.7 of its time: what moves sideways is judged where it will be by then."""
 STAYS_AT = 0.5
 """The lead stays it while its probability to be in the path is above this share of what a new one needs."""
 
@@ -77,7 +79,8 @@ def choose(
         where, crossing_s = placed if placed is not None else (None, None)
         leads = item.id == state.lead_id
         if where is not None:
-            now = where.log_odds(_widening_m(leads, params))
+            moves_m = believed_mps(where.sideways_mps, item) * params.decide_s * _HALF_WAY
+            now = where.log_odds(_widening_m(leads, params), moves_m)
             before = state.odds.get(item.id, now)
             odds[item.id] = before + fresh * (now - before)
         candidate = Candidate(item, where, odds.get(item.id, 0.0), leads, path, params)

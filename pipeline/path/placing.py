@@ -28,6 +28,8 @@ SIDEWAYS_SIGMA_MPS = 0.5
 """What a tracked cluster's sideways speed may be off by: only what exceeds it is believed."""
 CAMERA_SIDEWAYS_PER_S = 0.02
 """The same of a box, a metre of distance: it is placed by its bearing, and swings with its estimated distance."""
+_SLANTED = 0.64
+"""Turned by more than 20° from along or across the path, as |sin 2φ|."""
 SURE = 4.0
 """Log-odds beyond which nothing gets surer: the sigmas themselves are not known that well."""
 
@@ -69,12 +71,14 @@ class Place:
         high, low = (self.left_m - self.middle_m) / self.sigma_m, (-self.right_m - self.middle_m) / self.sigma_m
         return float(ndtr(high) - ndtr(low))
 
-    def log_odds(self, extra_m: float) -> float:
+    def log_odds(self, extra_m: float, moves_m: float) -> float:
         """What this sighting says for (positive) or against its being in the path: the log of the likelihood ratio of
-        where it was seen against the nearest place on the other side of the edge, ±4 at most."""
+        where it was seen against the nearest place on the other side of the edge, ±4 at most. moves_m: how far to the
+        left it is taken to have moved on."""
         if self.ahead_m <= 0.0:
             return -SURE
-        margin = self.margin_m(extra_m)
+        middle = self.middle_m + moves_m
+        margin = min(self.left_m + extra_m - middle, self.right_m + extra_m + middle)
         surety = min(0.5 * (margin / self.sigma_m) ** 2, SURE)
         return surety if margin >= 0.0 else -surety
 
@@ -112,11 +116,13 @@ def place(
         return [None] * len(objects)
     points = np.array([_outline(item) for item in known])  # (N, 5, 2): middle of the near face, four corners
     offsets, reached = (row.reshape(-1, 5) for row in nearest_on_path(path, points.reshape(-1, 2)))
-    low, high = offsets[:, 1:].min(axis=1), offsets[:, 1:].max(axis=1)
     ahead = reached[:, 0]
     k = np.clip(ahead.astype(np.intp), 0, len(path.center) - 2)
     way = path.center[k + 1] - path.center[k]
     heading = np.arctan2(way[:, 1], way[:, 0])
+    # columns 1 and 2 are the nearest face; the far corners count for what stands across the path
+    offsets[:, 3:] = np.where(_stands_across(known, heading)[:, None], offsets[:, 3:], offsets[:, 1:3])
+    low, high = offsets[:, 1:].min(axis=1), offsets[:, 1:].max(axis=1)
     half_left, half_right = _half_widths(path, k)
     needed = np.minimum(params.min_overlap_m, 0.5 * (high - low))
     spare = 0.5 * (high - low) - needed
@@ -128,39 +134,47 @@ def place(
         path_sigma.tolist(),
         half_left.tolist(),
         half_right.tolist(),
-        zip(offsets[:, 0].tolist(), ahead.tolist(), low.tolist(), high.tolist(), strict=True),
+        offsets[:, 0].tolist(),
+        ahead.tolist(),
+        zip(low.tolist(), high.tolist(), strict=True),
         (half_left + spare).tolist(),
         (half_right + spare).tolist(),
         strict=True,
     )
     placed = []
-    for item, near, direction, sigma, edge_left, edge_right, where, left, right in rows:
+    for item, near, direction, sigma, edge_left, edge_right, offset, along, (lowest, highest), left, right in rows:
         sideways = _sideways_mps(item, near, direction, ego)
-        there = Place(*where, left, right, hypot(sigma, _sigma_m(item, near, direction)), sideways)
+        both = hypot(sigma, _sigma_m(item, near, direction))
+        there = Place(offset, along, lowest, highest, left, right, both, sideways)
         placed.append((there, there.crossing_s(believed_mps(sideways, item), edge_left, edge_right)))
     following = iter(placed)
     return [next(following) if item.bev is not None else None for item in objects]
 
 
-def near_face(bev: tuple[Point2, Point2, Point2, Point2]) -> tuple[Point2, Point2]:
-    """The two corners of the side that faces the ego origin."""
-    a, b = sorted(bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)[:2]
-    return a, b
-
-
 def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
     """The middle of the side that faces the ego origin: between the two nearest corners."""
-    (ax, ay), (bx, by) = near_face(bev)
+    (ax, ay), (bx, by), *_ = _nearest_first(bev)
     return (ax + bx) / 2, (ay + by) / 2
 
 
+def _nearest_first(bev: tuple[Point2, Point2, Point2, Point2]) -> list[Point2]:
+    return sorted(bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)
+
+
 def _outline(item: FusedObject) -> list[Point2]:
-    """The middle of the nearest face, and what the object reaches over: all its corners where the LiDAR measured them;
-    else the nearest face alone, since how a vehicle that only the camera sees is turned is a guess."""
+    """The middle of the nearest face and all corners, nearest first."""
     assert item.bev is not None
-    a, b = near_face(item.bev)
-    middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
-    return [middle, a, b, a, b] if item.source == "V" else [middle, *item.bev]
+    corners = _nearest_first(item.bev)
+    (ax, ay), (bx, by) = corners[:2]
+    return [((ax + bx) / 2, (ay + by) / 2), *corners]
+
+
+def _stands_across(items: Sequence[FusedObject], heading: F64) -> np.ndarray:
+    """(N,) whether an object the LiDAR measured stands slantwise to the path, as one that turns across it does. Of what
+    drives along, the nearest face says better where it is: how long it is and how it is turned are known poorly."""
+    yaw = np.array([item.cuboid.yaw_rad if item.cuboid is not None else np.nan for item in items])
+    with np.errstate(invalid="ignore"):
+        return np.abs(np.sin(2.0 * (yaw - heading))) > _SLANTED
 
 
 def _half_widths(path: Path, k: np.ndarray) -> tuple[F64, F64]:
