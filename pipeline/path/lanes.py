@@ -27,8 +27,10 @@ from pipeline.types import I32, EgoState, RawLanes
 Seed = tuple[float, Sightings]
 
 _MIN_POINTS = 12
-_NEAR_M, _FAR_M = 6.0, 20.0
-"""Where the LiDAR's ground is asked for the road's height."""
+_NEAR_M, _FAR_M = 5.0, 12.0
+"""Where the LiDAR's ground is asked for the road's height: its rings lie dense there."""
+_PLANE_GAIN = 0.1
+"""Share by which one sweep moves the road's plane: one fit errs by centimetres, the car's stance changes slowly."""
 _UNPARALLEL = 0.004
 """Real lines of one road differ this much in heading, radians."""
 _FLATNESS_RAD = 0.003
@@ -62,11 +64,13 @@ class LaneMeasurement:
 
 @dataclass(frozen=True, eq=False)
 class LaneState:
-    """What one frame leaves to the next. plane: (3,) a, b, c of the road z = a·x + b·y + c as last seen."""
+    """What one frame leaves to the next. plane: (3,) a, b, c of the road z = a·x + b·y + c, the mean of
+    late, and sweeps: how many it is of; null before one showed it."""
 
     tracks: lane_tracking.LaneTracks = lane_tracking.LaneTracks()
     pitch: Pitch | None = None
     plane: F64 | None = None
+    sweeps: int = 0
 
 
 def follow(
@@ -80,8 +84,7 @@ def follow(
 ) -> tuple[LaneState, EgoLane | None]:
     """One frame: measure if a lane detector has looked at it, and track. Null until one has. ground: of this frame's
     sweep, if any. dt_s: since the frame before; null at the start."""
-    plane = road_plane(ground)
-    plane = plane if plane is not None else state.plane
+    plane, sweeps = _settled(state, road_plane(ground))
     road = plane if plane is not None else np.array([0.0, 0.0, -params.mount_height_m])
     pitch = _drifted(state.pitch, dt_s, params)
     measured = None
@@ -92,7 +95,7 @@ def follow(
     if measured is not None:
         tracks = lane_tracking.update(tracks, measured.source, measured.lines, params)
     lane = lane_tracking.ego_lane(tracks, pitch.rad, road, params)
-    return LaneState(tracks, pitch, plane), lane
+    return LaneState(tracks, pitch, plane, sweeps), lane
 
 
 def measure(
@@ -133,6 +136,14 @@ def road_plane(ground: Ground | None) -> F64 | None:
         return None
     along = (z[1] - z[0]) / (_FAR_M - _NEAR_M)
     return np.array([along, (z[2] - z[3]) / 4.0, z[0] - along * _NEAR_M])
+
+
+def _settled(state: LaneState, seen: F64 | None) -> tuple[F64 | None, int]:
+    """The plane after one more sweep, and of how many it is."""
+    if seen is None or state.plane is None:
+        return (state.plane, state.sweeps) if seen is None else (seen, 1)
+    gain = max(_PLANE_GAIN, 1.0 / (state.sweeps + 1))
+    return state.plane + gain * (seen - state.plane), state.sweeps + 1
 
 
 def polylines(lane: EgoLane) -> dict[str, F64]:
