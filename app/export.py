@@ -60,10 +60,10 @@ def export_clip(
     recorded = source.params(first) if isinstance(source, SessionSource) else None
     run = _run(source, first, last, params or recorded or Params(), detectors, progress)
     if kind == "rrd":
-        return _to_rrd(source, run, out, params or recorded or Params())
+        return write_rrd(source.title, run, out, params or recorded or Params())
     if params is None and isinstance(source, SessionSource) and source.result(first) is not None:
-        return _to_csv((source.result(index) for index in range(first, last + 1)), out)
-    return _to_csv((to_json(result) for _, result in run), out)
+        return write_csv((source.result(index) for index in range(first, last + 1)), out)
+    return write_csv((to_json(result) for _, result in run), out)
 
 
 def rows(result: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -104,15 +104,17 @@ def _run(
             progress(index + 1 - first, last + 1 - first)
 
 
-def _to_rrd(source: Source, run: Iterable[tuple[Frame, Result]], out: Path, params: Params) -> None:
+def write_rrd(title: str, run: Iterable[tuple[Frame, Result]], out: Path, params: Params) -> None:
+    """A replay for the rerun viewer."""
     from app.views.rerun_view import RerunSink  # half a second to import: only who asks pays
 
-    with RerunSink(out, source.title, params.alignment) as sink:
+    with RerunSink(out, title, params.alignment) as sink:
         for frame, result in run:
             sink.show(frame, result)
 
 
-def _to_csv(results: Iterable[dict[str, Any] | None], out: Path) -> None:
+def write_csv(results: Iterable[dict[str, Any] | None], out: Path) -> None:
+    """A row for each object of each result; null: a frame without one."""
     with out.open("w", encoding="utf-8", newline="") as file:
         table = csv.DictWriter(file, _COLUMNS)
         table.writeheader()

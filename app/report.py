@@ -41,7 +41,7 @@ def html(sections: Iterable[Section], title: str, replays: str = "") -> str:
     """The whole report. replays: what leads from it to the folder of the drives behind it, where they were kept."""
     sections = list(sections)
     links = "".join(f'<a href="#{escape(each.name)}">{escape(each.name)}</a>' for each in sections)
-    return page(title, f"<nav>{links}</nav>{''.join(_section(each, replays) for each in sections)}")
+    return page(title, f"<nav>{links}</nav>{''.join(section_html(each, replays) for each in sections)}")
 
 
 def page(title: str, body: str) -> str:
@@ -53,7 +53,8 @@ def page(title: str, body: str) -> str:
     )
 
 
-def _section(section: Section, replays: str) -> str:
+def section_html(section: Section, replays: str = "") -> str:
+    """One section, for a page of one's own."""
     return (
         f'<section id="{escape(section.name)}"><h2>{escape(section.title)}</h2>'
         + "".join(f"<p>{escape(paragraph)}</p>" for paragraph in section.text)
