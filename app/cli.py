@@ -5,44 +5,37 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from importlib import import_module
+from typing import Any
 
 import tyro
 
-from app.commands.bench import Bench
-from app.commands.calibrate import Calibrate
-from app.commands.models import Models
-from app.commands.params import ListParams
-from app.commands.run import Run
-from app.commands.scenarios import Scenarios
-from app.commands.serve import Demo, Serve
 from pipeline.errors import BadInput
 
-COMMANDS: dict[str, Callable[..., Callable[[], int]]] = {
-    "demo": Demo,
-    "serve": Serve,
-    "run": Run,
-    "models": Models,
-    "params": ListParams,
-    "calibrate": Calibrate,
-    "scenarios": Scenarios,
-    "bench": Bench,
+COMMANDS = {
+    "demo": "app.commands.serve:Demo",
+    "serve": "app.commands.serve:Serve",
+    "run": "app.commands.run:Run",
+    "live": "app.commands.live:Live",
+    "replay": "app.commands.replay:Replay",
+    "models": "app.commands.models:Models",
+    "params": "app.commands.params:ListParams",
+    "calibrate": "app.commands.calibrate:Calibrate",
+    "scenarios": "app.commands.scenarios:Scenarios",
+    "bench": "app.commands.bench:Bench",
 }
+"""Name → module and class. Only what was typed is imported: all together take seconds."""
 
+_CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
 _NAMED_WRONG = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)
 """A path that a person named cannot be used; any other failure of the system is not their doing."""
 
 
 def main(arguments: list[str] | None = None) -> None:
     """Entry point of the console script."""
-    command = tyro.extras.subcommand_cli_from_dict(
-        COMMANDS,
-        args=arguments,
-        prog="cipv",
-        description="CIPV Studio: which vehicle ahead is the closest one in my path, how far, how fast, and why.",
-        config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
-    )
+    typed = sys.argv[1:] if arguments is None else arguments
     try:
-        raise SystemExit(command())
+        raise SystemExit(_parse(typed)())
     except BadInput as error:
         print(f"cipv: {error}", file=sys.stderr)
         raise SystemExit(2) from None
@@ -60,3 +53,22 @@ def main(arguments: list[str] | None = None) -> None:
             raise
         print(f"cipv: {type(error).__name__}: {error} (CIPV_DEBUG=1 shows where)", file=sys.stderr)
         raise SystemExit(1) from None
+
+
+def _parse(arguments: list[str]) -> Callable[[], int]:
+    """The command that was typed, with its options. SystemExit after help, and with 2 for bad usage."""
+    if arguments and arguments[0] in COMMANDS:
+        name = arguments[0]
+        return tyro.cli(_command(name), args=arguments[1:], prog=f"cipv {name}", config=_CONFIG)
+    return tyro.extras.subcommand_cli_from_dict(
+        {name: _command(name) for name in COMMANDS},
+        args=arguments,
+        prog="cipv",
+        description="CIPV Studio: which vehicle ahead is the closest one in my path, how far, how fast, and why.",
+        config=_CONFIG,
+    )
+
+
+def _command(name: str) -> Any:
+    module, _, attribute = COMMANDS[name].partition(":")
+    return getattr(import_module(module), attribute)
