@@ -5,13 +5,16 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 from app.drive.book import RunBook
 from app.drive.inputs import InputStore
-from app.drive.run import DriveRun, digest
+from app.drive.run import DriveRun, Kept, digest
 from app.line import DetectionCache
 from pipeline.evaluation.lead import LeadRule
 from pipeline.params import Params
+from pipeline.recording.rewrite import Progress
+from pipeline.recording.save import save
 from pipeline.run import Detectors, Sensors, detect, only
 from pipeline.sources.base import Source, TruthObject
 from pipeline.step import State, step
@@ -58,24 +61,31 @@ class Recording:
         """The state in which the run of these parameters came to a frame; null where it has not come that far."""
         run = self.book.of(params)
         kept = run.nearest_state(index) if run is not None else None
-        if kept is None:
-            return None
-        state = kept.state
-        for between in range(kept.at, index):
-            state, _ = step(state, self.input(between), params)
-        return state
+        return self._onwards(kept, index, params) if kept is not None else None
+
+    def state_from_start(self, index: int, params: Params) -> State:
+        """The same, computed here as far as no run has come."""
+        run = self.book.of(params)
+        kept = run.nearest_state(min(index, run.done)) if run is not None else None
+        return self._onwards(kept or Kept(0, State()), index, params)
 
     def input(self, index: int) -> Frame:
         """A frame as the line takes it; its picture may be without pixels."""
         held = self.inputs.get(index)
-        if held is not None:
-            return held
+        return held if held is not None else self.frame(index)
+
+    def frame(self, index: int) -> Frame:
+        """A frame as the line takes it, from the source, with its picture."""
         with self._reading:
             frame = self._opened().frame(index)
         detectors = Detectors() if self.recipe.sensors == "lidar" else self.recipe.detectors
         frame = only(detect(frame, detectors, self._ask), self.recipe.sensors)
         self.inputs.offer(frame)
         return frame
+
+    def save(self, path: Path, first: int, last: int, progress: Progress) -> None:
+        """Frames as a session file, with all that the source has."""
+        save(self._open_source(self.recipe.uri), path, first, last, progress)
 
     def truth(self, index: int) -> Truth:
         """The labelled objects of a frame; null when it is not labelled."""
@@ -89,6 +99,12 @@ class Recording:
         detectors = self.recipe.detectors
         names = [each.name for each in (detectors.boxes, detectors.lanes) if each is not None]
         return digest(self.recipe.uri, names, self.recipe.sensors, params)
+
+    def _onwards(self, kept: Kept, index: int, params: Params) -> State:
+        state = kept.state
+        for between in range(kept.at, index):
+            state, _ = step(state, self.input(between), params)
+        return state
 
     def _opened(self) -> Source:
         if self._source is None:
