@@ -7,7 +7,7 @@ R(ωτ)·p + (v/ω)·(sin ωτ, 1 − cos ωτ).
 What moves with the car, as a lead does, is seen undistorted in the raw sweep and is distorted by this, by its own speed
 over ground times τ. Straight ahead τ is zero, so a lead keeps its place either way; what gains stands beside the road:
 at 30 m/s a parked car at 45° is seen 0.38 m off without it, and a car driving alongside as much with it. That is why it
-is off by default: traffic beside and ahead decides what this product does, the kerb does not.
+is off by default: in the simulated cut-in the distances to moving cars err by 6 cm with it and by 3 cm without.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from pipeline.sources.velodyne.clock import SensorClock
-from pipeline.sources.velodyne.decoder import DecoderCounts, Vlp16Decoder
+from pipeline.sources.velodyne.cutter import DecoderCounts, Rotation, RotationCutter
+from pipeline.sources.velodyne.decoder import Vlp16Decoder
 from pipeline.sources.velodyne.packet import PACKET_BYTES, BadPacket, Packet, read_packet
 from pipeline.sources.velodyne.position import POSITION_BYTES, Position, read_position
 
@@ -14,6 +15,8 @@ __all__ = [
     "DecoderCounts",
     "Packet",
     "Position",
+    "Rotation",
+    "RotationCutter",
     "SensorClock",
     "Vlp16Decoder",
     "read_packet",

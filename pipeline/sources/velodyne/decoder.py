@@ -1,92 +1,37 @@
-"""VLP-16 packets → sweeps, packet by packet: each is checked, put in its place, and a whole rotation is decoded at once
-by velodyne-decoder.
-
-A sweep is cut behind the car, so that what is ahead is never in two, and its tick is the moment the head looks straight
-ahead. Where a packet belongs follows from its time and its azimuth together: the two must agree with the packets before
-it, so one spoiled packet cannot cut a sweep short or move its time.
-"""
+"""VLP-16 packets → sweeps: checked and cut into rotations by ``cutter``, decoded by velodyne-decoder."""
 
 from __future__ import annotations
-
-from bisect import bisect
-from collections import Counter
-from dataclasses import dataclass, field
-from enum import Enum
-from typing import NamedTuple
 
 import numpy as np
 from velodyne_decoder import Config, Model, PacketVector, ScanDecoder, VelodynePacket
 
 from pipeline.sources.velodyne.clock import SensorClock
-from pipeline.sources.velodyne.packet import HOUR_US, ROTATION_CDEG, BadPacket, Packet, read_packet
+from pipeline.sources.velodyne.cutter import DecoderCounts, Rotation, RotationCutter
+from pipeline.sources.velodyne.packet import HOUR_US, BadPacket
 from pipeline.sources.velodyne.position import Position, read_position
 from pipeline.types import F32, F64, Sweep
 
 CHANNELS = 16
 MIN_RANGE_M, MAX_RANGE_M = 0.1, 200.0
-_CONTINUES_US = 100_000  # packets further apart do not tell how often the head went round
-_SEEN_PASSING_US = 20_000  # packets nearer than this on both sides of the cut: what is missing lies behind the car
-_PAUSE_AGREES_US = 50_000
-_AZIMUTH_TOLERANCE_CDEG, _AZIMUTH_TOLERANCE_SHARE = 300.0, 0.02
-_APART_SHARE = 0.5  # of a packet's span: nearer in time, two packets are one
-_EDGE_CDEG = 3_600.0
-_X, _Y, _Z, _INTENSITY, _TIME, _RING = 0, 1, 2, 3, 4, 6
-
-
-@dataclass
-class DecoderCounts:
-    """What came so far. refused: packets by reason. models: other Velodynes that sent packets. lost: packets that the
-    time between their neighbours says are missing. sweeps: given. partial: rotations seen in part only (the first, the
-    last, one cut by a pause), not given."""
-
-    packets: int = 0
-    refused: Counter[str] = field(default_factory=Counter)
-    models: Counter[str] = field(default_factory=Counter)
-    lost: int = 0
-    sweeps: int = 0
-    partial: int = 0
-
-    def about_refused(self) -> str:
-        """``3 packets refused: 2 all zero, 1 not 1206 bytes``; empty when none was."""
-        if not self.refused:
-            return ""
-        reasons = ", ".join(f"{count} {reason}" for reason, count in sorted(self.refused.items()))
-        return f"{sum(self.refused.values())} packets refused: {reasons}"
-
-
-class _Placed(NamedTuple):
-    """A packet on the clock that counts on over the hours, and on the circle that begins behind the car."""
-
-    time_us: int
-    phase_cdeg: float
-    packet: Packet
-    t_host_ns: int | None
-
-
-class _Place(Enum):
-    """Where a packet belongs: to the sweep under way, to the next one, to one after a gap in which nobody saw the head
-    pass behind the car, or to a new beginning of the sensor's own time."""
-
-    HERE, NEXT, AFTER_GAP, ANEW = range(4)
+_X, _INTENSITY, _TIME, _RING = 0, 3, 4, 6
 
 
 class Vlp16Decoder:
     """One sensor's stream. T_ego_lidar: (4, 4), where the sensor sits; by default the ego frame is the sensor's own."""
 
-    def __init__(self, T_ego_lidar: F64 | None = None, clock: SensorClock | None = None) -> None:
+    def __init__(
+        self, T_ego_lidar: F64 | None = None, clock: SensorClock | None = None, keeps_partial: bool = False
+    ) -> None:
         T = np.eye(4) if T_ego_lidar is None else np.asarray(T_ego_lidar, dtype=np.float64)
-        self.counts = DecoderCounts()
         self.clock = clock or SensorClock()
+        self._cutter = RotationCutter(T, self.clock, keeps_partial)
         self._R, self._origin = T[:3, :3].astype(np.float32), T[:3, 3].astype(np.float32)
         self._is_moved = not np.array_equal(T, np.eye(4))
-        ahead = T[:3, :3].T @ np.array([1.0, 0.0, 0.0])  # ego forward in the sensor's axes; azimuth runs clockwise
-        ahead_cdeg = -np.degrees(np.arctan2(ahead[1], ahead[0])) * 100.0
-        self._behind_cdeg = float((ahead_cdeg + ROTATION_CDEG / 2) % ROTATION_CDEG)
         self._library = ScanDecoder(Config(model=Model.VLP16, min_range=MIN_RANGE_M, max_range=MAX_RANGE_M))
-        self._sweep: list[_Placed] = []  # in order of time
-        self._began_at_cut = False
-        self._last: _Placed | None = None
-        self._suspect: _Placed | None = None
+
+    @property
+    def counts(self) -> DecoderCounts:
+        return self._cutter.counts
 
     def push(self, packet: bytes, t_host_ns: int | None = None) -> Sweep | None:
         """Take one data packet; the sweep that it completes, if it is the first of the next rotation.
@@ -94,22 +39,7 @@ class Vlp16Decoder:
         t_host_ns: when it was received (or, in a file, captured); null where nobody knows. Never raises: what is no
         packet of a VLP-16 is refused and counted by reason.
         """
-        self.counts.packets += 1
-        try:
-            placed = self._placed(read_packet(packet), t_host_ns)
-            place = self._accept(placed)
-        except BadPacket as bad:
-            self.counts.refused[bad.reason] += 1
-            if bad.model is not None:
-                self.counts.models[bad.model] += 1
-            return None
-        done = self._finish(place is _Place.NEXT) if place is not _Place.HERE else None
-        if place is _Place.ANEW:
-            self.clock.restart()
-        if t_host_ns is not None:
-            self.clock.observe(round(placed.time_us + placed.packet.span_us), t_host_ns)
-        self._sweep.insert(bisect(self._sweep, placed.time_us, key=_time_us), placed)
-        return done
+        return self._decode(self._cutter.push(packet, t_host_ns))
 
     def push_position(self, packet: bytes) -> Position | None:
         """Take one position packet: from here on the sensor's time is UTC, or it is not. Null when it is none."""
@@ -123,130 +53,27 @@ class Vlp16Decoder:
 
     def flush(self) -> Sweep | None:
         """The sweep under way at the end of a stream, if it is whole. The next packet starts anew."""
-        done = self._finish(False)
-        self._last = self._suspect = None
-        return done
+        return self._decode(self._cutter.flush())
 
-    def _placed(self, packet: Packet, t_host_ns: int | None) -> _Placed:
-        """The packet in the hour that is nearest to when it must have been sent."""
-        time_us = packet.time_us
-        if self._last is not None:
-            passed_us = (_host_gap_us(self._last, t_host_ns) or 0) + self._last.time_us
-            time_us += round((passed_us - time_us) / HOUR_US) * HOUR_US
-        return _Placed(time_us, (packet.azimuth_cdeg - self._behind_cdeg) % ROTATION_CDEG, packet, t_host_ns)
-
-    def _accept(self, placed: _Placed) -> _Place:
-        """Where the packet belongs. BadPacket when it does not fit to those before it.
-
-        What does not fit is not believed at once: it becomes the beginning only when the next packet follows on it.
-        """
-        last, suspect = self._last, self._suspect
-        self._suspect = None
-        if last is None:
-            self._last = placed
-            return _Place.HERE
-        if self._is_doubled(placed):
-            raise BadPacket("doubled")
-        ahead_us = placed.time_us - last.time_us
-        if 0 < ahead_us <= _CONTINUES_US and (turns := _turns(last, placed)) is not None:
-            self._last = placed
-            if turns == 0:
-                return _Place.HERE
-            return _Place.NEXT if ahead_us <= _SEEN_PASSING_US else _Place.AFTER_GAP
-        if -_CONTINUES_US <= ahead_us < 0 and _turns(placed, last) is not None:
-            first = self._sweep[0]
-            if placed.time_us > first.time_us or _turns(placed, first) == 0:
-                return _Place.HERE
-            raise BadPacket("late")
-        host_gap_us = _host_gap_us(last, placed.t_host_ns)
-        if host_gap_us is not None and ahead_us > _CONTINUES_US and abs(host_gap_us - ahead_us) < _PAUSE_AGREES_US:
-            self._last = placed
-            return _Place.AFTER_GAP
-        if suspect is not None and _follows(suspect, placed):
-            self._last = placed
-            return _Place.ANEW
-        self._suspect = placed
-        raise BadPacket("time or azimuth out of order")
-
-    def _is_doubled(self, placed: _Placed) -> bool:
-        """Whether a packet of this time is there already; only some µs off, one of the two is spoiled."""
-        at = bisect(self._sweep, placed.time_us, key=_time_us)
-        nearest = self._sweep[max(0, at - 1) : at + 1]
-        return any(abs(it.time_us - placed.time_us) < _APART_SHARE * placed.packet.span_us for it in nearest)
-
-    def _finish(self, seen_passing: bool) -> Sweep | None:
-        """Decode the packets at hand, if they are a whole rotation. seen_passing: the head was seen to pass behind the
-        car at its end, and the next sweep begins there."""
-        packets, self._sweep = self._sweep, []
-        began_there, self._began_at_cut = self._began_at_cut, seen_passing
-        if not packets:
+    def _decode(self, rotation: Rotation | None) -> Sweep | None:
+        """The sweep of a rotation; null when it holds no return."""
+        if rotation is None:
             return None
-        self.counts.lost += _missing(packets)
-        begins = began_there or packets[0].phase_cdeg <= _EDGE_CDEG
-        ends = seen_passing or packets[-1].phase_cdeg >= ROTATION_CDEG - _EDGE_CDEG
-        if not (begins and ends):
-            self.counts.partial += 1
-            return None
-        sweep = self._decode(packets)
-        self.counts.sweeps += 1 if sweep is not None else 0
-        return sweep
-
-    def _decode(self, packets: list[_Placed]) -> Sweep | None:
-        """The sweep of packets in order of time; null when it holds no return."""
+        packets = rotation.packets
         base_us = packets[0].time_us // HOUR_US * HOUR_US
-        vector = PacketVector(
-            [VelodynePacket((placed.time_us - base_us) * 1e-6, list(placed.packet.data)) for placed in packets]
-        )
+        vector = PacketVector([VelodynePacket((it.time_us - base_us) * 1e-6, list(it.packet.data)) for it in packets])
         _, cloud = self._library.decode(vector)
-        cloud = cloud[np.isfinite(cloud[:, _X])] if not np.isfinite(cloud[:, _X]).all() else cloud
+        finite = np.isfinite(cloud[:, _X])
+        cloud = cloud if finite.all() else cloud[finite]
         if not len(cloud):
             return None
-        ahead = min(packets, key=lambda placed: abs(placed.phase_cdeg - ROTATION_CDEG / 2))
-        ahead_us = ahead.time_us + (ROTATION_CDEG / 2 - ahead.phase_cdeg) / ahead.packet.rate_cdeg_us
-        time_s = cloud[:, _TIME] + np.float32((packets[-1].time_us - ahead_us) * 1e-6)
-        return Sweep(
-            self.clock.to_ns(ahead_us),
-            self._to_ego(cloud),
-            cloud[:, _RING].astype(np.uint8),
-            CHANNELS,
-            time_s=time_s.astype(np.float32, copy=False),
-        )
+        self.counts.sweeps += 1
+        time_s = cloud[:, _TIME] + np.float32((packets[-1].time_us - rotation.ahead_us) * 1e-6)
+        ring = cloud[:, _RING].astype(np.uint8)
+        return Sweep(rotation.t_ns, self._to_ego(cloud), ring, CHANNELS, time_s.astype(np.float32, copy=False))
 
     def _to_ego(self, cloud: F32) -> F32:
         points = np.ascontiguousarray(cloud[:, : _INTENSITY + 1])
         if self._is_moved:
             points[:, :3] = points[:, :3] @ self._R.T + self._origin
         return points
-
-
-def _turns(earlier: _Placed, later: _Placed) -> int | None:
-    """How often the head passed behind the car between two packets; null when their azimuths disagree with their
-    times."""
-    advance = (later.time_us - earlier.time_us) * later.packet.rate_cdeg_us
-    expected = earlier.phase_cdeg + advance
-    turns = round((expected - later.phase_cdeg) / ROTATION_CDEG)
-    off = abs(expected - later.phase_cdeg - turns * ROTATION_CDEG)
-    return turns if off <= _AZIMUTH_TOLERANCE_CDEG + _AZIMUTH_TOLERANCE_SHARE * advance else None
-
-
-def _follows(suspect: _Placed, placed: _Placed) -> bool:
-    """Whether two packets that fit to nothing else fit to each other."""
-    ahead_us = (placed.time_us - suspect.time_us + HOUR_US // 2) % HOUR_US - HOUR_US // 2
-    moved = suspect._replace(time_us=placed.time_us - ahead_us)
-    return 0 < ahead_us <= _CONTINUES_US and _turns(moved, placed) is not None
-
-
-def _host_gap_us(last: _Placed, t_host_ns: int | None) -> int | None:
-    """By the host's clock, how long after ``last`` a packet came; null when one of them has no host time."""
-    return None if last.t_host_ns is None or t_host_ns is None else (t_host_ns - last.t_host_ns) // 1000
-
-
-def _time_us(placed: _Placed) -> int:
-    return placed.time_us
-
-
-def _missing(packets: list[_Placed]) -> int:
-    """Packets that must have been sent between those at hand."""
-    span_us = packets[0].packet.span_us
-    gaps = np.diff([placed.time_us for placed in packets]) / span_us
-    return int(np.maximum(np.rint(gaps) - 1, 0).sum())
