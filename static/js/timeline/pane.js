@@ -28,6 +28,8 @@ const redrawFront = painter(drawMoving);
 export function setUp() {
   $("#timeline-curves").append(...CURVES.map(chip));
   on(["drive", "curve", "selection", "theme"], redraw);
+  let count = 0;
+  on(["state"], () => (count !== (count = get("state")?.count ?? 0) ? redraw() : undefined));
   on(["state", "scrub", "clip"], redrawFront);
   paint(["state", "drive"], describe);
   new ResizeObserver(redraw).observe(back);
@@ -62,25 +64,29 @@ function chip({ key, label, title, role }) {
   return button;
 }
 
-const rows = () => shareOut(back.clientHeight, get("drive")?.base !== null && get("drive")?.base !== undefined, curves);
-const isLight = () => getComputedStyle(document.documentElement).colorScheme === "light";
+/** As last drawn: the front asks ten times a second, and asking the page for sizes and styles makes it lay itself out. */
+let shared = shareOut(0, false, curves);
+let isLight = false;
+const rows = () => shared;
 
 function draw() {
   const { ctx, width, height } = fitted(back);
   span.setCount(get("state")?.count ?? 1);
   span.left = LABELS_PX;
   span.width = Math.max(1, width - LABELS_PX - EDGE_PX);
-  drawBack(ctx, { width, height }, span, rows(), isLight());
+  shared = shareOut(height, Boolean(get("drive")?.base), curves);
+  isLight = getComputedStyle(document.documentElement).colorScheme === "light";
+  drawBack(ctx, { width, height }, span, shared, isLight);
   $("#timeline-fit").hidden = span.isWhole;
   drawMoving();
 }
 
 function drawMoving() {
   const state = get("state");
-  if (!state) return;
+  if (!state?.count) return;
   if (state.playing && span.reveal(state.index)) return redraw();
   const { ctx, width, height } = fitted(front);
-  drawFront(ctx, { width, height }, span, rows(), { isLight: isLight(), hover });
+  drawFront(ctx, { width, height }, span, shared, { isLight, hover });
   front.setAttribute("aria-valuemax", String(Math.max(0, state.count - 1)));
   front.setAttribute("aria-valuenow", String(get("scrub") ?? state.index));
   front.setAttribute("aria-valuetext", `frame ${state.frame ?? ""}, ${clock(state.time_s)}`);

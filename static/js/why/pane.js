@@ -13,9 +13,10 @@ const type = el("span"), verdict = el("p", { class: "verdict", aria: { live: "po
 const gates = el("div", { class: "gates" }), ranking = el("div", { class: "ranking" });
 const rankingTitle = el("h3", { textContent: "Ranking of candidates" });
 const content = el("div", { class: "why-content" }, el("div", { class: "line" }, number, source, lead, type), verdict, gates, rankingTitle, ranking);
-const nothing = el("p", { class: "facts pad" });
+const nothing = el("p", { class: "facts pad", textContent: "Nothing is shown yet." });
 
 export function setUp() {
+  content.hidden = true;
   $("#why").append(nothing, content);
   paint(["frame", "selection"], update);
 }
