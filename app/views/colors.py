@@ -12,7 +12,19 @@ from pipeline.types import FusedObject
 
 Rgb = tuple[int, int, int]
 Role = Literal[
-    "lidar", "vision", "fused", "cipv", "path", "ego", "ground", "unclustered", "cluster", "dropped", "grid", "warning"
+    "lidar",
+    "vision",
+    "fused",
+    "cipv",
+    "path",
+    "ego",
+    "ground",
+    "unclustered",
+    "cluster",
+    "dropped",
+    "grid",
+    "warning",
+    "lane",
 ]
 
 
@@ -37,6 +49,7 @@ PALETTE: dict[Role, Shades] = {
     "dropped": Shades("#3f3f46", "#d4d4d8"),
     "grid": Shades("#33373f", "#d1d5db"),
     "warning": Shades("#fbbf24", "#b45309"),
+    "lane": Shades("#fde68a", "#a16207"),
 }
 """``cluster`` is a LiDAR cluster that belongs to no object (yet); ``dropped`` a point that down-sampling left out."""
 

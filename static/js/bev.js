@@ -1,192 +1,169 @@
 /** The plan view: ego frame from above, x up and y left, in metres. */
 import { color, onPicture, roleOf, ui } from "./colors.js";
-import { $, fitted } from "./dom.js";
+import { $, el, press } from "./dom.js";
+import { drawInPlan } from "./evidence.js";
 import { num } from "./format.js";
+import { followHover } from "./hover.js";
 import { Labels } from "./labels.js";
-import { DotRaster, rgba } from "./raster.js";
-import { get, paint, select } from "./store.js";
+import { addTool } from "./layers.js";
+import { nearestPoint, ownerOf } from "./pick.js";
+import { drawArrow, drawOutline, drawPath, drawRing, drawSigma, drawTrail, trace } from "./plan.js";
+import { CLUSTER, tints } from "./points.js";
+import { DotRaster } from "./raster.js";
+import { get, paint, select, set } from "./store.js";
+import { Surface } from "./surface.js";
+import { drawTape, measure } from "./tape.js";
 import { Viewport } from "./viewport.js";
 
-const RINGS_M = [10, 20, 30, 40, 50, 60, 70, 80, 100, 120];
-const KIND_ROLES = ["ground", "unclustered", "cluster", "dropped"];
-const CLUSTER = 2;
+/** @typedef {import("./types.js").Frame} Frame */
+/** @typedef {import("./types.js").FusedObject} FusedObject */
 
+const RINGS_M = [10, 20, 30, 40, 50, 60, 70, 80, 100, 120];
 const PICK_PX = 8;
 
-const canvas = $("#bev");
+const canvas = $("#bev", HTMLCanvasElement);
 const raster = new DotRaster();
+/** @type {Surface} */
+let surface;
 /** @type {Viewport} */
 let view;
-const U = (y) => view.u(y);
-const V = (x) => view.v(x);
 
 export function setUp() {
-  const invalidate = paint(["frame", "layers", "selection", "theme"], draw);
-  view = new Viewport(canvas, invalidate, (place) => select(objectAt(place)));
-  new ResizeObserver(invalidate).observe(canvas);
+  const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "tape"], draw);
+  surface = new Surface(canvas, invalidate);
+  view = new Viewport(canvas, {
+    changed: () => {
+      reflect();
+      invalidate();
+    },
+    clicked: (place) => (get("taping") ? set("tape", null) : select(objectAt(place))),
+    measures: (event) => get("taping") === true || event.shiftKey,
+    measured: (from, to) => measure({ ...from, z: null, u: null, v: null }, { ...to, z: null, u: null, v: null }),
+  });
+  followHover(canvas, (u, v) => objectAt(view.place(u, v)));
+  const views = /** @type {const} */ ([["ahead", "Ahead", "The road ahead (double click)"], ["around", "Around", "50 m on every side"]]);
+  for (const [name, label, title] of views) addTool("plan", el("button", { type: "button", textContent: label, title, data: { view: name }, onclick: () => view.show(name) }));
+  reflect();
+}
+
+function reflect() {
+  for (const button of document.querySelectorAll(".view-tools [data-view]")) press(button, /** @type {HTMLElement} */ (button).dataset.view === view.view);
 }
 
 function draw() {
-  const { ctx, width, height } = fitted(canvas);
-  view.resize({ width, height });
+  if (surface.isHidden) return;
+  const ctx = surface.begin(), frame = get("frame"), layers = get("layers") ?? {};
+  view.resize(surface);
   drawGrid(ctx);
-  const frame = get("frame");
+  const labels = new Labels(ctx, surface.width);
   if (frame) {
-    const layers = get("layers");
-    if (layers.planPath) drawPath(ctx, frame.result.path);
-    if (layers.planPoints) drawPoints(ctx, frame, { width, height });
-    drawObjects(ctx, frame, layers);
+    if (layers.planPath) drawPath(ctx, view, frame.result.path);
+    if (layers.planPoints) drawPoints(ctx, frame);
+    if (layers.planPath && frame.display.plan_lanes) drawLanes(ctx, frame.display.plan_lanes);
+    drawObjects(ctx, frame, layers, labels);
   }
   drawEgo(ctx);
+  const tape = get("tape");
+  if (tape) drawTape(ctx, [view.u(tape.from.y), view.v(tape.from.x)], [view.u(tape.to.y), view.v(tape.to.x)], tape, labels);
 }
 
+/** @param {CanvasRenderingContext2D} ctx */
 function drawGrid(ctx) {
+  const u = view.u(0), v = view.v(0);
   ctx.strokeStyle = color("grid");
   ctx.fillStyle = ui("dim");
   ctx.lineWidth = 1;
   ctx.font = "10px system-ui, sans-serif";
   for (const r of RINGS_M) {
     ctx.beginPath();
-    ctx.arc(U(0), V(0), r * view.scale, Math.PI, 2 * Math.PI);
+    ctx.arc(u, v, r * view.scale, view.view === "around" ? 0 : Math.PI, 2 * Math.PI);
     ctx.stroke();
-    const v = V(r);
-    if (v > 12) ctx.fillText(`${r} m`, U(0) + 3, v - 3);
+    const top = view.v(r);
+    if (top > 12) ctx.fillText(`${r} m`, u + 3, top - 3);
   }
   ctx.beginPath();
-  ctx.moveTo(U(0), V(0));
-  ctx.lineTo(U(0), 0);
+  ctx.moveTo(u, v);
+  ctx.lineTo(u, 0);
   ctx.setLineDash([2, 5]);
   ctx.stroke();
   ctx.setLineDash([]);
 }
 
-function drawPath(ctx, path) {
-  if (path.left.length < 2) return;
-  ctx.beginPath();
-  [...path.left, ...[...path.right].reverse()].forEach(([x, y], i) => (i ? ctx.lineTo(U(y), V(x)) : ctx.moveTo(U(y), V(x))));
-  ctx.closePath();
-  ctx.fillStyle = ctx.strokeStyle = color("path");
-  ctx.globalAlpha = 0.13;
-  ctx.fill();
-  ctx.globalAlpha = 0.8;
-  ctx.lineWidth = 1;
-  for (const side of [path.left, path.right]) {
-    ctx.beginPath();
-    side.forEach(([x, y], i) => (i ? ctx.lineTo(U(y), V(x)) : ctx.moveTo(U(y), V(x))));
-    ctx.stroke();
-  }
-  ctx.globalAlpha = 1;
-}
-
-/** Ground and loose points first, clusters over them in the colour of their object. */
-function drawPoints(ctx, { count, xyz, kind, owner, result }, { width, height }) {
-  const lead = result.cipv?.id ?? null;
-  const tints = [rgba(color("cluster")), ...result.objects.map((item) => rgba(color(roleOf(item, lead))))];
-  const loose = KIND_ROLES.map((role) => rgba(color(role), role === "unclustered" ? 0.8 : 0.55));
-  raster.begin(width, height);
+/** Ground and loose points first, clusters larger and over them. @param {CanvasRenderingContext2D} ctx @param {Frame} frame */
+function drawPoints(ctx, frame) {
+  const { count, xyz, kind } = frame, colors = tints(frame, get("colorBy")?.plan ?? "object", color, 0.55);
+  raster.begin(surface.width, surface.height);
   for (const isCluster of [false, true]) {
+    const size = isCluster ? 2 : 1;
     for (let i = 0; i < count; i++) {
-      if ((kind[i] === CLUSTER) !== isCluster) continue;
-      raster.dot(U(xyz[3 * i + 1] / 100), V(xyz[3 * i] / 100), isCluster ? 2 : 1, isCluster ? tints[owner[i]] : loose[kind[i]]);
+      if ((kind[i] === CLUSTER) === isCluster) raster.dot(view.u(xyz[3 * i + 1] / 100), view.v(xyz[3 * i] / 100), size, colors[i]);
     }
   }
   raster.drawOn(ctx);
 }
 
-function drawObjects(ctx, { result }, layers) {
-  const lead = result.cipv?.id ?? null;
-  const labels = new Labels(ctx);
-  const chosen = get("selection");
-  const important = (item) => item.id === lead || item.id === chosen;
-  const order = [...result.objects].filter((item) => item.bev).sort((a, b) => Number(important(a)) - Number(important(b)));
-  for (const item of order) {
-    const tint = color(roleOf(item, lead));
-    outline(ctx, item.bev);
-    ctx.fillStyle = ctx.strokeStyle = tint;
-    ctx.globalAlpha = item.id === lead ? 0.75 : item.carried ? 0.06 : 0.16;
-    ctx.fill();
-    ctx.globalAlpha = item.carried ? 0.6 : 1;
-    ctx.lineWidth = important(item) ? 2.2 : 1.2;
-    ctx.setLineDash(item.carried ? [3, 3] : []);
+/** @param {CanvasRenderingContext2D} ctx @param {{left: import("./types.js").Point2[], right: import("./types.js").Point2[]}} lanes */
+function drawLanes(ctx, lanes) {
+  ctx.strokeStyle = color("lane");
+  ctx.lineWidth = 2;
+  for (const line of [lanes.left, lanes.right]) {
+    trace(ctx, view, line);
     ctx.stroke();
-    ctx.setLineDash([]);
-    if (item.source !== "L") sigma(ctx, item);
+  }
+}
+
+/** @param {CanvasRenderingContext2D} ctx @param {Frame} frame @param {Record<string, boolean>} layers @param {Labels} labels */
+function drawObjects(ctx, frame, layers, labels) {
+  const { result } = frame, lead = result.cipv?.id ?? null, next = result.next_cipv?.id ?? null, chosen = get("selection");
+  const important = (/** @type {FusedObject} */ item) => item.id === lead || item.id === chosen || item.id === next;
+  const order = result.objects.filter((item) => item.bev).sort((a, b) => Number(important(a)) - Number(important(b)));
+  for (const item of order) {
+    const tint = color(roleOf(item, lead)), isNamed = important(item) || (!item.carried && (item.source !== "L" || item.in_path));
+    if (layers.trails && isNamed) drawTrail(ctx, view, item.id, tint);
+    ctx.fillStyle = ctx.strokeStyle = tint;
+    drawOutline(ctx, view, item, important(item), item.id === lead);
+    if (item.source !== "L") drawSigma(ctx, view, item);
     ctx.globalAlpha = item.source === "L" && !important(item) ? 0.4 : 1;
-    if (layers.velocity && item.velocity_mps && !item.carried) arrow(ctx, item);
+    if (layers.velocity && !item.carried) drawArrow(ctx, view, item);
     ctx.globalAlpha = 1;
-    if (item.id === chosen) ring(ctx, item.bev);
+    if (item.id === chosen) drawRing(ctx, view, item, ui("text"));
+    if (item.id === next) drawRing(ctx, view, item, color("cipv"), [4, 4]);
   }
+  const selected = order.find(({ id }) => id === chosen);
+  if (selected) drawInPlan(ctx, frame, selected, labels, { u: (y) => view.u(y), v: (x) => view.v(x), scale: view.scale });
   for (const item of order.reverse()) {
-    if (!important(item) && (item.carried || (item.source === "L" && !item.in_path))) continue;
-    const u = Math.max(...item.bev.map(([, y]) => U(y))) + 3, v = Math.min(...item.bev.map(([x]) => V(x))) + 14;
-    const distance = item.distance_m === null ? "" : ` ${num(item.distance_m)}`;
-    labels.put(item.id === lead ? `CIPV #${item.id} ${distance} m` : `#${item.id}${distance}`, u, v, onPicture(roleOf(item, lead)), item.id === lead);
+    if (!item.bev || (!important(item) && (item.carried || (item.source === "L" && !item.in_path)))) continue;
+    const u = Math.max(...item.bev.map(([, y]) => view.u(y))) + 3, v = Math.min(...item.bev.map(([x]) => view.v(x))) + 14;
+    const distance = item.distance_m === null ? "" : ` ${num(item.distance_m)}`, isLead = item.id === lead;
+    const words = isLead ? `CIPV #${item.id} ${distance} m` : `${item.id === next ? "next " : ""}#${item.id}${distance}`;
+    labels.put(words, u, v, onPicture(roleOf(item, lead)), isLead ? "strong" : important(item) ? "must" : "weak");
   }
 }
 
-function outline(ctx, corners) {
-  ctx.beginPath();
-  corners.forEach(([x, y], i) => (i ? ctx.lineTo(U(y), V(x)) : ctx.moveTo(U(y), V(x))));
-  ctx.closePath();
-}
-
-/** One sigma of the distance, along the line of sight. */
-function sigma(ctx, item) {
-  if (!item.distance_sigma_m || !item.closest_point || item.distance_m < 0.1) return;
-  const [x, y] = item.closest_point;
-  const k = item.distance_sigma_m / Math.hypot(x, y);
-  ctx.lineWidth = 1;
-  ctx.beginPath();
-  ctx.moveTo(U(y * (1 - k)), V(x * (1 - k)));
-  ctx.lineTo(U(y * (1 + k)), V(x * (1 + k)));
-  ctx.stroke();
-}
-
-function arrow(ctx, item) {
-  const [vx, vy] = item.velocity_mps;
-  if (Math.hypot(vx, vy) < 0.5) return;
-  const cx = item.bev.reduce((s, p) => s + p[0], 0) / 4, cy = item.bev.reduce((s, p) => s + p[1], 0) / 4;
-  const u0 = U(cy), v0 = V(cx), u1 = U(cy + vy), v1 = V(cx + vx);
-  const turn = Math.atan2(v1 - v0, u1 - u0);
-  ctx.lineWidth = 1.5;
-  ctx.beginPath();
-  ctx.moveTo(u0, v0);
-  ctx.lineTo(u1, v1);
-  for (const side of [-0.5, 0.5]) {
-    ctx.moveTo(u1, v1);
-    ctx.lineTo(u1 - 6 * Math.cos(turn + side), v1 - 6 * Math.sin(turn + side));
-  }
-  ctx.stroke();
-}
-
-function ring(ctx, corners) {
-  const us = corners.map(([, y]) => U(y)), vs = corners.map(([x]) => V(x));
-  ctx.strokeStyle = ui("text");
-  ctx.lineWidth = 1.5;
-  ctx.strokeRect(Math.min(...us) - 5, Math.min(...vs) - 5, Math.max(...us) - Math.min(...us) + 10, Math.max(...vs) - Math.min(...vs) + 10);
-}
-
-/** Our own car: the origin is at its front bumper or just behind it. */
+/** Our own car: the origin is at its front bumper or just behind it. @param {CanvasRenderingContext2D} ctx */
 function drawEgo(ctx) {
   const w = 1.8 * view.scale, l = 4.4 * view.scale;
   ctx.fillStyle = color("ego");
   ctx.globalAlpha = 0.9;
   ctx.beginPath();
-  ctx.roundRect(U(0) - w / 2, V(0), w, l, Math.min(w / 3, 6));
+  ctx.roundRect(view.u(0) - w / 2, view.v(0), w, l, Math.min(w / 3, 6));
   ctx.fill();
   ctx.globalAlpha = 1;
 }
 
-/** The object whose footprint is nearest to a place, within a few pixels. @param {{x: number, y: number}} place */
-function objectAt(place) {
+/** The object whose footprint or point is nearest to a place, within a few pixels. @param {{x: number, y: number}} place */
+function objectAt({ x, y }) {
+  const frame = get("frame");
+  if (!frame) return null;
+  /** @type {{id: number, away: number}|null} */
   let best = null;
-  for (const item of get("frame")?.result.objects ?? []) {
-    if (!item.bev) continue;
-    const xs = item.bev.map((p) => p[0]), ys = item.bev.map((p) => p[1]);
-    const dx = Math.max(Math.min(...xs) - place.x, 0, place.x - Math.max(...xs));
-    const dy = Math.max(Math.min(...ys) - place.y, 0, place.y - Math.max(...ys));
+  for (const { id, bev } of frame.result.objects) {
+    if (!bev) continue;
+    const xs = bev.map((p) => p[0]), ys = bev.map((p) => p[1]);
+    const dx = Math.max(Math.min(...xs) - x, 0, x - Math.max(...xs)), dy = Math.max(Math.min(...ys) - y, 0, y - Math.max(...ys));
     const away = Math.hypot(dx, dy) * view.scale;
-    if (away < PICK_PX && (!best || away < best.away)) best = { id: item.id, away };
+    if (away < PICK_PX && (!best || away < best.away)) best = { id, away };
   }
-  return best?.id ?? null;
+  const { count, xyz, owner } = frame;
+  return best?.id ?? ownerOf(frame, nearestPoint(count, (i) => owner[i] > 0, (i) => xyz[3 * i] / 100, (i) => xyz[3 * i + 1] / 100, x, y, PICK_PX / view.scale));
 }

@@ -2,6 +2,7 @@
 import { get } from "./store.js";
 
 const ROLE_OF_SOURCE = { L: "lidar", V: "vision", VL: "fused" };
+/** @type {Map<string, string>} */
 const cache = new Map();
 
 /** A role's colour for this theme. @param {string} role */
@@ -17,9 +18,13 @@ export function forget() {
   cache.clear();
 }
 
+/** @param {string} name */
 function read(name) {
-  if (!cache.has(name)) cache.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim() || "#888");
-  return cache.get(name);
+  const held = cache.get(name);
+  if (held !== undefined) return held;
+  const found = getComputedStyle(document.documentElement).getPropertyValue(name).trim() || "#888888";
+  cache.set(name, found);
+  return found;
 }
 
 /** @param {import("./types.js").FusedObject} item @param {number|null} cipvId */
@@ -30,7 +35,7 @@ export const cipvId = () => get("frame")?.result.cipv?.id ?? null;
 
 /** Near is warm, far is cold; no green and no magenta, which mean something. */
 const STOPS = [[255, 86, 56], [255, 160, 30], [250, 226, 90], [150, 205, 255], [80, 120, 255], [90, 80, 200]];
-export const RANGE_STEPS = 32;
+const RANGE_STEPS = 32;
 export const RANGE_MAX_M = 70;
 
 /** `RANGE_STEPS` colours [r, g, b] from 0 m to `RANGE_MAX_M`. */

@@ -1,28 +1,30 @@
 /** Text tags on a canvas that keep out of each other's way. */
 
 const HEIGHT = 16;
+/** "strong" is filled and drawn wherever it must, "must" finds a place, "weak" is left out where there is none. @typedef {"strong"|"must"|"weak"} Weight */
 
 export class Labels {
-  /** @param {CanvasRenderingContext2D} ctx */
-  constructor(ctx) {
+  /** @param {CanvasRenderingContext2D} ctx @param {number} width of the canvas, CSS pixels */
+  constructor(ctx, width) {
     this.ctx = ctx;
+    this.width = width;
     /** @type {{x: number, y: number, w: number, h: number}[]} */
     this.taken = [];
   }
 
   /**
-   * A tag whose lower left corner is at (x, y), moved up until it is free; a weak tag that finds no room is left out.
-   * @param {string} words @param {number} x @param {number} y @param {string} tint @param {boolean} strong
+   * A tag whose lower left corner is at (x, y), moved up until it is free.
+   * @param {string} words @param {number} x @param {number} y @param {string} tint @param {Weight} [weight]
    */
-  put(words, x, y, tint, strong = false) {
-    const { ctx } = this;
+  put(words, x, y, tint, weight = "weak") {
+    const { ctx } = this, strong = weight === "strong";
     const h = strong ? HEIGHT + 4 : HEIGHT;
     ctx.font = `${strong ? "700 13px" : "600 11px"} system-ui, "DejaVu Sans", sans-serif`;
     const w = ctx.measureText(words).width + 10;
-    const right = ctx.canvas.clientWidth - w - 2;
+    const right = this.width - w - 2;
     const at = { x: Math.max(2, Math.min(x, right)), y: Math.max(2, y - h - 1), w, h };
     for (let tries = 0; this.#overlaps(at); tries++) {
-      if (tries === 3 && !strong) return;
+      if (tries === 3 && weight === "weak") return;
       if (tries === 12) break;
       at.y -= h + 1;
     }
@@ -37,6 +39,7 @@ export class Labels {
     ctx.textBaseline = "alphabetic";
   }
 
+  /** @param {{x: number, y: number, w: number, h: number}} a */
   #overlaps(a) {
     return this.taken.some((b) => a.x < b.x + b.w && b.x < a.x + a.w && a.y < b.y + b.h && b.y < a.y + a.h);
   }

@@ -19,6 +19,7 @@ import * as params from "./params.js";
 import * as sources from "./sources.js";
 import * as exporting from "./timeline/export.js";
 import * as timeline from "./timeline/pane.js";
+import * as trails from "./trails.js";
 import * as transport from "./transport.js";
 import * as vitals from "./vitals.js";
 import * as history from "./whatif/history.js";
@@ -30,7 +31,7 @@ import * as panes from "./workspace/panes.js";
 import * as share from "./workspace/share.js";
 import * as theme from "./workspace/theme.js";
 
-for (const part of [theme, panes, gutters, layers, seek, shuttle, drive, object]) part.setUp();
+for (const part of [theme, panes, gutters, layers, trails, seek, shuttle, drive, object]) part.setUp();
 for (const part of [banner, camera, bev, objects, why, timeline, exporting, transport, notices, vitals]) part.setUp();
 for (const part of [params, history, runs, align, sources, layouts, share, keyboard]) part.setUp();
 $("#help-button").addEventListener("click", help.show);

@@ -96,7 +96,9 @@ function groundOf(ground) {
 const level = (share) => (share <= 0 ? 0 : share >= 1 ? 255 : Math.floor(share * 255));
 
 /** @param {number[]} rgb */
-const packed = ([r, g, b]) => pack(r, g, b);
+function packed([r, g, b]) {
+  return pack(r, g, b);
+}
 
 /** @param {number[][]} stops @param {number} count */
 function ramp(stops, count) {

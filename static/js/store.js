@@ -7,6 +7,9 @@
  * @property {import("./types.js").Frame} frame
  * @property {number} selection  id of the object selected everywhere
  * @property {Record<string, boolean>} layers
+ * @property {Record<"camera"|"plan", import("./points.js").ColorBy>} colorBy
+ * @property {boolean} taping  whether a drag measures
+ * @property {import("./tape.js").Tape} tape  what was measured
  * @property {{status: "live"|"lost", since: number}} link
  * @property {import("./types.js").ParamsAnswer} params
  * @property {string} theme

@@ -120,7 +120,15 @@
  * @property {Record<string, [number, number, number, number]>} vision_boxes
  * @property {Record<string, Pixels>} cuboids
  * @property {{center: Pixels, left: Pixels, right: Pixels}|null} path
+ * @property {{left: Pixels, right: Pixels}|null} lanes
+ * @property {{left: Point2[], right: Point2[]}|null} plan_lanes
+ * @property {GroundPlanes|null} ground
+ * @property {Record<string, {distance_m: number, sigma_m: number}>} vision_ranges  what the camera alone measured
  * @property {Ranked[]} [ranking]
+ *
+ * @typedef {object} GroundPlanes  n·p + d = 0 between neighbouring edges of x
+ * @property {number[]} edges
+ * @property {[number, number, number, number][]} planes
  *
  * @typedef {object} Ranked  a candidate for CIPV: the lead is order 1; `stopped_by` is the first gate it failed
  * @property {number} id
@@ -138,13 +146,16 @@
  * @property {Result} result
  * @property {Display} display
  * @property {boolean} [isLate]
- * @property {{width: number, height: number, scale: number, bytes: number}|null} picture
+ * @property {{width: number, height: number, scale: number, bytes: number, full_width: number}|null} picture
  * @property {ImageBitmap|null} bitmap
  * @property {number} count
  * @property {Int16Array} xyz
  * @property {Int16Array} uv
  * @property {Uint16Array} owner
  * @property {Uint8Array} kind
+ * @property {Uint8Array} intensity
+ * @property {Uint8Array} ring
+ * @property {Uint8Array} age
  *
  * @typedef {number|string|boolean|null} ParamValue
  *

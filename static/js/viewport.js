@@ -1,9 +1,19 @@
-/** The part of the plan that a pane shows: x up, y left, metres. Fitted to the road until a person moves it. */
+/** The part of the plan that a pane shows: x up, y left, metres. A named view follows the pane's size until a person moves it. */
 
-/** What is fitted: from behind our bumper to the farthest lead that matters, and the neighbouring lanes. */
-const FROM_X = -5, TO_X = 74, HALF_WIDTH = 13;
+/** @typedef {{x: number, y: number}} Place */
+/** @typedef {"ahead"|"around"} View */
+/** What each view holds, metres: ahead, from behind our bumper to the farthest lead that matters, with the neighbouring lanes. */
+const VIEWS = { ahead: { from: -5, to: 74, half: 13 }, around: { from: -50, to: 50, half: 50 } };
 const SCALE_LIMITS = [1.5, 200];
 const DRAG_FROM_PX = 4;
+
+/**
+ * @typedef {object} Hand  what a hand on the plan may do
+ * @property {() => void} changed  the view has moved
+ * @property {(place: Place) => void} clicked
+ * @property {(event: PointerEvent) => boolean} measures  whether this drag measures, rather than moves
+ * @property {(from: Place, to: Place) => void} measured
+ */
 
 export class Viewport {
   /** Pixels per metre, and the place at the pane's middle. */
@@ -12,76 +22,86 @@ export class Viewport {
   y = 0;
   width = 1;
   height = 1;
-  #isFitted = true;
+  /** Null once a person has moved it. @type {View|null} */
+  view = "ahead";
   #canvas;
-  #changed;
+  #hand;
 
-  /** @param {HTMLCanvasElement} canvas @param {() => void} changed @param {(place: {x: number, y: number}) => void} clicked */
-  constructor(canvas, changed, clicked) {
+  /** @param {HTMLCanvasElement} canvas @param {Hand} hand */
+  constructor(canvas, hand) {
     this.#canvas = canvas;
-    this.#changed = changed;
+    this.#hand = hand;
     canvas.addEventListener("wheel", (event) => this.#onWheel(event), { passive: false });
-    canvas.addEventListener("dblclick", () => this.fit());
+    canvas.addEventListener("dblclick", () => this.show("ahead"));
     canvas.addEventListener("keydown", (event) => this.#onKey(event));
-    this.#followPointer(clicked);
+    this.#followPointer();
   }
 
   /** Call before drawing. @param {{width: number, height: number}} size */
   resize({ width, height }) {
     this.width = width;
     this.height = height;
-    if (!this.#isFitted) return;
-    this.scale = Math.max(0.1, Math.min(height / (TO_X - FROM_X), width / (2 * HALF_WIDTH)));
-    this.x = FROM_X + height / (2 * this.scale);
+    if (this.view === null) return;
+    const { from, to, half } = VIEWS[this.view];
+    this.scale = Math.max(0.1, Math.min(height / (to - from), width / (2 * half)));
+    this.x = this.view === "ahead" ? from + height / (2 * this.scale) : (from + to) / 2;
     this.y = 0;
   }
 
-  fit() {
-    this.#isFitted = true;
-    this.#changed();
+  /** @param {View} view */
+  show(view) {
+    this.view = view;
+    this.#hand.changed();
   }
 
-  /** Pixel column of a y. */
+  /** Pixel column of a y. @param {number} y */
   u(y) {
     return this.width / 2 - (y - this.y) * this.scale;
   }
 
-  /** Pixel row of an x. */
+  /** Pixel row of an x. @param {number} x */
   v(x) {
     return this.height / 2 - (x - this.x) * this.scale;
   }
 
-  /** The place under a pixel. */
+  /** The place under a pixel. @param {number} u @param {number} v @returns {Place} */
   place(u, v) {
     return { x: this.x - (v - this.height / 2) / this.scale, y: this.y - (u - this.width / 2) / this.scale };
   }
 
-  /** Zoom so that the place under (u, v) stays there. */
+  /** Zoom so that the place under (u, v) stays there. @param {number} factor */
   zoom(factor, u = this.width / 2, v = this.height / 2) {
-    this.#isFitted = false;
+    this.view = null;
     const before = this.place(u, v);
     this.scale = Math.min(SCALE_LIMITS[1], Math.max(SCALE_LIMITS[0], this.scale * factor));
     const after = this.place(u, v);
     this.x += before.x - after.x;
     this.y += before.y - after.y;
-    this.#changed();
+    this.#hand.changed();
   }
 
+  /** @param {WheelEvent} event */
   #onWheel(event) {
     event.preventDefault();
     this.zoom(Math.exp(-event.deltaY * 0.0015), event.offsetX, event.offsetY);
   }
 
+  /** @param {KeyboardEvent} event */
   #onKey(event) {
-    const factor = { "+": 1.25, "=": 1.25, "-": 0.8 }[event.key];
-    if (factor) this.zoom(factor);
-    else if (event.key === "0") this.fit();
+    /** @type {Record<string, number>} */
+    const factors = { "+": 1.25, "=": 1.25, "-": 0.8 };
+    if (factors[event.key]) this.zoom(factors[event.key]);
+    else if (event.key === "0") this.show("ahead");
+    else return;
+    event.preventDefault();
   }
 
-  #followPointer(clicked) {
+  #followPointer() {
+    /** @type {{u: number, v: number, x: number, y: number, place: Place, isMeasure: boolean, moved: boolean}|null} */
     let start = null;
     this.#canvas.addEventListener("pointerdown", (event) => {
-      start = { u: event.offsetX, v: event.offsetY, x: this.x, y: this.y, moved: false };
+      const { offsetX: u, offsetY: v } = event;
+      start = { u, v, x: this.x, y: this.y, place: this.place(u, v), isMeasure: this.#hand.measures(event), moved: false };
       this.#canvas.setPointerCapture(event.pointerId);
     });
     this.#canvas.addEventListener("pointermove", (event) => {
@@ -89,13 +109,14 @@ export class Viewport {
       const du = event.offsetX - start.u, dv = event.offsetY - start.v;
       start.moved ||= Math.hypot(du, dv) >= DRAG_FROM_PX;
       if (!start.moved) return;
-      this.#isFitted = false;
+      if (start.isMeasure) return this.#hand.measured(start.place, this.place(event.offsetX, event.offsetY));
+      this.view = null;
       this.x = start.x + dv / this.scale;
       this.y = start.y + du / this.scale;
-      this.#changed();
+      this.#hand.changed();
     });
     this.#canvas.addEventListener("pointerup", (event) => {
-      if (start && !start.moved) clicked(this.place(event.offsetX, event.offsetY));
+      if (start && !start.moved) this.#hand.clicked(this.place(event.offsetX, event.offsetY));
       start = null;
     });
     this.#canvas.addEventListener("pointercancel", () => (start = null));
