@@ -1,0 +1,123 @@
+"""What people say is true of a drive: tracks of vehicles, who the lead is in each frame, path, events and tags.
+
+One ``LabelSet`` belongs to one recording. It is a plain value: the database stores it act by act, formats write and
+read it whole, scores compare it with results. Frames are counted from 0 as the source counts them; ego frame, metres,
+radians: x forward, y left, z up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from pipeline.geometry import Cuboid
+from pipeline.types import Box, Point2
+
+State = Literal["proposed", "accepted", "corrected", "rejected"]
+"""proposed: nobody has looked yet. corrected: a person changed what was proposed. rejected: a person said it is not so;
+it is kept, so that it is not proposed again."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Who made a label. name: the person, or the file or run that it came
+    from. params, calibration: digests of what the pipeline ran with; null for the other makers. t_unix_ms: when."""
+
+    maker: Literal["pipeline", "person", "import"]
+    name: str
+    t_unix_ms: int
+    params: str | None = None
+    calibration: str | None = None
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """A track in one frame. cuboid: null where only the picture shows it. bbox: pixels of the raw picture; null where
+    only the LiDAR shows it. keyframe: put there by a person or an import; otherwise interpolated between keyframes."""
+
+    frame: int
+    cuboid: Cuboid | None
+    bbox: Box | None = None
+    keyframe: bool = True
+
+
+@dataclass(frozen=True)
+class LabelTrack:
+    """One vehicle or person over time. label: class name as in ``pipeline.types.VEHICLES`` and COCO. sightings: by
+    ascending frame, at most one a frame. comment: what a reviewer wants to say."""
+
+    id: int
+    label: str
+    sightings: tuple[Sighting, ...]
+    state: State
+    origin: Origin
+    comment: str = ""
+
+    def at(self, frame: int) -> Sighting | None:
+        return next((each for each in self.sightings if each.frame == frame), None)
+
+
+Lead = int | Literal["none", "unknown"]
+"""The lead of a frame: a track's id, ``none`` when nothing is ahead in the path, ``unknown`` when one can't tell."""
+
+
+@dataclass(frozen=True)
+class LeadRange:
+    """Who is the closest in-path vehicle from frame ``first`` to ``last``, both included. Ranges do not overlap."""
+
+    first: int
+    last: int
+    lead: Lead
+    state: State
+    origin: Origin
+
+
+@dataclass(frozen=True)
+class PathLabel:
+    """The ego path of one frame where the pipeline's is wrong or missing. Lines are ego x, y from the bumper on."""
+
+    frame: int
+    left: tuple[Point2, ...] | None
+    right: tuple[Point2, ...] | None
+    state: State
+    origin: Origin
+
+
+@dataclass(frozen=True)
+class EventLabel:
+    """Something that happens at a frame: ``cut_in``, ``cut_out``, or another word. tracks: who takes part."""
+
+    frame: int
+    kind: str
+    tracks: tuple[int, ...]
+    state: State
+    origin: Origin
+
+
+@dataclass(frozen=True)
+class FrameTag:
+    """A word about a frame: ``night``, ``rain``, ``sensor dirty``."""
+
+    frame: int
+    tag: str
+    origin: Origin
+
+
+@dataclass(frozen=True)
+class LabelSet:
+    """All labels of one recording. source: its URI. frames: the recording's own names of its frames; t_ns: their ticks.
+    name: of a frozen version, else ``working``."""
+
+    source: str
+    frames: tuple[str, ...]
+    t_ns: tuple[int, ...]
+    tracks: tuple[LabelTrack, ...] = ()
+    leads: tuple[LeadRange, ...] = ()
+    paths: tuple[PathLabel, ...] = ()
+    events: tuple[EventLabel, ...] = ()
+    tags: tuple[FrameTag, ...] = ()
+    name: str = "working"
+
+    def lead_at(self, frame: int) -> Lead | None:
+        """Who leads at a frame; null where nobody has said. Rejected ranges say nothing."""
+        return next((r.lead for r in self.leads if r.first <= frame <= r.last and r.state != "rejected"), None)
