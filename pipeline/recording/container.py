@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import threading
+import weakref
 from collections import OrderedDict
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -60,6 +61,7 @@ class McapFile:
         except (OSError, Unreadable) as error:
             self._file.close()
             raise NotMcap(f"{path}: {error}") from None
+        weakref.finalize(self, self._file.close)  # nobody closes a ``Source``; its file goes with it
         spans = [(entry.start_ns, entry.end_ns) for entry in self.directory.chunks]
         self._spans = np.array(spans, dtype=np.uint64).reshape(-1, 2)
         self._meet_channels()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import struct
+import zlib
 from dataclasses import dataclass, field, replace
 from typing import BinaryIO
 
@@ -21,6 +22,7 @@ from pipeline.recording import topics
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEAD = struct.Struct("<BQ")
 _CHUNK_TIMES = struct.Struct("<QQ")
+_FOOTER = struct.Struct("<QQI")  # start of the summary, start of its offsets, checksum
 
 
 class Unreadable(Exception):
@@ -72,7 +74,9 @@ def read_directory(file: BinaryIO, size: int, *, walk: bool = False) -> Director
 
 
 def record_at(file: BinaryIO, offset: int, length: int, size: int) -> bytes:
-    """The content of a record that starts at ``offset`` and is ``length`` long with its head."""
+    """The content of a record at ``offset`` that is ``length`` long with its head; empty outside the file."""
+    if offset >= size:
+        return b""
     file.seek(offset + RECORD_HEAD.size)
     return file.read(max(0, min(length, size) - RECORD_HEAD.size))
 
@@ -95,6 +99,8 @@ def _read_profile(file: BinaryIO) -> str:
 def _from_summary(file: BinaryIO, size: int, profile: str) -> Directory | None:
     """Null when there is no summary, or none that fits the file."""
     try:
+        if not _is_sound(file, size):
+            return None
         file.seek(0)
         summary = SeekingReader(file, record_size_limit=size).get_summary()
     except Exception:  # damaged bytes make the library raise whatever they like; such a summary is as good as none
@@ -126,6 +132,17 @@ def _from_summary(file: BinaryIO, size: int, profile: str) -> Directory | None:
     for channel in summary.channels.values():
         found.know(channel)
     return found
+
+
+def _is_sound(file: BinaryIO, size: int) -> bool:
+    """Whether the summary's checksum is right, or there is none: it covers the summary and the footer up to itself."""
+    footer_offset = size - len(MAGIC) - RECORD_HEAD.size - _FOOTER.size
+    footer = record_at(file, footer_offset, RECORD_HEAD.size + _FOOTER.size, size)
+    summary_start, _, crc = _FOOTER.unpack(footer)
+    if summary_start == 0 or crc == 0:
+        return True
+    file.seek(summary_start)
+    return zlib.crc32(file.read(footer_offset + RECORD_HEAD.size + _FOOTER.size - 4 - summary_start)) == crc
 
 
 class _Walk:

@@ -90,7 +90,9 @@ class Output:
             self._writer.add_metadata(name, values)
 
     def add_attachment(self, name: str, media_type: str, data: bytes, log_time_ns: int = 0) -> None:
+        """After every message so far: the chunk in progress is closed first."""
         with self._failing_neatly():
+            self._writer.flush()
             self._writer.add_attachment(log_time_ns, log_time_ns, name, media_type, data)
 
     def flush(self, *, to_disk: bool = False) -> None:
