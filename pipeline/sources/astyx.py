@@ -23,12 +23,13 @@ from pipeline.sources.files import (
     check_looks_ahead,
     decode_picture,
     files_by_name,
+    picture_of,
     read_bytes,
     recording_folder,
     rigid_transform,
 )
 from pipeline.sources.text_rows import parse_rows
-from pipeline.types import F64, CameraCalibration, Frame, Picture, Sweep
+from pipeline.types import F64, CameraCalibration, Frame, Sweep
 
 _CHANNELS = 16
 _HALF_ROTATION_NS = 50_000_000
@@ -73,7 +74,7 @@ class AstyxSource:
         notes: list[str] = []
         T_ego_lidar, camera = self._calibration_of(name, notes)
         sweep = self._sweep(name, tick, T_ego_lidar, notes)
-        picture = self._picture(name, notes)
+        picture = picture_of(self._pictures.get(name), None, self._size, notes)
         return Frame(index, name, tick, sweep, picture, camera, notes=tuple(notes))
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
@@ -105,21 +106,6 @@ class AstyxSource:
         except SourceError as error:
             notes.append(str(error))
             return None
-
-    def _picture(self, name: str, notes: list[str]) -> Picture | None:
-        path = self._pictures.get(name)
-        if path is None:
-            notes.append("no picture for this frame")
-            return None
-        try:
-            bgr, encoded = decode_picture(path)
-        except SourceError as error:
-            notes.append(str(error))
-            return None
-        if (bgr.shape[1], bgr.shape[0]) != self._size:
-            notes.append(f"{path.name}: {bgr.shape[1]}×{bgr.shape[0]}, the others are {self._size[0]}×{self._size[1]}")
-            return None
-        return Picture(None, bgr, encoded)
 
     def _picture_size(self) -> tuple[int, int]:
         """Width and height of the first readable picture; the calibration files do not say."""

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.sources.base import SourceError
-from pipeline.types import F64, U8, CameraCalibration
+from pipeline.types import F64, U8, CameraCalibration, Picture
 
 _JPEG_START = b"\xff\xd8"
 _MARKERS = ((_JPEG_START, b"\xff\xd9"), (b"\x89PNG", b"IEND"))
@@ -29,7 +29,7 @@ def recording_folder(path: str) -> Path:
         if not any(folder.iterdir()):
             raise SourceError(f"{path}: the folder is empty")
     except (OSError, RuntimeError, ValueError) as error:
-        raise SourceError(f"{path}: cannot be opened: {_reason(error)}") from None
+        raise SourceError(f"{path}: cannot be opened: {reason_of(error)}") from None
     return folder
 
 
@@ -47,7 +47,7 @@ def read_bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise SourceError(f"{path.name}: cannot be read: {_reason(error)}") from None
+        raise SourceError(f"{path.name}: cannot be read: {reason_of(error)}") from None
 
 
 def decode_picture(path: Path) -> tuple[U8, bytes | None]:
@@ -67,6 +67,23 @@ def decode_picture(path: Path) -> tuple[U8, bytes | None]:
     if picture is None:
         raise SourceError(f"{path.name}: not a readable picture")
     return np.ascontiguousarray(picture, dtype=np.uint8), data if is_jpeg else None
+
+
+def picture_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: list[str]) -> Picture | None:
+    """The picture of a frame; null, and ``notes`` says why, when there is no file, when it is damaged or when it is not
+    of the size (width, height) of the recording's others."""
+    if path is None:
+        notes.append("no picture for this frame")
+        return None
+    try:
+        bgr, encoded = decode_picture(path)
+    except SourceError as error:
+        notes.append(str(error))
+        return None
+    if (bgr.shape[1], bgr.shape[0]) != size:
+        notes.append(f"{path.name}: {bgr.shape[1]}×{bgr.shape[0]}, the others are {size[0]}×{size[1]}")
+        return None
+    return Picture(t_ns, bgr, encoded)
 
 
 def rigid_transform(values: npt.ArrayLike, what: str) -> F64:
@@ -119,5 +136,6 @@ def check_looks_ahead(camera: CameraCalibration, what: str) -> None:
     raise SourceError(f"{what}: the camera does not look ahead; is its extrinsic given the wrong way round?")
 
 
-def _reason(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
+    """Why the system refused, in words."""
     return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.sources.base import SourceError, TruthObject
-from pipeline.sources.files import decode_picture, files_by_name, read_bytes, recording_folder
+from pipeline.sources.files import decode_picture, files_by_name, picture_of, read_bytes, recording_folder
 from pipeline.sources.hdl64 import keep_rings, match_vlp16, ring_elevations_deg, turns
 from pipeline.sources.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
 from pipeline.sources.kitti_records import parse_labels, parse_oxts, parse_timestamps
-from pipeline.types import F32, EgoState, Frame, Picture, Sweep
+from pipeline.types import F32, EgoState, Frame, Sweep
 
 _STEP_NS = 100_000_000
 _RINGS = 64
@@ -72,7 +72,8 @@ class KittiSource:
         notes: list[str] = []
         calibration = self._calibration_of(name, notes)
         sweep = self._sweep(name, tick, notes)
-        picture = self._picture(name, notes)
+        stamp = _stamp(self._files.camera_stamps, name)
+        picture = picture_of(self._files.pictures.get(name), stamp, self._size, notes)
         ego = self._ego(name, tick, notes)
         return Frame(index, name, tick, sweep, picture, calibration.camera, ego, notes=tuple(notes))
 
@@ -117,21 +118,6 @@ class KittiSource:
             notes.append(f"{path.name}: none of its rings lies where a VLP-16 has one")
             return None
         return Sweep(tick, kept, ring, 16)
-
-    def _picture(self, name: str, notes: list[str]) -> Picture | None:
-        path = self._files.pictures.get(name)
-        if path is None:
-            notes.append("no picture for this frame")
-            return None
-        try:
-            bgr, encoded = decode_picture(path)
-        except SourceError as error:
-            notes.append(str(error))
-            return None
-        if (bgr.shape[1], bgr.shape[0]) != self._size:
-            notes.append(f"{path.name}: {bgr.shape[1]}×{bgr.shape[0]}, the others are {self._size[0]}×{self._size[1]}")
-            return None
-        return Picture(_stamp(self._files.camera_stamps, name), bgr, encoded)
 
     def _ego(self, name: str, tick: int, notes: list[str]) -> EgoState | None:
         path = self._files.oxts.get(name)
