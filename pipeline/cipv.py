@@ -219,11 +219,17 @@ def _is_ahead(who: Candidate) -> Check:
     return Check(Gate("ahead", who.place.ahead_m, 0.0, who.place.ahead_m > 0.0), "beside or behind the bumper")
 
 
+def _is_near_path(who: Candidate) -> Check:
+    """As of now, in metres. A moment outside does not stop what its sightings so far say is inside."""
+    aside = abs(who.place.middle_m) if who.place is not None else 0.0
+    limit = who.place.limit_m + _widening_m(who.leads, who.params) if who.place is not None else 0.0
+    passed = aside <= limit or who.odds > 0.0
+    return Check(Gate("path_offset", aside, limit, passed), f"out of path by {aside - limit:.1f} m")
+
+
 def _is_in_path(who: Candidate) -> Check:
-    """By the running mean of what the sightings say; the reason is in metres, as of now."""
-    outside_m = -who.place.margin_m(_widening_m(who.leads, who.params)) if who.place is not None else 0.0
-    reason = f"out of path by {outside_m:.1f} m" if outside_m > 0.0 else "in path for a moment only"
-    return Check(Gate("path_odds", who.odds, 0.0, _in_path(who)), reason)
+    """By the running mean of what the sightings say."""
+    return Check(Gate("path_odds", who.odds, 0.0, _in_path(who)), "in path for a moment only")
 
 
 def _widening_m(leads: bool, params: CipvParams) -> float:
@@ -261,6 +267,7 @@ _ELIGIBILITY: tuple[Callable[[Candidate], Check], ...] = (
     _is_seen,
     _is_vehicle_sized,
     _is_ahead,
+    _is_near_path,
     _is_in_path,
     _is_probable,
     _is_within_reach,

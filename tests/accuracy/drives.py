@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pipeline.evaluation.lead import Judged, LeadRule, judge
 from pipeline.params import preset, with_changes
-from pipeline.run import Sensors, run
+from pipeline.run import Detectors, Sensors, run
 from pipeline.sources import open_source
 from pipeline.types import Result
 from pipeline.vision.detector import open_detector
@@ -54,7 +54,7 @@ def drive(
     size = (picture.bgr.shape[1], picture.bgr.shape[0])
     detector = open_detector(str(folder / "models" / "yolox_nano.onnx"), size)
     results, judged = {}, {}
-    for frame, result in run(source, params, detector, sensors):
+    for frame, result in run(source, params, Detectors(detector), sensors):
         results[frame.name] = result
         truth = source.truth(frame.index)
         if truth is not None:
