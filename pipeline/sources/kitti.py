@@ -19,7 +19,7 @@ from pipeline.sources.files import decode_picture, files_by_name, picture_of, re
 from pipeline.sources.hdl64 import keep_rings, match_vlp16, ring_elevations_deg, turns
 from pipeline.sources.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
 from pipeline.sources.kitti_records import parse_labels, parse_oxts, parse_timestamps
-from pipeline.types import F32, EgoState, Frame, Sweep
+from pipeline.types import F32, EgoState, Frame, GnssFix, Sweep
 
 _STEP_NS = 100_000_000
 _RINGS = 64
@@ -74,8 +74,8 @@ class KittiSource:
         sweep = self._sweep(name, tick, notes)
         stamp = _stamp(self._files.camera_stamps, name)
         picture = picture_of(self._files.pictures.get(name), stamp, self._size, notes)
-        ego = self._ego(name, tick, notes)
-        return Frame(index, name, tick, sweep, picture, calibration.camera, ego, notes=tuple(notes))
+        ego, gnss = self._own_motion(name, tick, notes)
+        return Frame(index, name, tick, sweep, picture, calibration.camera, ego, notes=tuple(notes), gnss=gnss)
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
         name = self._name(index)
@@ -119,16 +119,21 @@ class KittiSource:
             return None
         return Sweep(tick, kept, ring, 16)
 
-    def _ego(self, name: str, tick: int, notes: list[str]) -> EgoState | None:
+    def _own_motion(self, name: str, tick: int, notes: list[str]) -> tuple[EgoState | None, GnssFix | None]:
+        """Own speed and place, of the inertial unit, whose record belongs to the frame of its number."""
         path = self._files.oxts.get(name)
         if path is None:
-            return None
+            return None, None
         try:
-            speed_mps, yaw_rate_radps = parse_oxts(read_bytes(path), path.name)
+            oxts = parse_oxts(read_bytes(path), path.name)
         except SourceError as error:
             notes.append(str(error))
-            return None
-        return EgoState(tick, speed_mps, yaw_rate_radps)
+            return None, None
+        ego = EgoState(tick, oxts.speed_mps, oxts.yaw_rate_radps)
+        if oxts.quality is None:
+            return ego, None
+        place = (oxts.lat_deg, oxts.lon_deg, oxts.alt_m, oxts.course_rad)
+        return ego, GnssFix(tick, *place, abs(oxts.speed_mps), oxts.quality, oxts.sigma_m)
 
     def _calibration_of(self, name: str, notes: list[str]) -> KittiCalibration:
         path = self._files.calibrations.get(name)

@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.geometry import Cuboid, inverse, transform
 from pipeline.sources.base import SourceError, TruthObject
-from pipeline.types import F64
+from pipeline.types import F64, GnssQuality
 
 _LABELS = {"van": "car", "pedestrian": "person", "person_sitting": "person", "cyclist": "bicycle", "tram": "train"}
 _LABEL_FIELDS = 15
 _OXTS_FIELDS = 30
-_OXTS_FORWARD_SPEED, _OXTS_YAW_RATE = 8, 22  # vf, wu of dataformat.txt
+_LAT, _LON, _ALT, _YAW, _NORTH_MPS, _EAST_MPS, _FORWARD_MPS = 0, 1, 2, 5, 6, 7, 8  # as in dataformat.txt
+_YAW_RATE, _POSITION_ERROR, _POSITION_MODE = 22, 23, 27
+_QUALITY: dict[int, GnssQuality] = {3: "single", 4: "dgnss", 5: "rtk_float", 6: "rtk_fixed", 7: "dgnss", 8: "dgnss"}
+"""OXTS's position modes that are a fix; below 3 the unit reckons from what it had."""
+_SLOWEST_COURSE_MPS = 0.5
+_VELODYNE_FROM_IMU_M = (0.81, -0.32)
+"""Forward and left, from calib_imu_to_velo.txt, which is the same to a centimetre in all drives."""
+_METRES_A_DEGREE = 111_320.0
 
 
 def parse_labels(data: bytes, T_rect_ego: F64) -> tuple[TruthObject, ...]:
@@ -52,17 +60,44 @@ def _label(fields: list[str], T_ego_rect: F64) -> TruthObject:
     return TruthObject(_LABELS.get(name, name), cuboid)
 
 
-def parse_oxts(data: bytes, file: str) -> tuple[float, float]:
-    """Forward speed (m/s) and yaw rate (rad/s, positive to the left) of one oxts record. SourceError names the file."""
+class Oxts(NamedTuple):
+    """One record of the inertial unit. yaw_rate_radps: positive to the left. quality: null without a satellite fix. The
+    place is the Velodyne's, WGS 84; course clockwise from north, null when the car stands."""
+
+    speed_mps: float
+    yaw_rate_radps: float
+    lat_deg: float
+    lon_deg: float
+    alt_m: float
+    course_rad: float | None
+    sigma_m: float
+    quality: GnssQuality | None
+
+
+def parse_oxts(data: bytes, file: str) -> Oxts:
+    """One oxts record. SourceError names the file."""
     try:
         values = [float(word) for word in data.split()[:_OXTS_FIELDS]]
     except ValueError:
         values = []
-    if len(values) == _OXTS_FIELDS:
-        speed_mps, yaw_rate_radps = values[_OXTS_FORWARD_SPEED], values[_OXTS_YAW_RATE]
-        if abs(speed_mps) < 200.0 and abs(yaw_rate_radps) < 10.0:
-            return speed_mps, yaw_rate_radps
-    raise SourceError(f"{file}: not an oxts record")
+    if len(values) != _OXTS_FIELDS or not np.all(np.isfinite(values)):
+        raise SourceError(f"{file}: not an oxts record")
+    speed_mps, yaw_rate_radps, lat_deg, lon_deg = (values[k] for k in (_FORWARD_MPS, _YAW_RATE, _LAT, _LON))
+    if not (abs(speed_mps) < 200.0 and abs(yaw_rate_radps) < 10.0 and abs(lat_deg) < 89.0 and abs(lon_deg) <= 180.0):
+        raise SourceError(f"{file}: not an oxts record")
+    east, north = values[_EAST_MPS], values[_NORTH_MPS]
+    forward, left = _VELODYNE_FROM_IMU_M
+    c, s = np.cos(values[_YAW]), np.sin(values[_YAW])  # counter-clockwise from east
+    return Oxts(
+        speed_mps,
+        yaw_rate_radps,
+        lat_deg + (forward * s + left * c) / _METRES_A_DEGREE,
+        lon_deg + (forward * c - left * s) / (_METRES_A_DEGREE * np.cos(np.radians(lat_deg))),
+        values[_ALT],
+        float(np.arctan2(east, north) % (2.0 * np.pi)) if np.hypot(east, north) >= _SLOWEST_COURSE_MPS else None,
+        max(values[_POSITION_ERROR], 0.01),
+        _QUALITY.get(int(np.clip(values[_POSITION_MODE], -1, 99))),
+    )
 
 
 def parse_timestamps(data: bytes) -> tuple[int, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import cv2
@@ -111,6 +112,9 @@ def write_kitti_raw(date: Path) -> Path:
         cv2.imwrite(str(drive / "image_02" / "data" / f"{i:010d}.png"), np.zeros((40, 120, 3), dtype=np.uint8))
         record = [0.0] * 30
         record[8], record[22] = 13.5 + i, 0.02
+        record[0], record[1], record[2] = 49.0, 8.4, 112.0
+        record[5], record[6], record[7] = math.pi / 2, 13.5 + i, 0.0  # it drives north
+        record[23], record[27] = 0.04, 5.0 if i else 2.0
         (drive / "oxts" / "data" / f"{i:010d}.txt").write_text(" ".join(map(str, record)))
     head = "calib_time: 09-Jan-2012 13:57:47\n"
     cameras = f"{head}R_rect_00: {_numbers(np.eye(3))}\nP_rect_02: {_numbers(projection())}\n"

@@ -75,6 +75,18 @@ def test_raw_layout(kitti_raw: Path) -> None:
     assert (gap.ego.speed_mps, gap.ego.yaw_rate_radps) == (15.5, 0.02)
 
 
+def test_oxts_says_where_the_velodyne_is(kitti_raw: Path) -> None:
+    """The unit drives north; the Velodyne sits 0.81 m ahead of it and 0.32 m to its right, which is east."""
+    source = open_source(f"kitti:{kitti_raw}")
+    assert source.frame(0).gnss is None, "reckoned, not received"
+    fix = source.frame(1).gnss
+    assert fix is not None
+    assert (fix.quality, fix.sigma_m, fix.course_rad, fix.speed_mps) == ("rtk_float", 0.04, 0.0, 14.5)
+    assert (fix.lat_deg - 49.0) * 111_195 == pytest.approx(0.81, abs=0.01)
+    assert (fix.lon_deg - 8.4) * 111_195 * np.cos(np.radians(49.0)) == pytest.approx(0.32, abs=0.01)
+    assert fix.t_ns == source.t_ns(1)
+
+
 def test_label_in_ego_axes() -> None:
     (car,) = parse_labels(KITTI_LABEL.encode(), np.linalg.inv(T_ego_rect()))
     # bottom centre 12 m ahead, 1 m left and 1.7 m below a camera 0.3 m ahead of and 0.1 m below the LiDAR
