@@ -18,16 +18,20 @@ from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 
 from app.access import Access, Guard
+from app.clips.jobs import Jobs
 from app.drive.marks import Marks
 from app.engine import Engine
 from app.history import History
+from app.routes.clips import clips_router
 from app.routes.drive import drive_router
 from app.routes.params import params_router
 from app.routes.playback import playback_router
+from app.routes.rerun import rerun_router
 from app.routes.runs import runs_router
 from app.snapshot import Snapshot
 from app.stream import Stream
 from app.views.colors import palette_css
+from app.views.rerun_web import ViewerFiles
 from app.views.viser_proxy import viser_router
 from pipeline.errors import BadInput
 
@@ -53,6 +57,7 @@ def create_app(
     marked moments are kept; null forgets them at the end."""
     access = Access(hosts)
     stream, history = Stream(), History()
+    jobs, viewer = Jobs(engine.drives.changed), ViewerFiles()
 
     def show(snapshot: Snapshot) -> None:
         history.record(snapshot)
@@ -64,6 +69,8 @@ def create_app(
         end = engine.listen(show)
         yield
         end()
+        await asyncio.to_thread(jobs.close)
+        viewer.close()
 
     app = FastAPI(title="CIPV Studio", version="1", docs_url=None, redoc_url=None, lifespan=listening)
     app.add_middleware(Guard, access=access)
@@ -72,6 +79,8 @@ def create_app(
     app.include_router(params_router(engine))
     app.include_router(drive_router(engine, engine.drives, marks or Marks()))
     app.include_router(runs_router(engine, engine.drives))
+    app.include_router(clips_router(engine, jobs))
+    app.include_router(rerun_router(engine, viewer))
     app.include_router(viser_router(viser_port, access.allowed))
     app.add_api_route("/palette.css", _palette, include_in_schema=False)
     app.mount("/", _Pages(directory=STATIC, html=True), name="pages")

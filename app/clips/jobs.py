@@ -55,18 +55,18 @@ class Jobs:
 
     def __init__(self, on_end: Callable[[], None] = lambda: None) -> None:
         self._on_end = on_end
-        self._folder = Path(tempfile.mkdtemp(prefix="cipv-clips-"))
+        self._folder = Path()
         self._condition = threading.Condition()
         self._jobs: dict[str, Job] = {}
         self._work: dict[str, Work] = {}
         self._number = 0
         self._ended = False
-        self._thread = threading.Thread(target=self._run, name="cipv-jobs", daemon=True)
-        self._thread.start()
+        self._thread: threading.Thread | None = None
 
     def submit(self, kind: str, first: int, last: int, file: str, work: Work) -> Job:
         """Take a job on. The oldest that has ended goes; JobRefused when too many are under way."""
         with self._condition:
+            self._begin()
             self._make_room()
             self._number += 1
             job = Job(f"j{self._number}", kind, first, last, file=file)
@@ -111,8 +111,16 @@ class Jobs:
                 if job.state in ("waiting", "running"):
                     self._jobs[number] = replace(job, state="cancelled")
             self._condition.notify_all()
-        self._thread.join(_PATIENCE_S)
-        shutil.rmtree(self._folder, ignore_errors=True)
+        if self._thread is not None:
+            self._thread.join(_PATIENCE_S)
+            shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _begin(self) -> None:
+        """Folder and thread are made for the first job: most servers never write one."""
+        if self._thread is None:
+            self._folder = Path(tempfile.mkdtemp(prefix="cipv-clips-"))
+            self._thread = threading.Thread(target=self._run, name="cipv-jobs", daemon=True)
+            self._thread.start()
 
     def _make_room(self) -> None:
         ended = [number for number, job in self._jobs.items() if job.state not in ("waiting", "running")]

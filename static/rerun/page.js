@@ -1,0 +1,71 @@
+// @ts-check
+/**
+ * The page around rerun's web viewer: it starts the viewer on this drive, at this moment, and says what goes wrong.
+ * The viewer's script, loaded before this one, leaves `wasm_bindgen` behind.
+ */
+
+/**
+ * @typedef {Object} Handle
+ * @property {(canvas: HTMLCanvasElement) => Promise<void>} start
+ * @property {() => boolean} has_panicked
+ * @property {() => string | undefined} panic_message
+ */
+
+/** @type {any} */
+// @ts-expect-error a lexical global of the viewer's own script
+const bindgen = wasm_bindgen;
+
+const said = /** @type {HTMLElement} */ (document.getElementById("said"));
+const canvas = /** @type {HTMLCanvasElement} */ (document.getElementById("viewer"));
+const LOOK_EVERY_MS = 1000;
+
+/** @param {string} text */
+function say(text) {
+  said.textContent = text;
+  said.hidden = text === "";
+}
+
+/** Where the drive's recording is; the viewer opens it at the wanted frame. */
+function recording() {
+  const asked = new URLSearchParams(location.search);
+  const part = new URLSearchParams();
+  for (const name of ["first", "last"]) {
+    const value = asked.get(name);
+    if (value !== null && /^\d{1,9}$/.test(value)) part.set(name, value);
+  }
+  const frame = asked.get("frame") ?? "";
+  const when = /^\d{1,9}$/.test(frame) ? `#when=frame@${frame}` : "";
+  return `${location.origin}/api/rerun.rrd?${part}${when}`;
+}
+
+/** @param {Handle} handle */
+function watch(handle) {
+  if (handle.has_panicked()) {
+    canvas.hidden = true;
+    say(`rerun has stopped: ${handle.panic_message() ?? "no reason given"}`);
+    return;
+  }
+  setTimeout(watch, LOOK_EVERY_MS, handle);
+}
+
+async function open() {
+  await bindgen({ module_or_path: "/rerun/re_viewer_bg.wasm" });
+  /** @type {Handle} */
+  const handle = new bindgen.WebHandle({
+    url: [recording()],
+    hide_welcome_screen: true,
+    enable_history: false,
+    persist: false,
+    notebook: false,
+  });
+  canvas.hidden = false;
+  await handle.start(canvas);
+  say("");
+  document.documentElement.dataset.viewer = "started";
+  watch(handle);
+}
+
+open().catch((error) => {
+  canvas.hidden = true;
+  say(`rerun cannot be shown here: ${error instanceof Error ? error.message : error}`);
+});
