@@ -18,11 +18,11 @@ export function followHand(canvas, isOn) {
     if (!isOn()) return;
     canvas.setPointerCapture(event.pointerId);
     const from = present();
-    drag = { x: event.offsetX, y: event.offsetY, from, last: {} };
+    drag = { x: event.clientX, y: event.clientY, from, last: {} };
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!drag) return;
-    drag.last = shifted(drag.from, event.offsetX - drag.x, event.offsetY - drag.y);
+    drag.last = shifted(drag.from, event.clientX - drag.x, event.clientY - drag.y);
     change(drag.last, false);
   });
   const lift = () => {

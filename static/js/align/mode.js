@@ -10,6 +10,7 @@ import { reveal } from "../params.js";
 import { followHand } from "./hand.js";
 import { drawEdges } from "./edges.js";
 import { addLayer } from "../camera.js";
+import { grow } from "../workspace/panes.js";
 
 const OFF = { on: false, blend: 0.5, edges: true };
 
@@ -37,8 +38,9 @@ const isOn = () => get("align")?.on === true;
 
 export function toggleAlign() {
   set("align", { ...(get("align") ?? OFF), on: !isOn() });
+  if (isOn() !== (get("layout")?.grown === "camera")) grow("camera");
   if (!isOn()) return;
-  reveal("alignment.h_res_deg");
+  reveal("alignment.model");
   fetchScore(undefined);
 }
 
