@@ -103,12 +103,15 @@ def peaks(histogram: F64) -> list[float]:
     return found
 
 
-def fit_line(seen: Sightings, y0_m: float, shape: Shape, bearing_sigma_rad: float) -> FittedLine | None:
-    """The line near ``y0_m``, of about the shared shape, through the points around it; null with too few."""
+def fit_line(
+    seen: Sightings, y0_m: float, shape: Shape, bearing_sigma_rad: float, rounds: int = 3
+) -> FittedLine | None:
+    """The line near ``y0_m``, of about the shared shape, through the points around it; null with too few. rounds: of
+    weighing the points anew."""
     prior = np.array([y0_m, shape.heading_rad, shape.curvature_per_m / 2.0, 0.0])
     x = seen.x_m(shape.pitch_rad)
     ok, mean, cov, x_min, x_max, quality = _fit(
-        x, seen.slope * x, seen.slope, seen.weight, prior, _PRIOR_INFO, seen.height_m, bearing_sigma_rad
+        x, seen.slope * x, seen.slope, seen.weight, prior, _PRIOR_INFO, seen.height_m, bearing_sigma_rad, rounds
     )
     return FittedLine(mean, cov, x_min, x_max, quality) if ok else None
 
@@ -159,18 +162,15 @@ def _vote(slope, inverse, weight, height, headings, bends, pitches):  # type: ig
 
 
 @numba.njit(cache=True, nogil=True)
-def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma, rounds):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Re-weighted least squares with a prior, in x/10 so that the normal matrix is well conditioned."""
-    mean, cov = prior.copy(), np.zeros((4, 4))
+    mean, cov, info = prior.copy(), np.zeros((4, 4)), np.zeros((4, 4))
     scale = np.array([1.0, 0.1, 0.01, 0.001])
     covered = np.zeros(_COVER_BINS)
     x_min = x_max = 0.0
     near = inside = score = 0.0
-    for _ in range(5):
-        info, right = np.zeros((4, 4)), np.zeros(4)
-        for k in range(4):
-            info[k, k] = prior_info[k] * scale[k] * scale[k]
-            right[k] = info[k, k] * prior[k] / scale[k]
+    for _ in range(rounds):
+        sums, right = np.zeros(7), np.zeros(4)  # of the powers of x/10 up to 6: a Hankel matrix holds no more
         covered[:] = 0.0
         x_min, x_max = 1e9, 0.0
         near = inside = score = 0.0
@@ -188,12 +188,13 @@ def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma):  # type
             skew = (slope[i] - mean[1]) * x[i] * x[i] * bearing_sigma / height
             variance = _PAINT_SIGMA_M**2 + (x[i] * bearing_sigma) ** 2 + skew * skew
             trust = weight[i] / (variance * _SHARED_ERROR) / (1.0 + residual * residual / (4.0 * variance + 0.01))
-            s = x[i] / 10.0
-            row = np.array([1.0, s, s * s, s * s * s])
-            for a in range(4):
-                right[a] += trust * row[a] * y[i]
-                for b in range(4):
-                    info[a, b] += trust * row[a] * row[b]
+            step = x[i] / 10.0
+            power = trust
+            for k in range(7):
+                sums[k] += power
+                if k < 4:
+                    right[k] += power * y[i]
+                power *= step
             inside += weight[i]
             score += weight[i] * weight[i]
             x_min, x_max = min(x_min, x[i]), max(x_max, x[i])
@@ -202,6 +203,11 @@ def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma):  # type
                 covered[piece] = 1.0
         if inside < 1.0:
             return False, mean, cov, 0.0, 0.0, 0.0
+        for a in range(4):
+            for b in range(4):
+                info[a, b] = sums[a + b]
+            info[a, a] += prior_info[a] * scale[a] * scale[a]
+            right[a] += prior_info[a] * scale[a] * prior[a]
         inverse_info = np.linalg.inv(info)
         solved = inverse_info @ right
         for k in range(4):

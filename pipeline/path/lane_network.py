@@ -50,8 +50,8 @@ class LaneNetwork:
         found = self.head.points(run_session(self._session, self._blob(bgr, placed)))
         keep = found.score >= _MIN_SCORE
         uv = found.uv[keep] * (self.input_size[1], self.input_size[0])
-        uv = (uv - placed.shift) / placed.scale + (0.0, placed.top)
-        inside = np.all((uv >= 0.0) & (uv <= (bgr.shape[1], bgr.shape[0])), axis=1)
+        uv = (uv - placed.shift) / placed.scale + (0.0, placed.top) - 0.5  # whole numbers are the middles of pixels
+        inside = np.all((uv >= 0.0) & (uv <= (bgr.shape[1] - 1, bgr.shape[0] - 1)), axis=1)
         return RawLanes(self.name, uv[inside].astype(np.float32), found.score[keep][inside], found.line[keep][inside])
 
     def _blob(self, bgr: U8, placed: _Placed) -> F32:

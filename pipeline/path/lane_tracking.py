@@ -22,6 +22,7 @@ _SIDE_AT_M = 4.0
 """Which side of the car a line is on is judged here: where the front wheels will be."""
 _FURTHEST_M = 5.0
 _USUAL_WIDTH_M = 3.5
+_USUALLY_OFF_MIDDLE_M = 0.7
 _SEEN_GAIN = 0.35
 """Share by which a sighting moves a line's quality."""
 _FADE_S = 0.8
@@ -179,17 +180,17 @@ def _quality_now(line: LineTrack) -> float:
 
 
 def _worth(left: LineTrack | None, right: LineTrack | None, params: LaneParams) -> float:
-    """How good a pair is: well supported, as wide as a lane, and the nearest to the car."""
-    worth = sum(_quality_now(line) for line in (left, right) if line is not None)
-    if left is not None and right is not None:
-        width = _width_m(left, right)
-        if not params.min_width_m <= width <= params.max_width_m:
-            return -1.0
-        return worth + 0.5 * float(np.exp(-0.5 * ((width - _USUAL_WIDTH_M) / 0.5) ** 2))
-    alone = left or right
-    if alone is not None:
-        worth -= 0.1 * abs(float(powers(_SIDE_AT_M) @ alone.coefficients))
-    return worth
+    """How good a pair is: well supported and long known, as wide as a lane, the car near its middle."""
+    lines = [line for line in (left, right) if line is not None]
+    worth = sum(_quality_now(line) * line.seen / (line.seen + 1.0) for line in lines)
+    places = [float(powers(_SIDE_AT_M) @ line.coefficients) for line in lines]
+    if left is None or right is None:
+        return worth - 0.05 * abs(sum(places))
+    width = _width_m(left, right)
+    if not params.min_width_m <= width <= params.max_width_m:
+        return -1.0
+    usual = ((width - _USUAL_WIDTH_M) / 0.5) ** 2 + (sum(places) / 2.0 / _USUALLY_OFF_MIDDLE_M) ** 2
+    return worth + 0.5 * float(np.exp(-0.5 * usual))
 
 
 def _width_m(left: LineTrack, right: LineTrack) -> float:
