@@ -147,7 +147,7 @@ class Recorder:
     def _fail(self, error: Exception) -> None:
         """Recording ends here; the line goes on."""
         reason = (error.strerror if isinstance(error, OSError) else None) or f"{type(error).__name__}: {error}"
-        self._error = f"recording stopped: {reason}; {self._segments.frames} frames until then are kept"
+        self._error = f"recording stopped: {reason}; {self._segments.kept_frames} frames until then are kept"
         logger.error("%s: %s", self._segments.files[-1], self._error)
         while not self._jobs.empty():  # the frames that wait hold memory
             self._jobs.get_nowait()

@@ -43,6 +43,11 @@ class Segments:
         return self._earlier_frames + self._writer.frames
 
     @property
+    def kept_frames(self) -> int:
+        """See ``SessionWriter.kept_frames``."""
+        return self._earlier_frames + self._writer.kept_frames
+
+    @property
     def bytes_written(self) -> int:
         return self._earlier_bytes + self._writer.bytes_written
 

@@ -79,6 +79,7 @@ class SessionWriter:
         self._output.add_metadata(topics.METADATA, about.to_metadata())
         self._clock = clock or SessionClock()
         self._index: list[tuple[int, int]] = []
+        self._kept_frames = 0
         self._header_ns = 0
         self._tick: Tick | None = None
         self._picture: Picture | None = None
@@ -99,6 +100,11 @@ class SessionWriter:
     @property
     def frames(self) -> int:
         return len(self._index)
+
+    @property
+    def kept_frames(self) -> int:
+        """Of ``frames``, those in whole chunks: what stays when the file can take no more."""
+        return self._kept_frames
 
     @property
     def span_s(self) -> float:
@@ -159,6 +165,7 @@ class SessionWriter:
     def flush(self, *, to_disk: bool = False) -> None:
         """See ``Output.flush``."""
         self._output.flush(to_disk=to_disk)
+        self._kept_frames = len(self._index)
 
     def close(self) -> None:
         """Write the list of frames and the summary. Safe to call twice."""
@@ -172,7 +179,10 @@ class SessionWriter:
         self._output.discard()
 
     def _add(self, topic: str, at_ns: int, data: bytes, t_ns: int | None = None) -> None:
+        before = self._output.bytes_written
         self._output.add(topics.channel(topic), at_ns, self._header_ns if t_ns is None else t_ns, data)
+        if self._output.bytes_written > before:
+            self._kept_frames = len(self._index) + (topic == topics.FRAMES)
 
     def _put_sweep(self, sweep: Sweep | None, at_ns: int) -> SweepRef | None:
         if sweep is None:

@@ -1,0 +1,206 @@
+"""Recording never holds up the line, never loses a frame without saying so, and leaves whole files behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from mcap.exceptions import McapError
+from mcap.reader import NonSeekingReader
+
+from pipeline.errors import BadInput
+from pipeline.params import Params, with_changes
+from pipeline.recording.packets import packets_from
+from pipeline.recording.recorder import Recorder
+from pipeline.recording.rewrite import recover
+from pipeline.recording.segments import Rotation, Segments
+from pipeline.recording.session import SessionSource
+from tests.conftest import ROOT
+from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, same, sweep
+
+
+def test_what_is_put_can_be_opened_afterwards(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.mcap", ABOUT)
+    changed = with_changes(Params(), {"cluster.z_weight": 0.35})
+    for index in range(5):
+        assert recorder.put(full(index), params=Params() if index < 3 else changed)
+    recorder.mark("here")
+    state = recorder.stop()
+    assert (state.frames, state.dropped, state.error) == (5, 0, None)
+    assert state.seconds == pytest.approx(0.4)
+    assert state.bytes == (tmp_path / "a.mcap").stat().st_size
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    assert [same(session.frame(index), full(index)) for index in range(5)] == [True] * 5
+    assert session.params(4) == changed
+    assert [mark.text for mark in session.marks()] == ["here"]
+    assert recorder.stop() == state
+
+
+def test_received_times_are_kept_beside_the_sensors_own(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "a.mcap", ABOUT)
+    received_ns = [10**18, 10**18 + 5, 10**18 + 5]  # the host's clock may stand still
+    for index in range(3):
+        recorder.put(full(index), received_ns=received_ns[index])
+    recorder.stop()
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    assert [session.log_time_ns(index) - 10**18 for index in range(3)] == [0, 5, 6]
+    assert [session.t_ns(index) for index in range(3)] == [PERIOD_NS * (1 + index) for index in range(3)]
+
+
+@contextmanager
+def slow_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """Writing waits for the event."""
+    may_write = threading.Event()
+    write = Segments.write
+
+    def wait_and_write(*arguments: object) -> None:
+        assert may_write.wait(20.0)
+        write(*arguments)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Segments, "write", wait_and_write)
+    yield may_write
+    may_write.set()
+
+
+def test_a_slow_disk_holds_nobody_up_and_what_is_dropped_is_counted_and_noted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    with slow_disk(monkeypatch) as may_write:
+        recorder = Recorder(tmp_path / "a.mcap", ABOUT, queued=4)
+        taken = [recorder.put(full(index)) for index in range(12)]  # returns though nothing can be written
+        assert taken[:4] == [True] * 4
+        assert taken.count(False) >= 7
+        assert recorder.state.dropped == taken.count(False)
+        recorder.mark("marks are never dropped")
+        may_write.set()
+        state = recorder.stop()
+    assert state.frames == taken.count(True)
+    assert "too slow" in caplog.text
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    names = [session.frame(index).name for index in range(len(session))]
+    assert names == [f"{index:06d}" for index, was_taken in enumerate(taken) if was_taken]
+    notes = b"".join(stored.data for stored in session.file.messages(("/notes",)))
+    assert f"{state.dropped} frames were dropped here".encode() in notes
+    assert len(session.marks()) == 1
+
+
+def test_a_file_that_exists_is_never_written_over(tmp_path: Path) -> None:
+    (tmp_path / "a.mcap").write_text("precious")
+    with pytest.raises(BadInput, match="already"):
+        Recorder(tmp_path / "a.mcap", ABOUT)
+    with pytest.raises(OSError, match="No such file"):
+        Recorder(tmp_path / "no" / "a.mcap", ABOUT)
+    assert (tmp_path / "a.mcap").read_text() == "precious"
+
+
+@pytest.mark.parametrize("rotation", [Rotation(max_s=1.0), Rotation(max_bytes=300_000.0)], ids=["time", "size"])
+def test_each_file_of_a_long_recording_can_be_read_alone(rotation: Rotation, tmp_path: Path) -> None:
+    frames = [replace(full(index), sweep=sweep(index, points=3000)) for index in range(35)]
+    parts = Segments(tmp_path / "drive.mcap", ABOUT, rotation)
+    for frame in frames:
+        parts.write(frame, None, Params(), None)
+    parts.close()
+    assert [path.name for path in parts.files[:3]] == ["drive.mcap", "drive_001.mcap", "drive_002.mcap"]
+    sessions = [SessionSource("a", str(path)) for path in parts.files]
+    read = [session.frame(index) for session in sessions for index in range(len(session))]
+    assert [same(replace(a, index=b.index), b) for a, b in zip(read, frames, strict=True)] == [True] * 35
+    assert all(session.params(0) == Params() for session in sessions)
+    assert parts.frames == 35
+    assert parts.bytes_written == sum(path.stat().st_size for path in parts.files)
+    if rotation.max_s is not None:
+        assert [len(session) for session in sessions] == [11, 11, 11, 2]
+
+
+def test_raw_packets_are_kept_as_they_came(tmp_path: Path) -> None:
+    packets = [(10**18 + index, bytes([index]) * 1206) for index in range(76)]
+    recorder = Recorder(tmp_path / "a.mcap", ABOUT)
+    recorder.put(full(0))
+    assert recorder.put_packets(packets)
+    recorder.stop()
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    (stored,) = session.file.messages(("/lidar/packets",))
+    assert packets_from(stored.data) == packets
+    assert (stored.channel.schema_name, stored.channel.message_encoding) == ("velodyne_msgs/msg/VelodyneScan", "cdr")
+
+
+_RECORD_FOR_EVER = """
+import resource, sys
+from dataclasses import replace
+from pathlib import Path
+from pipeline.recording.recorder import Recorder
+from tests.pipeline.recording.frames import ABOUT, full, sweep
+limit = int(sys.argv[2])
+if limit:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+recorder = Recorder(Path(sys.argv[1]), ABOUT)
+points = sweep(0, points=3000)
+for index in range(1_000_000):
+    while not recorder.put(replace(full(index), sweep=points)):
+        if recorder.state.error:
+            print(recorder.stop().error)
+            sys.exit(0)
+    if index % 10 == 0:
+        print(index, recorder.state.bytes, flush=True)
+"""
+
+
+def recording_process(path: Path, limit: int) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", _RECORD_FOR_EVER, str(path), str(limit)]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+
+
+def messages_until_the_cut(path: Path) -> int:
+    """As MCAP's own reader finds them from the start on."""
+    count = 0
+    with path.open("rb") as file, suppress(McapError):
+        for _ in NonSeekingReader(file).iter_messages(log_time_order=False):
+            count += 1
+    return count
+
+
+@pytest.mark.parametrize("kill_after_bytes", [1, 1_000_000])
+def test_killed_at_any_moment_every_complete_chunk_is_there(kill_after_bytes: int, tmp_path: Path) -> None:
+    path, out = tmp_path / "a.mcap", tmp_path / "out.mcap"
+    with recording_process(path, 0) as process:
+        assert process.stdout is not None
+        written = 0
+        while written < kill_after_bytes:
+            written = int(process.stdout.readline().split()[1])
+        os.kill(process.pid, signal.SIGKILL)
+    assert path.stat().st_size >= written, "what the recorder counts is with the system"
+    saved = recover(path, out)
+    assert saved.is_cut
+    assert saved.lost_chunks == 0
+    assert saved.messages == messages_until_the_cut(path)
+    if saved.chunks == 0:  # killed before its first chunk was full
+        assert kill_after_bytes == 1
+        return
+    session = SessionSource("a", str(out))
+    assert len(session) == saved.frames > 0
+    for index in (0, len(session) // 2, len(session) - 1):
+        assert same(session.frame(index), replace(full(index), sweep=sweep(0, points=3000)))
+    assert len(SessionSource("a", str(path))) == saved.frames, "the cut file opens as it is, too"
+
+
+def test_a_full_disk_stops_the_recording_says_so_and_keeps_what_is_there(tmp_path: Path) -> None:
+    """A limit on the size of files does what a full disk does, at any byte of a chunk."""
+    path = tmp_path / "a.mcap"
+    with recording_process(path, 1_000_000) as process:
+        assert process.stdout is not None
+        *_, error = process.stdout.read().splitlines()
+    assert process.returncode == 0
+    assert "recording stopped: File too large" in error
+    session = SessionSource("a", str(path))
+    assert f"{len(session)} frames until then are kept" in error
+    assert path.stat().st_size <= 1_000_000
+    assert not session.file.directory.is_cut
+    for index in range(len(session)):
+        assert same(session.frame(index).sweep, sweep(0, points=3000))
