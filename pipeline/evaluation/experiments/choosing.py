@@ -98,7 +98,7 @@ def judge(way: Way, tick: Tick) -> Frame:
     elif chosen is None or chosen.bev is None:
         verdict = "missed"
     else:
-        verdict = "correct" if _same_place(near_face_middle(chosen.bev), lead) else "wrong"
+        verdict = "correct" if same_place(near_face_middle(chosen.bev), lead) else "wrong"
     return Frame(
         tick.t_s,
         verdict,
@@ -123,11 +123,11 @@ class Way:
         t_s = np.arange(0.0, scene.duration_s + _LONGEST_S, _STEP_S)
         return Way(t_s, np.array([world.at(alone, float(t)).pose[:2] for t in t_s]))
 
-    def ahead(self, now: World) -> Path | None:
+    def ahead(self, now: World, at_most_m: float = _AHEAD_M) -> Path | None:
         """What is left of it, 90 m at most, in the ego frame of now; null while the car stands."""
         coming = np.vstack([now.pose[:2], self.places[self.t_s > now.t_s]])
         moved = np.hypot(*np.diff(coming, axis=0).T)
-        keep = np.concatenate([[True], (moved > _SMALLEST_MOVE_M) & (np.cumsum(moved) < _AHEAD_M)])
+        keep = np.concatenate([[True], (moved > _SMALLEST_MOVE_M) & (np.cumsum(moved) < at_most_m)])
         if keep.sum() < 2:
             return None
         center = now.to_ego(coming[keep])
@@ -171,7 +171,8 @@ def _range_m(state: ActorState) -> float:
     return float(np.hypot(*_near_face(state)))
 
 
-def _same_place(point: Point2, lead: ActorState) -> bool:
+def same_place(point: Point2, lead: ActorState) -> bool:
+    """Whether a point is where a vehicle's nearest face is, give or take a fifth of its range."""
     x, y = _near_face(lead)
     return float(np.hypot(point[0] - x, point[1] - y)) <= max(_SAME_PLACE_M, _SAME_SHARE * _range_m(lead))
 

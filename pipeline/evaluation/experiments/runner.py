@@ -13,14 +13,15 @@ from pipeline.errors import BadInput
 from pipeline.evaluation.experiments.bev_error import BEV_ERROR
 from pipeline.evaluation.experiments.braking import BRAKING
 from pipeline.evaluation.experiments.choosing import CHOOSING
+from pipeline.evaluation.experiments.curves import CURVES
 from pipeline.evaluation.experiments.iso import ISO
 from pipeline.evaluation.experiments.ncap import NCAP
 from pipeline.evaluation.experiments.ranging import RANGING
 from pipeline.evaluation.experiments.regression import REGRESSION
 from pipeline.evaluation.experiments.sections import Experiment, Replay, Section
 
-EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, BRAKING, NCAP, ISO)
-SUITES = ("paper", "euroncap", "iso", "all")
+EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, CURVES, BRAKING, NCAP, ISO)
+SUITES = ("paper", "curves", "euroncap", "iso", "all")
 
 
 class NoSuchSuite(BadInput):

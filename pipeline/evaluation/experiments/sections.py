@@ -10,7 +10,7 @@ from pipeline.params import Params
 from pipeline.run import Sensors
 from pipeline.simulation.scenario import Scenario
 
-Suite = Literal["paper", "euroncap", "iso"]
+Suite = Literal["paper", "curves", "euroncap", "iso"]
 Tone = Literal["green", "yellow", "orange", "brown", "red", "grey"]
 Boxes = Literal["truth", "network"]
 """Whose the camera's boxes are: projected truth with a detector's errors, or the embedded network's on drawn
