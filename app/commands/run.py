@@ -76,8 +76,7 @@ class Run:
     def _results(self, source: AnySource, params: Params, detectors: Detectors) -> Iterator[Ran]:
         """Frames with their results, as many as are wanted."""
         if is_live_source(source):
-            live = source
-            every = run_live(live, params, detectors, self.sensors, lambda: _say_waiting(live))
+            every = run_live(source, params, detectors, self.sensors, _Waiting(source))
         else:
             every = run(cast("Source", source), params, detectors, self.sensors)
         return islice(every, self.frames)
@@ -92,9 +91,21 @@ def _until_interrupted(results: Iterator[Ran], is_live: bool) -> Iterator[Ran]:
             raise
 
 
-def _say_waiting(live: LiveSource) -> None:
-    states = [f"{each.sensor} {each.state}" + (f" ({each.note})" if each.note else "") for each in live.health()]
-    print(f"cipv: waiting for sensors: {', '.join(states)}", file=sys.stderr)
+class _Waiting:
+    """Says what live sensors are waited for, whenever that has changed."""
+
+    def __init__(self, live: LiveSource) -> None:
+        self._live = live
+        self._said = ""
+
+    def __call__(self) -> None:
+        states = [
+            f"{each.sensor} {each.state}" + (f" ({each.note})" if each.note else "") for each in self._live.health()
+        ]
+        text = f"cipv: waiting for sensors: {', '.join(states)}"
+        if text != self._said:
+            print(text, file=sys.stderr)
+        self._said = text
 
 
 def _sentence(result: Result) -> str:

@@ -1,0 +1,64 @@
+"""`cipv replay`: a recording sent as the car's sensors would, to whoever listens with the same live config."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from itertools import chain, count
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from app.options import SourceOptions
+from pipeline.errors import BadInput
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Send a recording as VLP-16 packets, MJPEG, NMEA and CAN, at true timing, to where a live config listens.
+
+    Example: cipv replay sim:straight --config car.yaml, and beside it: cipv serve live:car.yaml
+    """
+
+    source: SourceOptions
+    config: Annotated[Path, tyro.conf.arg(metavar="FILE")]
+    """The live config (`cipv live init`): its ports and addresses are where to send"""
+    speed: float = 1.0
+    """How fast the world runs; the LiDAR turns as it does, so faster leaves sweeps out"""
+    loop: bool = False
+    """Begin again at the end, until Ctrl-C"""
+    faults: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """A YAML list of what shall go wrong, e.g. [{sensor: camera, kind: disconnect, from_s: 5, to_s: 7}]"""
+
+    def __call__(self) -> int:
+        if not 0.05 <= self.speed <= 20.0:
+            raise BadInput(f"--speed {self.speed:g}: between 0.05 and 20")
+        from pipeline.replay.faults import load as load_faults  # drivers of sensors: only who replays pays for them
+        from pipeline.replay.messages import of_recording
+        from pipeline.replay.replayer import replay
+        from pipeline.replay.senders import open_senders
+        from pipeline.sources.live.config import load
+
+        config = load(str(self.config))
+        faults = load_faults(self.faults) if self.faults is not None else ()
+        source = self.source.open()
+        senders = open_senders(config)
+        mount = config.lidar.mount.T_ego_sensor() if config.lidar is not None else None
+        rounds = count() if self.loop else range(1)
+        span_ns = source.t_ns(len(source) - 1) - source.t_ns(0) + round(1e9 / source.rate_hz)
+        messages = chain.from_iterable(
+            (message._replace(t_ns=message.t_ns + number * span_ns) for message in of_recording(source))
+            for number in rounds
+        )
+        try:
+            sent = replay(messages, senders, speed=self.speed, T_ego_lidar=mount, faults=faults)
+        except KeyboardInterrupt:
+            return 0
+        finally:
+            for sender in senders.values():
+                sender.close()
+        said = ", ".join(f"{number} {sensor}" for sensor, number in sent.events.items())
+        late = f"; {sent.late} sent over 20 ms late: this machine is too slow" if sent.late else ""
+        print(f"cipv: sent {said or 'nothing'}{late}", file=sys.stderr)
+        return 0

@@ -1,0 +1,55 @@
+"""Listens to every sensor of a config for a while and says how each does."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from pipeline.sources.live.lidar import LidarInput
+from pipeline.sources.live.source import LiveSensors
+from pipeline.types import StreamHealth
+
+
+@dataclass(frozen=True)
+class SensorReport:
+    """clock_offset_ms: host time less the sensor's, the shortest delay on the way included; of a VLP-16, which counts
+    from the full hour, at most half an hour either way; null where the sensor sends no time. pps: what the LiDAR says
+    of the pulse per second; null where it says nothing. skew_ms: median of picture less sweep, over the ticks."""
+
+    health: StreamHealth
+    clock_offset_ms: float | None = None
+    refused: int = 0
+    pps: str | None = None
+    skew_ms: float | None = None
+
+    @property
+    def is_good(self) -> bool:
+        return self.health.state == "ok"
+
+
+def check(source: LiveSensors, seconds: float) -> list[SensorReport]:
+    """Open the sensors, take ticks for so long as they come, and report. The sensors are given back."""
+    source.start()
+    skews_ms = []
+    end_s = time.monotonic() + seconds
+    try:
+        while (left_s := end_s - time.monotonic()) > 0.0:
+            frame = source.next(left_s)
+            if frame is not None and frame.sweep is not None and frame.picture is not None and frame.picture.t_ns:
+                skews_ms.append((frame.picture.t_ns - frame.sweep.t_ns) / 1e6)
+        return [_report(source, health, skews_ms) for health in source.health()]
+    finally:
+        source.close()
+
+
+def _report(source: LiveSensors, health: StreamHealth, skews_ms: list[float]) -> SensorReport:
+    each = source.inputs.get(health.sensor)
+    if each is None:
+        return SensorReport(health)
+    return SensorReport(
+        health,
+        each.clock_offset_ms(),
+        each.stats.refused,
+        each.pps if isinstance(each, LidarInput) else None,
+        sorted(skews_ms)[len(skews_ms) // 2] if skews_ms and health.sensor == "camera" else None,
+    )
