@@ -21,16 +21,25 @@ def _open_session(uri: str, path: str, rings: int) -> Source:
     return SessionSource(uri, path)
 
 
+def _open_pcap(uri: str, rest: str, rings: int) -> Source:
+    from pipeline.sources.pcap import PcapSource  # decoder and video libraries: only who opens one pays
+
+    return PcapSource(uri, rest)
+
+
 _OPENERS: dict[str, Callable[[str, str, int], Source]] = {
     "astyx": lambda uri, rest, rings: AstyxSource(uri, rest),
     "kitti": lambda uri, rest, rings: KittiSource(uri, rest, rings),
     "mcap": _open_session,
+    "pcap": _open_pcap,
     "sim": lambda uri, rest, rings: SimulatedSource(uri, rest),
 }
 """Scheme → what opens it, given the whole URI, the part after the colon and how many LiDAR rings to keep."""
 
 _MARKS = {"lidar_vlp16": "astyx", "camera_front": "astyx", "velodyne": "kitti", "velodyne_points": "kitti"}
 """A folder with this one inside is such a recording."""
+_SUFFIXES = {".pcap": "pcap", ".pcapng": "pcap", ".cap": "pcap"}
+"""A file whose name ends so is such a recording."""
 
 
 def open_source(uri: str, *, rings: int = 16) -> Source:
@@ -72,6 +81,9 @@ def open_any(uri: str, *, rings: int = 16) -> AnySource:
 
 def _about_bare_path(path: str) -> str:
     """What to type instead of a path without a scheme."""
+    by_name = _SUFFIXES.get(Path(path).suffix.lower())
+    if by_name is not None:
+        return f"{path}: say what kind of recording it is; it looks like {by_name}:{path}"
     for inside, scheme in _MARKS.items():
         try:
             if path and (Path(path).expanduser() / inside).is_dir():

@@ -33,6 +33,21 @@ def recording_folder(path: str) -> Path:
     return folder
 
 
+def recording_file(path: str) -> Path:
+    """The file a person typed, ``~`` resolved. SourceError when there is none."""
+    if not path:
+        raise SourceError("no file given after the colon")
+    try:
+        file = Path(path).expanduser()
+        if not file.exists():
+            raise SourceError(f"{path}: no such file")
+        if not file.is_file():
+            raise SourceError(f"{path}: not a file")
+    except (OSError, RuntimeError, ValueError) as error:
+        raise SourceError(f"{path}: cannot be opened: {reason_of(error)}") from None
+    return file
+
+
 def files_by_name(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
     """Files of a folder by their name without suffix, in order of name; empty when there is no such folder."""
     try:

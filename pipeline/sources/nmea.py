@@ -60,6 +60,11 @@ class NmeaReader:
             self._said = {"done": None}
         return done
 
+    def flush(self, near_ns: int) -> GnssFix | None:
+        """At the end of the sentences: the fix of the last moment, if it was not given."""
+        self._moment = None
+        return self._close(near_ns)
+
     def _close(self, near_ns: int) -> GnssFix | None:
         """A new moment begins: what the last one had is what can be expected; its fix, if it was not given."""
         said, self._said = self._said, {}

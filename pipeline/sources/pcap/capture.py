@@ -1,0 +1,167 @@
+"""UDP datagrams of a capture file, one at a time, each with the place in the file where it can be read again.
+
+Classic pcap (libpcap's savefile format, µs and ns, either byte order) and pcapng (draft-ietf-opsawg-pcapng: section,
+interface, enhanced and simple packet blocks). Read here and not by dpkt, because it takes a damaged length at its word
+and reads gigabytes for one packet, and because its times are floating-point numbers that lose the nanoseconds.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, NamedTuple
+
+from pipeline.sources.base import SourceError
+from pipeline.sources.files import reason_of
+
+_MAX_RECORD = 1 << 18
+"""libpcap's own limit; a longer record is damage."""
+_CLASSIC = {
+    b"\xd4\xc3\xb2\xa1": ("<", 1000),
+    b"\xa1\xb2\xc3\xd4": (">", 1000),
+    b"\x4d\x3c\xb2\xa1": ("<", 1),
+    b"\xa1\xb2\x3c\x4d": (">", 1),
+}
+_SECTION, _INTERFACE, _SIMPLE, _ENHANCED = 0x0A0D0D0A, 1, 3, 6
+_BYTE_ORDER = {b"\x4d\x3c\x2b\x1a": "<", b"\x1a\x2b\x3c\x4d": ">"}
+_LINK_BYTES = {0: 4, 1: 14, 12: 0, 14: 0, 101: 0, 108: 4, 113: 16, 228: 0, 229: 0, 276: 20}
+"""Bytes before the IP header by link type: loopback, Ethernet, raw IP, Linux cooked."""
+_ETHERNET, _VLAN = 1, (0x8100, 0x88A8)
+_UDP = 17
+
+
+class Datagram(NamedTuple):
+    """origin: where its record begins in the file. t_ns: when it was captured, unix. port: to which it was sent."""
+
+    origin: int
+    t_ns: int
+    port: int
+    payload: bytes
+
+
+class Capture:
+    """One file. damage: why reading ended before the file did, null while it has not."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.damage: str | None = None
+        with self._open() as file:
+            self._magic = file.read(4)
+        if self._magic not in _CLASSIC and self._magic != struct.pack("<I", _SECTION):
+            raise SourceError(f"{path.name}: neither a pcap nor a pcapng file")
+
+    def datagrams(self, begin: int = 0, end: int | None = None) -> Iterator[Datagram]:
+        """Every whole UDP datagram whose record begins at ``begin`` (0: the first) to ``end``, both included.
+
+        SourceError when the file cannot be read any more.
+        """
+        with self._open() as file:
+            records = self._classic(file, begin) if self._magic in _CLASSIC else self._pcapng(file, begin)
+            for origin, t_ns, link, data in records:
+                if end is not None and origin > end:
+                    return
+                found = _udp(data, link)
+                if found is not None:
+                    yield Datagram(origin, t_ns, *found)
+
+    def _open(self) -> BinaryIO:
+        try:
+            return self.path.open("rb", buffering=1 << 20)
+        except OSError as error:
+            raise SourceError(f"{self.path.name}: cannot be read: {reason_of(error)}") from None
+
+    def _classic(self, file: BinaryIO, begin: int) -> Iterator[tuple[int, int, int, bytes]]:
+        order, tick_ns = _CLASSIC[self._magic]
+        header = file.read(24)
+        if len(header) < 24:
+            self.damage = "cut off in its header"
+            return
+        (link,) = struct.unpack_from(order + "I", header, 20)
+        record = struct.Struct(order + "IIII")
+        origin = max(begin, 24)
+        file.seek(origin)
+        while head := file.read(16):
+            if len(head) < 16:
+                self.damage = f"cut off after {origin} bytes"
+                return
+            seconds, ticks, length, _ = record.unpack(head)
+            if length > _MAX_RECORD:
+                self.damage = f"damaged after {origin} bytes"
+                return
+            data = file.read(length)
+            if len(data) < length:
+                self.damage = f"cut off after {origin} bytes"
+                return
+            yield origin, seconds * 1_000_000_000 + ticks * tick_ns, link & 0xFFFF, data
+            origin += 16 + length
+
+    def _pcapng(self, file: BinaryIO, begin: int) -> Iterator[tuple[int, int, int, bytes]]:
+        """Blocks from the beginning, because interfaces are described there; packets only from ``begin`` on."""
+        order, interfaces, origin = "<", list[tuple[int, float]](), 0
+        while head := file.read(12):
+            if len(head) < 12:
+                self.damage = f"cut off after {origin} bytes"
+                return
+            if head[:4] == self._magic:
+                order, interfaces = _BYTE_ORDER.get(head[8:12], "<"), []
+            kind, length = struct.unpack(order + "II", head[:8])
+            if length < 12 or length % 4 or length > _MAX_RECORD:
+                self.damage = f"damaged after {origin} bytes"
+                return
+            body = head[8:] + file.read(length - 12)
+            if len(body) < length - 8:
+                self.damage = f"cut off after {origin} bytes"
+                return
+            if kind == _INTERFACE and len(body) >= 12:
+                interfaces.append((struct.unpack_from(order + "H", body)[0], _resolution_ns(body[8:-4], order)))
+            elif kind == _ENHANCED and len(body) >= 24 and origin >= begin:
+                number, high, low, captured = struct.unpack_from(order + "IIII", body)
+                if number < len(interfaces):
+                    link, tick_ns = interfaces[number]
+                    yield origin, round((high << 32 | low) * tick_ns), link, body[20 : 20 + captured]
+            origin += length
+            if origin < begin and interfaces:
+                origin = begin
+                file.seek(origin)
+
+
+def _resolution_ns(options: bytes, order: str) -> float | int:
+    """Nanoseconds a tick of an interface's time stamps: option if_tsresol, µs without it."""
+    at = 0
+    while at + 4 <= len(options):
+        code, length = struct.unpack_from(order + "HH", options, at)
+        if code == 9 and length == 1 and at + 4 < len(options):
+            power = options[at + 4]
+            ticks_a_second = 2 ** (power & 0x7F) if power & 0x80 else 10**power
+            return 1_000_000_000 // ticks_a_second if 1_000_000_000 % ticks_a_second == 0 else 1e9 / ticks_a_second
+        if code == 0:
+            break
+        at += 4 + (length + 3) // 4 * 4
+    return 1000
+
+
+def _udp(data: bytes, link: int) -> tuple[int, bytes] | None:
+    """(destination port, payload) of a frame that holds one whole UDP datagram; null when it does not."""
+    at = _LINK_BYTES.get(link)
+    if at is None or len(data) < at + 28:
+        return None
+    if link == _ETHERNET:
+        while int.from_bytes(data[at - 2 : at], "big") in _VLAN and at + 4 + 28 <= len(data):
+            at += 4
+    version = data[at] >> 4
+    if version == 4:
+        fragment = int.from_bytes(data[at + 6 : at + 8], "big")
+        if data[at + 9] != _UDP or fragment & 0x3FFF:
+            return None
+        at += (data[at] & 0x0F) * 4
+    elif version == 6 and data[at + 6] == _UDP:
+        at += 40
+    else:
+        return None
+    if at + 8 > len(data):
+        return None
+    length = int.from_bytes(data[at + 4 : at + 6], "big")
+    if length < 8 or at + length > len(data):
+        return None
+    return int.from_bytes(data[at + 2 : at + 4], "big"), data[at + 8 : at + length]

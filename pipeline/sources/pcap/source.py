@@ -1,0 +1,180 @@
+"""A capture of a VLP-16's packets as a recording: one pass over the file finds its sweeps, each is decoded when asked.
+
+What is kept of a sweep is where its first and last packet lie in the file and its time, so the length of a recording
+costs no memory to speak of. GNSS comes from a file of sentences beside it, else from the sensor's own position packets.
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections import Counter
+
+import numpy as np
+
+from pipeline.records import evolve
+from pipeline.sources.base import SourceError, TruthObject
+from pipeline.sources.beside import OPTIONS, Beside, rig_of
+from pipeline.sources.files import recording_file
+from pipeline.sources.nmea import NmeaReader
+from pipeline.sources.options import number_option, split_options
+from pipeline.sources.pcap.capture import Capture, Datagram
+from pipeline.sources.velodyne import (
+    PACKET_BYTES,
+    POSITION_BYTES,
+    BadPacket,
+    Rotation,
+    RotationCutter,
+    SensorClock,
+    Vlp16Decoder,
+    read_position,
+)
+from pipeline.types import F64, Frame, GnssFix, Sweep
+
+_DATA_PORT = 2368
+_LOOK_AT = 2000
+"""Datagrams at the beginning that show to which port a LiDAR sends."""
+_NMEA = slice(0xCA, 0x14E)  # PPS state and sentence of a position packet
+
+
+class PcapSource:
+    """``<file>?port=2368&video=…&video_offset_s=…&nmea=…&rig=…``, all optional."""
+
+    def __init__(self, uri: str, rest: str) -> None:
+        path, options = split_options(rest, ("port", *OPTIONS))
+        file = recording_file(path)
+        self.uri, self.title = uri, file.stem
+        self._capture = Capture(file)
+        rig = rig_of(file, options)
+        self._T_ego_lidar = rig.lidar.mount.T_ego_sensor()
+        self._port = int(number_option(options, "port", 0)) or _lidar_port(self._capture)
+        self._index = _Index(self._capture, self._port, self._T_ego_lidar)
+        if not len(self._index):
+            raise SourceError(f"{file.name}: {self._index.about_nothing(self._port)}")
+        self._beside = Beside(file, options, rig, self._index.begin_ns, self._index.fixes)
+        self.rate_hz = self._index.rate_hz()
+        self.notes = (*self._index.about(), *self._beside.notes)
+
+    def __len__(self) -> int:
+        return len(self._index)
+
+    def t_ns(self, index: int) -> int:
+        """When the head looked straight ahead: UTC where the sensor follows GPS, else by the capturing host's clock."""
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        return self._index.times_ns[index]
+
+    def frame(self, index: int) -> Frame:
+        t_ns = self.t_ns(index)
+        notes: list[str] = []
+        return self._beside.frame(index, f"{index:06d}", t_ns, self._sweep(index, notes), notes)
+
+    def truth(self, index: int) -> tuple[TruthObject, ...] | None:
+        self.t_ns(index)
+        return None
+
+    def _sweep(self, index: int, notes: list[str]) -> Sweep | None:
+        """Decoded anew from its stretch of the file, in which the ends of its neighbours may lie too."""
+        decoder, found = Vlp16Decoder(self._T_ego_lidar, keeps_partial=True), list[Sweep | None]()
+        try:
+            for datagram in self._capture.datagrams(self._index.first[index], self._index.last[index]):
+                if datagram.port == self._port:
+                    found.append(decoder.push(datagram.payload, datagram.t_ns))
+        except SourceError as error:
+            notes.append(str(error))
+            return None
+        sweep = max((*found, decoder.flush()), key=lambda sweep: len(sweep.points) if sweep is not None else 0)
+        counts = decoder.counts
+        if counts.refused:
+            notes.append(f"LiDAR: {counts.about_refused()}")
+        if counts.lost:
+            notes.append(f"LiDAR: {counts.lost} packets lost")
+        if sweep is None:
+            notes.append("no LiDAR points in this sweep")
+        return None if sweep is None else evolve(sweep, t_ns=self._index.times_ns[index])
+
+
+class _Index:
+    """Where every whole sweep lies. first, last: of each, where the records of its packets begin. fixes: what the
+    position packets say."""
+
+    def __init__(self, capture: Capture, port: int, T_ego_lidar: F64) -> None:
+        self.first, self.last, self.times_ns = array("q"), array("q"), array("q")
+        self.fixes: list[GnssFix] = []
+        self.begin_ns = 0
+        self._clock, self._sentences = SensorClock(), NmeaReader()
+        self._cutter = RotationCutter(T_ego_lidar, self._clock)
+        self._said = b""
+        self._capture = capture
+        for datagram in capture.datagrams():
+            if datagram.port == port:
+                self.begin_ns = self.begin_ns or datagram.t_ns
+                self._add(self._cutter.push(datagram.payload, datagram.t_ns, datagram.origin))
+            elif len(datagram.payload) == POSITION_BYTES and datagram.payload[_NMEA] != self._said:
+                self._position(datagram)
+        self._add(self._cutter.flush())
+        self._keep(self._sentences.flush(self.begin_ns), self.begin_ns)
+
+    def __len__(self) -> int:
+        return len(self.times_ns)
+
+    def rate_hz(self) -> float:
+        steps = np.diff(np.frombuffer(self.times_ns, dtype=np.int64))
+        return round(1e9 / float(np.median(steps)), 2) if len(steps) and np.median(steps) > 0 else 10.0
+
+    def about(self) -> list[str]:
+        """What a person should know of the whole."""
+        counts = self._cutter.counts
+        says = {
+            "gps": "LiDAR times are UTC: the sensor follows GPS",
+            "host": "LiDAR times are the sensor's own steps from when the host captured them; it follows no GPS",
+            "sensor": "LiDAR times begin at the sensor's own hour",
+        }
+        notes = [says[self._clock.reference]]
+        notes += [counts.about_refused()] if counts.refused else []
+        notes += [f"{counts.lost} packets lost"] if counts.lost else []
+        notes += [f"the file is {self._capture.damage}"] if self._capture.damage else []
+        return notes
+
+    def about_nothing(self, port: int) -> str:
+        """Why there is no sweep in it."""
+        counts = self._cutter.counts
+        if counts.models:
+            return f"packets of a {counts.models.most_common(1)[0][0]}; only the VLP-16 is read"
+        damage = f"; the file is {self._capture.damage}" if self._capture.damage else ""
+        if counts.packets:
+            return f"no whole sweep in {counts.packets} packets to port {port}; {counts.about_refused()}{damage}"
+        return f"no packets of a VLP-16 in it{damage}"
+
+    def _add(self, rotation: Rotation | None) -> None:
+        if rotation is None:
+            return
+        origins = [placed.origin for placed in rotation.packets]
+        self.first.append(min(origins))
+        self.last.append(max(origins))
+        self.times_ns.append(max(rotation.t_ns, self.times_ns[-1] + 1 if self.times_ns else rotation.t_ns))
+
+    def _position(self, datagram: Datagram) -> None:
+        """A position packet that says something new: what the clock follows, and where the sensor is."""
+        self._said = datagram.payload[_NMEA]
+        try:
+            position = read_position(datagram.payload)
+        except BadPacket:
+            return
+        self._clock.follow_gps(position.locked)
+        self._keep(self._sentences.push(position.nmea, datagram.t_ns), datagram.t_ns)
+
+    def _keep(self, fix: GnssFix | None, t_host_ns: int) -> None:
+        """A fix is UTC; where the LiDAR's times are the host's, it is put at when the host had it."""
+        if fix is not None:
+            self.fixes.append(fix if self._clock.reference == "gps" else evolve(fix, t_ns=t_host_ns))
+
+
+def _lidar_port(capture: Capture) -> int:
+    """The port to which most datagrams of a LiDAR packet's length are sent; the usual one when there are none."""
+    ports: Counter[int] = Counter()
+    for count, datagram in enumerate(capture.datagrams()):
+        if len(datagram.payload) == PACKET_BYTES:
+            ports[datagram.port] += 1
+        if count == _LOOK_AT:
+            break
+    return _DATA_PORT if not ports or _DATA_PORT in ports else ports.most_common(1)[0][0]

@@ -1,0 +1,73 @@
+"""What a recording of bare sensors does not say: where they sit, the camera's calibration, and how their clocks differ.
+A small YAML file beside the recording, with the same words as the live configuration."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import yaml
+from pydantic import ValidationError
+
+from pipeline.sources.base import SourceError
+from pipeline.sources.files import check_looks_ahead, reason_of
+from pipeline.sources.live.config import CalibrationConfig, Mount, OffsetMs, Strict
+from pipeline.types import CameraCalibration, Picture
+
+SUFFIXES = (".yaml", ".yml")
+
+
+class RigLidar(Strict):
+    mount: Mount = Mount()
+
+
+class RigCamera(Strict):
+    calibration: CalibrationConfig | None = None
+    time_offset_ms: OffsetMs = 0.0
+
+
+class RigGnss(Strict):
+    time_offset_ms: OffsetMs = 0.0
+
+
+class Rig(Strict):
+    """Offsets are added to the sensor's own times, as in the live configuration."""
+
+    lidar: RigLidar = RigLidar()
+    camera: RigCamera = RigCamera()
+    gnss: RigGnss = RigGnss()
+
+    def camera_calibration(self) -> CameraCalibration | None:
+        calibration = self.camera.calibration
+        return calibration.calibration() if calibration is not None else None
+
+
+def load_rig(path: Path) -> Rig:
+    """The file's content. SourceError in one sentence when it cannot be used."""
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+        rig = Rig.model_validate(data)
+    except OSError as error:
+        raise SourceError(f"{path.name}: cannot be read: {reason_of(error)}") from None
+    except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
+        raise SourceError(f"{path.name}: not YAML: {str(error).splitlines()[0]}") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "the file"
+        raise SourceError(f"{path.name}: {where}: {first['msg']}") from None
+    camera = rig.camera_calibration()
+    if camera is not None:
+        check_looks_ahead(camera, path.name)
+    return rig
+
+
+def calibration_for(
+    camera: CameraCalibration | None, picture: Picture | None, notes: list[str]
+) -> CameraCalibration | None:
+    """The calibration, if it is of the picture's size; else null, and ``notes`` says so."""
+    if camera is None or picture is None:
+        return camera
+    height, width = picture.bgr.shape[:2]
+    if (width, height) == (camera.width, camera.height):
+        return camera
+    notes.append(f"pictures are {width}×{height}, the calibration is for {camera.width}×{camera.height}: not used")
+    return None

@@ -1,0 +1,87 @@
+"""A video file whose pictures can be had by their time, anywhere, without keeping more than one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Lock
+
+import av
+import numpy as np
+
+from pipeline.sources.base import SourceError
+from pipeline.sources.files import reason_of
+from pipeline.sources.timeline import Times
+from pipeline.types import U8
+
+SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".mjpeg", ".ts")
+_NS = 1_000_000_000
+_DECODE_ON_NS = 2 * _NS
+"""A picture this little later is reached sooner by decoding on than by seeking."""
+
+
+class VideoFile:
+    """times_ns: (N,) int64, ascending, of every picture since the first. Times come from the container; where it has
+    none, the pictures are evenly spaced at its rate."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._lock = Lock()
+        self._frames: Iterator[av.VideoFrame] | None = None
+        self._container: av.container.InputContainer | None = None
+        self._at_ns = 0
+        try:
+            with av.open(str(path)) as container:
+                stamps, self._tick_ns = _stamps(container)
+        except (av.FFmpegError, OSError, ValueError) as error:
+            raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
+        if not len(stamps):
+            raise SourceError(f"{path.name}: no pictures in it")
+        self._first_stamp = int(stamps[0])
+        self.times_ns: Times = np.rint((stamps - stamps[0]) * self._tick_ns).astype(np.int64)
+
+    def picture(self, index: int) -> U8:
+        """(H, W, 3) uint8 blue green red of one of ``times_ns``. SourceError when it cannot be decoded."""
+        wanted_ns = int(self.times_ns[index])
+        with self._lock:
+            try:
+                return self._decode(wanted_ns)
+            except (av.FFmpegError, OSError, ValueError, StopIteration) as error:
+                self._close()
+                raise SourceError(f"{self.path.name}: picture {index} cannot be decoded: {reason_of(error)}") from None
+
+    def _decode(self, wanted_ns: int) -> U8:
+        if self._frames is None or not self._at_ns < wanted_ns <= self._at_ns + _DECODE_ON_NS:
+            self._seek(wanted_ns)
+        assert self._frames is not None
+        half_tick_ns = self._tick_ns / 2
+        for frame in self._frames:
+            if frame.pts is None:
+                continue
+            self._at_ns = round((frame.pts - self._first_stamp) * self._tick_ns)
+            if self._at_ns >= wanted_ns - half_tick_ns:
+                return np.ascontiguousarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
+        raise ValueError("the video ends before it")
+
+    def _seek(self, wanted_ns: int) -> None:
+        if self._container is None:
+            self._container = av.open(str(self.path))
+        stream = self._container.streams.video[0]
+        self._container.seek(self._first_stamp + int(wanted_ns / self._tick_ns), stream=stream)
+        self._frames = self._container.decode(stream)
+
+    def _close(self) -> None:
+        if self._container is not None:
+            self._container.close()
+        self._container = self._frames = None
+
+
+def _stamps(container: av.container.InputContainer) -> tuple[np.ndarray, float]:
+    """Presentation stamps of every picture, ascending, and nanoseconds a tick; nothing is decoded."""
+    if not container.streams.video:
+        raise ValueError("no video in it")
+    stream = container.streams.video[0]
+    if stream.time_base is None:
+        raise ValueError("its pictures have no times")
+    stamps = [packet.pts for packet in container.demux(stream) if packet.pts is not None]
+    return np.unique(np.array(stamps, dtype=np.int64)), float(stream.time_base) * _NS
