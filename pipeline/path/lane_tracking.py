@@ -7,6 +7,7 @@ lane, so that in a lane change the lines pass through and the ego lane is simply
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from pipeline.types import EgoState
 _COMPARE_AT = powers([5.0, 15.0])
 _SIDE_AT_M = 4.0
 """Which side of the car a line is on is judged here: where the front wheels will be."""
+_PLACES = powers([_SIDE_AT_M, 0.0, 10.0, 20.0])
 _FURTHEST_M = 5.0
 _USUAL_WIDTH_M = 3.5
 _USUALLY_OFF_MIDDLE_M = 0.7
@@ -100,10 +102,9 @@ def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParam
     """
     if tracks.source is None:
         return None
-    believed = [line for line in tracks.lines if _quality_now(line) >= params.min_quality]
-    places = [float(powers(_SIDE_AT_M) @ line.coefficients) for line in believed]
-    left = [line for line, y in zip(believed, places, strict=True) if 0.0 < y < _FURTHEST_M]
-    right = [line for line, y in zip(believed, places, strict=True) if -_FURTHEST_M < y <= 0.0]
+    believed = [_Candidate.of(line) for line in tracks.lines if _quality_now(line) >= params.min_quality]
+    left = [each for each in believed if 0.0 < each.beside_m < _FURTHEST_M]
+    right = [each for each in believed if -_FURTHEST_M < each.beside_m <= 0.0]
     pairs = [(a, b) for a in [*left, None] for b in [*right, None]]
     a, b = max(pairs, key=lambda pair: _worth(pair[0], pair[1], params))
     width = _width_m(a, b) if a is not None and b is not None else None
@@ -176,39 +177,49 @@ def _faded(line: LineTrack) -> LineTrack:
 
 
 def _quality_now(line: LineTrack) -> float:
-    return line.quality * float(np.exp(-line.unseen_s / _FADE_S))
+    return line.quality * math.exp(-line.unseen_s / _FADE_S)
 
 
-def _worth(left: LineTrack | None, right: LineTrack | None, params: LaneParams) -> float:
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """A line that may be one of the ego lane's. beside_m: where it passes the front wheels; ahead_m: mean place over
+    the first 20 m; heading: its slope there."""
+
+    line: LineTrack
+    quality: float
+    beside_m: float
+    ahead_m: float
+    heading: float
+
+    @staticmethod
+    def of(line: LineTrack) -> _Candidate:
+        beside, *ahead = (_PLACES @ line.coefficients).tolist()
+        return _Candidate(line, _quality_now(line), beside, sum(ahead) / len(ahead), float(line.coefficients[1]))
+
+
+def _worth(left: _Candidate | None, right: _Candidate | None, params: LaneParams) -> float:
     """How good a pair is: well supported and long known, as wide as a lane, the car near its middle."""
-    lines = [line for line in (left, right) if line is not None]
-    worth = sum(_quality_now(line) * line.seen / (line.seen + 1.0) for line in lines)
-    places = [float(powers(_SIDE_AT_M) @ line.coefficients) for line in lines]
+    both = [each for each in (left, right) if each is not None]
+    worth = sum(each.quality * each.line.seen / (each.line.seen + 1.0) for each in both)
+    places = sum(each.beside_m for each in both)
     if left is None or right is None:
-        return worth - 0.05 * abs(sum(places))
+        return worth - 0.05 * abs(places)
     width = _width_m(left, right)
     if not params.min_width_m <= width <= params.max_width_m:
         return -1.0
-    usual = ((width - _USUAL_WIDTH_M) / 0.5) ** 2 + (sum(places) / 2.0 / _USUALLY_OFF_MIDDLE_M) ** 2
-    return worth + 0.5 * float(np.exp(-0.5 * usual))
+    usual = ((width - _USUAL_WIDTH_M) / 0.5) ** 2 + (places / 2.0 / _USUALLY_OFF_MIDDLE_M) ** 2
+    return worth + 0.5 * math.exp(-0.5 * usual)
 
 
-def _width_m(left: LineTrack, right: LineTrack) -> float:
+def _width_m(left: _Candidate, right: _Candidate) -> float:
     """Mean over the first 20 m, square to the lines."""
-    apart = float(np.mean(powers([0.0, 10.0, 20.0]) @ (left.coefficients - right.coefficients)))
-    heading = np.arctan((left.coefficients[1] + right.coefficients[1]) / 2.0)
-    return apart * float(np.cos(heading))
+    return (left.ahead_m - right.ahead_m) * math.cos(math.atan((left.heading + right.heading) / 2.0))
 
 
-def _as_line(side: Side, line: LineTrack | None) -> LaneLine | None:
-    if line is None:
+def _as_line(side: Side, chosen: _Candidate | None) -> LaneLine | None:
+    if chosen is None:
         return None
+    line = chosen.line
     return LaneLine(
-        side,
-        line.coefficients,
-        line.covariance,
-        max(line.x_min_m, 0.0),
-        line.x_max_m,
-        _quality_now(line),
-        line.unseen_s,
+        side, line.coefficients, line.covariance, max(line.x_min_m, 0.0), line.x_max_m, chosen.quality, line.unseen_s
     )

@@ -11,6 +11,7 @@ with range, and is tracked as a slow state.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,6 +41,8 @@ _STRAY_M = 9.0
 _HOPELESS = 0.05
 _BEYOND = 0.6
 """Points that seem farther than ``max_range_m`` may be nearer under another pitch: this much of the inverse."""
+_COMPARED = powers(10.0)
+_APART_M = 0.6
 _POLYLINE_STEP_M = 1.0
 _DRAWN_FROM_M = 1.0
 
@@ -123,7 +126,8 @@ def measure(
     shape = replace(shape, pitch_rad=pitch.rad)
     again = [(float(found.coefficients[0]), points) for found, points in first]
     lines = [found for found, _ in _fitted(again, shape, sigma)]
-    lines = [_in_ego(found, eye, height_m, pitch) for found in _distinct(lines) if _plausible(found, params)]
+    to_ego = lane_tracking.shifted(-float(eye[0]))
+    lines = [_in_ego(found, eye, to_ego, height_m, pitch) for found in _distinct(lines) if _plausible(found, params)]
     return LaneMeasurement(raw.model, tuple(lines), pitch, shape)
 
 
@@ -222,14 +226,13 @@ def _parallel(lines: list[FittedLine], height_m: float, tried_rad: float, before
     """
     if len(lines) < 2:
         return before
-    place = np.array([line.coefficients[0] for line in lines])
-    heading = np.array([line.coefficients[1] for line in lines])
+    place, heading = (np.array([line.coefficients[k] for line in lines]) for k in (0, 1))
     trust = np.array([line.quality / (line.covariance[1, 1] + _UNPARALLEL**2) for line in lines])
-    middle = np.average(place, weights=trust)
-    spread = float(np.sum(trust * (place - middle) ** 2))
+    place = place - float(trust @ place) / float(trust.sum())
+    spread = float(trust @ place**2)
     if spread <= 0.0:
         return before
-    measured = tried_rad + height_m * float(np.sum(trust * (place - middle) * heading)) / spread
+    measured = tried_rad + height_m * float((trust * place) @ heading) / spread
     variance = height_m**2 / spread + _FLATNESS_RAD**2
     gain = before.sigma_rad**2 / (before.sigma_rad**2 + variance)
     return Pitch(before.rad + gain * (measured - before.rad), float(np.sqrt((1.0 - gain) * before.sigma_rad**2)))
@@ -238,23 +241,25 @@ def _parallel(lines: list[FittedLine], height_m: float, tried_rad: float, before
 def _distinct(lines: list[FittedLine]) -> list[FittedLine]:
     """Without those that slid onto a better one while they were fitted."""
     kept: list[FittedLine] = []
-    row = powers(10.0)
+    places: list[float] = []
     for line in sorted(lines, key=lambda each: -each.quality):
-        if all(abs(row @ (line.coefficients - other.coefficients)) > 0.6 for other in kept):
+        place = float(_COMPARED @ line.coefficients)
+        if all(abs(place - other) > _APART_M for other in places):
             kept.append(line)
+            places.append(place)
     return kept
 
 
 def _plausible(line: FittedLine, params: LaneParams) -> bool:
-    turned = abs(np.arctan(line.coefficients[1]))
-    return bool(turned <= np.radians(params.max_heading_deg) and abs(line.coefficients[0]) <= _STRAY_M)
+    place, slope = float(line.coefficients[0]), float(line.coefficients[1])
+    return abs(slope) <= math.tan(math.radians(params.max_heading_deg)) and abs(place) <= _STRAY_M
 
 
-def _in_ego(line: FittedLine, eye: F64, height_m: float, pitch: Pitch) -> FittedLine:
+def _in_ego(line: FittedLine, eye: F64, to_ego: F64, height_m: float, pitch: Pitch) -> FittedLine:
     """From the foot of the camera to the ego origin; what the pitch leaves open goes into the covariance."""
     c0, _, c2, _ = line.coefficients
     by_pitch = np.array([0.0, -c0, 0.0, c2]) / height_m * pitch.sigma_rad
-    moved = lane_tracking.shifted(-float(eye[0]))
-    mean = moved @ line.coefficients + np.array([float(eye[1]), 0.0, 0.0, 0.0])
-    cov = moved @ (line.covariance + np.outer(by_pitch, by_pitch)) @ moved.T
+    mean = to_ego @ line.coefficients
+    mean[0] += eye[1]
+    cov = to_ego @ (line.covariance + by_pitch[:, None] * by_pitch) @ to_ego.T
     return FittedLine(mean, cov, line.x_min_m + float(eye[0]), line.x_max_m + float(eye[0]), line.quality)
