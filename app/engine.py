@@ -20,6 +20,7 @@ from app.drive.recording import Recipe
 from app.line import DetectionCache, Line, Tick
 from app.live_line import LiveLine, rerun
 from app.playback import PlaybackClock
+from app.recording import RecordingDesk
 from app.showing import Showing
 from app.snapshot import Notice, Snapshot
 from pipeline.params import Params
@@ -43,7 +44,8 @@ class Engine:
     """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
     one for a source's pictures; null runs without a camera's detector and says nothing about it; ``open_lanes`` gives
     the lane detector, which looks at every ``lanes_every``-th frame. ``whole_drives``: a recording's whole drive is
-    computed in the background (``drives``), so that any frame is shown as it is in it."""
+    computed in the background (``drives``), so that any frame is shown as it is in it. ``desk``: where what is shown
+    can be recorded; by default into the folder of this machine's sessions."""
 
     def __init__(
         self,
@@ -58,6 +60,7 @@ class Engine:
         whole_drives: bool = False,
         open_lanes: OpenLanes | None = None,
         lanes_every: int = 1,
+        desk: RecordingDesk | None = None,
     ) -> None:
         self.control = Control(Wish(params, preset, uri=uri, playing=playing))
         self._showing = Showing(Snapshot(params, preset))
@@ -66,6 +69,7 @@ class Engine:
         self._sensors: Sensors = sensors
         self._detections = DetectionCache()
         self.drives = Drives(_recordings_of(open_source), self._detections)
+        self.desk = desk or RecordingDesk()
         self._whole_drives = whole_drives
         self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every)
         self._line: Line | None = None
@@ -86,6 +90,14 @@ class Engine:
         self.drives.stop()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
+        self.desk.stop()
+
+    @property
+    def source(self) -> AnySource | None:
+        """What is open."""
+        if self._live is not None:
+            return self._live.source
+        return self._line.source if self._line is not None else None
 
     @property
     def alive(self) -> bool:
@@ -171,6 +183,8 @@ class Engine:
         """The line goes on whether or not it is shown: paused, the shown tick is held and can be run again with other
         parameters; playing on jumps to now."""
         came = live.look(wish.params, _LIVE_WAIT_S)
+        if came is not None:
+            self.desk.take(came)
         held = self.snapshot.tick
         if came is not None and wish.playing:
             tick: Tick | None = came
@@ -203,6 +217,7 @@ class Engine:
             return False
         notices = [Notice("info", text) for text in source.notes]
         detectors = self._detectors.both_for(source, notices)
+        self.desk.stop()
         self._close_live()
         if is_live_source(source):
             self._open_live(source, detectors)
@@ -275,9 +290,12 @@ class Engine:
                 line.timeline_s, time.monotonic(), float(line.timeline_s[index]), standing.speed
             )
         self._tell_drives(wish, tick)
+        if tick is not None and line is not None:
+            self.desk.take(tick)
         shown = replace(
             shown,
             drive=self.drives.state,
+            recording=self.desk.state,
             can_undo=self.control.can_undo,
             can_redo=self.control.can_redo,
             params=wish.params,

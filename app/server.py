@@ -22,10 +22,12 @@ from app.clips.jobs import Jobs
 from app.drive.marks import Marks
 from app.engine import Engine
 from app.history import History
+from app.recording import SESSIONS
 from app.routes.clips import clips_router
 from app.routes.drive import drive_router
 from app.routes.params import params_router
 from app.routes.playback import playback_router
+from app.routes.recording import recording_router
 from app.routes.rerun import rerun_router
 from app.routes.runs import runs_router
 from app.snapshot import Snapshot
@@ -36,8 +38,6 @@ from app.views.viser_proxy import viser_router
 from pipeline.errors import BadInput
 
 STATIC = Path(__file__).resolve().parent.parent / "static"
-SESSIONS = STATIC.parent / "sessions"
-"""What this machine keeps: recordings, marks."""
 DEFAULT_PORT = 8420
 _PORTS_TO_TRY = 20
 _LAST_PORT = 65535
@@ -77,6 +77,7 @@ def create_app(
     app.add_exception_handler(RequestValidationError, _one_sentence)
     app.include_router(playback_router(engine, stream, history))
     app.include_router(params_router(engine))
+    app.include_router(recording_router(engine))
     app.include_router(drive_router(engine, engine.drives, marks or Marks()))
     app.include_router(runs_router(engine, engine.drives))
     app.include_router(clips_router(engine, jobs))

@@ -8,6 +8,7 @@ from typing import Any, Literal
 from app.drive.drives import DriveState
 from app.line import Tick
 from pipeline.params import Params
+from pipeline.recording.recorder import RecordingState
 from pipeline.results import streams_json
 from pipeline.types import StreamHealth
 
@@ -55,6 +56,7 @@ class Snapshot:
     can_redo: bool = False
     live: bool = False
     streams: tuple[StreamHealth, ...] = ()
+    recording: RecordingState | None = None
 
     def state_json(self) -> dict[str, Any]:
         """The state without the result, as the page and ``/api/state`` read it."""
@@ -83,5 +85,6 @@ class Snapshot:
             "can_redo": self.can_redo,
             "live": self.live,
             "streams": streams_json(self.streams),
+            "recording": self.recording.to_json() if self.recording is not None else None,
             "notices": [{"level": n.level, "text": n.text} for n in self.notices],
         }

@@ -113,17 +113,19 @@ def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
 
     @router.post("/marks", status_code=201)
     def mark(body: NewMark) -> MarkJson:
-        """Mark a moment; it is kept with the recording."""
+        """Mark a moment; it is kept with the recording, and lands in the session that is being recorded."""
         shown = engine.snapshot
         if shown.uri is None:
             raise HTTPException(409, "no recording is open")
         index = shown.index if body.index is None else body.index
-        if index >= max(shown.count, 1):
+        if not shown.live and index >= max(shown.count, 1):
             raise HTTPException(422, f"index: the recording has {shown.count} frames")
         try:
             made = marks.add(shown.uri, index, body.text)
         except MarkRefused as error:
             raise HTTPException(409, str(error)) from None
+        if index == shown.index:
+            engine.desk.mark(body.text or "marked")
         drives.changed()
         return MarkJson(id=made.id, index=made.index, text=made.text)
 

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pipeline.params import Params
 from pipeline.recording.segments import NEVER, Rotation, Segments
@@ -41,6 +42,17 @@ class RecordingState:
     bytes: int
     dropped: int
     error: str | None
+
+    def to_json(self) -> dict[str, Any]:
+        """As the page and ``/api/recording`` read it."""
+        return {
+            "file": str(self.file),
+            "frames": self.frames,
+            "seconds": round(self.seconds, 3),
+            "bytes": self.bytes,
+            "dropped": self.dropped,
+            "error": self.error,
+        }
 
 
 class Recorder:

@@ -7,7 +7,7 @@ from pathlib import Path
 from pipeline.recording.rewrite import Progress, clip
 from pipeline.recording.session import SessionSource
 from pipeline.recording.writer import About, SessionWriter
-from pipeline.sources.base import Recorded, Source
+from pipeline.sources.base import AnySource, Recorded, Source
 
 
 def save(
@@ -34,7 +34,7 @@ def save(
         raise
 
 
-def about(source: Source) -> About:
+def about(source: AnySource) -> About:
     """Where a session made of this source came from: in the end from what was recorded first."""
     origin = source.origin if isinstance(source, Recorded) else source.uri
     return About(origin, source.title, source.rate_hz, source.notes)
