@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import cast
 
+from app.ahead import Ahead
 from app.control import Control, Wish
 from app.detector_pool import DetectorPool, OpenDetector, OpenLanes
 from app.drive.drives import Drives
@@ -73,6 +74,7 @@ class Engine:
         self._whole_drives = whole_drives
         self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every)
         self._line: Line | None = None
+        self._ahead: Ahead | None = None
         self._live: LiveLine | None = None
         self._health_told_s = 0.0
         self._clock: PlaybackClock | None = None
@@ -162,8 +164,9 @@ class Engine:
         return tick
 
     def _play(self, wish: Wish) -> Tick | None:
-        """The frame that is due, if it is not the shown one. Frames that are late already are skipped."""
+        """The next frame that is due and was prepared, if there is one. Frames that are late already are skipped."""
         assert self._line is not None
+        assert self._ahead is not None
         if self._clock is None:
             return None
         index, now = self.snapshot.index, time.monotonic()
@@ -171,9 +174,12 @@ class Engine:
             return None
         last = len(self._line.source) - 1
         if index < last:
-            due = self._clock.due(now)
-            self._skipped += due - index - 1
-            return self._line.advance(due, wish.params)
+            due, ready = self._clock.due(now), self._ahead.ready
+            if ready is None or not index < ready <= due:
+                self._ahead.want(due)
+                return None
+            self._skipped += ready - index - 1
+            return self._line.advance(ready, wish.params)
         if wish.loop:
             return self._seek(0, wish)
         self.control.change(playing=False)
@@ -199,8 +205,10 @@ class Engine:
         """Seconds until playback needs the worker; null while nothing is playing."""
         if self._live is not None:
             return 0.0  # it waits for its sensors instead
-        if self._clock is None or self._line is None:
+        if self._clock is None or self._line is None or self._ahead is None:
             return None
+        if self._ahead.busy and self._clock.wait_s(self.snapshot.index, time.monotonic()) <= 0:
+            return None  # what is due wakes the worker when it is there
         return self._clock.wait_s(self.snapshot.index, time.monotonic())
 
     # ------------------------------------------------------------ opening
@@ -261,9 +269,17 @@ class Engine:
     def _line_of(self, source: Source, detectors: Detectors) -> Line:
         """The line for a recording, whose whole drive is computed beside it from now on."""
         line = Line(source, detectors, self._detections, self._sensors, self.drives.state_before)
+        if self._ahead is not None:
+            self._ahead.end()
+        self._ahead = Ahead(lambda index: self._prepare(line, index), self.control.change)
         recipe = Recipe(source.uri, len(source), line.timeline_s, detectors, self._sensors, is_simulated(source))
         self.drives.open(recipe if self._whole_drives else None)
         return line
+
+    def _prepare(self, line: Line, index: int) -> None:
+        """On the thread that works ahead."""
+        with self.drives.turn.foreground():
+            line.prepare(index)
 
     # ------------------------------------------------------------ showing
 
@@ -320,6 +336,9 @@ class Engine:
                 notices=tuple(n for n in shown.notices if n.level != "error"),
             )
         self._showing.publish(shown)
+        if self._clock is not None and self._ahead is not None and line is not None:
+            last = len(line.source) - 1
+            self._ahead.want(min(max(shown.index + 1, self._clock.due(time.monotonic())), last))
 
     def _time_s(self, tick: Tick) -> float:
         """Where the tick is on the timeline."""

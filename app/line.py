@@ -15,7 +15,7 @@ from typing import cast
 from app.lru import BoundedCache
 from app.playback import timeline_s
 from pipeline.params import Params
-from pipeline.run import Detectors, Detects, Seen, Sensors, advance
+from pipeline.run import Detectors, Detects, Seen, Sensors, advance, detect
 from pipeline.sources.base import Source
 from pipeline.step import State, step
 from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result
@@ -87,7 +87,7 @@ def _nothing_known(index: int, params: Params) -> State | None:
 
 
 class Line:
-    """A source, the detectors for its pictures, and their caches. Used by one thread.
+    """A source, the detectors for its pictures, and their caches. Used by one thread, but for ``prepare``.
 
     state_before: the state in which a run through the whole drive with these parameters comes to a frame, null where
     nobody knows it."""
@@ -105,7 +105,9 @@ class Line:
         self.tick: Tick | None = None
         self._detectors = detectors
         self._state_before = state_before
-        self._ask = detections.asker(source.uri)
+        self._ask, self._ask_ahead = detections.asker(source.uri), detections.asker(source.uri)
+        self._ahead_ms: tuple[int, float] = (-1, 0.0)
+        self._reading = threading.Lock()
         self._sensors = sensors
         self._frames: BoundedCache[int, Frame] = BoundedCache(_CACHED_FRAMES_BYTES, _frame_bytes)
 
@@ -151,6 +153,16 @@ class Line:
         self.tick = replace(self.tick, before=before, after=after, result=result, params=params, exact=exact)
         return self.tick
 
+    def prepare(self, index: int) -> None:
+        """Read a frame and have the detectors look at it, so that running it later waits for neither. For a second
+        thread."""
+        spent_ms = self._ask_ahead.spent_ms
+        if self._sensors != "lidar":
+            detect(self._read(index), self._detectors, self._ask_ahead)
+        else:
+            self._read(index)
+        self._ahead_ms = (index, self._ask_ahead.spent_ms - spent_ms)
+
     def can_be_exact(self) -> bool:
         """Whether the shown frame is not what a run through the whole drive gives, and now could be."""
         shown = self.tick
@@ -162,14 +174,17 @@ class Line:
     def _run(self, state: State, index: int, params: Params, *, exact: bool) -> Tick:
         spent_ms = self._ask.spent_ms
         frame, after, result = advance(state, self._read(index), params, self._detectors, self._sensors, self._ask)
-        return Tick(state, frame, after, result, params, self._ask.spent_ms - spent_ms, exact)
+        ahead, ahead_ms = self._ahead_ms
+        detect_ms = self._ask.spent_ms - spent_ms + (ahead_ms if ahead == index else 0.0)
+        return Tick(state, frame, after, result, params, detect_ms, exact)
 
     def _read(self, index: int) -> Frame:
-        held = self._frames.get(index)
-        if held is None:
-            held = self.source.frame(index)
-            self._frames.put(index, held)
-        return held
+        with self._reading:
+            held = self._frames.get(index)
+            if held is None:
+                held = self.source.frame(index)
+                self._frames.put(index, held)
+            return held
 
 
 def _frame_bytes(frame: Frame) -> float:

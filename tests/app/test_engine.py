@@ -192,6 +192,21 @@ def test_playing_in_a_loop_begins_again(start: Start):
     assert engine.wait_for(at(0), WAIT_S).playing
 
 
+def test_a_parameter_is_answered_while_the_next_frame_is_still_being_read(start: Start):
+    engine, recording, _ = start()
+    recording.gate.clear()
+    recording.reading.clear()
+    engine.control.change(playing=True)
+    assert recording.reading.wait(WAIT_S), "it reads the next frame"
+    engine.control.change_params({"cluster.tolerance_m": 0.4})
+    shown = engine.wait_for(lambda s: s.params.cluster.tolerance_m == 0.4 and s.tick is not None, WAIT_S)
+    assert shown.index == 0
+    assert shown.tick is not None
+    assert shown.tick.params is shown.params, "run again with it"
+    recording.gate.set()
+    engine.wait_for(lambda s: s.index > 0, WAIT_S)
+
+
 def test_a_recording_that_cannot_be_opened_leaves_the_old_one(start: Start):
     engine, recording, _ = start()
     engine.control.change(uri="test:nowhere")

@@ -1,0 +1,72 @@
+"""The next frame of a recording that plays, read and looked at before it is due.
+
+Reading, and a network, take longer than everything else. In a thread of their own they keep nobody waiting: a parameter
+that is changed meanwhile is answered at once.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+
+logger = logging.getLogger("cipv.ahead")
+
+
+class Ahead:
+    """Has ``prepare(index)`` run for one index at a time. ``on_ready`` is called when it has, on the thread that did.
+
+    What went wrong is left to who reads the frame in earnest: it goes wrong there again."""
+
+    def __init__(self, prepare: Callable[[int], None], on_ready: Callable[[], object]) -> None:
+        self._prepare, self._on_ready = prepare, on_ready
+        self._condition = threading.Condition()
+        self._wanted: int | None = None
+        self._under_way: int | None = None
+        self._ready: int | None = None
+        self._ended = False
+        # a read that hangs must not keep the program from ending
+        threading.Thread(target=self._work, name="cipv-ahead", daemon=True).start()
+
+    @property
+    def ready(self) -> int | None:
+        """The index that was prepared last."""
+        with self._condition:
+            return self._ready
+
+    @property
+    def busy(self) -> bool:
+        """Whether ``on_ready`` is going to be called."""
+        with self._condition:
+            return self._wanted is not None or self._under_way is not None
+
+    def want(self, index: int) -> None:
+        """Prepare this one next, instead of another that was wanted and not begun."""
+        with self._condition:
+            if index in (self._ready, self._under_way):
+                return
+            self._wanted = index
+            self._condition.notify()
+
+    def end(self) -> None:
+        """Begin nothing more."""
+        with self._condition:
+            self._ended = True
+            self._condition.notify()
+
+    def _work(self) -> None:
+        while True:
+            with self._condition:
+                self._condition.wait_for(lambda: self._ended or self._wanted is not None)
+                if self._ended:
+                    return
+                self._under_way, self._wanted = self._wanted, None
+                index = self._under_way
+            assert index is not None
+            try:
+                self._prepare(index)
+            except Exception:
+                logger.debug("frame %s could not be prepared", index, exc_info=True)
+            with self._condition:
+                self._ready, self._under_way = index, None
+            self._on_ready()
