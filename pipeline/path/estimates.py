@@ -31,6 +31,9 @@ _TIGHTEST_CURVATURE_PER_M = 0.02
 _LANE_WIDTH_SIGMA_M = 0.3
 """How far a lane's width may be off where only one of its lines is seen."""
 _USUAL_LANE_M = 3.5
+_PITCH_SIGMA_RAD, _EYE_HEIGHT_M = 0.003, 1.2
+"""How far the road ahead may bend up or down against the car, and how high a camera sits: together, how far off a
+point on the road may be taken to be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,14 +112,17 @@ def _along(lane: EgoLane, params: PathParams) -> tuple[F64, float]:
 def _as_estimate(
     x: F64, y: F64, sigma: F64, left: F64, right: F64, reach: float, params: PathParams
 ) -> PathEstimate | None:
-    """Places y(x) as samples along the path, edges and sigma along its normal. What lies beyond the paint is less
-    sure by how far a road may bend away meanwhile."""
+    """Places y(x) as samples along the path, edges and sigma along its normal. In a bend the camera's pitch against
+    the road shifts the lines sideways; what lies beyond the paint is less sure by how far a road may bend away."""
     slope = np.gradient(y, STEP_M)
     stretch = np.sqrt(1.0 + slope * slope)
     travelled = np.concatenate([[0.0], np.cumsum(0.5 * (stretch[1:] + stretch[:-1]) * STEP_M)])
     across = 1.0 / stretch
     beyond = np.maximum(x - reach, 0.0)
-    sigma = np.hypot(sigma * across, 0.5 * _FASTEST_CURVATURE_PER_M * beyond**2)
+    too_far = (
+        x * x / _EYE_HEIGHT_M * _PITCH_SIGMA_RAD
+    )  # a point taken for too far lies aside by so much times the slope
+    sigma = across * np.sqrt(sigma**2 + (slope * too_far) ** 2 + (0.5 * _FASTEST_CURVATURE_PER_M * beyond**2) ** 2)
     if not (np.isfinite(y).all() and np.isfinite(sigma).all()):
         return None
     s = samples(params.length_m)

@@ -191,9 +191,10 @@ def _sigma_m(item: FusedObject, near: list[float], heading: float) -> float:
     distance = hypot(*near)
     slant = abs(near[1] * np.cos(heading) - near[0] * np.sin(heading)) / max(distance, 0.1)
     along = (item.distance_sigma_m or 0.0) * slant
-    across = BEARING_SIGMA_RAD * distance if item.source == "V" else LIDAR_SIDEWAYS_SIGMA_M
-    if item.carried:
-        across = max(across, item.distance_sigma_m or 0.0)
+    if item.source == "V":
+        across = BEARING_SIGMA_RAD * distance * (2.0 if item.carried else 1.0)
+    else:  # while it is carried its sigma grows, to either side as much as ahead
+        across = hypot(LIDAR_SIDEWAYS_SIGMA_M, (item.distance_sigma_m or 0.0) if item.carried else 0.0)
     return hypot(along, across)
 
 
