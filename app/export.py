@@ -13,9 +13,8 @@ from pipeline.recording.rewrite import Progress
 from pipeline.recording.save import save
 from pipeline.recording.session import SessionSource
 from pipeline.results import to_json
-from pipeline.run import Detectors, advance
+from pipeline.run import Detectors, through
 from pipeline.sources.base import Source
-from pipeline.step import State, warm_up
 from pipeline.types import Frame, Result
 
 Kind = Literal["mcap", "rrd", "csv"]
@@ -95,20 +94,20 @@ def _run(
     source: Source, first: int, last: int, params: Params, detectors: Detectors, progress: Progress
 ) -> Iterator[tuple[Frame, Result]]:
     """Frames with results, from a few frames before the clip so that trackers have their history when it begins."""
-    warm_up()
-    state = State()
-    for index in range(max(0, first - WARM_UP_FRAMES), last + 1):
-        frame, state, result = advance(state, source.frame(index), params, detectors)
-        if index >= first:
+    frames = (source.frame(index) for index in range(max(0, first - WARM_UP_FRAMES), last + 1))
+    for frame, result in through(frames, params, detectors):
+        if frame.index >= first:
             yield frame, result
-            progress(index + 1 - first, last + 1 - first)
+            progress(frame.index + 1 - first, last + 1 - first)
 
 
-def write_rrd(title: str, run: Iterable[tuple[Frame, Result]], out: Path, params: Params) -> None:
-    """A replay for the rerun viewer."""
+def write_rrd(
+    title: str, run: Iterable[tuple[Frame, Result]], out: Path, params: Params, moment: int | None = None
+) -> None:
+    """A replay for the rerun viewer, which opens it at the frame ``moment``."""
     from app.views.rerun_view import RerunSink  # half a second to import: only who asks pays
 
-    with RerunSink(out, title, params.alignment) as sink:
+    with RerunSink(out, title, params.alignment, moment) as sink:
         for frame, result in run:
             sink.show(frame, result)
 

@@ -78,7 +78,7 @@ class Recorder:
     ) -> bool:
         """Record a frame, what was believed of it and with which parameters. Returns at once; false when it was
         dropped. received_ns: when a live frame was made, by the host's clock; null for one from a recording."""
-        return self._put(lambda segments: segments.write(frame, result, params, received_ns))
+        return self._put(lambda segments: segments.write(frame, result, params, received_ns=received_ns))
 
     def put_packets(self, packets: list[tuple[int, bytes]]) -> bool:
         """Record raw LiDAR packets, (when received in ns, payload) each, oldest first; best a sweep's at a time.

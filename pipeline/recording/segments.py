@@ -9,6 +9,7 @@ from pipeline.params import Params
 from pipeline.recording.clock import SessionClock
 from pipeline.recording.output import Compression
 from pipeline.recording.writer import About, SessionWriter
+from pipeline.sources.base import TruthObject
 from pipeline.types import Frame, Result
 
 
@@ -55,11 +56,19 @@ class Segments:
     def seconds(self) -> float:
         return self._earlier_s + self._writer.span_s
 
-    def write(self, frame: Frame, result: Result | None, params: Params | None, received_ns: int | None) -> None:
+    def write(
+        self,
+        frame: Frame,
+        result: Result | None = None,
+        params: Params | None = None,
+        *,
+        received_ns: int | None = None,
+        truth: tuple[TruthObject, ...] | None = None,
+    ) -> None:
         """See ``SessionWriter.write``."""
         if self._is_full():
             self._rotate()
-        self._writer.write(frame, result, params, received_ns=received_ns)
+        self._writer.write(frame, result, params, received_ns=received_ns, truth=truth)
 
     def write_packets(self, packets: list[tuple[int, bytes]]) -> None:
         """See ``SessionWriter.write_packets``."""

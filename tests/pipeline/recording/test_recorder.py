@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from mcap.exceptions import McapError
@@ -61,9 +62,9 @@ def slow_disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     may_write = threading.Event()
     write = Segments.write
 
-    def wait_and_write(*arguments: object) -> None:
+    def wait_and_write(self: Segments, *arguments: Any, **named: Any) -> None:
         assert may_write.wait(20.0)
-        write(*arguments)  # type: ignore[arg-type]
+        write(self, *arguments, **named)
 
     monkeypatch.setattr(Segments, "write", wait_and_write)
     yield may_write
@@ -106,7 +107,7 @@ def test_each_file_of_a_long_recording_can_be_read_alone(rotation: Rotation, tmp
     frames = [replace(full(index), sweep=sweep(index, points=3000)) for index in range(35)]
     parts = Segments(tmp_path / "drive.mcap", ABOUT, rotation)
     for frame in frames:
-        parts.write(frame, None, Params(), None)
+        parts.write(frame, params=Params())
     parts.close()
     assert [path.name for path in parts.files[:3]] == ["drive.mcap", "drive_001.mcap", "drive_002.mcap"]
     sessions = [SessionSource("a", str(path)) for path in parts.files]

@@ -1,0 +1,138 @@
+"""`cipv record`: a recording or live sensors through the line into a session, inputs and results."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from threading import Event
+from typing import Annotated
+
+import tyro
+
+from app.options import LineOptions, SourceOptions
+from app.progress import frames_progress
+from app.recording import SESSIONS, new_session
+from pipeline.params import Params
+from pipeline.recording.recorder import Recorder
+from pipeline.recording.save import about
+from pipeline.recording.segments import Rotation, Segments
+from pipeline.run import run, run_live
+from pipeline.sources.base import LiveSource, Source
+from pipeline.types import Frame, Result
+
+Ran = tuple[Frame, Result]
+
+
+@dataclass(frozen=True)
+class Record:
+    """Run the line and record what it saw and what it believed, until the end or Ctrl-C.
+
+    Example: cipv record live:car.yaml --out sessions --rotate-minutes 10
+    """
+
+    source: SourceOptions
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR|FILE.mcap")] = SESSIONS
+    """A folder, for a file named by title and time, or a new file"""
+    line: LineOptions = field(default_factory=LineOptions)
+    seconds: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
+    """Stop after this time of the drive"""
+    rotate_mb: Annotated[float | None, tyro.conf.arg(metavar="MB")] = None
+    """Go on in a new file when one has reached this size"""
+    rotate_minutes: Annotated[float | None, tyro.conf.arg(metavar="MIN")] = None
+    """Go on in a new file after this time of the drive"""
+
+    def __call__(self) -> int:
+        params = self.line.parameters()
+        live = self.source.open_live()
+        with _asked_to_stop() as asked:
+            if live is not None:
+                return self._live(live, params, asked)
+            return self._offline(self.source.open(), params, asked)
+
+    def _offline(self, source: Source, params: Params, asked: Event) -> int:
+        """A recording waits for the disk, so nothing is dropped."""
+        detectors = self.line.open_detectors(source)
+        segments = Segments(new_session(self.out, source.title), about(source), self._rotation)
+        with closing(segments), frames_progress() as bar:
+            task = bar.add_task(source.title, total=len(source))
+            for index, (frame, result) in enumerate(self._until_enough(run(source, params, detectors), asked)):
+                segments.write(frame, result, params, truth=source.truth(index))
+                bar.advance(task)
+        _say(segments.files, segments.frames, segments.bytes_written)
+        return 0
+
+    def _live(self, source: LiveSource, params: Params, asked: Event) -> int:
+        """Sensors do not wait: what the disk is too slow for is dropped, and said."""
+        detectors = self.line.open_detectors(source)
+        recorder = Recorder(new_session(self.out, source.title), about(source), self._rotation)
+        with frames_progress() as bar:
+            task = bar.add_task(source.title, total=None)
+            ran = run_live(source, params, detectors, on_silence=lambda: _end_if(asked))
+            for frame, result in self._until_enough(ran, asked):
+                recorder.put(frame, result, params, received_ns=time.time_ns())
+                if recorder.state.error is not None:
+                    break
+                bar.advance(task)
+        state = recorder.stop()
+        _say(list(state.files), state.frames, state.bytes)
+        if state.dropped:
+            print(f"cipv: {state.dropped} frames were dropped: the disk was too slow", file=sys.stderr)
+        if state.error is not None:
+            print(f"cipv: {state.error}", file=sys.stderr)
+        return 0 if state.error is None else 1
+
+    @property
+    def _rotation(self) -> Rotation:
+        max_bytes = None if self.rotate_mb is None else self.rotate_mb * 1e6
+        max_s = None if self.rotate_minutes is None else self.rotate_minutes * 60.0
+        return Rotation(max_bytes, max_s)
+
+    def _until_enough(self, ran: Iterator[Ran], asked: Event) -> Iterator[Ran]:
+        """Until ``seconds`` are over or somebody asks to stop, which ends a recording as it should end."""
+        first_ns = None
+        with suppress(_Ended):
+            for frame, result in ran:
+                first_ns = frame.t_ns if first_ns is None else first_ns
+                if self.seconds is not None and frame.t_ns - first_ns > self.seconds * 1e9:
+                    return
+                yield frame, result
+                _end_if(asked)
+
+
+class _Ended(Exception):
+    """Somebody asked to stop."""
+
+
+def _end_if(asked: Event) -> None:
+    if asked.is_set():
+        raise _Ended
+
+
+@contextmanager
+def _asked_to_stop() -> Iterator[Event]:
+    """Set by Ctrl-C and by what ends a service; the frame under way is finished. Asked again, it ends at once."""
+    asked = Event()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def ask(*_: object) -> None:
+        if asked.is_set():
+            raise KeyboardInterrupt
+        asked.set()
+
+    for number in before:
+        signal.signal(number, ask)
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _say(files: list[Path], frames: int, count: int) -> None:
+    names = str(files[0]) if len(files) == 1 else f"{files[0]} … {files[-1].name}"
+    print(f"cipv: {names}: {frames} frames, {count / 1e6:.1f} MB", file=sys.stderr)
