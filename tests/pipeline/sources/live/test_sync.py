@@ -1,0 +1,231 @@
+"""Which messages belong together, as a table of times: no threads, no clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.params import SyncParams
+from pipeline.sources.live.sync import Stream, Synchroniser, Together
+from pipeline.types import EgoState, Sweep
+
+MS = 1_000_000
+START = 1_700_000_000_000 * MS
+
+
+def sweep(t_ms: float) -> Sweep:
+    return Sweep(START + round(t_ms * MS), np.zeros((1, 4), np.float32), np.zeros(1, np.uint8), 16)
+
+
+@dataclass
+class Bench:
+    """Times in milliseconds after the start."""
+
+    sync: Synchroniser[str] = field(default_factory=Synchroniser)
+    params: SyncParams = field(default_factory=SyncParams)
+
+    def lidar(self, t_ms: float, arrived_ms: float) -> None:
+        self.sync.sweeps.add(START + round(t_ms * MS), sweep(t_ms), START + round(arrived_ms * MS))
+
+    def camera(self, t_ms: float, arrived_ms: float | None = None) -> None:
+        arrived_ms = t_ms if arrived_ms is None else arrived_ms
+        self.sync.pictures.add(START + round(t_ms * MS), f"at {t_ms:g}", START + round(arrived_ms * MS))
+
+    def tick(self, now_ms: float) -> Together[str] | None:
+        return self.sync.tick(START + round(now_ms * MS), self.params)
+
+
+def at_ms(together: Together[str] | None) -> float | None:
+    return None if together is None else (together.t_ns - START) / MS
+
+
+def test_a_sweep_ticks_with_the_picture_nearest_to_it() -> None:
+    bench = Bench()
+    for t in (0, 33, 66, 100, 133):
+        bench.camera(t)
+    bench.lidar(70, 135)
+    together = bench.tick(135)
+    assert together is not None
+    assert at_ms(together) == 70
+    assert together.picture is not None
+    assert together.picture.value == "at 66"
+    assert together.skew_ns == -4 * MS
+    assert bench.tick(136) is None, "a tick is given once"
+
+
+def test_60_hz_camera_against_10_hz_lidar_is_never_more_than_half_a_picture_off() -> None:
+    bench, skews = Bench(), []
+    pictures = [5.0 + k * 1000 / 60 for k in range(180)]
+    for k in range(1, 25):
+        arrives = 100.0 * k + 51.0
+        while pictures and pictures[0] <= arrives:
+            bench.camera(pictures.pop(0))
+        bench.lidar(100.0 * k, arrives)
+        together = bench.tick(arrives)
+        assert together is not None
+        assert together.skew_ns is not None
+        skews.append(abs(together.skew_ns) / MS)
+    assert max(skews) <= 1000 / 60 / 2 + 0.01
+
+
+@pytest.mark.parametrize(
+    ("case", "picture_ms", "max_skew_ms", "kept"),
+    [
+        ("inside the bound", 140.0, 60.0, True),
+        ("outside the bound", 30.0, 60.0, False),
+        ("bound widened", 30.0, 80.0, True),
+    ],
+)
+def test_the_skew_is_bounded_and_said(case: str, picture_ms: float, max_skew_ms: float, kept: bool) -> None:
+    bench = Bench(params=SyncParams(max_skew_ms=max_skew_ms, wait_ms=0.0))
+    bench.camera(picture_ms)
+    bench.lidar(100, 151)
+    together = bench.tick(151)
+    assert together is not None
+    assert (together.picture is not None) == kept
+    assert (together.skew_ns is not None) == kept
+    assert any("the nearest is -70 ms off" in note for note in together.notes) == (not kept)
+
+
+def test_the_cameras_offset_moves_its_pictures_while_it_runs() -> None:
+    bench = Bench()
+    for t in (60, 93, 126, 160):
+        bench.camera(t)
+    bench.lidar(100, 160)
+    bench.params = SyncParams(camera_offset_ms=-30.0)
+    together = bench.tick(160)
+    assert together is not None
+    assert together.picture is not None
+    assert together.picture.value == "at 126", "it was taken 30 ms before its stamp: at 96"
+    assert together.skew_ns == -4 * MS
+
+
+def test_a_sweep_waits_shortly_for_a_picture_that_is_on_its_way() -> None:
+    bench = Bench()
+    bench.camera(70, 100)
+    bench.lidar(105, 156)
+    assert bench.tick(156) is None
+    bench.camera(103, 160)
+    assert bench.tick(160) is None, "one from after the sweep may be nearer still"
+    bench.camera(136, 166)
+    together = bench.tick(166)
+    assert together is not None
+    assert together.picture is not None
+    assert together.picture.value == "at 103"
+
+
+def test_a_sweep_does_not_wait_longer_than_it_may() -> None:
+    bench = Bench()
+    bench.camera(70, 100)
+    bench.lidar(105, 156)
+    assert bench.tick(156 + 24) is None
+    together = bench.tick(156 + 26)
+    assert together is not None
+    assert together.picture is not None
+
+
+def test_without_a_camera_lidar_goes_on() -> None:
+    bench = Bench()
+    bench.lidar(100, 151)
+    together = bench.tick(151)
+    assert together is not None
+    assert together.sweep is not None
+    assert together.picture is None
+
+
+def test_without_lidar_the_camera_ticks() -> None:
+    bench = Bench()
+    for t in (0, 33, 66):
+        bench.camera(t)
+        together = bench.tick(t)
+        assert together is not None
+        assert at_ms(together) == t
+        assert together.sweep is None
+        assert together.skew_ns is None
+
+
+def test_the_camera_takes_over_when_lidar_falls_silent_and_gives_back_when_it_returns() -> None:
+    bench, ticked = Bench(), []
+    arrivals = [("lidar", t, t + 51.0) for t in (100.0, 200.0, 300.0, 1200.0, 1300.0)]
+    arrivals += [("camera", k * 33.3, k * 33.3) for k in range(45)]
+    for kind, t, arrived in sorted(arrivals, key=lambda item: item[2]):
+        (bench.lidar if kind == "lidar" else bench.camera)(t, arrived)
+        together = bench.tick(arrived + 25.1)
+        if together is not None:
+            ticked.append((at_ms(together), "L" if together.sweep is not None else "C", arrived))
+    times = [t for t, _, _ in ticked]
+    assert times == sorted(set(times)), "time never runs back"
+    kinds = "".join(kind for _, kind, _ in ticked)
+    assert "LCCC" in kinds
+    assert kinds.rstrip("L").endswith("C")
+    first_camera = next(arrived for t, kind, arrived in ticked if kind == "C" and t > 300)
+    assert first_camera - 351.0 < 400.0, "not longer than three periods and a picture"
+    assert ticked[-1][1] == "L"
+    assert ticked[-1][2] - 1251.0 <= 101.0, "the LiDAR ticks again within a sweep of its return"
+
+
+def test_ticks_that_nobody_took_are_replaced_and_counted() -> None:
+    bench = Bench()
+    for k in range(1, 6):
+        bench.lidar(100 * k, 100 * k + 51)
+    together = bench.tick(552)
+    assert together is not None
+    assert at_ms(together) == 500
+    assert together.replaced == 4
+    bench.lidar(600, 651)
+    following = bench.tick(652)
+    assert following is not None
+    assert following.replaced == 0
+
+
+@pytest.mark.parametrize(
+    ("case", "t_ms", "now_ms", "taken", "counter"),
+    [
+        ("in order", 300, 300, True, None),
+        ("the same once more", 200, 300, False, "duplicates"),
+        ("overtaken on the way", 150, 300, True, "late"),
+        ("a clock set to the future", 300 + 7000, 300, False, "implausible"),
+        ("a clock set to the past", 300 - 7000, 300, False, "implausible"),
+    ],
+)
+def test_a_stream_takes_what_can_be(case: str, t_ms: int, now_ms: int, taken: bool, counter: str | None) -> None:
+    stream: Stream[int] = Stream()
+    for t in (100, 200):
+        assert stream.add(START + t * MS, t, START + t * MS)
+    assert stream.add(START + t_ms * MS, 0, START + now_ms * MS) == taken
+    assert {name: getattr(stream, name) for name in ("late", "duplicates", "implausible")} == {
+        name: int(name == counter) for name in ("late", "duplicates", "implausible")
+    }
+
+
+def test_own_motion_is_the_nearest_and_not_an_old_one() -> None:
+    bench = Bench()
+    for t in (0, 100, 200):
+        bench.sync.egos.add(START + t * MS, EgoState(START + t * MS, t / 10.0), START + t * MS)
+    bench.lidar(120, 171)
+    together = bench.tick(171)
+    assert together is not None
+    assert together.ego is not None
+    assert together.ego.speed_mps == 10.0
+    bench.lidar(900, 951)
+    later = bench.tick(951)
+    assert later is not None
+    assert later.ego is None
+
+
+@given(st.lists(st.tuples(st.integers(0, 3000), st.booleans(), st.integers(0, 200)), max_size=60))
+def test_whatever_arrives_in_whatever_order_ticks_go_forward(messages: list[tuple[int, bool, int]]) -> None:
+    bench, last = Bench(), -1.0
+    for t, is_lidar, delay in sorted(messages, key=lambda item: item[0] + item[2]):
+        (bench.lidar if is_lidar else bench.camera)(t, t + delay)
+        together = bench.tick(t + delay)
+        if together is not None:
+            now = at_ms(together)
+            assert now is not None
+            assert now > last
+            assert together.skew_ns is None or abs(together.skew_ns) <= bench.params.max_skew_ms * MS
+            last = now
