@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import urlencode
 
@@ -52,15 +53,19 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
             for name in FILES:
                 viewer.path(name)
         first, last = _span(engine, None, None)
-        query = urlencode({"first": first, "last": last, "frame": engine.snapshot.index})
+        query = urlencode({"first": first, "last": last, "moment": engine.snapshot.index})
         return Address(url=f"/rerun/?{query}", first=first, last=last)
 
     @router.get("/api/rerun.rrd", response_class=FileResponse)
-    def replay(first: int | None = Query(None, ge=0), last: int | None = Query(None, ge=0)) -> FileResponse:
+    def replay(
+        first: int | None = Query(None, ge=0),
+        last: int | None = Query(None, ge=0),
+        moment: int | None = Query(None, ge=0, description="The viewer opens it at this frame, paused"),
+    ) -> FileResponse:
         """The drive as a rerun recording, with the present parameters: by default what is around the shown frame, at
         most 600 frames."""
         span = _span(engine, first, last)
-        clip = clip_of(engine, *span)
+        clip = replace(clip_of(engine, *span), moment=moment)
         file = tempfile.NamedTemporaryFile(prefix="cipv-", suffix=".rrd", delete=False)  # noqa: SIM115
         path = Path(file.name)
         file.close()

@@ -25,17 +25,28 @@ function say(text) {
   said.hidden = text === "";
 }
 
-/** Where the drive's recording is; the viewer opens it at the wanted frame. */
+/** Where the drive's recording is: the part, and the moment to open it at, that this page was asked for. */
 function recording() {
   const asked = new URLSearchParams(location.search);
   const part = new URLSearchParams();
-  for (const name of ["first", "last"]) {
+  for (const name of ["first", "last", "moment"]) {
     const value = asked.get(name);
     if (value !== null && /^\d{1,9}$/.test(value)) part.set(name, value);
   }
-  const frame = asked.get("frame") ?? "";
-  const when = /^\d{1,9}$/.test(frame) ? `#when=frame@${frame}` : "";
-  return `${location.origin}/api/rerun.rrd?${part}${when}`;
+  return `${location.origin}/api/rerun.rrd?${part}`;
+}
+
+/**
+ * The viewer would ask its maker's servers for updates and tell them about its use. The policy of this page forbids it;
+ * here such a request gets an empty answer before the browser has to refuse it.
+ */
+function stayHere() {
+  const ask = window.fetch.bind(window);
+  window.fetch = (input, init) => {
+    const url = new URL(input instanceof Request ? input.url : String(input), location.href);
+    const isOurs = url.origin === location.origin || url.protocol === "blob:" || url.protocol === "data:";
+    return isOurs ? ask(input, init) : Promise.resolve(new Response(null, { status: 204 }));
+  };
 }
 
 /** @param {Handle} handle */
@@ -49,6 +60,7 @@ function watch(handle) {
 }
 
 async function open() {
+  stayHere();
   await bindgen({ module_or_path: "/rerun/re_viewer_bg.wasm" });
   /** @type {Handle} */
   const handle = new bindgen.WebHandle({
