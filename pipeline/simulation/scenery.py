@@ -28,6 +28,7 @@ _WHEELS_M, _TRACK_M = 0.78, 0.48
 _CORNER_M = 4.0  # from the edge of the crossing road to where markings go on: room for the corners' curbs
 _CROSSING_SEEN_M = 120.0
 _STOP_LINE_M = 0.5
+_EDGE_INSET_M = 0.25
 _NO_MEDIAN_M = 0.6
 
 _Strip = tuple[F64, F64, F64]
@@ -108,11 +109,16 @@ def _wheel_tracks(road: Road, s_m: F64) -> list[_Strip]:
 
 def _edge_lines(road: Road, s_m: F64, open_m: list[tuple[float, float]]) -> list[_Strip]:
     """Solid lines along both sides of each carriageway, open at junctions; none where two meet without a median."""
-    pairs = [(right + 0.25, left - 0.25) for right, left in road.edges_m()]
-    edges = [edge for pair in pairs for edge in pair if not (_undivided(road) and abs(edge) < _NO_MEDIAN_M)]
+    edges = edge_paint_m(road)
     return [
         _strip(part, edge - _EDGE_M / 2, edge + _EDGE_M / 2, _WHITE) for part in _without(s_m, open_m) for edge in edges
     ]
+
+
+def edge_paint_m(road: Road) -> list[float]:
+    """d of the solid lines' middles: a little inside the carriageways, none in the middle of an undivided road."""
+    pairs = [(right + _EDGE_INSET_M, left - _EDGE_INSET_M) for right, left in road.edges_m()]
+    return [edge for pair in pairs for edge in pair if not (_undivided(road) and abs(edge) < _NO_MEDIAN_M)]
 
 
 def _lane_lines(road: Road, world: World, open_m: list[tuple[float, float]]) -> list[_Strip]:
