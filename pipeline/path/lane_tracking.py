@@ -36,8 +36,8 @@ _YAW_RATE_SIGMA_RADPS = 0.01
 _UNKNOWN_YAW_RATE_RADPS = 0.06
 _UNKNOWN_SPEED_MPS = 20.0
 _NOT_CUBIC = np.diag(np.square([0.03, 1e-3, 1e-4, 4e-6]))
-"""What a line keeps of error however often it is seen, as a covariance: a road that is no cubic and no plane. Set so that
-in the simulator's S-curve 95 % of the lines lie within 2.5 sigma at 30 m."""
+"""What a line keeps of error however often it is seen, as a covariance: a road that is no cubic and no plane. Set so
+that in the simulator's S-curve 95 % of the lines lie within 2.5 sigma at 30 m."""
 _CLOTHOID_PER_M2 = 1.0 / 150.0**2
 """How fast roads change their curvature: a clothoid of parameter A = 150 m, that of a road for 80 km/h."""
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pipeline.evaluation.lead import Judged, LeadRule, judge
 from pipeline.params import preset, with_changes
-from pipeline.run import Detectors, Sensors, run
+from pipeline.run import Detectors, Sensors, lanes_for, run
 from pipeline.sources import open_source
 from pipeline.types import Result
 from pipeline.vision.detector import open_detector
@@ -44,8 +44,10 @@ def drive(
     preset_name: str = "default",
     sensors: Sensors = "both",
     changes: tuple[tuple[str, float], ...] = (),
+    lanes: str = "off",
 ) -> Drive:
-    """Run a recording of the data folder with YOLOX-nano. ``changes``: dotted parameters on top of the preset."""
+    """Run a recording of the data folder with YOLOX-nano. ``changes``: dotted parameters on top of the preset. lanes:
+    the lane detector, as on the command line."""
     name = {"astyx": "astyx", "kitti": "kitti_0052"}[kind]
     source = open_source(f"{kind}:{folder / name}")
     params = with_changes(preset(preset_name), dict(changes))
@@ -54,7 +56,7 @@ def drive(
     size = (picture.bgr.shape[1], picture.bgr.shape[0])
     detector = open_detector(str(folder / "models" / "yolox_nano.onnx"), size)
     results, judged = {}, {}
-    for frame, result in run(source, params, Detectors(detector), sensors):
+    for frame, result in run(source, params, Detectors(detector, lanes_for(source, lanes)), sensors):
         results[frame.name] = result
         truth = source.truth(frame.index)
         if truth is not None:
