@@ -34,6 +34,8 @@
  * @property {""|SourceKind} seen_by
  * @property {number} hits
  * @property {number} lidar_points
+ * @property {number|null} lateral_mps
+ * @property {number|null} crossing_s
  * @property {Gate[]} gates
  *
  * @typedef {object} Cipv
@@ -50,6 +52,10 @@
  * @property {Point2[]} right
  * @property {Record<string, number|null>} sigma_m
  * @property {Record<string, number|null>} weights
+ * @property {number|null} confidence
+ * @property {boolean} usable
+ * @property {number|null} reach_m
+ * @property {Record<string, Record<string, number|null>>} carried_by
  *
  * @typedef {"cruise"|"follow"|"stop"|"warn"|"partial_brake"|"full_brake"} AccState
  *
@@ -99,11 +105,14 @@
  * @property {number} sequence
  * @property {number} skipped
  * @property {Notice[]} notices
- * @property {boolean} [live]
- * @property {boolean} [provisional]
- * @property {DriveState|null} [drive]
- * @property {boolean} [can_undo]
- * @property {boolean} [can_redo]
+ * @property {string|null} lane_detector
+ * @property {boolean} live
+ * @property {Record<string, any>} streams
+ * @property {Record<string, any>|null} recording
+ * @property {boolean} provisional
+ * @property {DriveState} drive
+ * @property {boolean} can_undo
+ * @property {boolean} can_redo
  *
  * @typedef {object} DriveState
  * @property {number} revision
@@ -124,7 +133,7 @@
  * @property {{left: Point2[], right: Point2[]}|null} plan_lanes
  * @property {GroundPlanes|null} ground
  * @property {Record<string, {distance_m: number, sigma_m: number}>} vision_ranges  what the camera alone measured
- * @property {Ranked[]} [ranking]
+ * @property {Ranked[]} ranking
  *
  * @typedef {object} GroundPlanes  n·p + d = 0 between neighbouring edges of x
  * @property {number[]} edges
@@ -139,6 +148,13 @@
  * @property {number|null} limit
  * @property {string} reason
  *
+ * @typedef {object} Picture  as sent; scale is sent pixels per pixel of the camera's picture
+ * @property {number} width
+ * @property {number} height
+ * @property {number} scale
+ * @property {number} bytes
+ * @property {number} full_width
+ *
  * @typedef {object} Frame  one decoded message: see protocol.js
  * @property {number} madeUnixMs
  * @property {number} detectMs
@@ -146,7 +162,7 @@
  * @property {Result} result
  * @property {Display} display
  * @property {boolean} [isLate]
- * @property {{width: number, height: number, scale: number, bytes: number, full_width: number}|null} picture
+ * @property {Picture|null} picture
  * @property {ImageBitmap|null} bitmap
  * @property {number} count
  * @property {Int16Array} xyz
@@ -178,8 +194,8 @@
  * @property {Record<string, ParamValue>} values
  * @property {Record<string, ParamValue>} base
  * @property {Record<string, number>} effective
- * @property {boolean} [can_undo]
- * @property {boolean} [can_redo]
+ * @property {boolean} can_undo
+ * @property {boolean} can_redo
  *
  * @typedef {object} Columns  one entry a frame; the CIPV's figures are null without one
  * @property {(number|null)[]} cipv_id
@@ -229,11 +245,13 @@
  * @property {(number|null)[]} path_offset_m
  * @property {boolean[]} in_path
  * @property {boolean[]} carried
+ * @property {(number|null)[]} vl_gap_m
  *
  * @typedef {object} Run
  * @property {number} id
  * @property {string} name
  * @property {string} label
+ * @property {string} digest
  * @property {string} preset
  * @property {Record<string, [ParamValue, ParamValue]>} changes
  * @property {number} done

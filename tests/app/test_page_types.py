@@ -1,0 +1,129 @@
+"""What the page's types.js says of a message is what the server sends: no key more, no key less."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from app.encode import Encoder
+from app.engine import Engine
+from app.server import Server, create_app, listen_socket
+from app.snapshot import Snapshot
+from pipeline.params import Params
+from tests.app.recording import CountingDetector, Recording, opener
+
+TYPES = Path(__file__).resolve().parents[2] / "static" / "js" / "types.js"
+WAIT_S = 60.0
+
+
+def typedefs(text: str) -> dict[str, set[str]]:
+    """The keys of each ``@typedef {object} Name``, by its name."""
+    found: dict[str, set[str]] = {}
+    name = ""
+    for line in text.splitlines():
+        if begun := re.match(r" \* @typedef \{object\} (\w+)", line):
+            name = begun[1]
+            found[name] = set()
+        elif key := re.match(r" \* @property \{.*\} \[?(\w+)\]?", line):
+            found[name].add(key[1])
+    return found
+
+
+@pytest.fixture(scope="module")
+def sent() -> Iterator[dict[str, Any]]:
+    """One real message of each kind, by the name of its type."""
+    recording = Recording(count=30)
+    engine = Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri, whole_drives=True)
+    bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
+    address = f"http://127.0.0.1:{bound.getsockname()[1]}"
+    server = Server(create_app(engine), address, lambda _: is_ready.set())
+    thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
+    engine.start()
+    engine.control.seek(28)
+    thread.start()
+    try:
+        assert is_ready.wait(WAIT_S)
+        with httpx.Client(base_url=address, timeout=WAIT_S) as client:
+            yield collect(engine, client)
+    finally:
+        server.should_exit = True
+        thread.join()
+        engine.stop()
+        bound.close()
+
+
+def is_compared(shown: Snapshot) -> bool:
+    """The shown frame is the run's own, and so is a second run of the whole drive."""
+    drive = shown.state_json()["drive"]
+    return not drive["running"] and drive["done"] == drive["total"] == 30 and drive["run"] != drive["base"]
+
+
+def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
+    def get(path: str) -> Any:
+        answer = client.get(path)
+        assert answer.status_code == 200, (path, answer.text)
+        return answer.json()
+
+    engine.wait_for(lambda shown: shown.index == 28 and shown.tick is not None, WAIT_S)
+    assert client.post("/api/marks", json={"text": "here"}).status_code == 201
+    # the first run is the base only once a second one stands beside it
+    engine.wait_for(lambda shown: not shown.state_json()["drive"]["running"], WAIT_S)
+    assert client.patch("/api/params", json={"changes": {"path.half_width_m": 2.0}}).status_code == 200
+    shown = engine.wait_for(is_compared, WAIT_S)
+    message = Encoder().message(shown)
+    assert message is not None
+    header = json.loads(message[4 : 4 + struct.unpack("<I", message[:4])[0]])
+    result, display, state = header["result"], header["display"], header["state"]
+    assert result["cipv"] is not None, "the recording has a lead"
+    params, columns, runs, comparison = (get(f"/api/{path}") for path in ("params", "drive", "runs", "compare"))
+    job = client.post("/api/clip", json={"first": 0, "last": 1, "kind": "csv"}).json()
+    every_param = [param for section in params["sections"] for param in section["params"]]
+    return {
+        "Gate": result["objects"][0]["gates"][0],
+        "FusedObject": result["objects"][0],
+        "Cipv": result["cipv"],
+        "Path": result["path"],
+        "Acc": result["acc"],
+        "Result": result,
+        "Notice": state["notices"][0],
+        "State": state,
+        "DriveState": state["drive"],
+        "Display": display,
+        "GroundPlanes": display["ground"],
+        "Ranked": display["ranking"][0],
+        "Picture": header["picture"],
+        "Param": {key: None for param in every_param for key in param},
+        "ParamsAnswer": params,
+        "Columns": columns["columns"],
+        "ColumnsAnswer": columns,
+        "DriveEvent": get("/api/drive/events")["events"][0],
+        "ObjectCurve": get(f"/api/drive/object/{result['cipv']['id']}"),
+        "Run": runs["runs"][0],
+        "Metric": comparison["metrics"][0],
+        "Comparison": comparison,
+        "Job": job,
+        "AlignmentScore": client.get("/api/alignment/score").json(),
+    }
+
+
+MADE_BY_THE_PAGE = {"Frame", "Series", "Drive"}
+"""Put together in the page from messages."""
+
+KNOWN = typedefs(TYPES.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", sorted(KNOWN.keys() - MADE_BY_THE_PAGE))
+def test_the_page_knows_every_key_and_no_other(sent: dict[str, Any], name: str):
+    assert KNOWN[name] == set(sent[name]), "say it in static/js/types.js"
+
+
+def test_every_kind_of_message_is_looked_at(sent: dict[str, Any]):
+    assert set(sent) == KNOWN.keys() - MADE_BY_THE_PAGE
