@@ -19,6 +19,8 @@ _QUALITY: Mapping[int, GnssQuality] = {1: "single", 2: "dgnss", 3: "single", 4: 
 """GGA's quality indicator; 0 is no fix, 6 to 8 are dead reckoning, typed in or simulated."""
 _RANGE_ERROR_M: Mapping[GnssQuality, float] = {"single": 3.0, "dgnss": 1.0, "rtk_float": 0.3, "rtk_fixed": 0.015}
 """Usual error of a range, which times the dilution gives the error of a place where no GST says it."""
+_BEARING = frozenset({"GGA", "RMC"})
+"""Sentences that a fix waits for."""
 _LONGEST_SENTENCE = 256
 
 
@@ -33,7 +35,8 @@ class NmeaReader:
         self.bad = self.no_fix = 0
         self._moment: time | None = None
         self._said: dict[str, Any] = {}
-        self._expected = {"GGA", "RMC"}
+        self._is_given = False
+        self._expected = set(_BEARING)
         self._date: date | None = None
 
     def push(self, line: str, near_ns: int) -> GnssFix | None:
@@ -50,31 +53,27 @@ class NmeaReader:
         kind, moment = sentence.sentence_type, getattr(sentence, "timestamp", None)
         if kind not in ("GGA", "RMC", "GST") or not isinstance(moment, time):
             return None
-        done = None
         if moment != self._moment:
-            done = self._close(near_ns)
-            self._moment = moment
+            self._begin(moment)
         self._said[kind] = sentence
-        if self._said.keys() >= self._expected:
-            done = self._fix(near_ns)
-            self._said = {"done": None}
-        return done
+        if self._is_given:
+            self._expected |= {kind} & _BEARING
+            return None
+        return self._give(near_ns) if self._expected <= self._said.keys() else None
 
     def flush(self, near_ns: int) -> GnssFix | None:
         """At the end of the sentences: the fix of the last moment, if it was not given."""
-        self._moment = None
-        return self._close(near_ns)
+        return self._give(near_ns) if self._said and not self._is_given else None
 
-    def _close(self, near_ns: int) -> GnssFix | None:
-        """A new moment begins: what the last one had is what can be expected; its fix, if it was not given."""
-        said, self._said = self._said, {}
-        if not said or "done" in said:
-            return None
-        self._expected = set(said) & {"GGA", "RMC"} or self._expected
-        self._said = said
-        fix = self._fix(near_ns)
-        self._said = {}
-        return fix
+    def _begin(self, moment: time) -> None:
+        """A new moment. What was not said of the last one is not waited for again, until it is said."""
+        if self._said and not self._is_given:
+            self._expected = self._said.keys() & _BEARING or set(_BEARING)
+        self._moment, self._said, self._is_given = moment, {}, False
+
+    def _give(self, near_ns: int) -> GnssFix | None:
+        self._is_given = True
+        return self._fix(near_ns)
 
     def _fix(self, near_ns: int) -> GnssFix | None:
         gga, rmc, gst = (self._said.get(kind) for kind in ("GGA", "RMC", "GST"))
