@@ -14,11 +14,19 @@ from pipeline.errors import BadInput
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
 from pipeline.run import Detectors, Sensors, detector_for, lanes_for
 from pipeline.sources import is_live, open_live, open_source
+from pipeline.sources.along_route import along_route
 from pipeline.sources.base import AnySource, LiveSource, Source
+from pipeline.sources.routes import load_route
+from pipeline.types import Route
 from pipeline.vision.detector import Detector
 from pipeline.vision.runtime import DetectorMissing
 
 S = TypeVar("S", Source, LiveSource)
+
+
+def planned(file: Path | None) -> Route | None:
+    """The route of a file, if one is named."""
+    return load_route(str(file)) if file is not None else None
 
 
 @dataclass(frozen=True)
@@ -29,14 +37,18 @@ class SourceOptions:
     """What to open: astyx:<dir>, kitti:<dir>, sim:<scenario or my.yaml>, live:<config.yaml>, …"""
     rings: int = 16
     """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
+    route: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """The road to be driven, on which GNSS places the car: CSV, GPX, an NMEA log or an earlier session"""
 
     def open(self) -> Source:
-        """A recording. SourceError says in one sentence what is wrong."""
-        return self._with_notes(open_source(self.source, rings=self.rings))
+        """A recording. SourceError says in one sentence what is wrong, RouteError the same of the route."""
+        return self._with_notes(along_route(open_source(self.source, rings=self.rings), planned(self.route)))
 
     def open_live(self) -> LiveSource | None:
         """The sensors, if it names some; they are not started yet. SourceError as with ``open``."""
-        return self._with_notes(open_live(self.source)) if is_live(self.source) else None
+        if not is_live(self.source):
+            return None
+        return self._with_notes(along_route(open_live(self.source), planned(self.route)))
 
     def _with_notes(self, source: S) -> S:
         """The source, after what there is to say about it."""

@@ -2,7 +2,8 @@
 
 Algorithm 3 prints the gap law under d ≤ d_min, where it is negative, keeps v_current for ever once the lead is gone and
 lets the last object of its loop win. Built here is what it means: the law holds when d ≤ d_desired, clipped to
-[0, set speed]; with nothing ahead the car returns to the set speed; the smallest demand wins.
+[0, set speed]; with nothing ahead the car returns to the set speed; the smallest demand wins. Where the path is not
+known well enough to say who leads, the car gets no faster.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pipeline.threat import enters_corridor, is_dependable
 from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Path
 
 STANDSTILL_MPS = 0.1
+CREEP_MPS = 3.0
 State = Literal["cruise", "follow", "stop", "warn"]
 
 
@@ -49,7 +51,7 @@ def control(
     if ego is None:
         return AccState(), None
     demand = min(
-        (follow(ego, cipv, params), *avoid(ego, cipv, objects, path, params)),
+        (follow(ego, cipv, params), *avoid(ego, cipv, objects, path, params), *hold(ego, path, params)),
         key=lambda wish: wish.speed_mps,
     )
     state, accel = pid(state, demand.speed_mps - ego.speed_mps, dt_s, params)
@@ -108,6 +110,17 @@ def avoid(
         and is_dependable(item)
         and enters_corridor(item, path)
     ]
+
+
+def hold(ego: EgoState, path: Path, params: AccParams) -> list[Demand]:
+    """No faster than now where nobody knows well enough where the car is going: a lead could be anywhere. Slower than
+    the speed at which a curve shows at all, the car may creep on."""
+    if path.usable:
+        return []
+    allowed = max(ego.speed_mps, CREEP_MPS)
+    if allowed >= params.set_speed_kmh / 3.6:
+        return []
+    return [Demand(allowed, "cruise", f"path known for {path.reach_m:.0f} m only: no faster than now")]
 
 
 def pid(state: AccState, error_mps: float, dt_s: float | None, params: AccParams) -> tuple[AccState, float]:

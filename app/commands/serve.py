@@ -5,16 +5,18 @@ from __future__ import annotations
 import webbrowser
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
 from app.engine import Engine
-from app.options import LineOptions
+from app.options import LineOptions, planned
 from app.scene_feed import SceneFeed
 from app.server import DEFAULT_PORT, serve
 from pipeline.run import detector_for, lanes_for
 from pipeline.sources import open_any
+from pipeline.sources.along_route import along_route
 
 
 @dataclass(frozen=True)
@@ -61,12 +63,15 @@ class Serve:
     """Ablation: what a car with only this sensor would believe"""
     rings: int = 16
     """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
+    route: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """The road to be driven, on which GNSS places the car: CSV, GPX, an NMEA log or an earlier session"""
 
     def __call__(self) -> int:
         params = self.line.parameters()
+        route = planned(self.route)
         open_any(self.source, rings=self.rings)  # a typing mistake is said here, not on the page
         engine = Engine(
-            lambda uri: open_any(uri, rings=self.rings),
+            lambda uri: along_route(open_any(uri, rings=self.rings), route),
             lambda source: detector_for(source, self.line.detector),
             params,
             preset=self.line.preset,

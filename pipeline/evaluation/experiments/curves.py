@@ -2,9 +2,9 @@
 
 Bends at 3 m/s² lateral acceleration, S-curves and straights; a lead in the lane draws away while cars drive in the
 lanes beside it at 20–100 m. Detections are given: true boxes with the errors measured of the embedded detector, a
-simulated LiDAR. Every frame goes through the line with each source of the path alone, with none, without a
-route, and with all fused. Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge and no
-nearer vehicle hides it; the first second, in which the trackers start, is left out.
+simulated LiDAR. Every frame goes through the line with each source of the path alone, with none, without a route, and
+with all fused. Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge
+and no nearer vehicle hides it; the first second, in which the trackers start, is left out.
 """
 
 from __future__ import annotations
