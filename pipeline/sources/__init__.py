@@ -27,18 +27,32 @@ def _open_pcap(uri: str, rest: str, rings: int) -> Source:
     return PcapSource(uri, rest)
 
 
+def _open_pcd(uri: str, rest: str, rings: int) -> Source:
+    from pipeline.sources.pcd import PcdSource
+
+    return PcdSource(uri, rest)
+
+
+def _open_rosbag(uri: str, rest: str, rings: int) -> Source:
+    from pipeline.sources.rosbag import RosbagSource
+
+    return RosbagSource(uri, rest)
+
+
 _OPENERS: dict[str, Callable[[str, str, int], Source]] = {
     "astyx": lambda uri, rest, rings: AstyxSource(uri, rest),
     "kitti": lambda uri, rest, rings: KittiSource(uri, rest, rings),
     "mcap": _open_session,
     "pcap": _open_pcap,
+    "pcd": _open_pcd,
+    "rosbag": _open_rosbag,
     "sim": lambda uri, rest, rings: SimulatedSource(uri, rest),
 }
 """Scheme → what opens it, given the whole URI, the part after the colon and how many LiDAR rings to keep."""
 
 _MARKS = {"lidar_vlp16": "astyx", "camera_front": "astyx", "velodyne": "kitti", "velodyne_points": "kitti"}
 """A folder with this one inside is such a recording."""
-_SUFFIXES = {".pcap": "pcap", ".pcapng": "pcap", ".cap": "pcap"}
+_SUFFIXES = {".pcap": "pcap", ".pcapng": "pcap", ".cap": "pcap", ".bag": "rosbag", ".db3": "rosbag"}
 """A file whose name ends so is such a recording."""
 
 
@@ -81,13 +95,22 @@ def open_any(uri: str, *, rings: int = 16) -> AnySource:
 
 def _about_bare_path(path: str) -> str:
     """What to type instead of a path without a scheme."""
-    by_name = _SUFFIXES.get(Path(path).suffix.lower())
-    if by_name is not None:
-        return f"{path}: say what kind of recording it is; it looks like {by_name}:{path}"
-    for inside, scheme in _MARKS.items():
-        try:
-            if path and (Path(path).expanduser() / inside).is_dir():
-                return f"{path}: say what kind of recording it is; it looks like {scheme}:{path}"
-        except (OSError, RuntimeError, ValueError):
-            break
+    try:
+        scheme = _looks_like(Path(path).expanduser()) if path else None
+    except (OSError, RuntimeError, ValueError):
+        scheme = None
+    if scheme is not None:
+        return f"{path}: say what kind of recording it is; it looks like {scheme}:{path}"
     return f"{path}: not a source; type one of {', '.join(f'{scheme}:…' for scheme in _OPENERS)}"
+
+
+def _looks_like(path: Path) -> str | None:
+    """The scheme of a file or folder, by its name or what lies in it."""
+    for inside, scheme in _MARKS.items():
+        if (path / inside).is_dir():
+            return scheme
+    if (path / "metadata.yaml").is_file():
+        return "rosbag"
+    if path.is_dir() and any(path.glob("*.pcd")):
+        return "pcd"
+    return _SUFFIXES.get(path.suffix.lower())

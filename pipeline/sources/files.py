@@ -66,21 +66,25 @@ def read_bytes(path: Path) -> bytes:
 
 
 def decode_picture(path: Path) -> tuple[U8, bytes | None]:
-    """(H, W, 3) uint8 blue green red, and the file itself where it is a JPEG. SourceError when it is no whole picture.
+    """As ``decode_image``, of a file. SourceError too when it cannot be read."""
+    return decode_image(read_bytes(path), path.name)
+
+
+def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
+    """(H, W, 3) uint8 blue green red, and the data itself where it is a JPEG. SourceError when it is no whole picture.
 
     A JPEG or PNG without its end marker is refused: its lower part would be a flat grey that a detector takes for road.
     """
-    data = read_bytes(path)
     is_jpeg = data.startswith(_JPEG_START)
     for start, end in _MARKERS:
         if data.startswith(start) and end not in data[-_END_BYTES:]:
-            raise SourceError(f"{path.name}: the picture is cut off")
+            raise SourceError(f"{name}: the picture is cut off")
     try:
         picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR) if data else None
     except cv2.error:
         picture = None
     if picture is None:
-        raise SourceError(f"{path.name}: not a readable picture")
+        raise SourceError(f"{name}: not a readable picture")
     return np.ascontiguousarray(picture, dtype=np.uint8), data if is_jpeg else None
 
 

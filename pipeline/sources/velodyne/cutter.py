@@ -1,4 +1,4 @@
-"""VLP-16 packets → rotations, packet by packet: each is checked, put in its place, and a rotation is cut behind the car.
+"""VLP-16 packets → rotations, packet by packet: each is checked and put in its place; rotations are cut behind the car.
 
 So what is ahead is never in two, and its tick is the moment the head looks straight ahead. Where a packet belongs
 follows from its time and its azimuth together: the two must agree with the packets before it, so one spoiled packet

@@ -1,0 +1,104 @@
+"""One bag: its topics, and their messages by the time they were recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from pipeline.sources.base import SourceError
+
+_VELODYNE = {
+    "velodyne_msgs/msg/VelodynePacket": "builtin_interfaces/Time stamp\nuint8[1206] data",
+    "velodyne_msgs/msg/VelodyneScan": "std_msgs/Header header\nvelodyne_msgs/VelodynePacket[] packets",
+}
+"""Older ROS 2 bags hold no definitions; what ROS's own packages define is in the library, this is not."""
+_SUFFIXES = (".bag", ".db3", ".mcap")
+
+
+class Topic(NamedTuple):
+    """kind: the message type without its package path, as ``PointCloud2``. held: how many messages."""
+
+    name: str
+    kind: str
+    held: int
+
+
+class BagError(Exception):
+    """A bag or a message that cannot be read; the text is why."""
+
+
+class Bag:
+    """Open for reading until the program ends. SourceError when it is none."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._reader = AnyReader([path], default_typestore=_store())
+            self._reader.open()
+            self.topics = _topics(self._reader)
+        except Exception as error:  # damaged files make the library raise whatever they like
+            raise SourceError(f"{path.name}: cannot be read as a bag: {_in_words(error)}") from None
+
+    def messages(
+        self, topics: list[str], at_ns: int | None = None, onward: bool = False
+    ) -> Iterator[tuple[str, int, Any]]:
+        """(topic, when it was recorded, message) of all messages, or of those recorded at that very moment (onward: or
+        later), in order.
+
+        BagError when the bag is damaged there.
+        """
+        connections = [each for each in self._reader.connections if each.topic in topics]
+        if not connections:
+            return
+        until_ns = None if at_ns is None or onward else at_ns + 1
+        try:
+            for connection, t_ns, raw in self._reader.messages(connections, start=at_ns, stop=until_ns):
+                yield connection.topic, t_ns, self._reader.deserialize(raw, connection.msgtype)
+        except GeneratorExit:
+            raise
+        except Exception as error:
+            raise BagError(_in_words(error)) from None
+
+
+def bag_path(path: str) -> Path:
+    """The file or folder a person typed. SourceError when there is none, or one that is no bag's."""
+    if not path:
+        raise SourceError("no bag given after the colon")
+    try:
+        bag = Path(path).expanduser()
+        if not bag.exists():
+            raise SourceError(f"{path}: no such file or folder")
+        if bag.is_dir() and not (bag / "metadata.yaml").is_file():
+            raise SourceError(f"{path}: no ROS 2 bag: no metadata.yaml in it")
+    except (OSError, RuntimeError, ValueError) as error:
+        raise SourceError(f"{path}: cannot be opened: {_in_words(error)}") from None
+    if bag.is_file() and bag.suffix not in _SUFFIXES:
+        raise SourceError(f"{path}: no bag; their names end in {', '.join(_SUFFIXES)}")
+    return bag
+
+
+def _topics(reader: AnyReader) -> dict[str, Topic]:
+    found: dict[str, Topic] = {}
+    for connection in reader.connections:
+        count = found[connection.topic].held if connection.topic in found else 0
+        kind = connection.msgtype.rpartition("/")[2]
+        found[connection.topic] = Topic(connection.topic, kind, count + connection.msgcount)
+    return found
+
+
+def _in_words(error: Exception) -> str:
+    text = str(error).strip().splitlines()
+    return text[0][:200] if text else type(error).__name__
+
+
+@cache
+def _store() -> Any:
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name, definition in _VELODYNE.items():
+        store.register(get_types_from_msg(definition, name))
+    return store

@@ -1,0 +1,182 @@
+"""A ROS bag as a recording: a frame a LiDAR sweep (a picture, where there is no LiDAR), times by messages' headers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.records import evolve
+from pipeline.sources import rig as rig_files
+from pipeline.sources.base import SourceError, TruthObject
+from pipeline.sources.beside import rig_of
+from pipeline.sources.live.own_motion import MotionFromGnss
+from pipeline.sources.options import split_options
+from pipeline.sources.rosbag import messages
+from pipeline.sources.rosbag.bag import Bag, BagError, bag_path
+from pipeline.sources.rosbag.index import BagIndex, Stream
+from pipeline.sources.rosbag.rig import calibration
+from pipeline.sources.rosbag.topics import ROLES, map_topics
+from pipeline.sources.timeline import Timeline, nearest
+from pipeline.sources.velodyne import Vlp16Decoder
+from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Sweep
+
+_PICTURE_WITHIN_NS = 100_000_000
+_OWN_WITHIN_NS, _FIX_WITHIN_NS = 500_000_000, 1_500_000_000
+_MESSAGES_A_SWEEP = 3
+
+
+class RosbagSource:
+    """``<bag>?lidar=/topic&camera=/topic&camera_info=/topic&gnss=/topic&odometry=/topic&rig=file.yaml``: all optional,
+    ``none`` for a topic leaves it out."""
+
+    def __init__(self, uri: str, rest: str) -> None:
+        path, options = split_options(rest, (*ROLES, "rig"))
+        file = bag_path(path)
+        self.uri, self.title = uri, file.resolve().stem
+        self._bag = Bag(file)
+        topics = map_topics(self._bag.topics, options)
+        if topics.lidar is None and topics.camera is None:
+            raise SourceError(f"{path}: neither LiDAR nor pictures in it; its topics are {_listed(self._bag)}")
+        self._index = BagIndex(self._bag, topics)
+        self._ticks = self._ticking(path)
+        notes = [topics.about(self._bag.topics), *self._about_times()]
+        self._place(rig_of(file.resolve(), options), notes)
+        self._own, self._fixes = self._own_motion(notes)
+        if self._index.damage:
+            notes.append(f"damaged: {self._index.damage}; what lies before it is read")
+        self.notes = tuple(notes)
+        steps = np.diff(self._ticks.times_ns)
+        self.rate_hz = round(1e9 / float(np.median(steps)), 2) if len(steps) and np.median(steps) > 0 else 10.0
+
+    def __len__(self) -> int:
+        return len(self._ticks.times_ns)
+
+    def t_ns(self, index: int) -> int:
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        return int(self._ticks.times_ns[index])
+
+    def frame(self, index: int) -> Frame:
+        t_ns, notes = self.t_ns(index), list[str]()
+        sweep = self._sweep(index, t_ns, notes)
+        picture = self._picture(t_ns, notes)
+        return Frame(
+            index,
+            f"{index:06d}",
+            t_ns,
+            sweep,
+            picture,
+            camera=rig_files.calibration_for(self._camera, picture, notes),
+            ego=self._own.latest(t_ns, _OWN_WITHIN_NS),
+            gnss=self._fixes.latest(t_ns, _FIX_WITHIN_NS),
+            notes=tuple(notes),
+        )
+
+    def truth(self, index: int) -> tuple[TruthObject, ...] | None:
+        self.t_ns(index)
+        return None
+
+    def _ticking(self, path: str) -> Stream:
+        """The LiDAR's messages; the camera's where it has none."""
+        for stream in (self._index.lidar, self._index.camera):
+            if stream is not None and len(stream.times_ns):
+                return stream
+        counts = self._index.counts
+        if counts is not None and counts.models:
+            raise SourceError(f"{path}: packets of a {counts.models.most_common(1)[0][0]}; only the VLP-16 is read")
+        why = self._index.damage or (counts.about_refused() if counts is not None else "")
+        raise SourceError(f"{path}: not one whole sweep or picture in it{'; ' + why if why else ''}")
+
+    def _place(self, rig: rig_files.Rig, notes: list[str]) -> None:
+        """Where sensors sit: by a rig file, else by what the bag says."""
+        index, lidar = self._index, self._index.lidar
+        frame_id = lidar.frame_id if lidar is not None else ""
+        mounted = rig.lidar.mount.T_ego_sensor()
+        self._T_ego_lidar = index.tree.T_ego_lidar(frame_id) if np.array_equal(mounted, np.eye(4)) else mounted
+        self._camera: CameraCalibration | None = rig.camera_calibration()
+        if self._camera is None and index.camera is not None:
+            if index.camera_info is None:
+                notes.append("no CameraInfo: LiDAR and camera are not fused")
+            else:
+                self._camera = calibration(index.camera_info, index.tree, frame_id, self._T_ego_lidar, notes)
+
+    def _own_motion(self, notes: list[str]) -> tuple[Timeline[EgoState], Timeline[Any]]:
+        """Own speed from odometry, else from GNSS."""
+        own, fixes = self._index.own, self._index.fixes
+        if not own and fixes:
+            follow = MotionFromGnss()
+            own = [follow.push(fix) for fix in sorted(fixes, key=lambda fix: fix.t_ns)]
+            notes.append("own speed from GNSS places")
+        if not own:
+            notes.append("no ego speed recorded")
+        return Timeline([each.t_ns for each in own], own), Timeline([fix.t_ns for fix in fixes], fixes)
+
+    def _about_times(self) -> list[str]:
+        notes = []
+        for role, stream in (("LiDAR", self._index.lidar), ("camera", self._index.camera)):
+            if stream is not None and stream.without_header:
+                notes.append(f"{role}: {stream.without_header} messages without a time: taken when they were recorded")
+        counts = self._index.counts
+        if counts is not None:
+            notes.append("LiDAR packets are cut behind the car; times are the sensor's own steps, set by the driver's")
+            notes += [counts.about_refused()] if counts.refused else []
+            notes += [f"{counts.lost} packets lost"] if counts.lost else []
+        return notes
+
+    def _sweep(self, index: int, t_ns: int, notes: list[str]) -> Sweep | None:
+        lidar = self._index.lidar
+        if lidar is None or lidar is not self._ticks:
+            return None
+        recorded_ns = int(lidar.recorded_ns[index])
+        try:
+            if self._index.is_packets:
+                return self._packets_sweep(recorded_ns, t_ns, notes)
+            for _, at_ns, message in self._bag.messages([lidar.topic], recorded_ns):
+                if messages.stamp_ns(message, at_ns)[0] == t_ns:
+                    return messages.cloud(message, t_ns, notes).sweep(t_ns, self._T_ego_lidar)
+            notes.append("LiDAR: its message is not there any more")
+        except (BagError, messages.BadMessage) as error:
+            notes.append(f"LiDAR: {error}")
+        return None
+
+    def _packets_sweep(self, recorded_ns: int, t_ns: int, notes: list[str]) -> Sweep | None:
+        """The sweep of the packets in the message that holds its first, and in those after it."""
+        lidar = self._index.lidar
+        assert lidar is not None
+        decoder, found = Vlp16Decoder(self._T_ego_lidar, keeps_partial=True), list[Sweep]()
+        for count, (_, at_ns, message) in enumerate(self._bag.messages([lidar.topic], recorded_ns, onward=True)):
+            for data, received_ns in messages.packets(message):
+                sweep = decoder.push(data, received_ns or at_ns)
+                found += [sweep] if sweep is not None else []
+            if count + 1 >= _MESSAGES_A_SWEEP:
+                break
+        last = decoder.flush()
+        found += [last] if last is not None else []
+        sweep = min(found, key=lambda sweep: abs(sweep.t_ns - t_ns), default=None)
+        if sweep is None:
+            notes.append(f"LiDAR: no points; {decoder.counts.about_refused()}")
+            return None
+        return evolve(sweep, t_ns=t_ns)
+
+    def _picture(self, t_ns: int, notes: list[str]) -> Picture | None:
+        camera = self._index.camera
+        if camera is None:
+            return None
+        index = nearest(camera.times_ns, t_ns, _PICTURE_WITHIN_NS)
+        if index is None:
+            notes.append("no picture within 0.1 s")
+            return None
+        wanted_ns = int(camera.times_ns[index])
+        try:
+            for _, at_ns, message in self._bag.messages([camera.topic], int(camera.recorded_ns[index])):
+                if messages.stamp_ns(message, at_ns)[0] == wanted_ns:
+                    return messages.picture(message, wanted_ns)
+            notes.append("camera: its message is not there any more")
+        except (BagError, messages.BadMessage) as error:
+            notes.append(f"camera: {error}")
+        return None
+
+
+def _listed(bag: Bag) -> str:
+    return ", ".join(f"{topic.name} ({topic.kind})" for topic in bag.topics.values()) or "none"

@@ -1,0 +1,90 @@
+"""Which topic of a bag is which sensor: guessed by message type, name and number, or said by a person."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from pipeline.sources.base import SourceError
+from pipeline.sources.rosbag.bag import Topic
+
+NONE = "none"
+ROLES: dict[str, tuple[str, ...]] = {
+    "lidar": ("PointCloud2", "VelodyneScan"),
+    "camera": ("CompressedImage", "Image"),
+    "camera_info": ("CameraInfo",),
+    "gnss": ("NavSatFix",),
+    "odometry": ("Odometry",),
+}
+"""Role → message types that can play it."""
+_LIKELY: dict[str, tuple[str, ...]] = {
+    "lidar": ("velodyne", "lidar", "points_raw", "points"),
+    "camera": ("front", "center", "image_raw", "color", "rgb"),
+    "odometry": ("wheel", "vehicle", "odom"),
+    "gnss": ("fix", "gnss", "gps"),
+}
+_UNLIKELY = ("depth", "thermal", "ir", "mask", "debug", "rear", "back", "left", "right", "filtered", "ground")
+
+
+class TopicMap(NamedTuple):
+    """Topic of each role; null where the bag has none."""
+
+    lidar: str | None
+    camera: str | None
+    camera_info: str | None
+    gnss: str | None
+    odometry: str | None
+
+    def about(self, topics: Mapping[str, Topic]) -> str:
+        """``topics: lidar /velodyne_points (PointCloud2), …``."""
+        parts = [f"{role} {name} ({topics[name].kind})" for role, name in self._asdict().items() if name]
+        return f"topics: {', '.join(parts)}; others with ?lidar=/name&camera=…, none to leave one out"
+
+
+def map_topics(topics: Mapping[str, Topic], wanted: Mapping[str, str]) -> TopicMap:
+    """Each role's topic: the one a person named, else the likeliest. SourceError for a name that is not there or is no
+    such sensor's."""
+    chosen: dict[str, str | None] = {}
+    for role, kinds in ROLES.items():
+        if role in wanted:
+            chosen[role] = None if wanted[role] == NONE else _checked(role, wanted[role], topics)
+        elif role == "camera_info":
+            chosen[role] = _info_of(chosen["camera"], topics)
+        else:
+            fitting = [topic for topic in topics.values() if topic.kind in kinds and topic.held]
+            chosen[role] = max(fitting, key=lambda topic: _rank(role, topic)).name if fitting else None
+    return TopicMap(**chosen)
+
+
+def _checked(role: str, name: str, topics: Mapping[str, Topic]) -> str:
+    if name not in topics:
+        raise SourceError(f"{role}={name}: no such topic; there are {', '.join(sorted(topics)) or 'none'}")
+    if topics[name].kind not in ROLES[role]:
+        raise SourceError(f"{role}={name}: its messages are {topics[name].kind}, not {' or '.join(ROLES[role])}")
+    return name
+
+
+def _rank(role: str, topic: Topic) -> tuple[int, int, int, int, str]:
+    """Likely words in the name, no unlikely ones, the type listed first, most messages; the name ends a draw."""
+    name = topic.name.lower()
+    likely = sum(word in name for word in _LIKELY.get(role, ()))
+    unlikely = sum(word in name.replace("_", "/").split("/") for word in _UNLIKELY)
+    return likely - 2 * unlikely, -ROLES[role].index(topic.kind), topic.held, -len(name), name
+
+
+def _info_of(camera: str | None, topics: Mapping[str, Topic]) -> str | None:
+    """The ``CameraInfo`` beside the pictures: ROS puts it into the same namespace."""
+    infos = sorted(topic.name for topic in topics.values() if topic.kind == "CameraInfo" and topic.held)
+    if camera is None or not infos:
+        return None
+    common = {info: len(_common(info.split("/"), camera.split("/"))) for info in infos}
+    return max(infos, key=lambda info: common[info])
+
+
+def _common(one: list[str], other: list[str]) -> list[str]:
+    shared = []
+    for a, b in zip(one, other, strict=False):
+        if a != b:
+            break
+        shared.append(a)
+    return shared
