@@ -101,13 +101,11 @@ def _run(
             progress(frame.index + 1 - first, last + 1 - first)
 
 
-def write_rrd(
-    title: str, run: Iterable[tuple[Frame, Result]], out: Path, params: Params, moment: int | None = None
-) -> None:
-    """A replay for the rerun viewer, which opens it at the frame ``moment``."""
+def write_rrd(title: str, run: Iterable[tuple[Frame, Result]], out: Path, params: Params, paused: bool = False) -> None:
+    """A replay for the rerun viewer. paused: it opens standing still at the first frame."""
     from app.views.rerun_view import RerunSink  # half a second to import: only who asks pays
 
-    with RerunSink(out, title, params.alignment, moment) as sink:
+    with RerunSink(out, title, params.alignment, paused) as sink:
         for frame, result in run:
             sink.show(frame, result)
 

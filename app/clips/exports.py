@@ -26,7 +26,7 @@ MOST_FRAMES = 6000
 @dataclass(frozen=True, eq=False)
 class Clip:
     """Frames ``first`` to ``last`` of a recording, both included, run with these parameters. turn: to be asked before
-    each frame is computed. moment: the frame at which a viewer opens it."""
+    each frame is computed. paused: a viewer opens it standing still."""
 
     recording: Recording
     params: Params
@@ -35,7 +35,7 @@ class Clip:
     turn: Turn
     title: str
     rate_hz: float
-    moment: int | None = None
+    paused: bool = False
 
 
 def submit(jobs: Jobs, clip: Clip, kind: Kind) -> Job:
@@ -55,7 +55,7 @@ def _mcap(clip: Clip, path: Path, report: Report) -> None:
 
 def _rrd(clip: Clip, path: Path, report: Report) -> None:
     run = clip_frames(clip.recording, clip.params, clip.first, clip.last, report, clip.turn)
-    write_rrd(clip.title, run, path, clip.params, clip.moment)
+    write_rrd(clip.title, run, path, clip.params, clip.paused)
 
 
 def _mp4(clip: Clip, path: Path, report: Report) -> None:

@@ -47,25 +47,26 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
 
     @router.get("/api/rerun/open")
     def address() -> Address:
-        """The address for a frame or a tab. 409 in one sentence when there is no web viewer here."""
+        """The address for a frame or a tab: the drive from the shown frame on, standing still there (a recording cannot
+        say where the viewer's cursor is). 409 in one sentence when there is no web viewer here."""
         with refusing():
             open_recording(engine.drives)
             for name in FILES:
                 viewer.path(name)
-        first, last = _span(engine, None, None)
-        query = urlencode({"first": first, "last": last, "moment": engine.snapshot.index})
+        first, last = _span(engine, engine.snapshot.index, None)
+        query = urlencode({"first": first, "last": last, "paused": 1})
         return Address(url=f"/rerun/?{query}", first=first, last=last)
 
     @router.get("/api/rerun.rrd", response_class=FileResponse)
     def replay(
         first: int | None = Query(None, ge=0),
         last: int | None = Query(None, ge=0),
-        moment: int | None = Query(None, ge=0, description="The viewer opens it at this frame, paused"),
+        paused: bool = Query(False, description="The viewer opens it standing still"),
     ) -> FileResponse:
         """The drive as a rerun recording, with the present parameters: by default what is around the shown frame, at
         most 600 frames."""
         span = _span(engine, first, last)
-        clip = replace(clip_of(engine, *span), moment=moment)
+        clip = replace(clip_of(engine, *span), paused=paused)
         file = tempfile.NamedTemporaryFile(prefix="cipv-", suffix=".rrd", delete=False)  # noqa: SIM115
         path = Path(file.name)
         file.close()

@@ -8,8 +8,6 @@ import rerun.blueprint as rrb
 
 CAMERA = "world/camera"
 OVERLAYS = f"{CAMERA}/overlay"
-MOMENT = "from this moment"
-"""The timeline that begins at the frame a replay is opened at."""
 BEV_AHEAD_M, BEV_BEHIND_M, BEV_ASIDE_M = 80.0, 8.0, 24.0
 TTC_AXIS_S = 20.0
 """A longer time to collision is no news."""
@@ -17,8 +15,8 @@ _BACKGROUND = (13, 17, 23)
 _NO_LEGEND = rrb.PlotLegend(visible=False)
 
 
-def blueprint(*, opens_at_moment: bool = False) -> rrb.Blueprint:
-    """The layout that a replay carries inside its file. opens_at_moment: paused at the beginning of ``MOMENT``."""
+def blueprint(paused: bool = False) -> rrb.Blueprint:
+    """The layout that a replay carries inside its file. paused: it opens standing still at its first frame."""
     camera = rrb.Spatial2DView(name="Camera", origin=CAMERA, contents=[f"{CAMERA}/image", f"{OVERLAYS}/**"])
     world = rrb.Spatial3DView(
         name="World",
@@ -51,17 +49,11 @@ def blueprint(*, opens_at_moment: bool = False) -> rrb.Blueprint:
     left = rrb.Vertical(camera, rrb.Horizontal(bev, reasons), row_shares=[2, 3])
     return rrb.Blueprint(
         rrb.Vertical(rrb.Horizontal(left, world, column_shares=[1, 1]), curves, row_shares=[3, 1]),
-        _time_panel(opens_at_moment),
+        rrb.TimePanel(state="collapsed", timeline="sensor_time", play_state="paused" if paused else None),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         auto_views=False,
     )
-
-
-def _time_panel(opens_at_moment: bool) -> rrb.TimePanel:
-    if opens_at_moment:
-        return rrb.TimePanel(state="collapsed", timeline=MOMENT, play_state="paused")
-    return rrb.TimePanel(state="collapsed", timeline="sensor_time")
 
 
 def _curve(name: str, curve: str, **options: Any) -> rrb.TimeSeriesView:

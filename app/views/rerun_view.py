@@ -15,7 +15,7 @@ import rerun as rr
 from app.views import rerun_parts as parts
 from app.views import scene
 from app.views.colors import rgb
-from app.views.rerun_blueprint import BEV_AHEAD_M, BEV_ASIDE_M, CAMERA, MOMENT, OVERLAYS, blueprint
+from app.views.rerun_blueprint import BEV_AHEAD_M, BEV_ASIDE_M, CAMERA, OVERLAYS, blueprint
 from pipeline import alignment
 from pipeline.errors import BadInput
 from pipeline.geometry import inverse
@@ -40,9 +40,7 @@ class RerunSink:
     ``title`` names the recording in the viewer; ``params`` says which model projects the points into the picture.
     Timelines: ``frame`` (index) and ``sensor_time`` (the frame's tick), never the time of writing. ReplayError when the
     file cannot be made. Use it in a ``with`` block: a replay is complete once closed. One thread at a time.
-
-    ``moment``: the frame at which the viewer opens, paused. A file cannot say where the cursor stands, so frames from
-    there on lie on a timeline of their own, which the viewer opens at its beginning; the whole is on the others.
+    ``paused``: the viewer opens it standing still at its first frame, instead of playing.
     """
 
     def __init__(
@@ -50,10 +48,9 @@ class RerunSink:
         target: str | FilePath | BinaryIO,
         title: str = APPLICATION,
         params: AlignmentParams = _CALIBRATED,
-        moment: int | None = None,
+        paused: bool = False,
     ) -> None:
         self._params = params
-        self._moment = moment
         self._rec = rr.RecordingStream(APPLICATION, send_properties=False)
         self._rec.send_recording_name(title)
         rr.set_log_time_enabled(False, recording=self._rec)
@@ -64,7 +61,7 @@ class RerunSink:
             self._open_file(FilePath(target))
         else:
             self._stream, self._buffer = target, rr.binary_stream(self._rec)
-        self._rec.send_blueprint(blueprint(opens_at_moment=moment is not None))
+        self._rec.send_blueprint(blueprint(paused))
         self._log_static()
 
     def _open_file(self, path: FilePath) -> None:
@@ -77,8 +74,6 @@ class RerunSink:
         """Add one frame."""
         self._rec.set_time("frame", sequence=frame.index)
         self._rec.set_time("sensor_time", timestamp=np.datetime64(frame.t_ns, "ns"))
-        if self._moment is not None and frame.index >= self._moment:
-            self._rec.set_time(MOMENT, sequence=frame.index)
         self._log_world(result)
         self._log_camera(frame, result)
         self._log_bev(result)

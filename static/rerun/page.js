@@ -25,11 +25,11 @@ function say(text) {
   said.hidden = text === "";
 }
 
-/** Where the drive's recording is: the part, and the moment to open it at, that this page was asked for. */
+/** Where the drive's recording is: the part that this page was asked for, which begins at the wanted moment. */
 function recording() {
   const asked = new URLSearchParams(location.search);
   const part = new URLSearchParams();
-  for (const name of ["first", "last", "moment"]) {
+  for (const name of ["first", "last", "paused"]) {
     const value = asked.get(name);
     if (value !== null && /^\d{1,9}$/.test(value)) part.set(name, value);
   }
