@@ -22,6 +22,7 @@ from pipeline.lidar import warm_up as warm_up_lidar
 from pipeline.params import Params
 from pipeline.path import corridor, lanes
 from pipeline.types import (
+    VEHICLES,
     CameraCalibration,
     Frame,
     Ground,
@@ -77,7 +78,10 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     )
     clock.lap("fusion")
     objects = motion.describe(fused.objects, frame.ego, params.motion)
-    lane_state, lane = lanes.follow(state.lanes, frame.raw_lanes, aligned, seen.ground, frame.ego, dt_s, params.lanes)
+    vehicles = [each.detection.bbox for each in measured or () if each.detection.label in VEHICLES]
+    lane_state, lane = lanes.follow(
+        state.lanes, frame.raw_lanes, aligned, seen.ground, frame.ego, dt_s, params.lanes, vehicles
+    )
     clock.lap("lanes")
     path_state, path = corridor.predict(
         state.path, frame.ego, lane, frame.gnss, frame.route, frame.t_ns, dt_s, params.path

@@ -21,7 +21,12 @@ from pipeline.types import EgoState
 _COMPARE_AT = powers([5.0, 15.0])
 _SIDE_AT_M = 4.0
 """Which side of the car a line is on is judged here: where the front wheels will be."""
-_PLACES = powers([_SIDE_AT_M, 0.0, 10.0, 20.0])
+_OVER_M = 20.0
+_PLACES = powers([_SIDE_AT_M, 0.0, _OVER_M / 2, _OVER_M])
+_CAR_HALF_M = 0.9
+"""A line of a lane that the car is in with all its width is no farther than the widest lane less this."""
+_MOST_UNPARALLEL, _USUALLY_UNPARALLEL = 0.08, 0.03
+"""How much the slopes of a lane's two lines may and usually do differ."""
 _FURTHEST_M = 5.0
 _USUAL_WIDTH_M = 3.5
 _USUALLY_OFF_MIDDLE_M = 0.7
@@ -186,7 +191,7 @@ def _quality_now(line: LineTrack) -> float:
 @dataclass(frozen=True, eq=False)
 class _Candidate:
     """A line that may be one of the ego lane's. beside_m: where it passes the front wheels; ahead_m: mean place over
-    the first 20 m; heading: its slope there."""
+    the first 20 m; heading: its mean slope there."""
 
     line: LineTrack
     quality: float
@@ -197,7 +202,8 @@ class _Candidate:
     @staticmethod
     def of(line: LineTrack) -> _Candidate:
         beside, *ahead = (_PLACES @ line.coefficients).tolist()
-        return _Candidate(line, _quality_now(line), beside, sum(ahead) / len(ahead), float(line.coefficients[1]))
+        heading = (ahead[-1] - ahead[0]) / _OVER_M
+        return _Candidate(line, _quality_now(line), beside, sum(ahead) / len(ahead), heading)
 
 
 def _worth(left: _Candidate | None, right: _Candidate | None, params: LaneParams) -> float:
@@ -206,11 +212,12 @@ def _worth(left: _Candidate | None, right: _Candidate | None, params: LaneParams
     worth = sum(each.quality * each.line.seen / (each.line.seen + 1.0) for each in both)
     places = sum(each.beside_m for each in both)
     if left is None or right is None:
-        return worth - 0.05 * abs(places)
-    width = _width_m(left, right)
-    if not params.min_width_m <= width <= params.max_width_m:
+        return worth if abs(places) < params.max_width_m - _CAR_HALF_M else -1.0
+    width, unparallel = _width_m(left, right), left.heading - right.heading
+    if not params.min_width_m <= width <= params.max_width_m or abs(unparallel) > _MOST_UNPARALLEL:
         return -1.0
     usual = ((width - _USUAL_WIDTH_M) / 0.5) ** 2 + (places / 2.0 / _USUALLY_OFF_MIDDLE_M) ** 2
+    usual += (unparallel / _USUALLY_UNPARALLEL) ** 2
     return worth + 0.5 * math.exp(-0.5 * usual)
 
 

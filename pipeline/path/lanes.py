@@ -12,6 +12,7 @@ with range, and is tracked as a slow state.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +24,7 @@ from pipeline.params import LaneParams
 from pipeline.path import lane_fit, lane_tracking
 from pipeline.path.lane_fit import FittedLine, Shape, Sightings
 from pipeline.path.lane_types import EgoLane, LaneLine, powers
-from pipeline.types import I32, EgoState, RawLanes
+from pipeline.types import I32, Box, EgoState, RawLanes
 
 Seed = tuple[float, Sightings]
 
@@ -84,15 +85,18 @@ def follow(
     ego: EgoState | None,
     dt_s: float | None,
     params: LaneParams,
+    vehicles: Sequence[Box] = (),
 ) -> tuple[LaneState, EgoLane | None]:
     """One frame: measure if a lane detector has looked at it, and track. Null until one has. ground: of this frame's
-    sweep, if any. dt_s: since the frame before; null at the start."""
+    sweep, if any. dt_s: since the frame before; null at the start. vehicles: boxes in the picture that hide it."""
     plane, sweeps = _settled(state, road_plane(ground))
     road = plane if plane is not None else np.array([0.0, 0.0, -params.mount_height_m])
     pitch = _drifted(state.pitch, dt_s, params)
     measured = None
     if raw is not None and aligned is not None:
-        measured = measure(raw, aligned, road, pitch, params, lane_tracking.expected_shape(state.tracks))
+        measured = measure(
+            _beside(raw, vehicles), aligned, road, pitch, params, lane_tracking.expected_shape(state.tracks)
+        )
         pitch = measured.pitch
     tracks = lane_tracking.predict(state.tracks, ego, dt_s, params)
     if measured is not None:
@@ -129,6 +133,16 @@ def measure(
     to_ego = lane_tracking.shifted(-float(eye[0]))
     lines = [_in_ego(found, eye, to_ego, height_m, pitch) for found in _distinct(lines) if _plausible(found, params)]
     return LaneMeasurement(raw.model, tuple(lines), pitch, shape)
+
+
+def _beside(raw: RawLanes, vehicles: Sequence[Box]) -> RawLanes:
+    """Without the points on vehicles: their edges and reflections look like paint."""
+    if not vehicles or not len(raw.points):
+        return raw
+    u, v = raw.points.T[:, :, None]
+    x1, y1, x2, y2 = np.array(vehicles).T
+    free = ~np.any((u > x1) & (u < x2) & (v > y1) & (v < y2), axis=1)
+    return RawLanes(raw.model, raw.points[free], raw.scores[free], raw.line[free])
 
 
 def road_plane(ground: Ground | None) -> F64 | None:
