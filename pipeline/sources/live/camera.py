@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.sources.live.clock import HostClock
+from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.config import CameraConfig
 from pipeline.sources.live.health import StreamStats
 from pipeline.sources.live.inputs import Deliver
@@ -10,7 +10,6 @@ from pipeline.sources.live.mjpeg import NotMjpeg, read_mjpeg
 from pipeline.sources.live.pictures import Shot, is_whole_jpeg
 from pipeline.sources.live.reader import Read, Reader, Stop
 from pipeline.sources.live.video import play_file, read_device, read_stream
-from pipeline.sources.velodyne import SensorClock
 
 _ARRIVAL = "times are when its pictures arrive: it sends none of its own"
 
@@ -22,22 +21,23 @@ class CameraInput:
         self.stats = StreamStats("camera")
         self._clock, self._deliver = clock, deliver
         self._offset_ns = round(config.time_offset_ms * 1e6)
-        self._own = SensorClock()
+        self._own = FollowedClock()
         self.readers: tuple[Reader, ...] = (Reader("camera", self._read(config), self._say),)
 
     def clock_offset_ms(self) -> float | None:
-        return None if self._own.offset_ns is None else self._own.offset_ns / 1e6
+        return self._own.offset_ms
 
     def _read(self, config: CameraConfig) -> Read:
         if config.url is not None:
-            return _HttpOrVideo(config.url, self._jpeg, self._shot)
+            return _HttpOrVideo(config.url, self.receive, self._shot)
         if config.file is not None:
             path = config.file
             return lambda stop: play_file(path, self._shot, stop)
         number = config.device or 0
         return lambda stop: read_device(number, self._shot, stop)
 
-    def _jpeg(self, data: bytes, stamp_us: int | None) -> None:
+    def receive(self, data: bytes, stamp_us: int | None) -> None:
+        """Take a JPEG and its own stamp, µs since 1970, if it has one. One that is cut off is counted as lost."""
         if not is_whole_jpeg(data):
             self.stats.lost += 1
             return
@@ -45,8 +45,7 @@ class CameraInput:
         if stamp_us is None:
             self._give(Shot(encoded=data), now_ns, now_ns, _ARRIVAL)
         else:
-            self._own.observe(stamp_us, now_ns)
-            self._give(Shot(encoded=data), self._own.to_ns(stamp_us), now_ns, "")
+            self._give(Shot(encoded=data), self._own.to_host_ns(stamp_us * 1000, now_ns), now_ns, "")
 
     def _shot(self, shot: Shot) -> None:
         now_ns = self._clock.now_ns()

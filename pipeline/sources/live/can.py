@@ -45,11 +45,12 @@ class CanInput:
                 while not stop:
                     message = bus.recv(POLL_S)
                     if message is not None:
-                        self._message(message)
+                        self.receive(message)
         except (can.CanError, ImportError, OSError, ValueError) as error:
             raise DeviceLost(f"CAN {config.channel}: {str(error).splitlines()[0] if str(error) else error!r}") from None
 
-    def _message(self, message: can.Message) -> None:
+    def receive(self, message: can.Message) -> None:
+        """Take a CAN frame; of another arbitration id than the wanted ones it is nothing to us."""
         known = self._messages.get(message.arbitration_id)
         if known is None or message.is_error_frame or message.is_remote_frame:
             return

@@ -8,7 +8,11 @@ from __future__ import annotations
 
 import time
 
+from pipeline.sources.velodyne import SensorClock
+
 _LONGEST_AGE_NS = 1_000_000_000
+_EARLIEST_NS, _LATEST_NS = 50_000_000, 100_000_000
+_SET_AFTER_NS = 400_000_000
 
 
 class HostClock:
@@ -28,3 +32,32 @@ class HostClock:
     def ahead_ns(self) -> int:
         """How far the system's clock is ahead of this timeline by now: it was set in between."""
         return time.time_ns() - self.now_ns()
+
+
+class FollowedClock:
+    """A sensor's own clock, followed by when its messages arrive, also when it is set anew."""
+
+    def __init__(self) -> None:
+        self._own = SensorClock()
+        self._off_since_ns: int | None = None
+
+    @property
+    def offset_ms(self) -> float | None:
+        """Host time less the sensor's, the shortest delay on the way included; null before the first message."""
+        return None if self._own.offset_ns is None else self._own.offset_ns / 1e6
+
+    def to_host_ns(self, stamp_ns: int, arrived_ns: int) -> int:
+        """When a message that has just arrived was measured. What comes before it was made, or more than 100 ms late,
+        for 0.4 s on end, was not held up: its clock was set."""
+        self._own.observe(stamp_ns // 1000, arrived_ns)
+        t_ns = self._own.to_ns(stamp_ns / 1000)
+        if -_EARLIEST_NS <= arrived_ns - t_ns <= _LATEST_NS:
+            self._off_since_ns = None
+        elif self._off_since_ns is None:
+            self._off_since_ns = arrived_ns
+        elif arrived_ns - self._off_since_ns >= _SET_AFTER_NS:
+            self._off_since_ns = None
+            self._own.restart()
+            self._own.observe(stamp_ns // 1000, arrived_ns)
+            t_ns = self._own.to_ns(stamp_ns / 1000)
+        return t_ns

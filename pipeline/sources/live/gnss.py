@@ -9,14 +9,13 @@ from dataclasses import replace
 
 import serial
 
-from pipeline.sources.live.clock import HostClock
+from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.config import GnssConfig
 from pipeline.sources.live.health import StreamStats
 from pipeline.sources.live.inputs import Deliver
 from pipeline.sources.live.reader import CONNECT_S, POLL_S, DeviceLost, Read, Reader, Stop
 from pipeline.sources.live.udp import read_datagrams
 from pipeline.sources.nmea import NmeaReader
-from pipeline.sources.velodyne import SensorClock
 from pipeline.types import GnssFix
 
 _SILENT_POLLS = 10
@@ -38,25 +37,26 @@ class GnssInput:
         self.stats = StreamStats("gnss")
         self._clock, self._deliver, self._utc_to_host_ns = clock, deliver, utc_to_host_ns
         self._offset_ns = round(config.time_offset_ms * 1e6)
-        self._own = SensorClock()
+        self._own = FollowedClock()
         self._sentences = NmeaReader()
         self._rest = b""
         self.readers: tuple[Reader, ...] = (Reader("gnss", self._read(config), self._say),)
 
     def clock_offset_ms(self) -> float | None:
-        return None if self._own.offset_ns is None else self._own.offset_ns / 1e6
+        return self._own.offset_ms
 
     def _read(self, config: GnssConfig) -> Read:
         if config.udp_port is not None:
             port, interface = config.udp_port, config.interface
-            return lambda stop: read_datagrams(port, interface, None, self._datagram, stop)
+            return lambda stop: read_datagrams(port, interface, None, self.receive, stop)
         if config.tcp is not None:
             host, _, number = config.tcp.rpartition(":")
             return lambda stop: _read_tcp(host, int(number), self._bytes, stop)
         device = config.serial or ""
         return lambda stop: _read_serial(device, config.baud, self._bytes, stop)
 
-    def _datagram(self, data: bytes, wall_ns: int) -> None:
+    def receive(self, data: bytes, wall_ns: int) -> None:
+        """Take a datagram of whole sentences, received at ``wall_ns`` of the system's clock."""
         self._lines(data.splitlines(), self._clock.of_wall_ns(wall_ns))
 
     def _bytes(self, data: bytes) -> None:
@@ -77,11 +77,8 @@ class GnssInput:
         self.stats.note = "no fix yet" if self._sentences.no_fix and self.stats.since_ns(arrived_ns) is None else ""
 
     def _give(self, fix: GnssFix, arrived_ns: int) -> None:
-        self._own.observe(fix.t_ns // 1000, arrived_ns)
-        t_ns = self._utc_to_host_ns(fix.t_ns, arrived_ns)
-        if t_ns is None:
-            t_ns = self._own.to_ns(fix.t_ns / 1000)
-        t_ns += self._offset_ns
+        own_ns, by_lidar_ns = self._own.to_host_ns(fix.t_ns, arrived_ns), self._utc_to_host_ns(fix.t_ns, arrived_ns)
+        t_ns = (own_ns if by_lidar_ns is None else by_lidar_ns) + self._offset_ns
         self.stats.arrived(arrived_ns, t_ns)
         self._deliver(t_ns, replace(fix, t_ns=t_ns), arrived_ns)
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LidarConfig
 from pipeline.sources.live.health import StreamStats
 from pipeline.sources.live.inputs import Deliver, whole_hours_off
-from pipeline.sources.live.reader import Reader
+from pipeline.sources.live.reader import Read, Reader
 from pipeline.sources.live.udp import read_datagrams
 from pipeline.sources.velodyne import BadPacket, Vlp16Decoder, read_position
 from pipeline.types import Sweep
@@ -28,11 +29,12 @@ class LidarInput:
         self._offset_ns = round(config.time_offset_ms * 1e6)
         self._decoder = Vlp16Decoder(config.mount.T_ego_sensor())
         listen = partial(read_datagrams, interface=config.interface, group=config.multicast_group)
-        readers = [Reader("lidar", lambda stop: listen(config.data_port, receive=self._data, stop=stop), self._say)]
+        listeners = [("lidar", partial(listen, config.data_port, receive=self.receive))]
         if config.position_port is not None:
-            port = config.position_port
-            readers.append(Reader("lidar-position", lambda stop: listen(port, receive=self._pps, stop=stop), self._say))
-        self.readers: tuple[Reader, ...] = tuple(readers)
+            listeners.append(("lidar-position", partial(listen, config.position_port, receive=self.receive_position)))
+        self.readers: tuple[Reader, ...] = tuple(
+            Reader(name, _until_stopped(read), self._say) for name, read in listeners
+        )
 
     def clock_offset_ms(self) -> float | None:
         offset_ns = self._decoder.clock.offset_ns
@@ -45,8 +47,9 @@ class LidarInput:
             return None
         return near_ns + round(whole_hours_off(utc_ns + offset_ns - near_ns) * 1e6)
 
-    def _data(self, packet: bytes, wall_ns: int) -> None:
-        """The decoder's own clock maps to the host's timeline; it is not told of GPS, whose time is not the host's."""
+    def receive(self, packet: bytes, wall_ns: int) -> None:
+        """Take a data packet, received at ``wall_ns`` of the system's clock. The decoder's own clock maps to the host's
+        timeline; it is not told of GPS, whose time is not the host's."""
         arrived_ns = self._clock.of_wall_ns(wall_ns)
         sweep = self._decoder.push(packet, arrived_ns)
         counts = self._decoder.counts
@@ -59,7 +62,8 @@ class LidarInput:
             self.stats.arrived(arrived_ns, t_ns)
             self._deliver(t_ns, sweep, arrived_ns)
 
-    def _pps(self, packet: bytes, wall_ns: int) -> None:
+    def receive_position(self, packet: bytes, wall_ns: int) -> None:
+        """Take a position packet."""
         try:
             position = read_position(packet)
         except BadPacket:
@@ -69,3 +73,8 @@ class LidarInput:
 
     def _say(self, text: str) -> None:
         self.stats.note = text
+
+
+def _until_stopped(read: Callable[..., None]) -> Read:
+    """A reading whose ``stop`` is given last."""
+    return lambda stop: read(stop=stop)

@@ -36,12 +36,12 @@ class LiveSensors:
 
     A frame's index counts the ticks, those that nobody took in time too, so a gap in it is a drop."""
 
-    def __init__(self, uri: str, config: LiveConfig) -> None:
+    def __init__(self, uri: str, config: LiveConfig, clock: HostClock | None = None) -> None:
         self.uri, self.title = uri, config.title
         self.rate_hz = 10.0 if config.lidar is not None else 30.0
         self.dropped = 0
         self._index = -1
-        self._clock = HostClock()
+        self._clock = clock or HostClock()
         self._sync: Synchroniser[Shot] = Synchroniser()
         self._came = threading.Condition()
         self._is_open = False

@@ -1,0 +1,93 @@
+"""The live path for real on loopback: a replayer in a thread sends, a live source receives, on ports of the system's
+choice."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
+from types import TracebackType
+from typing import Any
+
+from pipeline.replay.faults import Fault
+from pipeline.replay.messages import Message
+from pipeline.replay.replayer import Sent, replay
+from pipeline.replay.senders import open_senders
+from pipeline.sources.live.config import LiveConfig
+from pipeline.sources.live.source import LiveSensors
+from pipeline.types import Frame
+
+PATIENCE_S = 30.0
+"""Tests wait for conditions; this long only when they fail, on a machine however busy."""
+
+
+def free_port(kind: socket.SocketKind) -> int:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def loopback_config(**more: Any) -> LiveConfig:
+    """LiDAR, MJPEG camera, receiver and own motion from it, all on 127.0.0.1; ``more`` replaces sections."""
+    sections: dict[str, Any] = {
+        "lidar": {
+            "data_port": free_port(socket.SOCK_DGRAM),
+            "position_port": free_port(socket.SOCK_DGRAM),
+            "interface": "127.0.0.1",
+        },
+        "camera": {"url": f"http://127.0.0.1:{free_port(socket.SOCK_STREAM)}/video"},
+        "gnss": {"udp_port": free_port(socket.SOCK_DGRAM), "interface": "127.0.0.1"},
+        "ego": {"source": "gnss"},
+    }
+    return LiveConfig.model_validate({name: value for name, value in {**sections, **more}.items() if value is not None})
+
+
+class Replaying(AbstractContextManager["Replaying"]):
+    """Plays the messages from entering on, until they end or the block does."""
+
+    def __init__(self, config: LiveConfig, messages: Iterable[Message], faults: Sequence[Fault] = ()) -> None:
+        self._senders = open_senders(config)
+        self._stop = threading.Event()
+        self._messages, self._faults = messages, faults
+        self.sent: Sent | None = None
+        self.error: BaseException | None = None
+        self._thread = threading.Thread(target=self._play, name="replaying")
+
+    @property
+    def is_over(self) -> bool:
+        return not self._thread.is_alive()
+
+    def _play(self) -> None:
+        try:
+            self.sent = replay(self._messages, self._senders, faults=self._faults, stopped=self._stop.is_set)
+        except Exception as error:  # shown by the test that waited in vain
+            self.error = error
+
+    def __enter__(self) -> Replaying:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
+    ) -> None:
+        self._stop.set()
+        self._thread.join(PATIENCE_S)
+        for sender in self._senders.values():
+            sender.close()
+        assert self.error is None
+
+
+def frames_until(source: LiveSensors, done: Callable[[Frame], bool], seen: list[Frame] | None = None) -> Frame:
+    """The first frame for which ``done``; all are added to ``seen``."""
+    end_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end_s:
+        frame = source.next(1.0)
+        if frame is None:
+            continue
+        if seen is not None:
+            seen.append(frame)
+        if done(frame):
+            return frame
+    raise AssertionError(f"no such frame within {PATIENCE_S:g} s; sensors: {source.health()}")
