@@ -9,8 +9,13 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from app.bench import clients as clients_bench
+from app.bench import page as page_bench
 from app.bench.suite import run_all
 from app.options import LineOptions
+from pipeline.errors import BadInput
+
+CLIENTS_EACH_S, PAGE_S = 6.0, 12.0
 
 
 @dataclass(frozen=True)
@@ -23,8 +28,22 @@ class Bench:
     line: LineOptions = field(default_factory=LineOptions)
     json: bool = False
     """Print the figures as JSON"""
+    clients: int = 0
+    """Instead: what so many clients of the stream cost the server, e.g. 50"""
+    page: str | None = None
+    """Instead: how fresh the page is in a browser, playing this source, e.g. sim:straight"""
 
     def __call__(self) -> int:
+        if self.clients < 0:
+            raise BadInput(f"--clients {self.clients}: there cannot be fewer than none")
+        if self.clients or self.page is not None:
+            live: dict[str, Any] = {}
+            if self.clients:
+                live["clients"] = clients_bench.figures(self.clients, CLIENTS_EACH_S)
+            if self.page is not None:
+                live["page"] = page_bench.figures(self.page, PAGE_S)
+            print(json.dumps(live, indent=1))
+            return 0
         figures = run_all(self.line.parameters(), self.line.detector)
         if self.json:
             print(json.dumps(figures, indent=1))

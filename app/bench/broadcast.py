@@ -1,0 +1,64 @@
+"""The server side of the clients' bench, in a process of its own so that its processor time can be told apart.
+
+    python -m app.bench.broadcast [--deflate]
+
+sends frames of ``sim:straight`` at 10 Hz through the stream that the product uses, compressed or not. It prints its
+port on a line, and for each line that it reads, its processor time in seconds. It ends with its input.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from dataclasses import replace
+from itertools import count
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.routing import WebSocketRoute
+
+from app.line import DetectionCache, Line, Tick
+from app.server import listen_socket
+from app.snapshot import Snapshot
+from app.stream import Stream
+from pipeline.params import Params
+from pipeline.run import Detectors
+from pipeline.sources import open_source
+
+RATE_HZ = 10.0
+FRAMES = 20
+
+
+def main() -> None:
+    """Until standard input ends."""
+    stream, ticks = Stream(), _ticks()
+    app = Starlette(routes=[WebSocketRoute("/", stream.serve)])
+    config = uvicorn.Config(app, log_level="warning", access_log=False, ws_per_message_deflate="--deflate" in sys.argv)
+    server, bound = uvicorn.Server(config), listen_socket("127.0.0.1", 0)
+    threading.Thread(target=lambda: server.run(sockets=[bound]), daemon=True).start()
+    threading.Thread(target=_publish, args=(stream, ticks), daemon=True).start()
+    while not server.started:
+        time.sleep(0.01)
+    print(bound.getsockname()[1], flush=True)
+    for _ in sys.stdin:
+        print(time.process_time(), flush=True)
+
+
+def _publish(stream: Stream, ticks: list[Tick]) -> None:
+    """One frame each tenth of a second, by the clock: a late one does not put off the next."""
+    start = time.monotonic()
+    for sequence in count(1):
+        shown = Snapshot(Params(), uri="sim:straight", index=sequence, sequence=sequence, made_unix_s=time.time())
+        stream.publish(replace(shown, tick=ticks[sequence % len(ticks)]))
+        time.sleep(max(0.0, start + sequence / RATE_HZ - time.monotonic()))
+
+
+def _ticks() -> list[Tick]:
+    source = open_source("sim:straight")
+    line, params = Line(source, Detectors(None, None), DetectionCache(), "both"), Params()
+    return [line.advance(index, params) for index in range(FRAMES)]
+
+
+if __name__ == "__main__":
+    main()
