@@ -208,7 +208,7 @@ class PathParams(Section):
     use_yaw_rate: bool = _choice(True, "Bend the corridor with the yaw rate where it is known")
     min_speed_mps: float = _slider(2.0, 0.0, 10.0, 0.5, "m/s", "Below this speed yaw rate and course say nothing")
     yaw_rate_sigma_radps: float = _slider(
-        0.0045, 0.0005, 0.05, 0.0005, "rad/s", "Noise of one yaw rate, the driver's small corrections included"
+        0.007, 0.0005, 0.05, 0.0005, "rad/s", "Noise of one yaw rate, the driver's small corrections included"
     )
     lateral_jerk_mps3: float = _slider(
         0.5, 0.05, 3.0, 0.05, "m/s³", "How fast a road's lateral acceleration changes: sets how far an arc is good for"
