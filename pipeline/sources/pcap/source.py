@@ -139,7 +139,7 @@ class _Index:
         """Why there is no sweep in it."""
         counts = self._cutter.counts
         if counts.models:
-            return f"packets of a {counts.models.most_common(1)[0][0]}; only the VLP-16 is read"
+            return f"packets of another Velodyne, {counts.models.most_common(1)[0][0]}; only the VLP-16 is read"
         damage = f"; the file is {self._capture.damage}" if self._capture.damage else ""
         if counts.packets:
             return f"no whole sweep in {counts.packets} packets to port {port}; {counts.about_refused()}{damage}"

@@ -13,7 +13,7 @@ from pipeline.sources import SourceError, open_source
 @pytest.mark.parametrize(
     ("uri", "says"),
     [
-        ("nosuch:thing", "no kind of source named 'nosuch'; there are astyx, kitti, sim"),
+        ("nosuch:thing", "no kind of source named 'nosuch'; there are astyx, kitti, mcap, pcap, pcd, rosbag, sim"),
         ("", "not a source; type one of astyx:"),
         ("/somewhere/else", "/somewhere/else: not a source"),
         ("C:\\drives\\one", "not a source"),
