@@ -94,7 +94,7 @@ export function fitted(canvas) {
     canvas.width = Math.round(width * ratio);
     canvas.height = Math.round(height * ratio);
   }
-  const ctx = context(canvas);
+  const ctx = context(canvas, { willReadFrequently: true }); // drawn by the processor: see surface.js
   ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
   ctx.clearRect(0, 0, width, height);
   return { ctx, width, height };
