@@ -25,6 +25,9 @@ from pipeline.run import Detectors
 from pipeline.sources import open_source
 from pipeline.sources.base import Source
 
+_WIDE = 120
+"""Columns of what is written to a file or another program."""
+
 
 @dataclass(frozen=True)
 class Import:
@@ -154,25 +157,30 @@ def _print_json(values: dict[str, object]) -> None:
 
 
 def _print_info(found: Info) -> None:
-    console = Console()
     about = found.about
     title = f"{about.title} ({about.origin})" if about else f"profile {found.profile!r}"
-    console.print(f"{found.path}: {title}, {_size(found.bytes)}, {found.duration_s:.1f} s", highlight=False)
+    print(f"{found.path}: {title}, {_size(found.bytes)}, {found.duration_s:.1f} s")
     if found.frames is not None:
-        console.print(f"frames by header time: {_rhythm(found.frames)}", highlight=False)
-    table = Table("topic", "schema", "messages", "Hz", "gaps", "longest step", title="by time of recording")
+        print(f"frames by header time: {_rhythm(found.frames)}")
+    Console(width=None if sys.stdout.isatty() else _WIDE).print(_topics_table(found))
+    for line in (*(about.notes if about else ()), *(f"mark: {mark}" for mark in found.marks)):
+        print(line)
+    if found.problem is not None:
+        print(f"{found.problem}; `cipv recover {found.path}` makes a whole file of it")
+    if found.damaged_chunks:
+        print(f"{found.damaged_chunks} of {found.chunks} chunks are damaged")
+
+
+def _topics_table(found: Info) -> Table:
+    table = Table(title="topics, by time of recording", title_justify="left", box=None, pad_edge=False)
+    for name in ("topic", "schema", "count", "Hz", "gaps", "longest"):
+        table.add_column(name, no_wrap=True, justify="left" if name in ("topic", "schema") else "right")
     for topic in found.topics:
         beat = topic.rhythm
         longest = "" if beat.longest_gap_s is None else f"{beat.longest_gap_s:.3f} s"
         rate = "" if beat.rate_hz is None else f"{beat.rate_hz:.2f}"
         table.add_row(topic.topic, topic.schema, str(beat.count), rate, str(beat.gaps or ""), longest)
-    console.print(table)
-    for line in (*(about.notes if about else ()), *(f"mark: {mark}" for mark in found.marks)):
-        console.print(line, highlight=False)
-    if found.problem is not None:
-        console.print(f"{found.path}: {found.problem}; `cipv recover` makes a whole file of it", highlight=False)
-    if found.damaged_chunks:
-        console.print(f"{found.damaged_chunks} of {found.chunks} chunks are damaged", highlight=False)
+    return table
 
 
 def _rhythm(frames: Rhythm) -> str:

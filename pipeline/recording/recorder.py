@@ -12,6 +12,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -129,6 +130,8 @@ class Recorder:
             self._write_all()
             self._segments.close()
         except Exception as error:
+            with suppress(Exception):  # nothing to do for a file that can take no more; any other is closed as usual
+                self._segments.close()
             self._fail(error)
 
     def _write_all(self) -> None:

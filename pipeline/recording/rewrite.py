@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.errors import BadInput
 from pipeline.recording import topics
 from pipeline.recording.container import McapFile, Stored
 from pipeline.recording.messages import Damaged
 from pipeline.recording.output import Output
 from pipeline.recording.session import SessionSource
-from pipeline.recording.tick import tick_from
+from pipeline.recording.tick import tick_from, tick_message
 
 Progress = Callable[[int, int], None]
 """Told (done, total) as the work goes on."""
@@ -63,19 +62,31 @@ def recover(path: Path, out: Path, progress: Progress = lambda done, total: None
 
 def clip(source: SessionSource, first: int, last: int, out: Path) -> int:
     """Frames ``first`` to ``last``, both included, as a session of their own, with results, marks and all else that
-    was recorded meanwhile, and what these frames refer to from before. Returns the number of messages."""
+    was recorded meanwhile. What these frames refer to from before (calibration, parameters) is moved to right before
+    the first, so that the clip begins where it begins. Returns the number of messages."""
     first_ns = source.log_time_ns(first)
     # a frame's companions (marks, notes) come after it, so the clip goes on to the next frame
     last_ns = source.log_time_ns(last + 1) - 1 if last + 1 < len(source) else 2**63 - 1
     earlier = _referred(source, first, last, first_ns)
+    times = sorted({at_ns for at_ns, _ in earlier})
+    to_ns = {at_ns: max(first_ns - len(times) + place, 0) for place, at_ns in enumerate(times)}
 
     def messages() -> Iterator[Stored]:
         for at_ns, topic in earlier:
-            yield from source.file.messages((topic,), at_ns, at_ns)
-        yield from source.file.messages(None, first_ns, last_ns)
+            for stored in source.file.messages((topic,), at_ns, at_ns):
+                yield stored._replace(log_time_ns=to_ns[at_ns])
+        for stored in source.file.messages(None, first_ns, last_ns):
+            yield _with_references_moved(stored, to_ns) if stored.channel.topic == topics.FRAMES else stored
 
     copied, _ = _copy(messages(), source.file, out)
     return copied
+
+
+def _with_references_moved(stored: Stored, to_ns: Mapping[int, int]) -> Stored:
+    try:
+        return stored._replace(data=tick_message(tick_from(stored.data).moved(to_ns)))
+    except Damaged:
+        return stored
 
 
 def _referred(source: SessionSource, first: int, last: int, first_ns: int) -> list[tuple[int, str]]:
@@ -92,8 +103,6 @@ def _referred(source: SessionSource, first: int, last: int, first_ns: int) -> li
 
 def _copy(messages: Iterable[Stored], file: McapFile, out: Path) -> tuple[int, int]:
     """(messages, frames) written to a new file, with the metadata and, for a session, the list of its frames."""
-    if out.exists() and out.samefile(file.path):
-        raise BadInput(f"{out}: a file cannot be written over itself; choose another name")
     output, index, copied = Output(out, profile=file.directory.profile), [], 0
     try:
         for name in file.directory.metadata:

@@ -7,8 +7,9 @@ the picture and the route by their log times, which are unique within a topic.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Annotated
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Annotated, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
@@ -79,6 +80,9 @@ class CameraRecord:
         return CameraCalibration(K, np.array(self.distortion), T_camera_ego, self.width, self.height)
 
 
+R = TypeVar("R", SweepRef | None, PictureRef | None, CameraRecord | None)
+
+
 @dataclass(frozen=True)
 class Tick:
     """One frame of a session, as in ``Frame``. params_at_ns: where ``/params`` has what it was run with, null when a
@@ -109,6 +113,24 @@ class Tick:
             topics.PARAMS: self.params_at_ns,
         }
         return {topic: at_ns for topic, at_ns in named.items() if at_ns is not None}
+
+    def moved(self, to_ns: Mapping[int, int]) -> Tick:
+        """The same tick after messages it refers to were moved, from log time to log time."""
+
+        def at(before_ns: int | None) -> int | None:
+            return None if before_ns is None else to_ns.get(before_ns, before_ns)
+
+        def moved_ref(ref: R) -> R:
+            return ref if ref is None else replace(ref, at_ns=to_ns.get(ref.at_ns, ref.at_ns))
+
+        return replace(
+            self,
+            sweep=moved_ref(self.sweep),
+            picture=moved_ref(self.picture),
+            camera=moved_ref(self.camera),
+            route_at_ns=at(self.route_at_ns),
+            params_at_ns=at(self.params_at_ns),
+        )
 
 
 @dataclass(frozen=True)

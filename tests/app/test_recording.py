@@ -1,0 +1,159 @@
+"""Recording from the page: started, stopped and marked over the API, fed by the running engine."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from app.engine import Engine
+from app.recording import RecordingDesk, new_session
+from app.server import create_app
+from pipeline.params import Params
+from pipeline.recording.segments import Segments
+from pipeline.recording.session import SessionSource
+from pipeline.results import to_json
+from tests.app.recording import CountingDetector, Recording, opener
+from tests.pipeline.recording.frames import same
+
+WAIT_S = 30.0
+
+
+@pytest.fixture
+def engine(tmp_path: Path) -> Iterator[Engine]:
+    first, second = Recording(), Recording("test:other", count=5)
+    desk = RecordingDesk(tmp_path / "sessions")
+    engine = Engine(opener(first, second), lambda _: CountingDetector(), Params(), uri=first.uri, desk=desk)
+    engine.start()
+    engine.wait_for(lambda shown: shown.tick is not None, WAIT_S)
+    yield engine
+    engine.stop()
+
+
+class Client:
+    """Asks the application itself, without a network."""
+
+    def __init__(self, engine: Engine) -> None:
+        self._app = create_app(engine)
+
+    def get(self, path: str) -> httpx.Response:
+        return self._ask("GET", path)
+
+    def post(self, path: str, json: dict[str, Any]) -> httpx.Response:
+        return self._ask("POST", path, json)
+
+    def _ask(self, method: str, path: str, json: dict[str, Any] | None = None) -> httpx.Response:
+        async def ask() -> httpx.Response:
+            transport = httpx.ASGITransport(self._app)
+            async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
+                return await client.request(method, path, json=json)
+
+        return asyncio.run(ask())
+
+
+@pytest.fixture
+def client(engine: Engine) -> Client:
+    return Client(engine)
+
+
+def show(engine: Engine, index: int) -> dict[str, Any]:
+    """Seek, wait, and what is believed of the frame."""
+    engine.control.seek(index)
+    shown = engine.wait_for(lambda shown: shown.tick is not None and shown.index == index, WAIT_S)
+    assert shown.tick is not None
+    return to_json(shown.tick.result)
+
+
+def test_what_is_shown_between_start_and_stop_is_in_the_session(client: Client, engine: Engine) -> None:
+    assert client.get("/api/recording").json() is None
+    started = client.post("/api/recording", json={"on": True}).json()
+    assert (started["frames"], started["dropped"], started["error"]) == (0, 0, None)
+    results = [show(engine, index) for index in (3, 7, 4)]
+    engine.control.change_params({"cluster.z_weight": 0.35})
+    engine.wait_for(lambda shown: shown.params.cluster.z_weight == 0.35, WAIT_S)
+    assert client.post("/api/marks", json={"text": "he braked"}).status_code == 201
+    results.append(show(engine, 9))
+    stopped = client.post("/api/recording", json={"on": False}).json()
+    assert stopped["file"] == started["file"]
+    assert stopped["frames"] == 4
+    session = SessionSource("a", stopped["file"])
+    assert [session.frame(k).name for k in range(len(session))] == ["000003", "000007", "000004", "000009"]
+    assert [session.result(k) for k in range(4)] == results
+    assert [mark.text for mark in session.marks()] == ["he braked"]
+    assert [session.params(k).cluster.z_weight for k in range(4)][2:] == [Params().cluster.z_weight, 0.35]  # type: ignore[union-attr]
+    assert same(session.frame(0).sweep, Recording().frame(3).sweep)
+    assert session.origin == "test:car"
+    show(engine, 2)
+    assert client.get("/api/recording").json() is None
+    assert len(SessionSource("a", stopped["file"])) == 4
+
+
+def test_the_state_tells_how_it_goes(client: Client, engine: Engine) -> None:
+    assert client.get("/api/state").json()["recording"] is None
+    file = client.post("/api/recording", json={"on": True}).json()["file"]
+    assert client.post("/api/recording", json={"on": True}).json()["file"] == file, "it just goes on"
+    show(engine, 3)
+    engine.wait_for(lambda shown: shown.recording is not None, WAIT_S)
+    state = client.get("/api/state").json()["recording"]
+    assert state.keys() == {"file", "frames", "seconds", "bytes", "dropped", "error"}
+    client.post("/api/recording", json={"on": False})
+    engine.wait_for(lambda shown: shown.recording is None, WAIT_S)
+
+
+def test_a_recording_of_nothing_leaves_no_file(client: Client) -> None:
+    file = client.post("/api/recording", json={"on": True}).json()["file"]
+    assert Path(file).exists()
+    assert client.post("/api/recording", json={"on": False}).json() is None
+    assert not Path(file).exists()
+
+
+def test_opening_something_else_ends_it(client: Client, engine: Engine) -> None:
+    file = client.post("/api/recording", json={"on": True}).json()["file"]
+    show(engine, 3)
+    client.post("/api/source", json={"uri": "test:other"})
+    engine.wait_for(lambda shown: shown.uri == "test:other" and shown.tick is not None, WAIT_S)
+    assert client.get("/api/recording").json() is None
+    assert SessionSource("a", file).notes == ("made for a test",), "the file is whole"
+
+
+def test_what_goes_wrong_is_one_sentence(
+    client: Client, engine: Engine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sessions").write_text("in the way")
+    answer = client.post("/api/recording", json={"on": True})
+    assert answer.status_code == 409
+    assert "no recording can be made" in answer.json()["detail"]
+    (tmp_path / "sessions").unlink()
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Segments, "write", fail)
+    client.post("/api/recording", json={"on": True})
+    show(engine, 3)
+    for index in range(4, 30):  # until the recorder's thread has come to it
+        show(engine, index)
+        state = engine.snapshot.recording
+        if state is not None and state.error is not None:
+            break
+    assert "No space left on device" in client.get("/api/recording").json()["error"]
+    show(engine, 2), "the line goes on"
+
+
+def test_nothing_open_is_nothing_to_record(tmp_path: Path) -> None:
+    engine = Engine(opener(), None, Params(), desk=RecordingDesk(tmp_path))
+    assert Client(engine).post("/api/recording", json={"on": True}).status_code == 409
+    assert not list(tmp_path.iterdir())
+
+
+def test_files_are_named_by_title_and_never_twice(tmp_path: Path) -> None:
+    assert new_session(tmp_path / "mine.mcap", "any title") == tmp_path / "mine.mcap"
+    first = new_session(tmp_path / "deep" / "folder", "Zürich → Bern/2026: ../x")
+    assert first.parent == tmp_path / "deep" / "folder"
+    assert first.name.startswith("z-rich-bern-2026-x_")
+    first.touch()
+    assert new_session(first.parent, "Zürich → Bern/2026: ../x") != first
