@@ -31,6 +31,10 @@ _TIGHTEST_CURVATURE_PER_M = 0.02
 _LANE_WIDTH_SIGMA_M = 0.3
 """How far a lane's width may be off where only one of its lines is seen."""
 _USUAL_LANE_M = 3.5
+_CAR_HALF_M, _SOON_M = 0.9, 15.0
+"""Half a car's width, and how far ahead a line is crossed that is being crossed on purpose."""
+_HEADING_AT = 5
+"""The lane's heading against the car is taken over so many metres."""
 _PITCH_SIGMA_RAD, _EYE_HEIGHT_M = 0.003, 1.2
 """How far the road ahead may bend up or down against the car, and how high a camera sits: together, how far off a
 point on the road may be taken to be."""
@@ -96,7 +100,21 @@ def between_lines(lane: EgoLane | None, params: PathParams) -> PathEstimate | No
         (y, sigma), side = (left, -1.0) if left is not None else (right, 1.0)  # type: ignore[misc]
         y, sigma = y + side * half, np.hypot(sigma, 0.5 * _LANE_WIDTH_SIGMA_M)
         half_left = half_right = np.full(len(x), half)
-    return _as_estimate(x, y, sigma, half_left, half_right, reach, params)
+    aside, open_m = _leaving(x, y, half_left, half_right)
+    return _as_estimate(x, y - aside, np.hypot(sigma, open_m), half_left, half_right, reach, params)
+
+
+def _leaving(x: F64, y: F64, left: F64, right: F64) -> tuple[F64, F64]:
+    """How far a car that points out of its lane will be beside the lane's middle, and how open that is, at each x.
+
+    It either stays or goes on as it points, the likelier so the sooner its side crosses the line: mean and spread of
+    the two.
+    """
+    heading = float(y[_HEADING_AT] - y[0]) / _HEADING_AT
+    to_line_m = float(left[0] + y[0] if heading < 0.0 else right[0] - y[0]) - _CAR_HALF_M
+    crossing_m = max(to_line_m, 0.0) / max(abs(heading), 1e-6)
+    goes = float(np.exp(-crossing_m / _SOON_M))
+    return goes * heading * x, np.sqrt(goes * (1.0 - goes)) * abs(heading) * x
 
 
 def _places(line: LaneLine | None, x: F64) -> tuple[F64, F64] | None:
