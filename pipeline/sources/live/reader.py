@@ -53,9 +53,12 @@ class Reader:
     def start(self) -> None:
         self._thread.start()
 
-    def close(self) -> None:
-        """Ask it to end, and wait a little: a driver that hangs must not hang the program."""
+    def end(self) -> None:
+        """Ask it to end."""
         self._stop.set()
+
+    def join(self) -> None:
+        """Wait a little until it has ended: a driver that hangs must not hang the program."""
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
 

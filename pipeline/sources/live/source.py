@@ -79,11 +79,14 @@ class LiveSensors:
 
     def close(self) -> None:
         """Give the devices back. Safe to call twice."""
-        if self._is_open:
-            self._is_open = False
-            for each in self.inputs.values():
-                for reader in each.readers:
-                    reader.close()
+        if not self._is_open:
+            return
+        self._is_open = False
+        readers = [reader for each in self.inputs.values() for reader in each.readers]
+        for reader in readers:
+            reader.end()
+        for reader in readers:
+            reader.join()
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
         """The newest tick not given yet; null when none came in time."""

@@ -71,9 +71,10 @@ def leads(frames: list[Frame], params: Params, detectors: Detectors) -> list[Res
 
 
 def test_a_drive_over_the_network_has_the_lead_of_the_recording(sensors: list[LiveSensors]) -> None:
-    """Same drive, same line: the lead's distance differs by what a VLP-16's 0.2° firings and the JPEG cost."""
+    """Same drive, same line. The lead drives 23 m ahead at nearly our speed, so that a frame more or less is no matter;
+    what remains is a VLP-16's steps of 0.2° and 2 mm, and the JPEG."""
     recording = open_source("sim:straight")
-    recorded = [recording.frame(index) for index in range(16)]
+    recorded = [recording.frame(index) for index in range(86, 100)]
     camera = recorded[0].camera
     assert camera is not None
     detectors, params = Detectors(detector_for(recording)), Params()
@@ -82,15 +83,13 @@ def test_a_drive_over_the_network_has_the_lead_of_the_recording(sensors: list[Li
     source.camera = camera
     live: list[Frame] = []
     with Replaying(config, (message for frame in recorded for message in of_frame(frame))):
-        first = recorded[0].t_ns
-        frames_until(source, lambda frame: is_whole(frame) and frame.t_ns - live[0].t_ns > 1_350 * MS, live)
+        frames_until(source, lambda frame: is_whole(frame) and len(live) > 10, live)
     whole = [frame for frame in live if frame.sweep is not None]
     direct = leads(recorded, params, detectors)[-1].cipv
     over_network = leads(whole, params, detectors)[-1].cipv
     assert direct is not None
     assert over_network is not None
-    assert over_network.distance_m == pytest.approx(direct.distance_m, abs=0.5)
-    assert first == 0
+    assert over_network.distance_m == pytest.approx(direct.distance_m, abs=0.3)
     for frame in whole[2:]:
         assert frame.picture is not None
         assert frame.picture.t_ns is not None
@@ -147,9 +146,7 @@ def test_a_receiver_on_tcp_and_own_motion_by_can(sensors: list[LiveSensors], tmp
             yield Message((k * 100 + 2) * MS, "ego", EgoState(0, 25.0, -0.1))
 
     with Replaying(config, sent()):
-        frame = frames_until(
-            source, lambda f: None not in (f.sweep, f.ego, f.gnss) and f.ego.yaw_rate_radps is not None
-        )
+        frame = frames_until(source, lambda frame: frame.gnss is not None and _yaw_rate(frame) is not None)
     assert frame.ego is not None
     assert frame.ego.speed_mps == pytest.approx(25.0, abs=0.003)
     assert frame.ego.yaw_rate_radps == pytest.approx(-0.1, abs=0.0002)
@@ -180,11 +177,15 @@ def test_garbage_on_the_can_bus_is_counted_and_passes_by(sensors: list[LiveSenso
     assert frame.ego.yaw_rate_radps is None
 
 
+def _yaw_rate(frame: Frame) -> float | None:
+    return frame.ego.yaw_rate_radps if frame.ego is not None else None
+
+
 @pytest.mark.parametrize(
     ("case", "dbc", "complaint"),
     [
         ("not there", None, "No such file"),
-        ("no DBC", "hello", "not a DBC file"),
+        ("no DBC", "hello", "not a DBC"),
         ("no such signal", DBC, "no signal V"),
     ],
 )
