@@ -31,13 +31,13 @@ def read_mjpeg(url: str, receive: Receive, stop: Stop) -> None:
         connection.connect()
         connection.sock.settimeout(SILENCE_S)
         connection.request("GET", (parts.path or "/") + (f"?{parts.query}" if parts.query else ""))
-        response = connection.getresponse()
-        if response.status != http.client.OK:
-            raise DeviceLost(f"{url}: HTTP {response.status} {response.reason}")
-        if not response.headers.get_content_type().startswith("multipart/"):
-            raise NotMjpeg
-        while not stop:
-            receive(*_next_part(response, url))
+        with connection.getresponse() as response:
+            if response.status != http.client.OK:
+                raise DeviceLost(f"{url}: HTTP {response.status} {response.reason}")
+            if not response.headers.get_content_type().startswith("multipart/"):
+                raise NotMjpeg
+            while not stop:
+                receive(*_next_part(response, url))
     except TimeoutError:
         raise DeviceLost(f"{url}: does not answer") from None
     except (http.client.HTTPException, ValueError) as error:
@@ -49,9 +49,9 @@ def read_mjpeg(url: str, receive: Receive, stop: Stop) -> None:
 
 
 def _connection(url: str) -> http.client.HTTPConnection:
-    parts = urlsplit(url)
-    kind = http.client.HTTPSConnection if parts.scheme == "https" else http.client.HTTPConnection
     try:
+        parts = urlsplit(url)
+        kind = http.client.HTTPSConnection if parts.scheme == "https" else http.client.HTTPConnection
         return kind(parts.hostname or "", parts.port, timeout=CONNECT_S)
     except ValueError:
         raise DeviceLost(f"{url}: not an address") from None
