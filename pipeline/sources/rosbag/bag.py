@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
+from weakref import finalize
 
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -33,13 +34,14 @@ class BagError(Exception):
 
 
 class Bag:
-    """Open for reading until the program ends. SourceError when it is none."""
+    """Open for reading as long as somebody holds it. SourceError when it is none."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
             self._reader = AnyReader([path], default_typestore=_store())
             self._reader.open()
+            finalize(self, self._reader.close)
             self.topics = _topics(self._reader)
         except Exception as error:  # damaged files make the library raise whatever they like
             raise SourceError(f"{path.name}: cannot be read as a bag: {_in_words(error)}") from None

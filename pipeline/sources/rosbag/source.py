@@ -84,7 +84,8 @@ class RosbagSource:
                 return stream
         counts = self._index.counts
         if counts is not None and counts.models:
-            raise SourceError(f"{path}: packets of another Velodyne, {counts.models.most_common(1)[0][0]}; only the VLP-16 is read")
+            model = counts.models.most_common(1)[0][0]
+            raise SourceError(f"{path}: packets of another Velodyne, {model}; only the VLP-16 is read")
         why = self._index.damage or (counts.about_refused() if counts is not None else "")
         raise SourceError(f"{path}: not one whole sweep or picture in it{'; ' + why if why else ''}")
 
