@@ -23,8 +23,8 @@ from pipeline.types import VEHICLES, Cipv, EgoState, FusedObject, Gate, Path, Re
 AGREEMENT_SIGMAS = 3.0
 _HALF_WAY = 0.7
 """A running mean has turned half way after 0.7 of its time: what moves sideways is judged where it will be by then."""
-STAYS_AT = 0.5
-"""The lead stays it while its probability to be in the path is above this share of what a new one needs."""
+STAYS_UP_TO = 1.5
+"""The lead stays it while its place against the path is this much more uncertain than a new one's may be."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,8 @@ def choose(
             before = state.odds.get(item.id, now)
             odds[item.id] = before + fresh * (now - before)
         candidate = Candidate(item, where, odds.get(item.id, 0.0), leads, path, params)
+        if where is not None and where.margin_m() >= 0.0 and where.ahead_m > 0.0 and not _in_path(candidate):
+            crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
         checks = [ask(candidate) for ask in _ELIGIBILITY]
         item = evolve(
             item,
@@ -152,6 +154,7 @@ def _next_lead(
         and item.crossing_s is not None
         and item.crossing_s <= params.cut_in_s
         and (item.distance_m or 0.0) < lead_m
+        and not item.carried
         and all(gate.passed for gate in item.gates if gate.name in _BESIDE_PLACE)
     ]
     if cutting_in:
@@ -241,13 +244,12 @@ def _in_path(who: Candidate) -> bool:
     return who.place is not None and who.place.ahead_m > 0.0 and who.odds > 0.0
 
 
-def _is_probable(who: Candidate) -> Check:
-    """So far ahead that the path's own uncertainty is wider than a lane, nobody can be said to be in it."""
-    needed = who.params.min_probability * (STAYS_AT if who.leads else 1.0)
-    probability = who.place.probability() if who.place is not None else 0.0
+def _is_placed(who: Candidate) -> Check:
+    """So far ahead that its place against the path is uncertain by more than a lane, nobody can be said to be in it."""
+    limit = who.params.max_sigma_m * (STAYS_UP_TO if who.leads else 1.0)
+    sigma = who.place.sigma_m if who.place is not None else 0.0
     return Check(
-        Gate("path_probability", probability, needed, probability >= needed),
-        f"in path with {100 * probability:.0f} % only: path not known that far",
+        Gate("path_sigma", sigma, limit, sigma <= limit), f"its place against the path is uncertain by {sigma:.1f} m"
     )
 
 
@@ -269,10 +271,10 @@ _ELIGIBILITY: tuple[Callable[[Candidate], Check], ...] = (
     _is_ahead,
     _is_near_path,
     _is_in_path,
-    _is_probable,
+    _is_placed,
     _is_within_reach,
 )
-_BESIDE_PLACE = frozenset({"vehicle_class", "distance_known", "hits", "seen", "size"})
+_BESIDE_PLACE = frozenset({"vehicle_class", "distance_known", "hits", "size"})
 """The gates that one which is not in the path yet must pass all the same."""
 
 

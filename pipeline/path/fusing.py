@@ -19,6 +19,8 @@ from pipeline.path.estimates import SOURCES, STEP_M, PathEstimate
 COMPARED_M = 60.0
 """Sources are compared up to here: farther ahead none of them is meant to agree closely."""
 LARGEST_BIRGE = 3.0
+EDGE_SIGMA_M = 0.5
+"""Where lane lines are this uncertain, the edges lie half way between them and the usual half width."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,18 +61,18 @@ def fuse(
         for each, much in zip(estimates, disagree.tolist(), strict=True)
         if much > 0.0
     )
-    left, right = _edges(estimates, shares, half_width_m)
+    left, right = _edges(estimates, half_width_m)
     return FusedPath(center, sigma, left, right, shares), notes
 
 
-def _edges(estimates: list[PathEstimate], shares: F64, half_width_m: float) -> tuple[F64, F64]:
-    """Distances from the centre to the edges: the lane's where lane lines carry the path, the usual half width where
-    they do not."""
-    usual = np.full(len(shares), half_width_m)
+def _edges(estimates: list[PathEstimate], half_width_m: float) -> tuple[F64, F64]:
+    """Distances from the centre to the edges: the lane's as far as its lines are known well, whoever carries the
+    centre; the usual half width where they are not."""
+    usual = np.full(len(estimates[0].center), half_width_m)
     for each in estimates:
         if each.left_m is not None and each.right_m is not None:
-            share = shares[:, SOURCES.index(each.source)]
-            return usual + share * (each.left_m - usual), usual + share * (each.right_m - usual)
+            trust = EDGE_SIGMA_M**2 / (EDGE_SIGMA_M**2 + each.sigma_m**2)
+            return usual + trust * (each.left_m - usual), usual + trust * (each.right_m - usual)
     return usual, usual
 
 

@@ -87,15 +87,13 @@ class Place:
         has left it; null when its believed sideways speed (positive to the left) leads nowhere. 0: on the edge."""
         if believed_mps == 0.0 or self.ahead_m <= 0.0:
             return None
-        inside = self.margin_m() >= 0.0
-        if inside:
-            way = self.left_m - self.middle_m if believed_mps > 0.0 else self.right_m + self.middle_m
-        elif self.middle_m > 0.0 and believed_mps < 0.0:
-            way = self.low_m - half_left_m
-        elif self.middle_m < 0.0 and believed_mps > 0.0:
-            way = -half_right_m - self.high_m
-        else:
+        outwards = (self.middle_m > 0.0) == (believed_mps > 0.0)
+        if outwards != (self.margin_m() >= 0.0):  # it comes to the middle of the path, or goes away beside it
             return None
+        if outwards:
+            way = self.margin_m()
+        else:
+            way = self.low_m - half_left_m if self.middle_m > 0.0 else -half_right_m - self.high_m
         return max(way, 0.0) / abs(believed_mps)
 
 
