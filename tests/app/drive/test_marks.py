@@ -1,0 +1,52 @@
+"""Moments that a person marked."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.drive.marks import MOST_MARKS, Mark, MarkRefused, Marks
+
+
+def test_marks_come_by_frame_and_are_the_recordings_own():
+    marks = Marks()
+    marks.add("sim:a", 9, "later")
+    marks.add("sim:a", 3, "  two   words ")
+    marks.add("sim:b", 1)
+    assert marks.of("sim:a") == [Mark(2, 3, "two words"), Mark(1, 9, "later")]
+    assert marks.remove("sim:a", 2)
+    assert not marks.remove("sim:a", 2)
+    assert not marks.remove("sim:b", 9)
+    assert [mark.index for mark in marks.of("sim:a")] == [9]
+
+
+def test_marks_are_still_there_when_the_server_starts_again(tmp_path: Path):
+    folder = tmp_path / "marks"
+    Marks(folder).add("../../etc:x", 4, "Bremslicht ü")
+    assert Marks(folder).of("../../etc:x") == [Mark(1, 4, "Bremslicht ü")]
+    assert [file.parent for file in tmp_path.rglob("*.json")] == [folder], "a URI is no path"
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"marks": 3}', '{"marks": [{"id": "x"}]}', "\x00"])
+def test_a_damaged_file_holds_no_marks(tmp_path: Path, content: str):
+    marks = Marks(tmp_path)
+    marks.add("sim:a", 4)
+    (file,) = tmp_path.iterdir()
+    file.write_text(content)
+    assert Marks(tmp_path).of("sim:a") == []
+
+
+def test_a_folder_that_cannot_be_written_refuses_the_mark(tmp_path: Path):
+    (tmp_path / "file").write_text("in the way")
+    marks = Marks(tmp_path / "file")
+    with pytest.raises(MarkRefused, match="cannot be kept"):
+        marks.add("sim:a", 4)
+    assert marks.of("sim:a") == []
+
+
+def test_a_recording_holds_so_many_marks():
+    marks = Marks()
+    marks._marks["sim:a"] = [Mark(number + 1, 0) for number in range(MOST_MARKS)]
+    with pytest.raises(MarkRefused, match="at most"):
+        marks.add("sim:a", 4)
