@@ -1,0 +1,156 @@
+"""Sessions as long and as large as real ones, made and read under a memory limit; recordings killed again and again.
+
+The files are made for the test and removed with it. Writes build/sessions.json.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.recording.rewrite import recover
+from pipeline.recording.session import SessionSource
+from tests.conftest import ROOT
+
+pytestmark = pytest.mark.soak
+
+LIMIT_BYTES = 1 << 30
+SEEK_LIMIT_MS = 100.0
+KILLS = 12
+
+_WRITE = """
+import resource, sys
+from dataclasses import replace
+from pathlib import Path
+import cv2, numpy as np
+from pipeline.recording.writer import SessionWriter
+from pipeline.types import Picture
+from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, sweep
+
+path, frames, points, height, flush_each, limit = sys.argv[1], *map(int, sys.argv[2:])
+resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+noise = np.random.default_rng(0).integers(0, 255, (height, height * 2, 3)).astype(np.uint8)
+jpeg = cv2.imencode(".jpg", noise)[1].tobytes()
+cloud = sweep(0, points=points)
+writer = SessionWriter(Path(path), ABOUT, compression="lz4")
+for index in range(frames):
+    t_ns = PERIOD_NS * (1 + index)
+    picture = Picture(t_ns, noise, jpeg)
+    writer.write(replace(full(index), sweep=replace(cloud, t_ns=t_ns), picture=picture), {"frame": index})
+    if flush_each:
+        writer.flush()
+writer.close()
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+"""
+
+_READ = """
+import json, resource, sys, time
+from pathlib import Path
+import numpy as np
+from pipeline.recording.info import info
+from pipeline.recording.session import SessionSource
+
+path, limit = sys.argv[1], int(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))
+began = time.perf_counter()
+session = SessionSource("a", path)
+opened_s = time.perf_counter() - began
+seeks_ms = []
+for index in np.random.default_rng(1).integers(0, len(session), 300).tolist():
+    began = time.perf_counter()
+    frame = session.frame(index)
+    seeks_ms.append((time.perf_counter() - began) * 1e3)
+    assert frame.notes == ("gnss silent for 1.0 s (antenna?)",), frame.notes
+    assert frame.t_ns == 100_000_000 * (1 + index)
+    assert frame.sweep.t_ns == frame.picture.t_ns == frame.t_ns
+found = info(Path(path))
+print(json.dumps({
+    "GB": round(found.bytes / 1e9, 2), "hours": round(found.duration_s / 3600, 3), "frames": len(session),
+    "chunks": found.chunks, "open_s": round(opened_s, 3), "seek_median_ms": round(float(np.median(seeks_ms)), 2),
+    "seek_p99_ms": round(float(np.percentile(seeks_ms, 99)), 2), "seek_max_ms": round(max(seeks_ms), 2),
+    "read_peak_MB": round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024, 1),
+}))
+"""
+
+
+def run(script: str, *arguments: object) -> str:
+    command = [sys.executable, "-c", script, *map(str, arguments)]
+    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+
+
+def report(name: str, figures: dict[str, object]) -> None:
+    file = ROOT / "build" / "sessions.json"
+    file.parent.mkdir(exist_ok=True)
+    every = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+    file.write_text(json.dumps({**every, name: figures}, indent=1) + "\n", encoding="utf-8")
+    print(name, figures)
+
+
+SIZES = {
+    # an hour at 10 Hz, a chunk to each frame as in an hour of full sweeps and pictures
+    "one hour": (36_000, 600, 60, 1),
+    # full sweeps and pictures of 0.4 MB each
+    "10 GB": (10_800, 28_000, 500, 0),
+}
+
+
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize(("frames", "points", "height", "flush_each"), SIZES.values(), ids=SIZES)
+def test_any_frame_of_a_large_session_is_near_and_memory_is_bounded(
+    frames: int, points: int, height: int, flush_each: int, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    path = tmp_path / "large.mcap"
+    written = int(run(_WRITE, path, frames, points, height, flush_each, LIMIT_BYTES))
+    figures = json.loads(run(_READ, path, LIMIT_BYTES))
+    path.unlink()
+    report(request.node.callspec.id, {**figures, "write_peak_MB": round(written / 2**20, 1)})
+    assert figures["frames"] == frames
+    assert figures["seek_p99_ms"] < SEEK_LIMIT_MS
+
+
+_RECORD_FOR_EVER = """
+import sys
+from dataclasses import replace
+from pathlib import Path
+from pipeline.recording.recorder import Recorder
+from tests.pipeline.recording.frames import ABOUT, full, sweep
+recorder = Recorder(Path(sys.argv[1]), ABOUT)
+points = sweep(0, points=3000)
+for index in range(10**9):
+    recorder.put(replace(full(index), sweep=points))
+    if index % 20 == 0:
+        print(recorder.state.bytes, flush=True)
+"""
+
+
+@pytest.mark.timeout(600)
+def test_killed_again_and_again(tmp_path: Path) -> None:
+    """After any number of bytes, up to 6 MB: every frame that was in a complete chunk is there."""
+    random, saved = np.random.default_rng(2), []
+    for kill in range(KILLS):
+        path, out = tmp_path / f"{kill}.mcap", tmp_path / f"{kill}_recovered.mcap"
+        command = [sys.executable, "-c", _RECORD_FOR_EVER, str(path)]
+        with subprocess.Popen(
+            command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        ) as process:
+            assert process.stdout is not None
+            enough, written = int(random.integers(600_000, 6_000_000)), 0
+            while written < enough:
+                written = int(process.stdout.readline())
+            os.kill(process.pid, signal.SIGKILL)
+        found = recover(path, out)
+        assert found.is_cut
+        assert found.lost_chunks == 0
+        assert found.sound_bytes >= written
+        session = SessionSource("a", str(out))
+        for index in range(len(session)):
+            assert session.frame(index).sweep is not None
+        saved.append(len(session))
+    report("kills", {"kills": KILLS, "frames_saved": saved})
