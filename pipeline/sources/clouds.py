@@ -47,17 +47,17 @@ def cloud_of(raw: npt.NDArray[np.void], t_ns: int, notes: list[str]) -> Cloud:
     of a VLP-16 by elevation; rings counted from above are turned round. A time is taken as seconds or nanoseconds after
     the stamp, or as absolute, by its size. SourceError when no point is left.
     """
-    names = set(raw.dtype.names or ())
+    names = {name for name in raw.dtype.names or () if raw.dtype[name].shape == ()}
     if not {"x", "y", "z"} <= names:
         raise SourceError("a cloud without x, y and z")
-    with np.errstate(invalid="ignore", over="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):  # signalling NaNs and huge numbers of a damaged file
         xyz = np.column_stack([raw[axis].astype(np.float32) for axis in "xyz"])
         good = np.all(np.abs(xyz) < _FARTHEST_M, axis=1) & np.any(xyz != 0.0, axis=1)
-    if not good.any():
-        raise SourceError("no LiDAR points in it")
-    xyz, kept = np.ascontiguousarray(xyz[good]), raw[good]
-    ring, channels = _rings(kept, xyz, names, notes)
-    return Cloud(xyz, _intensity(kept, names), ring, channels, _times(kept, t_ns, names))
+        if not good.any():
+            raise SourceError("no LiDAR points in it")
+        xyz, kept = np.ascontiguousarray(xyz[good]), raw[good]
+        ring, channels = _rings(kept, xyz, names, notes)
+        return Cloud(xyz, _intensity(kept, names), ring, channels, _times(kept, t_ns, names))
 
 
 def _intensity(kept: npt.NDArray[np.void], names: set[str]) -> F32:

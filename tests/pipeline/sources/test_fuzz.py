@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -10,22 +11,45 @@ from hypothesis import strategies as st
 
 from pipeline.sources import SourceError, open_source
 
+from .bags import Kind, write_bag
+from .captures import write_capture
+from .clouds_on_disk import STAMPS_NS, write_clouds
 from .conftest import write_astyx, write_kitti, write_kitti_raw
 
+
+def small_bag(folder: Path, kind: Kind = "db3") -> Path:
+    """A folder that is a bag, or, of ROS 1, has one in it."""
+    if kind == "ros1":
+        folder.mkdir()
+        write_bag(folder / "drive.bag", kind, sweeps=2)
+        return folder
+    return write_bag(folder, kind, sweeps=2)
+
+
 FILES = {
-    "astyx lidar": (write_astyx, "astyx", "lidar_vlp16/000002.txt"),
-    "astyx picture": (write_astyx, "astyx", "camera_front/000002.jpg"),
-    "astyx first calibration": (write_astyx, "astyx", "calibration/000001.json"),
-    "astyx calibration": (write_astyx, "astyx", "calibration/000002.json"),
-    "astyx labels": (write_astyx, "astyx", "groundtruth_obj3d/000002.json"),
-    "kitti velodyne": (write_kitti, "kitti", "velodyne/0000000001.bin"),
-    "kitti picture": (write_kitti, "kitti", "image_02/0000000001.png"),
-    "kitti calibration": (write_kitti, "kitti", "calib/0000000001.txt"),
-    "kitti labels": (write_kitti, "kitti", "label_2/0000000001.txt"),
-    "kitti oxts": (write_kitti_raw, "kitti", "oxts/data/0000000001.txt"),
-    "kitti stamps": (write_kitti_raw, "kitti", "velodyne_points/timestamps.txt"),
-    "kitti raw cameras": (write_kitti_raw, "kitti", "../calib_cam_to_cam.txt"),
-    "kitti raw velodyne": (write_kitti_raw, "kitti", "../calib_velo_to_cam.txt"),
+    "astyx lidar": (write_astyx, "astyx:{folder}", "lidar_vlp16/000002.txt"),
+    "astyx picture": (write_astyx, "astyx:{folder}", "camera_front/000002.jpg"),
+    "astyx first calibration": (write_astyx, "astyx:{folder}", "calibration/000001.json"),
+    "astyx calibration": (write_astyx, "astyx:{folder}", "calibration/000002.json"),
+    "astyx labels": (write_astyx, "astyx:{folder}", "groundtruth_obj3d/000002.json"),
+    "kitti velodyne": (write_kitti, "kitti:{folder}", "velodyne/0000000001.bin"),
+    "kitti picture": (write_kitti, "kitti:{folder}", "image_02/0000000001.png"),
+    "kitti calibration": (write_kitti, "kitti:{folder}", "calib/0000000001.txt"),
+    "kitti labels": (write_kitti, "kitti:{folder}", "label_2/0000000001.txt"),
+    "kitti oxts": (write_kitti_raw, "kitti:{folder}", "oxts/data/0000000001.txt"),
+    "kitti stamps": (write_kitti_raw, "kitti:{folder}", "velodyne_points/timestamps.txt"),
+    "kitti raw cameras": (write_kitti_raw, "kitti:{folder}", "../calib_cam_to_cam.txt"),
+    "kitti raw velodyne": (write_kitti_raw, "kitti:{folder}", "../calib_velo_to_cam.txt"),
+    "pcap": (write_capture, "pcap:{folder}/drive.pcap", "drive.pcap"),
+    "video": (write_capture, "pcap:{folder}/drive.pcap", "drive.avi"),
+    "sentences": (write_capture, "pcap:{folder}/drive.pcap", "drive.nmea"),
+    "rig": (write_capture, "pcap:{folder}/drive.pcap", "drive.yaml"),
+    "pcd": (write_clouds, "pcd:{folder}", f"{STAMPS_NS[0]}.pcd"),
+    "pcd, compressed": (partial(write_clouds, encoding="binary_compressed"), "pcd:{folder}", f"{STAMPS_NS[1]}.pcd"),
+    "rosbag": (small_bag, "rosbag:{folder}", "recording.db3"),
+    "rosbag mcap": (partial(small_bag, kind="mcap"), "rosbag:{folder}", "recording.mcap"),
+    "rosbag metadata": (small_bag, "rosbag:{folder}", "metadata.yaml"),
+    "rosbag 1": (partial(small_bag, kind="ros1"), "rosbag:{folder}/drive.bag", "drive.bag"),
 }
 
 EDITS = st.lists(
@@ -60,7 +84,7 @@ def damaged(data: bytes, edits: list[tuple[float, str, bytes]]) -> bytes:
 
 @pytest.mark.parametrize("what", FILES)
 def test_damage(what: str, tmp_path: Path) -> None:
-    write, scheme, name = FILES[what]
+    write, uri, name = FILES[what]
     folder = write(tmp_path / "recording")
     path = folder / name
     whole = path.read_bytes()
@@ -70,7 +94,7 @@ def test_damage(what: str, tmp_path: Path) -> None:
     def survives(edits: list[tuple[float, str, bytes]]) -> None:
         path.write_bytes(damaged(whole, edits))
         try:
-            source = open_source(f"{scheme}:{folder}")
+            source = open_source(uri.format(folder=folder))
         except SourceError:
             return
         for index in range(len(source)):
