@@ -1,19 +1,20 @@
-"""Recordings that the page can offer without a path being typed: the simulator's scenarios and known data folders."""
+"""Recordings that the page can offer without a path being typed: the simulator's scenarios, sessions and known data
+folders."""
 
 from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
 
+from app.recording import SESSIONS
 from pipeline.data import data_dir
 
-_PROJECT = Path(__file__).resolve().parent.parent
 _FOLDERS = (("lidar_vlp16", "astyx"), ("velodyne", "kitti"), ("velodyne_points", "kitti"))
 
 
 def catalog() -> list[tuple[str, str]]:
-    """(uri, title) pairs: scenarios, then the recordings right below ``CIPV_DATA`` and ``sessions``."""
-    return [*scenarios(), *recordings()]
+    """(uri, title) pairs: scenarios, then sessions, then the recordings right below ``CIPV_DATA`` and ``sessions``."""
+    return [*scenarios(), *sessions(), *recordings()]
 
 
 def scenarios() -> list[tuple[str, str]]:
@@ -23,10 +24,18 @@ def scenarios() -> list[tuple[str, str]]:
     return [(f"sim:{name}", f"Simulation · {name.replace('_', ' ')}") for name in names]
 
 
+def sessions(folder: Path = SESSIONS) -> list[tuple[str, str]]:
+    """(uri, title) of the sessions of this machine, the newest first."""
+    files = (
+        sorted(folder.glob("*.mcap"), key=lambda file: (-file.stat().st_mtime, file.name)) if folder.is_dir() else ()
+    )
+    return [(str(file), f"session · {file.stem}") for file in files]
+
+
 def recordings() -> list[tuple[str, str]]:
     """(uri, title) of the folders right below the data folder and ``sessions`` that look like a known recording."""
     found = []
-    for root in (data_dir(), _PROJECT / "sessions"):
+    for root in (data_dir(), SESSIONS):
         for folder in sorted(root.iterdir()) if root.is_dir() else ():
             scheme = next((scheme for mark, scheme in _FOLDERS if (folder / mark).is_dir()), None)
             if scheme is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import httpx
 import pytest
 
+from app.catalog import sessions
 from app.engine import Engine
 from app.recording import RecordingDesk, new_session
 from app.server import create_app
@@ -148,6 +150,15 @@ def test_nothing_open_is_nothing_to_record(tmp_path: Path) -> None:
     engine = Engine(opener(), None, Params(), desk=RecordingDesk(tmp_path))
     assert Client(engine).post("/api/recording", json={"on": True}).status_code == 409
     assert not list(tmp_path.iterdir())
+
+
+def test_sessions_are_offered_the_newest_first(tmp_path: Path) -> None:
+    for age, name in enumerate(("new", "old")):
+        (tmp_path / f"{name}.mcap").touch()
+        os.utime(tmp_path / f"{name}.mcap", (1e9 - age, 1e9 - age))
+    expected = [(str(tmp_path / f"{name}.mcap"), f"session · {name}") for name in ("new", "old")]
+    assert sessions(tmp_path) == expected
+    assert sessions(tmp_path / "nowhere") == []
 
 
 def test_files_are_named_by_title_and_never_twice(tmp_path: Path) -> None:
