@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,6 +34,8 @@ FLAGS = [
     "--disable-sync",
 ]
 WAIT_MS = 60_000
+START = 60
+"""A frame of the scenario with traffic around."""
 expect.set_options(timeout=WAIT_MS)
 
 
@@ -93,7 +96,7 @@ class Site:
         self._thread.join()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def site() -> Iterator[Site]:
     """The dashboard on ``sim:straight``, paused on its first frame."""
     detectors: list[CountedDetector] = []
@@ -102,7 +105,7 @@ def site() -> Iterator[Site]:
         detectors.append(CountedDetector(source))
         return detectors[-1]
 
-    engine = Engine(open_source, open_counted, Params(), uri="sim:straight")
+    engine = Engine(open_source, open_counted, Params(), uri="sim:straight", whole_drives=True)
     engine.start()
     engine.wait_for(lambda s: s.tick is not None, 120)
     running = Site(engine, 0, detectors)
@@ -124,6 +127,17 @@ def browser() -> Iterator[Browser]:
         browser.close()
 
 
+@pytest.fixture
+def paused_in_traffic(site: Site) -> None:
+    """The shown frame is ``START``, with default parameters, and nothing plays."""
+    control, before = site.engine.control, site.engine.snapshot.sequence
+    control.set_params(Params(), "default")
+    control.change(playing=False, speed=1.0, loop=True, target=START, steps=0)
+    site.engine.wait_for(
+        lambda s: s.sequence > before and s.params == Params() and s.index == START and not s.playing, WAIT_MS / 1e3
+    )
+
+
 OpenPage = Callable[..., Page]
 
 
@@ -133,13 +147,18 @@ def open_page(browser: Browser, site: Site) -> Iterator[OpenPage]:
     complaints: list[str] = []
     pages: list[Page] = []
 
-    def begin(width: int = 1440, height: int = 900, address: str | None = None) -> Page:
-        page = browser.new_page(viewport={"width": width, "height": height}, color_scheme="dark")
+    def begin(width: int = 1440, height: int = 900, address: str | None = None, **context: Any) -> Page:
+        page = browser.new_page(**{"viewport": {"width": width, "height": height}, "color_scheme": "dark"} | context)
         pages.append(page)
         page.set_default_timeout(WAIT_MS)
         page.on("console", lambda m: complaints.append(m.text) if m.type in ("error", "warning") else None)
         page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on("request", lambda r: complaints.append(r.url) if _leaves(r.url, address or site.address) else None)
+        page.on(
+            "request",
+            lambda r: (
+                complaints.append(r.url) if _leaves(r.url, (address or site.address).partition("/#")[0]) else None
+            ),
+        )
         page.goto(address or site.address)
         expect(page.locator("#transport .name")).not_to_be_empty()
         page.wait_for_selector("#objects tbody tr", state="attached")

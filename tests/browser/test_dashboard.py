@@ -2,64 +2,18 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import expect
 
 from app.engine import Engine
 from pipeline.params import Params
 from tests.app.recording import CountingDetector, Recording, opener
-from tests.browser.conftest import OpenPage, Site
+from tests.browser.conftest import START, WAIT_MS, OpenPage, Site
+from tests.browser.looks import colours, frame_name, go_to, pixels, repainted, wait_for_frame
 
-WAIT_S = 60
-START = 60
-"""A frame of the scenario with traffic around."""
+WAIT_S = WAIT_MS / 1e3
 
-
-@pytest.fixture(autouse=True)
-def _paused_in_traffic(site: Site) -> None:
-    control, before = site.engine.control, site.engine.snapshot.sequence
-    revision = control.peek().params_revision + 1
-    wishes = {"playing": False, "speed": 1.0, "loop": True, "target": START, "steps": 0}
-    control.change(params=Params(), preset="default", params_revision=revision, **wishes)
-    site.engine.wait_for(lambda s: s.sequence > before and s.params_revision == revision and s.index == START, WAIT_S)
-
-
-def frame_name(page: Page) -> str:
-    return page.inner_text("#transport .name")
-
-
-def wait_for_frame(page: Page, index: int) -> None:
-    expect(page.locator("#transport .where .dim")).to_have_text(f"{index + 1}/200", timeout=WAIT_S * 1000)
-
-
-def pixels(page: Page, canvas: str) -> str:
-    """What is painted, once nothing more is to be painted."""
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-    return page.evaluate(f"document.querySelector('{canvas}').toDataURL()")
-
-
-def repainted(page: Page, canvas: str, old: str, *, like: bool = False) -> bool:
-    """True as soon as a canvas shows something else than ``old``, or with ``like`` the same. One look a painted frame;
-    the page's policy forbids playwright's own way of waiting, which evaluates text."""
-    deadline = time.monotonic() + WAIT_S
-    while time.monotonic() < deadline:
-        if (pixels(page, canvas) == old) == like:
-            return True
-    return False
-
-
-def colours(page: Page, canvas: str) -> int:
-    """How many different colours a canvas shows: a blank one has one."""
-    return page.evaluate(
-        """(selector) => {
-          const canvas = document.querySelector(selector);
-          const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-          return new Set(new Uint32Array(data.buffer)).size;
-        }""",
-        canvas,
-    )
+pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
 
 def test_it_opens_and_shows_the_frame_everywhere(open_page: OpenPage, site: Site):
@@ -103,7 +57,7 @@ def test_it_steps_and_seeks(open_page: OpenPage):
     wait_for_frame(page, START + 1)
     page.get_by_role("button", name="Step back").click()
     wait_for_frame(page, START)
-    page.get_by_role("slider", name="Frame").fill("90")
+    go_to(page, 90)
     wait_for_frame(page, 90)
     page.locator("h1").click()
     page.keyboard.press("Home")
@@ -221,7 +175,7 @@ def test_layers_can_be_switched_off_and_stay_off(open_page: OpenPage):
 
 def test_whoever_joins_late_sees_the_same(open_page: OpenPage):
     first = open_page()
-    first.get_by_role("slider", name="Frame").fill("75")
+    go_to(first, 75)
     wait_for_frame(first, 75)
     second = open_page()
     wait_for_frame(second, 75)

@@ -107,6 +107,8 @@ function hovered(index) {
 /** How far the computing has come, and how much the two runs differ. */
 function describe() {
   const state = get("state")?.drive, drive = get("drive");
+  const isWhole = drive?.now && drive.now.run === state?.run && drive.now.done === drive.count && drive.base?.run === (state.base === state.run ? undefined : state.base);
+  $(".timeline-pane").setAttribute("aria-busy", String(!isWhole));
   const words = [];
   if (state?.running) words.push(`${state.phase === "detect" ? "detecting" : "computing"} ${Math.round((100 * state.done) / Math.max(1, state.total))} %`);
   if (state?.note) words.push(state.note);

@@ -1,0 +1,68 @@
+"""Looking at a page, and putting a hand on it."""
+
+from __future__ import annotations
+
+import time
+
+from playwright.sync_api import FloatRect, Locator, Page, expect
+
+from tests.browser.conftest import WAIT_MS
+
+COUNT = 200
+"""Frames of the scenario that the page shows."""
+PLOT_LEFT_PX, PLOT_RIGHT_PX = 122, 8
+"""Where the timeline's plot lies on its canvas."""
+
+
+def frame_name(page: Page) -> str:
+    return page.inner_text("#transport .name")
+
+
+def wait_for_frame(page: Page, index: int) -> None:
+    expect(page.locator("#transport .where .dim")).to_have_text(f"{index + 1}/{COUNT}", timeout=WAIT_MS)
+
+
+def box_of(locator: Locator) -> FloatRect:
+    box = locator.bounding_box()
+    assert box is not None
+    return box
+
+
+def on_timeline(page: Page, index: int) -> float:
+    """The pixel column of a frame's middle, on the timeline that shows everything."""
+    width = box_of(page.locator("#timeline-front"))["width"] - PLOT_LEFT_PX - PLOT_RIGHT_PX
+    return PLOT_LEFT_PX + width * (index + 0.5) / COUNT
+
+
+def go_to(page: Page, index: int) -> None:
+    """Press the timeline there, below its ribbon."""
+    height = box_of(page.locator("#timeline-front"))["height"]
+    page.locator("#timeline-front").click(position={"x": on_timeline(page, index), "y": height - 16})
+
+
+def pixels(page: Page, canvas: str) -> str:
+    """What is painted, once nothing more is to be painted."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    return page.evaluate(f"document.querySelector('{canvas}').toDataURL()")
+
+
+def repainted(page: Page, canvas: str, old: str, *, like: bool = False) -> bool:
+    """True as soon as a canvas shows something else than ``old``, or with ``like`` the same. One look a painted frame;
+    the page's policy forbids playwright's own way of waiting, which evaluates text."""
+    deadline = time.monotonic() + WAIT_MS / 1e3
+    while time.monotonic() < deadline:
+        if (pixels(page, canvas) == old) == like:
+            return True
+    return False
+
+
+def colours(page: Page, canvas: str) -> int:
+    """How many different colours a canvas shows: a blank one has one."""
+    return page.evaluate(
+        """(selector) => {
+          const canvas = document.querySelector(selector);
+          const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+          return new Set(new Uint32Array(data.buffer)).size;
+        }""",
+        canvas,
+    )
