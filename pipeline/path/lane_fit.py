@@ -30,6 +30,9 @@ _MAX_LINES = 6
 _VOTED_POINTS = 220
 _WIDE_GATE_M, _GATE_PER_M = 0.35, 0.012
 _PAINT_SIGMA_M = 0.05
+_AROUND = 2.5
+_BY_CHANCE = 1.0 / _AROUND
+"""Points within this many gates are looked at; of clutter spread evenly over them such a share lies within the gate."""
 _SHARED_ERROR = 4.0
 """Points of neighbouring rows err together: this many count as one."""
 _COVER_FROM_M, _COVER_STEP_M, _COVER_BINS = 4.0, 2.0, 12
@@ -180,7 +183,7 @@ def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma, rounds):
             expected = mean[0] + x[i] * (mean[1] + x[i] * (mean[2] + x[i] * mean[3]))
             residual = y[i] - expected
             gate = _WIDE_GATE_M + _GATE_PER_M * x[i]
-            if abs(residual) > 2.5 * gate:
+            if abs(residual) > _AROUND * gate:
                 continue
             near += weight[i]
             if abs(residual) > gate:
@@ -214,5 +217,6 @@ def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma, rounds):
             mean[k] = solved[k] * scale[k]
             for b in range(4):
                 cov[k, b] = inverse_info[k, b] * scale[k] * scale[b]
-    quality = min(1.0, covered.sum() / _ENOUGH_COVER) * inside / near * min(1.0, 1.5 * score / inside)
+    clear = max(0.0, inside / near - _BY_CHANCE) / (1.0 - _BY_CHANCE)
+    quality = min(1.0, covered.sum() / _ENOUGH_COVER) * clear * min(1.0, 1.5 * score / inside)
     return True, mean, cov, x_min, x_max, quality
