@@ -191,9 +191,10 @@ class Engine:
         came = live.look(wish.params, _LIVE_WAIT_S)
         if came is not None:
             self.desk.take(came)
-        held = self.snapshot.tick
-        if came is not None and wish.playing:
-            tick: Tick | None = came
+        held, newest = self.snapshot.tick, live.tick
+        is_behind = newest is not None and (held is None or newest.frame is not held.frame)
+        if wish.playing and is_behind:
+            tick = newest
         elif held is not None and wish.params is not self.snapshot.params:
             tick = rerun(held, wish.params)
         else:
