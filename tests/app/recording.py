@@ -71,7 +71,7 @@ class Recording:
             sweep=Sweep(t_ns, points, ring, 16),
             picture=_picture(t_ns, distance_m),
             camera=_camera(),
-            ego=EgoState(t_ns, 20.0),
+            ego=EgoState(t_ns, 20.0, 0.0),
         )
 
 

@@ -1,0 +1,184 @@
+"""A part of a drive as a file of each kind: it holds the frames that the page shows."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import get_args
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from app.clips.exports import MOST_FRAMES, WRITERS, Clip, Kind, submit
+from app.clips.jobs import Jobs
+from app.clips.overlay import WIDTH_PX, draw_frame
+from app.clips.page import worth_a_picture
+from app.drive.events import Event
+from app.drive.recording import Recipe
+from app.drive.recording import Recording as DriveRecording
+from app.drive.turn import Turn
+from app.line import DetectionCache
+from app.playback import timeline_s
+from app.views.colors import rgb
+from pipeline.errors import BadInput
+from pipeline.params import Params
+from pipeline.results import to_json
+from pipeline.run import Detectors, detector_for, run
+from pipeline.sources import open_source
+from pipeline.step import State, step
+from pipeline.types import Frame, Picture, Result
+from tests.app.recording import HEIGHT, WIDTH, CountingDetector, Recording
+
+FIRST, LAST = 12, 19
+Results = list[tuple[Frame, Result]]
+
+
+@pytest.fixture(scope="module")
+def results() -> Results:
+    return list(run(Recording(), Params(), Detectors(CountingDetector())))
+
+
+@pytest.fixture
+def clip() -> Clip:
+    """Eight frames out of the middle; no run of the whole drive has been made yet."""
+    source = Recording()
+    times = timeline_s([source.t_ns(i) for i in range(len(source))], source.rate_hz)
+    recipe = Recipe(source.uri, len(source), times, Detectors(CountingDetector()), "both")
+    recording = DriveRecording(recipe, lambda _: Recording(), DetectionCache(), 1)
+    return Clip(recording, Params(), FIRST, LAST, Turn(), source.title, source.rate_hz)
+
+
+@pytest.fixture
+def written(clip: Clip, tmp_path: Path) -> Callable[[Kind], Path]:
+    """Writes the clip; progress ends at the whole."""
+
+    def write(kind: Kind) -> Path:
+        told: list[tuple[int, int]] = []
+        path = tmp_path / f"clip.{kind}"
+        WRITERS[kind](clip, path, lambda done, total: told.append((done, total)))
+        assert told[-1] == (LAST + 1 - FIRST, LAST + 1 - FIRST)
+        assert [done for done, _ in told] == sorted(done for done, _ in told)
+        return path
+
+    return write
+
+
+def test_every_kind_has_a_writer():
+    assert set(WRITERS) == set(get_args(Kind))
+
+
+def test_a_table_has_the_drives_own_numbers(written: Callable[[Kind], Path], results: Results):
+    with written("csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    expected = [to_json(result) for _, result in results[FIRST : LAST + 1]]
+    assert [row["frame"] for row in rows if row["is_cipv"] == "True"] == [each["frame"] for each in expected]
+    assert [float(row["distance_m"]) for row in rows if row["is_cipv"] == "True"] == [
+        each["cipv"]["distance_m"] for each in expected
+    ]
+    assert [int(row["hits"]) for row in rows if row["is_cipv"] == "True"] == [
+        item["hits"] for each in expected for item in each["objects"] if item["id"] == each["cipv"]["id"]
+    ], "the state goes back to the drive's beginning, not to the clip's"
+
+
+def test_a_session_can_be_opened_again(written: Callable[[Kind], Path]):
+    source = open_source(str(written("mcap")))
+    assert len(source) == LAST + 1 - FIRST
+    original, kept = Recording().frame(FIRST), source.frame(0)
+    assert kept.sweep is not None
+    assert original.sweep is not None
+    np.testing.assert_allclose(kept.sweep.points, original.sweep.points, atol=1e-6)
+
+
+def test_a_film_plays_at_the_drives_own_times(written: Callable[[Kind], Path]):
+    with av.open(str(written("mp4"))) as film:
+        video = film.streams.video[0]
+        frames = list(film.decode(video))
+        assert (video.codec_context.name, video.codec_context.pix_fmt) == ("h264", "yuv420p")
+        assert (video.width, video.height) == (WIDTH, HEIGHT)
+    assert [frame.time for frame in frames] == pytest.approx([0.1 * n for n in range(LAST + 1 - FIRST)], abs=0.002)
+    drawn = frames[-1].to_ndarray(format="rgb24").astype(int)
+    green = np.abs(drawn - np.array(rgb("cipv"))).sum(axis=2) < 120
+    assert green.sum() > 30, "the lead's box is in the film"
+
+
+def test_a_page_tells_loads_nothing_and_says_what_it_was_made_with(written: Callable[[Kind], Path], clip: Clip):
+    text = written("html").read_text(encoding="utf-8")
+    assert "Frames 000012 to 000019 (8) of test:car." in text
+    assert "acquired at" in text
+    assert "Distance to the CIPV" in text
+    assert clip.recording.digest(Params()) in text
+    assert "confirm_hits: 3" in text
+    assert text.count('src="data:image/jpeg;base64,') == 2, "where it begins, and the shortest TTC"
+    assert not re.search(r'(src|href)="(?!data:|#)', text)
+
+
+def test_a_replay_is_written(written: Callable[[Kind], Path]):
+    assert written("rrd").read_bytes()[:4] == b"RRF2"
+
+
+@pytest.mark.parametrize(("first", "last"), [(5, 4), (0, 30), (-1, 3)], ids=["backwards", "beyond", "before"])
+def test_what_is_no_clip_is_refused(clip: Clip, first: int, last: int):
+    jobs = Jobs()
+    with pytest.raises(BadInput, match="a clip goes from"):
+        submit(jobs, Clip(**{**vars(clip), "first": first, "last": last}), "csv")
+    jobs.close()
+
+
+def test_a_clip_that_is_too_long_is_refused(clip: Clip):
+    clip.recording.recipe.__dict__["total"] = MOST_FRAMES + 1
+    with pytest.raises(BadInput, match="at most"):
+        submit(Jobs(), Clip(**{**vars(clip), "first": 0, "last": MOST_FRAMES}), "csv")
+
+
+# ---------------------------------------------------------------- what is drawn
+
+
+def test_a_large_picture_is_made_smaller_and_even(results: Results):
+    frame, result = results[5]
+    large = Frame(**{**vars(frame), "picture": Picture(None, np.full((621, 2049, 3), 90, np.uint8))})
+    height, width = draw_frame(large, result, Params()).shape[:2]
+    assert width == WIDTH_PX
+    assert (height % 2, abs(height - 621 * WIDTH_PX / 2049) <= 2) == (0, True)
+
+
+def test_a_frame_without_a_picture_says_so(results: Results):
+    frame, result = results[5]
+    drawn = draw_frame(Frame(**{**vars(frame), "picture": None}), result, Params())
+    assert drawn.shape == (720, 1280, 3)
+    assert drawn.any()
+
+
+def test_the_source_picture_is_not_drawn_on(results: Results):
+    frame, result = results[5]
+    assert frame.picture is not None
+    before = frame.picture.bgr.copy()
+    draw_frame(frame, result, Params())
+    assert np.array_equal(before, frame.picture.bgr)
+
+
+def test_pictures_are_of_the_weightiest_events():
+    events = [Event("cipv_switch", n, f"switch {n}", severity="info") for n in range(10)]
+    chosen = worth_a_picture([*events, Event("brake", 15, "full braking", severity="alarm")])
+    assert list(chosen) == [0, 1, 2, 3, 15]
+    assert chosen[15] == "full braking"
+    assert worth_a_picture([]) == {0: "the clip begins"}
+
+
+def test_a_real_clip_looks_as_it_should(data_dir: Path):
+    """Astyx 183: the box of the lead is drawn in the lead's colour where the detector has it."""
+    source = open_source(f"astyx:{data_dir / 'astyx'}")
+    detector = detector_for(source, str(data_dir / "models" / "yolox_nano.onnx"))
+    times = timeline_s([source.t_ns(i) for i in range(len(source))], source.rate_hz)
+    recipe = Recipe(source.uri, len(source), times, Detectors(detector), "both")
+    recording = DriveRecording(recipe, lambda _: source, DetectionCache(), 1)
+    frame = recording.frame(17)
+    _, result = step(State(), frame, Params())
+    drawn = draw_frame(frame, result, Params())
+    assert result.cipv is not None
+    x1, _, x2, y2 = (round(v * drawn.shape[1] / 2048) for v in result.layers.vision_boxes[result.cipv.id])
+    edge = cv2.cvtColor(drawn, cv2.COLOR_BGR2RGB)[y2, (x1 + x2) // 2].astype(int)
+    assert np.abs(edge - np.array(rgb("cipv"))).sum() < 60
