@@ -1,0 +1,124 @@
+"""Packets of one rotation to a sweep, with every guard, against the library alone and against plain Python."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable
+from itertools import cycle
+from math import cos, radians, sin
+from typing import Any
+
+import numpy as np
+from velodyne_decoder import Config, Model, StreamDecoder
+
+from app.bench.timing import interleaved
+from pipeline.data import data_dir
+from pipeline.sources import open_source
+from pipeline.sources.velodyne import PACKET_BYTES, RotationCutter, SensorClock, Vlp16Decoder
+from pipeline.sources.velodyne.encode import packets_of
+
+OURS = "ours"
+_SIMULATED = 12
+_COSINES = [cos(radians(2 * (laser // 2 + 8 * (laser % 2)) - 15)) for laser in range(16)]
+_SINES = [sin(radians(2 * (laser // 2 + 8 * (laser % 2)) - 15)) for laser in range(16)]
+
+Rotations = list[list[bytes]]
+
+
+def stages(budget_s: float) -> dict[str, dict[str, Any]]:
+    """``decode`` in the contract's form: one rotation, packet by packet, to a sweep in the ego frame."""
+    rotations = _rotations(_recorded() or _simulated())
+    contestants = {
+        OURS: _ours(rotations),
+        "velodyne_decoder, unguarded": _library(rotations),
+        "plain Python": _plain(rotations),
+    }
+    times = interleaved(contestants, budget_s)
+    median = {name: float(np.median(spent)) * 1e3 for name, spent in times.items()}
+    peers = {name: {"median_ms": ms, "ratio": ms / median[OURS]} for name, ms in median.items() if name != OURS}
+    return {
+        "decode": {
+            "median_ms": median[OURS],
+            "p99_ms": float(np.percentile(times[OURS], 99)) * 1e3,
+            "packets": round(float(np.mean([len(rotation) for rotation in rotations])), 1),
+            "peers": peers,
+        }
+    }
+
+
+def _recorded() -> list[bytes]:
+    """Payloads of a real sensor, kept one after another in a file; empty without one."""
+    folder = data_dir() / "vlp16_packets"
+    for path in sorted(folder.glob(f"*x{PACKET_BYTES}.bin")) if folder.is_dir() else ():
+        raw = path.read_bytes()
+        return [raw[at : at + PACKET_BYTES] for at in range(0, len(raw) - PACKET_BYTES + 1, PACKET_BYTES)]
+    return []
+
+
+def _simulated() -> list[bytes]:
+    """The simulator's sweeps as a sensor would have sent them: the front half turn only, so half the points."""
+    source = open_source("sim:straight")
+    sweeps = (source.frame(index).sweep for index in range(_SIMULATED))
+    return [packet for sweep in sweeps if sweep is not None for packet in packets_of(sweep)]
+
+
+def _rotations(packets: list[bytes]) -> Rotations:
+    cutter = RotationCutter(np.eye(4), SensorClock())
+    rotations = [*(cutter.push(packet, None) for packet in packets), cutter.flush()]
+    return [[placed.packet.data for placed in rotation.packets] for rotation in rotations if rotation is not None]
+
+
+def _ours(rotations: Rotations) -> Callable[[], object]:
+    """A rotation's packets are pushed; the first of them completes the sweep before."""
+    turn, decoder = cycle(enumerate(rotations)), Vlp16Decoder()
+
+    def run() -> object:
+        nonlocal decoder
+        index, packets = next(turn)
+        if index == 0:
+            decoder = Vlp16Decoder()
+        sweeps = [decoder.push(packet, None) for packet in packets]
+        return decoder.flush() if index == len(rotations) - 1 else sweeps
+
+    return run
+
+
+def _library(rotations: Rotations) -> Callable[[], object]:
+    turn, decoder = cycle(enumerate(rotations)), StreamDecoder(Config(model=Model.VLP16))
+    at_s = 0.0
+
+    def run() -> object:
+        nonlocal decoder, at_s
+        index, packets = next(turn)
+        if index == 0:
+            decoder, at_s = StreamDecoder(Config(model=Model.VLP16)), 0.0
+        done = None
+        for packet in packets:
+            at_s += 0.00132
+            done = decoder.decode(at_s, packet) or done
+        return done
+
+    return run
+
+
+def _plain(rotations: Rotations) -> Callable[[], object]:
+    turn = cycle(rotations)
+    return lambda: [point for packet in next(turn) for point in _points(packet)]
+
+
+def _points(packet: bytes) -> list[tuple[float, float, float, int]]:
+    """x, y, z, intensity of a single-return packet, with no thought of time or damage."""
+    points = []
+    azimuths = struct.unpack("<" + "2xH96x" * 12, packet[:1200])
+    for block, azimuth in enumerate(azimuths):
+        step = (azimuths[min(block + 1, 11)] - azimuths[min(block, 10)]) % 36_000
+        returns = struct.unpack_from("<" + "HB" * 32, packet, block * 100 + 4)
+        for k in range(32):
+            if returns[2 * k]:
+                laser = k % 16
+                turned = (k // 16 * 55.296 + laser * 2.304) / 110.592
+                angle = radians((azimuth + step * turned) / 100.0)
+                range_m = returns[2 * k] * 0.002
+                flat = range_m * _COSINES[laser]
+                points.append((flat * cos(angle), -flat * sin(angle), range_m * _SINES[laser], returns[2 * k + 1]))
+    return points

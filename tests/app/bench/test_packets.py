@@ -1,0 +1,34 @@
+"""The bench of the packet decoder: the contract's shape, and peers that do the same work."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from app.bench import packets
+from pipeline.sources.velodyne.encode import PACKETS_A_ROTATION
+from tests.pipeline.sources.velodyne.streams import drive
+
+
+def test_decode_has_its_figures_also_without_recordings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("CIPV_DATA", str(tmp_path))
+    row = packets.stages(0.3)["decode"]
+    assert 0.0 < row["median_ms"] <= row["p99_ms"]
+    assert row["packets"] == PACKETS_A_ROTATION
+    assert list(row["peers"]) == ["velodyne_decoder, unguarded", "plain Python"]
+    assert row["peers"]["plain Python"]["ratio"] > 1.0
+
+
+def test_every_contestant_decodes_the_rotation() -> None:
+    rotations = packets._rotations([packet for packet, _ in drive(3)])
+    assert [len(rotation) for rotation in rotations] == [PACKETS_A_ROTATION] * 3
+    plain = packets._plain(rotations)()
+    assert len(plain) == 14_400  # type: ignore[arg-type]
+    x, y, z, _ = plain[0]  # type: ignore[index]
+    assert math.sqrt(x * x + y * y + z * z) == pytest.approx(10.0, abs=0.01)
+    ours, library = packets._ours(rotations), packets._library(rotations)
+    ours(), library()
+    sweeps, (_, cloud) = [it for it in ours() if it is not None], library()  # type: ignore[union-attr, misc, attr-defined]
+    assert len(sweeps[0].points) == len(cloud) == 14_400
