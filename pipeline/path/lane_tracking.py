@@ -25,7 +25,7 @@ _OVER_M = 20.0
 _PLACES = powers([_SIDE_AT_M, 0.0, _OVER_M / 2, _OVER_M])
 _CAR_HALF_M = 0.9
 """A line of a lane that the car is in with all its width is no farther than the widest lane less this."""
-_MOST_UNPARALLEL, _USUALLY_UNPARALLEL = 0.04, 0.02
+_MOST_UNPARALLEL, _USUALLY_UNPARALLEL = 0.05, 0.02
 """How much the slopes of a lane's two lines may and usually do differ."""
 _FURTHEST_M = 5.0
 _USUAL_WIDTH_M = 3.5
