@@ -2,17 +2,56 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from pipeline.recording.container import McapFile
 from pipeline.recording.messages import Damaged
-from pipeline.recording.topics import VELODYNE_PACKET_DEFINITION, VELODYNE_SCAN, VELODYNE_SCAN_DEFINITION
+from pipeline.recording.tick import PacketsRef
+from pipeline.recording.topics import PACKETS, VELODYNE_PACKET_DEFINITION, VELODYNE_SCAN, VELODYNE_SCAN_DEFINITION
+from pipeline.sources.base import SourceError
+from pipeline.sources.files import rigid_transform
+from pipeline.sources.velodyne import PACKET_BYTES, Vlp16Decoder
+from pipeline.types import F64, Sweep
 
-PACKET_BYTES = 1206
+_WINDOW_NS = 800_000_000, 200_000_000
+"""How long before and after the tick the packets of its sweep may have been received."""
+_SAME_SWEEP_NS = 40_000_000
+"""Stamps of a sweep decoded with and without what came long before differ by far less; sweeps lie 100 ms apart."""
 _PACKET, _HEADER, _TIME = "velodyne_msgs/msg/VelodynePacket", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
+
+
+@dataclass(frozen=True)
+class RawLidar:
+    """What it takes to make sweeps of a sensor's packets. T_ego_lidar: (4, 4), where it sits. offset_ns: what is added
+    to its stamps."""
+
+    T_ego_lidar: F64
+    offset_ns: int = 0
+
+    def reference(self, sweep: Sweep) -> PacketsRef:
+        """What a tick says of a sweep that is not stored itself."""
+        return PacketsRef(sweep.t_ns, self.offset_ns, tuple(float(value) for value in self.T_ego_lidar.ravel()))
+
+
+def sweep_of_packets(ref: PacketsRef, at_ns: int, file: McapFile) -> Sweep:
+    """The sweep of a tick stored at log time ``at_ns``, decoded anew. Damaged when its packets are not there."""
+    try:
+        decoder = Vlp16Decoder(rigid_transform(np.reshape(ref.T_ego_lidar, (4, 4)), "T_ego_lidar"))
+    except (SourceError, ValueError):
+        raise Damaged("where the LiDAR sits cannot be read") from None
+    scans = file.messages((PACKETS,), at_ns - _WINDOW_NS[0], at_ns + _WINDOW_NS[1])
+    packets = [packet for stored in scans for packet in packets_from(stored.data)]
+    sweeps = [decoder.push(payload, t_ns) for t_ns, payload in packets] + [decoder.flush()]
+    wanted_ns = ref.t_ns - ref.offset_ns
+    near = [each for each in sweeps if each is not None and abs(each.t_ns - wanted_ns) < _SAME_SWEEP_NS]
+    if not near:
+        raise Damaged("the session lacks the packets of this sweep")
+    return replace(min(near, key=lambda each: abs(each.t_ns - wanted_ns)), t_ns=ref.t_ns)
 
 
 def scan_message(packets: list[tuple[int, bytes]]) -> bytes:

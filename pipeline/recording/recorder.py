@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.params import Params
+from pipeline.recording.packets import RawLidar
 from pipeline.recording.segments import NEVER, Rotation, Segments
 from pipeline.recording.writer import About
 from pipeline.types import Frame, Result
@@ -58,10 +59,18 @@ class RecordingState:
 
 class Recorder:
     """Starts at once. BadInput when there is such a file already, OSError when it cannot be made. ``stop`` it in the
-    end. ``queued``: how many frames may wait for the disk."""
+    end. ``queued``: how many frames may wait for the disk. ``raw_lidar``: ``put_packets`` instead of clouds."""
 
-    def __init__(self, path: Path, about: About, rotation: Rotation = NEVER, *, queued: int = _QUEUED) -> None:
-        self._segments = Segments(path, about, rotation, "lz4")
+    def __init__(
+        self,
+        path: Path,
+        about: About,
+        rotation: Rotation = NEVER,
+        *,
+        queued: int = _QUEUED,
+        raw_lidar: RawLidar | None = None,
+    ) -> None:
+        self._segments = Segments(path, about, rotation, "lz4", raw_lidar)
         self._jobs: queue.Queue[_Job | None] = queue.Queue(queued)
         self._marks: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._dropped = 0

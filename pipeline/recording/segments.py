@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.params import Params
 from pipeline.recording.clock import SessionClock
 from pipeline.recording.output import Compression
+from pipeline.recording.packets import RawLidar
 from pipeline.recording.writer import About, SessionWriter
 from pipeline.sources.base import TruthObject
 from pipeline.types import Frame, Result
@@ -22,6 +24,8 @@ class Rotation:
 
 
 NEVER = Rotation()
+_PACKETS_CARRIED = 6
+"""Batches, of about a sweep each."""
 
 
 class Segments:
@@ -31,7 +35,16 @@ class Segments:
     more: nothing can be written after that, and what was written before is whole.
     """
 
-    def __init__(self, path: Path, about: About, rotation: Rotation = NEVER, compression: Compression = "zstd") -> None:
+    def __init__(
+        self,
+        path: Path,
+        about: About,
+        rotation: Rotation = NEVER,
+        compression: Compression = "zstd",
+        raw_lidar: RawLidar | None = None,
+    ) -> None:
+        self._raw_lidar = raw_lidar
+        self._recent_packets: deque[list[tuple[int, bytes]]] = deque(maxlen=_PACKETS_CARRIED)
         self._about, self._rotation, self._compression = about, rotation, compression
         self._clock = SessionClock()
         self._earlier_frames, self._earlier_bytes = 0, 0
@@ -72,6 +85,7 @@ class Segments:
 
     def write_packets(self, packets: list[tuple[int, bytes]]) -> None:
         """See ``SessionWriter.write_packets``."""
+        self._recent_packets.append(packets)
         self._writer.write_packets(packets)
 
     def write_mark(self, text: str) -> None:
@@ -104,6 +118,10 @@ class Segments:
         path = first.with_name(f"{first.stem}_{len(self.files):03d}{first.suffix}")
         self._writer = self._open(path)
         self.files.append(path)
+        for packets in self._recent_packets:  # of the sweep that the first frame of the new file shows
+            self._writer.write_packets(packets)
 
     def _open(self, path: Path) -> SessionWriter:
-        return SessionWriter(path, self._about, compression=self._compression, clock=self._clock)
+        return SessionWriter(
+            path, self._about, compression=self._compression, clock=self._clock, raw_lidar=self._raw_lidar
+        )

@@ -14,7 +14,8 @@ from pipeline.params import Params, ParamsError, with_changes
 from pipeline.recording import topics
 from pipeline.recording.container import McapFile, NotMcap
 from pipeline.recording.messages import Damaged, log_text, picture_from, sweep_from
-from pipeline.recording.tick import PictureRef, SweepRef, Tick, route_from, tick_from
+from pipeline.recording.packets import sweep_of_packets
+from pipeline.recording.tick import PictureRef, Tick, route_from, tick_from
 from pipeline.recording.writer import VERSION, About
 from pipeline.sources.base import SourceError, TruthObject
 from pipeline.types import CameraCalibration, Frame, Picture, Route, Sweep
@@ -73,7 +74,7 @@ class SessionSource:
             index,
             tick.name,
             tick.t_ns,
-            _or_note(lambda: self._sweep(tick.sweep), notes),
+            _or_note(lambda: self._sweep(tick, self.log_time_ns(index)), notes),
             _or_note(lambda: self._read_picture(tick.picture), notes),
             _or_note(lambda: _camera(tick), notes),
             tick.ego,
@@ -169,8 +170,13 @@ class SessionSource:
         at_ns = self.log_time_ns(index)
         return _or_note(lambda: tick_from(self.file.message(topics.FRAMES, at_ns).data), notes)
 
-    def _sweep(self, ref: SweepRef | None) -> Sweep | None:
-        return sweep_from(self.file.message(topics.POINTS, ref.at_ns).data, ref.t_ns, ref.channels) if ref else None
+    def _sweep(self, tick: Tick, at_ns: int) -> Sweep | None:
+        if tick.packets is not None:
+            return sweep_of_packets(tick.packets, at_ns, self.file)
+        if tick.sweep is None:
+            return None
+        ref = tick.sweep
+        return sweep_from(self.file.message(topics.POINTS, ref.at_ns).data, ref.t_ns, ref.channels)
 
     def _read_picture(self, ref: PictureRef | None) -> Picture | None:
         """One picture may serve several ticks, and is the same object then."""

@@ -43,6 +43,16 @@ class PictureRef:
     t_ns: Nanoseconds | None
 
 
+@dataclass(frozen=True)
+class PacketsRef:
+    """A sweep that is stored as the sensor's packets, received shortly before the tick. t_ns: the sweep's stamp, which
+    is the decoder's and ``offset_ns``. T_ego_lidar: (4, 4), row by row."""
+
+    t_ns: Nanoseconds
+    offset_ns: Nanoseconds
+    T_ego_lidar: tuple[float, ...]
+
+
 def _known_distortion(values: tuple[float, ...]) -> tuple[float, ...]:
     if len(values) not in _DISTORTIONS:
         raise ValueError(f"{len(values)} distortion coefficients")
@@ -92,6 +102,7 @@ class Tick:
     t_ns: Nanoseconds
     notes: tuple[str, ...] = ()
     sweep: SweepRef | None = None
+    packets: PacketsRef | None = None
     picture: PictureRef | None = None
     camera: CameraRecord | None = None
     ego: EgoState | None = None

@@ -22,7 +22,7 @@ from pipeline.recording.messages import (
     transform_messages,
 )
 from pipeline.recording.output import Compression, Output
-from pipeline.recording.packets import scan_message
+from pipeline.recording.packets import RawLidar, scan_message
 from pipeline.recording.tick import (
     CameraRecord,
     PictureRef,
@@ -69,12 +69,20 @@ _ABOUT = TypeAdapter(About)
 class SessionWriter:
     """Writes one file. Not for several threads; ``Recorder`` is. OSError when the file can take no more.
 
+    raw_lidar: clouds are not stored; their packets are, by ``write_packets``, and make the clouds anew when read.
     What stays the same from frame to frame (calibration, route, parameters, a picture shown twice) is written once.
     """
 
     def __init__(
-        self, path: Path, about: About, *, compression: Compression = "zstd", clock: SessionClock | None = None
+        self,
+        path: Path,
+        about: About,
+        *,
+        compression: Compression = "zstd",
+        clock: SessionClock | None = None,
+        raw_lidar: RawLidar | None = None,
     ) -> None:
+        self._raw_lidar = raw_lidar
         self._output = Output(path, compression)
         self._output.add_metadata(topics.METADATA, about.to_metadata())
         self._clock = clock or SessionClock()
@@ -130,7 +138,8 @@ class SessionWriter:
             name=frame.name,
             t_ns=frame.t_ns,
             notes=frame.notes,
-            sweep=self._put_sweep(frame.sweep, at_ns),
+            sweep=self._put_sweep(frame.sweep, at_ns) if self._raw_lidar is None else None,
+            packets=self._raw_lidar.reference(frame.sweep) if self._raw_lidar is not None and frame.sweep else None,
             picture=self._put_picture(frame.picture, at_ns),
             camera=self._put_camera(frame.camera, at_ns),
             ego=frame.ego,

@@ -19,7 +19,6 @@ from mcap.reader import NonSeekingReader
 
 from pipeline.errors import BadInput
 from pipeline.params import Params, with_changes
-from pipeline.recording.packets import packets_from
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.rewrite import recover
 from pipeline.recording.segments import Rotation, Segments
@@ -118,18 +117,6 @@ def test_each_file_of_a_long_recording_can_be_read_alone(rotation: Rotation, tmp
     assert parts.bytes_written == sum(path.stat().st_size for path in parts.files)
     if rotation.max_s is not None:
         assert [len(session) for session in sessions] == [11, 11, 11, 2]
-
-
-def test_raw_packets_are_kept_as_they_came(tmp_path: Path) -> None:
-    packets = [(10**18 + index, bytes([index]) * 1206) for index in range(76)]
-    recorder = Recorder(tmp_path / "a.mcap", ABOUT)
-    recorder.put(full(0))
-    assert recorder.put_packets(packets)
-    recorder.stop()
-    session = SessionSource("a", str(tmp_path / "a.mcap"))
-    (stored,) = session.file.messages(("/lidar/packets",))
-    assert packets_from(stored.data) == packets
-    assert (stored.channel.schema_name, stored.channel.message_encoding) == ("velodyne_msgs/msg/VelodyneScan", "cdr")
 
 
 _RECORD_FOR_EVER = """
