@@ -232,3 +232,14 @@ def write_packet_bag(path: Path, kind: Kind = "db3", sweeps: int = 4) -> Path:
             bag.write("/velodyne_packets", bag.scan(part), part[-1][1] + 1_000_000)
         bag.write("/velodyne_packets", bag.scan(stream[-38:]), stream[-1][1] + 2_000_000)
     return path
+
+
+def write_long_bag(path: Path, sweeps: int) -> Path:
+    """Clouds and raw 720p pictures, 3 MB of both ten times a second."""
+    pixels = np.random.default_rng(0).integers(0, 255, (720, 1280, 3), dtype=np.uint8)
+    with BagWriter(path, "mcap") as bag:
+        for index in range(sweeps):
+            t_ns = HEADER_NS + index * STEP_NS
+            bag.write("/velodyne_points", bag.cloud(ring_wall(t_ns), t_ns), t_ns + RECORDED_LATER_NS)
+            bag.write("/front/image_raw", bag.image(t_ns, pixels, "bgr8"), t_ns + RECORDED_LATER_NS)
+    return path

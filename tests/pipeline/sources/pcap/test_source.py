@@ -161,7 +161,7 @@ def test_memory_does_not_grow_with_the_file(tmp_path: Path) -> None:
     with path.open("wb") as file:
         file.write(head)
         for round_ in range(150):
-            file.write(_later(body, round_ * 200_000_000))
+            file.write(later(body, round_ * 200_000_000))
     tracemalloc.start()
     source = open_source(f"pcap:{path}")
     kept, _ = tracemalloc.get_traced_memory()
@@ -172,7 +172,7 @@ def test_memory_does_not_grow_with_the_file(tmp_path: Path) -> None:
     assert source.frame(250).sweep is not None
 
 
-def _later(body: bytes, by_ns: int) -> bytes:
+def later(body: bytes, by_ns: int) -> bytes:
     """Records of a capture, and the packets in them, later by that much."""
     rows = np.frombuffer(body, np.uint8).reshape(-1, 1264).copy()
     seconds, micros = (rows[:, at : at + 4].view("<u4")[:, 0].astype(np.int64) for at in (0, 4))

@@ -1,0 +1,83 @@
+"""A capture of more than 10 GB and a bag of 2 GB: opened and read anywhere in bounded memory. Neither is kept."""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+ALLOWED_MB = 150.0
+"""What opening and reading may add; the files are 13 and 70 times as large."""
+ROUNDS = {"pcap": 5_600, "rosbag": 700}  # of 20 sweeps, and of 3
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(3600)
+@pytest.mark.skipif(sys.platform != "linux", reason="resident size is in kB on Linux only")
+@pytest.mark.parametrize("kind", ROUNDS)
+def test_longer_than_memory(kind: str, tmp_path: Path) -> None:
+    """In a process of its own, so that its greatest size is this work's."""
+    command = [sys.executable, __file__, kind, str(tmp_path), str(ROUNDS[kind])]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT)
+    report = json.loads(done.stdout)
+    print(report)
+    (ROOT / "build").mkdir(exist_ok=True)
+    (ROOT / "build" / f"long_{kind}.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    assert report["GB"] > {"pcap": 10.0, "rosbag": 2.0}[kind]
+    assert report["grown_MB"] < ALLOWED_MB
+
+
+def _main(kind: str, folder: Path, rounds: int) -> dict[str, float]:
+    from time import perf_counter
+
+    import numpy as np
+
+    from pipeline.sources import open_source
+    from tests.pipeline.sources import bags, captures
+    from tests.pipeline.sources.pcap.test_source import later
+
+    path = folder / ("long.pcap" if kind == "pcap" else "long")
+    sweeps = 0
+    try:
+        if kind == "pcap":
+            body = captures.pcap(captures.lidar(20))[24:]
+            with path.open("wb") as file:
+                file.write(captures.pcap([]))
+                for count in range(rounds):
+                    file.write(later(body, count * 2_000_000_000))
+            sweeps, size = 20 * rounds, path.stat().st_size
+        else:
+            bags.write_long_bag(path, 3 * rounds)
+            sweeps, size = 3 * rounds, sum(file.stat().st_size for file in path.iterdir())
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        begun = perf_counter()
+        source = open_source(f"{kind}:{path}")
+        opened_s = perf_counter() - begun
+        assert len(source) == sweeps
+        seeks = []
+        for index in np.random.default_rng(0).integers(sweeps, size=50):
+            begun = perf_counter()
+            assert source.frame(int(index)).sweep is not None
+            seeks.append((perf_counter() - begun) * 1e3)
+        grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
+    finally:
+        for file in path.iterdir() if path.is_dir() else [path]:
+            file.unlink()
+    return {
+        "GB": round(size / 1e9, 2),
+        "sweeps": sweeps,
+        "open_s": round(opened_s, 1),
+        "seek_ms_median": round(float(np.median(seeks)), 1),
+        "seek_ms_max": round(max(seeks), 1),
+        "grown_MB": round(grown / 1e3, 1),
+    }
+
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(ROOT))
+    print(json.dumps(_main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]))))
