@@ -18,7 +18,7 @@ from pipeline.sources.files import rigid_transform
 from pipeline.sources.velodyne import PACKET_BYTES, Vlp16Decoder
 from pipeline.types import F64, Sweep
 
-_WINDOW_NS = 800_000_000, 200_000_000
+PACKETS_BEFORE_NS, _PACKETS_AFTER_NS = 800_000_000, 200_000_000
 """How long before and after the tick the packets of its sweep may have been received."""
 _SAME_SWEEP_NS = 40_000_000
 """Stamps of a sweep decoded with and without what came long before differ by far less; sweeps lie 100 ms apart."""
@@ -44,7 +44,7 @@ def sweep_of_packets(ref: PacketsRef, at_ns: int, file: McapFile) -> Sweep:
         decoder = Vlp16Decoder(rigid_transform(np.reshape(ref.T_ego_lidar, (4, 4)), "T_ego_lidar"))
     except (SourceError, ValueError):
         raise Damaged("where the LiDAR sits cannot be read") from None
-    scans = file.messages((PACKETS,), at_ns - _WINDOW_NS[0], at_ns + _WINDOW_NS[1])
+    scans = file.messages((PACKETS,), at_ns - PACKETS_BEFORE_NS, at_ns + _PACKETS_AFTER_NS)
     packets = [packet for stored in scans for packet in packets_from(stored.data)]
     sweeps = [decoder.push(payload, t_ns) for t_ns, payload in packets] + [decoder.flush()]
     wanted_ns = ref.t_ns - ref.offset_ns

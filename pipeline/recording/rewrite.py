@@ -12,6 +12,7 @@ from pipeline.recording import topics
 from pipeline.recording.container import McapFile, Stored
 from pipeline.recording.messages import Damaged
 from pipeline.recording.output import Output
+from pipeline.recording.packets import PACKETS_BEFORE_NS
 from pipeline.recording.session import SessionSource
 from pipeline.recording.tick import tick_from, tick_message
 
@@ -72,6 +73,7 @@ def clip(source: SessionSource, first: int, last: int, out: Path) -> int:
     to_ns = {at_ns: max(first_ns - len(times) + place, 0) for place, at_ns in enumerate(times)}
 
     def messages() -> Iterator[Stored]:
+        yield from source.file.messages((topics.PACKETS,), first_ns - PACKETS_BEFORE_NS, first_ns - 1)
         for at_ns, topic in earlier:
             for stored in source.file.messages((topic,), at_ns, at_ns):
                 yield stored._replace(log_time_ns=to_ns[at_ns])

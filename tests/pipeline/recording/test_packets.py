@@ -11,6 +11,7 @@ from pipeline.geometry import rotation
 from pipeline.recording.packets import RawLidar, packets_from
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.rewrite import recover
+from pipeline.recording.save import save
 from pipeline.recording.segments import Rotation, Segments
 from pipeline.recording.session import SessionSource
 from pipeline.sources.velodyne import Vlp16Decoder
@@ -61,8 +62,10 @@ def test_sweeps_are_made_anew_of_their_packets(tmp_path: Path) -> None:
     assert not list(session.file.messages(("/lidar/points",)))
     assert [same_points(session.frame(k).sweep, frame.sweep) for k, frame in enumerate(frames)] == [True] * len(frames)
     recover(tmp_path / "a.mcap", tmp_path / "b.mcap")
-    again = SessionSource("b", str(tmp_path / "b.mcap"))
+    save(session, tmp_path / "c.mcap", 5, 8)
+    again, part = (SessionSource(name, str(tmp_path / f"{name}.mcap")) for name in "bc")
     assert same_points(again.frame(5).sweep, frames[5].sweep)
+    assert [same_points(part.frame(k).sweep, frames[5 + k].sweep) for k in range(4)] == [True] * 4
 
 
 def test_a_new_file_begins_with_the_packets_of_its_first_sweep(tmp_path: Path) -> None:
