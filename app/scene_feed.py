@@ -6,19 +6,22 @@ import threading
 from typing import Any
 
 from app.engine import Engine
+from app.looks import Looks
 from app.snapshot import Snapshot
 from app.views.viser_view import ViserView
 from pipeline.params import ParamsError
 
 
 class SceneFeed:
-    """Draws the engine's newest snapshot in viser, while a browser looks. While one is drawn, older ones that wait are
-    dropped: the 3D view may be slower than the line, but never behind it. Use it in a ``with`` block.
+    """Draws the engine's newest snapshot in viser, while a browser looks: one that hides its 3D view does not. While
+    one is drawn, older ones that wait are dropped: the 3D view may be slower than the line, but never behind it. Use it
+    in a ``with`` block.
 
     drawn: frames drawn so far."""
 
-    def __init__(self, engine: Engine) -> None:
+    def __init__(self, engine: Engine, looks: Looks | None = None) -> None:
         self._engine = engine
+        self._looks = looks or Looks()
         self._view = ViserView(engine.snapshot.params, self._moved)
         self._condition = threading.Condition()
         self._newest: Snapshot | None = None
@@ -33,6 +36,7 @@ class SceneFeed:
 
     def __enter__(self) -> SceneFeed:
         self._view.on_watched(lambda: self._offer(self._engine.snapshot))
+        self._looks.on_change(lambda: self._offer(self._engine.snapshot))
         self._stop_listening = self._engine.listen(self._offer)
         self._thread.start()
         return self
@@ -67,8 +71,9 @@ class SceneFeed:
                     return
                 newest, self._newest = self._newest, None
             assert newest is not None
-            if not self._view.watched:
+            if self._view.watchers <= self._looks.hiding:
                 continue
+            self._view.select(self._looks.selected)
             if drawn is None or newest.params is not drawn.params:
                 self._view.set_params(newest.params)
             if newest.tick is not None and (drawn is None or newest.tick is not drawn.tick):

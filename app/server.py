@@ -22,6 +22,7 @@ from app.clips.jobs import Jobs
 from app.drive.marks import Marks
 from app.engine import Engine
 from app.history import History
+from app.looks import Looks
 from app.recording import SESSIONS
 from app.routes.clips import clips_router
 from app.routes.drive import drive_router
@@ -52,11 +53,12 @@ def create_app(
     viser_port: Callable[[], int | None] = lambda: None,
     hosts: Iterable[str] = (),
     marks: Marks | None = None,
+    looks: Looks | None = None,
 ) -> FastAPI:
     """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
-    marked moments are kept; null forgets them at the end."""
+    marked moments are kept; null forgets them at the end. ``looks``: hears what people look at."""
     access = Access(hosts)
-    stream, history = Stream(), History()
+    stream, history = Stream(looks), History()
     jobs, viewer = Jobs(engine.drives.changed), ViewerFiles()
 
     def show(snapshot: Snapshot) -> None:
@@ -118,6 +120,7 @@ def serve(
     strict_port: bool = False,
     hosts: Iterable[str] = (),
     viser_port: Callable[[], int | None] = lambda: None,
+    looks: Looks | None = None,
     on_ready: Callable[[str], None] | None = None,
 ) -> None:
     """Serve until Ctrl-C. Starts and stops the engine; prints the page's address on a line of its own when it answers.
@@ -129,7 +132,7 @@ def serve(
     if port not in (0, number):
         print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
     named = f"[{host}]" if ":" in host else host
-    app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"))
+    app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks)
     engine.start()
     try:
         Server(app, f"http://{named}:{number}", on_ready).run(sockets=[bound])

@@ -9,6 +9,7 @@ Buffers of the system between here and a page hold many frames, which would be a
 for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no more than ``FRAMES_UNDER_WAY`` are sent
 ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the picture: the one that all get is
 as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
+``{"selected": 7}`` and ``{"hides_3d": true}`` are for the views that the server draws.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.encode import Encoder
+from app.looks import Looks
 from app.sent_picture import MAX_WIDTH_PX, width_for
 from app.snapshot import Snapshot
 
@@ -79,7 +81,8 @@ class Slot:
 class Stream:
     """Between the engine's thread, which publishes, and the clients' slots on the event loop."""
 
-    def __init__(self) -> None:
+    def __init__(self, looks: Looks | None = None) -> None:
+        self._looks = looks or Looks()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._slots: list[Slot] = []
         self._encoder = Encoder()
@@ -122,6 +125,7 @@ class Stream:
             pass  # the client left while something was being sent to it
         finally:
             self._slots.remove(slot)
+            self._looks.hide(slot, False)
             self._fit_width()
 
     async def _receive(self, socket: WebSocket, slot: Slot) -> None:
@@ -139,6 +143,10 @@ class Stream:
                     await self._put_newest(slot, self._snapshot)
             if said.get("painted") is True:
                 slot.painted()
+            if "selected" in said and _is_id_or_null(said["selected"]):
+                self._looks.select(said["selected"])
+            if isinstance(said.get("hides_3d"), bool):
+                self._looks.hide(slot, said["hides_3d"])
 
     async def _put_newest(self, slot: Slot, snapshot: Snapshot) -> None:
         sequence, frame = await asyncio.to_thread(self._encoded, snapshot)
@@ -193,6 +201,10 @@ def _object(text: str | None) -> dict[str, Any]:
 def _number(value: Any, limit: float) -> float | None:
     """A number within ±limit; else null. What a client says is not to be trusted."""
     return value if isinstance(value, int | float) and -limit < value < limit else None
+
+
+def _is_id_or_null(value: Any) -> bool:
+    return value is None or (isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**53)
 
 
 def _width(shown_px: Any) -> int | None:

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import tyro
 
 from app.engine import Engine
+from app.looks import Looks
 from app.options import LineOptions, planned
 from app.scene_feed import SceneFeed
 from app.server import DEFAULT_PORT, serve
@@ -35,7 +36,8 @@ class ServerOptions:
     def serve(self, engine: Engine) -> int:
         """Until Ctrl-C."""
         on_ready: Callable[[str], None] | None = webbrowser.open if self.browser else None  # type: ignore[assignment]
-        with SceneFeed(engine) as feed:
+        looks = Looks()
+        with SceneFeed(engine, looks) as feed:
             serve(
                 engine,
                 host=self.host,
@@ -43,6 +45,7 @@ class ServerOptions:
                 strict_port=self.port is not None,
                 hosts=self.allow_host,
                 viser_port=lambda: feed.port,
+                looks=looks,
                 on_ready=on_ready,
             )
         return 0

@@ -142,6 +142,9 @@ class RerunSink:
         for side, line in parts.sides(result.path).items():
             strip = rr.LineStrips3D([scene.on_ground(line, ground_m + 0.05)], colors=rgb("path"), radii=parts.THIN)
             self._put(f"world/path/{side}", strip)
+        lanes = [scene.on_ground(line, ground_m + 0.06) for line in scene.lane_lines(result) if len(line) > 1]
+        strips = rr.LineStrips3D(lanes, colors=rgb("lane"), radii=parts.THICK) if lanes else None
+        self._put("world/path/lanes", strips)
         ego = scene.ego_cuboid(ground_m)
         box = rr.Boxes3D(centers=[ego.center], sizes=[ego.size], colors=rgb("ego"), radii=parts.THIN, fill_mode="solid")
         self._put("world/ego", box)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from app.views.colors import Rgb, rgb, role_of, shade_of
 from pipeline.geometry import Cuboid
+from pipeline.path.lanes import polylines
 from pipeline.types import DROPPED, F64, GROUND, UNCLUSTERED, FusedObject, Path, Point3, Result
 
 U8 = npt.NDArray[np.uint8]
@@ -78,7 +79,7 @@ def point_colors(result: Result, by: ColorBy = "kind") -> U8:
     if by == "kind":
         return _kind_colors(result)
     if by == "height":
-        return _scale(points[:, 2] - (ground_height_m(result) or 0.0), *_HEIGHT_SPAN_M)
+        return _scale(_heights_m(result), *_HEIGHT_SPAN_M)
     if by == "range":
         return range_colors(np.hypot(points[:, 0], points[:, 1]))
     brightest = float(np.percentile(points[:, 3], _BRIGHTEST_PERCENTILE)) if len(points) else 0.0
@@ -115,9 +116,24 @@ def _scale(values: npt.NDArray[np.floating], low: float, high: float) -> U8:
 
 
 def ground_height_m(result: Result) -> float | None:
-    """The middle height of this sweep's ground points; null without any, for example when there was no sweep."""
-    heights = result.layers.points[result.layers.kind == GROUND, 2]
-    return float(np.median(heights)) if len(heights) else None
+    """Height of the fitted ground at the ego origin; null without one, for example when there was no sweep."""
+    ground = result.layers.ground
+    if ground is None:
+        return None
+    height_m = float(ground.height(np.zeros((1, 2)))[0])
+    return height_m if np.isfinite(height_m) else None
+
+
+def _heights_m(result: Result) -> npt.NDArray[np.floating]:
+    """(N,) heights of the points over the ground, over the ego origin where none was found."""
+    points, ground = result.layers.points, result.layers.ground
+    above = points[:, 2].astype(np.float64) if ground is None else ground.above(points)
+    return np.where(np.isfinite(above), above, points[:, 2])
+
+
+def lane_lines(result: Result) -> list[F64]:
+    """(K, 2) ego x y of each line of the ego lane that is believed."""
+    return list(polylines(result.layers.lanes).values()) if result.layers.lanes is not None else []
 
 
 def cuboid_edges(cuboid: Cuboid) -> F64:

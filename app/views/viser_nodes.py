@@ -74,10 +74,12 @@ def arrows(scene: viser.SceneApi, strokes: Strokes) -> None:
     )
 
 
-def lead(scene: viser.SceneApi, each: FusedObject | None, floor_m: float) -> None:
-    """The closest in-path vehicle filled in, whichever sensor gave its place."""
+def filled(
+    scene: viser.SceneApi, name: str, each: FusedObject | None, color: Rgb, opacity: float, floor_m: float
+) -> None:
+    """An object filled in, whichever sensor gave its place."""
     if each is None or each.bev is None:
-        return _hide(scene, "/cipv")
+        return _hide(scene, name)
     corners = np.asarray(each.bev)
     if each.cuboid is not None:
         center, size, yaw_rad = each.cuboid.center, each.cuboid.size, each.cuboid.yaw_rad
@@ -88,8 +90,14 @@ def lead(scene: viser.SceneApi, each: FusedObject | None, floor_m: float) -> Non
         center, yaw_rad = (float(x), float(y), floor_m + 0.05), float(np.arctan2(edge[1], edge[0]))
     wxyz = viser.transforms.SO3.from_z_radians(yaw_rad).wxyz
     scene.add_box(
-        "/cipv", rgb("cipv"), size, opacity=0.25, wxyz=wxyz, position=center, cast_shadow=False, receive_shadow=False
+        name, color, size, opacity=opacity, wxyz=wxyz, position=center, cast_shadow=False, receive_shadow=False
     )
+
+
+def lanes(scene: viser.SceneApi, found: Sequence[F64], floor_m: float) -> None:
+    """The ego lane's lines, each (K, 2) ego x y."""
+    parts = [_segments(outlines.on_ground(line, floor_m + 0.05)) for line in found if len(line) > 1]
+    lines(scene, "/path/lanes", Strokes(parts, [rgb("lane")] * len(parts)), 4.0)
 
 
 def label(scene: viser.SceneApi, place: int, text: str, position: Point3 | None) -> None:

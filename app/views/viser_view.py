@@ -10,22 +10,39 @@ import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import rich
 import viser
 
 from app.views import scene, viser_nodes
+from app.views.colors import Role, rgb
 from app.views.viser_gui import OnChange, ParamsGui
 from app.views.viser_nodes import Strokes
 from pipeline.params import Params
-from pipeline.types import Frame, FusedObject, Result
+from pipeline.types import Frame, FusedObject, Point3, Result
 
 HOST = "127.0.0.1"
-CAMERA_POSITION, CAMERA_TARGET, CAMERA_FOV_DEG = (-16.0, 0.0, 9.0), (20.0, 0.0, -1.0), 48.0
+CAMERA_FOV_DEG = 48.0
 _LABELS = ("vehicles and in path", "all", "none")
 _ARROW_S = 1.0
+
+
+class Pose(NamedTuple):
+    """Where an eye is, at what it looks, and which way is up there. Ego frame, metres."""
+
+    eye: Point3
+    target: Point3
+    up: Point3
+
+
+POSES = {
+    "Follow": Pose((-16.0, 0.0, 9.0), (20.0, 0.0, -1.0), (0.0, 0.0, 1.0)),
+    "Top": Pose((28.0, 0.0, 75.0), (28.01, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    "Driver": Pose((-1.9, 0.36, 0.75), (30.0, 0.36, -0.2), (0.0, 0.0, 1.0)),
+}
+"""Behind and above the car, from above with the road upwards, and from the driver's seat."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +66,7 @@ class ViserView:
         self._shown: tuple[Frame, Result] | None = None
         self._display = _Display()
         self._labels = 0
+        self._selected: int | None = None
         with _silent():
             self._server = viser.ViserServer(HOST, port, label="CIPV Studio", verbose=False)
         self._server.gui.configure_theme(
@@ -56,17 +74,18 @@ class ViserView:
         )
         self._server.gui.main_panel.minimize()  # the scene first: a pane of the dashboard is small
         camera = self._server.initial_camera
-        camera.position, camera.look_at, camera.up = CAMERA_POSITION, CAMERA_TARGET, (0.0, 0.0, 1.0)
+        camera.position, camera.look_at, camera.up = POSES["Follow"]
         camera.fov = math.radians(CAMERA_FOV_DEG)
         self._scene = self._server.scene
         self._add_static()
+        self._add_cameras()
         self._add_display_options()
         self._params = ParamsGui(self._server.gui, params, on_change)
 
     @property
-    def watched(self) -> bool:
-        """Whether a browser is looking."""
-        return bool(self._server.get_clients())
+    def watchers(self) -> int:
+        """How many browsers hold this view."""
+        return len(self._server.get_clients())
 
     def on_watched(self, callback: Callable[[], None]) -> None:
         """Call ``callback``, on a thread of viser's, when a browser comes to look."""
@@ -83,6 +102,13 @@ class ViserView:
             self._shown = (frame, result)
             self._draw()
 
+    def select(self, number: int | None) -> None:
+        """Mark this object, or none."""
+        with self._lock:
+            if number != self._selected:
+                self._selected = number
+                self._draw()
+
     def set_params(self, params: Params) -> None:
         """Put the sliders where the parameters are; ``on_change`` does not hear of it."""
         self._params.set(params)
@@ -97,6 +123,19 @@ class ViserView:
     def _add_static(self) -> None:
         viser_nodes.floor(self._scene, 0.0)
         self._scene.world_axes.visible = False
+
+    def _add_cameras(self) -> None:
+        """One button a pose; it moves the camera of whoever pressed it."""
+        group = self._server.gui.add_button_group("Camera", tuple(POSES))
+
+        def take(event: viser.GuiEvent[Any]) -> None:
+            if event.client is None:
+                return
+            pose, camera = POSES[event.target.value], event.client.camera
+            with event.client.atomic():
+                camera.up_direction, camera.position, camera.look_at = pose.up, pose.eye, pose.target
+
+        group.on_click(take)
 
     def _add_display_options(self) -> None:
         gui, start = self._server.gui, self._display
@@ -127,6 +166,7 @@ class ViserView:
             self._draw_objects(frame, result, floor_m)
             self._draw_labels(result, floor_m)
             viser_nodes.path(self._scene, result.path, floor_m)
+            viser_nodes.lanes(self._scene, scene.lane_lines(result), floor_m)
             viser_nodes.floor(self._scene, floor_m)
             viser_nodes.picture(self._scene, frame, self._display.picture)
 
@@ -155,8 +195,16 @@ class ViserView:
         viser_nodes.lines(self._scene, "/footprints", footprints, 2.5)
         viser_nodes.lines(self._scene, "/rays", rays, 1.0)
         viser_nodes.arrows(self._scene, velocities)
-        lead = next((each for each in result.objects if each.id == scene.cipv_id(result)), None)
-        viser_nodes.lead(self._scene, lead, floor_m)
+        by_id = {each.id: each for each in result.objects}
+        following = None if result.next_cipv is None else result.next_cipv.id
+        marked: tuple[tuple[str, int | None, Role, float], ...] = (
+            ("/cipv", scene.cipv_id(result), "cipv", 0.25),
+            ("/next_cipv", following, "cipv", 0.08),
+            ("/selection", self._selected, "ego", 0.2),
+        )
+        for name, number, role, opacity in marked:
+            found = None if number is None else by_id.get(number)
+            viser_nodes.filled(self._scene, name, found, rgb(role), opacity, floor_m)
 
     def _draw_labels(self, result: Result, floor_m: float) -> None:
         """Labels are numbered places that objects share, not nodes of their own: ids come and go without end."""
@@ -170,7 +218,7 @@ class ViserView:
         self._labels = max(len(named), self._labels)
 
     def _has_label(self, each: FusedObject, result: Result) -> bool:
-        if self._display.labels == "all":
+        if self._display.labels == "all" or each.id == self._selected:
             return True
         return self._display.labels == _LABELS[0] and scene.stands_out(each, result)
 

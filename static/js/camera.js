@@ -83,7 +83,7 @@ function drawBelief(ctx, frame) {
   if (layers.path && display.path) drawPath(ctx, display.path, X, Y);
   if (layers.points) drawPoints(ctx, frame);
   if (layers.lanes && display.lanes) for (const lane of [display.lanes.left, display.lanes.right]) drawLane(ctx, lane);
-  const labels = new Labels(ctx, surface.width);
+  const labels = new Labels(ctx, surface.width, laid.y);
   const chosen = result.objects.find(({ id }) => id === get("selection"));
   if (chosen) {
     for (const [boxes, role] of /** @type {const} */ ([[display.lidar_boxes, "lidar"], [display.vision_boxes, "vision"]])) {

@@ -21,7 +21,8 @@ let waiting = null;
 let decoding = false;
 /** @type {WebSocket|null} */
 let socket = null;
-let pictureSteps = 0;
+/** What the server was told about this page. @type {Map<string, number|boolean|null>} */
+const told = new Map();
 
 /** The server's clock now, Unix milliseconds. */
 export function serverNow() {
@@ -31,14 +32,21 @@ export function serverNow() {
 /** Say how wide the picture is shown: no wider one has to be sent. @param {number} width device pixels */
 export function showPictureAt(width) {
   const steps = Math.ceil(width / WIDTH_STEP_PX);
-  if (steps === pictureSteps || steps <= 0) return;
-  pictureSteps = steps;
-  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ picture_px: steps * WIDTH_STEP_PX }));
+  if (steps > 0) tell("picture_px", steps * WIDTH_STEP_PX);
+}
+
+/** Let the server know something about this page, now and after every reconnection; once for each value.
+ * @param {string} name @param {number|boolean|null} value */
+export function tell(name, value) {
+  if (told.get(name) === value) return;
+  told.set(name, value);
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ [name]: value }));
 }
 
 export function connect() {
   const url = new URL("api/stream?paced=1", location.href);
-  if (pictureSteps) url.searchParams.set("picture_px", String(pictureSteps * WIDTH_STEP_PX));
+  const width = told.get("picture_px");
+  if (width) url.searchParams.set("picture_px", String(width));
   url.protocol = url.protocol.replace("http", "ws");
   const opened = new WebSocket(url);
   socket = opened;
@@ -51,6 +59,7 @@ export function connect() {
     set("link", { status: "live", since: Date.now() });
     const ping = () => opened.send(JSON.stringify({ ping: Date.now() }));
     ping();
+    if (told.size) opened.send(JSON.stringify(Object.fromEntries(told)));
     pinging = setInterval(ping, PING_MS);
   };
   const done = () => opened.readyState === WebSocket.OPEN && opened.send('{"painted":true}');

@@ -4,10 +4,11 @@ const HEIGHT = 16;
 /** "strong" is filled and drawn wherever it must, "must" finds a place, "weak" is left out where there is none. @typedef {"strong"|"must"|"weak"} Weight */
 
 export class Labels {
-  /** @param {CanvasRenderingContext2D} ctx @param {number} width of the canvas, CSS pixels */
-  constructor(ctx, width) {
+  /** @param {CanvasRenderingContext2D} ctx @param {number} width of the canvas, CSS pixels @param {number} top nothing is written above it */
+  constructor(ctx, width, top = 0) {
     this.ctx = ctx;
     this.width = width;
+    this.top = top;
     /** @type {{x: number, y: number, w: number, h: number}[]} */
     this.taken = [];
   }
@@ -22,11 +23,11 @@ export class Labels {
     ctx.font = `${strong ? "700 13px" : "600 11px"} system-ui, "DejaVu Sans", sans-serif`;
     const w = ctx.measureText(words).width + 10;
     const right = this.width - w - 2;
-    const at = { x: Math.max(2, Math.min(x, right)), y: Math.max(2, y - h - 1), w, h };
+    const at = { x: Math.max(2, Math.min(x, right)), y: Math.max(this.top + 2, y - h - 1), w, h };
     for (let tries = 0; this.#overlaps(at); tries++) {
       if (tries === 3 && weight === "weak") return;
       if (tries === 12) break;
-      at.y -= h + 1;
+      at.y = at.y - h - 1 > this.top ? at.y - h - 1 : at.y + (tries + 2) * (h + 1);
     }
     this.taken.push(at);
     ctx.fillStyle = strong ? tint : "rgb(8 10 13 / .78)";

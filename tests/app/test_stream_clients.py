@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import struct
 import threading
 from collections.abc import Callable, Iterator
@@ -28,7 +29,7 @@ from tests.app.recording import CountingDetector, Recording
 
 WAIT_S = 60.0
 FAST_FRAMES = 40
-"""At 1 MB each they are more than the sockets' buffers between a server and a client that does not read can hold."""
+"""More than the system's buffers between a server and a client that does not read can hold."""
 
 
 @dataclass
@@ -36,14 +37,19 @@ class Site:
     """A server of nothing but the stream; ``show(n)`` publishes frame n, as an engine's thread does."""
 
     stream: Stream
-    address: str
+    port: int
     first: Snapshot
 
     def show(self, sequence: int, **changes: Any) -> None:
         self.stream.publish(replace(self.first, sequence=sequence, index=sequence, **changes))
 
     def connected(self, query: str = "") -> AbstractContextManager[ClientConnection]:
-        return connect(self.address + query, max_size=None, open_timeout=WAIT_S, compression=None, max_queue=1)
+        """A client with little room for what it has not read yet."""
+        end = socket.socket()
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 16)
+        end.connect(("127.0.0.1", self.port))
+        url = f"ws://127.0.0.1:{self.port}/{query}"
+        return connect(url, sock=end, max_size=None, open_timeout=WAIT_S, compression=None, max_queue=1)
 
 
 @pytest.fixture
@@ -55,7 +61,7 @@ def site() -> Iterator[Site]:
     thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
     thread.start()
     assert is_ready.wait(WAIT_S)
-    site = Site(stream, f"ws://127.0.0.1:{bound.getsockname()[1]}/", _first())
+    site = Site(stream, bound.getsockname()[1], _first())
     site.show(0)
     yield site
     server.should_exit = True
@@ -180,6 +186,28 @@ def test_a_nonsense_width_changes_nothing(site: Site, said: str):
         site.show(1)
         width = next_header(client)["picture"]["width"]
     assert width == MAX_WIDTH_PX
+
+
+def test_what_a_page_looks_at_is_heard_until_it_leaves(site: Site):
+    looks = site.stream._looks
+    with site.connected() as page:
+        page.send(json.dumps({"selected": 7, "hides_3d": True}))
+        _heard(page)
+        assert (looks.selected, looks.hiding) == (7, 1)
+        for nonsense in ('{"selected": "7"}', '{"selected": -1}', '{"selected": 1e400}', '{"hides_3d": 2}'):
+            page.send(nonsense)
+        _heard(page)
+        assert (looks.selected, looks.hiding) == (7, 1)
+        page.send(json.dumps({"selected": None}))
+        _heard(page)
+        assert looks.selected is None
+    with site.connected() as other:
+        next_header(other)
+        for _ in range(100):
+            _heard(other)
+            if looks.hiding == 0:
+                break
+    assert looks.hiding == 0
 
 
 def _heard(client: ClientConnection) -> None:

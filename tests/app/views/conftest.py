@@ -26,6 +26,7 @@ from pipeline.types import (
     EgoState,
     Frame,
     FusedObject,
+    Ground,
     Layers,
     LidarTrack,
     Obstacle,
@@ -129,6 +130,7 @@ def make_result(index: int = 0) -> Result:
         layers=Layers(
             points, kind, obstacles, tracks, (),
             {7: (139.0, 53.0, 183.0, 90.0)}, {7: (140.0, 55.0, 182.0, 88.0), 10: (300.0, 40.0, 310.0, 70.0)},
+            ground=Ground(kind == GROUND, np.array([[0.0, 0.0, 1.0, 1.2]]), np.array([-50.0, 50.0]), np.ones(1, bool)),
         ),
     )  # fmt: skip
 

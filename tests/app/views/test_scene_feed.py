@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from app.engine import Engine
+from app.looks import Looks
 from app.scene_feed import SceneFeed
 from pipeline.params import Params
 from tests.app.recording import CountingDetector, Recording, opener
@@ -40,6 +41,33 @@ def test_who_comes_to_look_sees_the_present_frame_and_the_ones_after(engine: Eng
         engine.control.seek(1)
         client.read_until(_is_cloud)
     assert feed.drawn >= 2
+
+
+def test_a_page_that_hides_its_3d_view_costs_nothing_until_it_shows_it_again(engine: Engine, open_scene: Any) -> None:
+    looks, page = Looks(), object()
+    with SceneFeed(engine, looks) as feed:
+        client = open_scene(feed.port)
+        client.look()
+        client.read_until(_is_cloud)
+        looks.hide(page, True)
+        for index in range(1, 4):
+            engine.control.seek(index)
+            engine.wait_for(lambda shown, index=index: shown.index == index, WAIT_S)
+        looks.hide(page, False)
+        client.read_until(_is_cloud)
+    assert feed.drawn == 2, "the first one and the last one"
+
+
+def test_what_is_selected_at_a_page_is_marked_in_the_3d_view(engine: Engine, open_scene: Any) -> None:
+    tick = engine.snapshot.tick
+    assert tick is not None
+    looks = Looks()
+    with SceneFeed(engine, looks) as feed:
+        client = open_scene(feed.port)
+        client.look()
+        client.read_until(_is_cloud)
+        looks.select(tick.result.objects[0].id)
+        client.read_until(lambda message: message.get("name") == "/selection")
 
 
 def test_a_slider_of_the_3d_view_reaches_the_engine(engine: Engine, open_scene: Any) -> None:

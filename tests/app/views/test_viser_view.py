@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 from app.views.viser_gui import ParamsGui
-from app.views.viser_view import ViserView
+from app.views.viser_view import POSES, ViserView
 from pipeline.params import Params, with_changes
-from pipeline.types import Frame, Layers, Result
+from pipeline.path.lane_types import EgoLane, LaneLine
+from pipeline.types import Cipv, Frame, Layers, Result
 
 Ticks = list[tuple[Frame, Result]]
 Changes = queue.Queue[tuple[str, Any]]
@@ -76,7 +77,9 @@ def test_labels_and_the_ego_car_follow_the_newest_frame(
     view: ViserView, frame: Frame, result: Result, open_scene: Any
 ) -> None:
     view.show(frame, result)
-    layers = dataclasses.replace(result.layers, points=result.layers.points + np.float32([0, 0, 0.5, 0]))
+    assert result.layers.ground is not None
+    planes = result.layers.ground.planes - [0.0, 0.0, 0.0, 0.5]
+    layers = dataclasses.replace(result.layers, ground=dataclasses.replace(result.layers.ground, planes=planes))
     nearer = dataclasses.replace(result.objects[0], distance_m=11.0)
     view.show(frame, dataclasses.replace(result, objects=(nearer, *result.objects[1:]), layers=layers))
     client = open_scene(view.port)
@@ -84,6 +87,48 @@ def test_labels_and_the_ego_car_follow_the_newest_frame(
     assert client.texts() == ["#7 car 11.0 m"]
     placed = [each for each in client.messages if each["type"] == "SetPositionMessage" and each["name"] == "/ego"]
     assert placed[-1]["position"][2] == pytest.approx(-1.2 + 0.5 + 1.5 / 2, abs=1e-3), "on this frame's ground"
+
+
+def test_the_selected_object_is_marked_and_named_until_another_one_is(
+    view: ViserView, frame: Frame, result: Result, open_scene: Any
+) -> None:
+    view.show(frame, result)
+    view.select(8)
+    client = open_scene(view.port)
+    client.read_present_state()
+    assert client.nodes()["/selection"]
+    assert sorted(client.texts()) == ["#7 car 19.9 m", "#8 obstacle 15.9 m"]
+    view.select(None)
+    client.read_until(lambda each: each["type"] == "SetSceneNodeVisibilityMessage" and each["name"] == "/selection")
+    assert not client.nodes()["/selection"]
+
+
+def test_lanes_and_the_next_vehicle_are_drawn_where_there_are_any(
+    view: ViserView, frame: Frame, result: Result, open_scene: Any
+) -> None:
+    line = LaneLine("left", np.array([1.8, 0.0, 0.0, 0.0]), np.eye(4), 3.0, 30.0, 1.0, 0.0)
+    layers = dataclasses.replace(result.layers, lanes=EgoLane(line, None, "classical", 0.0, 0.0, None, np.zeros(3)))
+    following = Cipv(8, 15.9, None, None, "next")
+    view.show(frame, dataclasses.replace(result, layers=layers, next_cipv=following))
+    client = open_scene(view.port)
+    client.read_present_state()
+    assert client.nodes()["/path/lanes"]
+    assert client.nodes()["/next_cipv"]
+    view.show(frame, result)
+    late = open_scene(view.port)
+    late.read_present_state()
+    assert not late.nodes()["/path/lanes"]
+    assert not late.nodes()["/next_cipv"]
+
+
+@pytest.mark.parametrize("name", POSES)
+def test_a_button_takes_the_camera_of_whoever_pressed_it_there(view: ViserView, open_scene: Any, name: str) -> None:
+    client = open_scene(view.port)
+    client.read_present_state()
+    group = next(each for each in client.messages if each["type"] == "GuiButtonGroupMessage")
+    client.move(group["uuid"], name)
+    moved = client.read_until(lambda each: each["type"] == "SetCameraPositionMessage" and not each.get("initial"))
+    assert moved["position"] == pytest.approx(POSES[name].eye)
 
 
 def test_a_thousand_objects_later_a_late_browser_gets_no_more_than_at_first(
