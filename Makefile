@@ -42,7 +42,7 @@ suite: install
 	@$(BIN)/python -m pytest -q tests/accuracy -s
 	@$(BIN)/cipv scenarios run --suite all --report build/experiments.html --drives build/drives --json > build/experiments.json
 
-# Memory over a drive looped 100 times. Writes build/soak.json.
+# Memory over a drive looped 100 times; live sensors for ten minutes with every fault. Writes build/soak*.json.
 soak: install
 	@mkdir -p build
 	@$(BIN)/python -m pytest -q -m soak tests/soak -s

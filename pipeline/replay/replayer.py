@@ -37,15 +37,16 @@ def replay(
     speed: float = 1.0,
     T_ego_lidar: F64 | None = None,
     faults: Sequence[Fault] = (),
+    start_ns: int | None = None,
     stopped: Callable[[], bool] = lambda: False,
-    on_sent: Callable[[WireEvent], None] = lambda event: None,
 ) -> Sent:
-    """Play to the end, or until ``stopped``. A sensor that nobody listens to is left out."""
+    """Play to the end, or until ``stopped``. A sensor that nobody listens to is left out. start_ns: when to begin,
+    unix, by default soon; faults are counted from it."""
     wanted = (message for message in messages if message.sensor in senders)
     first = next(iter(wanted), None)
     if first is None:
         return Sent()
-    start_ns = time.time_ns() + _START_IN_NS
+    start_ns = time.time_ns() + _START_IN_NS if start_ns is None else start_ns
     events = to_wire(chain([first], wanted), start_ns, speed, T_ego_lidar)
     sent = Sent()
     plugged = dict.fromkeys(senders, True)
@@ -55,7 +56,6 @@ def replay(
         sent.late += time.time_ns() - event.send_ns > _LATE_NS
         senders[event.sensor].send(event.payload, event.stamp_ns)
         sent.events[event.sensor] = sent.events.get(event.sensor, 0) + 1
-        on_sent(event)
     return sent
 
 

@@ -1,0 +1,84 @@
+"""A car for the soak: `python -m tests.soak.live_car CONFIG SECONDS FAULTS`.
+
+In a process of its own, as sensors are: LiDAR 10 Hz, camera 1280×720 at 30 Hz, GNSS 10 Hz, of two seconds of a
+simulated drive played to and fro. Says when it begins (unix ns) on a line, and in the end what it sent, as JSON.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from pipeline.replay.faults import load as load_faults
+from pipeline.replay.messages import Message
+from pipeline.replay.replayer import replay
+from pipeline.replay.senders import open_senders
+from pipeline.simulation import scenario, world
+from pipeline.simulation.sensors import Sensors
+from pipeline.sources.live.config import load
+from pipeline.types import CameraCalibration, Frame
+
+SCENARIO, FROM_S, SPAN = "straight", 8.6, 20
+MS = 1_000_000
+LEAD_M = (22.0, 25.5)
+"""Where the car ahead is in these two seconds, the nearest and the farthest."""
+
+
+def clip() -> tuple[list[Frame], list[bytes]]:
+    """``SPAN`` frames of the LiDAR, and three pictures to each."""
+    drive = scenario.load(SCENARIO)
+    sensors = Sensors(drive, world.at(drive, drive.duration_s).s_m)
+    frames, jpegs = [], []
+    for number in range(3 * SPAN):
+        frame = sensors.frame(world.at(drive, FROM_S + number / 30.0), number, 0)
+        if number % 3 == 0:
+            frames.append(frame)
+        assert frame.picture is not None
+        jpegs.append(bytes(cv2.imencode(".jpg", frame.picture.bgr, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()))
+    return frames, jpegs
+
+
+def camera() -> CameraCalibration:
+    drive = scenario.load(SCENARIO)
+    return Sensors(drive, 0.0).camera
+
+
+def messages(frames: list[Frame], jpegs: list[bytes], seconds: float) -> Iterator[Message]:
+    for tick in range(round(seconds * 10)):
+        for third in range(3):
+            at_ns = tick * 100 * MS + third * 33_333_333
+            if third == 0:
+                frame = frames[_to_and_fro(tick, len(frames))]
+                assert frame.sweep is not None
+                assert frame.gnss is not None
+                yield Message(at_ns, "lidar", frame.sweep)
+                yield Message(at_ns, "gnss", frame.gnss)
+            yield Message(at_ns + 5 * MS, "camera", jpegs[_to_and_fro(3 * tick + third, len(jpegs))])
+
+
+def _to_and_fro(number: int, count: int) -> int:
+    place = number % (2 * count - 2)
+    return int(np.minimum(place, 2 * count - 2 - place))
+
+
+def main(config_file: str, seconds: str, faults_file: str) -> None:
+    config = load(config_file)
+    faults = load_faults(Path(faults_file))
+    frames, jpegs = clip()
+    senders = open_senders(config)
+    start_ns = time.time_ns() + 500 * MS
+    print(start_ns, flush=True)
+    sent = replay(messages(frames, jpegs, float(seconds)), senders, faults=faults, start_ns=start_ns)
+    for sender in senders.values():
+        sender.close()
+    print(json.dumps({"sent": sent.events, "late": sent.late}), flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
