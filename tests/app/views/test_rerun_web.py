@@ -1,0 +1,113 @@
+"""rerun's web viewer, taken out of the installed program and served by us."""
+
+from __future__ import annotations
+
+import stat
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import httpx
+import pytest
+
+from app.engine import Engine
+from app.server import Server, create_app, listen_socket
+from app.views.rerun_web import FILES, NoViewer, ViewerFiles
+from pipeline.params import Params
+from tests.app.recording import CountingDetector, Recording, opener
+
+WAIT_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[httpx.Client]:
+    """A real server on a small drive."""
+    engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car", whole_drives=True)
+    engine.start()
+    engine.wait_for(lambda s: s.tick is not None and s.drive.run is not None, WAIT_S)
+    bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
+    address = f"http://127.0.0.1:{bound.getsockname()[1]}"
+    server = Server(create_app(engine), address, lambda _: is_ready.set())
+    thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
+    thread.start()
+    assert is_ready.wait(WAIT_S)
+    with httpx.Client(base_url=address, timeout=WAIT_S) as client:
+        yield client
+    server.should_exit = True
+    thread.join()
+    engine.stop()
+
+
+def test_the_viewer_is_opened_at_the_shown_frame_with_every_file_from_here(client: httpx.Client):
+    address = client.get("/api/rerun/open").json()
+    assert (address["url"], address["first"], address["last"]) == ("/rerun/?first=0&last=29&paused=1", 0, 29)
+    page = client.get(address["url"])
+    policy = page.headers["content-security-policy"]
+    assert "connect-src 'self' blob: data:" in policy
+    assert "http" not in policy, "nobody else may be asked for anything"
+    assert "unsafe-eval" not in policy.replace("'wasm-unsafe-eval'", "")
+    script, program = (client.get(f"/rerun/{name}") for name in FILES)
+    assert script.headers["content-type"].startswith("text/javascript")
+    assert "WebHandle" in script.text
+    assert (program.headers["content-type"], program.content[:4]) == ("application/wasm", b"\0asm")
+    assert client.get("/rerun/page.js").status_code == 200
+
+
+@pytest.mark.parametrize("name", ["rerun", "..%2f..%2fpyproject.toml", "home"])
+def test_nothing_else_is_served_there(client: httpx.Client, name: str):
+    assert client.get(f"/rerun/{name}").status_code == 404
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Callable[[str], Path]:
+    """A stand-in for the rerun program: a Python script with this body."""
+
+    def write(body: str) -> Path:
+        file = tmp_path / "rerun"
+        file.write_text(f"#!{sys.executable}\n{body}\n", encoding="utf-8")
+        file.chmod(file.stat().st_mode | stat.S_IXUSR)
+        return file
+
+    return write
+
+
+def test_a_program_without_a_viewer_is_told_in_one_sentence(program: Callable[[str], Path]):
+    viewer = ViewerFiles(program("raise SystemExit(3)"))
+    with pytest.raises(NoViewer, match="ended without serving"):
+        viewer.path(FILES[0])
+    viewer.close()
+
+
+def test_a_program_that_is_not_there_is_told_in_one_sentence(tmp_path: Path):
+    with pytest.raises(NoViewer, match="cannot be started"):
+        ViewerFiles(tmp_path / "nowhere").path(FILES[0])
+    with pytest.raises(NoViewer, match="no file"):
+        ViewerFiles().path("../../etc/passwd")
+
+
+_SERVES = """
+import http.server, os, sys
+assert os.environ["CI"] == "true" and os.environ["HOME"] != os.path.expanduser("~root"), os.environ
+assert sys.argv[sys.argv.index("--bind") + 1] == "127.0.0.1"
+class Handler(http.server.BaseHTTPRequestHandler):
+    def do_GET(self):
+        self.send_response(200)
+        self.end_headers()
+        self.wfile.write(self.path.encode())
+    def log_message(self, *args):
+        pass
+port = int(sys.argv[sys.argv.index("--web-viewer-port") + 1])
+http.server.HTTPServer(("127.0.0.1", port), Handler).serve_forever()
+"""
+
+
+def test_the_files_are_fetched_once_over_loopback_and_removed_at_the_end(program: Callable[[str], Path]):
+    viewer = ViewerFiles(program(_SERVES))
+    script = viewer.path(FILES[0])
+    assert script.read_text() == f"/{FILES[0]}"
+    program("raise SystemExit(3)")
+    assert viewer.path(FILES[1]).read_text() == f"/{FILES[1]}", "the program is not asked again"
+    assert sorted(file.name for file in script.parent.iterdir()) == sorted(FILES)
+    viewer.close()
+    assert not script.parent.exists()
