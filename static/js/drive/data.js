@@ -2,21 +2,21 @@
 import { newestOnly, request } from "../api.js";
 import { get, on, set } from "../store.js";
 
-/** @typedef {import("../types.js").DriveState} DriveState */
 /** @typedef {import("../types.js").Series} Series */
 /** @typedef {import("../types.js").Drive} Drive */
+/** @typedef {Pick<Drive, "events"|"comparison">} Findings */
 
-/** While a run is under way it is looked at no more often. */
-const PAUSE_MS = 200;
+/** While a run is under way, columns are fetched no more often than this, and what is found in them less often. */
+const PAUSE_MS = 200, FINDINGS_PAUSE_MS = 1000;
 
 let known = "";
-/** @type {Record<number, Series>} series of the runs shown, by run */
+/** @type {Record<number, Series>} the runs shown, by number */
 let held = {};
+let foundAt_ms = -Infinity;
 
 const refresh = newestOnly(async (/** @type {string} */ key) => {
-  await fetchAll().catch(() => (known = ""));
-  if (get("state")?.drive?.running) await new Promise((done) => setTimeout(done, PAUSE_MS));
-  return void key;
+  await fetchAll().catch(() => key === known && (known = ""));
+  if (get("state")?.drive.running) await new Promise((done) => setTimeout(done, PAUSE_MS));
 });
 
 export function setUp() {
@@ -25,27 +25,25 @@ export function setUp() {
 
 function follow() {
   const state = get("state");
-  const key = `${state?.uri} ${state?.drive?.revision} ${state?.drive?.run} ${state?.drive?.base}`;
-  if (key === known || !state?.drive) return;
+  if (!state || state.live || state.drive.run === null) return;
+  const { revision, run, base } = state.drive, key = `${state.uri} ${revision} ${run} ${base}`;
+  if (key === known) return;
   known = key;
   refresh(key);
 }
 
 async function fetchAll() {
   const state = get("state");
-  if (!state?.drive || state.drive.run === null) return;
+  if (!state || state.drive.run === null) return;
   const { run, base } = state.drive;
-  const before = get("drive");
-  const isSame = before?.uri === state.uri;
-  if (!isSame) held = {};
+  const before = get("drive")?.uri === state.uri ? get("drive") : null;
+  if (!before) held = {};
   const [now, t_s] = await fetchSeries(run, "api/drive");
   const [old] = base === null || base === run ? [null] : await fetchSeries(base, `api/runs/${base}/columns`);
   held = Object.fromEntries([now, old].filter((series) => series !== null).map((series) => [series.run, series]));
-  const [{ events }, comparison] = await Promise.all([
-    request("api/drive/events"), old ? request(`api/compare?base=${old.run}&run=${now.run}`).catch(() => null) : null,
-  ]);
+  const found = await findings(before, now, old);
   if (get("state")?.uri !== state.uri) return;
-  set("drive", { uri: state.uri, count: state.count, t_s: t_s.length ? t_s : before?.t_s ?? [], now, base: old, events, comparison });
+  set("drive", { uri: state.uri, count: state.count, t_s: t_s.length ? t_s : before?.t_s ?? [], now, base: old, ...found });
 }
 
 /**
@@ -63,4 +61,15 @@ async function fetchSeries(run, path) {
 function extended({ run, columns }, more) {
   const joined = Object.entries(more.columns).map(([name, values]) => [name, [...columns[/** @type {keyof typeof columns} */ (name)].slice(0, more.from), ...values]]);
   return { run, done: more.done, columns: Object.fromEntries(joined) };
+}
+
+/** Events, and how the two runs differ. @param {Drive|null} before @param {Series} now @param {Series|null} base @returns {Promise<Findings>} */
+async function findings(before, now, base) {
+  const isSame = before?.now?.run === now.run && before.base?.run === base?.run;
+  if (isSame && get("state")?.drive.running && performance.now() - foundAt_ms < FINDINGS_PAUSE_MS) return before;
+  foundAt_ms = performance.now();
+  const [{ events }, comparison] = await Promise.all([
+    request("api/drive/events"), base ? request(`api/compare?base=${base.run}&run=${now.run}`).catch(() => null) : null,
+  ]);
+  return { events, comparison };
 }

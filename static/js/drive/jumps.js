@@ -1,9 +1,6 @@
 /** From event to event, and from difference to difference. */
 import { get } from "../store.js";
-import { seekTo } from "./seek.js";
-
-/** The frame that jumps start from: where a seek is going, else the shown one. */
-const here = () => get("scrub") ?? get("state")?.index ?? 0;
+import { here, seekTo } from "./seek.js";
 
 /** @param {number[]} places ascending @param {number} from @param {1|-1} direction */
 export function next(places, from, direction) {

@@ -1,9 +1,8 @@
 /** Marking a stretch of the recording: in, out, and none. */
 import { $, text } from "../dom.js";
+import { here } from "../drive/seek.js";
 import { clock } from "../format.js";
 import { get, on, set } from "../store.js";
-
-const here = () => get("scrub") ?? get("state")?.index ?? 0;
 
 export function setUp() {
   $("#clip-in").addEventListener("click", markIn);

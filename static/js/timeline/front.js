@@ -1,5 +1,6 @@
 /** What of the timeline moves with the frame: cursor, the values at it, and the marked clip. Cheap: ten times a second. */
 import { color, ui } from "../colors.js";
+import { here } from "../drive/seek.js";
 import { DASH, num } from "../format.js";
 import { get } from "../store.js";
 import { colorOf } from "./ribbon.js";
@@ -16,7 +17,7 @@ const VALUE = '600 10.5px system-ui, "DejaVu Sans", sans-serif';
  */
 export function drawFront(ctx, size, span, rows, { isLight, hover }) {
   drawClip(ctx, size, span, rows);
-  const index = get("scrub") ?? get("state")?.index ?? 0;
+  const index = here();
   if (hover !== null && hover !== index) drawLine(ctx, span, hover, ui("dim"), rows.axis.height, size.height);
   drawLine(ctx, span, index, ui("accent"), 0, size.height);
   drawHandle(ctx, span, index);

@@ -1,6 +1,7 @@
 /** The timeline: the whole recording at a glance. Its still part and its moving part lie on two canvases. */
 import { ui } from "../colors.js";
 import { $, el, fitted, memory, press, text } from "../dom.js";
+import { here } from "../drive/seek.js";
 import { clock, num } from "../format.js";
 import { get, on, paint, painter } from "../store.js";
 import { drawBack } from "./back.js";
@@ -28,8 +29,7 @@ const redrawFront = painter(drawMoving);
 export function setUp() {
   $("#timeline-curves").append(...CURVES.map(chip));
   on(["drive", "curve", "selection", "theme"], redraw);
-  let count = 0;
-  on(["state"], () => (count !== (count = get("state")?.count ?? 0) ? redraw() : undefined));
+  on(["state"], () => frames() !== span.count && redraw());
   on(["state", "scrub", "clip"], redrawFront);
   paint(["state", "drive"], describe);
   new ResizeObserver(redraw).observe(back);
@@ -39,6 +39,9 @@ export function setUp() {
   events.setUp();
 }
 
+/** How many frames there are to show. */
+const frames = () => Math.max(1, (get("state")?.live ? get("drive")?.count : get("state")?.count) ?? 1);
+
 /** Show the whole recording. */
 export function fit() {
   span.fit();
@@ -47,7 +50,7 @@ export function fit() {
 
 /** @param {1|-1} direction in or out, around the cursor */
 export function zoom(direction) {
-  span.zoom(direction > 0 ? 0.6 : 1 / 0.6, span.middle(get("state")?.index ?? 0));
+  span.zoom(direction > 0 ? 0.6 : 1 / 0.6, span.middle(here()));
   redraw();
 }
 
@@ -71,7 +74,7 @@ const rows = () => shared;
 
 function draw() {
   const { ctx, width, height } = fitted(back);
-  span.setCount(get("state")?.count ?? 1);
+  span.setCount(frames());
   span.left = LABELS_PX;
   span.width = Math.max(1, width - LABELS_PX - EDGE_PX);
   shared = shareOut(height, Boolean(get("drive")?.base), curves);
@@ -83,12 +86,12 @@ function draw() {
 
 function drawMoving() {
   const state = get("state");
-  if (!state?.count) return;
-  if (state.playing && span.reveal(state.index)) return redraw();
+  if (!state?.frame) return;
+  if (state.playing && span.reveal(here())) return redraw();
   const { ctx, width, height } = fitted(front);
   drawFront(ctx, { width, height }, span, shared, { isLight, hover });
-  front.setAttribute("aria-valuemax", String(Math.max(0, state.count - 1)));
-  front.setAttribute("aria-valuenow", String(get("scrub") ?? state.index));
+  front.setAttribute("aria-valuemax", String(frames() - 1));
+  front.setAttribute("aria-valuenow", String(here()));
   front.setAttribute("aria-valuetext", `frame ${state.frame ?? ""}, ${clock(state.time_s)}`);
 }
 

@@ -1,0 +1,65 @@
+/** Live sensors have no whole recording: the timeline shows the last minutes as they came, and then lets go of them. */
+import { get, on, set } from "../store.js";
+
+/** @typedef {import("../types.js").Columns} Columns */
+/** @typedef {import("../types.js").Frame} Frame */
+
+const MOST_FRAMES = 1200;
+
+/** @type {{[K in keyof Columns]: (frame: Frame) => Columns[K][number]}} */
+const OF_FRAME = {
+  cipv_id: ({ result }) => result.cipv?.id ?? null,
+  source: (frame) => lead(frame)?.source ?? null,
+  carried: (frame) => lead(frame)?.carried ?? null,
+  distance_m: ({ result }) => result.cipv?.distance_m ?? null,
+  closing_speed_mps: ({ result }) => result.cipv?.closing_speed_mps ?? null,
+  ttc_s: ({ result }) => result.cipv?.ttc_s ?? null,
+  path_offset_m: (frame) => lead(frame)?.path_offset_m ?? null,
+  speed_mps: ({ result }) => result.ego?.speed_mps ?? null,
+  desired_speed_mps: ({ result }) => result.acc?.desired_speed_mps ?? null,
+  accel_mps2: ({ result }) => result.acc?.accel_mps2 ?? null,
+  brake: ({ result }) => result.acc?.brake ?? null,
+  acc_state: ({ result }) => result.acc?.state ?? null,
+  next_cipv_id: ({ result }) => result.next_cipv?.id ?? null,
+  objects: ({ result }) => result.objects.length,
+  gaps: () => "",
+  vl_disagreement_m: () => null,
+  notes: ({ result }) => result.notes.length,
+};
+const NAMES = /** @type {(keyof Columns)[]} */ (Object.keys(OF_FRAME));
+
+/** @type {string|null} */
+let uri = null;
+/** @type {number[]} */
+let times = [];
+let columns = empty();
+
+export function setUp() {
+  on(["frame"], remember);
+}
+
+/** @param {Frame} frame */
+const lead = ({ result }) => result.objects.find(({ id }) => id === result.cipv?.id);
+
+/** @returns {Columns} */
+function empty() {
+  return /** @type {any} */ (Object.fromEntries(NAMES.map((name) => [name, []])));
+}
+
+function remember() {
+  const frame = get("frame");
+  if (!frame?.state.live) return;
+  if (frame.state.uri !== uri) {
+    uri = frame.state.uri;
+    times = [];
+    columns = empty();
+  }
+  if (frame.state.time_s === times.at(-1)) return;
+  times.push(frame.state.time_s);
+  for (const name of NAMES) /** @type {unknown[]} */ (columns[name]).push(OF_FRAME[name](frame));
+  if (times.length > MOST_FRAMES) {
+    times.shift();
+    for (const name of NAMES) columns[name].shift();
+  }
+  set("drive", { uri, count: times.length, t_s: times, now: { run: -1, done: times.length, columns }, base: null, events: [], comparison: null });
+}

@@ -1,0 +1,167 @@
+"""How the page looks and is reached: every view's picture, contrast, touch, keys, layouts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from pipeline.params import Params
+from tests.browser.conftest import START, WAIT_MS, OpenPage, Site
+from tests.browser.judges import LOW_CONTRAST, SMALL_TARGETS
+from tests.browser.looks import COUNT, pixels, repainted, wait_for_frame
+
+WAIT_S = WAIT_MS / 1e3
+SCREENS = Path(__file__).resolve().parents[2] / "build" / "screens"
+"""Pictures of each view, kept as build output."""
+
+pytestmark = pytest.mark.usefixtures("paused_in_traffic")
+
+
+def keep(page: Page, name: str) -> None:
+    SCREENS.mkdir(parents=True, exist_ok=True)
+    pixels(page, "#timeline-back")
+    page.screenshot(path=SCREENS / f"{name}.png")
+
+
+def whole_drive(page: Page, site: Site) -> None:
+    site.engine.wait_for(lambda s: s.drive.done == s.drive.total == COUNT, WAIT_S)
+    expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_words_stand_out_from_their_ground(open_page: OpenPage, site: Site, theme: str):
+    page = open_page(color_scheme=theme)
+    wait_for_frame(page, START)
+    whole_drive(page, site)
+    keep(page, f"dashboard_{theme}")
+    assert page.evaluate(LOW_CONTRAST) == []
+    page.get_by_role("tab", name="Runs").click()
+    page.keyboard.press("?")
+    keep(page, f"help_{theme}")
+    assert page.evaluate(LOW_CONTRAST) == []
+
+
+@pytest.mark.parametrize(("width", "height"), [(1024, 768), (820, 1180)])
+def test_fingers_find_their_targets_on_a_tablet(open_page: OpenPage, site: Site, width: int, height: int):
+    page = open_page(width, height, has_touch=True, is_mobile=True)
+    wait_for_frame(page, START)
+    whole_drive(page, site)
+    keep(page, f"tablet_{width}")
+    assert page.evaluate(SMALL_TARGETS) == []
+    assert page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [
+        width,
+        height,
+    ]
+    page.get_by_role("button", name="Inspect").tap()
+    expect(page.locator("#params")).to_be_visible()
+    keep(page, f"tablet_{width}_inspect")
+    assert page.evaluate(SMALL_TARGETS) == []
+    page.get_by_role("button", name="Inspect").tap()
+    page.locator("#timeline-front").tap(position={"x": 300, "y": 34})
+    site.engine.wait_for(lambda s: s.index != START, WAIT_S)
+
+
+def test_every_view_is_kept_as_a_picture(open_page: OpenPage, site: Site):
+    page = open_page()
+    wait_for_frame(page, START)
+    whole_drive(page, site)
+    page.keyboard.press("a")
+    expect(page.locator("#align-bar")).to_be_visible()
+    keep(page, "align")
+    page.keyboard.press("a")
+    page.locator("#export-button").click()
+    keep(page, "export")
+    page.keyboard.press("Escape")
+    site.engine.control.change_params({"path.half_width_m": 3.0})
+    expect(page.locator("#timeline-facts")).to_contain_text("frames differ")
+    whole_drive(page, site)
+    page.get_by_role("tab", name="Runs").click()
+    keep(page, "what_if")
+    for key, name in (("Shift+1", "camera"), ("Shift+2", "plan"), ("Shift+4", "objects")):
+        page.keyboard.press(key)
+        keep(page, name)
+        page.keyboard.press(key)
+    assert (
+        len({(SCREENS / f"{name}.png").read_bytes() for name in ("align", "what_if", "camera", "plan", "objects")}) == 5
+    )
+
+
+def test_views_have_numbers_and_are_remembered(open_page: OpenPage):
+    page = open_page()
+    panes = {
+        "1": ".camera-pane",
+        "2": ".bev-pane",
+        "4": ".table-pane",
+        "5": ".why-pane",
+        "6": ".params",
+        "7": ".timeline-pane",
+    }
+    for key, pane in panes.items():
+        page.keyboard.press(key)
+        expect(page.locator(pane)).to_be_hidden()
+        if key in "12":
+            page.keyboard.press(key)
+            expect(page.locator(pane)).to_be_visible()
+    page.reload()
+    page.wait_for_selector("#transport .name:not(:empty)")
+    expect(page.locator(".table-pane")).to_be_hidden()
+    expect(page.locator(".camera-pane")).to_be_visible()
+    page.locator("#layout-button").click()
+    page.get_by_label("Name of the layout").fill("bare")
+    page.get_by_role("button", name="Save").click()
+    page.locator("#menu").get_by_role("button", name="Everything").click()
+    expect(page.locator(".table-pane")).to_be_visible()
+    page.locator("#layout-button").click()
+    page.locator("#menu").get_by_role("button", name="bare", exact=True).click()
+    expect(page.locator(".table-pane")).to_be_hidden()
+
+
+def test_a_gutter_is_moved_by_hand_and_by_keys(open_page: OpenPage):
+    page = open_page()
+    plan, gutter = page.locator(".bev-pane"), page.locator("[data-gutter=plan]")
+    before = plan.bounding_box()
+    gutter.focus()
+    page.keyboard.press("ArrowLeft")
+    after = plan.bounding_box()
+    assert before is not None
+    assert after is not None
+    assert after["width"] == pytest.approx(before["width"] + 24, abs=4)
+    gutter.dblclick()
+    assert plan.bounding_box() == before
+
+
+def test_j_k_and_l_play_back_stop_and_on(open_page: OpenPage, site: Site):
+    page = open_page()
+    wait_for_frame(page, START)
+    page.keyboard.press("j")
+    site.engine.wait_for(lambda s: s.index < START - 2, WAIT_S)
+    page.keyboard.press("k")
+    page.keyboard.press("l")
+    site.engine.wait_for(lambda s: s.playing and s.speed == 1.0, WAIT_S)
+    page.keyboard.press("l")
+    site.engine.wait_for(lambda s: s.playing and s.speed == 2.0, WAIT_S)
+    page.keyboard.press("k")
+    site.engine.wait_for(lambda s: not s.playing, WAIT_S)
+
+
+def test_the_help_tells_every_key(open_page: OpenPage):
+    page = open_page()
+    page.keyboard.press("?")
+    told = page.locator("#help-dialog kbd").all_inner_texts()
+    assert len(told) == len(set(told))
+    for key in ("Space", "J", "K", "L", "1", "7", "E", "I", "O", "Ctrl Z", "?"):
+        assert key in told
+
+
+def test_a_gate_leads_to_the_parameter_behind_its_limit(open_page: OpenPage, site: Site):
+    page = open_page()
+    wait_for_frame(page, START)
+    camera = pixels(page, "#camera")
+    page.locator("#why .gate", has_text="From the path's middle").click()
+    focused = page.locator("[data-param='path.half_width_m'] input[type=range]")
+    expect(focused).to_be_focused()
+    page.keyboard.press("ArrowRight")
+    site.engine.wait_for(lambda s: s.params.path.half_width_m > Params().path.half_width_m, WAIT_S)
+    assert repainted(page, "#camera", camera), "the corridor is wider in the picture too"

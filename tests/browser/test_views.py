@@ -1,0 +1,228 @@
+"""Camera and plan: what is drawn, coloured, measured and picked there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.sent_picture import WIDTH_STEP_PX
+from tests.browser.conftest import START, OpenPage, Site
+from tests.browser.looks import box_of, pixels, repainted, wait_for_frame
+
+pytestmark = pytest.mark.usefixtures("paused_in_traffic")
+
+COLOURS = ("object", "range", "height", "intensity", "ring", "cluster", "ground")
+"""``age`` needs a recording that says when each point was measured."""
+AHEAD_M, FROM_M, HALF_WIDTH_M = 79.0, -5.0, 13.0
+"""What the plan shows until somebody moves it (viewport.js)."""
+
+
+def of_store(page: Page, words: str) -> Any:
+    """Something about the page's state: ``words`` is an expression of ``get``."""
+    return page.evaluate(f"async () => {{ const {{ get }} = await import('/js/store.js'); return {words}; }}")
+
+
+def on_plan(page: Page, x_m: float, y_m: float) -> tuple[float, float]:
+    """Where a place of the fitted plan is on the screen."""
+    box = box_of(page.locator("#bev"))
+    per_metre = min(box["height"] / AHEAD_M, box["width"] / (2 * HALF_WIDTH_M))
+    return box["x"] + box["width"] / 2 - y_m * per_metre, box["y"] + box["height"] - (x_m - FROM_M) * per_metre
+
+
+def in_picture(page: Page, u: float, v: float) -> tuple[float, float]:
+    """Where a pixel of the sent picture is on the screen."""
+    box = box_of(page.locator("#camera"))
+    place = page.evaluate("async () => (await import('/js/camera.js')).place()")
+    return box["x"] + place["x"] + u * place["scale"], box["y"] + place["y"] + v * place["scale"]
+
+
+def drag(page: Page, start: tuple[float, float], end: tuple[float, float]) -> None:
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move((start[0] + end[0]) / 2, (start[1] + end[1]) / 2)
+    page.mouse.move(*end)
+    page.mouse.up()
+
+
+def opened(open_page: OpenPage) -> Page:
+    page = open_page()
+    wait_for_frame(page, START)
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    return page
+
+
+@pytest.mark.parametrize(("view", "canvas"), [("camera", "#camera"), ("plan", "#bev")])
+def test_points_take_every_colour_that_is_offered(open_page: OpenPage, view: str, canvas: str):
+    page = opened(open_page)
+    choice = page.get_by_label(f"Colour points of the {view} by")
+    choice.select_option("age")
+    looks = [pixels(page, canvas)]
+    for by in COLOURS:
+        choice.select_option(by)
+        assert repainted(page, canvas, looks[-1]), by
+        looks.append(pixels(page, canvas))
+    assert len(set(looks)) == len(looks), "each one looks different"
+    page.reload()
+    wait_for_frame(page, START)
+    expect(choice).to_have_value(COLOURS[-1])
+
+
+def test_the_tape_measures_metres_in_the_plan(open_page: OpenPage):
+    page = opened(open_page)
+    before = pixels(page, "#bev")
+    page.get_by_role("group", name="Tools of the plan").get_by_role("button", name="Tape").click()
+    drag(page, on_plan(page, 10.0, 3.0), on_plan(page, 40.0, -5.0))
+    tape = of_store(page, "get('tape')")
+    assert [tape["from"][axis] for axis in "xy"] == pytest.approx([10.0, 3.0], abs=0.2)
+    assert [tape["to"][axis] for axis in "xy"] == pytest.approx([40.0, -5.0], abs=0.2)
+    words = page.evaluate("async (tape) => (await import('/js/tape.js')).tapeWords(tape)", tape)
+    assert float(words.split()[0]) == pytest.approx(31.05, abs=0.3)
+    assert repainted(page, "#bev", before)
+    page.get_by_role("group", name="Tools of the plan").get_by_role("button", name="Tape").click()
+    assert of_store(page, "get('tape')") is None
+    assert repainted(page, "#bev", before, like=True), "the plan has not moved"
+
+
+def test_the_tape_holds_on_to_lidar_points_in_the_picture(open_page: OpenPage):
+    page = opened(open_page)
+    points = of_store(
+        page,
+        """(() => {
+          const { count, uv, xyz, kind, picture } = get("frame"), found = [];
+          for (let i = 0; i < count; i++) {
+            const u = uv[2 * i], v = uv[2 * i + 1];
+            if (kind[i] === 2 && u > 0.3 * picture.width && u < 0.7 * picture.width && v > 30 && v < picture.height - 60) {
+              found.push({ u, v, x: xyz[3 * i] / 100, y: xyz[3 * i + 1] / 100, z: xyz[3 * i + 2] / 100 });
+            }
+          }
+          found.sort((a, b) => a.u - b.u);
+          return [found[0], found[found.length - 1]];
+        })()""",
+    )
+    first, last = points
+    page.keyboard.down("Shift")
+    drag(page, in_picture(page, first["u"], first["v"]), in_picture(page, last["u"], last["v"]))
+    page.keyboard.up("Shift")
+    tape = of_store(page, "get('tape')")
+    for end, point in (("from", first), ("to", last)):
+        assert [tape[end][axis] for axis in "uv"] == pytest.approx([point["u"], point["v"]], abs=2)
+        assert tape[end]["z"] is not None
+
+
+def test_a_click_on_a_point_selects_its_object(open_page: OpenPage):
+    page = opened(open_page)
+    point = of_store(
+        page,
+        """(() => {
+          const { count, xyz, owner, result } = get("frame");
+          for (let i = 0; i < count; i++) {
+            const x = xyz[3 * i] / 100, y = xyz[3 * i + 1] / 100;
+            if (owner[i] > 0 && x > 5 && x < 70 && Math.abs(y) < 12) return { x, y, id: result.objects[owner[i] - 1].id };
+          }
+        })()""",
+    )
+    page.mouse.click(*on_plan(page, point["x"], point["y"]))
+    assert of_store(page, "get('selection')") == point["id"]
+    expect(page.locator("tr.is-selected td").first).to_have_text(f"#{point['id']}")
+
+
+def test_what_lies_under_the_pointer_is_named(open_page: OpenPage, site: Site):
+    page = opened(open_page)
+    tick = site.engine.snapshot.tick
+    assert tick is not None
+    lead = tick.result.cipv
+    assert lead is not None
+    item = next(item for item in tick.result.objects if item.id == lead.id)
+    assert item.bev is not None
+    x, y = (sum(corner[axis] for corner in item.bev) / 4 for axis in (0, 1))
+    page.mouse.move(*on_plan(page, x, y))
+    expect(page.locator("#tooltip")).to_contain_text(f"#{lead.id}")
+    expect(page.locator("#tooltip")).to_contain_text(f"{item.distance_m:.1f} m")
+    page.mouse.move(*on_plan(page, 70.0, 12.5))
+    expect(page.locator("#tooltip")).to_be_hidden()
+
+
+def test_a_failed_test_of_the_selected_object_is_drawn_with_its_number(open_page: OpenPage, site: Site):
+    """In the picture at its box, in the plan as a dimension from the path's middle."""
+    page = opened(open_page)
+    tick = site.engine.snapshot.tick
+    assert tick is not None
+    aside = next(
+        item
+        for item in tick.result.objects
+        if item.bev is not None
+        and any(gate.name == "path_offset" and not gate.passed and gate.value is not None for gate in item.gates)
+    )
+    first = next(gate for gate in aside.gates if not gate.passed)
+    words = of_store(
+        page,
+        f"(await import('/js/evidence.js')).failedWords(get('frame').result.objects.find(({{ id }}) => id === {aside.id}))",
+    )
+    assert first.name.replace("_", " ") in words
+    page.evaluate("""() => {
+      window.written = [];
+      const write = CanvasRenderingContext2D.prototype.fillText;
+      CanvasRenderingContext2D.prototype.fillText = function (words, ...rest) {
+        window.written.push(`${this.canvas.id}: ${words}`);
+        return write.call(this, words, ...rest);
+      };
+    }""")
+    page.locator(f"#objects tr[data-id='{aside.id}']").click()
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    gate = next(gate for gate in aside.gates if gate.name == "path_offset")
+    written = page.evaluate("window.written")
+    assert f"bev: {gate.value:.2f} m, limit {gate.limit:.2f}" in written
+    if aside.id in tick.result.layers.vision_boxes or aside.id in tick.result.layers.lidar_boxes:
+        assert f"camera: {words}" in written
+
+
+def test_trails_follow_what_is_played(open_page: OpenPage):
+    page = opened(open_page)
+    for step in range(1, 4):
+        page.keyboard.press("ArrowRight")
+        wait_for_frame(page, START + step)
+    lengths = page.evaluate(
+        """async () => {
+          const { get } = await import("/js/store.js"), { trailOf } = await import("/js/trails.js");
+          return get("frame").result.objects.map(({ id }) => trailOf(id).length);
+        }"""
+    )
+    assert max(lengths) == 4
+    before = pixels(page, "#bev")
+    page.locator("#bev-layers").get_by_role("button", name="Trails").click()
+    assert repainted(page, "#bev", before)
+    page.keyboard.press("Home")
+    wait_for_frame(page, 0)
+    assert page.evaluate("async () => (await import('/js/trails.js')).trailOf(1).length") <= 1, "a jump ends them"
+
+
+def test_the_plan_shows_all_around_and_ahead_again(open_page: OpenPage):
+    page = opened(open_page)
+    ahead = pixels(page, "#bev")
+    tools = page.get_by_role("group", name="Tools of the plan")
+    tools.get_by_role("button", name="Around").click()
+    assert repainted(page, "#bev", ahead)
+    expect(tools.get_by_role("button", name="Around")).to_have_attribute("aria-pressed", "true")
+    tools.get_by_role("button", name="Ahead").click()
+    assert repainted(page, "#bev", ahead, like=True)
+
+
+def test_no_wider_picture_is_sent_than_is_shown(open_page: OpenPage, site: Site):
+    """And a wider one as soon as the pane grows, though nothing plays."""
+    page = opened(open_page)
+    shown = box_of(page.locator("#camera"))["width"]
+    sent = of_store(page, "get('frame').picture.width")
+    assert sent < shown + WIDTH_STEP_PX
+    page.locator("[data-grow=camera]").click()
+    wide = box_of(page.locator("#camera"))["width"]
+    assert wide > shown + WIDTH_STEP_PX
+    assert page.evaluate(
+        """async (least) => {
+          const { get, on } = await import("/js/store.js");
+          if (get("frame").picture.width >= least) return true;
+          return new Promise((done) => on(["frame"], () => get("frame").picture.width >= least && done(true)));
+        }""",
+        sent + WIDTH_STEP_PX,
+    )
