@@ -59,6 +59,6 @@ class Replay:
             for sender in senders.values():
                 sender.close()
         said = ", ".join(f"{number} {sensor}" for sensor, number in sent.events.items())
-        late = f"; {sent.late} sent over 20 ms late: this machine is too slow" if sent.late else ""
-        print(f"cipv: sent {said or 'nothing'}{late}", file=sys.stderr)
+        slow = f"; {sent.late} late, {sent.skipped} left out: this machine is too slow" if sent.late else ""
+        print(f"cipv: sent {said or 'nothing'}{slow}", file=sys.stderr)
         return 0

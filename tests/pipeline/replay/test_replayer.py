@@ -1,0 +1,82 @@
+"""What is due is sent when it is due; what came too late is not sent at all."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+
+from pipeline.replay.faults import Fault
+from pipeline.replay.messages import Message
+from pipeline.replay.replayer import replay
+
+MS = 1_000_000
+
+
+class Notebook:
+    """A sender that writes down what it is given and when."""
+
+    def __init__(self, takes_s: float = 0.0) -> None:
+        self.sent: list[tuple[int, Any]] = []
+        self.plugs: list[bool] = []
+        self._takes_s = takes_s
+
+    def send(self, payload: Any, stamp_ns: int) -> None:
+        self.sent.append((time.time_ns() - stamp_ns, payload))
+        time.sleep(self._takes_s)
+
+    def plug(self, is_in: bool) -> None:
+        self.plugs.append(is_in)
+
+    def close(self) -> None:
+        pass
+
+
+def pictures(count: int) -> list[Message]:
+    return [Message(k * 10 * MS, "camera", bytes([k % 256])) for k in range(count)]
+
+
+def test_everything_is_sent_in_order_and_not_early() -> None:
+    camera = Notebook()
+    sent = replay(pictures(20), {"camera": camera})
+    assert [payload[0] for _, payload in camera.sent] == list(range(20))[: len(camera.sent)]
+    assert sent.events["camera"] + sent.skipped == 20
+    assert min(late for late, _ in camera.sent) >= 0
+
+
+def test_what_is_too_late_is_left_out_instead_of_lagging_behind() -> None:
+    slow = Notebook(takes_s=0.05)
+    sent = replay(pictures(60), {"camera": slow})
+    assert sent.skipped > 10
+    assert sent.events["camera"] + sent.skipped == 60
+    assert max(late for late, _ in slow.sent) < 1000 * MS, "without that it would be 2.4 s in the end"
+
+
+def test_a_plug_is_pulled_and_put_back() -> None:
+    camera = Notebook()
+    fault = Fault(sensor="camera", kind="disconnect", from_s=0.15, to_s=0.25)
+    replay(pictures(40), {"camera": camera}, faults=[fault])
+    assert camera.plugs == [False, True]
+    assert len(camera.sent) < 40
+
+
+def test_a_sensor_nobody_listens_to_is_left_out_and_nothing_is_nothing() -> None:
+    assert replay(pictures(3), {}).events == {}
+    assert replay([], {"camera": Notebook()}).events == {}
+
+
+def test_it_ends_when_it_is_stopped() -> None:
+    camera = Notebook()
+    sent = replay(pictures(10_000), {"camera": camera}, stopped=lambda: len(camera.sent) >= 3)
+    assert sent.events["camera"] == 3
+
+
+def test_what_goes_wrong_while_making_messages_is_raised() -> None:
+    def broken():
+        yield from pictures(2)
+        raise ValueError("no more frames")
+
+    camera = Notebook()
+    with pytest.raises(ValueError, match="no more frames"):
+        replay(broken(), {"camera": camera})
