@@ -17,7 +17,9 @@ import tyro
 from app.options import LineOptions, SourceOptions
 from app.progress import frames_progress
 from app.recording import SESSIONS, new_session
+from pipeline.errors import BadInput
 from pipeline.params import Params
+from pipeline.recording.packets import RawLidar
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.save import about
 from pipeline.recording.segments import Rotation, Segments
@@ -41,6 +43,8 @@ class Record:
     line: LineOptions = field(default_factory=LineOptions)
     seconds: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
     """Stop after this time of the drive"""
+    packets: bool = False
+    """Live: keep the LiDAR's raw packets instead of its clouds; they are decoded anew when the session is opened"""
     rotate_mb: Annotated[float | None, tyro.conf.arg(metavar="MB")] = None
     """Go on in a new file when one has reached this size"""
     rotate_minutes: Annotated[float | None, tyro.conf.arg(metavar="MIN")] = None
@@ -52,6 +56,8 @@ class Record:
         with _asked_to_stop() as asked:
             if live is not None:
                 return self._live(live, params, asked)
+            if self.packets:
+                raise BadInput("--packets is for live sensors; a recording has none")
             return self._offline(self.source.open(), params, asked)
 
     def _offline(self, source: Source, params: Params, asked: Event) -> int:
@@ -69,7 +75,7 @@ class Record:
     def _live(self, source: LiveSource, params: Params, asked: Event) -> int:
         """Sensors do not wait: what the disk is too slow for is dropped, and said."""
         detectors = self.line.open_detectors(source)
-        recorder = Recorder(new_session(self.out, source.title), about(source), self._rotation)
+        recorder = self._recorder(source)
         with frames_progress() as bar:
             task = bar.add_task(source.title, total=None)
             ran = run_live(source, params, detectors, on_silence=lambda: _end_if(asked))
@@ -85,6 +91,17 @@ class Record:
         if state.error is not None:
             print(f"cipv: {state.error}", file=sys.stderr)
         return 0 if state.error is None else 1
+
+    def _recorder(self, source: LiveSource) -> Recorder:
+        """Of clouds, or of the packets that they are made of."""
+        path, mount = new_session(self.out, source.title), source.lidar_mount
+        if not self.packets:
+            return Recorder(path, about(source), self._rotation)
+        if mount is None:
+            raise BadInput(f"--packets: {source.uri} has no LiDAR")
+        recorder = Recorder(path, about(source), self._rotation, raw_lidar=RawLidar(*mount))
+        source.tap_lidar(recorder.put_packet)
+        return recorder
 
     @property
     def _rotation(self) -> Rotation:

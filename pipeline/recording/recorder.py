@@ -29,6 +29,9 @@ FLUSH_S, SYNC_S = 1.0, 5.0
 _QUEUED = 64
 """Six seconds of frames at 10 Hz; with pictures of 1280×720 that is 200 MB at worst."""
 
+_BATCH = 76
+"""A VLP-16 sends about so many packets a rotation."""
+
 _Job = Callable[[Segments], None]
 
 
@@ -73,6 +76,7 @@ class Recorder:
         self._segments = Segments(path, about, rotation, "lz4", raw_lidar)
         self._jobs: queue.Queue[_Job | None] = queue.Queue(queued)
         self._marks: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._batch: list[tuple[int, bytes]] = []
         self._dropped = 0
         self._error: str | None = None
         self._thread = threading.Thread(target=self._work, name="cipv-recorder", daemon=True)
@@ -95,6 +99,13 @@ class Recorder:
         Returns at once; false when they were dropped."""
         return self._put(lambda segments: segments.write_packets(packets))
 
+    def put_packet(self, t_ns: int, payload: bytes) -> None:
+        """Record a raw LiDAR packet; they are written a sweep's at a time. For one thread. t_ns: when it arrived."""
+        self._batch.append((t_ns, payload))
+        if len(self._batch) >= _BATCH:
+            batch, self._batch = self._batch, []
+            self.put_packets(batch)
+
     def mark(self, text: str) -> None:
         """ "Something happened here": never dropped. Returns at once."""
         self._marks.put(text)
@@ -116,6 +127,8 @@ class Recorder:
     def stop(self) -> RecordingState:
         """Write what is queued, close the file, and say how it went. Safe to call twice."""
         if self._thread.is_alive():
+            if self._batch:
+                self.put_packets(self._batch)
             self._jobs.put(None)
             self._thread.join()
         return self.state

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeGuard, runtime_checkable
 
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.params import SyncParams
-from pipeline.types import CameraCalibration, Frame, StreamHealth
-
+from pipeline.types import F64, CameraCalibration, Frame, StreamHealth
 
 LIVE = "live:"
 """Scheme of what is read from devices."""
@@ -77,6 +77,15 @@ class LiveSource(Protocol):
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
         """The newest tick not given yet; null when none came in time. A tick is a whole LiDAR sweep with the nearest
         picture, or, while the LiDAR is silent, a picture. ``params``: how sensors are put together, as it stands."""
+        ...
+
+    @property
+    def lidar_mount(self) -> tuple[F64, int] | None:
+        """T_ego_lidar (4, 4) and what is added to the LiDAR's stamps in ns; null when there is none."""
+        ...
+
+    def tap_lidar(self, on_packet: Callable[[int, bytes], object]) -> None:
+        """Have each of the LiDAR's data packets told, with when it arrived in ns, on another thread."""
         ...
 
     def health(self) -> tuple[StreamHealth, ...]:

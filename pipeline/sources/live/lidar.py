@@ -19,15 +19,18 @@ _HOUR_NS = 3_600_000_000_000
 
 class LidarInput:
     """pps: what the last position packet said of the pulse per second; null before one came. follows_gps: the sensor's
-    time is UTC past the hour."""
+    time is UTC past the hour. T_ego_lidar: (4, 4), where it sits. offset_ns: what is added to its stamps. on_packet:
+    told each data packet and when it arrived."""
 
     def __init__(self, config: LidarConfig, clock: HostClock, deliver: Deliver[Sweep]) -> None:
         self.stats = StreamStats("lidar")
         self.pps: str | None = None
         self.follows_gps = False
         self._clock, self._deliver = clock, deliver
-        self._offset_ns = round(config.time_offset_ms * 1e6)
-        self._decoder = Vlp16Decoder(config.mount.T_ego_sensor())
+        self.offset_ns = round(config.time_offset_ms * 1e6)
+        self.T_ego_lidar = config.mount.T_ego_sensor()
+        self.on_packet: Callable[[int, bytes], object] | None = None
+        self._decoder = Vlp16Decoder(self.T_ego_lidar)
         listen = partial(read_datagrams, interface=config.interface, group=config.multicast_group)
         listeners = [("lidar", partial(listen, config.data_port, receive=self.receive))]
         if config.position_port is not None:
@@ -51,6 +54,8 @@ class LidarInput:
         """Take a data packet, received at ``wall_ns`` of the system's clock. The decoder's own clock maps to the host's
         timeline; it is not told of GPS, whose time is not the host's."""
         arrived_ns = self._clock.of_wall_ns(wall_ns)
+        if self.on_packet is not None:
+            self.on_packet(arrived_ns, packet)
         sweep = self._decoder.push(packet, arrived_ns)
         counts = self._decoder.counts
         self.stats.lost, self.stats.refused = counts.lost, sum(counts.refused.values())
@@ -58,7 +63,7 @@ class LidarInput:
             self.stats.note = f"packets of a {', '.join(counts.models)}, not of a VLP-16"
         if sweep is not None:
             self.stats.note = ""
-            t_ns = sweep.t_ns + self._offset_ns
+            t_ns = sweep.t_ns + self.offset_ns
             self.stats.arrived(arrived_ns, t_ns)
             self._deliver(t_ns, sweep, arrived_ns)
 

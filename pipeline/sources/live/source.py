@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
@@ -23,7 +24,7 @@ from pipeline.sources.live.lidar import LidarInput
 from pipeline.sources.live.own_motion import MotionFromGnss
 from pipeline.sources.live.pictures import Shot
 from pipeline.sources.live.sync import Stream, Synchroniser, Together
-from pipeline.types import CameraCalibration, Frame, GnssFix, Picture, StreamHealth, Sweep
+from pipeline.types import F64, CameraCalibration, Frame, GnssFix, Picture, StreamHealth, Sweep
 
 T = TypeVar("T")
 
@@ -87,6 +88,18 @@ class LiveSensors:
             reader.end()
         for reader in readers:
             reader.join()
+
+    @property
+    def lidar_mount(self) -> tuple[F64, int] | None:
+        """T_ego_lidar (4, 4) and what is added to the LiDAR's stamps in ns; null when there is none."""
+        lidar = self.inputs.get("lidar")
+        return (lidar.T_ego_lidar, lidar.offset_ns) if isinstance(lidar, LidarInput) else None
+
+    def tap_lidar(self, on_packet: Callable[[int, bytes], object]) -> None:
+        """Have each of the LiDAR's data packets told, with when it arrived in ns, on the reader's thread."""
+        lidar = self.inputs.get("lidar")
+        if isinstance(lidar, LidarInput):
+            lidar.on_packet = on_packet
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
         """The newest tick not given yet; null when none came in time."""

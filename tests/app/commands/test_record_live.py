@@ -1,0 +1,50 @@
+"""`cipv record live:…` over real sockets: what the sensors sent is in the session, clouds or raw packets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import count
+from pathlib import Path
+
+import pytest
+import yaml
+
+from app.cli import main
+from pipeline.recording.session import SessionSource
+from pipeline.replay.messages import Message
+from tests.pipeline.sources.live.bench import MS, messages
+from tests.pipeline.sources.live.rig import Replaying, loopback_config
+
+
+def endless() -> Iterator[Message]:
+    for second in count():
+        for message in messages(1.0, 30.0):
+            yield message._replace(t_ns=message.t_ns + second * 1000 * MS)
+
+
+@pytest.mark.parametrize("arguments", [(), ("--packets",)], ids=["clouds", "packets"])
+def test_live_sensors_are_recorded(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    config = loopback_config()
+    file, out = tmp_path / "car.yaml", tmp_path / "drive.mcap"
+    file.write_text(yaml.safe_dump(config.model_dump(mode="json", exclude_none=True)), encoding="utf-8")
+    typed = ["record", f"live:{file}", "--out", str(out), "--seconds", "2", "--lanes", "off", *arguments]
+    with Replaying(config, endless()), pytest.raises(SystemExit) as end:
+        main(typed)
+    assert end.value.code == 0
+    session = SessionSource("a", str(out))
+    frames = [session.frame(index) for index in range(len(session))]
+    assert len(frames) >= 5
+    with_sweep = sum(frame.sweep is not None for frame in frames)
+    assert with_sweep >= len(frames) // 2, [frame.notes for frame in frames]
+    assert any(frame.picture is not None and frame.picture.encoded is not None for frame in frames)
+    assert any(frame.gnss is not None for frame in frames)
+    assert any(frame.ego is not None for frame in frames)
+    assert all(frame.streams for frame in frames)
+    results = [session.result(index) for index in range(len(session))]
+    assert all(result is not None and result["sensors"]["lidar"]["state"] for result in results)
+    stored = {stream.channel.topic for stream in session.file.messages()}
+    assert ("/lidar/packets" in stored, "/lidar/points" in stored) == (bool(arguments), not arguments)
+    for index, result in enumerate(results):
+        assert result is not None
+        sweep = frames[index].sweep
+        assert result["sensors"]["lidar"]["points"] in (None, len(sweep.points) if sweep is not None else None)
