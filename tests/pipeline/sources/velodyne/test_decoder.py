@@ -188,6 +188,41 @@ def test_counts_in_words() -> None:
     assert Vlp16Decoder().counts.about_refused() == ""
 
 
+def test_dual_return_gives_both_returns_once() -> None:
+    """Two blocks in a row hold the two returns of the same firings: of a wall behind a fence both are kept, of a wall
+    alone, where the two are the same, one."""
+    packets = [packet for index in range(3) for packet in dual_packets(index)]
+    decoder = Vlp16Decoder()
+    sweeps = decoded(decoder, [(packet, None) for packet in packets])
+    assert len(sweeps) == 3
+    assert not decoder.counts.refused
+    assert decoder.counts.lost == 0
+    for sweep in sweeps:
+        range_m = np.linalg.norm(sweep.points[:, :3], axis=1)
+        left, right = sweep.points[:, 1] > 0.5, sweep.points[:, 1] < -0.5
+        assert np.abs(range_m[right] - 10.0).max() < 0.02
+        near, far = np.abs(range_m[left] - 4.0) < 0.02, np.abs(range_m[left] - 10.0) < 0.02
+        assert np.all(near | far)
+        assert np.count_nonzero(near) == pytest.approx(np.count_nonzero(far), rel=0.1)
+        assert np.count_nonzero(right) == pytest.approx(np.count_nonzero(far), rel=0.02)
+
+
+def dual_packets(index: int) -> list[bytes]:
+    """A wall at 10 m as the last return, a fence at 4 m to the left of the car as the strongest."""
+    wall = packets_of(ring_wall(0), None, 10**6 + index * 10**5)
+    fence = packets_of(ring_wall(0, 4.0), None, 10**6 + index * 10**5)
+    dual = []
+    for last, strongest in zip(wall, fence, strict=True):
+        for half in range(2):
+            blocks = b""
+            for block in range(6 * half, 6 * half + 6):
+                at = slice(100 * block, 100 * block + 100)
+                azimuth = int.from_bytes(last[at][2:4], "little")
+                blocks += last[at] + (strongest[at] if azimuth > 18_000 else last[at])
+            dual.append(stamped(with_byte(blocks + last[1200:], MODE, 0x39), time_us(last) + round(half * 663.552)))
+    return dual
+
+
 def test_nothing_returned() -> None:
     """A sensor in an empty field, or covered: no sweep without a point."""
     blank = Sweep(0, np.zeros((0, 4), np.float32), np.zeros(0, np.uint8), 16)
