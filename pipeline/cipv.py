@@ -23,6 +23,8 @@ from pipeline.types import VEHICLES, Cipv, EgoState, FusedObject, Gate, Path, Re
 AGREEMENT_SIGMAS = 3.0
 _HALF_WAY = 0.7
 """A running mean has turned half way after 0.7 of its time: what moves sideways is judged where it will be by then."""
+ON_A_VAGUE_PATH = 1.0 / 3.0
+"""What is left of the permitted uncertainty on a path that is not usable."""
 STAYS_UP_TO = 1.5
 """The lead stays it while its place against the path is this much more uncertain than a new one's may be."""
 
@@ -47,11 +49,8 @@ class Candidate(NamedTuple):
     params: CipvParams
 
 
-class Check(NamedTuple):
-    """One question to a candidate: the gate with its number, and the sentence that says why it failed."""
-
-    gate: Gate
-    reason: str
+Check = tuple[Gate, str]
+"""The answer to one question to a candidate: the gate with its number, and the sentence that says why it failed."""
 
 
 class Choice(NamedTuple):
@@ -89,15 +88,15 @@ def choose(
         checks = [ask(candidate) for ask in _ELIGIBILITY]
         item = evolve(
             item,
-            gates=item.gates + tuple(check.gate for check in checks),
-            path_offset_m=where.offset_m if where else None,
+            gates=(*item.gates, *[gate for gate, _ in checks]),
+            path_offset_m=where.offset_m if where is not None else None,
             in_path=_in_path(candidate),
-            in_path_probability=where.probability() if where else None,
-            lateral_mps=where.sideways_mps if where else None,
+            in_path_probability=where.probability() if where is not None else None,
+            lateral_mps=where.sideways_mps if where is not None else None,
             crossing_s=crossing_s,
         )
         judged.append(item)
-        failed = next((check.reason for check in checks if not check.gate.passed), None)
+        failed = next((reason for gate, reason in checks if not gate.passed), None)
         if failed is None:
             able.append(item)
         else:
@@ -175,19 +174,19 @@ def _next_lead(
 def _is_vehicle(who: Candidate) -> Check:
     """A named object must be a vehicle; a nameless one (L) is judged by its size."""
     label = who.item.label
-    return Check(Gate("vehicle_class", None, 1.0, label is None or label in VEHICLES), f"class {label}")
+    return Gate("vehicle_class", None, 1.0, label is None or label in VEHICLES), f"class {label}"
 
 
 def _has_distance(who: Candidate) -> Check:
     distance = who.item.distance_m
-    return Check(Gate("distance_known", distance, 0.0, distance is not None), "distance not known")
+    return Gate("distance_known", distance, 0.0, distance is not None), "distance not known"
 
 
 def _is_confirmed(who: Candidate) -> Check:
     """Two sensors that both see it now are enough at once; one alone must see it again. The lead is confirmed."""
     hits, needed = who.item.hits, 1 if who.item.seen_by == "VL" or who.leads else who.params.confirm_hits
     passed = hits >= needed
-    return Check(Gate("hits", hits, needed, passed), "" if passed else f"seen {hits} of {needed} times")
+    return Gate("hits", hits, needed, passed), "" if passed else f"seen {hits} of {needed} times"
 
 
 def _is_seen(who: Candidate) -> Check:
@@ -196,43 +195,34 @@ def _is_seen(who: Candidate) -> Check:
     known = not who.item.carried and who.item.measured
     passed = known or who.leads or who.params.carried_may_become_lead
     reason = "not seen in this frame" if who.item.carried else "its distance was not measured in this frame"
-    return Check(Gate("seen", float(known), 0.0 if who.leads else 1.0, passed), reason)
+    return Gate("seen", float(known), 0.0 if who.leads else 1.0, passed), reason
 
 
 def _is_vehicle_sized(who: Candidate) -> Check:
     """An L object must be as large as a vehicle's rear or side: kerbs, posts and hedges are not leads."""
     item, params = who.item, who.params
     if item.source != "L" or item.cuboid is None:
-        return Check(Gate("size", None, params.min_width_m, True), "")
+        return Gate("size", None, params.min_width_m, True), ""
     length, width, height = item.cuboid.size
     across = max(length, width)
     if across < params.min_width_m:
-        return Check(Gate("size", across, params.min_width_m, False), f"only {across:.1f} m across")
+        return Gate("size", across, params.min_width_m, False), f"only {across:.1f} m across"
     if height < params.min_height_m:
-        return Check(Gate("size", height, params.min_height_m, False), f"only {height:.1f} m high")
+        return Gate("size", height, params.min_height_m, False), f"only {height:.1f} m high"
     passed = across <= params.max_size_m
-    return Check(
-        Gate("size", across, params.max_size_m, passed), "" if passed else f"{across:.0f} m long: not a vehicle"
-    )
-
-
-def _is_ahead(who: Candidate) -> Check:
-    if who.place is None:
-        return Check(Gate("ahead", None, 0.0, False), "place not known")
-    return Check(Gate("ahead", who.place.ahead_m, 0.0, who.place.ahead_m > 0.0), "beside or behind the bumper")
+    return Gate("size", across, params.max_size_m, passed), "" if passed else f"{across:.0f} m long: not a vehicle"
 
 
 def _is_near_path(who: Candidate) -> Check:
     """As of now, in metres. A moment outside does not stop what its sightings so far say is inside."""
-    aside = abs(who.place.middle_m) if who.place is not None else 0.0
-    limit = who.place.limit_m + _widening_m(who.leads, who.params) if who.place is not None else 0.0
+    if who.place is None:
+        return Gate("path_offset", None, who.path.half_width_m, False), "place not known"
+    aside = abs(who.place.middle_m)
+    limit = who.place.limit_m + _widening_m(who.leads, who.params)
+    if who.place.ahead_m <= 0.0:
+        return Gate("path_offset", aside, limit, False), "beside or behind the bumper"
     passed = aside <= limit or who.odds > 0.0
-    return Check(Gate("path_offset", aside, limit, passed), f"out of path by {aside - limit:.1f} m")
-
-
-def _is_in_path(who: Candidate) -> Check:
-    """By the running mean of what the sightings say."""
-    return Check(Gate("path_odds", who.odds, 0.0, _in_path(who)), "in path for a moment only")
+    return Gate("path_offset", aside, limit, passed), "" if passed else f"out of path by {aside - limit:.1f} m"
 
 
 def _widening_m(leads: bool, params: CipvParams) -> float:
@@ -240,26 +230,23 @@ def _widening_m(leads: bool, params: CipvParams) -> float:
     return params.hysteresis_m if leads else 0.0
 
 
+def _is_in_path(who: Candidate) -> Check:
+    """By the running mean of what the sightings say."""
+    return Gate("path_odds", who.odds, 0.0, _in_path(who)), "in path for a moment only"
+
+
 def _in_path(who: Candidate) -> bool:
     return who.place is not None and who.place.ahead_m > 0.0 and who.odds > 0.0
 
 
 def _is_placed(who: Candidate) -> Check:
-    """So far ahead that its place against the path is uncertain by more than a lane, nobody can be said to be in it."""
-    limit = who.params.max_sigma_m * (STAYS_UP_TO if who.leads else 1.0)
+    """So far ahead that its place against the path is uncertain by more than a lane, nobody can be said to be in it.
+    On a path that is too vague to be driven after, only what lies where it is known well may become the lead."""
+    limit = who.params.max_sigma_m * (STAYS_UP_TO if who.leads else 1.0 if who.path.usable else ON_A_VAGUE_PATH)
     sigma = who.place.sigma_m if who.place is not None else 0.0
-    return Check(
-        Gate("path_sigma", sigma, limit, sigma <= limit), f"its place against the path is uncertain by {sigma:.1f} m"
-    )
-
-
-def _is_within_reach(who: Candidate) -> Check:
-    """On a path that is too vague to be driven after, only what lies where it is still known may become the lead."""
-    if who.path.usable or who.place is None:
-        return Check(Gate("path_reach", None, who.path.reach_m, True), "")
-    ahead = who.place.ahead_m
-    passed = ahead <= who.path.reach_m or who.leads
-    return Check(Gate("path_reach", ahead, who.path.reach_m, passed), f"path known for {who.path.reach_m:.0f} m only")
+    passed = sigma <= limit
+    reason = "" if passed else f"its place against the path is uncertain by {sigma:.1f} m"
+    return Gate("path_sigma", sigma, limit, passed), reason
 
 
 _ELIGIBILITY: tuple[Callable[[Candidate], Check], ...] = (
@@ -268,11 +255,9 @@ _ELIGIBILITY: tuple[Callable[[Candidate], Check], ...] = (
     _is_confirmed,
     _is_seen,
     _is_vehicle_sized,
-    _is_ahead,
     _is_near_path,
     _is_in_path,
     _is_placed,
-    _is_within_reach,
 )
 _BESIDE_PLACE = frozenset({"vehicle_class", "distance_known", "hits", "size"})
 """The gates that one which is not in the path yet must pass all the same."""

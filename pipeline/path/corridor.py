@@ -165,26 +165,40 @@ def nearest_on_path(path: Path, points: F64) -> tuple[F64, F64]:
 
 @numba.njit(cache=True, nogil=True)
 def _nearest(center, points):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """For each point, the foot on each piece of the line; the nearest foot wins, the first of equals."""
+    """For each point, the foot on each piece of the line; the nearest foot wins, the first of equals. From a foot that
+    is d farther away than the nearest so far, the next d metres of the line hold no nearer one and are passed over."""
+    pieces = len(center) - 1
+    way, along = np.empty((pieces, 3)), np.zeros(pieces + 1)
+    longest = 0.0
+    for k in range(pieces):
+        dx, dy = center[k + 1, 0] - center[k, 0], center[k + 1, 1] - center[k, 1]
+        length = np.sqrt(dx * dx + dy * dy)
+        way[k, 0], way[k, 1], way[k, 2] = dx / length, dy / length, length
+        along[k + 1] = along[k] + length
+        longest = max(longest, length)
     offset, reached = np.empty(len(points)), np.empty(len(points))
-    last = len(center) - 2
     for n in range(len(points)):
-        best2, travelled = np.inf, 0.0
-        for k in range(last + 1):
-            dx, dy = center[k + 1, 0] - center[k, 0], center[k + 1, 1] - center[k, 1]
-            length = np.sqrt(dx * dx + dy * dy)
-            dx, dy = dx / length, dy / length
-            rx, ry = points[n, 0] - center[k, 0], points[n, 1] - center[k, 1]
+        best = np.inf
+        guess = min(
+            max(int(points[n, 0] / longest), 0), pieces - 1
+        )  # a near one first, so that far ones are passed over
+        k = -1
+        while k < pieces:
+            here = guess if k < 0 else k
+            rx, ry = points[n, 0] - center[here, 0], points[n, 1] - center[here, 1]
+            dx, dy, length = way[here, 0], way[here, 1], way[here, 2]
             t = rx * dx + ry * dy
-            if t < 0.0 and k > 0:
+            if t < 0.0 and here > 0:
                 t = 0.0
-            if t > length and k < last:
+            if t > length and here < pieces - 1:
                 t = length
             ex, ey = rx - t * dx, ry - t * dy
-            distance2 = ex * ex + ey * ey
-            if distance2 < best2:
-                best2 = distance2
+            distance = np.sqrt(ex * ex + ey * ey)
+            if distance < best:
+                best = distance
                 side = 1.0 if dx * ry - dy * rx >= 0.0 else -1.0
-                offset[n], reached[n] = side * np.sqrt(distance2), travelled + t
-            travelled += length
+                offset[n], reached[n] = side * distance, along[here] + t
+            skip = max(1, int((distance - best) / longest)) if k >= 0 else 1
+            # the last piece goes on for ever, so it is never passed over
+            k = pieces - 1 if k < pieces - 1 and k + skip > pieces - 1 else k + skip
     return offset, reached

@@ -8,11 +8,10 @@ middle is outside but which leaves no room is in the path too.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import hypot
+from math import copysign, erf, sqrt
+from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
 
 from pipeline.geometry import F64
 from pipeline.params import CipvParams
@@ -34,8 +33,7 @@ SURE = 4.0
 """Log-odds beyond which nothing gets surer: the sigmas themselves are not known that well."""
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """One object against the path. offset_m: of the middle of its nearest face, positive to the left of the centre;
     ahead_m: path length to its foot. low_m, high_m: from where to where it reaches across the path. left_m, right_m:
     how far its middle may lie to either side and still be in the path. sigma_m: of its sideways place against the path,
@@ -68,8 +66,8 @@ class Place:
         """That it is in the path, its place being normal around the measured one; 0 for what is not ahead."""
         if self.ahead_m <= 0.0:
             return 0.0
-        high, low = (self.left_m - self.middle_m) / self.sigma_m, (-self.right_m - self.middle_m) / self.sigma_m
-        return float(ndtr(high) - ndtr(low))
+        scale = self.sigma_m * sqrt(2.0)
+        return 0.5 * (erf((self.left_m - self.middle_m) / scale) + erf((self.right_m + self.middle_m) / scale))
 
     def log_odds(self, extra_m: float, moves_m: float) -> float:
         """What this sighting says for (positive) or against its being in the path: the log of the likelihood ratio of
@@ -102,7 +100,7 @@ def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
     if sideways_mps is None or item.moving is False:
         return 0.0
     doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * (item.distance_m or 0.0) if item.source == "V" else 0.0)
-    return float(np.sign(sideways_mps)) * max(abs(sideways_mps) - doubt, 0.0)
+    return copysign(max(abs(sideways_mps) - doubt, 0.0), sideways_mps)
 
 
 def place(
@@ -112,7 +110,7 @@ def place(
     known = [item for item in objects if item.bev is not None]
     if not known:
         return [None] * len(objects)
-    points = np.array([_outline(item) for item in known])  # (N, 5, 2): middle of the near face, four corners
+    points = _outlines(known)
     offsets, reached = (row.reshape(-1, 5) for row in nearest_on_path(path, points.reshape(-1, 2)))
     ahead = reached[:, 0]
     k = np.clip(ahead.astype(np.intp), 0, len(path.center) - 2)
@@ -122,49 +120,36 @@ def place(
     offsets[:, 3:] = np.where(_stands_across(known, heading)[:, None], offsets[:, 3:], offsets[:, 1:3])
     low, high = offsets[:, 1:].min(axis=1), offsets[:, 1:].max(axis=1)
     half_left, half_right = _half_widths(path, k)
-    needed = np.minimum(params.min_overlap_m, 0.5 * (high - low))
-    spare = 0.5 * (high - low) - needed
-    path_sigma = path.profile_m[k] if len(path.profile_m) else np.zeros(len(k))
-    rows = zip(
-        known,
-        points[:, 0].tolist(),
-        heading.tolist(),
-        path_sigma.tolist(),
-        half_left.tolist(),
-        half_right.tolist(),
-        offsets[:, 0].tolist(),
-        ahead.tolist(),
-        zip(low.tolist(), high.tolist(), strict=True),
-        (half_left + spare).tolist(),
-        (half_right + spare).tolist(),
-        strict=True,
-    )
+    spare = 0.5 * (high - low) - np.minimum(params.min_overlap_m, 0.5 * (high - low))
+    sigma = np.hypot(path.profile_m[k] if len(path.profile_m) else 0.0, _sigmas_m(known, points[:, 0], heading))
+    speeds = _sideways_mps(known, points[:, 0], heading, ego)
+    columns = (offsets[:, 0], ahead, low, high, half_left + spare, half_right + spare, sigma, speeds)
     placed = []
-    for item, near, direction, sigma, edge_left, edge_right, offset, along, (lowest, highest), left, right in rows:
-        sideways = _sideways_mps(item, near, direction, ego)
-        both = hypot(sigma, _sigma_m(item, near, direction))
-        there = Place(offset, along, lowest, highest, left, right, both, sideways)
-        placed.append((there, there.crossing_s(believed_mps(sideways, item), edge_left, edge_right)))
+    for item, (offset, along, lowest, highest, left, right, both, moves), edges in zip(
+        known,
+        zip(*(column.tolist() for column in columns), strict=True),
+        zip(half_left.tolist(), half_right.tolist(), strict=True),
+        strict=True,
+    ):
+        sideways_mps = moves if item.velocity_mps is not None else None
+        there = Place(offset, along, lowest, highest, left, right, both, sideways_mps)
+        placed.append((there, there.crossing_s(believed_mps(there.sideways_mps, item), *edges)))
     following = iter(placed)
     return [next(following) if item.bev is not None else None for item in objects]
 
 
 def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
     """The middle of the side that faces the ego origin: between the two nearest corners."""
-    (ax, ay), (bx, by), *_ = _nearest_first(bev)
+    (ax, ay), (bx, by) = sorted(bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)[:2]
     return (ax + bx) / 2, (ay + by) / 2
 
 
-def _nearest_first(bev: tuple[Point2, Point2, Point2, Point2]) -> list[Point2]:
-    return sorted(bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)
-
-
-def _outline(item: FusedObject) -> list[Point2]:
-    """The middle of the nearest face and all corners, nearest first."""
-    assert item.bev is not None
-    corners = _nearest_first(item.bev)
-    (ax, ay), (bx, by) = corners[:2]
-    return [((ax + bx) / 2, (ay + by) / 2), *corners]
+def _outlines(items: Sequence[FusedObject]) -> F64:
+    """(N, 5, 2): the middle of the nearest face, and the four corners, nearest first."""
+    corners = np.array([item.bev for item in items])
+    order = np.argsort((corners**2).sum(axis=2), axis=1, kind="stable")
+    corners = np.take_along_axis(corners, order[:, :, None], axis=1)
+    return np.concatenate([corners[:, :2].mean(axis=1, keepdims=True), corners], axis=1)
 
 
 def _stands_across(items: Sequence[FusedObject], heading: F64) -> np.ndarray:
@@ -183,26 +168,27 @@ def _half_widths(path: Path, k: np.ndarray) -> tuple[F64, F64]:
     return np.hypot(*(path.left[k] - path.center[k]).T), np.hypot(*(path.right[k] - path.center[k]).T)
 
 
-def _sigma_m(item: FusedObject, near: list[float], heading: float) -> float:
-    """Of the object's place across the path. A wrong distance moves it along the line of sight, which in a bend is not
-    the way the path goes there."""
-    distance = hypot(*near)
-    slant = abs(near[1] * np.cos(heading) - near[0] * np.sin(heading)) / max(distance, 0.1)
-    along = (item.distance_sigma_m or 0.0) * slant
-    if item.source == "V":
-        across = BEARING_SIGMA_RAD * distance * (2.0 if item.carried else 1.0)
-    else:  # while it is carried its sigma grows, to either side as much as ahead
-        across = hypot(LIDAR_SIDEWAYS_SIGMA_M, (item.distance_sigma_m or 0.0) if item.carried else 0.0)
-    return hypot(along, across)
+def _sigmas_m(items: Sequence[FusedObject], near: F64, heading: F64) -> F64:
+    """(N,) of the objects' places across the path. A wrong distance moves one along the line of sight, which in a bend
+    is not the way the path goes there. near: (N, 2) middles of their nearest faces."""
+    by_camera = np.array([item.source == "V" for item in items])
+    carried = np.array([item.carried for item in items])
+    along = np.array([item.distance_sigma_m or 0.0 for item in items])
+    distance = np.maximum(np.hypot(*near.T), 0.1)
+    slant = np.abs(near[:, 1] * np.cos(heading) - near[:, 0] * np.sin(heading)) / distance
+    boxed = BEARING_SIGMA_RAD * distance * np.where(carried, 2.0, 1.0)
+    # while a cluster is carried its sigma grows, to either side as much as ahead
+    clustered = np.hypot(LIDAR_SIDEWAYS_SIGMA_M, np.where(carried, along, 0.0))
+    return np.hypot(along * slant, np.where(by_camera, boxed, clustered))
 
 
-def _sideways_mps(item: FusedObject, near: list[float], heading: float, ego: EgoState | None) -> float | None:
-    """Speed to the left of the path, which lies still on the ground: over ground, so that a car that follows the bend
-    has none. Without ego speed, relative to ego."""
-    if item.velocity_mps is None:
-        return None
-    vx, vy = item.velocity_mps
-    if ego is not None:
-        turning = usable_rate(ego) or 0.0
-        vx, vy = vx + ego.speed_mps - turning * near[1], vy + turning * near[0]
-    return float(vy * np.cos(heading) - vx * np.sin(heading)) if ego is not None else vy
+def _sideways_mps(items: Sequence[FusedObject], near: F64, heading: F64, ego: EgoState | None) -> F64:
+    """(N,) speeds to the left of the path, which lies still on the ground: over ground, so that a car that follows the
+    bend has none; NaN where a velocity is not known. Without ego speed, relative to ego and its x axis."""
+    velocity = np.array([item.velocity_mps or (np.nan, np.nan) for item in items])
+    if ego is None:
+        return velocity[:, 1]
+    turning = usable_rate(ego) or 0.0
+    vx = velocity[:, 0] + ego.speed_mps - turning * near[:, 1]
+    vy = velocity[:, 1] + turning * near[:, 0]
+    return np.asarray(vy * np.cos(heading) - vx * np.sin(heading))
