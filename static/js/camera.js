@@ -44,6 +44,7 @@ const Y = (/** @type {number} */ v) => laid.y + v * laid.scale;
 export function setUp() {
   const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "align", "tape"], draw);
   surface = new Surface(canvas, invalidate);
+  showPictureAt(canvas.clientWidth * devicePixelRatio); // it is no wider than its pane
   canvas.addEventListener("click", (event) => !get("align")?.on && !get("taping") && select(objectAt(event.offsetX, event.offsetY)));
   followHover(canvas, (u, v) => (get("align")?.on ? null : objectAt(u, v)));
   followTape();
@@ -83,7 +84,7 @@ function drawBelief(ctx, frame) {
   if (layers.path && display.path) drawPath(ctx, display.path, X, Y);
   if (layers.points) drawPoints(ctx, frame);
   if (layers.lanes && display.lanes) for (const lane of [display.lanes.left, display.lanes.right]) drawLane(ctx, lane);
-  const labels = new Labels(ctx, surface.width, laid.y);
+  const labels = new Labels(ctx, surface.width, laid.y, laid.y + (frame.picture?.height ?? 0) * laid.scale);
   const chosen = result.objects.find(({ id }) => id === get("selection"));
   if (chosen) {
     for (const [boxes, role] of /** @type {const} */ ([[display.lidar_boxes, "lidar"], [display.vision_boxes, "vision"]])) {

@@ -4,11 +4,12 @@ const HEIGHT = 16;
 /** "strong" is filled and drawn wherever it must, "must" finds a place, "weak" is left out where there is none. @typedef {"strong"|"must"|"weak"} Weight */
 
 export class Labels {
-  /** @param {CanvasRenderingContext2D} ctx @param {number} width of the canvas, CSS pixels @param {number} top nothing is written above it */
-  constructor(ctx, width, top = 0) {
+  /** @param {CanvasRenderingContext2D} ctx @param {number} width of the canvas, CSS pixels @param {number} top @param {number} bottom between which it is written */
+  constructor(ctx, width, top = 0, bottom = Infinity) {
     this.ctx = ctx;
     this.width = width;
     this.top = top;
+    this.bottom = bottom;
     /** @type {{x: number, y: number, w: number, h: number}[]} */
     this.taken = [];
   }
@@ -23,7 +24,7 @@ export class Labels {
     ctx.font = `${strong ? "700 13px" : "600 11px"} system-ui, "DejaVu Sans", sans-serif`;
     const w = ctx.measureText(words).width + 10;
     const right = this.width - w - 2;
-    const at = { x: Math.max(2, Math.min(x, right)), y: Math.max(this.top + 2, y - h - 1), w, h };
+    const at = { x: Math.max(2, Math.min(x, right)), y: Math.max(this.top + 2, Math.min(y - h - 1, this.bottom - h - 2)), w, h };
     for (let tries = 0; this.#overlaps(at); tries++) {
       if (tries === 3 && weight === "weak") return;
       if (tries === 12) break;

@@ -93,7 +93,8 @@ def test_the_tape_holds_on_to_lidar_points_in_the_picture(open_page: OpenPage):
           const { count, uv, xyz, kind, picture } = get("frame"), found = [];
           for (let i = 0; i < count; i++) {
             const u = uv[2 * i], v = uv[2 * i + 1];
-            if (kind[i] === 2 && u > 0.3 * picture.width && u < 0.7 * picture.width && v > 30 && v < picture.height - 60) {
+            const isInside = u > 0.3 * picture.width && u < 0.7 * picture.width && v > 30 && v < picture.height - 60;
+            if (kind[i] === 2 && isInside) {
               found.push({ u, v, x: xyz[3 * i] / 100, y: xyz[3 * i + 1] / 100, z: xyz[3 * i + 2] / 100 });
             }
           }
@@ -119,7 +120,8 @@ def test_a_click_on_a_point_selects_its_object(open_page: OpenPage):
           const { count, xyz, owner, result } = get("frame");
           for (let i = 0; i < count; i++) {
             const x = xyz[3 * i] / 100, y = xyz[3 * i + 1] / 100;
-            if (owner[i] > 0 && x > 5 && x < 70 && Math.abs(y) < 12) return { x, y, id: result.objects[owner[i] - 1].id };
+            const isNear = x > 5 && x < 70 && Math.abs(y) < 12;
+            if (owner[i] > 0 && isNear) return { x, y, id: result.objects[owner[i] - 1].id };
           }
         })()""",
     )
@@ -156,10 +158,8 @@ def test_a_failed_test_of_the_selected_object_is_drawn_with_its_number(open_page
         and any(gate.name == "path_offset" and not gate.passed and gate.value is not None for gate in item.gates)
     )
     first = next(gate for gate in aside.gates if not gate.passed)
-    words = of_store(
-        page,
-        f"(await import('/js/evidence.js')).failedWords(get('frame').result.objects.find(({{ id }}) => id === {aside.id}))",
-    )
+    found = f"get('frame').result.objects.find(({{ id }}) => id === {aside.id})"
+    words = of_store(page, f"(await import('/js/evidence.js')).failedWords({found})")
     assert first.name.replace("_", " ") in words
     page.evaluate("""() => {
       window.written = [];
@@ -214,7 +214,7 @@ def test_no_wider_picture_is_sent_than_is_shown(open_page: OpenPage, site: Site)
     page = opened(open_page)
     shown = box_of(page.locator("#camera"))["width"]
     sent = of_store(page, "get('frame').picture.width")
-    assert sent < shown + WIDTH_STEP_PX
+    assert sent < shown + WIDTH_STEP_PX, "from the first one on"
     page.locator("[data-grow=camera]").click()
     wide = box_of(page.locator("#camera"))["width"]
     assert wide > shown + WIDTH_STEP_PX
