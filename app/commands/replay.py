@@ -43,6 +43,8 @@ class Replay:
         config = load(str(self.config))
         faults = load_faults(self.faults) if self.faults is not None else ()
         source = self.source.open()
+        if self.speed != 1.0 and self.source.source.startswith("pcap:"):
+            raise BadInput(f"--speed {self.speed:g}: a capture's packets carry their own times; only 1 is true to them")
         senders = open_senders(config)
         mount = config.lidar.mount.T_ego_sensor() if config.lidar is not None else None
         rounds = count() if self.loop else range(1)

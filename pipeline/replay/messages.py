@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 import cv2
 
 from pipeline.sources.base import Source
+from pipeline.sources.pcap import PcapSource
 from pipeline.types import EgoState, Frame, GnssFix, Picture, Sweep
 
 Sensor = Literal["lidar", "camera", "gnss", "ego"]
@@ -15,7 +17,8 @@ _JPEG_QUALITY = 95
 
 
 class Message(NamedTuple):
-    """value: a ``Sweep``, a JPEG, a ``GnssFix`` or an ``EgoState``, measured at ``t_ns`` of the recording."""
+    """value: a ``Sweep`` or a LiDAR's packet as it was captured, a JPEG, a ``GnssFix`` or an ``EgoState``, measured at
+    ``t_ns`` of the recording."""
 
     t_ns: int
     sensor: Sensor
@@ -23,7 +26,16 @@ class Message(NamedTuple):
 
 
 def of_recording(source: Source, first: int = 0, last: int | None = None) -> Iterator[Message]:
-    """Frames ``first`` to ``last`` as messages. A picture without a stamp is taken at its frame's tick."""
+    """Frames ``first`` to ``last`` as messages. A picture without a stamp is taken at its frame's tick. A capture's
+    LiDAR packets are sent as they were."""
+    if isinstance(source, PcapSource):
+        packets = (Message(t_ns, "lidar", payload) for t_ns, payload in source.packets())
+        others = (message for message in _of_frames(source, first, last) if message.sensor != "lidar")
+        return heapq.merge(packets, others, key=lambda message: message.t_ns)
+    return _of_frames(source, first, last)
+
+
+def _of_frames(source: Source, first: int, last: int | None) -> Iterator[Message]:
     for index in range(first, len(source) if last is None else min(last + 1, len(source))):
         yield from of_frame(source.frame(index))
 

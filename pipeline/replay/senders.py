@@ -17,13 +17,13 @@ from pipeline.replay.messages import Sensor
 from pipeline.replay.nmea_writer import sentences
 from pipeline.sources.live.can import load_dbc
 from pipeline.sources.live.config import CanConfig, GnssConfig, LidarConfig, LiveConfig, SignalConfig
+from pipeline.sources.velodyne import PACKET_BYTES, POSITION_BYTES
 from pipeline.types import EgoState, GnssFix
 
 _LOOPBACK = "127.0.0.1"
 _EVERY = "0.0.0.0"
 _HOUR_NS = 3_600_000_000_000
 _STAMP_AT = 1200
-_PACKET_BYTES = 1206
 
 
 class Sender(Protocol):
@@ -53,21 +53,23 @@ def open_senders(config: LiveConfig) -> dict[Sensor, Sender]:
 
 
 class LidarSender:
-    """Data packets over UDP; the stamp is put in as the sensor does, microseconds past the hour."""
+    """Data and position packets over UDP; a data packet's stamp is put in as the sensor does, µs past the hour."""
 
     def __init__(self, config: LidarConfig) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._to = (config.multicast_group or _here(config.interface), config.data_port)
+        self._host = config.multicast_group or _here(config.interface)
+        self._data_port, self._position_port = config.data_port, config.position_port or config.data_port
         if config.multicast_group is not None:
             self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton(config.interface))
             self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
 
     def send(self, payload: bytes, stamp_ns: int) -> None:
-        if len(payload) == _PACKET_BYTES:
+        if len(payload) == PACKET_BYTES:
             stamp = struct.pack("<I", stamp_ns % _HOUR_NS // 1000)
             payload = payload[:_STAMP_AT] + stamp + payload[_STAMP_AT + 4 :]
         with contextlib.suppress(OSError):  # nobody listens: a sensor sends all the same
-            self._socket.sendto(payload, self._to)
+            port = self._position_port if len(payload) == POSITION_BYTES else self._data_port
+            self._socket.sendto(payload, (self._host, port))
 
     def plug(self, is_in: bool) -> None:
         pass

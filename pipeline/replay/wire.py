@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from pipeline.replay.messages import Message, Sensor
 from pipeline.sources.velodyne.encode import PACKETS_A_ROTATION, packets_of
-from pipeline.sources.velodyne.packet import BLOCK_US
+from pipeline.sources.velodyne.packet import BLOCK_US, PACKET_BYTES
 from pipeline.types import F64, Sweep
 
 _PACKET_NS = round(12 * BLOCK_US * 1000)
@@ -41,7 +41,7 @@ def to_wire(
         at_ns = start_ns + _AHEAD_NS + round((message.t_ns - first_ns) / speed)
         while waiting and waiting[0][0] <= at_ns - _AHEAD_NS:
             yield heapq.heappop(waiting)[2]
-        if message.sensor == "lidar":
+        if isinstance(message.value, Sweep):
             if at_ns - ROTATION_NS // 2 < busy_until_ns:
                 continue
             busy_until_ns = at_ns + ROTATION_NS // 2
@@ -51,9 +51,16 @@ def to_wire(
         yield heapq.heappop(waiting)[2]
 
 
+def _own_stamp_ns(message: Message, at_ns: int) -> int:
+    """Of a captured packet its own, which has nothing to do with the host's; of all others the moment itself."""
+    if message.sensor == "lidar" and isinstance(message.value, bytes) and len(message.value) == PACKET_BYTES:
+        return int.from_bytes(message.value[-6:-2], "little") * 1000
+    return at_ns
+
+
 def _events(message: Message, at_ns: int, T_ego_lidar: F64 | None) -> Iterator[WireEvent]:
     if not isinstance(message.value, Sweep):
-        yield WireEvent(at_ns, message.sensor, at_ns, message.value)
+        yield WireEvent(at_ns, message.sensor, _own_stamp_ns(message, at_ns), message.value)
         return
     packets = packets_of(replace(message.value, t_ns=at_ns), T_ego_lidar)
     for number, packet in enumerate(packets):

@@ -14,8 +14,6 @@ from pipeline.sources.live.udp import read_datagrams
 from pipeline.sources.velodyne import BadPacket, Vlp16Decoder, read_position
 from pipeline.types import Sweep
 
-_HOUR_NS = 3_600_000_000_000
-
 
 class LidarInput:
     """pps: what the last position packet said of the pulse per second; null before one came. follows_gps: the sensor's

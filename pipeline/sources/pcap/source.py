@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -67,6 +68,12 @@ class PcapSource:
         t_ns = self.t_ns(index)
         notes: list[str] = []
         return self._beside.frame(index, f"{index:06d}", t_ns, self._sweep(index, notes), notes)
+
+    def packets(self) -> Iterator[tuple[int, bytes]]:
+        """Every data and position packet of the LiDAR as it was captured: when (unix ns), and its payload."""
+        for datagram in self._capture.datagrams():
+            if datagram.port == self._port or len(datagram.payload) == POSITION_BYTES:
+                yield datagram.t_ns, datagram.payload
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
         self.t_ns(index)

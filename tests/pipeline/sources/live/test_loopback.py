@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 
 from pipeline.params import Params
-from pipeline.replay.messages import Message, of_frame
+from pipeline.replay.messages import Message, of_frame, of_recording
 from pipeline.run import Detectors, advance, detector_for
 from pipeline.sources import open_source
 from pipeline.sources.base import SourceError
 from pipeline.sources.live.check import check
 from pipeline.sources.live.config import LiveConfig
+from pipeline.sources.live.lidar import LidarInput
 from pipeline.sources.live.source import LiveSensors
+from pipeline.sources.pcap import PcapSource
 from pipeline.step import State
 from pipeline.types import EgoState, Frame, GnssFix, Result
 
@@ -271,3 +273,25 @@ def test_closing_twice_is_safe_and_gives_the_port_back(sensors: list[LiveSensors
     again = opened(config, sensors)
     with Replaying(config, endless()):
         frames_until(again, lambda frame: frame.sweep is not None)
+
+
+def test_a_real_capture_sent_back_is_decoded_as_its_file_is(sensors: list[LiveSensors], data_dir: Path) -> None:
+    """MRPT's capture of a VLP-16 indoors, its own packets at their own times."""
+    recording = open_source(f"pcap:{data_dir / 'vlp16_packets' / 'mrpt_sample_velodyne_vlp16_gps.pcap'}")
+    assert isinstance(recording, PcapSource)
+    direct = [recording.frame(index).sweep for index in range(len(recording))]
+    config = loopback_config(camera=None, gnss=None, ego=None)
+    source = opened(config, sensors)
+    packets: list[bytes] = []
+    lidar = source.inputs["lidar"]
+    assert isinstance(lidar, LidarInput)
+    lidar.on_packet = lambda arrived_ns, packet: packets.append(packet)
+    live: list[Frame] = []
+    with Replaying(config, of_recording(recording)) as replaying:
+        frames_until(source, lambda frame: len(live) >= min(8, len(direct) - 2), live)
+    over_network = {len(frame.sweep.points) for frame in live if frame.sweep is not None}
+    known = {len(sweep.points) for sweep in direct if sweep is not None}
+    assert set(packets) <= {payload for _, payload in recording.packets()}, "as they were"
+    assert replaying.sent is not None
+    assert len(over_network & known) >= 0.7 * len(over_network), "whole sweeps are the file's own"
+    assert lidar.pps is not None, "position packets come to their own port"
