@@ -184,11 +184,9 @@ def _topics_table(found: Info) -> Table:
 
 
 def _rhythm(frames: Rhythm) -> str:
-    if frames.first_ns is None or frames.last_ns is None:
-        return "no frames"
     rate = "" if frames.rate_hz is None else f", {frames.rate_hz:.2f} Hz"
     gaps = "" if not frames.gaps else f", {frames.gaps} gaps, the longest {frames.longest_gap_s:.2f} s"
-    return f"{frames.count} frames, {(frames.last_ns - frames.first_ns) / 1e9:.1f} s{rate}{gaps}"
+    return f"{frames.count} frames, {frames.duration_s:.1f} s{rate}{gaps}"
 
 
 def _size(count: int) -> str:

@@ -21,11 +21,13 @@ _GAP_STEPS = 3.0
 @dataclass(frozen=True)
 class Rhythm:
     """How something came over time. rate_hz: by the median step, null for fewer than two or all at once. gaps: steps of
-    more than three usual ones; longest_gap_s: the longest step of all."""
+    more than three usual ones; longest_gap_s: the longest step of all. duration_s: all steps together, but those back
+    in time."""
 
     count: int
     first_ns: int | None
     last_ns: int | None
+    duration_s: float
     rate_hz: float | None
     gaps: int
     longest_gap_s: float | None
@@ -99,6 +101,7 @@ def rhythm(stamps_ns: npt.NDArray[np.int64]) -> Rhythm:
         count=len(stamps_ns),
         first_ns=int(stamps_ns[0]) if len(stamps_ns) else None,
         last_ns=int(stamps_ns[-1]) if len(stamps_ns) else None,
+        duration_s=float(steps.sum() / 1e9),
         rate_hz=round(1e9 / usual_ns, 3) if usual_ns else None,
         gaps=int(np.count_nonzero(steps > _GAP_STEPS * usual_ns)) if usual_ns else 0,
         longest_gap_s=float(steps.max() / 1e9) if len(steps) else None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -114,6 +115,7 @@ GAPS = {
     "steady": ([0, 1, 2, 3, 4], 1e9, 0, 1e-9),
     "a hole": ([0, 1, 2, 9, 10], 1e9, 1, 7e-9),
     "a clock that was set back": ([5, 6, 0, 1], 1e9, 0, 1e-9),
+    "a drive played in a loop": ([0, 1, 2, 0, 1, 2], 1e9, 0, 1e-9),
     "one": ([7], None, 0, None),
     "none": ([], None, 0, None),
     "all at once": ([3, 3, 3], None, 0, None),
@@ -124,4 +126,5 @@ GAPS = {
 def test_rates_and_gaps(stamps: list[int], rate_hz: float | None, gaps: int, longest_s: float | None) -> None:
     found = rhythm(np.array(stamps, dtype=np.int64))
     assert (found.count, found.rate_hz, found.gaps) == (len(stamps), rate_hz, gaps)
+    assert found.duration_s == pytest.approx(sum(b - a for a, b in pairwise(stamps) if b > a) / 1e9)
     assert found.longest_gap_s == (None if longest_s is None else pytest.approx(longest_s))
