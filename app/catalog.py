@@ -8,8 +8,7 @@ from pathlib import Path
 
 from app.recording import SESSIONS
 from pipeline.data import data_dir
-
-_FOLDERS = (("lidar_vlp16", "astyx"), ("velodyne", "kitti"), ("velodyne_points", "kitti"))
+from pipeline.sources import looks_like
 
 
 def catalog() -> list[tuple[str, str]]:
@@ -33,11 +32,11 @@ def sessions(folder: Path = SESSIONS) -> list[tuple[str, str]]:
 
 
 def recordings() -> list[tuple[str, str]]:
-    """(uri, title) of the folders right below the data folder and ``sessions`` that look like a known recording."""
+    """(uri, title) of what lies right below the data folder and ``sessions`` and looks like a known recording."""
     found = []
     for root in (data_dir(), SESSIONS):
-        for folder in sorted(root.iterdir()) if root.is_dir() else ():
-            scheme = next((scheme for mark, scheme in _FOLDERS if (folder / mark).is_dir()), None)
+        for path in sorted(root.iterdir()) if root.is_dir() else ():
+            scheme = looks_like(path)
             if scheme is not None:
-                found.append((f"{scheme}:{folder}", f"{scheme} · {folder.name}"))
+                found.append((f"{scheme}:{path}", f"{scheme} · {path.name}"))
     return found

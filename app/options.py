@@ -34,7 +34,8 @@ class SourceOptions:
     """Where frames come from."""
 
     source: tyro.conf.Positional[str]
-    """What to open: astyx:<dir>, kitti:<dir>, sim:<scenario or my.yaml>, live:<config.yaml>, …"""
+    """What to open: a session.mcap, pcap:<file>, rosbag:<path>, pcd:<dir>, astyx:<dir>, kitti:<dir>,
+    sim:<scenario or my.yaml>, live:<config.yaml>"""
     rings: int = 16
     """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
     route: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None

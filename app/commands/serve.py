@@ -59,7 +59,8 @@ class Serve:
     """
 
     source: tyro.conf.Positional[str]
-    """What to open: astyx:<dir>, kitti:<dir>, sim:<scenario or my.yaml>, live:<config.yaml>, …"""
+    """What to open: a session.mcap, pcap:<file>, rosbag:<path>, pcd:<dir>, astyx:<dir>, kitti:<dir>,
+    sim:<scenario or my.yaml>, live:<config.yaml>"""
     server: ServerOptions = field(default_factory=ServerOptions)
     line: LineOptions = field(default_factory=LineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"

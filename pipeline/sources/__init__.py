@@ -10,7 +10,17 @@ from pipeline.sources.base import LIVE, AnySource, LiveSource, Source, SourceErr
 from pipeline.sources.kitti import KittiSource
 from pipeline.sources.simulated import SimulatedSource
 
-__all__ = ["LiveSource", "Source", "SourceError", "TruthObject", "is_live", "open_any", "open_live", "open_source"]
+__all__ = [
+    "LiveSource",
+    "Source",
+    "SourceError",
+    "TruthObject",
+    "is_live",
+    "looks_like",
+    "open_any",
+    "open_live",
+    "open_source",
+]
 
 _SESSION_SUFFIX = ".mcap"
 
@@ -96,7 +106,7 @@ def open_any(uri: str, *, rings: int = 16) -> AnySource:
 def _about_bare_path(path: str) -> str:
     """What to type instead of a path without a scheme."""
     try:
-        scheme = _looks_like(Path(path).expanduser()) if path else None
+        scheme = looks_like(Path(path).expanduser()) if path else None
     except (OSError, RuntimeError, ValueError):
         scheme = None
     if scheme is not None:
@@ -104,8 +114,8 @@ def _about_bare_path(path: str) -> str:
     return f"{path}: not a source; type one of {', '.join(f'{scheme}:…' for scheme in _OPENERS)}"
 
 
-def _looks_like(path: Path) -> str | None:
-    """The scheme of a file or folder, by its name or what lies in it."""
+def looks_like(path: Path) -> str | None:
+    """The scheme of a file or folder, by its name or what lies in it; null when it is no recording that needs one."""
     for inside, scheme in _MARKS.items():
         if (path / inside).is_dir():
             return scheme

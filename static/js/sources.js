@@ -13,7 +13,7 @@ export function setUp() {
 export async function open() {
   /** @type {{sources: {uri: string, title: string}[], open: string|null}} */
   const { sources, open: current } = await request("api/sources").catch(() => ({ sources: [], open: null }));
-  const field = el("input", { type: "text", name: "uri", value: current ?? "", placeholder: "astyx:<folder>, kitti:<folder>, sim:<scenario>", aria: { label: "Address of a recording" }, spellcheck: false });
+  const field = el("input", { type: "text", name: "uri", value: current ?? "", placeholder: "pcap:<file>, rosbag:<path>, kitti:<folder>, sim:<scenario>", aria: { label: "Address of a recording" }, spellcheck: false });
   const form = el("form", { class: "open-row", method: "dialog" }, field, el("button", { textContent: "Open" }));
   form.addEventListener("submit", () => choose(field.value));
   const list = sources.map(({ uri, title }) => {
