@@ -24,6 +24,7 @@ from app.engine import Engine
 from app.history import History
 from app.looks import Looks
 from app.recording import SESSIONS
+from app.routes.alignment import alignment_router
 from app.routes.clips import clips_router
 from app.routes.drive import drive_router
 from app.routes.params import params_router
@@ -83,6 +84,7 @@ def create_app(
     app.include_router(drive_router(engine, engine.drives, marks or Marks()))
     app.include_router(runs_router(engine, engine.drives))
     app.include_router(clips_router(engine, jobs))
+    app.include_router(alignment_router(engine))
     app.include_router(rerun_router(engine, viewer))
     app.include_router(viser_router(viser_port, access.allowed))
     app.add_api_route("/palette.css", _palette, include_in_schema=False)

@@ -76,12 +76,16 @@ class Recording:
 
     def frame(self, index: int) -> Frame:
         """A frame as the line takes it, from the source, with its picture."""
-        with self._reading:
-            frame = self._opened().frame(index)
+        frame = self.as_read(index)
         detectors = Detectors() if self.recipe.sensors == "lidar" else self.recipe.detectors
         frame = only(detect(frame, detectors, self._ask), self.recipe.sensors)
         self.inputs.offer(frame)
         return frame
+
+    def as_read(self, index: int) -> Frame:
+        """A frame as its source gives it: no detector has looked at it."""
+        with self._reading:
+            return self._opened().frame(index)
 
     def save(self, path: Path, first: int, last: int, progress: Progress) -> None:
         """Frames as a session file, with all that the source has."""

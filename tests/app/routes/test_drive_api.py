@@ -296,3 +296,11 @@ def test_every_route_of_the_timeline_is_described(client: httpx.Client):
     for path, methods in described.items():
         for method, operation in methods.items():
             assert operation.get("description"), f"{method} {path}"
+
+
+def test_the_alignment_is_scored(client: httpx.Client):
+    """The small recording has one car's two sides in each sweep."""
+    found = client.get("/api/alignment/score").json()
+    assert set(found) == {"score", "median_px", "pairs", "text"}
+    assert found["text"]
+    assert found == client.get("/api/alignment/score").json()
