@@ -116,17 +116,17 @@ export function change(changes, isFinal) {
   submit({ changes: { ...changes, ...(model ? { "alignment.model": model } : {}) }, final: isFinal });
 }
 
-/** Show one parameter and give it the focus. @param {string} name */
+/** Show one parameter. @param {string} name @returns {HTMLElement|null} its control */
 export function reveal(name) {
   toggle("params", true);
   $("#tab-params").click();
   search.value = "";
   filter();
   const section = sections.get(name.split(".")[0]), node = controls.get(name)?.node;
-  if (!section || !node) return;
+  if (!section || !node) return null;
   section.node.open = true;
   node.scrollIntoView({ block: "center" });
-  $("input, .choices button", HTMLElement, node).focus();
+  return $("input, .choices button", HTMLElement, node);
 }
 
 /** @param {string} name */

@@ -127,3 +127,10 @@ def test_the_page_knows_every_key_and_no_other(sent: dict[str, Any], name: str):
 
 def test_every_kind_of_message_is_looked_at(sent: dict[str, Any]):
     assert set(sent) == KNOWN.keys() - MADE_BY_THE_PAGE
+
+
+def test_every_gate_has_words_and_leads_to_a_parameter_that_there_is(sent: dict[str, Any]):
+    words = (TYPES.parent / "why" / "gates.js").read_text(encoding="utf-8")
+    said = set(re.findall(r"^  (\w+): \{ label:", words, re.MULTILINE))
+    assert {gate["name"] for item in sent["Result"]["objects"] for gate in item["gates"]} <= said
+    assert set(re.findall(r'param: "([\w.]+)"', words)) <= set(sent["ParamsAnswer"]["values"])

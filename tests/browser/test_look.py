@@ -159,7 +159,7 @@ def test_a_gate_leads_to_the_parameter_behind_its_limit(open_page: OpenPage, sit
     page = open_page()
     wait_for_frame(page, START)
     camera = pixels(page, "#camera")
-    page.locator("#why .gate", has_text="From the path's middle").click()
+    page.locator("#why .gate", has_text="Off the path's middle").click()
     focused = page.locator("[data-param='path.half_width_m'] input[type=range]")
     expect(focused).to_be_focused()
     page.keyboard.press("ArrowRight")

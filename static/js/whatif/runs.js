@@ -19,7 +19,7 @@ const refresh = newestOnly(async () => {
 });
 
 export function setUp() {
-  $("#runs").append(problem, list, comparison);
+  $("#runs").append(problem, comparison, list);
   for (const tab of ["params", "runs"]) $(`#tab-${tab}`).addEventListener("click", () => showTab(tab));
   on(["state"], () => {
     const revision = get("state")?.drive?.revision ?? -1;
@@ -82,7 +82,7 @@ function showRun(row, run) {
   base.disabled = isBase;
   drop.disabled = isNow || isBase;
   drop.setAttribute("aria-label", `Forget run ${run.name || run.id}`);
-  text($(".facts", HTMLElement, row), run.phase === "done" ? (run.seconds === null ? "" : `${run.seconds.toFixed(2)} s`) : run.note || `${Math.round((100 * run.done) / Math.max(1, run.total))} %`);
+  text($(".facts", HTMLElement, row), run.phase === "done" ? (run.seconds === null ? "" : `${run.seconds.toFixed(run.seconds < 10 ? 1 : 0)} s`) : run.note || `${Math.round((100 * run.done) / Math.max(1, run.total))} %`);
 }
 
 /** What the shown run changes against the compared one. */

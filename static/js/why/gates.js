@@ -14,14 +14,16 @@ import { reveal } from "../params.js";
 
 /** @type {Record<string, Kind>} */
 const KINDS = {
-  iou: { label: "Overlap of boxes (IoU)", test: "least", param: "fusion.min_iou" },
+  iou: { label: "Box overlap (IoU)", test: "least", param: "fusion.min_iou" },
   range_sigmas: { label: "Distances disagree", test: "most", unit: "σ", param: "fusion.range_gate_sigmas" },
   vehicle_class: { label: "A vehicle by class", test: "flag" },
   distance_known: { label: "Distance known", test: "flag", unit: "m" },
   hits: { label: "Times seen", test: "least", param: "cipv.confirm_hits" },
-  seen: { label: "Measured in this frame", test: "flag", param: "cipv.carried_may_become_lead" },
+  seen: { label: "Measured now", test: "flag", param: "cipv.carried_may_become_lead" },
   size: { label: "Size of a vehicle", test: "flag", unit: "m", param: "cipv.max_size_m" },
-  path_offset: { label: "From the path's middle", test: "most", unit: "m", param: "path.half_width_m" },
+  path_offset: { label: "Off the path's middle", test: "most", unit: "m", param: "path.half_width_m" },
+  path_odds: { label: "In path over time", test: "least", unit: "log odds" },
+  path_sigma: { label: "Place uncertain by", test: "most", unit: "m", param: "cipv.max_sigma_m" },
 };
 /** How far a bar reaches beyond the larger of value and limit. */
 const HEADROOM = 1.2;
@@ -39,7 +41,7 @@ const digits = (value) => (Number.isInteger(value) ? 0 : Math.abs(value) < 10 ? 
 export function gateRow({ name }) {
   const { label, param } = kindOf(name);
   const title = param ? `Limit set by ${param}: press to go there` : label;
-  const row = el("button", { type: "button", class: "gate", title, disabled: !param, onclick: () => param && reveal(param) },
+  const row = el("button", { type: "button", class: "gate", title, disabled: !param, onclick: () => param && reveal(param)?.focus() },
     el("i", { class: "sign" }), el("span", { class: "name", textContent: label }), el("span", { class: "number" }), el("span", { class: "bar" }, el("i"), el("b")));
   return row;
 }

@@ -16,6 +16,8 @@ import { showRerun } from "./rerun.js";
 
 /** @type {Record<Pane, string>} in the order of their menu */
 export const PANES = { camera: "Camera", plan: "Plan, 3D, rerun", objects: "Objects", why: "Why", params: "Parameters", timeline: "Timeline" };
+/** What a pane with the whole workspace lies over. @type {Pane[]} */
+const COVERED = ["camera", "plan", "objects"];
 /** @type {Layout} */
 export const EVERYTHING = { hidden: [], grown: null, tab: "plan", sizes: {} };
 
@@ -51,7 +53,7 @@ export function change(changes) {
 /** @param {Pane} pane @param {boolean} [shown] */
 export function toggle(pane, shown = layout().hidden.includes(pane)) {
   const others = layout().hidden.filter((key) => key !== pane);
-  change({ hidden: shown ? others : [...others, pane], grown: null });
+  change({ hidden: shown ? others : [...others, pane], grown: COVERED.includes(pane) ? null : layout().grown });
   if (shown && (pane === "why" || pane === "params")) showInspector(true);
 }
 
