@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ class RosbagSource:
         path, options = split_options(rest, (*ROLES, "rig"))
         file = bag_path(path)
         self.uri, self.title = uri, file.resolve().stem
-        self._bag = Bag(file)
+        self._bag, self._lock = Bag(file), Lock()
         topics = map_topics(self._bag.topics, options)
         if topics.lidar is None and topics.camera is None:
             raise SourceError(f"{path}: neither LiDAR nor pictures in it; its topics are {_listed(self._bag)}")
@@ -59,8 +60,9 @@ class RosbagSource:
 
     def frame(self, index: int) -> Frame:
         t_ns, notes = self.t_ns(index), list[str]()
-        sweep = self._sweep(index, t_ns, notes)
-        picture = self._picture(t_ns, notes)
+        with self._lock:  # a bag is read at one place at a time
+            sweep = self._sweep(index, t_ns, notes)
+            picture = self._picture(t_ns, notes)
         return Frame(
             index,
             f"{index:06d}",

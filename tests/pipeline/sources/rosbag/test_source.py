@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cv2
@@ -254,3 +255,12 @@ def test_nebula(data_dir: Path) -> None:
         assert frame.sweep is not None
         assert 14_700 < len(frame.sweep.points) < 15_000
         assert frame.notes == ()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_frames_from_several_threads(kind: Kind, tmp_path: Path) -> None:
+    source = open_source(f"rosbag:{write_bag(path_of(tmp_path, kind), kind)}")
+    with ThreadPoolExecutor(4) as pool:
+        frames = list(pool.map(source.frame, [0, 1, 2] * 4))
+    assert [frame.index for frame in frames] == [0, 1, 2] * 4
+    assert all(frame.sweep is not None and frame.picture is not None for frame in frames)

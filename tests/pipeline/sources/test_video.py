@@ -1,0 +1,42 @@
+"""Pictures of a video file by their time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.sources import SourceError
+from pipeline.sources.video import VideoFile
+
+from .captures import write_video
+
+PICTURES = 12
+
+
+@pytest.mark.parametrize(("name", "codec"), [("a.avi", "mjpeg"), ("a.mp4", "mpeg4"), ("a.mkv", "mpeg4")])
+@pytest.mark.parametrize("order", [range(PICTURES), range(PICTURES - 1, -1, -1), (3, 3, 9, 2, 4, 11, 0)])
+def test_every_picture_in_any_order(name: str, codec: str, order: range, tmp_path: Path) -> None:
+    write_video(tmp_path / name, PICTURES, rate=25, codec=codec)
+    video = VideoFile(tmp_path / name)
+    assert video.times_ns == pytest.approx(np.arange(PICTURES) * 40e6, abs=1e6)
+    for index in order:
+        picture = video.picture(index)
+        assert picture.shape == (48, 80, 3)
+        assert np.median(picture) == pytest.approx(20 * index, abs=8)
+
+
+@pytest.mark.parametrize("data", [b"", b"garbage" * 100, b"RIFF....AVI LIST"])
+def test_no_video(data: bytes, tmp_path: Path) -> None:
+    (tmp_path / "a.avi").write_bytes(data)
+    with pytest.raises(SourceError, match=r"a\.avi: not a readable video"):
+        VideoFile(tmp_path / "a.avi")
+
+
+def test_a_video_that_goes_away(tmp_path: Path) -> None:
+    write_video(tmp_path / "a.avi", 3)
+    video = VideoFile(tmp_path / "a.avi")
+    (tmp_path / "a.avi").unlink()
+    with pytest.raises(SourceError, match=r"a\.avi: picture 1 cannot be decoded"):
+        video.picture(1)
