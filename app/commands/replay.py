@@ -61,6 +61,6 @@ class Replay:
             for sender in senders.values():
                 sender.close()
         said = ", ".join(f"{number} {sensor}" for sensor, number in sent.events.items())
-        slow = f"; {sent.late} late, {sent.skipped} left out: this machine is too slow" if sent.late else ""
+        slow = f"; {sent.late} late, put off {sent.slips} times: this machine is too slow" if sent.late else ""
         print(f"cipv: sent {said or 'nothing'}{slow}", file=sys.stderr)
         return 0

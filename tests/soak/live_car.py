@@ -77,7 +77,7 @@ def main(config_file: str, seconds: str, faults_file: str) -> None:
     sent = replay(messages(frames, jpegs, float(seconds)), senders, faults=faults, start_ns=start_ns)
     for sender in senders.values():
         sender.close()
-    print(json.dumps({"sent": sent.events, "late": sent.late, "skipped": sent.skipped}), flush=True)
+    print(json.dumps({"sent": sent.events, "late": sent.late, "slips": sent.slips}), flush=True)
 
 
 if __name__ == "__main__":

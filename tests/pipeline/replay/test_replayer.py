@@ -1,4 +1,4 @@
-"""What is due is sent when it is due; what came too late is not sent at all."""
+"""What is due is sent when it is due; a machine that is too slow puts things off and does not lag."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ def pictures(count: int) -> list[Message]:
 def test_everything_is_sent_in_order_and_not_early() -> None:
     camera = Notebook()
     sent = replay(pictures(20), {"camera": camera})
-    assert [payload[0] for _, payload in camera.sent] == list(range(20))[: len(camera.sent)]
-    assert sent.events["camera"] + sent.skipped == 20
+    assert [payload[0] for _, payload in camera.sent] == list(range(20))
+    assert sent.events == {"camera": 20}
     assert min(late for late, _ in camera.sent) >= 0
 
 
-def test_what_is_too_late_is_left_out_instead_of_lagging_behind() -> None:
+def test_a_machine_that_is_too_slow_puts_off_instead_of_lagging_behind() -> None:
     slow = Notebook(takes_s=0.05)
     sent = replay(pictures(60), {"camera": slow})
-    assert sent.skipped > 10
-    assert sent.events["camera"] + sent.skipped == 60
+    assert sent.slips > 3
+    assert sent.events["camera"] == 60
     assert max(late for late, _ in slow.sent) < 1000 * MS, "without that it would be 2.4 s in the end"
 
 
