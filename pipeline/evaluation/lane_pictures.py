@@ -22,6 +22,7 @@ from pipeline.types import U8, CameraCalibration, RawLanes
 EYE_HEIGHT_M = 1.4
 _FOCAL_SHARE, _HORIZON_SHARE = 0.9, 0.57
 _COLOURS = {"left": (0, 0, 255), "right": (0, 220, 0)}
+_ROWS_BEYOND = 2
 UNSURE = LaneParams(mount_height_m=EYE_HEIGHT_M, pitch_sigma_deg=1.5, min_width_m=2.0, max_width_m=5.5)
 """The pitch and the scale of a guessed camera may be well off."""
 Marks = Mapping[str, Mapping[int, tuple[float | None, float | None]]]
@@ -96,10 +97,12 @@ def tiles(pictures: Sequence[U8], columns: int = 3, width: int = 640) -> U8:
     return np.vstack([np.hstack(small[i : i + columns]) for i in range(0, len(small), columns)]).astype(np.uint8)
 
 
-def _column(uv: F64, row: int) -> float:
-    """Where a line crosses a row; the line goes on straight below its nearest point."""
+def _column(uv: F64, row: int) -> float | None:
+    """Where a line crosses a row; it goes on straight below its nearest point, and is not believed above its last."""
     uv = uv[~np.isnan(uv[:, 0])]
     (u0, v0), (u1, v1) = uv[:2]
     if row > v0:
         return float(u0 + (row - v0) * (u0 - u1) / (v0 - v1))
+    if row < uv[-1, 1] - _ROWS_BEYOND:
+        return None
     return float(np.interp(-row, -uv[:, 1], uv[:, 0]))

@@ -30,12 +30,15 @@ _MAX_LINES = 6
 _VOTED_POINTS = 220
 _WIDE_GATE_M, _GATE_PER_M = 0.35, 0.012
 _PAINT_SIGMA_M = 0.05
+_LAST_GATE = 0.5
+"""The gate narrows to this share over the rounds, as the line settles onto its points."""
 _AROUND = 2.5
 _BY_CHANCE = 1.0 / _AROUND
 """Points within this many gates are looked at; of clutter spread evenly over them such a share lies within the gate."""
 _SHARED_ERROR = 4.0
 """Points of neighbouring rows err together: this many count as one."""
 _COVER_FROM_M, _COVER_STEP_M, _COVER_BINS = 4.0, 2.0, 12
+_ENOUGH_POINTS = 14
 _ENOUGH_COVER = 5.0
 """Pieces of 2 m with paint in them that make a line sure; a broken line of 3 m in 12 m has about as many to 28 m."""
 
@@ -172,17 +175,20 @@ def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma, rounds):
     covered = np.zeros(_COVER_BINS)
     x_min = x_max = 0.0
     near = inside = score = 0.0
-    for _ in range(rounds):
+    count = 0
+    for turn in range(rounds):
+        narrow = 1.0 - (1.0 - _LAST_GATE) * turn / max(rounds - 1, 1)
         sums, right = np.zeros(7), np.zeros(4)  # of the powers of x/10 up to 6: a Hankel matrix holds no more
         covered[:] = 0.0
         x_min, x_max = 1e9, 0.0
         near = inside = score = 0.0
+        count = 0
         for i in range(len(x)):
             if not (x[i] > _NEAREST_M and x[i] < 90.0):
                 continue
             expected = mean[0] + x[i] * (mean[1] + x[i] * (mean[2] + x[i] * mean[3]))
             residual = y[i] - expected
-            gate = _WIDE_GATE_M + _GATE_PER_M * x[i]
+            gate = narrow * (_WIDE_GATE_M + _GATE_PER_M * x[i])
             if abs(residual) > _AROUND * gate:
                 continue
             near += weight[i]
@@ -199,6 +205,7 @@ def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma, rounds):
                     right[k] += power * y[i]
                 power *= step
             inside += weight[i]
+            count += 1
             score += weight[i] * weight[i]
             x_min, x_max = min(x_min, x[i]), max(x_max, x[i])
             piece = int((x[i] - _COVER_FROM_M) / _COVER_STEP_M)
@@ -218,5 +225,6 @@ def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma, rounds):
             for b in range(4):
                 cov[k, b] = inverse_info[k, b] * scale[k] * scale[b]
     clear = max(0.0, inside / near - _BY_CHANCE) / (1.0 - _BY_CHANCE)
-    quality = min(1.0, covered.sum() / _ENOUGH_COVER) * clear * min(1.0, 1.5 * score / inside)
+    support = min(1.0, covered.sum() / _ENOUGH_COVER) * min(1.0, count / _ENOUGH_POINTS)
+    quality = support * clear * min(1.0, 1.5 * score / inside)
     return True, mean, cov, x_min, x_max, quality
