@@ -160,9 +160,12 @@ class RotationCutter:
 
     def _is_doubled(self, placed: Placed) -> bool:
         """Whether a packet of this time is there already; only some µs off, one of the two is spoiled."""
+        apart_us = _APART_SHARE * placed.packet.span_us
+        if not self._packets or placed.time_us - self._packets[-1].time_us >= apart_us:
+            return False  # in order, as nearly all
         at = bisect(self._packets, placed.time_us, key=_time_us)
         nearest = self._packets[max(0, at - 1) : at + 1]
-        return any(abs(it.time_us - placed.time_us) < _APART_SHARE * placed.packet.span_us for it in nearest)
+        return any(abs(it.time_us - placed.time_us) < apart_us for it in nearest)
 
     def _finish(self, seen_passing: bool) -> Rotation | None:
         """The packets at hand, if they are a whole rotation. seen_passing: the head was seen to pass behind the car at
