@@ -102,6 +102,11 @@ class Control:
         with self._condition:
             return self._wish.stop or self._wish.uri is not None or self._wish.target is not None
 
+    @property
+    def waiting(self) -> bool:
+        """Whether anything has changed that the worker has not taken yet."""
+        return self._changed
+
     def take(self, timeout_s: float | None) -> Wish:
         """Wait until something changes or the time is over; the wishes served once are handed out and cleared."""
         with self._condition:

@@ -146,13 +146,27 @@ class Engine:
         elif wish.playing and shown.playing:
             tick = self._play(wish)
         else:
-            tick = self._line.rerun(wish.params) if self._line.can_be_exact() else None
+            tick = self._better(self._line, wish)
         self._show(wish, tick)
 
     def _seek(self, index: int, wish: Wish) -> Tick | None:
         assert self._line is not None
         self._clock = None
-        return self._line.seek(index, wish.params, self.control.superseded)
+        return self._line.seek(index, wish.params, self.control.superseded, at_once=True)
+
+    def _better(self, line: Line, wish: Wish) -> Tick | None:
+        """The paused frame once more, when more is known of it than when it was shown: exactly as in the whole drive,
+        or after a whole warm-up, which gives way to every wish."""
+        if line.can_be_exact():
+            return line.rerun(wish.params)
+        shown = line.tick
+        if shown is None or shown.warmed:
+            return None
+        try:
+            return line.seek(shown.frame.index, wish.params, lambda: self.control.waiting)
+        except BaseException:
+            line.tick = replace(shown, warmed=True)  # what cannot be had is not tried again
+            raise
 
     def _step(self, index: int, wish: Wish) -> Tick | None:
         """Every frame up to ``index``, none skipped."""
@@ -206,6 +220,13 @@ class Engine:
         """Seconds until playback needs the worker; null while nothing is playing."""
         if self._live is not None:
             return 0.0  # it waits for its sensors instead
+        if (
+            self._clock is None
+            and self._line is not None
+            and self._line.tick is not None
+            and not self._line.tick.warmed
+        ):
+            return 0.0
         if self._clock is None or self._line is None or self._ahead is None:
             return None
         if self._ahead.busy and self._clock.wait_s(self.snapshot.index, time.monotonic()) <= 0:

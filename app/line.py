@@ -22,6 +22,8 @@ from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result
 
 WARM_UP_FRAMES = 10
 """A seek runs this many frames before its target, so that trackers there have their history and confirmations."""
+AT_ONCE_FRAMES = 1
+"""The same, where somebody waits and the frames before have not been read and looked at yet: that takes 50 ms each."""
 _CACHED_FRAMES_BYTES = 192e6
 _CACHED_ANSWERS = 8192
 
@@ -31,7 +33,8 @@ class Tick:
     """One frame, what the line believed before it and after it, and what it believes at it.
 
     exact: ``before`` is the state of a run through the whole drive from its first frame, so that the result is the one
-    that ``cipv run`` gives; else it comes from a short warm-up, and numbers of objects may differ."""
+    that ``cipv run`` gives; else it comes from a short warm-up, and numbers of objects may differ. warmed: the warm-up
+    was a whole one; else the frame was wanted at once, and trackers have hardly any history."""
 
     before: State
     frame: Frame
@@ -40,6 +43,7 @@ class Tick:
     params: Params
     detect_ms: float
     exact: bool = False
+    warmed: bool = True
 
 
 class DetectionCache:
@@ -111,23 +115,35 @@ class Line:
         self._sensors = sensors
         self._frames: BoundedCache[int, Frame] = BoundedCache(_CACHED_FRAMES_BYTES, _frame_bytes)
 
-    def seek(self, index: int, params: Params, superseded: Callable[[], bool] = lambda: False) -> Tick | None:
+    def seek(
+        self,
+        index: int,
+        params: Params,
+        superseded: Callable[[], bool] = lambda: False,
+        *,
+        at_once: bool = False,
+    ) -> Tick | None:
         """Jump to ``index``: exactly where the state there is known, else from a fresh state ``WARM_UP_FRAMES`` before
         it. Either way the answer depends on nothing but the recording, the index and the parameters. Null, and nothing
-        changed, when ``superseded`` said so on the way."""
+        changed, when ``superseded`` said so on the way.
+
+        at_once: where the frames before are not at hand, the warm-up is cut to ``AT_ONCE_FRAMES``; the tick says so."""
         known = self._known(index, params)
         if known is not None:
             self.tick = self._run(known, index, params, exact=True)
             return self.tick
         first = max(0, index - WARM_UP_FRAMES)
+        if at_once and not all(self._is_at_hand(i) for i in range(first, index)):
+            first = max(0, index - AT_ONCE_FRAMES)
         state, tick = State(), None
         for i in range(first, index + 1):
             if superseded():
                 return None
             tick = self._run(state, i, params, exact=first == 0)
             state = tick.after
-        self.tick = tick
-        return tick
+        assert tick is not None
+        self.tick = replace(tick, warmed=first == max(0, index - WARM_UP_FRAMES))
+        return self.tick
 
     def advance(self, index: int, params: Params) -> Tick:
         """Run ``index`` after the shown frame. Where the state there is not known, frames skipped between are simply
@@ -177,6 +193,10 @@ class Line:
         ahead, ahead_ms = self._ahead_ms
         detect_ms = self._ask.spent_ms - spent_ms + (ahead_ms if ahead == index else 0.0)
         return Tick(state, frame, after, result, params, detect_ms, exact)
+
+    def _is_at_hand(self, index: int) -> bool:
+        with self._reading:
+            return self._frames.get(index) is not None
 
     def _read(self, index: int) -> Frame:
         with self._reading:

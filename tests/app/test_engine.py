@@ -49,7 +49,8 @@ def body(result: Result) -> str:
 
 
 def at(index: int) -> Callable[[Snapshot], bool]:
-    return lambda s: s.tick is not None and s.index == index
+    """The frame is shown, after a whole warm-up."""
+    return lambda s: s.tick is not None and s.index == index and s.tick.warmed
 
 
 def played(recording: Recording, first: int, last: int, params: Params) -> Result:
@@ -80,6 +81,40 @@ def test_a_seek_gives_the_bytes_of_playing_there_from_its_warm_up(start: Start, 
     assert tick is not None
     expected = played(recording, max(0, index - WARM_UP_FRAMES), index, Params())
     assert body(tick.result) == body(expected)
+
+
+def test_a_frame_wanted_at_once_is_shown_after_two_reads_and_again_after_a_whole_warm_up(start: Start):
+    engine, recording, detector = start()
+    shown: list[tuple[bool, int, str]] = []
+    recording.reads.clear()
+    calls = detector.calls
+    engine.listen(lambda s: shown.append((s.tick.warmed, detector.calls - calls, body(s.tick.result))))
+    engine.control.seek(20)
+    engine.wait_for(at(20), WAIT_S)
+    assert recording.reads == [19, 20, *range(10, 19)]
+    at_once, warmed = [one for one in dict.fromkeys(shown) if one[1]]
+    assert at_once == (False, 2, body(played(recording, 19, 20, Params())))
+    assert warmed == (True, 11, body(played(recording, 10, 20, Params())))
+    engine.control.seek(22)
+    seen = engine.wait_for(lambda s: s.index == 22, WAIT_S)
+    assert seen.tick is not None
+    assert not seen.tick.warmed, "21 has not been read"
+    engine.wait_for(at(22), WAIT_S)
+    engine.control.seek(21)
+    seen = engine.wait_for(lambda s: s.index == 21, WAIT_S)
+    assert seen.tick is not None
+    assert seen.tick.warmed, "all that it needs is at hand"
+
+
+def test_a_warm_up_that_fails_is_not_tried_again(start: Start):
+    engine, recording, _ = start(Recording(broken=frozenset({12})))
+    engine.control.seek(20)
+    engine.wait_for(lambda s: any(n.level == "error" for n in s.notices), WAIT_S)
+    reads = recording.reads.count(12)
+    engine.control.change(loop=False)
+    engine.wait_for(lambda s: not s.loop, WAIT_S)
+    assert recording.reads.count(12) == reads == 1
+    assert engine.snapshot.index == 20
 
 
 def test_a_seek_depends_on_nothing_before_it(start: Start):
@@ -171,7 +206,7 @@ def test_an_overtaken_seek_is_dropped_on_the_way(start: Start):
     engine.control.seek(24)
     recording.gate.set()
     engine.wait_for(at(24), WAIT_S)
-    assert recording.reads[:2] == [10, 14], "one frame of the first seek was read, then the last seek began"
+    assert recording.reads[:2] == [19, 23], "one frame of the first seek was read, then the last seek began"
     assert not {20, 22} & set(shown)
 
 
