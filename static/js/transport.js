@@ -4,6 +4,7 @@ import { $, el, press, text } from "./dom.js";
 import * as shuttle from "./drive/shuttle.js";
 import { clock } from "./format.js";
 import { icon } from "./icons.js";
+import { recordButton } from "./recording.js";
 import { get, on } from "./store.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
@@ -24,7 +25,7 @@ export function setUp() {
   play.classList.add("play");
   speed.addEventListener("change", () => playback({ speed: Number(speed.value) }));
   const where = el("span", { class: "where" }, live, name, count, time, provisional);
-  $("#transport").append(back, play, next, where, el("span", { class: "spacer" }), speed, loop);
+  $("#transport").append(back, play, next, where, el("span", { class: "spacer" }), recordButton(), speed, loop);
   on(["state"], update);
 }
 

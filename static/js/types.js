@@ -108,11 +108,19 @@
  * @property {string|null} lane_detector
  * @property {boolean} live
  * @property {Record<string, any>} streams
- * @property {Record<string, any>|null} recording
+ * @property {RecordingState|null} recording
  * @property {boolean} provisional
  * @property {DriveState} drive
  * @property {boolean} can_undo
  * @property {boolean} can_redo
+ *
+ * @typedef {object} RecordingState
+ * @property {string} file
+ * @property {number} frames
+ * @property {number} seconds
+ * @property {number} bytes
+ * @property {number} dropped
+ * @property {string|null} error
  *
  * @typedef {object} DriveState
  * @property {number} revision

@@ -15,6 +15,7 @@ import pytest
 
 from app.encode import Encoder
 from app.engine import Engine
+from app.recording import RecordingDesk
 from app.server import Server, create_app, listen_socket
 from app.snapshot import Snapshot
 from pipeline.params import Params
@@ -38,10 +39,17 @@ def typedefs(text: str) -> dict[str, set[str]]:
 
 
 @pytest.fixture(scope="module")
-def sent() -> Iterator[dict[str, Any]]:
+def sent(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
     """One real message of each kind, by the name of its type."""
     recording = Recording(count=30)
-    engine = Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri, whole_drives=True)
+    engine = Engine(
+        opener(recording),
+        lambda _: CountingDetector(),
+        Params(),
+        uri=recording.uri,
+        whole_drives=True,
+        desk=RecordingDesk(tmp_path_factory.mktemp("sessions")),
+    )
     bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
     address = f"http://127.0.0.1:{bound.getsockname()[1]}"
     server = Server(create_app(engine), address, lambda _: is_ready.set())
@@ -95,6 +103,7 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Result": result,
         "Notice": state["notices"][0],
         "State": state,
+        "RecordingState": client.post("/api/recording", json={"on": True}).json(),
         "DriveState": state["drive"],
         "Display": display,
         "GroundPlanes": display["ground"],
@@ -110,7 +119,7 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Metric": comparison["metrics"][0],
         "Comparison": comparison,
         "Job": job,
-        "AlignmentScore": client.get("/api/alignment/score").json(),
+        "AlignmentScore": get("/api/alignment/score"),
     }
 
 

@@ -3,9 +3,9 @@ import { context } from "../dom.js";
 
 /** @typedef {import("../types.js").Frame} Frame */
 
-const WIDTH_PX = 480;
-/** The strongest share of all pixels is drawn. */
-const SHARE = 0.08;
+const WIDTH_PX = 800;
+/** The strongest share of all pixels may be drawn; of a broad edge, its ridge is. */
+const SHARE = 0.12;
 const TINT = [255, 240, 120];
 
 const canvas = document.createElement("canvas");
@@ -31,10 +31,11 @@ function find(bitmap) {
   canvas.height = height;
   ctx.drawImage(bitmap, 0, 0, width, height);
   const image = ctx.getImageData(0, 0, width, height);
-  const strength = gradient(brightness(image.data), width, height);
+  const { strength, step } = gradient(brightness(image.data), width, height);
   const limit = quantile(strength, 1 - SHARE);
   for (let i = 0; i < strength.length; i++) {
-    image.data.set([...TINT, strength[i] > limit ? Math.min(255, 120 + strength[i] / 4) : 0], 4 * i);
+    const isRidge = strength[i] > limit && strength[i] >= strength[i - step[i]] && strength[i] > strength[i + step[i]];
+    image.data.set([...TINT, isRidge ? Math.min(255, 130 + strength[i] / 3) : 0], 4 * i);
   }
   ctx.putImageData(image, 0, 0);
 }
@@ -46,17 +47,22 @@ function brightness(rgba) {
   return grey;
 }
 
-/** Sobel's, as the sum of both directions' sizes. @param {Float32Array} grey @param {number} width @param {number} height */
+/**
+ * Sobel's gradient: its strength (both directions' sizes together), and how far it is to the next pixel along it.
+ * @param {Float32Array} grey @param {number} width @param {number} height
+ */
 function gradient(grey, width, height) {
-  const strength = new Float32Array(grey.length);
+  const strength = new Float32Array(grey.length), step = new Int32Array(grey.length);
   for (let y = 1; y < height - 1; y++) {
     for (let i = y * width + 1; i < (y + 1) * width - 1; i++) {
       const a = grey[i - width - 1], b = grey[i - width], c = grey[i - width + 1], d = grey[i - 1];
       const e = grey[i + 1], f = grey[i + width - 1], g = grey[i + width], h = grey[i + width + 1];
-      strength[i] = Math.abs(c + 2 * e + h - a - 2 * d - f) + Math.abs(f + 2 * g + h - a - 2 * b - c);
+      const across = Math.abs(c + 2 * e + h - a - 2 * d - f), down = Math.abs(f + 2 * g + h - a - 2 * b - c);
+      strength[i] = across + down;
+      step[i] = across > down ? 1 : width;
     }
   }
-  return strength;
+  return { strength, step };
 }
 
 /** @param {Float32Array} values @param {number} share */

@@ -4,7 +4,7 @@ import { clock } from "../format.js";
 import { get } from "../store.js";
 import { scaleOf, traceLine, yOf } from "./curves.js";
 import { drawFlags } from "./flags.js";
-import { drawRibbon } from "./ribbon.js";
+import { colorLeads, drawRibbon } from "./ribbon.js";
 import { MARKS_PX } from "./rows.js";
 
 /** @typedef {import("./span.js").Span} Span */
@@ -29,6 +29,7 @@ export function drawBack(ctx, size, span, rows, isLight) {
   ctx.beginPath();
   ctx.rect(span.left, 0, span.width, size.height);
   ctx.clip();
+  colorLeads([drive.base, drive.now]);
   const look = { isLight, empty: ui("raised"), chosen: get("selection"), ring: ui("text") };
   drawRibbon(ctx, drive.now, span, rows.ribbon, look);
   if (drive.base && rows.base) {

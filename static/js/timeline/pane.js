@@ -1,9 +1,10 @@
 /** The timeline: the whole recording at a glance. Its still part and its moving part lie on two canvases. */
 import { ui } from "../colors.js";
-import { $, el, fitted, memory, press, text } from "../dom.js";
+import { $, el, memory, press, text } from "../dom.js";
 import { here } from "../drive/seek.js";
 import { clock, num } from "../format.js";
 import { get, on, paint, painter } from "../store.js";
+import { Surface } from "../surface.js";
 import { drawBack } from "./back.js";
 import * as clip from "./clip.js";
 import { CURVES } from "./curves.js";
@@ -25,6 +26,7 @@ let hover = null;
 
 const redraw = painter(draw);
 const redrawFront = painter(drawMoving);
+const still = new Surface(back, redraw), moving = new Surface(front, redrawFront);
 
 export function setUp() {
   $("#timeline-curves").append(...CURVES.map(chip));
@@ -32,7 +34,6 @@ export function setUp() {
   on(["state"], () => frames() !== span.count && redraw());
   on(["state", "scrub", "clip"], redrawFront);
   paint(["state", "drive"], describe);
-  new ResizeObserver(redraw).observe(back);
   followPointer(front, { span, rows, zoomed: redraw, hovered });
   $("#timeline-fit").addEventListener("click", fit);
   clip.setUp();
@@ -73,7 +74,8 @@ let isLight = false;
 const rows = () => shared;
 
 function draw() {
-  const { ctx, width, height } = fitted(back);
+  if (still.isHidden) return;
+  const ctx = still.begin(), { width, height } = still;
   span.setCount(frames());
   span.left = LABELS_PX;
   span.width = Math.max(1, width - LABELS_PX - EDGE_PX);
@@ -86,10 +88,9 @@ function draw() {
 
 function drawMoving() {
   const state = get("state");
-  if (!state?.frame) return;
+  if (!state?.frame || moving.isHidden) return;
   if (state.playing && span.reveal(here())) return redraw();
-  const { ctx, width, height } = fitted(front);
-  drawFront(ctx, { width, height }, span, shared, { isLight, hover });
+  drawFront(moving.begin(), moving, span, shared, { isLight, hover });
   front.setAttribute("aria-valuemax", String(frames() - 1));
   front.setAttribute("aria-valuenow", String(here()));
   front.setAttribute("aria-valuetext", `frame ${state.frame ?? ""}, ${clock(state.time_s)}`);

@@ -5,15 +5,26 @@
 /** @typedef {{top: number, height: number}} Row */
 /** @typedef {{first: number, end: number, id: number|null, source: string|null, carried: boolean}} Stretch */
 
-/** Degrees of hue from one id to the next: the golden angle keeps neighbours apart. */
-const HUE_STEP = 137.508;
+/** Degrees of hue from one lead to the next: the golden angle keeps the first dozens apart. */
+const HUE_STEP = 137.508, FIRST_HUE = 190;
 const HATCH_PX = 6;
 /** Narrower stretches get no number. */
 const NUMBER_FROM_PX = 24;
 
+/** Which lead of the recording an id is: the first, the second … @type {Map<number, number>} */
+let places = new Map();
+
+/** Give every lead its colour, the compared run's first, so that those of both keep theirs. @param {(Series|null)[]} runs */
+export function colorLeads(runs) {
+  places = new Map();
+  for (const series of runs) {
+    for (const id of series?.columns.cipv_id ?? []) if (id !== null && !places.has(id)) places.set(id, places.size);
+  }
+}
+
 /** @param {number} id @param {boolean} isLight */
 export function colorOf(id, isLight) {
-  const hue = Math.round((id * HUE_STEP) % 360);
+  const hue = Math.round((FIRST_HUE + (places.get(id) ?? id) * HUE_STEP) % 360);
   return isLight ? `hsl(${hue} 55% 38%)` : `hsl(${hue} 58% 66%)`;
 }
 

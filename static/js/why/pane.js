@@ -61,10 +61,10 @@ function sentence({ cipv, rejected }, ranked, id, isLead) {
   return `Not the CIPV: ${reason}${measured(ranked)}.`;
 }
 
-/** @param {Ranked} ranked @returns {string} " (from the path's middle 2.31 m, limit 1.5 m)" */
+/** @param {Ranked} ranked @returns {string} " (off the path's middle 2.31 m, limit 1.5 m)"; empty where the reason has the number */
 function measured({ stopped_by, value, limit }) {
   const kind = kindOf(stopped_by ?? "");
-  if (value === null || limit === null || kind.test === "flag") return "";
+  if (value === null || limit === null || kind.test !== "most") return "";
   return ` (${kind.label.toLowerCase()} ${quantity(value, kind)}, limit ${quantity(limit, kind)})`;
 }
 
