@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Any
 
 import numpy as np
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pipeline.recording.container import McapFile
 from pipeline.recording.messages import Damaged
 from pipeline.recording.tick import PacketsRef
-from pipeline.recording.topics import PACKETS, VELODYNE_PACKET_DEFINITION, VELODYNE_SCAN, VELODYNE_SCAN_DEFINITION
+from pipeline.recording.topics import PACKETS
 from pipeline.sources.base import SourceError
 from pipeline.sources.files import rigid_transform
 from pipeline.sources.velodyne import PACKET_BYTES, Vlp16Decoder
+from pipeline.sources.velodyne.ros import PACKET, SCAN, typestore
 from pipeline.types import F64, Sweep
 
 PACKETS_BEFORE_NS, _PACKETS_AFTER_NS = 800_000_000, 200_000_000
 """How long before and after the tick the packets of its sweep may have been received."""
 _SAME_SWEEP_NS = 40_000_000
 """Stamps of a sweep decoded with and without what came long before differ by far less; sweeps lie 100 ms apart."""
-_PACKET, _HEADER, _TIME = "velodyne_msgs/msg/VelodynePacket", "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
+_HEADER, _TIME = "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
 
 
 @dataclass(frozen=True)
@@ -57,29 +56,21 @@ def sweep_of_packets(ref: PacketsRef, at_ns: int, file: McapFile) -> Sweep:
 def scan_message(packets: list[tuple[int, bytes]]) -> bytes:
     """CDR of (when received in ns, payload) each, oldest first. Payloads of another length than a VLP-16's are left
     out: the message has no room for them."""
-    types = _store().types
-    stamp, header, packet = types[_TIME], types[_HEADER], types[_PACKET]
+    types = typestore().types
+    stamp, header, packet = types[_TIME], types[_HEADER], types[PACKET]
     whole = [(t_ns, payload) for t_ns, payload in packets if len(payload) == PACKET_BYTES]
     first_ns = packets[0][0] if packets else 0
-    message = types[VELODYNE_SCAN](
+    message = types[SCAN](
         header(stamp(*divmod(first_ns, 1_000_000_000)), "lidar"),
         [packet(stamp(*divmod(t_ns, 1_000_000_000)), np.frombuffer(data, dtype=np.uint8)) for t_ns, data in whole],
     )
-    return bytes(_store().serialize_cdr(message, VELODYNE_SCAN))
+    return bytes(typestore().serialize_cdr(message, SCAN))
 
 
 def packets_from(data: bytes) -> list[tuple[int, bytes]]:
     """Back from ``scan_message``. Damaged when it is none."""
     try:
-        scan: Any = _store().deserialize_cdr(data, VELODYNE_SCAN)
+        scan: Any = typestore().deserialize_cdr(data, SCAN)
     except Exception as error:  # damaged bytes make the library raise whatever they like
         raise Damaged(f"a message of /lidar/packets cannot be read: {error}") from None
     return [(each.stamp.sec * 1_000_000_000 + each.stamp.nanosec, each.data.tobytes()) for each in scan.packets]
-
-
-@cache
-def _store() -> Any:
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    store.register(get_types_from_msg(VELODYNE_PACKET_DEFINITION, _PACKET))
-    store.register(get_types_from_msg(VELODYNE_SCAN_DEFINITION, VELODYNE_SCAN))
-    return store

@@ -15,6 +15,8 @@ from typing import Any
 from foxglove import messages as foxglove
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory  # type: ignore[import-untyped]
 
+from pipeline.sources.velodyne.ros import PACKET_DEFINITION, SCAN, SCAN_DEFINITION
+
 FRAMES = "/frames"
 POINTS = "/lidar/points"
 PACKETS = "/lidar/packets"
@@ -65,15 +67,10 @@ _WELL_KNOWN: dict[str, Any] = {
     NOTES: foxglove.Log,
 }
 
-VELODYNE_SCAN = "velodyne_msgs/msg/VelodyneScan"
-
-VELODYNE_SCAN_DEFINITION = "std_msgs/Header header\nvelodyne_msgs/VelodynePacket[] packets\n"
-VELODYNE_PACKET_DEFINITION = "builtin_interfaces/Time stamp\nuint8[1206] data\n"
-
 _SCAN_SCHEMA = f"\n{'=' * 80}\n".join(
     (
-        VELODYNE_SCAN_DEFINITION,
-        f"MSG: velodyne_msgs/VelodynePacket\n{VELODYNE_PACKET_DEFINITION}",
+        SCAN_DEFINITION,
+        f"MSG: velodyne_msgs/VelodynePacket\n{PACKET_DEFINITION}",
         "MSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n",
         "MSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n",
     )
@@ -97,7 +94,7 @@ def channel(topic: str) -> Channel:
         schema = _WELL_KNOWN[topic].get_schema()
         return Channel(topic, "protobuf", schema.name, schema.encoding, schema.data)
     if topic == PACKETS:
-        return Channel(topic, "cdr", VELODYNE_SCAN, "ros2msg", _SCAN_SCHEMA.encode())
+        return Channel(topic, "cdr", SCAN, "ros2msg", _SCAN_SCHEMA.encode())
     schema_data = json.dumps({"title": _JSON_TITLES[topic], "type": "object"}).encode()
     return Channel(topic, "json", _JSON_TITLES[topic], "jsonschema", schema_data)
 

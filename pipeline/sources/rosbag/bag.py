@@ -1,23 +1,18 @@
-"""One bag: its topics, and their messages by the time they were recorded."""
+"""One bag: its topics, and their messages by the time they were recorded. Older ROS 2 bags hold no definitions of their
+messages: then ROS's own serve, and those of Velodyne packets."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 from weakref import finalize
 
 from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pipeline.sources.base import SourceError
+from pipeline.sources.velodyne.ros import typestore
 
-_VELODYNE = {
-    "velodyne_msgs/msg/VelodynePacket": "builtin_interfaces/Time stamp\nuint8[1206] data",
-    "velodyne_msgs/msg/VelodyneScan": "std_msgs/Header header\nvelodyne_msgs/VelodynePacket[] packets",
-}
-"""Older ROS 2 bags hold no definitions; what ROS's own packages define is in the library, this is not."""
 _SUFFIXES = (".bag", ".db3", ".mcap")
 
 
@@ -39,7 +34,7 @@ class Bag:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            self._reader = AnyReader([path], default_typestore=_store())
+            self._reader = AnyReader([path], default_typestore=typestore())
             self._reader.open()
             finalize(self, self._reader.close)
             self.topics = _topics(self._reader)
@@ -96,11 +91,3 @@ def _topics(reader: AnyReader) -> dict[str, Topic]:
 def _in_words(error: Exception) -> str:
     text = str(error).strip().splitlines()
     return text[0][:200] if text else type(error).__name__
-
-
-@cache
-def _store() -> Any:
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    for name, definition in _VELODYNE.items():
-        store.register(get_types_from_msg(definition, name))
-    return store
