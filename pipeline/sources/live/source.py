@@ -153,7 +153,7 @@ class LiveSensors:
         picture = self._picture(together, notes)
         decoded_ns = self._clock.now_ns()
         streams = self.health()
-        notes += [_missing(each) for each in streams if each.state != "ok"]
+        notes += _missing(streams)
         return Frame(
             self._index,
             f"{self._index:06d}",
@@ -198,10 +198,11 @@ def _sweep(together: Together[Shot]) -> Sweep | None:
     return None if together.sweep is None else replace(together.sweep.value, t_ns=together.sweep.t_ns)
 
 
-def _missing(stream: StreamHealth) -> str:
-    since = f" for {stream.age_ms / 1e3:.1f} s" if stream.age_ms is not None and stream.state != "absent" else ""
-    why = f" ({stream.note})" if stream.note else ""
-    return f"{stream.sensor} {stream.state}{since}{why}"
+def _missing(streams: tuple[StreamHealth, ...]) -> list[str]:
+    """One sentence for all sensors that do not deliver; the same while they do not, so that it can be read."""
+    states = [f"{each.sensor} {each.state}" + (f" ({each.note})" if each.note else "") for each in streams]
+    bad = [text for each, text in zip(streams, states, strict=True) if each.state != "ok"]
+    return [", ".join(bad)] if bad else []
 
 
 def _about(config: LiveConfig) -> tuple[str, ...]:
