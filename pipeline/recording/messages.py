@@ -38,9 +38,9 @@ def points_message(sweep: Sweep) -> bytes:
     packed["ring"] = sweep.ring
     if sweep.time_s is not None:
         packed["time"] = sweep.time_s
-    return _bytes(
+    return to_bytes(
         topics.message_class(topics.POINTS)(
-            timestamp=_stamp(sweep.t_ns),
+            timestamp=stamp(sweep.t_ns),
             frame_id=topics.EGO_FRAME,
             pose={"position": {}, "orientation": {"w": 1.0}},
             point_stride=packed.dtype.itemsize,
@@ -76,9 +76,9 @@ def image_message(picture: Picture, t_ns: int) -> bytes:
         data, kind = picture.encoded, "jpeg"
     else:
         data, kind = cv2.imencode(".png", picture.bgr, _PNG_FAST)[1].tobytes(), "png"
-    stamp = _stamp(t_ns if picture.t_ns is None else picture.t_ns)
+    taken_ns = t_ns if picture.t_ns is None else picture.t_ns
     message = topics.message_class(topics.IMAGE)
-    return _bytes(message(timestamp=stamp, frame_id=topics.CAMERA_FRAME, data=data, format=kind))
+    return to_bytes(message(timestamp=stamp(taken_ns), frame_id=topics.CAMERA_FRAME, data=data, format=kind))
 
 
 def picture_from(data: bytes, t_ns: int | None) -> Picture:
@@ -99,9 +99,9 @@ def calibration_message(camera: CameraCalibration, t_ns: int) -> bytes:
     distortion = [float(value) for value in camera.distortion]
     model = "rational_polynomial" if len(distortion) > 5 else "plumb_bob"
     distortion += [0.0] * ((8 if len(distortion) > 5 else 5) - len(distortion))
-    return _bytes(
+    return to_bytes(
         topics.message_class(topics.CALIBRATION)(
-            timestamp=_stamp(t_ns),
+            timestamp=stamp(t_ns),
             frame_id=topics.CAMERA_FRAME,
             width=camera.width,
             height=camera.height,
@@ -126,9 +126,9 @@ def transform_messages(camera: CameraCalibration | None, t_ns: int) -> list[byte
         turned = tuple(float(value) for value in Rotation.from_matrix(T_ego_camera[:3, :3]).as_quat())
         transforms.append((topics.CAMERA_FRAME, (x, y, z), turned))  # type: ignore[arg-type]
     return [
-        _bytes(
+        to_bytes(
             topics.message_class(topics.TF)(
-                timestamp=_stamp(t_ns),
+                timestamp=stamp(t_ns),
                 parent_frame_id=topics.EGO_FRAME,
                 child_frame_id=child,
                 translation=dict(zip("xyz", place, strict=True)),
@@ -143,9 +143,9 @@ def location_message(fix: GnssFix) -> bytes:
     """``foxglove.LocationFix``; its heading is the course, in degrees clockwise from north."""
     known = {} if fix.course_rad is None else {"heading": float(np.degrees(fix.course_rad)) % 360.0}
     variance = fix.sigma_m**2
-    return _bytes(
+    return to_bytes(
         topics.message_class(topics.GNSS)(
-            timestamp=_stamp(fix.t_ns),
+            timestamp=stamp(fix.t_ns),
             frame_id=topics.EGO_FRAME,
             latitude=fix.lat_deg,
             longitude=fix.lon_deg,
@@ -161,7 +161,7 @@ def location_message(fix: GnssFix) -> bytes:
 def log_message(topic: str, text: str, t_ns: int, *, warning: bool = False) -> bytes:
     """``foxglove.Log`` for ``/marks`` and ``/notes``."""
     level = _WARNING if warning else _INFO
-    return _bytes(topics.message_class(topic)(timestamp=_stamp(t_ns), level=level, message=text, name=topic[1:]))
+    return to_bytes(topics.message_class(topic)(timestamp=stamp(t_ns), level=level, message=text, name=topic[1:]))
 
 
 def log_text(topic: str, data: bytes) -> str:
@@ -175,12 +175,14 @@ def _packed_fields(layout: np.dtype[np.void]) -> list[tuple[str, int, int]]:
     return [(name, fields[name][1], _NUMERIC_TYPE[fields[name][0]]) for name in layout.names or ()]
 
 
-def _stamp(t_ns: int) -> dict[str, int]:
+def stamp(t_ns: int) -> dict[str, int]:
+    """``google.protobuf.Timestamp``."""
     seconds, nanos = divmod(t_ns, 1_000_000_000)
     return {"seconds": seconds, "nanos": nanos}
 
 
-def _bytes(message: Any) -> bytes:
+def to_bytes(message: Any) -> bytes:
+    """The same message gives the same bytes."""
     return bytes(message.SerializeToString(deterministic=True))
 
 

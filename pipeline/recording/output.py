@@ -100,7 +100,7 @@ class Output:
         with self._failing_neatly():
             self._writer.flush()
             if to_disk:
-                os.fdatasync(self._stream.file.fileno())
+                os.fsync(self._stream.file.fileno())
 
     def close(self) -> None:
         """Write the summary and close the file. Safe to call twice."""
@@ -108,7 +108,7 @@ class Output:
             return
         with self._failing_neatly():
             self._writer.finish()
-            os.fdatasync(self._stream.file.fileno())
+            os.fsync(self._stream.file.fileno())
         self._is_open = False
         self._stream.file.close()
 

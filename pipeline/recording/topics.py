@@ -28,6 +28,7 @@ TF = "/tf"
 ROUTE = "/route"
 PARAMS = "/params"
 RESULTS = "/results"
+OBJECTS = "/objects"
 MARKS = "/marks"
 NOTES = "/notes"
 HEALTH = "/health"
@@ -63,6 +64,7 @@ _WELL_KNOWN: dict[str, Any] = {
     CALIBRATION: foxglove.CameraCalibration,
     GNSS: foxglove.LocationFix,
     TF: foxglove.FrameTransform,
+    OBJECTS: foxglove.SceneUpdate,
     MARKS: foxglove.Log,
     NOTES: foxglove.Log,
 }
@@ -87,6 +89,26 @@ _JSON_TITLES = {
 }
 
 
+def _numbers(*names: str) -> dict[str, Any]:
+    return {name: {"type": "number"} for name in names}
+
+
+_JSON_NUMBERS: dict[str, dict[str, Any]] = {
+    EGO: _numbers("speed_mps", "yaw_rate_radps"),
+    RESULTS: {
+        "ego": {"type": "object", "properties": _numbers("speed_mps", "yaw_rate_radps")},
+        "cipv": {"type": "object", "properties": _numbers("id", "distance_m", "closing_speed_mps", "ttc_s")},
+        "acc": {
+            "type": "object",
+            "properties": _numbers("desired_speed_mps", "accel_mps2", "accelerator", "brake")
+            | {"state": {"type": "string"}},
+        },
+        "timing_ms": {"type": "object", "properties": _numbers("total")},
+    },
+}
+"""What a person may want to plot, so that viewers offer it."""
+
+
 @cache
 def channel(topic: str) -> Channel:
     """The channel of one of this module's topics. KeyError for another."""
@@ -95,8 +117,8 @@ def channel(topic: str) -> Channel:
         return Channel(topic, "protobuf", schema.name, schema.encoding, schema.data)
     if topic == PACKETS:
         return Channel(topic, "cdr", SCAN, "ros2msg", _SCAN_SCHEMA.encode())
-    schema_data = json.dumps({"title": _JSON_TITLES[topic], "type": "object"}).encode()
-    return Channel(topic, "json", _JSON_TITLES[topic], "jsonschema", schema_data)
+    schema = {"title": _JSON_TITLES[topic], "type": "object", "properties": _JSON_NUMBERS.get(topic, {})}
+    return Channel(topic, "json", _JSON_TITLES[topic], "jsonschema", json.dumps(schema).encode())
 
 
 @cache

@@ -23,6 +23,7 @@ from pipeline.recording.messages import (
 )
 from pipeline.recording.output import Compression, Output
 from pipeline.recording.packets import RawLidar, scan_message
+from pipeline.recording.scene import objects_message
 from pipeline.recording.tick import (
     CameraRecord,
     PictureRef,
@@ -261,3 +262,4 @@ class SessionWriter:
         content = to_json(result) if isinstance(result, Result) else result
         text = json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
         self._add(topics.RESULTS, at_ns, text.encode())
+        self._add(topics.OBJECTS, at_ns, objects_message(content, self._header_ns))

@@ -116,6 +116,9 @@ def test_info_prints_topics_rates_and_duration(
     found = json.loads(capsys.readouterr().out)
     assert found["about"]["origin"] == "sim:straight"
     assert {topic["topic"]: topic["rhythm"]["count"] for topic in found["topics"]}["/results"] == 11
+    assert {"/lidar/points", "/camera/image", "/tf", "/objects", "/ego", "/gnss", "/params"} <= {
+        topic["topic"] for topic in found["topics"]
+    }
     assert cipv("info", "sim:straight") == 0
     assert "10.00 Hz" in capsys.readouterr().out
 
