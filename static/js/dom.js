@@ -82,24 +82,6 @@ export function within(event, selector) {
   return event.target instanceof Element ? /** @type {HTMLElement|null} */ (event.target.closest(selector)) : null;
 }
 
-/**
- * A canvas fitted to its box at the screen's resolution, cleared.
- * @param {HTMLCanvasElement} canvas @returns {{ctx: CanvasRenderingContext2D, width: number, height: number}} CSS pixels
- */
-export function fitted(canvas) {
-  const ratio = window.devicePixelRatio || 1;
-  const width = canvas.clientWidth;
-  const height = canvas.clientHeight;
-  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-    canvas.width = Math.round(width * ratio);
-    canvas.height = Math.round(height * ratio);
-  }
-  const ctx = context(canvas, { willReadFrequently: true }); // drawn by the processor: see surface.js
-  ctx.setTransform(ratio, 0, 0, ratio, 0, 0);
-  ctx.clearRect(0, 0, width, height);
-  return { ctx, width, height };
-}
-
 /** @param {HTMLCanvasElement} canvas @param {CanvasRenderingContext2DSettings} [settings] */
 export function context(canvas, settings) {
   const ctx = canvas.getContext("2d", settings);
