@@ -1,11 +1,13 @@
 """Sessions: one MCAP file holds everything that the line saw at each tick, and what it believed.
 
-    topics.py    which topics there are, and their schemas      messages.py  sensor data ↔ messages
-    tick.py      what ties the messages of one tick together    clock.py     the times under which they are stored
-    output.py    an MCAP file being written, whole at any moment
-    writer.py    frames and results into one file               recorder.py  the same from a thread of its own, rotating
-    container.py an MCAP file read by chunk                     session.py   a session as a ``Source``
-    rewrite.py   clips, and what a cut file still holds         info.py      topics, rates, gaps
+    topics.py    which topics there are, and their schemas      tick.py      what ties the messages of a tick together
+    messages.py  sensor data ↔ messages                         scene.py     results as boxes for 3D views
+    packets.py   raw LiDAR packets ↔ messages and sweeps        clock.py     the times under which all is stored
+    output.py    an MCAP file being written, whole at any time  writer.py    frames and results into one session
+    segments.py  into several, by size and time                 recorder.py  the same from a thread of its own
+    directory.py what an MCAP file holds and where              container.py its messages, read by chunk
+    session.py   a session as a ``Source``                      info.py      topics, rates, gaps
+    rewrite.py   clips, and what a cut file still holds         save.py      any recording as a session
 
 Two times stand beside every message. ``publish_time`` is the header's: the sensor's own stamp, which is what the line
 uses. ``log_time`` is when it was received, by the recorder's clock; where a recording was made from another one there
