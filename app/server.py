@@ -21,7 +21,6 @@ from app.access import Access, Guard
 from app.clips.jobs import Jobs
 from app.drive.marks import Marks
 from app.engine import Engine
-from app.history import History
 from app.looks import Looks
 from app.recording import SESSIONS
 from app.routes.alignment import alignment_router
@@ -32,7 +31,6 @@ from app.routes.playback import playback_router
 from app.routes.recording import recording_router
 from app.routes.rerun import rerun_router
 from app.routes.runs import runs_router
-from app.snapshot import Snapshot
 from app.stream import Stream
 from app.views.colors import palette_css
 from app.views.rerun_web import ViewerFiles
@@ -59,17 +57,13 @@ def create_app(
     """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
     marked moments are kept; null forgets them at the end. ``looks``: hears what people look at."""
     access = Access(hosts)
-    stream, history = Stream(looks), History()
+    stream = Stream(looks)
     jobs, viewer = Jobs(engine.drives.changed), ViewerFiles()
-
-    def show(snapshot: Snapshot) -> None:
-        history.record(snapshot)
-        stream.publish(snapshot)
 
     @asynccontextmanager
     async def listening(_: FastAPI) -> AsyncIterator[None]:
-        show(engine.snapshot)
-        end = engine.listen(show)
+        stream.publish(engine.snapshot)
+        end = engine.listen(stream.publish)
         yield
         end()
         await asyncio.to_thread(jobs.close)
@@ -78,7 +72,7 @@ def create_app(
     app = FastAPI(title="CIPV Studio", version="1", docs_url=None, redoc_url=None, lifespan=listening)
     app.add_middleware(Guard, access=access)
     app.add_exception_handler(RequestValidationError, _one_sentence)
-    app.include_router(playback_router(engine, stream, history))
+    app.include_router(playback_router(engine, stream))
     app.include_router(params_router(engine))
     app.include_router(recording_router(engine))
     app.include_router(drive_router(engine, engine.drives, marks or Marks()))

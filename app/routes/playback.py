@@ -9,7 +9,6 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.catalog import catalog
 from app.engine import Engine
-from app.history import History
 from app.stream import Stream
 from pipeline.results import to_json
 
@@ -30,7 +29,7 @@ class SourceChoice(BaseModel):
     uri: str = Field(min_length=1, max_length=4096, examples=["sim:straight"])
 
 
-def playback_router(engine: Engine, stream: Stream, history: History) -> APIRouter:
+def playback_router(engine: Engine, stream: Stream) -> APIRouter:
     """Routes over the engine's playback."""
     router = APIRouter(prefix="/api", tags=["playback"])
 
@@ -51,11 +50,6 @@ def playback_router(engine: Engine, stream: Stream, history: History) -> APIRout
         if tick is None:
             raise HTTPException(404, "no frame is shown yet")
         return to_json(tick.result)
-
-    @router.get("/history")
-    def lead_history() -> dict[str, Any]:
-        """The lead at each frame run so far: [index, revision, id, distance_m, closing_speed_mps, ttc_s]."""
-        return history.to_json()
 
     @router.post("/playback", status_code=202)
     def playback(body: PlaybackChange) -> dict[str, str]:

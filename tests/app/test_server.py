@@ -146,25 +146,6 @@ def test_the_saved_file_is_taken_back_by_the_command_line(client: httpx.Client, 
     assert from_yaml(file, Params()).cluster.z_weight == 0.65
 
 
-def test_the_leads_history_holds_each_frame_once_and_goes_with_the_recording(client: httpx.Client, engine: Engine):
-    for index in (2, 1, 2):
-        client.post("/api/playback", json={"seek": index})
-        shown = reach(engine, lambda s, i=index: s.index == i)
-    history = client.get("/api/history").json()
-    indices = [sample[0] for sample in history["samples"]]
-    assert indices == sorted(set(indices))
-    assert {1, 2} <= set(indices)
-    assert shown.tick is not None
-    cipv = shown.tick.result.cipv
-    assert cipv is not None
-    last = dict((sample[0], sample[1:]) for sample in history["samples"])[2]
-    assert last == [shown.params_revision, cipv.id, cipv.distance_m, cipv.closing_speed_mps, cipv.ttc_s]
-    client.post("/api/source", json={"uri": "test:other"})
-    reach(engine, lambda s: s.uri == "test:other" and s.tick is not None)
-    other = client.get("/api/history").json()
-    assert (other["uri"], [sample[0] for sample in other["samples"]]) == ("test:other", [0])
-
-
 def test_scenarios_are_offered(client: httpx.Client):
     assert "sim:straight" in [each["uri"] for each in client.get("/api/sources").json()["sources"]]
 

@@ -14,6 +14,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from app.engine import Engine
+from app.recording import RecordingDesk
 from app.server import Server, create_app, listen_socket
 from pipeline.params import Params
 from pipeline.run import detector_for
@@ -97,7 +98,7 @@ class Site:
 
 
 @pytest.fixture(scope="session")
-def site() -> Iterator[Site]:
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """The dashboard on ``sim:straight``, paused on its first frame."""
     detectors: list[CountedDetector] = []
 
@@ -105,7 +106,8 @@ def site() -> Iterator[Site]:
         detectors.append(CountedDetector(source))
         return detectors[-1]
 
-    engine = Engine(open_source, open_counted, Params(), uri="sim:straight", whole_drives=True)
+    desk = RecordingDesk(tmp_path_factory.mktemp("sessions"))
+    engine = Engine(open_source, open_counted, Params(), uri="sim:straight", whole_drives=True, desk=desk)
     engine.start()
     engine.wait_for(lambda s: s.tick is not None, 120)
     running = Site(engine, 0, detectors)

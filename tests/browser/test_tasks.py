@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -191,7 +192,7 @@ def test_the_ribbon_selects_who_was_the_lead(page: Page, site: Site):
 
 def test_the_cloud_is_dragged_over_the_picture(page: Page, site: Site):
     page.keyboard.press("a")
-    expect(page.locator("#align-bar")).to_be_visible()
+    expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %"))
     picture = box_of(page.locator("#camera"))
     x, y = picture["x"] + picture["width"] / 2, picture["y"] + picture["height"] / 2
     page.mouse.move(x, y)
@@ -209,3 +210,15 @@ def test_the_cloud_is_dragged_over_the_picture(page: Page, site: Site):
     assert repainted(page, "#camera", blended)
     page.keyboard.press("a")
     expect(page.locator("#align-bar")).to_be_hidden()
+
+
+def test_what_is_shown_is_recorded(page: Page, site: Site):
+    page.get_by_role("button", name="Record").click()
+    recording = site.engine.wait_for(lambda s: s.recording is not None, WAIT_S).recording
+    assert recording is not None
+    page.keyboard.press("ArrowRight")
+    wait_for_frame(page, START + 1)
+    page.get_by_role("button", name="End the recording").click()
+    site.engine.wait_for(lambda s: s.recording is None, WAIT_S)
+    assert recording.file.stat().st_size > 0
+    expect(page.get_by_role("button", name="Record")).to_have_attribute("aria-pressed", "false")
