@@ -1,0 +1,30 @@
+"""The page's bench, as far as it needs no browser of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.bench import page
+from app.bench.page import _page, _revision_of, _spread
+from pipeline.errors import BadInput
+
+
+def test_without_a_browser_it_says_what_it_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.setattr(page, "CHROMIUM", tmp_path / "no-browser")
+    with pytest.raises(BadInput, match="needs a browser at"):
+        _page("http://127.0.0.1:1", 0.1)
+
+
+@pytest.mark.parametrize(
+    ("message", "revision"),
+    [(b'\x10{"state":{"params_revision":17,"x":1}', 17), (b"no json at all", -1), (b"", -1)],
+)
+def test_the_revision_of_a_message(message: bytes, revision: int):
+    assert _revision_of(message) == revision
+
+
+def test_figures_of_nothing_are_unknown():
+    assert _spread([]) == {"median_ms": None, "p95_ms": None}
+    assert _spread([10.0, 20.0, 30.0])["median_ms"] == 20.0
