@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.snapshot import Notice
+from pipeline.path.lane_detector import usual_every
 from pipeline.run import Detectors, Detects, Sensors, picture_size
 from pipeline.sources.base import AnySource, is_simulated
 from pipeline.types import RawBoxes, RawLanes
@@ -18,14 +19,14 @@ OpenLanes = Callable[[AnySource], Detects[RawLanes] | None]
 
 class DetectorPool:
     """``open_detector`` and ``open_lanes`` give those for a source's pictures; null: none, and nothing is said about
-    it. lanes_every: lanes are looked for in every n-th frame."""
+    it. lanes_every: lanes are looked for in every n-th frame; null: as the lane detector is quick."""
 
     def __init__(
         self,
         open_detector: OpenDetector | None,
         sensors: Sensors,
         open_lanes: OpenLanes | None = None,
-        lanes_every: int = 1,
+        lanes_every: int | None = None,
     ) -> None:
         self._open_lanes = open_lanes if sensors != "lidar" else None
         self._lanes_every = lanes_every
@@ -35,7 +36,8 @@ class DetectorPool:
 
     def both_for(self, source: AnySource, notices: list[Notice]) -> Detectors:
         """What looks at the source's pictures; what is missing is null, and a notice says so."""
-        return Detectors(self.boxes_for(source, notices), self.lanes_for(source, notices), self._lanes_every)
+        lanes = self.lanes_for(source, notices)
+        return Detectors(self.boxes_for(source, notices), lanes, self._lanes_every or usual_every(lanes))
 
     def lanes_for(self, source: AnySource, notices: list[Notice]) -> Detects[RawLanes] | None:
         """The lane detector, which a notice names."""

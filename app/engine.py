@@ -60,7 +60,7 @@ class Engine:
         playing: bool = False,
         whole_drives: bool = False,
         open_lanes: OpenLanes | None = None,
-        lanes_every: int = 1,
+        lanes_every: int | None = None,
         desk: RecordingDesk | None = None,
     ) -> None:
         self.control = Control(Wish(params, preset, uri=uri, playing=playing))

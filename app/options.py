@@ -12,6 +12,7 @@ import yaml
 
 from pipeline.errors import BadInput
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
+from pipeline.path.lane_detector import usual_every
 from pipeline.run import Detectors, Sensors, detector_for, lanes_for
 from pipeline.sources import is_live, open_live, open_source
 from pipeline.sources.along_route import along_route
@@ -74,8 +75,9 @@ class LineOptions:
     lanes: str | None = None
     """Name or path of an ONNX lane network, `classical` for the detector without one, or `off`; else the registered
     default, then $CIPV_DATA/models, then the classical one, which is the default for sim:"""
-    lanes_every: Annotated[int, tyro.conf.arg(metavar="N")] = 1
-    """Run the lane detector in every N-th frame only; between, its lines are predicted and their age counted"""
+    lanes_every: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
+    """Run the lane detector in every N-th frame only; between, its lines are predicted and age. Else 3 for
+    a network, 1 for the classical one"""
 
     def parameters(self) -> Params:
         """preset, then --params, then each --set. ParamsError names the first that is wrong."""
@@ -97,9 +99,9 @@ class LineOptions:
         """Whether a person asked for other parameters than the default ones."""
         return self.preset != "default" or self.params is not None or bool(self.set)
 
-    def every(self) -> int:
+    def every(self) -> int | None:
         """Checked ``lanes_every``."""
-        if self.lanes_every < 1:
+        if self.lanes_every is not None and self.lanes_every < 1:
             raise BadInput(f"--lanes-every {self.lanes_every}: a number of frames, at least 1")
         return self.lanes_every
 
@@ -111,7 +113,7 @@ class LineOptions:
         lanes = lanes_for(source, self.lanes)
         for note in lanes.notes if lanes is not None else ():
             print(f"cipv: {note}", file=sys.stderr)
-        return Detectors(self.open_detector(source, sensors), lanes, every)
+        return Detectors(self.open_detector(source, sensors), lanes, every or usual_every(lanes))
 
     def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
         """The detector for the source's pictures, with what there is to say about it. A named one that is missing is

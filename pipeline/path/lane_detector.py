@@ -11,8 +11,15 @@ from pipeline.types import CameraCalibration
 from pipeline.vision.runtime import find_graph
 
 OFF = "off"
+_NETWORK_EVERY = 3
+"""A network takes longer than a frame on a processor; its lines are good for the time between by the car's motion."""
 LaneDetector = LaneNetwork | ClassicalLanes
 _REMEDY = "; for real roads pull a network with `cipv models pull twinlitenet`"
+
+
+def usual_every(lanes: object) -> int:
+    """In every how many frames a lane detector looks at the picture where nobody says so."""
+    return _NETWORK_EVERY if isinstance(lanes, LaneNetwork) else 1
 
 
 def open_lanes(spec: str | None, camera: CameraCalibration | None, drawn: bool = False) -> LaneDetector | None:

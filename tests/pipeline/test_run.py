@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from pipeline.run import detector_for
+from pipeline.params import Params
+from pipeline.run import Detectors, advance, detect, detector_for, lanes_for
 from pipeline.sources import open_source
+from pipeline.step import State
+from pipeline.types import U8, Frame, Picture, RawBoxes, RawLanes
 from pipeline.vision.models import EMBEDDED, find, register
 from tests.pipeline.vision import networks
 
@@ -37,3 +42,60 @@ def test_a_recording_is_seen_by_the_default_one(tmp_path: Path) -> None:
     assert "simulated cars only" in detector_for(source).notes[0]
     register(networks.yolox(tmp_path / "mine.onnx"), "mine")
     assert detector_for(source).name.startswith("mine")
+
+
+class _Seen:
+    """A detector that says which pictures it was asked about."""
+
+    notes = ()
+
+    def __init__(self, answer: RawBoxes | RawLanes) -> None:
+        self.name, self.answer, self.calls = answer.model, answer, 0
+
+    def detect(self, bgr: U8) -> RawBoxes | RawLanes:
+        self.calls += 1
+        return self.answer
+
+
+_NO_BOXES = RawBoxes("boxes", np.zeros((0, 4), np.float32), np.zeros(0, np.float32), ())
+_NO_LANES = RawLanes("lanes", np.zeros((0, 2), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int32))
+
+
+def _frames(count: int) -> list[Frame]:
+    picture = Picture(0, np.zeros((36, 64, 3), np.uint8))
+    return [Frame(i, f"{i}", i * 100_000_000, picture=picture) for i in range(count)]
+
+
+def test_lanes_are_looked_for_in_every_nth_frame_and_boxes_in_all() -> None:
+    boxes, lanes = _Seen(_NO_BOXES), _Seen(_NO_LANES)
+    seen = [detect(frame, Detectors(boxes, lanes, lanes_every=3)) for frame in _frames(7)]
+    assert (boxes.calls, lanes.calls) == (7, 3)
+    assert [frame.index for frame in seen if frame.raw_lanes is not None] == [0, 3, 6]
+
+
+def test_a_car_with_lidar_alone_asks_no_detector() -> None:
+    boxes, lanes = _Seen(_NO_BOXES), _Seen(_NO_LANES)
+    frame, _, result = advance(State(), _frames(1)[0], Params(), Detectors(boxes, lanes), "lidar")
+    assert (boxes.calls, lanes.calls) == (0, 0)
+    assert frame.raw_boxes is None
+    assert frame.raw_lanes is None
+    assert result.layers.lanes is None
+
+
+def test_a_camera_without_a_picture_is_not_asked() -> None:
+    lanes = _Seen(_NO_LANES)
+    frame = replace(_frames(1)[0], picture=None)
+    assert detect(frame, Detectors(None, lanes)) is frame
+    assert lanes.calls == 0
+
+
+def test_the_line_believes_the_simulators_lane_by_the_classical_detector() -> None:
+    source = open_source("sim:straight")
+    lanes = lanes_for(source)
+    assert lanes is not None
+    assert lanes.name.startswith("classical")
+    _, _, result = advance(State(), source.frame(0), Params(), Detectors(None, lanes))
+    lane = result.layers.lanes
+    assert lane is not None
+    assert lane.width_m == pytest.approx(3.6, abs=0.2)
+    assert lanes_for(source, "off") is None

@@ -1,0 +1,60 @@
+"""What looks at a source's pictures, and what the page says about it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.detector_pool import DetectorPool
+from app.options import LineOptions
+from app.snapshot import Notice
+from pipeline.errors import BadInput
+from pipeline.path.lane_classical import open_classical
+from pipeline.path.lane_network import open_lane_network
+from pipeline.run import Detectors
+from pipeline.vision.runtime import DetectorMissing
+from tests.app.recording import CountingDetector, Recording
+from tests.pipeline.path import lane_networks
+
+
+def both(open_lanes, sensors="both", every: int | None = None) -> tuple[Detectors, list[Notice]]:
+    notices: list[Notice] = []
+    pool = DetectorPool(lambda _: CountingDetector(), sensors, open_lanes, every)
+    return pool.both_for(Recording(), notices), notices
+
+
+def test_the_page_says_which_lane_detector_works() -> None:
+    detectors, notices = both(lambda _: open_classical(None))
+    assert detectors.lanes is not None
+    assert detectors.lanes.name == "classical"
+    assert [notice.level for notice in notices] == ["info"]
+    assert "lane lines by colour and gradient" in notices[0].text
+
+
+def test_a_missing_lane_network_is_said_and_boxes_go_on() -> None:
+    def missing(_: object):
+        raise DetectorMissing("No lane network 'x'.")
+
+    detectors, notices = both(missing)
+    assert detectors.boxes is not None
+    assert detectors.lanes is None
+    assert notices == [Notice("warning", "No lane network 'x'. Lane lines are not looked for.")]
+
+
+def test_lidar_alone_opens_no_detector() -> None:
+    detectors, notices = both(lambda _: open_classical(None), "lidar")
+    assert (detectors.boxes, detectors.lanes, notices) == (None, None, [])
+
+
+def test_a_network_looks_less_often_unless_told_otherwise(tmp_path: Path) -> None:
+    network = open_lane_network(str(lane_networks.twin(tmp_path / "tiny.onnx")))
+    assert both(lambda _: network)[0].lanes_every == 3
+    assert both(lambda _: network, every=1)[0].lanes_every == 1
+    assert both(lambda _: open_classical(None))[0].lanes_every == 1
+
+
+@pytest.mark.parametrize("every", [0, -2])
+def test_a_rate_that_is_none_is_refused(every: int) -> None:
+    with pytest.raises(BadInput, match=f"--lanes-every {every}"):
+        LineOptions(lanes_every=every).open_detectors(Recording())
