@@ -20,7 +20,7 @@ from pipeline.lidar import boxes, cluster, deskew, downsample, ground
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.lidar import warm_up as warm_up_lidar
 from pipeline.params import Params
-from pipeline.path import corridor, lanes
+from pipeline.path import corridor, lanes, yaw_rate
 from pipeline.types import (
     VEHICLES,
     CameraCalibration,
@@ -57,8 +57,9 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     state, dt_s = _continue_or_restart(state, frame, params)
     clock = _Stopwatch()
     aligned = alignment.resolve(params.alignment, frame.camera)
+    ego = yaw_rate.believable(frame.ego)
 
-    sweep = deskew.deskew(frame.sweep, frame.ego, params.deskew)
+    sweep = deskew.deskew(frame.sweep, ego, params.deskew)
     clock.lap("deskew")
     seen = _perceive_lidar(sweep, params, clock)
     lidar_state, lidar_tracks = lidar_tracking.track(
@@ -69,7 +70,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     measured = _perceive_picture(frame, aligned, params)
     clock.lap("distance")
     vision_state, vision_tracks = vision_tracking.track(
-        state.vision, measured, dt_s, params.vision_tracking, frame.ego.speed_mps if frame.ego else None
+        state.vision, measured, dt_s, params.vision_tracking, ego.speed_mps if ego else None
     )
     clock.lap("vision_tracking")
 
@@ -77,22 +78,22 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         state.fusion, lidar_tracks, vision_tracks, aligned, _picture_size(frame), params.fusion
     )
     clock.lap("fusion")
-    objects = motion.describe(fused.objects, frame.ego, params.motion)
+    objects = motion.describe(fused.objects, ego, params.motion)
     vehicles = [each.detection.bbox for each in measured or () if each.detection.label in VEHICLES]
     lane_state, lane = lanes.follow(
-        state.lanes, frame.raw_lanes, aligned, seen.ground, frame.ego, dt_s, params.lanes, vehicles
+        state.lanes, frame.raw_lanes, aligned, seen.ground, ego, dt_s, params.lanes, vehicles
     )
     clock.lap("lanes")
     path_state, path = corridor.predict(
         state.path, frame.ego, lane, frame.gnss, frame.route, frame.t_ns, dt_s, params.path
     )
     clock.lap("path")
-    cipv_state, chosen = cipv.choose(state.cipv, objects, path, frame.ego, dt_s, params.cipv)
+    cipv_state, chosen = cipv.choose(state.cipv, objects, path, ego, dt_s, params.cipv)
     objects, lead = chosen.objects, chosen.lead
     clock.lap("cipv")
-    acc_state, command = acc.control(state.acc, frame.ego, lead, objects, path, dt_s, params.acc)
+    acc_state, command = acc.control(state.acc, ego, lead, objects, path, dt_s, params.acc)
     clock.lap("acc")
-    aeb_state, command = aeb.guard(state.aeb, command, frame.ego, lead, objects, path, dt_s, params.aeb, params.acc)
+    aeb_state, command = aeb.guard(state.aeb, command, ego, lead, objects, path, dt_s, params.aeb, params.acc)
     clock.lap("aeb")
 
     result = Result(

@@ -100,8 +100,10 @@ def _expected(
     if last is None or ego is None or not dt_s or len(last.center) != size:
         return None
     rate = yaw_rate.usable_rate(ego)
+    if rate is None and yaw is not None:
+        rate = yaw.rate_radps
     if rate is None:
-        rate = yaw.rate_radps if yaw is not None else 0.0
+        return None
     return fusing.moved(last, max(ego.speed_mps, 0.0) * dt_s, rate * dt_s, dt_s)
 
 
@@ -112,6 +114,7 @@ def _about_yaw_rate(ego: EgoState | None) -> tuple[str, ...]:
 
 def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], params: PathParams) -> Path:
     normal = fusing.normals(path.center)
+    sigma_m = np.hypot(path.sigma_m, path.behind_m)
     at = np.minimum(np.array(_LOOK_AHEAD_M) / STEP_M, len(path.center) - 1).astype(np.intp)
     shares = path.shares[at]
     carried_by: dict[str, dict[str, float]] = {
@@ -121,10 +124,10 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
     overall = shares.mean(axis=0)
     main = int(np.argmax(shares[1]))
     source: PathSource = SOURCES[main] if shares[1, main] >= _CARRIES_ALONE else "fused"
-    too_vague = np.flatnonzero(~(path.sigma_m <= params.good_sigma_m))
+    too_vague = np.flatnonzero(~(sigma_m <= params.good_sigma_m))
     reach_m = float(too_vague[0] - 1) * STEP_M if len(too_vague) else params.length_m
     needed_m = _needed_m(ego, params)
-    sigma = float(path.sigma_m[min(int(needed_m / STEP_M), len(path.sigma_m) - 1)])
+    sigma = float(sigma_m[min(int(needed_m / STEP_M), len(sigma_m) - 1)])
     usable = reach_m >= min(needed_m, params.length_m)
     if not usable:
         notes = (*notes, f"the path is known well enough for {max(reach_m, 0.0):.0f} m only")
@@ -134,9 +137,9 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
         left=path.center + path.left_m[:, None] * normal,
         right=path.center - path.right_m[:, None] * normal,
         half_width_m=params.half_width_m,
-        sigma_m={f"{s}": float(sigma) for s, sigma in zip(_LOOK_AHEAD_M, path.sigma_m[at].tolist(), strict=True)},
+        sigma_m={f"{s}": float(sigma) for s, sigma in zip(_LOOK_AHEAD_M, sigma_m[at].tolist(), strict=True)},
         weights={name: float(share) for name, share in zip(SOURCES, overall.tolist(), strict=True) if share > 0.005},
-        profile_m=path.sigma_m,
+        profile_m=sigma_m,
         carried_by=carried_by,
         reach_m=max(reach_m, 0.0),
         usable=usable,

@@ -19,19 +19,23 @@ from pipeline.path.estimates import SOURCES, STEP_M, PathEstimate
 COMPARED_M = 60.0
 """Sources are compared up to here: farther ahead none of them is meant to agree closely."""
 LARGEST_BIRGE = 3.0
+IN_DISPUTE = 1.5
+"""How much less sure a path is while a source is left out: it may be the others that err."""
 EDGE_SIGMA_M = 0.5
 """Where lane lines are this uncertain, the edges lie half way between them and the usual half width."""
 
 
 @dataclass(frozen=True, eq=False)
 class FusedPath:
-    """center: (K, 2). sigma_m: (K,). left_m, right_m: (K,) distances to the edges. shares: (K, 4) of ``SOURCES``."""
+    """center: (K, 2). sigma_m: (K,). left_m, right_m: (K,) distances to the edges. shares: (K, 4) of ``SOURCES``.
+    behind_m: (K,) how far it has not yet followed its sources, which makes it doubtful for now."""
 
     center: F64
     sigma_m: F64
     left_m: F64
     right_m: F64
     shares: F64
+    behind_m: F64
 
 
 def normals(center: F64) -> F64:
@@ -51,7 +55,7 @@ def fuse(
     known = expected is not None
     memory, memory_sigma = (expected.center, expected.sigma_m) if expected else (centers[ref], sigmas[ref])
     center, sigma, weights, disagree = _fuse(
-        centers, sigmas, ref, memory, memory_sigma, known, compared, outlier_sigmas, LARGEST_BIRGE
+        centers, sigmas, ref, memory, memory_sigma, known, compared, outlier_sigmas, LARGEST_BIRGE, IN_DISPUTE
     )
     shares = np.zeros((len(center), len(SOURCES)))
     for row, each in zip(weights, estimates, strict=True):
@@ -62,7 +66,7 @@ def fuse(
         if much > 0.0
     )
     left, right = _edges(estimates, half_width_m)
-    return FusedPath(center, sigma, left, right, shares), notes
+    return FusedPath(center, sigma, left, right, shares, np.zeros(len(center))), notes
 
 
 def _edges(estimates: list[PathEstimate], half_width_m: float) -> tuple[F64, F64]:
@@ -82,7 +86,9 @@ def blend(fresh: FusedPath, expected: FusedPath, keep: float, largest_m: float) 
 
     The two share their sources, so they are joined by covariance intersection (Julier and Uhlmann 1997): the weights
     are ``keep`` and 1 − ``keep`` times the inverse variances, and the outcome is never surer than either."""
-    center, sigma, kept = _blend(fresh.center, fresh.sigma_m, expected.center, expected.sigma_m, keep, largest_m)
+    center, sigma, kept, behind = _blend(
+        fresh.center, fresh.sigma_m, expected.center, expected.sigma_m, keep, largest_m
+    )
     mix = kept[:, None]
     return FusedPath(
         center,
@@ -90,6 +96,7 @@ def blend(fresh: FusedPath, expected: FusedPath, keep: float, largest_m: float) 
         fresh.left_m + kept * (expected.left_m - fresh.left_m),
         fresh.right_m + kept * (expected.right_m - fresh.right_m),
         fresh.shares + mix * (expected.shares - fresh.shares),
+        behind,
     )
 
 
@@ -100,7 +107,7 @@ def moved(path: FusedPath, travelled_m: float, turned_rad: float, dt_s: float) -
     center, rows = _moved(path.center, rows, travelled_m, turned_rad)
     s = np.arange(len(center)) * STEP_M
     grown = np.sqrt(rows[:, 0] ** 2 + (0.3**2 + (0.003 * s) ** 2) * dt_s)
-    return FusedPath(center, grown, rows[:, 1], rows[:, 2], rows[:, 3:])
+    return FusedPath(center, grown, rows[:, 1], rows[:, 2], rows[:, 3:], np.zeros(len(center)))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -121,7 +128,7 @@ def _normals(center):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @numba.njit(cache=True, nogil=True)
-def _fuse(centers, sigmas, ref, memory, memory_sigma, known, compared, limit, largest):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _fuse(centers, sigmas, ref, memory, memory_sigma, known, compared, limit, largest, dispute_factor):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Weighted mean along the normals of source ``ref``. Sources are left out one by one, the worst first, while one
     lies more than ``limit`` sigmas (root mean square up to ``compared``) from all the rest and two others remain, the
     remembered path being one of them. disagree: that figure for those left out, else 0."""
@@ -150,15 +157,14 @@ def _fuse(centers, sigmas, ref, memory, memory_sigma, known, compared, limit, la
             break
         used[worst] = False
         disagree[worst] = worst_much
+    dispute = dispute_factor if disagree.any() else 1.0
     center, sigma, weights = np.empty((size, 2)), np.empty(size), np.zeros((count, size))
     for k in range(size):
-        total, out, mean = 0.0, 0.0, 0.0
+        total, mean = 0.0, 0.0
         for i in range(count):
             if used[i]:
                 total += 1.0 / var[i, k]
                 mean += d[i, k] / var[i, k]
-            else:
-                out += 1.0 / var[i, k]
         mean /= total
         chi2, free = 0.0, -1.0
         for i in range(count):
@@ -167,7 +173,7 @@ def _fuse(centers, sigmas, ref, memory, memory_sigma, known, compared, limit, la
                 chi2 += (d[i, k] - mean) ** 2 / var[i, k]
                 free += 1.0
         birge = min(np.sqrt(chi2 / free), largest) if free > 0.0 else 1.0
-        sigma[k] = np.sqrt(1.0 / total) * max(birge, 1.0) * (1.0 + out / (out + total))
+        sigma[k] = np.sqrt(1.0 / total) * max(birge, 1.0) * dispute
         center[k, 0] = centers[ref, k, 0] + normal[k, 0] * mean
         center[k, 1] = centers[ref, k, 1] + normal[k, 1] * mean
     return center, sigma, weights, disagree
@@ -192,7 +198,7 @@ def _blend(fresh, fresh_sigma, old, old_sigma, keep, largest):  # type: ignore[n
     """Covariance intersection along the normals of the fresh path, no faster than is sensible."""
     size = len(fresh)
     normal = _normals(fresh)
-    center, sigma, kept = np.empty((size, 2)), np.empty(size), np.empty(size)
+    center, sigma, kept, behind = np.empty((size, 2)), np.empty(size), np.empty(size), np.zeros(size)
     for k in range(size):
         apart = normal[k, 0] * (old[k, 0] - fresh[k, 0]) + normal[k, 1] * (old[k, 1] - fresh[k, 1])
         a, b = keep / old_sigma[k] ** 2, (1.0 - keep) / fresh_sigma[k] ** 2
@@ -202,11 +208,11 @@ def _blend(fresh, fresh_sigma, old, old_sigma, keep, largest):  # type: ignore[n
         allowed = largest + old_sigma[k]
         if step > allowed:
             share = 1.0 - allowed / abs(apart)
-            sigma[k] = np.sqrt(sigma[k] ** 2 + (step - allowed) ** 2)
+            behind[k] = step - allowed
         kept[k] = share
         center[k, 0] = fresh[k, 0] + normal[k, 0] * share * apart
         center[k, 1] = fresh[k, 1] + normal[k, 1] * share * apart
-    return center, sigma, kept
+    return center, sigma, kept, behind
 
 
 @numba.njit(cache=True, nogil=True)

@@ -23,6 +23,7 @@ import numpy as np
 
 from pipeline.params import PathParams
 from pipeline.path.estimates import PathEstimate, arc, samples
+from pipeline.records import evolve
 from pipeline.types import EgoState
 
 _FASTEST_RADPS = 2.0
@@ -62,6 +63,13 @@ def usable_rate(ego: EgoState | None) -> float | None:
     """The measured yaw rate, or null when there is none that a car can have."""
     rate = ego.yaw_rate_radps if ego is not None else None
     return rate if rate is not None and isfinite(rate) and abs(rate) <= _FASTEST_RADPS else None
+
+
+def believable(ego: EgoState | None) -> EgoState | None:
+    """The ego state without a yaw rate that no car has; null where the speed is not a number."""
+    if ego is None or not isfinite(ego.speed_mps):
+        return None
+    return ego if ego.yaw_rate_radps == usable_rate(ego) else evolve(ego, yaw_rate_radps=None)
 
 
 def ahead(yaw: YawRate | None, ego: EgoState | None, params: PathParams) -> PathEstimate | None:

@@ -1,0 +1,149 @@
+"""Whatever breaks, the path says that it knows less, and no car beside it becomes the lead.
+
+A car drives through a bend of 250 m radius with a lead in its lane and cars in the lanes beside it, everything given
+with the errors measured; then one input breaks.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pipeline.evaluation.experiments import bends, curves
+from pipeline.evaluation.experiments.choosing import Way
+from pipeline.evaluation.experiments.track import SCENE_LAW
+from pipeline.params import Params, with_changes
+from pipeline.records import evolve
+from pipeline.simulation.world import World
+from pipeline.step import State, step, warm_up
+from pipeline.types import CameraCalibration, Frame, Result
+
+LAYOUT = bends.LAYOUTS["r250"]
+BREAKS_S, ENDS_S = 4.0, 7.0
+"""In the bend from 3 s on."""
+PARAMS = with_changes(Params(), SCENE_LAW)
+Break = Callable[[Frame], Frame]
+
+
+@cache
+def drive() -> list[tuple[World, Frame]]:
+    warm_up()
+    scene = bends.scenario(LAYOUT, 0)
+    return [(now, frame) for now, frame in curves.seen(scene) if now.t_s < ENDS_S]
+
+
+def driven(broken: Break, from_start: bool = False) -> tuple[list[Result], set[str]]:
+    """The results from the break on, and what was chosen: right, missed, decoy, …"""
+    way, state, results, verdicts = Way.of(bends.scenario(LAYOUT, 0)), State(), [], set()
+    for now, frame in drive():
+        after = now.t_s >= BREAKS_S
+        state, result = step(state, broken(frame) if after or from_start else frame, PARAMS)
+        if after:
+            results.append(result)
+            assert frame.camera is not None
+            verdicts.add(curves.judge(now, frame.camera, result, way.ahead(now, 130.0), LAYOUT.reach_m)[0])
+    return results, verdicts
+
+
+def no_lines(frame: Frame) -> Frame:
+    return evolve(frame, raw_lanes=None)
+
+
+def without(*names: str) -> Break:
+    return lambda frame: evolve(frame, **dict.fromkeys(names))
+
+
+def yaw_rate(value: float | None, *also: str) -> Break:
+    def broken(frame: Frame) -> Frame:
+        assert frame.ego is not None
+        return evolve(frame, ego=dataclasses.replace(frame.ego, yaw_rate_radps=value), **dict.fromkeys(also))
+
+    return broken
+
+
+def jumped(frame: Frame) -> Frame:
+    """5 m to the north, which here is the left."""
+    assert frame.gnss is not None
+    return evolve(frame, gnss=dataclasses.replace(frame.gnss, lat_deg=frame.gnss.lat_deg + 5.0 / 110_950.0))
+
+
+def wrong_mount(frame: Frame) -> Frame:
+    """The camera is taken to look 4° to the left of where it looks."""
+    assert frame.camera is not None
+    turn = math.radians(4.0)
+    T = np.eye(4)
+    T[:2, :2] = [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
+    camera: CameraCalibration = dataclasses.replace(frame.camera, T_camera_ego=frame.camera.T_camera_ego @ T)
+    return evolve(frame, camera=camera)
+
+
+def test_nothing_broken() -> None:
+    results, verdicts = driven(lambda frame: frame)
+    assert verdicts == {"right"}
+    assert all(result.path.usable and not result.path.notes for result in results)
+
+
+@pytest.mark.parametrize(
+    ("broken", "from_start"),
+    [
+        pytest.param(no_lines, True, id="no lines"),
+        pytest.param(jumped, False, id="GNSS jumps by 5 m"),
+        pytest.param(without("gnss"), False, id="GNSS lost"),
+        pytest.param(yaw_rate(math.nan), True, id="yaw rate is not a number"),
+        pytest.param(yaw_rate(math.nan, "raw_lanes", "route"), False, id="nothing but a broken yaw rate"),
+        pytest.param(without("ego", "raw_lanes", "route"), False, id="nothing at all"),
+    ],
+)
+def test_less_is_known_and_nobody_else_leads(broken: Break, from_start: bool) -> None:
+    whole, _ = driven(lambda frame: frame)
+    results, verdicts = driven(broken, from_start)
+    assert verdicts <= {"right", "missed", "undecided"}, "never a decoy"
+    sure = [result.path.sigma_m["60"] for result in whole]
+    less = [result.path.sigma_m["60"] for result in results]
+    assert np.mean(less) > np.mean(sure)
+
+
+def test_a_wrong_mount_ends_in_less_confidence_and_no_wrong_lead() -> None:
+    """The lines seen contradict the route and the yaw rate."""
+    whole, _ = driven(lambda frame: frame)
+    results, verdicts = driven(wrong_mount, from_start=True)
+    assert "decoy" not in verdicts
+    assert np.mean([r.path.sigma_m["30"] for r in results]) > np.mean([r.path.sigma_m["30"] for r in whole])
+
+
+def test_a_jump_is_said_and_moves_nothing() -> None:
+    whole, _ = driven(lambda frame: frame)
+    results, _ = driven(jumped)
+    assert any("GNSS jumped by 5.0 m" in note for note in results[0].notes)
+    first = results[: int(PARAMS.path.gnss_restart_s * 10) - 2]
+    for ours, theirs in zip(first, whole, strict=False):
+        assert np.abs(ours.path.center - theirs.path.center)[:40].max() < 0.6
+
+
+def test_a_broken_yaw_rate_is_said() -> None:
+    results, _ = driven(yaw_rate(math.nan))
+    assert all("the yaw rate is not one that a car can have: left out" in result.notes for result in results)
+    assert all(np.isfinite(result.path.center).all() for result in results)
+
+
+def test_acc_hears_that_nobody_knows_the_way() -> None:
+    """With a straight guess at 99 km/h the car gets no faster, though 130 km/h are set."""
+    params = with_changes(PARAMS, {"acc.set_speed_kmh": 130.0})
+    state = State()
+    for _, frame in drive()[:10]:
+        frame = yaw_rate(None, "raw_lanes", "route", "gnss", "raw_boxes", "sweep")(frame)
+        state, result = step(state, frame, params)
+    assert not result.path.usable
+    assert result.acc is not None
+    assert result.acc.accelerator == 0.0
+    assert result.acc.reason == f"path known for {result.path.reach_m:.0f} m only: no faster than now"
+    alone = without("raw_boxes", "sweep")(drive()[0][1])
+    _, result = step(State(), alone, params)
+    assert result.path.usable
+    assert result.acc is not None
+    assert result.acc.accelerator > 0.0
