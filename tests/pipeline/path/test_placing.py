@@ -1,0 +1,119 @@
+"""How far an object reaches into the path, how surely, and when it crosses its edge."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.geometry import Cuboid
+from pipeline.motion import describe
+from pipeline.params import CipvParams, MotionParams, PathParams
+from pipeline.path.corridor import corridor
+from pipeline.path.estimates import arc, samples
+from pipeline.path.placing import Place, place
+from pipeline.types import EgoState, FusedObject, Path
+from tests.pipeline.build import fused
+
+STRAIGHT = corridor(None, PathParams(half_width_m=1.5))
+EGO = EgoState(0, 20.0, 0.0)
+
+
+def placed(item: FusedObject, path: Path = STRAIGHT, ego: EgoState | None = EGO) -> tuple[Place, float | None]:
+    (found,) = place(describe([item], ego, MotionParams()), path, ego, CipvParams())
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    ("width", "limit_m"),
+    [
+        pytest.param(1.8, 1.5, id="a car: the middle of its rear between the edges"),
+        pytest.param(0.8, 1.5, id="a motorcycle: half of it"),
+        pytest.param(2.5, 1.85, id="a truck leaves no room earlier"),
+    ],
+)
+def test_how_far_aside_it_is_still_in_the_path(width: float, limit_m: float) -> None:
+    for side in (1.0, -1.0):
+        inside, outside = (placed(fused(1, 20.0, side * (limit_m + step), width=width))[0] for step in (-0.05, 0.05))
+        assert inside.margin_m() == pytest.approx(0.05, abs=0.01)
+        assert outside.margin_m() == pytest.approx(-0.05, abs=0.01)
+        assert inside.log_odds(0.0, 0.0) > 0.0 > outside.log_odds(0.0, 0.0)
+
+
+def test_lines_need_not_be_parallel_to_the_centre() -> None:
+    """A lane that widens to the left: what is out of it at 20 m is in it at 60 m."""
+    center = STRAIGHT.center
+    left = center + np.column_stack([np.zeros(len(center)), 1.5 + 0.03 * center[:, 0]])
+    path = dataclasses.replace(STRAIGHT, left=left)
+    assert placed(fused(1, 20.0, 2.8), path)[0].margin_m() < 0.0
+    assert placed(fused(1, 60.0, 2.8), path)[0].margin_m() > 0.0
+
+
+def test_what_stands_across_the_path_is_in_it_while_any_of_it_reaches_in() -> None:
+    """A car turns out of the path: its front is 2.5 m aside, its tail still in the middle."""
+    turned = Cuboid((20.0, 1.2, 0.2), (4.5, 1.8, 1.5), 0.75)
+    corners = tuple((float(x), float(y)) for x, y in turned.footprint())
+    item = dataclasses.replace(fused(1, 20.0, 1.2), cuboid=turned, bev=corners)
+    across, _ = placed(item)
+    assert across.low_m < 0.0 < 2.5 < across.high_m
+    assert across.margin_m() > 0.0
+
+
+def test_a_wrong_distance_matters_where_the_path_turns_away_from_the_line_of_sight() -> None:
+    """60 m ahead on an arc of 125 m radius the path leads 0.24 rad away from the line of sight."""
+    seen = dataclasses.replace(fused(1, 60.0, 0.0, source="V"), distance_sigma_m=6.0)
+    center, _ = arc(1 / 125.0, samples(100.0))
+    x, y = center[60]
+    there = dataclasses.replace(fused(1, float(x), float(y), source="V"), distance_sigma_m=6.0)
+    bent = Path("gnss", center, center, center, 1.5, {}, {})
+    assert placed(seen)[0].sigma_m < 5.0
+    straight_on = dataclasses.replace(STRAIGHT, profile_m=np.zeros(0))
+    assert placed(seen, straight_on)[0].sigma_m == pytest.approx(0.3, abs=0.01)
+    assert placed(there, bent)[0].sigma_m == pytest.approx(6.0 * math.sin(0.24), rel=0.1)
+
+
+def test_a_path_known_less_makes_a_probability_that_says_less() -> None:
+    sure = dataclasses.replace(STRAIGHT, profile_m=np.full(101, 0.05))
+    vague = dataclasses.replace(STRAIGHT, profile_m=np.full(101, 3.0))
+    assert placed(fused(1, 30.0), sure)[0].probability() > 0.999
+    assert 0.3 < placed(fused(1, 30.0), vague)[0].probability() < 0.5
+    assert placed(fused(1, 30.0), sure)[0].log_odds(0.0, 0.0) == 4.0
+    assert 0.0 < placed(fused(1, 30.0), vague)[0].log_odds(0.0, 0.0) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("item", "seconds"),
+    [
+        pytest.param(fused(1, 30.0, 4.4, velocity=(-5.0, -1.5)), 2.0, id="2 m from the line at 1 m/s believed"),
+        pytest.param(fused(1, 30.0, -4.4, velocity=(-5.0, 1.5)), 2.0, id="from the right"),
+        pytest.param(fused(1, 30.0, 2.0, velocity=(-5.0, -1.5)), 0.0, id="its side is over the line"),
+        pytest.param(fused(1, 30.0, 4.4, velocity=(-5.0, -0.4)), None, id="noise"),
+        pytest.param(fused(1, 30.0, 4.4, velocity=(-5.0, 1.5)), None, id="moves away"),
+        pytest.param(fused(1, 30.0, 4.4, velocity=(-20.0, -1.4)), None, id="a post does not cut in"),
+        pytest.param(fused(1, 30.0, 0.5, velocity=(-5.0, 1.5)), 1.0, id="cuts out"),
+        pytest.param(fused(1, 30.0, 0.5, velocity=(-5.0, -1.5)), None, id="comes to the middle"),
+        pytest.param(fused(1, 30.0, 0.5, velocity=None), None, id="velocity not known"),
+    ],
+)
+def test_time_to_the_crossing(item: FusedObject, seconds: float | None) -> None:
+    _, crossing_s = placed(item)
+    assert crossing_s == (pytest.approx(seconds, abs=0.05) if seconds is not None else None)
+
+
+def test_a_car_that_follows_the_bend_does_not_move_sideways() -> None:
+    """20 m/s on a 200 m radius, the lead 40 m ahead on the same arc at the same speed: seen from the turning car it
+    stands still; over ground and against the path it goes straight along it."""
+    ego = EgoState(0, 20.0, 0.1)
+    bent = corridor(ego, PathParams(half_width_m=1.5))
+    x, y = bent.center[40]
+    there, crossing_s = placed(fused(1, float(x), float(y), velocity=(0.0, 0.0)), bent, ego)
+    assert there.sideways_mps == pytest.approx(0.0, abs=0.1)
+    assert crossing_s is None
+
+
+def test_what_has_no_place_has_none() -> None:
+    assert place((fused(1, None, source="V"),), STRAIGHT, EGO, CipvParams()) == [None]
+    assert place((), STRAIGHT, EGO, CipvParams()) == []

@@ -1,0 +1,102 @@
+"""Routes from what people have: spreadsheets, hikers' files, receivers' logs, earlier drives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.sources import open_source
+from pipeline.sources.along_route import along_route
+from pipeline.sources.routes import RouteError, from_fixes, load_route
+from pipeline.types import GnssFix, Route
+
+GPX = '<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/{}" version="1.{}">{}</gpx>'
+POINTS = '<{0} lat="48.1" lon="11.2"/><{0} lat="48.2" lon="11.3"><ele>500</ele></{0}>'
+GGA = (
+    "$GPGGA,123519,4807.038,N,01131.000,E,4,08,0.9,545.4,M,46.9,M,,*42\n"
+    "$GPGGA,123520,4807.138,N,01131.000,E,4,08,0.9,545.4,M,46.9,M,,*49\n"
+)
+RMC = (
+    "$GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\n"
+    "$GPRMC,123520,A,4807.138,N,01131.000,E,022.4,084.4,230394,003.1,W*61\n"
+)
+
+
+def written(folder: Path, name: str, text: str) -> str:
+    (folder / name).write_text(text, encoding="utf-8")
+    return str(folder / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "sigma_m"),
+    [
+        pytest.param("a.csv", "lat,lon\n48.1,11.2\n48.2,11.3\n", 0.5, id="CSV"),
+        pytest.param("a.csv", "t;Longitude;Latitude\n0;11.2;48.1\n1;11.3;48.2\n", 0.5, id="CSV by name, semicolons"),
+        pytest.param("a.txt", "48.1 11.2\n48.2 11.3\n", 0.5, id="two columns"),
+        pytest.param("a.csv", "\ufefflat,lon\n48.1,11.2\nnan,11\nx,y\n48.2,11.3\n", 0.5, id="CSV with rubbish in it"),
+        pytest.param("a.gpx", GPX.format(1, 1, f"<trk><trkseg>{POINTS.format('trkpt')}</trkseg></trk>"), 0.5, id="GPX"),
+        pytest.param("a.gpx", GPX.format(0, 0, f"<rte>{POINTS.format('rtept')}</rte>"), 0.5, id="GPX 1.0 route"),
+    ],
+)
+def test_places(tmp_path: Path, name: str, text: str, sigma_m: float) -> None:
+    route = load_route(written(tmp_path, name, text))
+    assert route.lat_deg.tolist() == [48.1, 48.2]
+    assert route.lon_deg.tolist() == [11.2, 11.3]
+    assert (route.name, route.sigma_m) == ("a", sigma_m)
+
+
+@pytest.mark.parametrize(("text", "sigma_m"), [(GGA, 0.02), (RMC, 2.0), (GGA + RMC + "$GPXXX,1*00\nrubbish\n", 0.02)])
+def test_nmea_logs_say_how_good_they_are(tmp_path: Path, text: str, sigma_m: float) -> None:
+    route = load_route(written(tmp_path, "log.nmea", text))
+    assert route.lat_deg == pytest.approx([48.1173, 48.1189667], abs=1e-6)
+    assert route.lon_deg == pytest.approx([11.5166667] * 2, abs=1e-6)
+    assert route.sigma_m == sigma_m
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "says"),
+    [
+        pytest.param("a.csv", "", "no route in it", id="empty"),
+        pytest.param("a.csv", "a,b\n1,2\n", "no columns named lat and lon", id="other columns"),
+        pytest.param("a.csv", "lat,lon\n48,11\n48,11\n", "1 places on the Earth", id="one place"),
+        pytest.param("a.csv", "lat,lon\n480,11\n481,11\n", "0 places on the Earth", id="not on the Earth"),
+        pytest.param("a.gpx", "<gpx", "not XML", id="cut off"),
+        pytest.param("a.gpx", '<!DOCTYPE x [<!ENTITY a "b">]><gpx/>', "no document type", id="entities"),
+        pytest.param("a.nmea", GGA.replace("E,4,", "E,0,"), "no route in it", id="no fix, wrong checksums"),
+    ],
+)
+def test_what_is_no_route_is_told_in_one_sentence(tmp_path: Path, name: str, text: str, says: str) -> None:
+    path = written(tmp_path, name, text)
+    with pytest.raises(RouteError, match=says) as told:
+        load_route(path)
+    assert str(told.value).startswith(path)
+
+
+def test_a_missing_file_and_a_folder(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.csv", tmp_path):
+        with pytest.raises(RouteError, match=str(path)):
+            load_route(str(path))
+
+
+def test_an_earlier_drive() -> None:
+    fixes = [GnssFix(k, 48.0 + k * 1e-4, 11.0, 0.0, None, 1.0, "rtk_fixed", 0.01) for k in range(3)]
+    route = from_fixes("drive", fixes)
+    assert route.lat_deg.tolist() == [fix.lat_deg for fix in fixes]
+    assert route.sigma_m == 0.01
+    with pytest.raises(RouteError, match="no route in it"):
+        from_fixes("nothing", [])
+
+
+def test_a_source_along_a_route() -> None:
+    source = open_source("sim:straight")
+    route = Route("mine", np.array([1.0, 2.0]), np.array([3.0, 4.0]), 0.1)
+    along = along_route(source, route)
+    assert along_route(source, None) is source
+    assert (along.uri, along.title, len(along)) == (source.uri, source.title, len(source))
+    assert along.frame(3).route is route
+    assert along.t_ns(3) == source.t_ns(3)
+    own = source.frame(3).route
+    assert own is not None
+    assert own.name.startswith("planned")
