@@ -90,9 +90,9 @@ function drawBelief(ctx, frame) {
     for (const [boxes, role] of /** @type {const} */ ([[display.lidar_boxes, "lidar"], [display.vision_boxes, "vision"]])) {
       if (boxes[chosen.id]) drawBox(ctx, boxes[chosen.id], onPicture(role), 1.5, X, Y);
     }
-    drawInPicture(ctx, frame, chosen, labels, X, Y);
   }
   drawObjects(ctx, frame, layers, labels, X, Y);
+  if (chosen) drawInPicture(ctx, frame, chosen, labels, X, Y);
   const tape = get("tape");
   if (tape?.from.u != null && tape.from.v != null && tape.to.u != null && tape.to.v != null) {
     drawTape(ctx, [X(tape.from.u), Y(tape.from.v)], [X(tape.to.u), Y(tape.to.v)], tape, labels);
