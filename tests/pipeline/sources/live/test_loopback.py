@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import socket
+import threading
+import time
+import tty
 from collections.abc import Iterator
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from itertools import count
 from pathlib import Path
 
+import av
 import can
 import numpy as np
 import pytest
 
 from pipeline.params import Params
 from pipeline.replay.messages import Message, of_frame, of_recording
+from pipeline.replay.nmea_writer import sentences
 from pipeline.run import Detectors, advance, detector_for
 from pipeline.sources import open_source
 from pipeline.sources.base import SourceError
@@ -213,16 +221,8 @@ def test_a_multicast_group_is_joined(sensors: list[LiveSensors]) -> None:
 
 
 def test_a_video_file_is_a_camera(sensors: list[LiveSensors], tmp_path: Path) -> None:
-    import av
-
     path = tmp_path / "drive.mp4"
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("mpeg4", rate=25)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        for shade in (0, 60, 120, 180, 240):
-            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), shade, np.uint8), format="bgr24")
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode())
+    film(path, 5)
     config = LiveConfig.model_validate({"camera": {"file": str(path)}})
     source = opened(config, sensors)
     seen: list[Frame] = []
@@ -295,3 +295,66 @@ def test_a_real_capture_sent_back_is_decoded_as_its_file_is(sensors: list[LiveSe
     assert replaying.sent is not None
     assert len(over_network & known) >= 0.7 * len(over_network), "whole sweeps are the file's own"
     assert lidar.pps is not None, "position packets come to their own port"
+
+
+def test_a_receiver_on_a_serial_line_comes_goes_and_comes(sensors: list[LiveSensors]) -> None:
+    """A pair of pseudo-terminals is a serial line; closing its other end pulls the plug."""
+    ours, theirs = os.openpty()
+    tty.setraw(theirs)
+    config = LiveConfig.model_validate({"lidar": {"data_port": free_port(socket.SOCK_DGRAM), "position_port": None},
+                                        "gnss": {"serial": os.ttyname(theirs)}})  # fmt: skip
+    source = opened(config, sensors)
+    for k in range(1000):
+        os.write(ours, b"garbage\n" + sentences(fix_at(0), time.time_ns()))
+        if k >= 4 and source.health()[1].state == "ok":
+            break
+        source.next(0.05)
+    health = source.health()[1]
+    assert health.state == "ok"
+    assert health.lost > 0, "the garbage"
+    os.close(ours)
+    os.close(theirs)
+    for _ in range(1000):
+        source.next(0.02)
+        if source.health()[1].note:
+            break
+    assert source.health()[1].note, "it says that the line is gone"
+
+
+def test_video_over_http_is_a_camera_too(sensors: list[LiveSensors], tmp_path: Path) -> None:
+    film(tmp_path / "drive.mp4", 12)
+    handler = partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
+    handler.log_message = lambda *_: None  # type: ignore[attr-defined]
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            url = f"http://127.0.0.1:{server.server_address[1]}/drive.mp4"
+            source = opened(LiveConfig.model_validate({"camera": {"url": url}}), sensors)
+            frame = frames_until(source, lambda frame: frame.picture is not None)
+            source.close()
+        finally:
+            server.shutdown()
+            thread.join()
+    assert frame.picture is not None
+    assert frame.picture.bgr.shape == (48, 64, 3)
+
+
+def test_a_camera_that_is_not_plugged_in_is_said(sensors: list[LiveSensors]) -> None:
+    source = opened(LiveConfig.model_validate({"camera": {"device": 63}}), sensors)
+    for _ in range(600):
+        source.next(0.05)
+        if source.health()[0].note:
+            break
+    assert "camera 63: not plugged in" in source.health()[0].note
+
+
+def film(path: Path, count: int) -> None:
+    """A video of grey pictures, each brighter than the one before."""
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream("mpeg4", rate=25)
+        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
+        for shade in np.linspace(0, 240, count).astype(np.uint8):
+            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), shade, np.uint8), format="bgr24")
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
