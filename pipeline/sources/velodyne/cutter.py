@@ -88,6 +88,7 @@ class RotationCutter:
         self._keeps_partial = keeps_partial
         self._packets: list[Placed] = []  # in order of time
         self._began_at_cut = False
+        self._reach_cdeg = (np.inf, np.inf)  # from where to where the rotation before was seen
         self._last: Placed | None = None
         self._suspect: Placed | None = None
 
@@ -168,16 +169,21 @@ class RotationCutter:
         return any(abs(it.time_us - placed.time_us) < apart_us for it in nearest)
 
     def _finish(self, seen_passing: bool) -> Rotation | None:
-        """The packets at hand, if they are a whole rotation. seen_passing: the head was seen to pass behind the car at
-        its end, and the next rotation begins there."""
+        """The packets at hand, if they are a whole rotation: from cut to cut, or, of a sensor set to send a part of the
+        circle only, as far round as the one before. seen_passing: the head was seen to pass behind the car at its end,
+        and the next rotation begins there."""
         packets, self._packets = self._packets, []
         began_there, self._began_at_cut = self._began_at_cut, seen_passing
         if not packets:
             return None
         self.counts.lost += _missing(packets)
-        begins = began_there or packets[0].phase_cdeg <= _EDGE_CDEG
-        ends = seen_passing or packets[-1].phase_cdeg >= ROTATION_CDEG - _EDGE_CDEG
-        if not (begins and ends):
+        first_cdeg, last_cdeg = packets[0].phase_cdeg, packets[-1].phase_cdeg
+        begins = began_there or first_cdeg <= _EDGE_CDEG
+        ends = seen_passing or last_cdeg >= ROTATION_CDEG - _EDGE_CDEG
+        first_before, last_before = self._reach_cdeg
+        again = abs(first_cdeg - first_before) <= _EDGE_CDEG and abs(last_cdeg - last_before) <= _EDGE_CDEG
+        self._reach_cdeg = first_cdeg, last_cdeg
+        if not (begins and ends) and not again:
             self.counts.partial += 1
             if not self._keeps_partial:
                 return None

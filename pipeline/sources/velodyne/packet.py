@@ -5,7 +5,9 @@ return mode and the product. In dual return mode two blocks in a row hold the la
 same firings.
 
 The decoding library takes what it is given: an all-zero packet, or one whose last azimuth is spoiled, makes it cut the
-sweep in the middle. So a packet that is not what a VLP-16 sends is refused here, with the reason.
+sweep in the middle. So a packet that is not what a VLP-16 sends is refused here, with the reason. A sensor set to send
+a part of the circle only makes one packet a rotation that reaches over the gap; that one is refused too, for its
+azimuths do not advance evenly.
 """
 
 from __future__ import annotations

@@ -132,6 +132,19 @@ def test_begins_and_ends_anywhere() -> None:
 
 
 @pytest.mark.parametrize("with_host", [True, False])
+def test_a_sensor_set_to_send_the_front_half_only(with_host: bool) -> None:
+    """The first rotation could be one seen in part; from the second on it is known to be all there is."""
+    front = [(packet, t if with_host else None) for i, (packet, t) in enumerate(STREAM) if 19 <= i % 75 < 56]
+    decoder = Vlp16Decoder()
+    sweeps = decoded(decoder, front)
+    assert [round(ranges(sweep), 2) for sweep in sweeps] == [9.9, 9.8, 9.7]
+    assert not decoder.counts.refused
+    for sweep in sweeps:
+        assert len(sweep.points) == pytest.approx(POINTS * 37 / 75, rel=0.01)
+        assert sweep.points[:, 0].min() > -0.5
+
+
+@pytest.mark.parametrize("with_host", [True, False])
 def test_silence(with_host: bool) -> None:
     """Plugged out for ten seconds in the middle of a sweep: no sweep is made of both sides of the silence."""
     later = drive(2)
