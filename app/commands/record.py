@@ -64,6 +64,7 @@ class Record:
         """A recording waits for the disk, so nothing is dropped."""
         detectors = self.line.open_detectors(source)
         segments = Segments(new_session(self.out, source.title), about(source), self._rotation)
+        _say_where(segments.files[0])
         with closing(segments), frames_progress() as bar:
             task = bar.add_task(source.title, total=len(source))
             for index, (frame, result) in enumerate(self._until_enough(run(source, params, detectors), asked)):
@@ -76,6 +77,7 @@ class Record:
         """Sensors do not wait: what the disk is too slow for is dropped, and said."""
         detectors = self.line.open_detectors(source)
         recorder = self._recorder(source)
+        _say_where(recorder.state.file)
         with frames_progress() as bar:
             task = bar.add_task(source.title, total=None)
             ran = run_live(source, params, detectors, on_silence=lambda: _end_if(asked))
@@ -148,6 +150,10 @@ def _asked_to_stop() -> Iterator[Event]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _say_where(file: Path) -> None:
+    print(f"cipv: recording to {file}; Ctrl-C ends it", file=sys.stderr)
 
 
 def _say(files: list[Path], frames: int, count: int) -> None:

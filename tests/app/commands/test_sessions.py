@@ -49,25 +49,26 @@ def test_record_keeps_inputs_results_parameters_and_labels(recorded: Path) -> No
 
 
 def test_record_names_a_file_in_a_folder_and_goes_on_in_another(tmp_path: Path) -> None:
-    assert cipv("record", "sim:straight", "--out", tmp_path, "--seconds", 1, "--rotate-mb", 3, *LIDAR_ONLY) == 0
+    assert cipv("record", "sim:straight", "--out", tmp_path, "--seconds", 0.4, "--rotate-mb", 2, *LIDAR_ONLY) == 0
     files = sorted(tmp_path.iterdir())
     assert len(files) >= 2
     assert all(file.name.startswith("following-on-a-straight-motorway_") for file in files)
-    assert sum(len(SessionSource("a", str(file))) for file in files) == 11
+    assert sum(len(SessionSource("a", str(file))) for file in files) == 5
 
 
 def test_record_ends_as_it_should_on_ctrl_c(tmp_path: Path) -> None:
     typed = ["record", "sim:straight", "--out", str(tmp_path / "a.mcap"), *LIDAR_ONLY]
     command = [sys.executable, "-c", "from app.cli import main; main()", *typed]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
-        while not (tmp_path / "a.mcap").exists() or (tmp_path / "a.mcap").stat().st_size < 1_000_000:
+        assert process.stderr is not None
+        while "Ctrl-C" not in process.stderr.readline():
             assert process.poll() is None
         os.kill(process.pid, signal.SIGINT)
-        assert process.stderr is not None
         said = process.stderr.read()
     assert process.returncode == 0
     session = SessionSource("a", str(tmp_path / "a.mcap"))
     assert session.notes == ()
+    assert 0 < len(session) < len(open_source("sim:straight"))
     assert f"{len(session)} frames" in said
 
 

@@ -28,7 +28,7 @@ def imported(source: Source, tmp_path: Path, frames: int) -> Source:
     return open_source(str(tmp_path / "a.mcap"))
 
 
-@pytest.mark.parametrize(("kind", "folder", "frames"), [("astyx", "astyx", 8), ("kitti", "kitti_0052", 4)])
+@pytest.mark.parametrize(("kind", "folder", "frames"), [("astyx", "astyx", 8), ("kitti", "kitti_0052", 3)])
 def test_real_recordings(kind: str, folder: str, frames: int, data_dir: Path, tmp_path: Path) -> None:
     """JPEG of Astyx, PNG of KITTI, each with its own calibration."""
     source = open_source(f"{kind}:{data_dir / folder}")
