@@ -7,14 +7,17 @@ make it. Used by one thread.
 from __future__ import annotations
 
 from dataclasses import replace
-from time import perf_counter
+from time import monotonic, perf_counter
 
 from app.line import Tick
 from pipeline.params import Params
 from pipeline.run import Detectors, Detects, Seen, Sensors, advance
 from pipeline.sources.base import LiveSource
+from pipeline.sources.live.health import not_delivering
 from pipeline.step import State, step
 from pipeline.types import U8, Frame
+
+_SILENCE_S = 1.0
 
 
 class LiveLine:
@@ -25,6 +28,7 @@ class LiveLine:
         self.tick: Tick | None = None
         self._detectors, self._sensors = detectors, sensors
         self._first_ns: int | None = None
+        self._ticked_s = monotonic()
 
     def open(self) -> None:
         self.source.start()
@@ -37,12 +41,19 @@ class LiveLine:
         frame = self.source.next(timeout_s, params.sync)
         if frame is None:
             return None
+        self._ticked_s = monotonic()
         self._first_ns = frame.t_ns if self._first_ns is None else self._first_ns
         before = self.tick.after if self.tick is not None else State()
         ask = _TimedLook()
         frame, after, result = advance(before, frame, params, self._detectors, self._sensors, ask)
         self.tick = Tick(before, frame, after, result, params, ask.spent_ms, exact=True)
         return self.tick
+
+    def silence(self) -> str | None:
+        """Whom it waits for, once nothing has ticked for a second."""
+        if monotonic() - self._ticked_s < _SILENCE_S:
+            return None
+        return f"Waiting for sensors: {not_delivering(self.source.health()) or 'none ticks'}"
 
     def time_s(self, tick: Tick) -> float:
         """Seconds since the first tick."""

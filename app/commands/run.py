@@ -19,6 +19,7 @@ from pipeline.params import Params
 from pipeline.results import write_line
 from pipeline.run import Detectors, run, run_live
 from pipeline.sources.base import AnySource, LiveSource, Source, is_live_source
+from pipeline.sources.live.health import not_delivering
 from pipeline.types import Frame, Result
 
 Ran = tuple[Frame, Result]
@@ -99,10 +100,7 @@ class _Waiting:
         self._said = ""
 
     def __call__(self) -> None:
-        states = [
-            f"{each.sensor} {each.state}" + (f" ({each.note})" if each.note else "") for each in self._live.health()
-        ]
-        text = f"cipv: waiting for sensors: {', '.join(states)}"
+        text = f"cipv: waiting for sensors: {not_delivering(self._live.health())}"
         if text != self._said:
             print(text, file=sys.stderr)
         self._said = text

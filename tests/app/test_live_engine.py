@@ -153,6 +153,11 @@ def test_how_sensors_do_is_told_while_none_ticks(start: Start) -> None:
     sensors.state = "silent"
     shown = engine.wait_for(lambda s: any(each.state == "silent" for each in s.streams), WAIT_S)
     assert shown.state_json()["streams"]["lidar"]["state"] == "silent"
+    said = "Waiting for sensors: lidar silent"
+    engine.wait_for(lambda s: any(notice.text == said for notice in s.notices), WAIT_S)
+    sensors.state = "ok"
+    shown_after(engine, sensors, 0)
+    engine.wait_for(lambda s: all(notice.text != said for notice in s.notices), WAIT_S)
 
 
 def test_what_the_line_left_out_is_counted(start: Start) -> None:

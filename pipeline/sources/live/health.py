@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
@@ -72,3 +73,10 @@ class StreamStats:
     def _said(self) -> str:
         refused = f"{self.refused} messages refused" if self.refused else ""
         return "; ".join(text for text in (self.note, refused) if text)
+
+
+def not_delivering(streams: Iterable[StreamHealth]) -> str:
+    """``lidar absent (nothing on UDP port 2368 yet), camera silent``: who does not deliver, in a sentence that stays
+    the same while it is so; empty when all do."""
+    bad = (each for each in streams if each.state != "ok")
+    return ", ".join(f"{each.sensor} {each.state}" + (f" ({each.note})" if each.note else "") for each in bad)

@@ -48,6 +48,7 @@ class Reader:
     def __init__(self, name: str, read: Read, say: Callable[[str], None]) -> None:
         self._read, self._say = read, say
         self._stop = Stop()
+        self._logged = ""
         self._thread = threading.Thread(target=self._work, name=f"cipv-{name}", daemon=True)
 
     def start(self) -> None:
@@ -62,6 +63,13 @@ class Reader:
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
 
+    def _log_once(self, error: Exception) -> None:
+        """With its traceback, but not five times a second."""
+        text = repr(error)
+        if text != self._logged:
+            logger.exception("while reading %s", self._thread.name)
+        self._logged = text
+
     def _work(self) -> None:
         while not self._stop:
             try:
@@ -71,6 +79,6 @@ class Reader:
             except OSError as error:
                 self._say(error.strerror or str(error))
             except Exception as error:  # whatever a driver throws, the other sensors go on and this one is tried again
-                logger.exception("while reading %s", self._thread.name)
+                self._log_once(error)
                 self._say(f"{type(error).__name__}: {error}")
             self._stop.wait(RETRY_S)

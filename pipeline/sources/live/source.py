@@ -18,7 +18,7 @@ from pipeline.sources.live.can import CanInput
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LiveConfig
 from pipeline.sources.live.gnss import GnssInput
-from pipeline.sources.live.health import StreamStats
+from pipeline.sources.live.health import StreamStats, not_delivering
 from pipeline.sources.live.inputs import Input
 from pipeline.sources.live.lidar import LidarInput
 from pipeline.sources.live.own_motion import MotionFromGnss
@@ -153,7 +153,8 @@ class LiveSensors:
         picture = self._picture(together, notes)
         decoded_ns = self._clock.now_ns()
         streams = self.health()
-        notes += _missing(streams)
+        missing = not_delivering(streams)
+        notes += [missing] if missing else []
         return Frame(
             self._index,
             f"{self._index:06d}",
@@ -196,13 +197,6 @@ class LiveSensors:
 
 def _sweep(together: Together[Shot]) -> Sweep | None:
     return None if together.sweep is None else replace(together.sweep.value, t_ns=together.sweep.t_ns)
-
-
-def _missing(streams: tuple[StreamHealth, ...]) -> list[str]:
-    """One sentence for all sensors that do not deliver; the same while they do not, so that it can be read."""
-    states = [f"{each.sensor} {each.state}" + (f" ({each.note})" if each.note else "") for each in streams]
-    bad = [text for each, text in zip(streams, states, strict=True) if each.state != "ok"]
-    return [", ".join(bad)] if bad else []
 
 
 def _about(config: LiveConfig) -> tuple[str, ...]:
