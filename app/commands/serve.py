@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import webbrowser
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -18,6 +19,9 @@ from app.server import DEFAULT_PORT, serve
 from pipeline.run import detector_for, lanes_for
 from pipeline.sources import open_any
 from pipeline.sources.along_route import along_route
+
+if TYPE_CHECKING:
+    from app.rerun_feed import RerunFeed
 
 
 @dataclass(frozen=True)
@@ -32,12 +36,17 @@ class ServerOptions:
     """Another name this server may be called by (repeatable)"""
     browser: bool = False
     """Open a browser once the dashboard answers"""
+    rerun: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
+    """Stream what is shown to a running rerun viewer too, e.g. rerun+http://127.0.0.1:9876/proxy"""
 
     def serve(self, engine: Engine) -> int:
         """Until Ctrl-C."""
         on_ready: Callable[[str], None] | None = webbrowser.open if self.browser else None  # type: ignore[assignment]
         looks = Looks()
-        with SceneFeed(engine, looks) as feed:
+        with ExitStack() as stack:
+            feed = stack.enter_context(SceneFeed(engine, looks))
+            if self.rerun is not None:
+                stack.enter_context(_rerun_feed(engine, self.rerun))
             serve(
                 engine,
                 host=self.host,
@@ -49,6 +58,12 @@ class ServerOptions:
                 on_ready=on_ready,
             )
         return 0
+
+
+def _rerun_feed(engine: Engine, url: str) -> RerunFeed:
+    from app.rerun_feed import RerunFeed  # half a second to import: only who asks pays
+
+    return RerunFeed(engine, url)
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ The viewer reads files of its own and the previous minor version only: this is a
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path as FilePath
 from types import TracebackType
 from typing import BinaryIO
@@ -33,9 +34,16 @@ class ReplayError(BadInput):
     """A replay that cannot be written; the text is one sentence that names the file."""
 
 
+@dataclass(frozen=True)
+class ViewerAddress:
+    """A running viewer, as it names itself: ``rerun+http://127.0.0.1:9876/proxy``."""
+
+    url: str
+
+
 class RerunSink:
-    """Writes each frame and its result to ``target``: a file's path, or an open binary stream, which stays open and
-    gets the whole replay on closing.
+    """Writes each frame and its result to ``target``: a file's path, an open binary stream, which stays open and
+    gets the whole replay on closing, or a running viewer.
 
     ``title`` names the recording in the viewer; ``params`` says which model projects the points into the picture.
     Timelines: ``frame`` (index) and ``sensor_time`` (the frame's tick), never the time of writing. ReplayError when the
@@ -45,7 +53,7 @@ class RerunSink:
 
     def __init__(
         self,
-        target: str | FilePath | BinaryIO,
+        target: str | FilePath | BinaryIO | ViewerAddress,
         title: str = APPLICATION,
         params: AlignmentParams = _CALIBRATED,
         paused: bool = False,
@@ -59,6 +67,8 @@ class RerunSink:
         self._buffer: rr.BinaryStream | None = None
         if isinstance(target, str | FilePath):
             self._open_file(FilePath(target))
+        elif isinstance(target, ViewerAddress):
+            self._connect(target)
         else:
             self._stream, self._buffer = target, rr.binary_stream(self._rec)
         self._rec.send_blueprint(blueprint(paused))
@@ -70,6 +80,12 @@ class RerunSink:
         except RuntimeError as error:
             raise ReplayError(f"{path}: the replay cannot be written: {_cause(error)}") from None
 
+    def _connect(self, viewer: ViewerAddress) -> None:
+        try:
+            self._rec.connect_grpc(viewer.url)
+        except (RuntimeError, ValueError) as error:
+            raise ReplayError(f"{viewer.url}: no address of a rerun viewer: {error}") from None
+
     def show(self, frame: Frame, result: Result) -> None:
         """Add one frame."""
         self._rec.set_time("frame", sequence=frame.index)
@@ -79,6 +95,18 @@ class RerunSink:
         self._log_bev(result)
         self._log_curves(result)
         self._log_reasons(result)
+
+    def flush(self, timeout_s: float) -> bool:
+        """Wait until what was shown is written or sent; false when that takes longer, as with a viewer that is gone."""
+        try:
+            self._rec.flush(timeout_sec=timeout_s)
+        except (RuntimeError, ValueError):
+            return False
+        return True
+
+    def abandon(self) -> None:
+        """End without waiting for a viewer that does not answer."""
+        self._rec.disconnect()
 
     def close(self) -> None:
         """Write what is buffered and finish the file. Closing twice is allowed."""

@@ -79,7 +79,7 @@ def _fetch(program: Path) -> Path:
 
 
 def _fetch_into(program: Path, folder: Path) -> None:
-    port, grpc_port = _free_ports(2)
+    port, grpc_port = free_ports(2)
     command = [str(program), "--serve-web", "--bind", "127.0.0.1"]
     command += ["--port", str(grpc_port), "--web-viewer-port", str(port)]
     home = folder / "home"
@@ -126,7 +126,7 @@ def _get(port: int, name: str) -> IO[bytes]:
     return response
 
 
-def _free_ports(count: int) -> list[int]:
+def free_ports(count: int) -> list[int]:
     """Ports of loopback that nobody listens on now."""
     sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
     ports = [each.getsockname()[1] for each in sockets]
