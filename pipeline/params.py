@@ -262,7 +262,7 @@ class CipvParams(Section):
         "In path: this much of its width reaches between the edges, or half of what is narrower",
     )
     decide_s: float = _slider(0.3, 0.0, 2.0, 0.05, "s", "In path: over how long sightings are weighed; 0: each alone")
-    max_sigma_m: float = _slider(3.0, 0.5, 20.0, 0.1, "m", "A lead's place against the path is no more uncertain")
+    max_sigma_m: float = _slider(4.0, 0.5, 20.0, 0.1, "m", "A lead's place against the path is no more uncertain")
     cut_in_s: float = _slider(3.0, 0.5, 6.0, 0.1, "s", "Lane crossings are told this long before")
     min_width_m: float = _slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest extent across, a vehicle's rear or side")
     min_height_m: float = _slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest height")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -126,3 +128,18 @@ def test_approaching_a_standing_car_from_100_m_at_72_km_h_the_car_stops_before_i
         gap -= speed * 0.05
     assert speed == pytest.approx(0.0, abs=0.2)
     assert gap > 2.0
+
+
+def test_where_nobody_knows_the_way_it_gets_no_faster() -> None:
+    """Whoever may lead on an unknown path: with the set speed far above, the car holds its speed and says why; slowing
+    down for a lead comes first all the same, and from standstill it may creep on."""
+    vague = dataclasses.replace(PATH, usable=False, reach_m=12.0)
+    for speed_mps, wanted_mps in ((20.0, 20.0), (0.0, 3.0)):
+        _, held = control(AccState(), EgoState(0, speed_mps), None, (), vague, 0.1, PARAMS)
+        assert held is not None
+        assert held.desired_speed_mps == wanted_mps
+        assert held.reason == "path known for 12 m only: no faster than now"
+    _, follows = control(AccState(), EgoState(0, 20.0), Cipv(1, 20.0, None, None, ""), (), vague, 0.1, PARAMS)
+    assert follows is not None
+    assert follows.state == "follow"
+    assert follows.desired_speed_mps == pytest.approx(10.0)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.cipv import CipvState, choose
-from pipeline.params import CipvParams, PathParams
+from pipeline.cipv import Choice, CipvState, choose
+from pipeline.motion import describe
+from pipeline.params import CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
-from pipeline.types import Cipv, EgoState, FusedObject
+from pipeline.types import Cipv, EgoState, FusedObject, Path
 from tests.pipeline.build import fused
 
 PARAMS = CipvParams(confirm_hits=3, hysteresis_m=0.3)
@@ -158,3 +160,68 @@ def test_a_nearer_car_that_only_the_camera_sees_still_leads() -> None:
     assert lead is not None
     assert lead.id == 1
     assert why_not == {2: "behind #1"}
+
+
+def over_time(frames: list[tuple[FusedObject, ...]], path: Path = PATH, ego: EgoState | None = None) -> list[Choice]:
+    """Each frame's choice, ten a second."""
+    state, choices = CipvState(), []
+    for k, objects in enumerate(frames):
+        objects = describe(objects, ego, MotionParams())
+        state, choice = choose(state, objects, path, ego, 0.1 if k else None, PARAMS)
+        choices.append(choice)
+    return choices
+
+
+def test_a_decoy_whose_place_sways_does_not_take_over() -> None:
+    """A box in the next lane, twice in ten frames measured inside the path."""
+    lead = fused(1, 50.0, source="V")
+    offsets = [3.2, 2.9, 3.3, 1.0, 3.1, 2.8, 1.2, 3.4, 3.0, 3.2]
+    choices = over_time([(lead, dataclasses.replace(fused(2, 40.0, y, source="V"))) for y in offsets])
+    assert {choice.lead.id for choice in choices if choice.lead} == {1}
+
+
+def test_one_that_moves_over_is_told_before_and_leads_when_it_is_in() -> None:
+    """A car 25 m ahead comes over from 3.5 m aside at 1.2 m/s; its wheel is on the edge when its middle is at 2.4 m."""
+    frames = []
+    for k in range(40):
+        y = max(3.5 - 0.12 * k, 0.0)
+        frames.append((fused(1, 50.0), fused(2, 25.0, y, velocity=(-1.0, -1.2 if y else 0.0))))
+    choices = over_time(frames, ego=EgoState(0, 20.0, 0.0))
+    on_the_edge = next(k for k in range(40) if 3.5 - 0.12 * k <= 2.4)
+    told = next(k for k, choice in enumerate(choices) if choice.next_lead and choice.next_lead.id == 2)
+    leads = next(k for k, choice in enumerate(choices) if choice.lead and choice.lead.id == 2)
+    assert told < on_the_edge < leads < on_the_edge + 12
+    assert choices[told].next_lead.reason.startswith("cuts in: over the edge of the path in ")  # type: ignore[union-attr]
+    assert all(2 in ids(choice) for choice in choices[told:]), "from then on it is one of the two"
+    assert choices[-1].next_lead is not None
+    assert choices[-1].next_lead.reason == "next behind #2"
+
+
+def test_a_lead_that_leaves_names_the_one_behind_it() -> None:
+    leaving = fused(1, 20.0, 0.8, velocity=(0.0, 1.5))
+    (choice,) = over_time([(leaving, fused(2, 50.0))], ego=EgoState(0, 20.0, 0.0))
+    assert choice.lead is not None
+    assert choice.next_lead is not None
+    assert (choice.lead.id, choice.next_lead.id) == (1, 2)
+    assert choice.next_lead.reason == "#1 leaves the path in 0.7 s"
+
+
+def test_nobody_beside_is_next() -> None:
+    (choice,) = over_time([(fused(2, 25.0, 3.5, velocity=(-1.0, 0.0)), fused(3, 15.0, 2.6, label="person"))])
+    assert choice.lead is None
+    assert choice.next_lead is None
+
+
+def test_where_the_path_is_not_known_nobody_new_leads() -> None:
+    vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 5.0))
+    (item,), lead, _, (why,) = choose(CipvState(), (fused(1, 40.0),), vague, None, None, PARAMS)[1]
+    assert lead is None
+    assert why.reason == "its place against the path is uncertain by 5.0 m"
+    assert item.in_path_probability == pytest.approx(0.24, abs=0.02)
+    assert choose(CipvState(1), (fused(1, 40.0),), vague, None, None, PARAMS)[1].lead is not None, "who led may stay"
+    unusable = dataclasses.replace(PATH, usable=False, profile_m=np.full(len(PATH.center), 1.5))
+    assert choose(CipvState(), (fused(1, 40.0),), unusable, None, None, PARAMS)[1].lead is None
+
+
+def ids(choice: Choice) -> set[int]:
+    return {lead.id for lead in (choice.lead, choice.next_lead) if lead is not None}

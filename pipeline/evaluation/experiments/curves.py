@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -89,17 +89,17 @@ def run(case: Case) -> Outcome:
     layout = bends.LAYOUTS[case.layout]
     if case.kind == "cut_in":
         scene, over_line_s = bends.cut_in(layout, case.seed)
-        return {name: _judged(scene, layout.reach_m, rows, over_line_s) for name, rows in _drive(scene).items()}
+        return {"fused": _judged(scene, layout.reach_m, _drive(scene, ("fused",))["fused"], over_line_s)}
     scene = bends.scenario(layout, case.seed)
-    return {name: _judged(scene, layout.reach_m, rows, None) for name, rows in _drive(scene).items()}
+    return {name: _judged(scene, layout.reach_m, rows, None) for name, rows in _drive(scene, tuple(SOURCES)).items()}
 
 
-def _drive(scene: Scenario, changes: Mapping[str, Any] | None = None) -> dict[str, list[tuple[World, Frame, Result]]]:
+def _drive(scene: Scenario, names: Sequence[str]) -> dict[str, list[tuple[World, Frame, Result]]]:
     """Every frame once through the sensors, and through the line once for each set of sources."""
     warm_up()
-    settings = {name: with_changes(Params(), {**SCENE_LAW, **use, **(changes or {})}) for name, use in SOURCES.items()}
-    states = dict.fromkeys(SOURCES, State())
-    rows: dict[str, list[tuple[World, Frame, Result]]] = {name: [] for name in SOURCES}
+    settings = {name: with_changes(Params(), {**SCENE_LAW, **SOURCES[name]}) for name in names}
+    states = dict.fromkeys(names, State())
+    rows: dict[str, list[tuple[World, Frame, Result]]] = {name: [] for name in names}
     for now, frame in seen(scene):
         for name, params in settings.items():
             states[name], result = step(states[name], frame, params)

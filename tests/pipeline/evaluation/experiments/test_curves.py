@@ -1,0 +1,86 @@
+"""The CIPV in curves: what the verdicts count, and one short drive of each kind."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipeline.evaluation.experiments import bends, curves
+from pipeline.evaluation.experiments.curves import (
+    Case,
+    Frames,
+    Outcome,
+    longest_wrong_s,
+    share_right,
+    told_before_line_s,
+)
+from pipeline.simulation import world
+
+
+def drive(
+    *verdicts: str, lead_m: float = 30.0, told: tuple[bool, ...] = (), over_line_s: float | None = None
+) -> Frames:
+    count = len(verdicts)
+    times = tuple(k / 10 for k in range(count))
+    known = tuple(lead_m if verdict in ("right", "missed", "decoy") else None for verdict in verdicts)
+    rows = ((0.0,) * 4,) * count
+    return Frames(times, verdicts, known, told or (False,) * count, rows, rows, over_line_s)  # type: ignore[arg-type]
+
+
+def test_what_counts_as_right() -> None:
+    near, far = drive("right", "right", "missed", "undecided"), drive("right", "decoy", "none", "false", lead_m=80.0)
+    assert share_right([near]) == (pytest.approx(2 / 3), 3)
+    assert share_right([near, far], 60.0) == (pytest.approx(3 / 5), 5)
+    assert share_right([near, far]) == (pytest.approx(4 / 7), 7)
+
+
+def test_the_longest_time_on_a_decoy() -> None:
+    assert longest_wrong_s(drive("right", "decoy", "decoy", "false", "right", "decoy")) == pytest.approx(0.3)
+    assert longest_wrong_s(drive("right", "missed", "undecided")) == 0.0
+
+
+def test_told_before_the_wheel_is_over_the_line() -> None:
+    told = (False, True, False, True, True, True)
+    assert told_before_line_s(drive(*["right"] * 6, told=told, over_line_s=0.45)) == pytest.approx(0.25)
+    assert told_before_line_s(drive(*["right"] * 6, told=(True,) * 5 + (False,), over_line_s=0.45)) is None
+
+
+@pytest.mark.parametrize("layout", bends.LAYOUTS.values(), ids=lambda layout: layout.name)
+def test_the_roads_bend_as_hard_as_said(layout: bends.Layout) -> None:
+    scene = bends.scenario(layout, 0)
+    hardest = max(abs(now.speed_mps * now.yaw_rate_radps) for now in (world.at(scene, t / 5) for t in range(60)))
+    assert hardest == pytest.approx(0.0 if layout.radius_m is None else 3.0, abs=0.2)
+    sides = {seed: bends.scenario(layout, seed).road.segments for seed in (0, 1)}
+    assert layout.radius_m is None or sides[0] != sides[1], "to the left, and to the right"
+
+
+@pytest.fixture(scope="module")
+def outcomes() -> dict[Case, Outcome]:
+    return {case: curves.run(case) for case in curves.cases(short=True)}
+
+
+def test_in_a_bend_of_125_m_the_lead_is_the_cipv(outcomes: dict[Case, Outcome]) -> None:
+    """Fused: in 99 % of the frames to 60 m, never 0.3 s on a decoy; a straight guess shows what is at stake."""
+    (outcome,) = (outcome for case, outcome in outcomes.items() if case.kind == "follow")
+    share, frames = share_right([outcome["fused"]], 60.0)
+    assert frames > 90
+    assert share >= 0.99
+    assert longest_wrong_s(outcome["fused"]) <= 0.3
+    assert share_right([outcome["straight guess"]])[0] < 0.5
+    assert share_right([outcome["yaw rate"]])[0] > share_right([outcome["straight guess"]])[0] + 0.3
+
+
+def test_a_cut_in_is_told_before_the_wheel_is_over_the_line(outcomes: dict[Case, Outcome]) -> None:
+    (outcome,) = (outcome for case, outcome in outcomes.items() if case.kind == "cut_in")
+    before_s = told_before_line_s(outcome["fused"])
+    assert before_s is not None
+    assert before_s >= 0.0
+
+
+def test_the_report_says_what_held(outcomes: dict[Case, Outcome]) -> None:
+    section = curves.report(list(outcomes), list(outcomes.values()))
+    assert any(text.startswith("R = 125 m, 70 km/h: right in ") for text in section.text)
+    choice, path, cut_in = section.tables
+    assert [row[1] for row in choice.rows] == list(curves.SOURCES)
+    errors = {row[1]: row[4] for row in path.rows}
+    assert errors["fused"] < 0.3 < errors["straight guess"]  # type: ignore[operator]
+    assert len(cut_in.rows) == 1
