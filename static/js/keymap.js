@@ -7,6 +7,7 @@ import * as shuttle from "./drive/shuttle.js";
 import * as help from "./help.js";
 import * as sources from "./sources.js";
 import { get, set } from "./store.js";
+import { toggleTape } from "./tape.js";
 import * as clip from "./timeline/clip.js";
 import { addMark } from "./timeline/events.js";
 import { fit, zoom } from "./timeline/pane.js";
@@ -65,6 +66,7 @@ export const keymap = () => [
     key("Shift+4", "Shift 4", "objects on the whole workspace", () => grow("objects")),
     key("b", "B", "plan or 3D", nextTab),
     key("p", "P", "why and parameters", toggleInspector),
+    key("g", "G", "measuring tape (also: drag with Shift)", toggleTape),
     key("a", "A", "align LiDAR and camera", toggleAlign),
   ] },
   { title: "Everything else", bindings: [
