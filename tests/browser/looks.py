@@ -6,7 +6,7 @@ import time
 
 from playwright.sync_api import FloatRect, Locator, Page, expect
 
-from tests.browser.conftest import WAIT_MS
+from tests.browser.conftest import WAIT_MS, Site
 
 COUNT = 200
 """Frames of the scenario that the page shows."""
@@ -20,6 +20,12 @@ def frame_name(page: Page) -> str:
 
 def wait_for_frame(page: Page, index: int) -> None:
     expect(page.locator("#transport .where .dim")).to_have_text(f"{index + 1}/{COUNT}", timeout=WAIT_MS)
+
+
+def whole_drive(page: Page, site: Site) -> None:
+    """Wait until the whole drive is computed, and is on the page's timeline: from then on no network runs."""
+    site.engine.wait_for(lambda s: s.drive.done == s.drive.total == COUNT, WAIT_MS / 1e3)
+    expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
 
 
 def box_of(locator: Locator) -> FloatRect:

@@ -9,7 +9,7 @@ from app.engine import Engine
 from pipeline.params import Params
 from tests.app.recording import CountingDetector, Recording, opener
 from tests.browser.conftest import START, WAIT_MS, OpenPage, Site
-from tests.browser.looks import colours, frame_name, go_to, pixels, repainted, wait_for_frame
+from tests.browser.looks import colours, frame_name, go_to, pixels, repainted, wait_for_frame, whole_drive
 
 WAIT_S = WAIT_MS / 1e3
 
@@ -67,6 +67,7 @@ def test_it_steps_and_seeks(open_page: OpenPage):
 def test_a_slider_on_the_paused_frame_changes_picture_and_table_without_the_network(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
+    whole_drive(page, site)
     runs, before, camera = site.network_runs, page.text_content("#objects tbody"), pixels(page, "#camera")
     page.locator("[data-param='cluster.tolerance_m'] input[type=range]").fill("0.2")
     expect(page.locator("[data-section=cluster] .count")).to_have_text("1 changed")
@@ -84,6 +85,7 @@ def test_a_slider_on_the_paused_frame_changes_picture_and_table_without_the_netw
 def test_h_res_moves_the_projected_points_and_chooses_its_model(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
+    whole_drive(page, site)
     runs, camera = site.network_runs, pixels(page, "#camera")
     slider = page.locator("[data-param='alignment.h_res_deg'] input[type=range]")
     slider.fill(str(float(slider.input_value()) * 1.3))

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 from pipeline.params import Params
 from tests.browser.conftest import START, WAIT_MS, OpenPage, Site
 from tests.browser.judges import LOW_CONTRAST, SMALL_TARGETS
-from tests.browser.looks import COUNT, pixels, repainted, wait_for_frame
+from tests.browser.looks import pixels, repainted, wait_for_frame, whole_drive
 
 WAIT_S = WAIT_MS / 1e3
 SCREENS = Path(__file__).resolve().parents[2] / "build" / "screens"
@@ -23,11 +23,6 @@ def keep(page: Page, name: str) -> None:
     SCREENS.mkdir(parents=True, exist_ok=True)
     pixels(page, "#timeline-back")
     page.screenshot(path=SCREENS / f"{name}.png")
-
-
-def whole_drive(page: Page, site: Site) -> None:
-    site.engine.wait_for(lambda s: s.drive.done == s.drive.total == COUNT, WAIT_S)
-    expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])
@@ -140,6 +135,7 @@ def test_j_k_and_l_play_back_stop_and_on(open_page: OpenPage, site: Site):
     page.keyboard.press("k")
     page.keyboard.press("l")
     site.engine.wait_for(lambda s: s.playing and s.speed == 1.0, WAIT_S)
+    expect(page.get_by_role("button", name="Pause")).to_be_visible()
     page.keyboard.press("l")
     site.engine.wait_for(lambda s: s.playing and s.speed == 2.0, WAIT_S)
     page.keyboard.press("k")
