@@ -63,7 +63,6 @@ class LaneMeasurement:
     source: str
     lines: tuple[FittedLine, ...]
     pitch: Pitch
-    shape: Shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +112,7 @@ def measure(
     plane: (3,) as in ``LaneState``. pitch: as believed before this picture. expected: the shape of the tracked lines,
     around which the search is then narrow; null searches wide.
     """
-    nothing = LaneMeasurement(raw.model, (), pitch, Shape())
+    nothing = LaneMeasurement(raw.model, (), pitch)
     eye, rays = aligned.rays(np.asarray(raw.points, np.float64))
     height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))
     if height_m <= 0.1:
@@ -132,7 +131,7 @@ def measure(
     lines = [found for found, _ in _fitted(again, shape, sigma)]
     to_ego = lane_tracking.shifted(-float(eye[0]))
     lines = [_in_ego(found, eye, to_ego, height_m, pitch) for found in _distinct(lines) if _plausible(found, params)]
-    return LaneMeasurement(raw.model, tuple(lines), pitch, shape)
+    return LaneMeasurement(raw.model, tuple(lines), pitch)
 
 
 def _beside(raw: RawLanes, vehicles: Sequence[Box]) -> RawLanes:

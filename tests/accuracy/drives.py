@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pipeline.evaluation.lead import Judged, LeadRule, judge
 from pipeline.params import preset, with_changes
+from pipeline.path.lane_detector import usual_every
 from pipeline.run import Detectors, Sensors, lanes_for, run
 from pipeline.sources import open_source
 from pipeline.types import Result
@@ -56,7 +57,8 @@ def drive(
     size = (picture.bgr.shape[1], picture.bgr.shape[0])
     detector = open_detector(str(folder / "models" / "yolox_nano.onnx"), size)
     results, judged = {}, {}
-    for frame, result in run(source, params, Detectors(detector, lanes_for(source, lanes)), sensors):
+    found = lanes_for(source, lanes)
+    for frame, result in run(source, params, Detectors(detector, found, usual_every(found)), sensors):
         results[frame.name] = result
         truth = source.truth(frame.index)
         if truth is not None:
