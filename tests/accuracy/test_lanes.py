@@ -180,7 +180,7 @@ def _bright_ground(frame: Frame, result: Result) -> F64:
 
 
 LEADS = {"twinlitenet": 29, "classical": 24}
-"""Astyx frames of 31 in which the lead is right when lane lines carry the path. Measured: 31 and 26; without lanes it is
+"""Astyx frames of 31 in which the lead is right when lane lines carry the path. Measured: 31 and 26; without lanes
 31. Half of the clip "lead near 20 m" is a lane change without any own motion recorded, and snow shines like paint."""
 
 
