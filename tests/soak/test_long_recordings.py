@@ -12,8 +12,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 ALLOWED_MB = 150.0
-"""What opening and reading may add; the files are 13 and 70 times as large."""
-ROUNDS = {"pcap": 5_600, "rosbag": 700}  # of 20 sweeps, and of 3
+"""What opening and reading may add; the files are 70 and 16 times as large."""
+ROUNDS = {"pcap": 5_600, "rosbag": 250}  # of 20 sweeps, and of 3
 
 
 @pytest.mark.soak
