@@ -22,7 +22,7 @@ function nameOf({ key, code, shiftKey, ctrlKey, metaKey }) {
 
 /** True when the focused element means the key for itself. @param {KeyboardEvent} event */
 function isTaken({ target, key, ctrlKey, metaKey }) {
-  if (document.querySelector("dialog[open]")) return true;
+  if (document.querySelector("dialog[open]") || (key === "Escape" && document.querySelector(":popover-open"))) return true;
   if (!(target instanceof HTMLElement)) return false;
   if (target.matches("select, textarea, input:not([type=range]):not([type=checkbox])")) return true;
   if (ctrlKey || metaKey) return false;

@@ -69,6 +69,7 @@ def test_every_view_is_kept_as_a_picture(open_page: OpenPage, site: Site):
     page.locator("#export-button").click()
     keep(page, "export")
     page.keyboard.press("Escape")
+    expect(page.locator("#menu")).to_be_hidden()
     site.engine.control.change_params({"path.half_width_m": 3.0})
     expect(page.locator("#timeline-facts")).to_contain_text("frames differ")
     whole_drive(page, site)
