@@ -93,7 +93,10 @@ async function onBinary(message) {
   while (waiting) {
     const next = waiting;
     waiting = null;
-    await show(next);
+    await show(next).catch((error) => {
+      console.error("a frame could not be shown", error);
+      next.done();
+    });
   }
   decoding = false;
 }

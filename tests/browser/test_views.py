@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 from app.sent_picture import WIDTH_STEP_PX
 from tests.browser.conftest import START, OpenPage, Site
@@ -15,6 +16,8 @@ pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
 COLOURS = ("object", "range", "height", "intensity", "ring", "cluster", "ground")
 """``age`` needs a recording that says when each point was measured."""
+HOLD_PX = 24
+"""How far from where it was set a tape's end may be: the nearest point holds it."""
 AHEAD_M, FROM_M, HALF_WIDTH_M = 79.0, -5.0, 13.0
 """What the plan shows until somebody moves it (viewport.js)."""
 
@@ -108,8 +111,10 @@ def test_the_tape_holds_on_to_lidar_points_in_the_picture(open_page: OpenPage):
     page.keyboard.up("Shift")
     tape = of_store(page, "get('tape')")
     for end, point in (("from", first), ("to", last)):
-        assert [tape[end][axis] for axis in "uv"] == pytest.approx([point["u"], point["v"]], abs=2)
-        assert tape[end]["z"] is not None
+        assert [tape[end][axis] for axis in "uv"] == pytest.approx([point["u"], point["v"]], abs=HOLD_PX)
+        spot = json.dumps([tape[end][axis] for axis in "xyz"])
+        is_there = f"{spot}.every((metres, k) => all[3 * i + k] === Math.round(100 * metres))"
+        assert of_store(page, f"Array.from(get('frame').xyz).some((_, i, all) => {is_there})"), "it is a point's place"
 
 
 def test_a_click_on_a_point_selects_its_object(open_page: OpenPage):
@@ -226,3 +231,26 @@ def test_no_wider_picture_is_sent_than_is_shown(open_page: OpenPage, site: Site)
         }""",
         sent + WIDTH_STEP_PX,
     )
+
+
+def test_a_message_that_cannot_be_read_does_not_end_the_stream(browser: Browser, site: Site):
+    """The page says so in its console, so this is no quiet page."""
+    page = browser.new_page()
+    try:
+        page.add_init_script("""
+          const Real = WebSocket;
+          window.WebSocket = class extends Real {
+            constructor(...about) {
+              super(...about);
+              window.stream = this;
+            }
+          };
+          window.WebSocket.OPEN = Real.OPEN;
+        """)
+        page.goto(site.address)
+        wait_for_frame(page, START)
+        page.evaluate("() => stream.onmessage({ data: new ArrayBuffer(16) })")
+        page.keyboard.press("ArrowRight")
+        wait_for_frame(page, START + 1)
+    finally:
+        page.context.close()
