@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from pipeline.sources.live import mjpeg, video
 from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.config import CameraConfig
 from pipeline.sources.live.health import StreamStats
 from pipeline.sources.live.inputs import Deliver
-from pipeline.sources.live.mjpeg import NotMjpeg, read_mjpeg
 from pipeline.sources.live.pictures import Shot, is_whole_jpeg
 from pipeline.sources.live.reader import Read, Reader, Stop
-from pipeline.sources.live.video import play_file, read_device, read_stream
 
 _ARRIVAL = "times are when its pictures arrive: it sends none of its own"
 
@@ -32,9 +31,9 @@ class CameraInput:
             return _HttpOrVideo(config.url, self.receive, self._shot)
         if config.file is not None:
             path = config.file
-            return lambda stop: play_file(path, self._shot, stop)
+            return lambda stop: video.play_file(path, self._shot, stop)
         number = config.device or 0
-        return lambda stop: read_device(number, self._shot, stop)
+        return lambda stop: video.read_device(number, self._shot, stop)
 
     def receive(self, data: bytes, stamp_us: int | None) -> None:
         """Take a JPEG and its own stamp, µs since 1970, if it has one. One that is cut off is counted as lost."""
@@ -63,14 +62,14 @@ class CameraInput:
 class _HttpOrVideo:
     """An address: MJPEG where it gives that, else video. What it gave once it is taken to give again."""
 
-    def __init__(self, url: str, jpeg, shot) -> None:  # type: ignore[no-untyped-def]
+    def __init__(self, url: str, jpeg: mjpeg.Receive, shot: video.Receive) -> None:
         self._url, self._jpeg, self._shot = url, jpeg, shot
         self._is_video = not url.startswith("http")
 
     def __call__(self, stop: Stop) -> None:
         if not self._is_video:
             try:
-                return read_mjpeg(self._url, self._jpeg, stop)
-            except NotMjpeg:
+                return mjpeg.read_mjpeg(self._url, self._jpeg, stop)
+            except mjpeg.NotMjpeg:
                 self._is_video = True
-        read_stream(self._url, self._shot, stop)
+        video.read_stream(self._url, self._shot, stop)

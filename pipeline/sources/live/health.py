@@ -43,13 +43,14 @@ class StreamStats:
 
     def period_ns(self) -> int | None:
         """Middle of the last gaps between messages; null until enough came."""
-        times = np.array(self._arrived)[-16:]
+        times = np.array(list(self._arrived)[-16:])
         return int(np.median(np.diff(times))) if len(times) >= _FEWEST else None
 
     def health(self, now_ns: int) -> StreamHealth:
         """As of now. Rate and jitter are over the last three seconds and null while fewer than three messages came in
         them; jitter is the standard deviation of the gaps between arrivals."""
-        times = np.array([t for t in self._arrived if now_ns - t <= _WINDOW_NS], dtype=np.int64)
+        arrived = list(self._arrived)  # at once: a reader's thread may add to it meanwhile
+        times = np.array([t for t in arrived if now_ns - t <= _WINDOW_NS], dtype=np.int64)
         gaps_ms = np.diff(times) / 1e6
         enough = len(times) >= _FEWEST and gaps_ms.sum() > 0
         return StreamHealth(

@@ -19,7 +19,7 @@ from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LiveConfig
 from pipeline.sources.live.gnss import GnssInput
 from pipeline.sources.live.health import StreamStats, not_delivering
-from pipeline.sources.live.inputs import Input
+from pipeline.sources.live.inputs import Deliver, Input
 from pipeline.sources.live.lidar import LidarInput
 from pipeline.sources.live.own_motion import MotionFromGnss
 from pipeline.sources.live.pictures import Shot
@@ -125,7 +125,7 @@ class LiveSensors:
                     return together
                 self._came.wait(min(left_s, _LOOK_AGAIN_S))
 
-    def _into(self, stream: Stream[T]):  # type: ignore[no-untyped-def]
+    def _into(self, stream: Stream[T]) -> Deliver[T]:
         """What an input delivers to: the stream, under the lock."""
 
         def deliver(t_ns: int, value: T, arrived_ns: int) -> None:

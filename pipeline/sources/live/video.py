@@ -4,7 +4,7 @@ through OpenCV (which knows the devices of every system), and a video file playe
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import av
@@ -69,7 +69,7 @@ def read_device(number: int, receive: Receive, stop: Stop) -> None:
         capture.release()
 
 
-def _shots(container: av.container.InputContainer):  # type: ignore[no-untyped-def]
+def _shots(container: av.container.InputContainer) -> Iterator[tuple[Shot, float]]:
     """Each picture with its time in the video, seconds. JPEGs are handed on as they are."""
     if not container.streams.video:
         raise ValueError("no video in it")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import pytest
 
 from pipeline.sources.live.health import StreamStats
@@ -52,3 +54,22 @@ def test_after_the_window_the_rate_is_unknown_again() -> None:
     health = after([100.0 * k for k in range(10)], 900.0 + 5000.0)
     assert (health.state, health.rate_hz, health.jitter_ms) == ("silent", None, None)
     assert health.age_ms == 5050.0
+
+
+def test_health_may_be_asked_for_while_messages_arrive() -> None:
+    """A reader's thread counts while another asks; a thousand times over each other."""
+    stats, stop = StreamStats("camera"), threading.Event()
+
+    def count() -> None:
+        at = 0
+        while not stop.is_set():
+            stats.arrived(at := at + MS, at)
+
+    reader = threading.Thread(target=count)
+    reader.start()
+    try:
+        for _ in range(1000):
+            stats.health(10_000 * MS)
+    finally:
+        stop.set()
+        reader.join()
