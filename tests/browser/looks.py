@@ -10,7 +10,7 @@ from tests.browser.conftest import WAIT_MS, Site
 
 COUNT = 200
 """Frames of the scenario that the page shows."""
-PLOT_LEFT_PX, PLOT_RIGHT_PX = 122, 8
+PLOT_LEFT_PX, PLOT_RIGHT_PX = 132, 8
 """Where the timeline's plot lies on its canvas."""
 
 

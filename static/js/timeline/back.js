@@ -16,6 +16,8 @@ import { MARKS_PX } from "./rows.js";
 const FONT = '10px system-ui, "DejaVu Sans", sans-serif';
 const TICK_STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 3600];
 const TICK_FROM_PX = 70;
+/** Where a recording has gaps, its seconds lie nearer to each other. */
+const TICK_APART_PX = 46;
 
 /**
  * @param {CanvasRenderingContext2D} ctx @param {{width: number, height: number}} size @param {Span} span @param {Rows} rows
@@ -56,12 +58,13 @@ function drawAxis(ctx, span, rows, size) {
   if (times.length < 2) return;
   const perSecond = (span.perFrame * times.length) / (times[times.length - 1] || 1);
   const step = TICK_STEPS_S.find((s) => s * perSecond >= TICK_FROM_PX) ?? 3600;
-  let due = 0;
+  let due = 0, taken = -Infinity;
   for (let i = 0; i < times.length; i++) {
     if (times[i] < due - 1e-6) continue;
     due = (Math.floor(times[i] / step + 1e-6) + 1) * step;
     const x = span.x(i);
-    if (x < span.left - 1 || x > span.left + span.width - 30) continue;
+    if (x < span.left - 1 || x > span.left + span.width - 30 || x < taken + TICK_APART_PX) continue;
+    taken = x;
     line(ctx, x + 0.5, rows.axis.top + 4, x + 0.5, size.height - rows.bar.height);
     ctx.fillText(clock(times[i]), x + 4, rows.axis.top + 11);
   }

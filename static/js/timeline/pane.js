@@ -15,7 +15,7 @@ import { followPointer } from "./pointer.js";
 import { shareOut } from "./rows.js";
 import { Span } from "./span.js";
 
-const LABELS_PX = 122;
+const LABELS_PX = 132;
 const EDGE_PX = 8;
 
 const back = $("#timeline-back", HTMLCanvasElement), front = $("#timeline-front", HTMLCanvasElement);

@@ -50,7 +50,7 @@ export function gateRow({ name }) {
 export function showGate(row, gate) {
   const kind = kindOf(gate.name), [, , number, bar] = /** @type {HTMLElement[]} */ ([...row.children]);
   mark(row, "passed", gate.passed ? "yes" : "no");
-  const sign = { least: "≥", most: "≤", flag: "" }[kind.test];
+  const sign = signOf(kind, gate);
   const limit = sign && gate.limit !== null ? ` ${sign} ${quantity(gate.limit, { ...kind, unit: "" })}` : "";
   text(number, kind.test === "flag" && !kind.unit ? (gate.passed ? "yes" : "no") : `${quantity(gate.value, kind)}${limit}`);
   row.setAttribute("aria-label", `${kind.label}: ${number.textContent}, ${gate.passed ? "passed" : "failed"}`);
@@ -60,4 +60,12 @@ export function showGate(row, gate) {
   const most = HEADROOM * Math.max(gate.value ?? 0, gate.limit ?? 0, 1e-9);
   bar.style.setProperty("--value", `${(100 * Math.max(0, gate.value ?? 0)) / most}%`);
   bar.style.setProperty("--limit", `${(100 * (gate.limit ?? 0)) / most}%`);
+}
+
+/** Between number and limit; a dash where the gate weighed more than the two. @param {Kind} kind @param {Gate} gate */
+function signOf({ test }, { value, limit, passed }) {
+  if (test === "flag" || limit === null) return "";
+  const holds = value !== null && (test === "least" ? value >= limit : value <= limit);
+  if (holds !== passed) return "–";
+  return { least: { true: "≥", false: "<" }, most: { true: "≤", false: ">" } }[test][/** @type {"true"|"false"} */ (String(holds))];
 }
