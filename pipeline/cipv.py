@@ -23,8 +23,8 @@ from pipeline.types import VEHICLES, Cipv, EgoState, FusedObject, Gate, Path, Re
 AGREEMENT_SIGMAS = 3.0
 _HALF_WAY = 0.7
 """A running mean has turned half way after 0.7 of its time: what moves sideways is judged where it will be by then."""
-ON_A_VAGUE_PATH = 1.0 / 3.0
-"""What is left of the permitted uncertainty on a path that is not usable."""
+ON_A_VAGUE_PATH = 0.25
+"""What is left of the permitted uncertainty on a path that is not usable: a metre, as a guess has."""
 STAYS_UP_TO = 1.5
 """The lead stays it while its place against the path is this much more uncertain than a new one's may be."""
 
@@ -241,8 +241,9 @@ def _in_path(who: Candidate) -> bool:
 
 def _is_placed(who: Candidate) -> Check:
     """So far ahead that its place against the path is uncertain by more than a lane, nobody can be said to be in it.
-    On a path that is too vague to be driven after, only what lies where it is known well may become the lead."""
-    limit = who.params.max_sigma_m * (STAYS_UP_TO if who.leads else 1.0 if who.path.usable else ON_A_VAGUE_PATH)
+    On a path that is too vague to be driven after, only what lies where it is known well may lead."""
+    limit = who.params.max_sigma_m * (STAYS_UP_TO if who.leads else 1.0)
+    limit *= 1.0 if who.path.usable else ON_A_VAGUE_PATH
     sigma = who.place.sigma_m if who.place is not None else 0.0
     passed = sigma <= limit
     reason = "" if passed else f"its place against the path is uncertain by {sigma:.1f} m"
