@@ -77,7 +77,6 @@ class Engine:
         self._ahead: Ahead | None = None
         self._live: LiveLine | None = None
         self._health_told_s = 0.0
-        self._silence: Notice | None = None
         self._clock: PlaybackClock | None = None
         self._skipped = 0
         self._thread = threading.Thread(target=self._work, name="cipv-engine", daemon=True)
@@ -346,7 +345,7 @@ class Engine:
         )
         if self._live is not None and time.monotonic() - self._health_told_s > _HEALTH_EVERY_S:
             self._health_told_s = time.monotonic()
-            shown = replace(shown, streams=self._live.source.health(), notices=self._with_silence(self._live, shown))
+            shown = replace(shown, streams=self._live.source.health(), notices=self._live.with_silence(shown.notices))
         if tick is not None:
             shown = replace(
                 shown,
@@ -362,13 +361,6 @@ class Engine:
         if self._clock is not None and self._ahead is not None and line is not None:
             last = len(line.source) - 1
             self._ahead.want(min(max(shown.index + 1, self._clock.due(time.monotonic())), last))
-
-    def _with_silence(self, live: LiveLine, shown: Snapshot) -> tuple[Notice, ...]:
-        """The notices, with whom the line waits for while nothing ticks."""
-        others = tuple(notice for notice in shown.notices if notice is not self._silence)
-        text = live.silence()
-        self._silence = Notice("warning", text) if text is not None else None
-        return (*others, self._silence) if self._silence is not None else others
 
     def _time_s(self, tick: Tick) -> float:
         """Where the tick is on the timeline."""

@@ -10,6 +10,7 @@ from dataclasses import replace
 from time import monotonic, perf_counter
 
 from app.line import Tick
+from app.snapshot import Notice
 from pipeline.params import Params
 from pipeline.run import Detectors, Detects, Seen, Sensors, advance
 from pipeline.sources.base import LiveSource
@@ -29,6 +30,7 @@ class LiveLine:
         self._detectors, self._sensors = detectors, sensors
         self._first_ns: int | None = None
         self._ticked_s = monotonic()
+        self._silence: Notice | None = None
 
     def open(self) -> None:
         self.source.start()
@@ -49,11 +51,15 @@ class LiveLine:
         self.tick = Tick(before, frame, after, result, params, ask.spent_ms, exact=True)
         return self.tick
 
-    def silence(self) -> str | None:
-        """Whom it waits for, once nothing has ticked for a second."""
+    def with_silence(self, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
+        """The notices with whom it waits for, while nothing has ticked for a second."""
+        others = tuple(notice for notice in notices if notice is not self._silence)
         if monotonic() - self._ticked_s < _SILENCE_S:
-            return None
-        return f"Waiting for sensors: {not_delivering(self.source.health()) or 'none ticks'}"
+            self._silence = None
+            return others
+        missing = not_delivering(self.source.health()) or "none ticks"
+        self._silence = Notice("warning", f"Waiting for sensors: {missing}")
+        return (*others, self._silence)
 
     def time_s(self, tick: Tick) -> float:
         """Seconds since the first tick."""
