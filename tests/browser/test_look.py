@@ -162,3 +162,28 @@ def test_a_gate_leads_to_the_parameter_behind_its_limit(open_page: OpenPage, sit
     page.keyboard.press("ArrowRight")
     site.engine.wait_for(lambda s: s.params.path.half_width_m > Params().path.half_width_m, WAIT_S)
     assert repainted(page, "#camera", camera), "the corridor is wider in the picture too"
+
+
+def test_live_sensors_draw_what_came_and_let_go_of_the_oldest(open_page: OpenPage):
+    """As if the shown frame had come from live sensors, again and again: what the stream's messages do to the page."""
+    page = open_page()
+    wait_for_frame(page, START)
+    ribbon = pixels(page, "#timeline-back")
+    counts = page.evaluate(
+        """async () => {
+          const { get, set } = await import("/js/store.js");
+          const frame = get("frame"), counts = [];
+          for (let k = 0; k < 1300; k++) {
+            const state = { ...frame.state, live: true, uri: "live:car.yaml", time_s: k / 10, count: 0, index: k };
+            set("state", state);
+            set("frame", { ...frame, state });
+            counts.push(get("drive").count);
+          }
+          return counts;
+        }"""
+    )
+    assert counts[:3] == [1, 2, 3]
+    assert counts[-1] == 1200, "a day of driving does not grow the page"
+    expect(page.locator("#transport")).to_contain_text("LIVE")
+    assert repainted(page, "#timeline-back", ribbon)
+    expect(page.locator("#timeline-front")).to_have_attribute("aria-valuenow", "1199")
