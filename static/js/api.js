@@ -1,5 +1,8 @@
 /** Requests to the server. What moves fast (sliders) goes through `newestOnly`. */
 
+/** Every page of the server has the same root, wherever it lies itself. */
+const ROOT = new URL("../", import.meta.url);
+
 /**
  * The server's answer; rejects with the server's own sentence.
  * @param {string} path @param {string} [method] @param {unknown} [body] @returns {Promise<any>}
@@ -11,7 +14,7 @@ export async function request(path, method = "GET", body = undefined) {
     options.headers = { "content-type": "application/json" };
     options.body = JSON.stringify(body);
   }
-  const response = await fetch(path, options);
+  const response = await fetch(new URL(path, ROOT), options);
   const answer = await response.json().catch(() => null);
   if (!response.ok) throw new Error(answer?.detail ?? `the server answered ${response.status}`);
   return answer;

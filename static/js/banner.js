@@ -2,14 +2,9 @@
 import { get, on } from "./store.js";
 import { $, el, mark, text } from "./dom.js";
 import { DASH, kmh, num, signed } from "./format.js";
+import { ACC_WORDS, urgencyOf } from "./urgency.js";
 
 /** @typedef {import("./types.js").Result} Result */
-
-const TTC_DANGER_S = 2.5, TTC_WARN_S = 5;
-/** @type {Record<import("./types.js").AccState, string>} */
-const ACC_WORDS = {
-  cruise: "Cruise", follow: "Follow", stop: "Stop", warn: "Warn", partial_brake: "Partial brake", full_brake: "Full brake",
-};
 
 const source = el("span", { class: "pill" }), name = el("span"), reason = el("p", { class: "reason" });
 const lead = el("div", { class: "card lead" }, el("div", { class: "title", aria: { live: "polite" } }, source, name), reason);
@@ -56,8 +51,7 @@ function update() {
   text(distance.value, num(cipv?.distance_m));
   text(closing.value, cipv ? signed(kmh(cipv.closing_speed_mps)) : DASH);
   text(ttc.value, num(cipv?.ttc_s));
-  const left_s = cipv?.ttc_s ?? Infinity;
-  mark(ttc.card, "alarm", left_s < TTC_DANGER_S ? "danger" : left_s < TTC_WARN_S ? "warn" : "none");
+  mark(ttc.card, "alarm", urgencyOf(cipv?.ttc_s));
   updateAcc(result);
 }
 

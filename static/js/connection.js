@@ -7,8 +7,11 @@ const RETRY_MS = [300, 600, 1200, 2500, 5000];
 /** The server makes pictures in steps of this width (app/sent_picture.py): within one there is nothing to tell. */
 const WIDTH_STEP_PX = 160;
 
-/** Server clock minus ours, milliseconds. */
-let clockOffset = 0;
+/** Nothing at all for this long, not even an answer to a ping: the connection is gone, whatever the system still says. */
+const SILENT_MS = 3 * PING_MS;
+
+/** Server clock minus ours, milliseconds; null until it has told. @type {number|null} */
+let clockOffset = null;
 let attempts = 0;
 let lastSequence = -1;
 let isFirst = true;
@@ -26,8 +29,11 @@ const told = new Map();
 
 /** The server's clock now, Unix milliseconds. */
 export function serverNow() {
-  return Date.now() + clockOffset;
+  return Date.now() + (clockOffset ?? 0);
 }
+
+/** Whether the server has told its clock; until then ours stands in. */
+export const isClockKnown = () => clockOffset !== null;
 
 /** Say how wide the picture is shown: no wider one has to be sent. @param {number} width device pixels */
 export function showPictureAt(width) {
@@ -44,34 +50,44 @@ export function tell(name, value) {
 }
 
 export function connect() {
-  const url = new URL("api/stream?paced=1", location.href);
+  const url = new URL("../api/stream?paced=1", import.meta.url);
   const width = told.get("picture_px");
   if (width) url.searchParams.set("picture_px", String(width));
   url.protocol = url.protocol.replace("http", "ws");
   const opened = new WebSocket(url);
   socket = opened;
   opened.binaryType = "arraybuffer";
-  let pinging = 0;
+  /** Since when something was asked and nothing at all has come; null when nothing is owed. @type {number|null} */
+  let owedSince = performance.now();
+  const ping = () => {
+    if (owedSince !== null && performance.now() - owedSince > SILENT_MS) return lose();
+    if (opened.readyState !== WebSocket.OPEN) return;
+    owedSince ??= performance.now();
+    opened.send(JSON.stringify({ ping: Date.now() }));
+  };
+  const pinging = setInterval(ping, PING_MS);
+  const lose = () => {
+    opened.onopen = opened.onmessage = opened.onclose = null;
+    opened.close(); // without a network it would be "closing" for long: nobody waits for it
+    clearInterval(pinging);
+    if (attempts === 0) set("link", { status: "lost", since: Date.now() });
+    setTimeout(connect, RETRY_MS[Math.min(attempts++, RETRY_MS.length - 1)]);
+  };
+  opened.onclose = lose;
   opened.onopen = () => {
     attempts = 0;
     lastSequence = -1;
     isFirst = true;
     set("link", { status: "live", since: Date.now() });
-    const ping = () => opened.send(JSON.stringify({ ping: Date.now() }));
     ping();
     if (told.size) opened.send(JSON.stringify(Object.fromEntries(told)));
-    pinging = setInterval(ping, PING_MS);
   };
   const done = () => opened.readyState === WebSocket.OPEN && opened.send('{"painted":true}');
   opened.onmessage = ({ data }) => {
+    owedSince = null;
     const number = ++received;
     if (typeof data === "string") onText(JSON.parse(data), number);
     else onBinary({ buffer: data, number, done });
-  };
-  opened.onclose = () => {
-    clearInterval(pinging);
-    if (attempts === 0) set("link", { status: "lost", since: Date.now() });
-    setTimeout(connect, RETRY_MS[Math.min(attempts++, RETRY_MS.length - 1)]);
   };
 }
 

@@ -4,7 +4,7 @@ import { middle, trailOf } from "./trails.js";
 
 /** @typedef {import("./types.js").Point2} Point2 */
 /** @typedef {import("./types.js").FusedObject} FusedObject */
-/** @typedef {import("./viewport.js").Viewport} Viewport */
+/** Where a place of the plan is drawn. @typedef {Pick<import("./viewport.js").Viewport, "u"|"v"|"scale">} Viewport */
 
 const SLOWEST_MPS = 0.5, HEAD_PX = 6;
 
