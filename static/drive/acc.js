@@ -19,7 +19,7 @@ const LOOKS = {
 };
 
 const band = $("#acc"), path = $("#acc-shape path", SVGElement);
-const word = $("#acc-word"), reason = $("#acc-reason"), own = $("#own-speed"), desired = $("#desired-speed");
+const word = $("#acc-word"), reason = $("#acc-reason"), own = $("#own-speed"), desired = $("#desired-speed"), speeds = $("#acc .speeds");
 
 export function setUp() {
   on(["frame"], update);
@@ -34,6 +34,7 @@ function update() {
   if (path.getAttribute("d") !== looks.shape) path.setAttribute("d", looks.shape);
   text(word, acc ? ACC_WORDS[acc.state] : "ACC off");
   text(reason, acc ? acc.reason : "own speed is unknown");
+  speeds.hidden = !ego && !acc;
   text(own, ego ? num(kmh(ego.speed_mps), 0) : DASH);
   text(desired, acc ? num(kmh(acc.desired_speed_mps), 0) : DASH);
 }

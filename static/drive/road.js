@@ -40,7 +40,12 @@ function draw() {
   ctx.globalAlpha = Number(ui("light"));
   ctx.drawImage(frame.bitmap, left, top, width * scale, height * scale);
   ctx.globalAlpha = 1;
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(left, top, width * scale, height * scale);
+  ctx.clip();
   if (frame.display.path) drawPath(ctx, frame.display.path, X, Y);
+  ctx.restore();
   drawObjects(ctx, frame, X, Y);
 }
 

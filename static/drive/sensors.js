@@ -24,19 +24,21 @@ export function setUp() {
 function update() {
   const frame = get("frame"), streams = get("state")?.streams ?? {};
   if (!frame) return;
-  const { sensors } = frame.result;
-  const keys = Object.keys(NAMES).filter((key) => key in sensors || key in streams);
-  keyed(list, keys.map((key) => look(key, sensors[key], streams[key])), ({ key }) => key, create, show);
+  const { sensors, ego } = frame.result;
+  /** What the frame has of each; an age alone does not tell, a recording may know no times. @type {Record<string, boolean>} */
+  const held = { lidar: Boolean(sensors.lidar?.points), camera: frame.picture !== null, ego: ego !== null };
+  const keys = Object.keys(NAMES).filter((key) => key in held || key in streams);
+  keyed(list, keys.map((key) => look(key, held[key] ?? false, streams[key])), ({ key }) => key, create, show);
 }
 
-/** @param {string} key @param {Record<string, any>|undefined} held by the frame @param {Record<string, any>|undefined} stream @returns {Sensor} */
-function look(key, held, stream) {
+/** @param {string} key @param {boolean} isHeld by the frame @param {Record<string, any>|undefined} stream @returns {Sensor} */
+function look(key, isHeld, stream) {
   if (stream) {
     /** @type {Health} */
     const health = stream.state === "ok" ? "ok" : stream.state === "stale" ? "stale" : "gone";
     return { key, health, detail: health === "ok" && stream.rate_hz ? `${num(stream.rate_hz, 0)} Hz` : health === "ok" ? "" : stream.state };
   }
-  return held?.age_ms == null ? { key, health: "gone", detail: "none" } : { key, health: "ok", detail: "" };
+  return isHeld ? { key, health: "ok", detail: "" } : { key, health: "gone", detail: "none" };
 }
 
 function create() {
