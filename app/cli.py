@@ -23,10 +23,12 @@ COMMANDS = {
     "recover": "app.commands.sessions:Recover",
     "live": "app.commands.live:Live",
     "replay": "app.commands.replay:Replay",
+    "labels": "app.commands.labels:Labels",
     "models": "app.commands.models:Models",
     "params": "app.commands.params:ListParams",
     "calibrate": "app.commands.calibrate:Calibrate",
     "scenarios": "app.commands.scenarios:Scenarios",
+    "evaluate": "app.commands.evaluate:Evaluate",
     "bench": "app.commands.bench:Bench",
 }
 """Name → module and class. Only what was typed is imported: all together take seconds."""

@@ -104,6 +104,15 @@ class Recorded(Protocol):
     origin: str
 
 
+@runtime_checkable
+class Rectified(Protocol):
+    """A source with a camera frame of its own that its labels are in."""
+
+    def T_rect_ego(self, index: int) -> F64:
+        """(4, 4), takes ego points of a frame to KITTI's rectified camera 0."""
+        ...
+
+
 AnySource = Source | LiveSource
 
 

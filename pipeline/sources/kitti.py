@@ -19,7 +19,7 @@ from pipeline.sources.files import decode_picture, files_by_name, picture_of, re
 from pipeline.sources.hdl64 import keep_rings, match_vlp16, ring_elevations_deg, turns
 from pipeline.sources.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
 from pipeline.sources.kitti_records import parse_labels, parse_oxts, parse_timestamps
-from pipeline.types import F32, EgoState, Frame, GnssFix, Sweep
+from pipeline.types import F32, F64, EgoState, Frame, GnssFix, Sweep
 
 _STEP_NS = 100_000_000
 _RINGS = 64
@@ -86,6 +86,10 @@ class KittiSource:
             return parse_labels(read_bytes(path), self._calibration_of(name, []).T_rect_ego)
         except SourceError:
             return None
+
+    def T_rect_ego(self, index: int) -> F64:
+        """(4, 4), takes ego points to the rectified camera 0, where labels are."""
+        return self._calibration_of(self._name(index), []).T_rect_ego
 
     def _name(self, index: int) -> str:
         if not 0 <= index < len(self._names):

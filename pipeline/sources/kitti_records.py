@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
 
@@ -43,21 +44,50 @@ def parse_labels(data: bytes, T_rect_ego: F64) -> tuple[TruthObject, ...]:
 
 def _label(fields: list[str], T_ego_rect: F64) -> TruthObject:
     try:
-        height, width, length, x, y, z, rotation_y = (float(field) for field in fields[8:_LABEL_FIELDS])
+        numbers = [float(field) for field in fields[8:_LABEL_FIELDS]]
     except ValueError:
-        raise SourceError("not a KITTI label file") from None
-    numbers = np.array([height, width, length, x, y, z, rotation_y])
+        numbers = []
+    if len(numbers) != _LABEL_FIELDS - 8:
+        raise SourceError("not a KITTI label file")
+    return TruthObject(label_name(fields[0]), cuboid_from_label(numbers, T_ego_rect))
+
+
+def label_name(kind: str) -> str:
+    """KITTI's type of an object as detectors name it."""
+    name = kind.lower()
+    return _LABELS.get(name, name.replace("_", " "))
+
+
+def cuboid_from_label(numbers: Sequence[float], T_ego_rect: F64) -> Cuboid:
+    """A label's height, width, length, x, y, z and rotation_y as a cuboid in the ego frame. SourceError when these are
+    no place and size."""
+    height, width, length, x, y, z, rotation_y = numbers
     if not np.all(np.isfinite(numbers)) or np.abs(numbers).max() > 1e4 or min(height, width, length) <= 0.0:
         raise SourceError("a KITTI label without place or size")
     center = transform(T_ego_rect, np.array([[x, y - height / 2, z]]))[0]
     along = T_ego_rect[:3, :3] @ np.array([np.cos(rotation_y), 0.0, -np.sin(rotation_y)])
-    name = fields[0].lower()
-    cuboid = Cuboid(
+    return Cuboid(
         (float(center[0]), float(center[1]), float(center[2])),
         (length, width, height),
         float(np.arctan2(along[1], along[0])),
     )
-    return TruthObject(_LABELS.get(name, name), cuboid)
+
+
+def cuboid_to_label(cuboid: Cuboid, T_rect_ego: F64) -> tuple[float, ...]:
+    """The inverse of ``cuboid_from_label``: height, width, length, x, y, z, rotation_y in −π…π.
+
+    A turn about the camera's y is one about ego z only as long as the camera is level; the one sought is that whose
+    length axis, seen from above, points along the cuboid's.
+    """
+    x, y, z = transform(T_rect_ego, np.array([cuboid.center]))[0]
+    length, width, height = cuboid.size
+    c, s = np.cos(cuboid.yaw_rad), np.sin(cuboid.yaw_rad)
+    (right_x, _, ahead_x), (right_y, _, ahead_y) = T_rect_ego[:3, 0], T_rect_ego[:3, 1]
+    rotation_y = np.arctan2(right_x * s - right_y * c, ahead_x * s - ahead_y * c)
+    along = np.cos(rotation_y) * np.array([right_x, right_y]) - np.sin(rotation_y) * np.array([ahead_x, ahead_y])
+    if along @ [c, s] < 0.0:
+        rotation_y += np.pi if rotation_y <= 0.0 else -np.pi
+    return height, width, length, float(x), float(y + height / 2), float(z), float(rotation_y)
 
 
 class Oxts(NamedTuple):

@@ -1,0 +1,164 @@
+"""What a format of labels is, and what it must know of the drive that the labels belong to."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.alignment import Pinhole, project_cuboid
+from pipeline.errors import BadInput
+from pipeline.geometry import iou_matrix
+from pipeline.labels.formats.parts import Part
+from pipeline.labels.model import LabelSet, Origin
+from pipeline.sources.base import Rectified, Source
+from pipeline.types import F32, F64, Box, CameraCalibration, EgoState
+
+_FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
+_FEWEST_PAIRS = 3
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One frame, without its data. camera: null where there is none. size: width and height of its picture in pixels.
+    T_rect_ego: (4, 4) to the frame that KITTI's labels are in: the recording's rectified camera 0 if it has one, else
+    the camera itself."""
+
+    name: str
+    t_ns: int
+    camera: CameraCalibration | None = None
+    size: tuple[int, int] | None = None
+    T_rect_ego: F64 | None = None
+    ego: EgoState | None = None
+
+
+def _no_points(frame: int) -> F32 | None:
+    return None
+
+
+@dataclass(frozen=True)
+class Drive:
+    """The recording that labels belong to. points: (N, 4) float32 of a frame's sweep, null without one; read when
+    asked for."""
+
+    uri: str
+    shots: tuple[Shot, ...]
+    points: Callable[[int], F32 | None] = field(default=_no_points, compare=False)
+
+    @property
+    def frames(self) -> tuple[str, ...]:
+        return tuple(shot.name for shot in self.shots)
+
+    @property
+    def t_ns(self) -> tuple[int, ...]:
+        return tuple(shot.t_ns for shot in self.shots)
+
+    def file_names(self) -> tuple[str, ...]:
+        """A name for a file of each frame: the recording's own names where they can be that, else its numbers."""
+        names = self.frames
+        if len({name.lower() for name in names}) == len(names) and all(_FILE_NAME.fullmatch(name) for name in names):
+            return names
+        return tuple(f"{index:06d}" for index in range(len(names)))
+
+    def empty(self) -> LabelSet:
+        """Labels of this drive that say nothing yet."""
+        return LabelSet(self.uri, self.frames, self.t_ns)
+
+
+def drive_of(source: Source, progress: Callable[[int, int], None] = lambda done, total: None) -> Drive:
+    """Reads every frame of a recording once."""
+    shots = []
+    for index in range(len(source)):
+        frame = source.frame(index)
+        camera, picture = frame.camera, frame.picture
+        size = (camera.width, camera.height) if camera is not None else None
+        if picture is not None:
+            size = picture.bgr.shape[1], picture.bgr.shape[0]
+        T_rect_ego = source.T_rect_ego(index) if isinstance(source, Rectified) else None
+        if T_rect_ego is None and camera is not None:
+            T_rect_ego = camera.T_camera_ego
+        shots.append(Shot(frame.name, frame.t_ns, camera, size, T_rect_ego, frame.ego))
+        progress(index + 1, len(source))
+
+    def points(index: int) -> F32 | None:
+        sweep = source.frame(index).sweep
+        return sweep.points if sweep is not None else None
+
+    return Drive(source.uri, tuple(shots), points)
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What was read. notes: what the file said that labels do not keep, and what it did not say."""
+
+    labels: LabelSet
+    notes: tuple[str, ...] = ()
+
+
+Write = Callable[[LabelSet, Drive, Path], tuple[str, ...]]
+"""Labels that hold nothing but what the format can, the drive, where to. Gives sentences about what was written
+otherwise than it was."""
+
+Read = Callable[[Path, Drive, Origin], Imported]
+"""The file or folder, the drive, and who made labels of which the file does not say that."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """One kind of file. holds: what it has a place for. is_folder: it is a folder of files. read_from: what to name
+    when it is read, where that is not what was written."""
+
+    name: str
+    about: str
+    holds: frozenset[Part]
+    write: Write
+    read: Read
+    is_folder: bool = False
+
+
+def check_extrinsic(labels: LabelSet, drive: Drive, what: str) -> None:
+    """BadInput when cuboids and boxes of the same sightings lie apart in the picture: the sign of an extrinsic that was
+    taken the wrong way round, or of labels of another recording."""
+    pairs = list(_pairs(labels, drive))
+    apart = sum(
+        projected is None or iou_matrix(np.array(box), np.array(projected))[0, 0] == 0.0 for box, projected in pairs
+    )
+    if len(pairs) >= _FEWEST_PAIRS and apart > len(pairs) / 2:
+        raise BadInput(
+            f"{what}: {apart} of {len(pairs)} cuboids do not fall where their boxes are in the picture; "
+            "is an extrinsic taken the wrong way round?"
+        )
+
+
+def _pairs(labels: LabelSet, drive: Drive) -> list[tuple[Box, Box | None]]:
+    """(box, projected cuboid) of every sighting that has both, where there is a camera."""
+    found: list[tuple[Box, Box | None]] = []
+    for track in labels.tracks:
+        for sighting in track.sightings:
+            camera = drive.shots[sighting.frame].camera
+            if sighting.cuboid is not None and sighting.bbox is not None and camera is not None:
+                view = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
+                corners = np.asarray(sighting.cuboid.corners())
+                found.append((sighting.bbox, project_cuboid(view, corners, camera.width, camera.height)))
+    return found
+
+
+def make_folder(out: Path) -> Path:
+    """A folder to write into, made if need be. BadInput when files are in it already: old labels among the new."""
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise BadInput(f"{out}: there is something there already; choose another name or remove it")
+    out.mkdir(parents=True, exist_ok=True)
+    return out
+
+
+def write_file(out: Path, data: bytes) -> None:
+    """A new file. BadInput when there is one."""
+    out.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with out.open("xb") as file:
+            file.write(data)
+    except FileExistsError:
+        raise BadInput(f"{out}: there is such a file already; choose another name or remove it") from None

@@ -1,0 +1,107 @@
+"""Lines of KITTI's label files (devkit_object/readme.txt, devkit_tracking/readme.txt).
+
+``type truncated occluded alpha x1 y1 x2 y2 height width length x y z rotation_y``; tracking puts the frame and the
+track in front. Pictures are rectified there: boxes of a lens that bends are moved to where a straight one would see
+them. What is not known is −1, −1000 for places and −10 for angles, as in ``DontCare`` lines.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.errors import BadInput
+from pipeline.geometry import Cuboid, inverse
+from pipeline.labels.model import Sighting
+from pipeline.sources.base import SourceError
+from pipeline.sources.kitti_records import cuboid_from_label, cuboid_to_label, label_name
+from pipeline.types import F64, Box, CameraCalibration
+
+DONT_CARE = "DontCare"
+_TYPES = {"car": "Car", "truck": "Truck", "person": "Pedestrian", "bicycle": "Cyclist", "train": "Tram"}
+_NO_CUBOID = (-1.0, -1.0, -1.0, -1000.0, -1000.0, -1000.0, -10.0)
+_NO_BOX = (-1.0, -1.0, -1.0, -1.0)
+_FIELDS, _FIELDS_WITH_SCORE = 15, 16
+_LARGEST_PX = 1e6
+_ENOUGH = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line in our terms: ego frame, pixels of the raw picture. kind: as KITTI calls it. said_more: it knew how far it is
+    cut or hidden."""
+
+    kind: str
+    label: str
+    cuboid: Cuboid | None
+    bbox: Box | None
+    said_more: bool
+
+
+def kind_of(label: str) -> str:
+    """KITTI's type of a class; a class that KITTI has not is written with a capital and without spaces."""
+    return _TYPES.get(label) or "_".join(label.split()).capitalize() or "Misc"
+
+
+def is_kept(label: str) -> bool:
+    """Whether a class is the same after it was written and read."""
+    return label_name(kind_of(label)) == label and kind_of(label) != DONT_CARE
+
+
+def to_line(label: str, sighting: Sighting, T_rect_ego: F64, camera: CameraCalibration) -> str:
+    """One line without frame and track."""
+    place = cuboid_to_label(sighting.cuboid, T_rect_ego) if sighting.cuboid is not None else _NO_CUBOID
+    box = straightened(sighting.bbox, camera) if sighting.bbox is not None else _NO_BOX
+    alpha = _wrapped(place[6] - math.atan2(place[3], place[5])) if sighting.cuboid is not None else -10.0
+    numbers = " ".join(f"{value + 0.0:.6f}" for value in (alpha, *box, *place))
+    return f"{kind_of(label)} -1 -1 {numbers}"
+
+
+def from_fields(fields: list[str], T_rect_ego: F64, camera: CameraCalibration | None, what: str) -> Row:
+    """One line that was split at its blanks. BadInput, beginning with ``what``, when it is none."""
+    if len(fields) not in (_FIELDS, _FIELDS_WITH_SCORE):
+        raise BadInput(f"{what}: {len(fields)} fields in a KITTI label of {_FIELDS}")
+    try:
+        truncated, occluded, _, x1, y1, x2, y2, *place = (float(field) for field in fields[1:_FIELDS])
+    except ValueError:
+        raise BadInput(f"{what}: a KITTI label with something else than numbers") from None
+    box: Box = (x1, y1, x2, y2)
+    if not all(math.isfinite(v) and abs(v) < _LARGEST_PX for v in (truncated, occluded, *box)):
+        raise BadInput(f"{what}: a KITTI label with impossible numbers")
+    try:
+        cuboid = cuboid_from_label(place, inverse(T_rect_ego)) if tuple(place) != _NO_CUBOID else None
+    except SourceError as error:
+        raise BadInput(f"{what}: {error}") from None
+    bbox = bent(box, camera) if box != _NO_BOX else None
+    return Row(fields[0], label_name(fields[0]), cuboid, bbox, said_more=truncated > 0.0 or occluded > 0.0)
+
+
+def straightened(box: Box, camera: CameraCalibration) -> Box:
+    """Two corners of a box in the raw picture, where they are in the undistorted one (same K)."""
+    if not camera.distortion.size:
+        return box
+    corners = np.array(box, dtype=np.float64).reshape(-1, 1, 2)
+    return _as_box(cv2.undistortImagePoints(corners, camera.K, camera.distortion, None, _ENOUGH))
+
+
+def bent(box: Box, camera: CameraCalibration | None) -> Box:
+    """The inverse of ``straightened``."""
+    if camera is None or not camera.distortion.size:
+        return box
+    flat = (np.array(box).reshape(-1, 2) - camera.K[:2, 2]) / [camera.K[0, 0], camera.K[1, 1]]
+    rays = np.column_stack([flat, np.ones(2)])
+    return _as_box(cv2.projectPoints(rays, np.zeros(3), np.zeros(3), camera.K, camera.distortion)[0])
+
+
+def _as_box(corners: npt.NDArray[Any]) -> Box:
+    x1, y1, x2, y2 = (float(value) for value in corners.ravel())
+    return x1, y1, x2, y2
+
+
+def _wrapped(angle_rad: float) -> float:
+    return math.remainder(angle_rad, math.tau)

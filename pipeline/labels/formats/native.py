@@ -1,0 +1,102 @@
+"""Our own file, ``cipv-labels`` version 1: JSON with every field of ``LabelSet`` under its own name; nothing is lost.
+
+A reader of this version takes what it does not know for a mistake, and a newer version for one it cannot read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter
+
+from pipeline.errors import BadInput
+from pipeline.labels.check import check
+from pipeline.labels.formats.base import Drive, Imported, write_file
+from pipeline.labels.formats.reading import fit, parse_json, read_bytes
+from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel
+
+KIND = "cipv-labels"
+VERSION = 1
+_LABELS = TypeAdapter(LabelSet)
+_AtFrame = TypeVar("_AtFrame", PathLabel, EventLabel, FrameTag)
+
+
+def to_json(labels: LabelSet) -> bytes:
+    """The file's bytes; the same labels give the same bytes. BadInput when the labels cannot be."""
+    body = _LABELS.dump_json(check(labels, "these labels"))
+    return b'{"format":"%s","version":%d,"labels":%s}\n' % (KIND.encode(), VERSION, body)
+
+
+def from_json(data: bytes, what: str) -> LabelSet:
+    """The labels as they were written. BadInput, beginning with ``what``, when these are none."""
+    outer: Any = parse_json(data, what)
+    if not isinstance(outer, dict) or outer.get("format") != KIND:
+        raise BadInput(f"{what}: no {KIND} file")
+    version = outer.get("version")
+    if not isinstance(version, int) or isinstance(version, bool) or not 1 <= version <= VERSION:
+        raise BadInput(f"{what}: {KIND} of version {str(version)[:20]}; this program reads up to {VERSION}")
+    inner = outer.get("labels")
+    unknown = sorted(inner.keys() - {field.name for field in fields(LabelSet)}) if isinstance(inner, dict) else []
+    if unknown:
+        raise BadInput(f"{what}: labels have no field {unknown[0][:40]!r}")
+    return check(fit(_LABELS, inner, what), what)
+
+
+def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
+    write_file(out, to_json(labels))
+    return ()
+
+
+def read(path: Path, drive: Drive, origin: Origin) -> Imported:
+    return onto(from_json(read_bytes(path), str(path)), drive, str(path))
+
+
+def onto(labels: LabelSet, drive: Drive, what: str) -> Imported:
+    """Labels of this drive, or of one that it is a clip of or that is a clip of it, counted by this drive's frames.
+
+    Frames are known by their name and time. BadInput when the two have no frame in common.
+    """
+    if (labels.frames, labels.t_ns) == (drive.frames, drive.t_ns):
+        return Imported(replace(labels, source=drive.uri))
+    here = {key: index for index, key in enumerate(zip(drive.frames, drive.t_ns, strict=True))}
+    to = {old: here[key] for old, key in enumerate(zip(labels.frames, labels.t_ns, strict=True)) if key in here}
+    if not to:
+        raise BadInput(f"{what}: these labels are of another recording ({labels.source}): no frame is the same")
+    moved = replace(
+        labels,
+        source=drive.uri,
+        frames=drive.frames,
+        t_ns=drive.t_ns,
+        tracks=tuple(moved for track in labels.tracks if (moved := _moved_track(track, to)).sightings),
+        leads=tuple(part for each in labels.leads for part in _moved_lead(each, to)),
+        paths=_moved(labels.paths, to),
+        events=_moved(labels.events, to),
+        tags=_moved(labels.tags, to),
+    )
+    note = (
+        f"{len(to)} of the labels' {len(labels.frames)} frames are in this recording; labels of the others are left out"
+    )
+    return Imported(check(moved, what), (note,))
+
+
+def _moved_track(track: LabelTrack, to: dict[int, int]) -> LabelTrack:
+    kept = (replace(each, frame=to[each.frame]) for each in track.sightings if each.frame in to)
+    return replace(track, sightings=tuple(sorted(kept, key=lambda each: each.frame)))
+
+
+def _moved_lead(lead: LeadRange, to: dict[int, int]) -> list[LeadRange]:
+    """The range's frames in this drive, as ranges: they need not be in one piece there."""
+    frames = sorted(to[frame] for frame in range(lead.first, lead.last + 1) if frame in to)
+    runs: list[list[int]] = []
+    for frame in frames:
+        if runs and runs[-1][-1] == frame - 1:
+            runs[-1].append(frame)
+        else:
+            runs.append([frame])
+    return [replace(lead, first=run[0], last=run[-1]) for run in runs]
+
+
+def _moved(labels: tuple[_AtFrame, ...], to: dict[int, int]) -> tuple[_AtFrame, ...]:
+    return tuple(replace(each, frame=to[each.frame]) for each in labels if each.frame in to)

@@ -1,0 +1,106 @@
+"""What a label set is made of, and in words what of it a format has no place for. One rule for all formats."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal, get_args
+
+from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
+
+Part = Literal[
+    "cuboids", "boxes", "identities", "leads", "paths", "events", "tags", "states", "origins", "comments", "keyframes",
+    "name",
+]  # fmt: skip
+"""identities: that sightings in several frames are the same track. states: proposed, accepted, corrected, rejected.
+origins: who made a label, when, with which parameters. keyframes: which sightings were interpolated. name: of a frozen
+version."""
+
+EVERYTHING: frozenset[Part] = frozenset(get_args(Part))
+
+_Marked = LabelTrack | LeadRange | PathLabel | EventLabel
+
+
+def reduce(labels: LabelSet, holds: frozenset[Part]) -> tuple[LabelSet, tuple[str, ...]]:
+    """The labels without what cannot be held, and a sentence for each kind of thing that is lost.
+
+    Where there is no place for a state, what a person rejected is left out: it would be read as true.
+    """
+    lost = [sentence for sentence in _lost(labels, holds) if sentence]
+    if "states" not in holds:
+        labels = replace(
+            labels,
+            tracks=tuple(track for track in labels.tracks if track.state != "rejected"),
+            leads=tuple(each for each in labels.leads if each.state != "rejected"),
+            paths=tuple(each for each in labels.paths if each.state != "rejected"),
+            events=tuple(each for each in labels.events if each.state != "rejected"),
+        )
+    tracks = tuple(
+        replace(track, sightings=tuple(each for s in track.sightings if (each := _reduced(s, holds)) is not None))
+        for track in labels.tracks
+    )
+    keeps_tracks = bool({"cuboids", "boxes"} & holds)
+    return replace(
+        labels,
+        tracks=tracks if keeps_tracks else (),
+        leads=labels.leads if "leads" in holds else (),
+        paths=labels.paths if "paths" in holds else (),
+        events=labels.events if "events" in holds else (),
+        tags=labels.tags if "tags" in holds else (),
+    ), tuple(lost)
+
+
+def _reduced(sighting: Sighting, holds: frozenset[Part]) -> Sighting | None:
+    """The sighting with what can be held of it; null when that is nothing of what it had."""
+    if {"cuboids", "boxes"} <= holds and "keyframes" in holds:
+        return sighting
+    cuboid = sighting.cuboid if "cuboids" in holds else None
+    bbox = sighting.bbox if "boxes" in holds else None
+    return replace(sighting, cuboid=cuboid, bbox=bbox) if cuboid is not None or bbox is not None else None
+
+
+def _lost(labels: LabelSet, holds: frozenset[Part]) -> list[str]:
+    missing = EVERYTHING - holds
+    sightings = [each for track in labels.tracks for each in track.sightings]
+    counted = {
+        "leads": (len(labels.leads), "{} of the lead not written: no place for them", "range", "ranges"),
+        "paths": (len(labels.paths), "{} of the ego path not written: no place for them", "frame", "frames"),
+        "events": (len(labels.events), "{} not written: no place for them", "event", "events"),
+        "tags": (len(labels.tags), "{} not written: no place for them", "frame tag", "frame tags"),
+        "comments": (sum(bool(t.comment) for t in labels.tracks), "{} not written", "comment", "comments"),
+    }
+    lost = [_count(*counted[part]) for part in counted if part in missing]
+    if {"cuboids", "boxes"} <= missing:
+        return [_count(len(labels.tracks), "{} not written: no place for them", "track", "tracks"), *lost]
+    kept = [each for each in sightings if _reduced(each, holds) is not None]
+    lost.append(_count(len(sightings) - len(kept), "{} not written: nothing of it has a place", "sighting"))
+    lost.append(_count(sum(not t.sightings for t in labels.tracks), "{} without sightings not written", "track"))
+    if "cuboids" in missing:
+        lost.append(_count(sum(s.cuboid is not None for s in sightings), "{} not written: no place for them", "cuboid"))
+    if "boxes" in missing:
+        lost.append(_count(sum(s.bbox is not None for s in sightings), "{} of pictures not written: no place", "box"))
+    if "identities" in missing:
+        lost.append(_count(sum(len(t.sightings) > 1 for t in labels.tracks), "{} lose their identity", "track"))
+        lost.append("" if not labels.tracks else "the tracks' numbers are not written: no place for them")
+    if "keyframes" in missing:
+        lost.append(_count(sum(not s.keyframe for s in sightings), "{} not told from keyframes", "interpolated place"))
+    return lost + _lost_marks(labels, missing)
+
+
+def _lost_marks(labels: LabelSet, missing: frozenset[Part]) -> list[str]:
+    marked: tuple[_Marked, ...] = (*labels.tracks, *labels.leads, *labels.paths, *labels.events)
+    states, lost = [each.state for each in marked], []
+    if "states" in missing:
+        lost.append(_count(states.count("rejected"), "{} left out: rejected, which it cannot say", "label"))
+        lost.append(_count(states.count("proposed"), "{} written as if true: nobody has looked at it yet", "label"))
+        lost.append(_count(states.count("corrected"), "{} not told from accepted ones", "corrected label"))
+    if "origins" in missing and (labels.tracks or labels.leads):
+        lost.append("who made each label, when and with which parameters is not written")
+    if "name" in missing and labels.name != "working":
+        lost.append(f"the version's name {labels.name!r} is not written")
+    return lost
+
+
+def _count(count: int, sentence: str, one: str, many: str = "") -> str:
+    """The sentence with a number and its noun; empty for none."""
+    plural = many or (f"{one}es" if one.endswith("x") else f"{one}s")
+    return sentence.format(f"{count:,} {one if count == 1 else plural}") if count else ""
