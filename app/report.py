@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from html import escape
 
 from app.svg import chart_svg
-from pipeline.evaluation.experiments.sections import Cell, Coloured, Section, Table
+from pipeline.evaluation.experiments.sections import Cell, Coloured, Linked, Section, Table
 
 _STYLE = """
 :root { color-scheme: light dark; --ground: #fff; --ink: #1b2024; --soft: #5d6870; --edge: #d8dee2; --raised: #f4f6f7;
@@ -74,7 +74,9 @@ def _table(table: Table, replays: str) -> str:
     return f'<h3>{escape(table.title)}</h3><div class="wide"><table>{caption}<tr>{head}</tr>{rows}</table></div>'
 
 
-def _cell(cell: Cell | Coloured, decimals: int, replays: str) -> str:
+def _cell(cell: Cell | Coloured | Linked, decimals: int, replays: str) -> str:
+    if isinstance(cell, Linked):
+        return f'<td class="word"><a href="{escape(cell.href)}">{escape(in_words(cell.value, decimals))}</a></td>'
     value, tone, replay = (cell.value, cell.tone, cell.replay) if isinstance(cell, Coloured) else (cell, "", "")
     kind = "word" if isinstance(value, str) and not tone else tone
     text = escape(in_words(value, decimals))

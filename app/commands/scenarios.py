@@ -8,18 +8,14 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
-from rich.console import Console
-from rich.table import Table as RichTable
 
 from app.progress import frames_progress
 from app.replays import ReplayFolder
-from app.report import html, in_words
+from app.report import html
+from app.tables import show
 from pipeline.errors import BadInput
 from pipeline.evaluation.experiments.runner import count_cases, of_suite, run_all
-from pipeline.evaluation.experiments.sections import Coloured, Section, as_json
-
-_FILE_WIDTH = 160
-"""Columns of a table that goes to a file or a pipe."""
+from pipeline.evaluation.experiments.sections import as_json
 
 
 @dataclass(frozen=True)
@@ -63,19 +59,5 @@ class Scenarios:
         if self.json:
             print(json.dumps([as_json(section) for section in sections], indent=1, ensure_ascii=False))
         else:
-            _show(sections)
+            show(sections)
         return 0
-
-
-def _show(sections: list[Section]) -> None:
-    console = Console(width=None if Console().is_terminal else _FILE_WIDTH)
-    for section in sections:
-        console.rule(section.title)
-        for paragraph in section.text:
-            console.print(paragraph)
-        for table in section.tables:
-            shown = RichTable(*table.columns, title=table.title, caption=table.caption or None)
-            for row in table.rows:
-                values = (cell.value if isinstance(cell, Coloured) else cell for cell in row)
-                shown.add_row(*(in_words(value, table.decimals) for value in values))
-            console.print(shown)

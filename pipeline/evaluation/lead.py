@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -76,8 +77,15 @@ def nearest_face_m(item: TruthObject) -> float:
 
 
 def judge(result: Result, truth: Iterable[TruthObject], rule: LeadRule) -> Judged:
-    """One frame's CIPV against its labels."""
-    lead = true_lead(truth, rule)
+    """One frame's CIPV against its labels, the lead being the nearest in the lane."""
+    return judge_lead(result, true_lead(truth, rule), rule)
+
+
+def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judged:
+    """One frame's CIPV against the vehicle that is known to lead; null: none does. A lead beyond the range asked for
+    counts as none."""
+    if lead is not None and nearest_face_m(lead) > rule.max_range_m:
+        lead = None
     chosen = next((item for item in result.objects if result.cipv is not None and item.id == result.cipv.id), None)
     in_reach = chosen is not None and chosen.distance_m is not None and chosen.distance_m <= rule.max_range_m
     if lead is None:
@@ -97,6 +105,13 @@ def _lateral_error(bev: tuple[Point2, Point2, Point2, Point2], lead: TruthObject
     y = near_face_middle(bev)[1]
     sides = lead.cuboid.footprint()[:, 1]
     return float(max(sides.min() - y, y - sides.max(), 0.0))
+
+
+def switches(pairs: Iterable[tuple[int | None, int | None]]) -> int:
+    """How often the chosen object's number changed while the true lead stayed the same. pairs: of each frame the true
+    lead and the chosen object; frames without either are passed over."""
+    both = [(lead, chosen) for lead, chosen in pairs if lead is not None and chosen is not None]
+    return sum(before[0] == after[0] and before[1] != after[1] for before, after in pairwise(both))
 
 
 @dataclass(frozen=True)

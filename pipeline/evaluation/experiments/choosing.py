@@ -17,6 +17,7 @@ import numpy as np
 
 from pipeline.evaluation.experiments.sections import Cell, Chart, Experiment, Section, Series, Table
 from pipeline.evaluation.experiments.track import SCENE_LAW
+from pipeline.evaluation.lead import switches
 from pipeline.params import Params, PathParams, with_changes
 from pipeline.path.corridor import nearest_on_path
 from pipeline.path.placing import near_face_middle
@@ -177,18 +178,6 @@ def same_place(point: Point2, lead: ActorState) -> bool:
     return float(np.hypot(point[0] - x, point[1] - y)) <= max(_SAME_PLACE_M, _SAME_SHARE * _range_m(lead))
 
 
-def switches(frames: Sequence[Frame]) -> int:
-    """How often the chosen object's number changed while the true lead stayed the same."""
-    count, last = 0, None
-    for frame in frames:
-        if frame.chosen is None or frame.lead is None:
-            continue
-        if last is not None and last[0] == frame.lead and last[1] != frame.chosen:
-            count += 1
-        last = (frame.lead, frame.chosen)
-    return count
-
-
 def acquired_m(frames: Sequence[Frame]) -> list[float]:
     """For each true lead: its range in the first frame in which it was rightly chosen."""
     first: dict[int, float] = {}
@@ -247,7 +236,7 @@ def _row(scene: str, sensors: Sensors, runs: list[list[Frame]]) -> tuple[Cell, .
         *count.values(),
         sum(frame.lead is not None for frame in frames),
         sum(first) / len(first) if first else None,
-        sum(switches(run) for run in runs) / len(runs) if runs else None,
+        sum(switches((frame.lead, frame.chosen) for frame in run) for run in runs) / len(runs) if runs else None,
     )
 
 

@@ -29,12 +29,20 @@ class Coloured:
 
 
 @dataclass(frozen=True)
+class Linked:
+    """A cell that leads somewhere: href is a whole address."""
+
+    value: Cell
+    href: str
+
+
+@dataclass(frozen=True)
 class Table:
     """Numbers keep their full precision here; null is shown as a dash. decimals: for people."""
 
     title: str
     columns: tuple[str, ...]
-    rows: tuple[tuple[Cell | Coloured, ...], ...]
+    rows: tuple[tuple[Cell | Coloured | Linked, ...], ...]
     caption: str = ""
     decimals: int = 2
 
@@ -129,5 +137,7 @@ def as_json(section: Section) -> dict[str, Any]:
     }
 
 
-def _plain(cell: Cell | Coloured) -> Any:
+def _plain(cell: Cell | Coloured | Linked) -> Any:
+    if isinstance(cell, Linked):
+        return {"value": cell.value, "href": cell.href}
     return {"value": cell.value, "tone": cell.tone} if isinstance(cell, Coloured) else cell

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.evaluation.experiments.choosing import Case, Frame, Way, acquired_m, report, run, switches, true_lead
+from pipeline.evaluation.experiments.choosing import Case, Frame, Way, acquired_m, report, run, true_lead
 from pipeline.simulation import scenario, world
 from tests.pipeline.simulation.worlds import with_actors
 
@@ -69,7 +69,7 @@ def test_switches_and_first_acquisition() -> None:
         frame("correct", 2, 9, 20.0),
         frame("none", None, None),
     ]
-    assert switches(frames) == 2, "7 → 8 → 7; a new lead is no switch"
+    assert switches((frame.lead, frame.chosen) for frame in frames) == 2, "7 → 8 → 7; a new lead is no switch"
     assert acquired_m(frames) == [45.0, 20.0]
 
 

@@ -1,0 +1,172 @@
+"""`cipv evaluate`: what the line believes, scored against labels."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Literal
+from urllib.parse import quote
+
+import tyro
+
+from app.options import LineOptions, SourceOptions
+from app.progress import frames_progress
+from app.report import html
+from app.tables import show
+from pipeline.errors import BadInput
+from pipeline.evaluation.lead import LeadRule
+from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
+from pipeline.evaluation.scores.report import as_json, sections
+from pipeline.evaluation.scores.results_file import EMPTY, read_results
+from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels, of_source
+from pipeline.labels.formats import native
+from pipeline.labels.formats.reading import read_bytes
+from pipeline.params import Params, from_yaml, preset
+from pipeline.run import Detectors, Sensors, detect, only
+from pipeline.sources.base import Source
+from pipeline.step import State, step, warm_up
+from pipeline.types import Frame, Result
+
+DASHBOARD = "http://127.0.0.1:8420/"
+_PRESETS = ("default", "paper")
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Score what the line believes of recordings against labels: the lead, distances, tracking, warnings.
+
+    Example: cipv evaluate astyx:PATH --set cluster.z_weight=0.4 --against default --report scores.html
+    """
+
+    sources: tyro.conf.Positional[tuple[str, ...]]
+    """Labelled recordings; with two or more, figures get confidence intervals"""
+    truth: tuple[str, ...] = ("native",)
+    """native: the labels that came with a recording; else a file of labels (cipv-labels JSON), one a recording"""
+    line: LineOptions = field(default_factory=LineOptions)
+    sensors: Literal["lidar", "camera", "both"] = "both"
+    """Ablation: what a car with only this sensor would believe"""
+    rings: int = 16
+    """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
+    results: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE")] = ()
+    """Score these results of `cipv run --out`, one a recording, instead of running the line"""
+    against: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FILE|PRESET")] = ()
+    """Compare with another run: results of `cipv run --out`, one a recording; or a preset by name or file (YAML)"""
+    max_range_m: float = 60.0
+    """Leads that are farther are not asked for"""
+    report: Path | None = None
+    """Write an HTML file with tables, charts and links to the worst frames"""
+    json: bool = False
+    """Print the figures as JSON"""
+
+    def __call__(self) -> int:
+        self._check()
+        params = self.line.parameters()
+        base = self._base_params()
+        if self.report is not None:
+            self.report.parent.mkdir(parents=True, exist_ok=True)
+            self.report.open("a").close()  # a place that cannot be written to is told before the drives, not after
+        run_scores, base_scores = [], []
+        for n in range(len(self.sources)):
+            scores = self._score(n, params, base)
+            run_scores.append(scores[0])
+            base_scores += scores[1:]
+        self._tell(run_scores, base_scores or None)
+        return 0
+
+    def _check(self) -> None:
+        count = len(self.sources)
+        if not count:
+            raise BadInput("no recording to evaluate; name at least one")
+        if self.truth != ("native",) and len(self.truth) != count:
+            raise BadInput(f"--truth: {len(self.truth)} files for {count} recordings; name one for each")
+        if self.results and len(self.results) != count:
+            raise BadInput(f"--results: {len(self.results)} files for {count} recordings; name one for each")
+        if self.against and self._base_preset() is None and len(self.against) != count:
+            raise BadInput(f"--against: {len(self.against)} files for {count} recordings; name one for each")
+        if not 0.0 < self.max_range_m < 1000.0:
+            raise BadInput(f"--max-range-m {self.max_range_m:g}: metres, more than 0 and less than 1000")
+
+    def _base_preset(self) -> str | None:
+        """What --against names, where that is a preset."""
+        one = self.against[0] if len(self.against) == 1 else ""
+        return one if one in _PRESETS or one.endswith((".yaml", ".yml")) else None
+
+    def _base_params(self) -> Params | None:
+        name = self._base_preset()
+        if name is None:
+            return None
+        return preset(name) if name in _PRESETS else from_yaml(Path(name), preset("default"))
+
+    def _score(self, n: int, params: Params, base: Params | None) -> list[DriveScore]:
+        """One recording's score, and the base's where there is one."""
+        source = SourceOptions(self.sources[n], self.rings).open()
+        rules = Rules(LeadRule(max_range_m=self.max_range_m), params.aeb)
+        truth = self._truth(n, source, rules)
+        given = [read_results(self.results[n])] if self.results else []
+        wanted = [*([] if given else [params]), *([base] if base is not None else [])]
+        runs = [*given, *self._run(source, wanted)]
+        if self.against and base is None:
+            runs.append(read_results(Path(self.against[n])))
+        return [score_drive(results, truth, rules) for results in runs]
+
+    def _truth(self, n: int, source: Source, rules: Rules) -> DriveTruth:
+        if self.truth == ("native",) or self.truth[n] == "native":
+            return of_source(source, rules.lead)
+        file = Path(self.truth[n])
+        truth = of_labels(native.from_json(read_bytes(file), str(file)), rules.lead)
+        ticks = tuple(source.t_ns(index) for index in range(len(source)))
+        frames = {tick: frame for tick, frame in truth.frames.items() if tick in set(ticks)}
+        if not frames:
+            raise NoTruth(f"{file}: labels of another recording ({truth.uri}): no frame is the same")
+        return replace(truth, uri=source.uri, ticks=ticks, frames=frames)
+
+    def _run(self, source: Source, wanted: list[Params]) -> list[list[Result]]:
+        """The line with each set of parameters. The networks look at each picture once."""
+        if not wanted:
+            return []
+        detectors = self.line.open_detectors(source, self.sensors)
+        with frames_progress() as progress:
+            bar = progress.add_task(source.title, total=len(source))
+            ran = list(_lines(source, wanted, detectors, self.sensors, lambda: progress.advance(bar)))
+        return [list(results) for results in zip(*ran, strict=True)]
+
+    def _tell(self, run: list[DriveScore], base: list[DriveScore] | None) -> None:
+        if self.json:
+            print(json.dumps(as_json(run, base), indent=1, ensure_ascii=False))
+        if self.json and self.report is None:
+            return
+        told = sections(run, dashboard_link, base)
+        if self.report is not None:
+            title = "Scores: " + ", ".join(drive.uri for drive in run)
+            self.report.write_text(html(told, title), encoding="utf-8")
+            print(f"cipv: report in {self.report}", file=sys.stderr)
+        if not self.json:
+            show(told)
+
+
+def _lines(
+    source: Source, wanted: list[Params], detectors: Detectors, sensors: Sensors, done: Callable[[], None]
+) -> Iterator[list[Result]]:
+    """Each frame's results, one a set of parameters, without their layers."""
+    warm_up()
+    states = [State() for _ in wanted]
+    for index in range(len(source)):
+        frame = _seen(source.frame(index), detectors, sensors)
+        row = []
+        for n, params in enumerate(wanted):
+            states[n], result = step(states[n], frame, params)
+            row.append(replace(result, layers=EMPTY))
+        yield row
+        done()
+
+
+def _seen(frame: Frame, detectors: Detectors, sensors: Sensors) -> Frame:
+    return only(frame if sensors == "lidar" else detect(frame, detectors), sensors)
+
+
+def dashboard_link(uri: str, index: int) -> str:
+    """The address that opens the dashboard of this machine at a frame."""
+    return f"{DASHBOARD}#uri={quote(uri, safe='')}&frame={index}"

@@ -1,0 +1,97 @@
+"""One drive's results against its truth: every count that the figures are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from pipeline.errors import BadInput
+from pipeline.evaluation.lead import Judged, LeadRule, judge_lead
+from pipeline.evaluation.scores import tracking
+from pipeline.evaluation.scores.alarms import Alarm, alarms
+from pipeline.evaluation.scores.episodes import (
+    Acquisition,
+    CutIn,
+    Moment,
+    acquisitions,
+    count_switches,
+    cut_ins,
+    judged_s,
+)
+from pipeline.evaluation.scores.matching import Error, errors
+from pipeline.evaluation.scores.truth import DriveTruth, FrameTruth
+from pipeline.params import AebParams
+from pipeline.types import Result
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What is asked: which vehicle leads, and when the emergency brake is due."""
+
+    lead: LeadRule = field(default_factory=LeadRule)
+    aeb: AebParams = field(default_factory=AebParams)
+
+
+@dataclass(frozen=True)
+class FrameScore:
+    """One labelled frame. index: in the recording. judged: null where nobody knows who leads."""
+
+    index: int
+    t_ns: int
+    name: str
+    judged: Judged | None
+    errors: tuple[Error, ...]
+
+
+@dataclass(frozen=True)
+class DriveScore:
+    """One drive. judged_s: how long the lead was judged. tracking: null without trackeval."""
+
+    uri: str
+    frames: tuple[FrameScore, ...]
+    judged_s: float
+    switches: int
+    acquisitions: tuple[Acquisition, ...]
+    cut_ins: tuple[CutIn, ...]
+    alarms: tuple[Alarm, ...]
+    tracking: tracking.Counts | None
+    notes: tuple[str, ...] = ()
+
+    def index_of(self, t_ns: int) -> int:
+        """The frame at a tick."""
+        return next(frame.index for frame in self.frames if frame.t_ns == t_ns)
+
+
+def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> DriveScore:
+    """Judge the results of one run. Frames are told apart by their ticks; BadInput when none of the labelled ones has
+    a result."""
+    pairs = [(result, truth.frames[result.t_ns]) for result in results if result.t_ns in truth.frames]
+    if not pairs:
+        raise BadInput(f"{truth.uri}: no labelled frame has a result; these results are of another recording")
+    index = {tick: n for n, tick in enumerate(truth.ticks)}
+    frames, moments = [], []
+    for result, known in pairs:
+        judged = judge_lead(result, known.lead, rules.lead) if known.lead_known else None
+        frames.append(FrameScore(index[result.t_ns], result.t_ns, result.frame, judged, errors(result, known)))
+        if judged is not None:
+            moments.append(_moment(result, known, judged))
+    notes = truth.notes
+    if len(pairs) < len(truth.frames):
+        notes = (*notes, f"{len(truth.frames) - len(pairs)} labelled frames have no result and do not count.")
+    return DriveScore(
+        truth.uri,
+        tuple(frames),
+        judged_s(moments),
+        count_switches(moments),
+        tuple(acquisitions(moments)),
+        tuple(cut_ins(moments, truth.frames, truth.cut_ins)),
+        tuple(alarms(pairs, rules.aeb)),
+        tracking.of_frames(pairs),
+        notes,
+    )
+
+
+def _moment(result: Result, known: FrameTruth, judged: Judged) -> Moment:
+    """A lead beyond the range asked for is none."""
+    lead = known.lead.id if known.lead is not None and judged.truth_m is not None else None
+    return Moment(result.t_ns, lead, result.cipv.id if result.cipv is not None else None, judged)

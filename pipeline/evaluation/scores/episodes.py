@@ -1,0 +1,134 @@
+"""The lead over time: when it was taken, lost and exchanged, and how soon one that cuts in was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from pipeline.evaluation.lead import Judged, nearest_face_m, switches
+from pipeline.evaluation.scores.truth import MAX_GAP_S, FrameTruth
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One frame in which it is known who leads. lead: null where none does; chosen: the CIPV's number."""
+
+    t_ns: int
+    lead: int | None
+    chosen: int | None
+    judged: Judged
+
+
+@dataclass(frozen=True)
+class Acquisition:
+    """One lead from when it leads. range_m: in the first frame in which it was rightly chosen, null when it never was;
+    after_s: how long that took. from_start: it led already when the recording began, so nobody knows since when.
+    drop_outs: how often it was lost again, without any CIPV."""
+
+    lead: int
+    t_ns: int
+    range_m: float | None
+    after_s: float | None
+    from_start: bool
+    drop_outs: int
+
+
+@dataclass(frozen=True)
+class CutIn:
+    """A vehicle that comes between. latency_s: from when it leads until it is the CIPV; null when it never was."""
+
+    lead: int
+    t_ns: int
+    latency_s: float | None
+
+
+def stretches(moments: Sequence[Moment]) -> list[list[Moment]]:
+    """Parts without a gap."""
+    parts: list[list[Moment]] = []
+    for moment in moments:
+        if parts and (moment.t_ns - parts[-1][-1].t_ns) / 1e9 <= MAX_GAP_S:
+            parts[-1].append(moment)
+        else:
+            parts.append([moment])
+    return parts
+
+
+def judged_s(moments: Sequence[Moment]) -> float:
+    """How long the lead was judged, gaps left out."""
+    return sum((part[-1].t_ns - part[0].t_ns) / 1e9 for part in stretches(moments))
+
+
+def count_switches(moments: Sequence[Moment]) -> int:
+    """How often the CIPV's number changed while the lead stayed the same."""
+    return sum(switches((m.lead, m.chosen) for m in part) for part in stretches(moments))
+
+
+def _reigns(moments: Sequence[Moment]) -> list[tuple[list[Moment], bool]]:
+    """Each lead's frames from when it leads until it no longer does, and whether a stretch begins with them."""
+    found: list[tuple[list[Moment], bool]] = []
+    for part in stretches(moments):
+        last: int | None = None
+        for n, moment in enumerate(part):
+            if moment.lead is not None and moment.lead == last:
+                found[-1][0].append(moment)
+            elif moment.lead is not None:
+                found.append(([moment], n == 0))
+            last = moment.lead
+    return found
+
+
+def acquisitions(moments: Sequence[Moment]) -> list[Acquisition]:
+    """One a lead, in order of time."""
+    found = []
+    for reign, from_start in _reigns(moments):
+        first = next((n for n, m in enumerate(reign) if m.judged.verdict == "correct"), None)
+        after = reign[first:] if first is not None else []
+        found.append(
+            Acquisition(
+                lead=reign[0].lead or 0,
+                t_ns=reign[0].t_ns,
+                range_m=after[0].judged.truth_m if after else None,
+                after_s=(after[0].t_ns - reign[0].t_ns) / 1e9 if after else None,
+                from_start=from_start,
+                drop_outs=sum(a.judged.verdict != "missed" == b.judged.verdict for a, b in pairwise(after)),
+            )
+        )
+    return found
+
+
+def cut_ins(
+    moments: Sequence[Moment], truth: Mapping[int, FrameTruth], labelled: Sequence[tuple[int, int]] | None
+) -> list[CutIn]:
+    """``labelled``: tick and object of each, as people saw them. Without: each lead that a frame before was labelled
+    beside the way, nearer than who led then."""
+    reigns = [reign for reign, _ in _reigns(moments)]
+    if labelled is not None:
+        return [cut_in for tick, lead in labelled if (cut_in := _labelled(reigns, tick, lead)) is not None]
+    before = {b.t_ns: a for part in stretches(moments) for a, b in pairwise(part)}
+    found = []
+    for reign in reigns:
+        start = reign[0]
+        if start.t_ns in before and _cuts_in(start, truth[before[start.t_ns].t_ns]):
+            found.append(CutIn(start.lead or 0, start.t_ns, _latency_s(reign, start.t_ns)))
+    return found
+
+
+def _labelled(reigns: Sequence[Sequence[Moment]], tick: int, lead: int) -> CutIn | None:
+    """Of an event: the lead's next reign, or the one it falls into. Null where who leads then is not known."""
+    reign = next((each for each in reigns if each[0].lead == lead and each[-1].t_ns >= tick), None)
+    if reign is None:
+        return None
+    return CutIn(lead, tick, _latency_s(reign, max(tick, reign[0].t_ns)))
+
+
+def _cuts_in(start: Moment, earlier: FrameTruth) -> bool:
+    item = next((each for each in earlier.objects if each.id == start.lead), None)
+    if item is None or not earlier.lead_known:
+        return False
+    return earlier.lead is None or (earlier.lead.id != item.id and nearest_face_m(item) < nearest_face_m(earlier.lead))
+
+
+def _latency_s(reign: Sequence[Moment], since_ns: int) -> float | None:
+    right = next((m.t_ns for m in reign if m.t_ns >= since_ns and m.judged.verdict == "correct"), None)
+    return (right - since_ns) / 1e9 if right is not None else None

@@ -1,0 +1,118 @@
+"""Which believed object stands for which labelled vehicle, and how far off it is (paper, Table 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from pipeline.evaluation.lead import LABELLED_VEHICLES, nearest_face_m
+from pipeline.evaluation.scores.truth import FrameTruth
+from pipeline.geometry import F64
+from pipeline.path.placing import near_face_middle
+from pipeline.sources.base import TruthObject
+from pipeline.types import VEHICLES, FusedObject, Point2, Result, SourceKind
+
+MAX_RANGE_M = 60.0
+HALF_ANGLE_RAD = np.radians(35.0)
+"""Vehicles are looked for ahead to this range and this far to either side: about what a front camera sees."""
+SIDE_M, SHARE, LEAST_M = 2.5, 0.35, 2.0
+"""What may stand for a vehicle: no farther to its side, and no farther off lengthwise than this share of its range."""
+_NEVER = 1e6
+
+
+class Error(NamedTuple):
+    """One matched vehicle in one frame: who saw it, its true range, and believed minus true of its distance, of its
+    nearest face's middle (lateral, longitudinal), and of its velocity along the car's axis; metres, m/s."""
+
+    source: SourceKind
+    range_m: float
+    distance_m: float
+    lateral_m: float
+    longitudinal_m: float
+    speed_mps: float | None
+
+
+def vehicles(objects: Iterable[TruthObject]) -> list[TruthObject]:
+    """The labelled vehicles that are looked for."""
+    return [item for item in objects if item.label.lower() in LABELLED_VEHICLES and _looked_for(item)]
+
+
+def _looked_for(item: TruthObject) -> bool:
+    x, y, _ = item.cuboid.center
+    return x > 0.0 and abs(np.arctan2(y, x)) <= HALF_ANGLE_RAD and nearest_face_m(item) <= MAX_RANGE_M
+
+
+def face_of(item: TruthObject) -> Point2:
+    """The middle of a labelled cuboid's nearest face, ego x, y."""
+    a, b, c, d = ((float(x), float(y)) for x, y in item.cuboid.footprint())
+    return near_face_middle((a, b, c, d))
+
+
+def errors(result: Result, truth: FrameTruth) -> tuple[Error, ...]:
+    """One a labelled vehicle that an object seen in this frame stands for. Any object may, whatever its class: what is
+    asked is how well its place is known."""
+    wanted = vehicles(truth.objects)
+    seen = [
+        item for item in result.objects if item.bev is not None and item.distance_m is not None and not item.carried
+    ]
+    return tuple(_error(seen[k], wanted[n], truth) for n, k in _pairs(wanted, seen))
+
+
+def _pairs(wanted: Sequence[TruthObject], seen: Sequence[FusedObject]) -> list[tuple[int, int]]:
+    """One to one, the nearest first in sum."""
+    if not wanted or not seen:
+        return []
+    true = np.array([face_of(item) for item in wanted])
+    believed = _faces(seen)
+    off = np.abs(believed[None] - true[:, None])
+    ranges = np.array([nearest_face_m(item) for item in wanted])
+    reach = np.maximum(LEAST_M, SHARE * ranges)[:, None]
+    away = np.abs(np.array([item.distance_m for item in seen])[None] - ranges[:, None])
+    cost = np.where((off[..., 1] <= SIDE_M) & (away <= reach), np.hypot(off[..., 0], off[..., 1]), _NEVER)
+    rows, columns = linear_sum_assignment(cost)
+    return [(int(n), int(k)) for n, k in zip(rows, columns, strict=True) if cost[n, k] < _NEVER]
+
+
+def _faces(seen: Sequence[FusedObject]) -> F64:
+    """(K, 2) middles of nearest faces."""
+    return np.array([near_face_middle(item.bev) for item in seen if item.bev is not None])
+
+
+def _error(item: FusedObject, true: TruthObject, truth: FrameTruth) -> Error:
+    (x, y), (true_x, true_y) = _faces([item])[0], face_of(true)
+    range_m = nearest_face_m(true)
+    velocity = (truth.velocity_mps or {}).get(true.id) if true.id is not None else None
+    known = velocity is not None and item.velocity_mps is not None
+    speed = item.velocity_mps[0] - velocity[0] if known else None  # type: ignore[index]
+    return Error(
+        item.source, range_m, float(item.distance_m or 0.0) - range_m, float(y - true_y), float(x - true_x), speed
+    )
+
+
+def claims(result: Result, wanted: Sequence[TruthObject], within_m: float) -> list[FusedObject]:
+    """The objects that claim to be vehicles, to be judged as detections: those of a vehicle's class, in the field that
+    is looked at. A nameless LiDAR object claims nothing: it counts where it lies within ``within_m`` of a labelled
+    vehicle that no named one stands for, and is otherwise not judged, as roadside returns must not be."""
+    placed = [item for item in result.objects if item.bev is not None and item.distance_m is not None]
+    field = [item for item in placed if _in_field(item)]
+    named = [item for item in field if item.label in VEHICLES]
+    places = _faces(named).reshape(-1, 2)
+    nameless = [item for item in field if item.label is None]
+    extra: list[FusedObject] = []
+    for true in wanted:
+        face = np.array(face_of(true))
+        if len(places) and np.hypot(*(places - face).T).min() <= within_m:
+            continue
+        near = [(float(np.hypot(*(_faces([item])[0] - face))), item) for item in nameless if item not in extra]
+        distance, item = min(near, key=lambda pair: pair[0], default=(np.inf, None))
+        if item is not None and distance <= within_m:
+            extra.append(item)
+    return named + extra
+
+
+def _in_field(item: FusedObject) -> bool:
+    x, y = _faces([item])[0]
+    return bool(x > 0.0 and abs(np.arctan2(y, x)) <= HALF_ANGLE_RAD and (item.distance_m or 0.0) <= MAX_RANGE_M)

@@ -1,0 +1,291 @@
+"""Scores as a report: figures, errors in the form of the paper's Table 4, what happened when, and the worst frames."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from pipeline.evaluation.experiments.sections import Cell, Chart, Linked, Section, Series, Table
+from pipeline.evaluation.scores import tracking
+from pipeline.evaluation.scores.drive import DriveScore
+from pipeline.evaluation.scores.figures import Compared, Drives, Interval, Measured, compare, measure
+from pipeline.evaluation.scores.matching import MAX_RANGE_M, Error
+from pipeline.evaluation.scores.worst import Bad, changed, worst
+
+Link = Callable[[str, int], str]
+"""The address that opens a recording's URI at a frame."""
+SOURCES = ("VL", "V", "L")
+BIN_M = 10
+_ERRORS = ("distance_m", "lateral_m", "longitudinal_m", "speed_mps")
+_ERROR_COLUMNS = (
+    *("vehicles", "seen by", "count"),
+    *(
+        f"{what} {which}"
+        for what in ("distance", "lateral", "longitudinal", "speed")
+        for which in ("min", "max", "MAE")
+    ),
+)
+MOST = 20
+"""Rows of a list of frames."""
+
+
+def sections(run: Drives, link: Link, base: Drives | None = None) -> list[Section]:
+    """The report of a run over some drives; with ``base``, another run over the same ones, of how the two differ."""
+    found = [_scores(run), _errors(run), _moments(run, link), _worst(run, link)]
+    return [_comparison(base, run, link), *found] if base is not None else found
+
+
+def as_json(run: Drives, base: Drives | None = None) -> dict[str, Any]:
+    """Every figure, and every error table's row, for scripts."""
+    out: dict[str, Any] = {
+        "drives": [
+            {
+                "uri": drive.uri,
+                "frames": len(drive.frames),
+                "judged": sum(frame.judged is not None for frame in drive.frames),
+                "judged_s": drive.judged_s,
+                "notes": list(drive.notes),
+                "worst": [_bad_json(bad) for bad in worst([drive], MOST)],
+            }
+            for drive in run
+        ],
+        "figures": {each.figure.name: _measured_json(each) for each in measure(run)},
+        "errors": [dict(zip(_ERROR_COLUMNS, row, strict=True)) for row in _error_rows(run)],
+        "cut_ins": [_cut_in_json(drive, n) for drive in run for n in range(len(drive.cut_ins))],
+    }
+    if base is not None:
+        out["against"] = {each.figure.name: _compared_json(each) for each in compare(base, run)}
+    return out
+
+
+def _interval_json(interval: Interval | None) -> list[float] | None:
+    return None if interval is None else [interval.low, interval.high]
+
+
+def _measured_json(each: Measured) -> dict[str, Any]:
+    return {"value": each.value, "unit": each.figure.unit, "interval": _interval_json(each.interval)}
+
+
+def _compared_json(each: Compared) -> dict[str, Any]:
+    values = {"base": each.base, "run": each.run, "difference": each.difference}
+    return {**values, "interval": _interval_json(each.interval), "unit": each.figure.unit}
+
+
+def _bad_json(bad: Bad) -> dict[str, Any]:
+    return {"frame": bad.name, "index": bad.index, "verdict": bad.verdict, "error_m": bad.error_m}
+
+
+def _cut_in_json(drive: DriveScore, n: int) -> dict[str, Any]:
+    cut_in = drive.cut_ins[n]
+    return {"uri": drive.uri, "t_ns": cut_in.t_ns, "lead": cut_in.lead, "latency_s": cut_in.latency_s}
+
+
+# ---------------------------------------------------------------- figures
+
+
+def _scores(run: Drives) -> Section:
+    judged = sum(frame.judged is not None for drive in run for frame in drive.frames)
+    seconds = sum(drive.judged_s for drive in run)
+    text = [
+        f"{judged} frames with a known lead or none, {seconds:.1f} s of {_many(len(run), 'drive')}. Missed: there is a "
+        "lead, none is chosen. Wrong: another vehicle, or the lead at a distance that is too far off. Errors are mean "
+        "absolute ones, of every labelled vehicle that an object stands for.",
+        f"Vehicles are looked for to {MAX_RANGE_M:.0f} m and 35° to either side. Two places are one within "
+        f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class claims to be no vehicle: it counts where one is.",
+    ]
+    if len(run) < 2:
+        text.append("Confidence intervals come from drawing whole drives anew: one drive alone has none.")
+    if not tracking.is_available():
+        text.append(tracking.MISSING)
+    text += [f"{drive.uri}: {note}" for drive in run for note in drive.notes]
+    rows = tuple(
+        (each.figure.title, each.figure.unit, each.value, *_ends(each.interval), _GOOD[each.figure.better])
+        for each in measure(run)
+    )
+    columns = ("figure", "unit", "value", "95 % from", "to", "better")
+    per_drive = tuple(
+        (
+            drive.uri,
+            sum(frame.judged is not None for frame in drive.frames),
+            *(figure.value for figure in measure([drive]) if figure.figure.name in _PER_DRIVE),
+        )
+        for drive in run
+    )
+    titles = tuple(each.figure.title for each in measure(run) if each.figure.name in _PER_DRIVE)
+    tables = [Table("Figures", columns, rows)]
+    if len(run) > 1:
+        tables.append(Table("By drive", ("drive", "frames", *titles), per_drive))
+    return Section("scores", "Scores", tuple(text), tuple(tables))
+
+
+_GOOD = {"higher": "more", "lower": "less"}
+_PER_DRIVE = ("cipv_correct", "lead_missed", "cipv_false", "cipv_wrong", "lead_distance", "mota", "hota")
+
+
+def _ends(interval: Interval | None) -> tuple[float | None, float | None]:
+    return (None, None) if interval is None else (interval.low, interval.high)
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+# ---------------------------------------------------------------- errors
+
+
+def _all_errors(run: Drives) -> list[Error]:
+    return [error for drive in run for frame in drive.frames for error in frame.errors]
+
+
+def _errors(run: Drives) -> Section:
+    every = _all_errors(run)
+    return Section(
+        "errors",
+        "Errors by distance and by sensor",
+        (
+            "Sizes of errors: smallest, largest, mean. Distance: to the nearest point. Lateral and longitudinal: of "
+            "the middle of the nearest face. Speed: relative to ego, along the car's axis, against what neighbouring "
+            "labelled frames show.",
+        ),
+        (Table("Errors, m and m/s", _ERROR_COLUMNS, _error_rows(run), decimals=3),),
+        (
+            Chart(
+                "Distance error over range",
+                "true range m",
+                "believed − true m",
+                tuple(
+                    Series(
+                        source,
+                        tuple(error.range_m for error in every if error.source == source),
+                        tuple(error.distance_m for error in every if error.source == source),
+                        points_only=True,
+                    )
+                    for source in SOURCES
+                ),
+            ),
+        ),
+    )
+
+
+def _error_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
+    """By who saw it over all ranges, then by range bin, all together and by who saw it. Empty groups are left out."""
+    every = _all_errors(run)
+    groups: list[tuple[str, str, list[Error]]] = [("all", "any", every)]
+    groups += [("all", source, [e for e in every if e.source == source]) for source in SOURCES]
+    for low in range(0, int(MAX_RANGE_M), BIN_M):
+        inside = [error for error in every if low <= error.range_m < low + BIN_M]
+        name = f"{low}–{low + BIN_M} m"
+        groups.append((name, "any", inside))
+        groups += [(name, source, [e for e in inside if e.source == source]) for source in SOURCES]
+    return tuple((name, source, len(errors), *_table_4(errors)) for name, source, errors in groups if errors)
+
+
+def _table_4(errors: Iterable[Error]) -> tuple[float | None, ...]:
+    """Min, max and MAE of each error (paper, Table 4)."""
+    rows = list(errors)
+    figures: list[float | None] = []
+    for name in _ERRORS:
+        sizes = [abs(value) for error in rows if (value := getattr(error, name)) is not None]
+        figures += [min(sizes), max(sizes), sum(sizes) / len(sizes)] if sizes else [None, None, None]
+    return tuple(figures)
+
+
+# ---------------------------------------------------------------- what happened when
+
+
+def _moments(run: Drives, link: Link) -> Section:
+    leads = tuple(
+        (
+            Linked(f"#{each.lead}", link(drive.uri, drive.index_of(each.t_ns))),
+            drive.uri,
+            "when the recording began" if each.from_start else "during it",
+            each.range_m,
+            each.after_s,
+            each.drop_outs,
+        )
+        for drive in run
+        for each in drive.acquisitions
+    )
+    cut_ins = tuple(
+        (Linked(f"#{each.lead}", link(drive.uri, drive.index_of(each.t_ns))), drive.uri, each.latency_s)
+        for drive in run
+        for each in drive.cut_ins
+    )
+    acts = tuple(
+        (
+            Linked(each.kind, link(drive.uri, drive.index_of(each.t_ns))),
+            drive.uri,
+            "no" if each.due_ns is None else "yes",
+            "no" if each.acted_ns is None else "yes",
+            each.delay_s,
+            each.true_ttc_s,
+        )
+        for drive in run
+        for each in drive.alarms
+    )
+    tables = (
+        Table("Leads", ("lead", "drive", "led", "acquired at m", "after s", "drop-outs"), leads),
+        Table("Cut-ins", ("vehicle", "drive", "latency s"), cut_ins),
+        Table(
+            "Warning and braking",
+            ("what", "drive", "due", "done", "after it was due s", "true TTC then s"),
+            acts,
+            "Due: by the emergency brake's own limits, from the labelled lead's range and closing speed.",
+        ),
+    )
+    return Section("moments", "What happened when", (), tuple(table for table in tables if table.rows))
+
+
+# ---------------------------------------------------------------- frames to look at
+
+
+def _worst(run: Drives, link: Link) -> Section:
+    return Section(
+        "worst",
+        "Worst frames",
+        ("A link opens the dashboard at the frame, where `cipv serve` runs.",),
+        (_frames("The lead wrong first, then its distance", worst(run, MOST), link),),
+    )
+
+
+def _frames(title: str, bad: Sequence[Bad], link: Link) -> Table:
+    rows = tuple(
+        (
+            Linked(each.name, link(each.uri, each.index)),
+            each.uri,
+            each.before,
+            each.verdict,
+            each.truth_m,
+            each.distance_m,
+            each.error_m,
+        )
+        for each in bad
+    )
+    columns = ("frame", "drive", "in the base", "verdict", "lead at m", "CIPV at m", "error m")
+    if any(each.before for each in bad):
+        return Table(title, columns, rows)
+    return Table(title, (*columns[:2], *columns[3:]), tuple((*row[:2], *row[3:]) for row in rows))
+
+
+def _comparison(base: Drives, run: Drives, link: Link) -> Section:
+    rows = tuple(
+        (each.figure.title, each.figure.unit, each.base, each.run, each.difference, *_ends(each.interval), _word(each))
+        for each in compare(base, run)
+    )
+    columns = ("figure", "unit", "base", "run", "run − base", "95 % from", "to", "")
+    return Section(
+        "comparison",
+        "Against the base",
+        ("The same frames, judged by the same truth. Better or worse is said of what the interval sets apart from 0.",),
+        (
+            Table("Two runs", columns, rows),
+            _frames("Frames that changed for the worse or the better", changed(base, run, MOST), link),
+        ),
+    )
+
+
+def _word(each: Compared) -> str:
+    """Better or worse, where the drives agree so far."""
+    if each.interval is None or each.interval.low <= 0.0 <= each.interval.high:
+        return ""
+    return "better" if (each.interval.low > 0.0) == (each.figure.better == "higher") else "worse"

@@ -1,0 +1,115 @@
+"""A ``results.jsonl`` file read back, as far as scores need it."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import BadInput
+from pipeline.geometry import Cuboid
+from pipeline.results import VERSION
+from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth
+
+EMPTY = Layers(np.zeros((0, 4), np.float32), np.zeros(0, np.int32))
+_NO_HEALTH = SensorHealth(None, None, None, None, None)
+_NO_LINE = np.zeros((0, 2))
+_NO_PATH = Path("straight", _NO_LINE, _NO_LINE, _NO_LINE, 0.0, {}, {})
+
+
+def read_results(path: FilePath) -> list[Result]:
+    """The results of ``cipv run --out``, in order of time. Path, gates, layers and health are not read: they stay
+    empty. BadInput names the line that is no result."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (UnicodeDecodeError, ValueError):
+        raise BadInput(f"{path}: not a text file; expected the JSON lines of `cipv run --out`") from None
+    results = [_result(line, f"{path}, line {n}") for n, line in enumerate(text.splitlines(), 1) if line.strip()]
+    if not results:
+        raise BadInput(f"{path}: no results in it")
+    return sorted(results, key=lambda result: result.t_ns)
+
+
+def _result(line: str, where: str) -> Result:
+    try:
+        row = json.loads(line, parse_constant=_refuse)
+        if row["version"] != VERSION:
+            raise BadInput(f"{where}: version {row['version']!r} of results; this one reads {VERSION}")
+        return Result(
+            frame=str(row["frame"]),
+            t_ns=int(row["t_ns"]),
+            sensors=_NO_HEALTH,
+            ego=_ego(row["ego"], int(row["t_ns"])),
+            objects=tuple(_object(each) for each in row["objects"]),
+            path=_NO_PATH,
+            cipv=Cipv(**row["cipv"]) if row["cipv"] is not None else None,
+            rejected=(),
+            acc=AccCommand(**row["acc"]) if row["acc"] is not None else None,
+            notes=(),
+            timing_ms={},
+            layers=EMPTY,
+        )
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        raise BadInput(f"{where}: not a result as `cipv run --out` writes it") from None
+
+
+def _refuse(word: str) -> float:
+    raise ValueError(word)
+
+
+def _ego(row: dict[str, Any] | None, t_ns: int) -> EgoState | None:
+    if row is None:
+        return None
+    yaw_rate = row["yaw_rate_radps"]
+    return EgoState(t_ns, _number(row["speed_mps"]), None if yaw_rate is None else _number(yaw_rate))
+
+
+def _object(row: dict[str, Any]) -> FusedObject:
+    bev = [_numbers(corner, 2) for corner in row["bev"]] if row["bev"] is not None else None
+    if bev is not None and len(bev) != 4:
+        raise ValueError("four corners")
+    box = row["cuboid"]
+    if row["source"] not in ("V", "L", "VL"):
+        raise ValueError(row["source"])
+    return FusedObject(
+        id=int(row["id"]),
+        source=row["source"],
+        label=row["type"],
+        score=row["type_score"],
+        bbox=_some(row["bbox"], 4),  # type: ignore[arg-type]
+        bev=tuple(bev) if bev is not None else None,  # type: ignore[arg-type]
+        cuboid=Cuboid(_numbers(box["center"], 3), _numbers(box["size"], 3), _number(box["yaw_rad"]))  # type: ignore[arg-type]
+        if box is not None
+        else None,
+        closest_point=_some(row["closest_point"], 3),  # type: ignore[arg-type]
+        distance_m=_number(row["distance_m"]) if row["distance_m"] is not None else None,
+        distance_sigma_m=row["distance_sigma_m"],
+        velocity_mps=_some(row["velocity_mps"], 2),  # type: ignore[arg-type]
+        seen_by=row.get("seen_by", "" if row["carried"] else row["source"]),
+        hits=int(row["hits"]),
+        lidar_points=int(row["lidar_points"]),
+        lidar_track=None,
+        vision_track=None,
+        in_path=bool(row["in_path"]),
+        ttc_s=row["ttc_s"],
+    )
+
+
+def _some(values: list[Any] | None, count: int) -> tuple[float, ...] | None:
+    return None if values is None else _numbers(values, count)
+
+
+def _numbers(values: list[Any], count: int) -> tuple[float, ...]:
+    if len(values) != count:
+        raise ValueError(f"{count} numbers")
+    return tuple(_number(value) for value in values)
+
+
+def _number(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(value)
+    return number

@@ -1,0 +1,131 @@
+"""Detection and tracking of vehicles: precision, recall, MOTA, IDF1 and HOTA, as trackeval counts them.
+
+Places are compared, not picture boxes: the similarity of two is 1 − d/4 m, d between the middles of their nearest
+faces, so the usual threshold of 0.5 is the 2 m of nuScenes. HOTA averages over d = 3.8 … 0.2 m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from pipeline.evaluation.scores.matching import claims, face_of, vehicles
+from pipeline.evaluation.scores.truth import FrameTruth
+from pipeline.path.placing import near_face_middle
+from pipeline.types import I64, Point2, Result
+
+ZERO_M = 4.0
+"""From this distance on two places have nothing in common."""
+MATCH_M = 0.5 * ZERO_M
+MISSING = "Detection and tracking scores need trackeval: pip install 'cipv-studio[scores]'."
+Named = list[tuple[int, Point2]]
+"""Numbers and places of one frame's vehicles."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """One drive's counts in trackeval's own form, to be summed up with others'."""
+
+    clear: dict[str, Any]
+    identity: dict[str, Any]
+    hota: dict[str, Any]
+
+
+def is_available() -> bool:
+    """Whether trackeval is there."""
+    return _metrics() is not None
+
+
+def of_frames(frames: Sequence[tuple[Result, FrameTruth]]) -> Counts | None:
+    """A drive's labelled frames, in order. Null without trackeval."""
+    truths, believed = [], []
+    for result, truth in frames:
+        wanted = vehicles(truth.objects)
+        truths.append([(item.id or 0, face_of(item)) for item in wanted])
+        found = claims(result, wanted, MATCH_M)
+        believed.append([(item.id, near_face_middle(item.bev)) for item in found if item.bev is not None])
+    return count(truths, believed)
+
+
+def count(truths: Sequence[Named], believed: Sequence[Named]) -> Counts | None:
+    """Frame by frame: what is there, and what is believed to be."""
+    metrics = _metrics()
+    if metrics is None:
+        return None
+    data = _sequence(truths, believed)
+    return Counts(*(metric.eval_sequence(data) for metric in metrics))
+
+
+def precision_sums(counts: Counts) -> tuple[int, int]:
+    """Rightly claimed vehicles over all that were claimed."""
+    clear = counts.clear
+    return clear["CLR_TP"], clear["CLR_TP"] + clear["CLR_FP"]
+
+
+def recall_sums(counts: Counts) -> tuple[int, int]:
+    """Found vehicles over all that are there."""
+    clear = counts.clear
+    return clear["CLR_TP"], clear["CLR_TP"] + clear["CLR_FN"]
+
+
+def mota_sums(counts: Counts) -> tuple[int, int]:
+    """Found less falsely claimed less switched, over all that are there (CLEAR MOT)."""
+    clear = counts.clear
+    return clear["CLR_TP"] - clear["CLR_FP"] - clear["IDSW"], clear["CLR_TP"] + clear["CLR_FN"]
+
+
+def idf1_sums(counts: Counts) -> tuple[int, int]:
+    """Twice what is rightly named, over what is there and what is claimed."""
+    named = counts.identity
+    return 2 * named["IDTP"], 2 * named["IDTP"] + named["IDFN"] + named["IDFP"]
+
+
+def hota_of(drives: Sequence[Counts]) -> float | None:
+    """HOTA of several drives as one, 0–1; null where no vehicle is there."""
+    metrics = _metrics()
+    if metrics is None or not any(recall_sums(drive)[1] for drive in drives):
+        return None
+    whole = metrics[2].combine_sequences({str(n): drive.hota for n, drive in enumerate(drives)})
+    return float(np.mean(whole["HOTA"]))
+
+
+@cache
+def _metrics() -> tuple[Any, Any, Any] | None:
+    """CLEAR, Identity and HOTA; imported when first asked for, which takes a second."""
+    try:
+        from trackeval.metrics import CLEAR, HOTA, Identity
+    except ImportError:
+        return None
+    config = {"THRESHOLD": 0.5, "PRINT_CONFIG": False}
+    return CLEAR(config), Identity(config), HOTA()
+
+
+def _sequence(truths: Sequence[Named], believed: Sequence[Named]) -> dict[str, Any]:
+    """What trackeval asks of a sequence: ids counted from 0, and similarities (truth, believed) of each frame."""
+    gt_ids, gt_count = _from_zero(truths)
+    tracker_ids, tracker_count = _from_zero(believed)
+    return {
+        "num_timesteps": len(truths),
+        "num_gt_ids": gt_count,
+        "num_tracker_ids": tracker_count,
+        "num_gt_dets": sum(map(len, truths)),
+        "num_tracker_dets": sum(map(len, believed)),
+        "gt_ids": gt_ids,
+        "tracker_ids": tracker_ids,
+        "similarity_scores": [_similarity(a, b) for a, b in zip(truths, believed, strict=True)],
+    }
+
+
+def _from_zero(frames: Sequence[Named]) -> tuple[list[I64], int]:
+    known = {key: n for n, key in enumerate(sorted({key for frame in frames for key, _ in frame}))}
+    return [np.array([known[key] for key, _ in frame], dtype=np.int64) for frame in frames], len(known)
+
+
+def _similarity(truths: Named, believed: Named) -> np.ndarray:
+    a = np.array([place for _, place in truths]).reshape(-1, 1, 2)
+    b = np.array([place for _, place in believed]).reshape(1, -1, 2)
+    return np.clip(1.0 - np.hypot(*np.moveaxis(a - b, 2, 0)) / ZERO_M, 0.0, None)

@@ -1,0 +1,163 @@
+"""What is true of a drive, in the form that scores need: who leads in each frame, and every labelled vehicle with its
+velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from pipeline.errors import BadInput
+from pipeline.evaluation.lead import LeadRule, true_lead
+from pipeline.labels.model import LabelSet, LabelTrack
+from pipeline.params import TimeParams
+from pipeline.sources.base import Source, TruthObject
+from pipeline.types import Point2
+
+MAX_GAP_S = TimeParams().reset_gap_s
+"""After a longer gap the line's trackers start anew, so nothing is compared across it."""
+_LINK_M, _LINK_MPS = 2.0, 10.0
+_COUNTED = ("accepted", "corrected")
+
+
+class NoTruth(BadInput):
+    """A recording, or a file, without labels to judge by."""
+
+
+@dataclass(frozen=True)
+class FrameTruth:
+    """A labelled frame. lead: null where none leads. lead_known: false where one can't tell, or the lead's place is not
+    labelled. velocity_mps: relative to ego in the turning ego frame, by object id, of those that neighbouring frames
+    show."""
+
+    t_ns: int
+    objects: tuple[TruthObject, ...]
+    lead: TruthObject | None
+    lead_known: bool = True
+    velocity_mps: Mapping[int, Point2] | None = None
+
+
+@dataclass(frozen=True)
+class DriveTruth:
+    """uri: of the recording. ticks: of all its frames. frames: the labelled ones, by tick. cut_ins: tick and object of
+    each labelled cut-in; null where nobody labels them, and the true leads tell. notes: what a person should know."""
+
+    uri: str
+    ticks: tuple[int, ...]
+    frames: Mapping[int, FrameTruth]
+    cut_ins: tuple[tuple[int, int], ...] | None = None
+    notes: tuple[str, ...] = ()
+
+
+def of_source(source: Source, rule: LeadRule) -> DriveTruth:
+    """A recording's own labels. The lead is the nearest vehicle in the lane, the lane taken as straight.
+
+    NoTruth when no frame is labelled. Labels without identities are linked over frames by nearness.
+    """
+    ticks = tuple(source.t_ns(index) for index in range(len(source)))
+    labelled = {tick: truth for index, tick in enumerate(ticks) if (truth := source.truth(index)) is not None}
+    if not labelled:
+        raise NoTruth(f"{source.uri}: no frame of this recording is labelled")
+    notes: tuple[str, ...] = ()
+    if any(item.id is None for truth in labelled.values() for item in truth):
+        labelled = linked(labelled)
+        notes = (
+            "The labels follow no identity over time: vehicles are linked from frame to frame by nearness. Figures of "
+            "identity and speed rest on that.",
+        )
+    frames = {tick: FrameTruth(tick, truth, true_lead(truth, rule)) for tick, truth in labelled.items()}
+    return DriveTruth(source.uri, ticks, with_velocities(frames), None, notes)
+
+
+def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
+    """What people labelled. Only what a person or an import stands behind counts: a proposal nobody has looked at is
+    the pipeline's own opinion, and a rejected one is nobody's.
+
+    Where no lead is labelled at all, it is the nearest vehicle in the lane, the lane taken as straight. NoTruth when
+    nothing counts.
+    """
+    tracks = {track.id: track for track in labels.tracks if track.state in _COUNTED}
+    ranges = [each for each in labels.leads if each.state in _COUNTED]
+    objects = _objects_by_frame(tracks)
+    covered = {index for each in ranges for index in range(each.first, each.last + 1)}
+    frames = {}
+    for index in sorted((objects.keys() | covered) & set(range(len(labels.t_ns)))):
+        items, tick = objects.get(index, ()), labels.t_ns[index]
+        if not ranges:
+            frames[tick] = FrameTruth(tick, items, true_lead(items, rule))
+            continue
+        said = next((each.lead for each in ranges if each.first <= index <= each.last), None)
+        lead = next((item for item in items if item.id == said), None)
+        frames[tick] = FrameTruth(tick, items, lead, lead is not None or said == "none")
+    if not frames:
+        raise NoTruth(f"{labels.source}: none of these labels has been accepted")
+    events = [each for each in labels.events if each.kind == "cut_in" and each.state in _COUNTED and each.tracks]
+    cut_ins = tuple((labels.t_ns[each.frame], each.tracks[0]) for each in events) or None
+    left_out = len(labels.tracks) - len(tracks)
+    notes = (f"{left_out} of {len(labels.tracks)} tracks are not accepted and do not count.",) if left_out else ()
+    return DriveTruth(labels.source, labels.t_ns, with_velocities(frames), cut_ins, notes)
+
+
+def _objects_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[TruthObject, ...]]:
+    found: dict[int, tuple[TruthObject, ...]] = {}
+    for track in tracks.values():
+        for seen in track.sightings:
+            item = (TruthObject(track.label, seen.cuboid, track.id),) if seen.cuboid is not None else ()
+            found[seen.frame] = (*found.get(seen.frame, ()), *item)
+    return found
+
+
+def linked(labelled: Mapping[int, tuple[TruthObject, ...]]) -> dict[int, tuple[TruthObject, ...]]:
+    """Labels with an identity over time, by tick: each object is the one of its class nearest to where it was, one to
+    one, at most 2 m and what 10 m/s of relative speed add. After a gap all are new."""
+    given = 0
+    before: tuple[TruthObject, ...] = ()
+    last_ns: int | None = None
+    out = {}
+    for tick in sorted(labelled):
+        gap_s = (tick - last_ns) / 1e9 if last_ns is not None else np.inf
+        ids = _links(before, labelled[tick], _LINK_M + _LINK_MPS * gap_s) if gap_s <= MAX_GAP_S else {}
+        now = []
+        for n, item in enumerate(labelled[tick]):
+            if n not in ids:
+                given += 1
+            now.append(replace(item, id=ids.get(n, given)))
+        out[tick], before, last_ns = tuple(now), tuple(now), tick
+    return out
+
+
+def _links(before: tuple[TruthObject, ...], now: tuple[TruthObject, ...], gate_m: float) -> dict[int, int]:
+    """Places in ``now`` to the ids they go on with."""
+    if not before or not now:
+        return {}
+    places = [np.array([item.cuboid.center[:2] for item in items]) for items in (before, now)]
+    apart = np.hypot(*np.moveaxis(places[0][:, None] - places[1][None], 2, 0))
+    other = np.array([[a.label != b.label for b in now] for a in before])
+    cost = np.where(other | (apart > gate_m), 1e6, apart)
+    rows, columns = linear_sum_assignment(cost)
+    return {int(n): before[k].id for k, n in zip(rows, columns, strict=True) if cost[k, n] < 1e6}  # type: ignore[misc]
+
+
+def with_velocities(frames: Mapping[int, FrameTruth]) -> dict[int, FrameTruth]:
+    """Each frame with its objects' velocities, from where they are in the labelled frames before and after (one side
+    where there is only one, none across a gap)."""
+    order = [frames[tick] for tick in sorted(frames)]
+    places = [{item.id: item.cuboid.center[:2] for item in frame.objects if item.id is not None} for frame in order]
+    near = [(b.t_ns - a.t_ns) / 1e9 <= MAX_GAP_S for a, b in pairwise(order)]
+    out = {}
+    for n, frame in enumerate(order):
+        first = n - 1 if n > 0 and near[n - 1] else n
+        last = n + 1 if n < len(near) and near[n] else n
+        velocities = {}
+        for key in places[n]:
+            a, b = (first if key in places[first] else n), (last if key in places[last] else n)
+            if a == b:
+                continue
+            dt_s = (order[b].t_ns - order[a].t_ns) / 1e9
+            (x0, y0), (x1, y1) = places[a][key], places[b][key]
+            velocities[key] = ((x1 - x0) / dt_s, (y1 - y0) / dt_s)
+        out[frame.t_ns] = replace(frame, velocity_mps=velocities)
+    return out
