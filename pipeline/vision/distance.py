@@ -22,7 +22,9 @@ from pipeline.params import DistanceParams
 from pipeline.types import Box, CameraCalibration, Detection, VisionMeasurement
 
 BIN_M, BIN_LOW_M, BIN_HIGH_M = 10.0, 5.0, 60.0
-_BORDER_PX = 1.0
+_BORDER_PX, _BORDER_SHARE = 1.0, 0.02
+"""A box ends at the picture's edge when it is nearer than a pixel or this share of its own height: so exact are the
+sides that a network draws."""
 _NEAREST_M = 0.5
 _STEPS = 2
 _HUBER = 1.345
@@ -134,7 +136,8 @@ def height_at_reference(box: Box, focal_px: float | None, params: DistanceParams
 
 def is_cut(box: Box, camera: CameraCalibration | None) -> bool:
     """Whether the picture's upper or lower edge cuts the box. The lower one is known from the calibration only."""
-    return box[1] <= _BORDER_PX or (camera is not None and box[3] >= camera.height - _BORDER_PX)
+    near_px = max(_BORDER_PX, _BORDER_SHARE * (box[3] - box[1]))
+    return box[1] <= near_px or (camera is not None and box[3] >= camera.height - near_px)
 
 
 def range_at_depth(pixels: F64, depth_m: F64, alignment: Alignment, camera: CameraCalibration | None) -> F64:

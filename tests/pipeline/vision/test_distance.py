@@ -102,12 +102,21 @@ def test_in_print_only_cars_have_a_distance() -> None:
     [
         ((600.0, 0.0, 700.0, 300.0), False),
         ((600.0, 400.0, 700.0, 719.6), False),
+        ((400.0, 12.0, 1100.0, 709.0), False),
         ((0.0, 300.0, 80.0, 360.0), True),
         ((600.0, 300.0, 700.0, 360.0), True),
         ((600.0, 300.0, 700.0, 300.0), False),
         ((600.0, 300.0, 700.0, 305.0), False),
     ],
-    ids=["cut above", "cut below", "cut at the side", "whole", "no height", "beyond reach"],
+    ids=[
+        "cut above",
+        "cut below",
+        "filling the picture but for a network's error",
+        "cut at the side",
+        "whole",
+        "no height",
+        "beyond reach",
+    ],
 )
 def test_a_box_that_tells_no_distance_keeps_its_row(box: tuple[float, float, float, float], known: bool) -> None:
     seen = _one(Detection(box, "car", 0.9), _camera())
