@@ -84,9 +84,7 @@ function drawPending(ctx, span, row, done) {
   if (done >= span.count) return;
   const x = Math.max(span.left, span.x(done));
   ctx.strokeStyle = ui("line");
-  ctx.setLineDash([3, 4]);
   line(ctx, x, row.top + row.height / 2, span.left + span.width, row.top + row.height / 2);
-  ctx.setLineDash([]);
 }
 
 /**
@@ -100,7 +98,7 @@ function drawLane(ctx, span, row, curve, now, base) {
   const scale = scaleOf(curve, /** @type {(number|null)[][]} */ ([...lines, own ?? []]));
   const y = yOf(row, scale, curve.most);
   drawGrid(ctx, span, row, scale, y, curve.limit);
-  if (base) stroke(ctx, ofSeries(base, curve.key, curve.factor), span, y, { style: ui("dim"), width: 1, alpha: 0.7, dash: [4, 3] });
+  if (base) stroke(ctx, ofSeries(base, curve.key, curve.factor), span, y, { style: ui("dim"), width: 1, alpha: 0.75 });
   if (curve.also) stroke(ctx, ofSeries(now, curve.also, curve.factor), span, y, { style: ui("dim"), width: 1, alpha: 0.8 });
   const samples = ofSeries(now, curve.key, curve.factor);
   if (curve.isArea) fillArea(ctx, samples, span, y, color(curve.role));
@@ -125,17 +123,15 @@ function ofSeries({ done, columns }, key, factor) {
 
 /**
  * @param {CanvasRenderingContext2D} ctx @param {Samples} samples @param {Span} span @param {(value: number) => number} y
- * @param {{style: string, width: number, alpha?: number, dash?: number[]}} pen
+ * @param {{style: string, width: number, alpha?: number}} pen
  */
-function stroke(ctx, samples, span, y, { style, width, alpha = 1, dash = [] }) {
+function stroke(ctx, samples, span, y, { style, width, alpha = 1 }) {
   ctx.strokeStyle = style;
   ctx.lineWidth = width;
   ctx.globalAlpha = alpha;
-  ctx.setLineDash(dash);
   ctx.lineJoin = "round";
   traceLine(ctx, samples.value, samples, span, y);
   ctx.stroke();
-  ctx.setLineDash([]);
   ctx.globalAlpha = 1;
 }
 
@@ -143,10 +139,13 @@ function stroke(ctx, samples, span, y, { style, width, alpha = 1, dash = [] }) {
 function fillArea(ctx, samples, span, y, tint) {
   ctx.fillStyle = tint;
   ctx.globalAlpha = 0.35;
-  for (let i = Math.max(0, Math.floor(span.first)); i < Math.min(samples.count, span.end); i++) {
+  ctx.beginPath();
+  const step = Math.max(1, Math.floor(1 / span.perFrame)), floor = y(0);
+  for (let i = Math.max(0, Math.floor(span.first)); i < Math.min(samples.count, span.end); i += step) {
     const value = samples.value(i);
-    if (value) ctx.fillRect(span.x(i), y(value), Math.max(1, span.perFrame), y(0) - y(value));
+    if (value) ctx.rect(span.x(i), y(value), step * span.perFrame, floor - y(value));
   }
+  ctx.fill();
   ctx.globalAlpha = 1;
 }
 
@@ -161,10 +160,9 @@ function drawGrid(ctx, span, row, { low, high }, y, limit) {
   ctx.lineWidth = 1;
   if (low < 0) line(ctx, span.left, y(0), span.left + span.width, y(0));
   if (limit !== undefined) {
-    ctx.strokeStyle = ui("danger");
-    ctx.setLineDash([2, 4]);
-    line(ctx, span.left, y(limit), span.left + span.width, y(limit));
-    ctx.setLineDash([]);
+    ctx.fillStyle = ui("danger");
+    for (let x = span.left; x < span.left + span.width; x += 8) ctx.fillRect(x, y(limit), 3, 1);
+    ctx.fillStyle = ui("dim");
   }
   if (row.height < 28) return;
   ctx.textAlign = "right";

@@ -6,6 +6,8 @@
 /** @typedef {{key: keyof Columns, unit: string, label: string, title: string, factor: number, low: number, high: number,
  *   most?: number, digits: number, role: string, also?: keyof Columns, isArea?: boolean, limit?: number}} Curve */
 
+/** The pixel column that a line is in: the rows it covers there, and where it stands. @typedef {{x: number, top: number, bottom: number, last: number}} Column */
+
 /** low and high: what the scale reaches at least; most: what is higher is drawn there. also: a second, fainter line. */
 export const CURVES = /** @type {Curve[]} */ ([
   { key: "distance_m", label: "Distance", unit: "m", title: "Distance to the CIPV's nearest point", factor: 1, low: 0, high: 20, digits: 1, role: "cipv" },
@@ -34,7 +36,7 @@ export function scaleOf({ low, high, most, factor }, lines) {
 
 /**
  * A line through what is known; it is broken where nothing is, and where one object gives way to another. Where several
- * frames share a pixel column, the line covers their whole range.
+ * frames share a pixel column, the line covers their whole range once, so that an hour costs no more than a minute.
  * @param {CanvasRenderingContext2D} ctx
  * @param {(i: number) => number|null} value of the i-th sample, in the curve's unit
  * @param {{count: number, index: (i: number) => number, joined: (i: number) => boolean}} samples `joined`: sample i goes on from i − 1
@@ -42,24 +44,37 @@ export function scaleOf({ low, high, most, factor }, lines) {
  */
 export function traceLine(ctx, value, samples, span, y) {
   ctx.beginPath();
-  let pen = false;
+  /** @type {Column|null} */
+  let column = null;
+  let isAlone = false;
+  const end = () => {
+    if (column && column.bottom > column.top) {
+      ctx.lineTo(column.x, column.top);
+      ctx.lineTo(column.x, column.bottom);
+      ctx.lineTo(column.x, column.last);
+    } else if (column && isAlone) ctx.lineTo(column.x + 1, column.last);
+    column = null;
+  };
   for (let i = 0; i < samples.count; i++) {
-    const index = samples.index(i);
-    if (index < span.first - 1 || index > span.end) {
-      pen = false;
+    const index = samples.index(i), now = index < span.first - 1 || index > span.end ? null : value(i);
+    if (now === null || !samples.joined(i)) {
+      end();
+      if (now === null) continue;
+    }
+    const x = Math.round(span.middle(index)), v = y(now);
+    const open = /** @type {Column|null} */ (column);
+    if (open?.x === x) {
+      column = { x, top: Math.min(open.top, v), bottom: Math.max(open.bottom, v), last: v };
       continue;
     }
-    const now = value(i);
-    if (now === null) {
-      pen = false;
-      continue;
-    }
-    const x = span.middle(index), isAlone = !pen && (i + 1 >= samples.count || value(i + 1) === null || !samples.joined(i + 1));
-    if (pen && samples.joined(i)) ctx.lineTo(x, y(now));
-    else ctx.moveTo(isAlone ? x - 1 : x, y(now));
-    if (isAlone) ctx.lineTo(x + 1, y(now));
-    pen = true;
+    isAlone = open === null;
+    if (open) {
+      end();
+      ctx.lineTo(x, v);
+    } else ctx.moveTo(x - 0.5, v);
+    column = { x, top: v, bottom: v, last: v };
   }
+  end();
 }
 
 /** @param {Row} row @param {{low: number, high: number}} scale @param {number} [most] @returns {(value: number) => number} */
