@@ -17,9 +17,6 @@ import { Span } from "./span.js";
 
 const LABELS_PX = 132;
 const EDGE_PX = 8;
-/** Drawn by the processor: a few thousand short strokes are slower where a graphics card is imitated, and quick enough
- * where there is one. */
-const DRAWN = { willReadFrequently: true };
 
 const back = $("#timeline-back", HTMLCanvasElement), front = $("#timeline-front", HTMLCanvasElement);
 const span = new Span();
