@@ -17,21 +17,25 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 
-from app.access import Access, Guard
+from app.access import WILDCARDS, Access, Guard, is_loopback
 from app.clips.jobs import Jobs
 from app.drive.marks import Marks
 from app.engine import Engine
+from app.limits import LARGEST_MESSAGE, BodyLimit
 from app.looks import Looks
+from app.metrics import Metrics
 from app.recording import SESSIONS
 from app.routes.alignment import alignment_router
 from app.routes.clips import clips_router
 from app.routes.drive import drive_router
+from app.routes.health import health_router
 from app.routes.params import params_router
 from app.routes.playback import playback_router
 from app.routes.recording import recording_router
 from app.routes.rerun import rerun_router
 from app.routes.runs import runs_router
 from app.stream import Stream
+from app.tokens import Tokens
 from app.views.colors import palette_css
 from app.views.rerun_web import ViewerFiles
 from app.views.viser_proxy import viser_router
@@ -53,25 +57,30 @@ def create_app(
     hosts: Iterable[str] = (),
     marks: Marks | None = None,
     looks: Looks | None = None,
+    tokens: Tokens | None = None,
 ) -> FastAPI:
     """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
-    marked moments are kept; null forgets them at the end. ``looks``: hears what people look at."""
+    marked moments are kept; null forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
+    comes must have; null where only this machine can come."""
     access = Access(hosts)
     stream = Stream(looks)
-    jobs, viewer = Jobs(engine.drives.changed), ViewerFiles()
+    jobs, viewer, metrics = Jobs(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
 
     @asynccontextmanager
     async def listening(_: FastAPI) -> AsyncIterator[None]:
         stream.publish(engine.snapshot)
-        end = engine.listen(stream.publish)
+        ends = [engine.listen(stream.publish), engine.listen(metrics.saw)]
         yield
-        end()
+        for end in ends:
+            end()
         await asyncio.to_thread(jobs.close)
         viewer.close()
 
     app = FastAPI(title="CIPV Studio", version="1", docs_url=None, redoc_url=None, lifespan=listening)
-    app.add_middleware(Guard, access=access)
+    app.add_middleware(BodyLimit)
+    app.add_middleware(Guard, access=access, tokens=tokens)  # the last one added is the first to be asked
     app.add_exception_handler(RequestValidationError, _one_sentence)
+    app.include_router(health_router(engine, metrics))
     app.include_router(playback_router(engine, stream))
     app.include_router(params_router(engine))
     app.include_router(recording_router(engine))
@@ -119,19 +128,21 @@ def serve(
     looks: Looks | None = None,
     on_ready: Callable[[str], None] | None = None,
 ) -> None:
-    """Serve until Ctrl-C. Starts and stops the engine; prints the page's address on a line of its own when it answers.
+    """Serve until Ctrl-C. Starts and stops the engine; prints the page's address on a line of its own when it answers,
+    and links with tokens where other machines can come.
 
-    PortTaken before anything is started.
+    PortTaken and BadInput (a weak token) before anything is started.
     """
+    tokens = None if is_loopback(host) and not tuple(hosts) else Tokens.from_environment()
     bound = listen_socket(host, port, strict=strict_port)
     number = bound.getsockname()[1]
     if port not in (0, number):
         print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
-    named = f"[{host}]" if ":" in host else host
-    app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks)
+    address = f"http://{_reachable(host)}:{number}"
+    app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks, tokens)
     engine.start()
     try:
-        Server(app, f"http://{named}:{number}", on_ready).run(sockets=[bound])
+        Server(app, address, on_ready, tokens).run(sockets=[bound])
     except KeyboardInterrupt:
         pass  # uvicorn raises the signal again once it has shut down
     finally:
@@ -142,21 +153,48 @@ def serve(
 class Server(uvicorn.Server):
     """Says where it is as soon as it answers. Compressing the stream would cost more than sending it."""
 
-    def __init__(self, app: FastAPI, address: str, on_ready: Callable[[str], None] | None) -> None:
+    def __init__(
+        self, app: FastAPI, address: str, on_ready: Callable[[str], None] | None, tokens: Tokens | None = None
+    ) -> None:
         super().__init__(
             uvicorn.Config(
-                app, log_level="warning", access_log=False, ws_per_message_deflate=False, timeout_graceful_shutdown=1
+                app,
+                log_level="warning",
+                access_log=False,
+                ws_per_message_deflate=False,
+                ws_max_size=LARGEST_MESSAGE,
+                timeout_graceful_shutdown=1,
             )
         )
         self._address = address
+        self._tokens = tokens
         self._on_ready = on_ready
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         if self.started:
             print(self._address, flush=True)
+            link = self._address
+            if self._tokens is not None:
+                link = f"{self._address}/?token={self._tokens.person}"
+                print(f"everything:         {link}", flush=True)
+                print(f"display in the car: {self._address}/drive/?token={self._tokens.display}", flush=True)
             if self._on_ready is not None:
-                await asyncio.to_thread(self._on_ready, self._address)
+                await asyncio.to_thread(self._on_ready, link)
+
+
+def _reachable(host: str) -> str:
+    """How a person writes the host in an address: for every interface, the one that leads out."""
+    if host in WILDCARDS:
+        probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            probe.connect(("192.0.2.1", 9))  # sends nothing: it only asks the system which way it would go
+            host = probe.getsockname()[0]
+        except OSError:
+            host = socket.gethostname()
+        finally:
+            probe.close()
+    return f"[{host}]" if ":" in host else host
 
 
 class _Pages(StaticFiles):

@@ -18,10 +18,12 @@ import asyncio
 import json
 import threading
 import time
+from dataclasses import dataclass
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from app.access import is_display
 from app.encode import Encoder
 from app.looks import Looks
 from app.sent_picture import MAX_WIDTH_PX, width_for
@@ -35,14 +37,24 @@ _LARGEST_PING = 1e15
 _WIDEST_PX = 4096
 
 
+@dataclass
+class Traffic:
+    """Frames over all clients since the start: sent, and dropped unsent for a newer one."""
+
+    sent: int = 0
+    dropped: int = 0
+
+
 class Slot:
     """The newest unsent messages of one client, by kind. Lives on the server's event loop.
 
-    ``paced``: frames wait for ``painted``. picture_px: how wide it shows the picture, null until it says so."""
+    ``paced``: frames wait for ``painted``. ``traffic``: where frames are counted. picture_px: how wide it shows the
+    picture, null until it says so."""
 
-    def __init__(self, paced: bool = False) -> None:
+    def __init__(self, paced: bool = False, traffic: Traffic | None = None) -> None:
         self.picture_px: int | None = None
         self._paced = paced
+        self._traffic = traffic or Traffic()
         self._under_way = 0
         self._unsent: dict[str, str | bytes] = {}
         self._newest: dict[str, int] = {}
@@ -53,7 +65,8 @@ class Slot:
         if order < self._newest.get(kind, order):
             return
         self._newest[kind] = order
-        self._unsent.pop(kind, None)  # so that the kinds stand in the order in which they came
+        replaced = self._unsent.pop(kind, None)  # so that the kinds stand in the order in which they came
+        self._traffic.dropped += kind == "frame" and replaced is not None
         self._unsent[kind] = message
         self._filled.set()
 
@@ -70,6 +83,7 @@ class Slot:
             is_full = self._paced and self._under_way >= FRAMES_UNDER_WAY
             ready = {kind: message for kind, message in self._unsent.items() if not (is_full and kind == "frame")}
             self._under_way += "frame" in ready
+            self._traffic.sent += "frame" in ready
             self._unsent = {kind: message for kind, message in self._unsent.items() if kind not in ready}
             kinds = list(ready)
             if "frame" in kinds and "state" in kinds and kinds.index("state") < kinds.index("frame"):
@@ -82,6 +96,7 @@ class Stream:
     """Between the engine's thread, which publishes, and the clients' slots on the event loop."""
 
     def __init__(self, looks: Looks | None = None) -> None:
+        self.traffic = Traffic()
         self._looks = looks or Looks()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._slots: list[Slot] = []
@@ -90,6 +105,11 @@ class Stream:
         self._frame: tuple[int, bytes | None] = (-1, None)
         self._width_px = MAX_WIDTH_PX
         self._snapshot: Snapshot | None = None
+
+    @property
+    def clients(self) -> int:
+        """How many watch now."""
+        return len(self._slots)
 
     def publish(self, snapshot: Snapshot) -> None:
         """Called by the engine. Encodes only when somebody watches, and a result only once."""
@@ -108,7 +128,7 @@ class Stream:
         """Feed one client until it leaves. It may send ``{"ping": t}`` and gets ``t`` back with the server's clock."""
         await socket.accept()
         self._loop = asyncio.get_running_loop()
-        slot = Slot(paced=socket.query_params.get("paced") == "1")
+        slot = Slot(socket.query_params.get("paced") == "1", self.traffic)
         slot.picture_px = _width(socket.query_params.get("picture_px"))
         self._slots.append(slot)
         self._fit_width()
@@ -143,7 +163,7 @@ class Stream:
                     await self._put_newest(slot, self._snapshot)
             if said.get("painted") is True:
                 slot.painted()
-            if "selected" in said and _is_id_or_null(said["selected"]):
+            if "selected" in said and _is_id_or_null(said["selected"]) and not is_display(socket):
                 self._looks.select(said["selected"])
             if isinstance(said.get("hides_3d"), bool):
                 self._looks.hide(slot, said["hides_3d"])

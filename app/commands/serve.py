@@ -29,11 +29,11 @@ class ServerOptions:
     """Where the dashboard listens."""
 
     host: str = "127.0.0.1"
-    """Address to listen on"""
+    """Address to listen on; other machines (0.0.0.0) get in by a link with a token that is shown at the start"""
     port: int | None = None
     """Port to listen on; without one, the first free from 8420 on"""
     allow_host: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
-    """Another name this server may be called by (repeatable)"""
+    """Another name this server may be called by (repeatable), as behind a proxy; then a token is needed"""
     browser: bool = False
     """Open a browser once the dashboard answers"""
     rerun: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None

@@ -10,6 +10,7 @@ from app.clips.exports import Clip, Kind, submit
 from app.clips.jobs import Job, Jobs, JobState
 from app.engine import Engine
 from app.routes.refusals import open_recording, refusing
+from app.routes.shapes import Done
 
 
 class ClipChoice(BaseModel):
@@ -62,11 +63,11 @@ def clips_router(engine: Engine, jobs: Jobs) -> APIRouter:
         return _json(job)
 
     @router.delete("/jobs/{number}")
-    def cancel(number: str) -> dict[str, str]:
+    def cancel(number: str) -> Done:
         """Stop an export, or forget one that has ended."""
         if not jobs.cancel(number):
             raise HTTPException(404, "there is no such export")
-        return {"status": "removed"}
+        return Done(status="removed")
 
     @router.get("/jobs/{number}/file", response_class=FileResponse)
     def download(number: str) -> FileResponse:

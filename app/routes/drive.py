@@ -15,6 +15,7 @@ from app.drive.recording import Recording
 from app.drive.run import DriveRun
 from app.engine import Engine
 from app.routes.refusals import open_recording, refusing
+from app.routes.shapes import Done
 
 
 class Columns(BaseModel):
@@ -130,13 +131,13 @@ def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
         return MarkJson(id=made.id, index=made.index, text=made.text)
 
     @router.delete("/marks/{number}")
-    def unmark(number: int) -> dict[str, str]:
+    def unmark(number: int) -> Done:
         """Take a mark away."""
         uri = engine.snapshot.uri
         if uri is None or not marks.remove(uri, number):
             raise HTTPException(404, f"there is no mark {number}")
         drives.changed()
-        return {"status": "removed"}
+        return Done(status="removed")
 
     return router
 

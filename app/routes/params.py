@@ -6,13 +6,17 @@ from typing import Any, get_args, get_origin
 
 import numpy as np
 from fastapi import APIRouter, HTTPException, Response
+from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
 from app.engine import Engine
+from app.routes.shapes import ParamsJson
 from pipeline.alignment import angular_from_calibration
 from pipeline.params import PRESETS, Params, ParamsError, preset, to_yaml, with_changes
 from pipeline.types import CameraCalibration
+
+_ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": ParamsJson}}
 
 
 class Changes(BaseModel):
@@ -30,6 +34,8 @@ class Replacement(BaseModel):
 
 
 class PresetChoice(BaseModel):
+    """A preset's name."""
+
     name: str = Field(examples=list(PRESETS))
 
 
@@ -37,13 +43,13 @@ def params_router(engine: Engine) -> APIRouter:
     """Routes over the engine's parameters."""
     router = APIRouter(prefix="/api", tags=["parameters"])
 
-    @router.get("/params")
-    def read() -> dict[str, Any]:
+    @router.get("/params", responses=_ANSWER)
+    def read() -> JSONResponse:
         """Sections with every parameter's bounds, step, unit and help; values; what null means now."""
         return _params_json(engine)
 
-    @router.patch("/params")
-    def change(body: Changes) -> dict[str, Any]:
+    @router.patch("/params", responses=_ANSWER)
+    def change(body: Changes) -> JSONResponse:
         """Change some parameters. The shown frame is run again at once. 422 with one sentence for a bad value."""
         try:
             engine.control.change_params(body.changes, final=body.final)
@@ -51,8 +57,8 @@ def params_router(engine: Engine) -> APIRouter:
             raise HTTPException(422, str(error)) from None
         return _params_json(engine)
 
-    @router.post("/params")
-    def replace_all(body: Replacement) -> dict[str, Any]:
+    @router.post("/params", responses=_ANSWER)
+    def replace_all(body: Replacement) -> JSONResponse:
         """Replace every parameter: a preset's values, then those that are given."""
         try:
             engine.control.set_params(with_changes(preset(body.preset), body.values), body.preset)
@@ -60,22 +66,22 @@ def params_router(engine: Engine) -> APIRouter:
             raise HTTPException(422, str(error)) from None
         return _params_json(engine)
 
-    @router.post("/params/undo")
-    def undo() -> dict[str, Any]:
+    @router.post("/params/undo", responses=_ANSWER)
+    def undo() -> JSONResponse:
         """Back to the parameters before the last change. 409 when there is none."""
         if not engine.control.undo():
             raise HTTPException(409, "there is nothing to undo")
         return _params_json(engine)
 
-    @router.post("/params/redo")
-    def redo() -> dict[str, Any]:
+    @router.post("/params/redo", responses=_ANSWER)
+    def redo() -> JSONResponse:
         """The change that was undone last, again. 409 when there is none."""
         if not engine.control.redo():
             raise HTTPException(409, "there is nothing to redo")
         return _params_json(engine)
 
-    @router.post("/params/preset")
-    def choose_preset(body: PresetChoice) -> dict[str, Any]:
+    @router.post("/params/preset", responses=_ANSWER)
+    def choose_preset(body: PresetChoice) -> JSONResponse:
         """Replace every parameter by a preset's."""
         try:
             engine.control.set_params(preset(body.name), body.name)
@@ -117,9 +123,9 @@ def effective(camera: CameraCalibration | None) -> dict[str, float]:
     }
 
 
-def _params_json(engine: Engine) -> dict[str, Any]:
+def _params_json(engine: Engine) -> JSONResponse:
     wish, tick = engine.control.peek(), engine.snapshot.tick
-    return {
+    answer = {
         "preset": wish.preset,
         "presets": list(PRESETS),
         "revision": wish.params_revision,
@@ -130,6 +136,7 @@ def _params_json(engine: Engine) -> dict[str, Any]:
         "base": flat(preset(wish.preset)),
         "effective": effective(tick.frame.camera if tick else None),
     }
+    return JSONResponse(answer)
 
 
 def flat(params: Params) -> dict[str, Any]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from fastapi import APIRouter, HTTPException, WebSocket
+from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.catalog import catalog
 from app.engine import Engine
+from app.routes.shapes import Done, ResultJson, SourceJson, SourcesJson, StateJson
 from app.stream import Stream
 from pipeline.results import to_json
 
@@ -26,6 +26,8 @@ class PlaybackChange(BaseModel):
 
 
 class SourceChoice(BaseModel):
+    """What to open: a path or a URI."""
+
     uri: str = Field(min_length=1, max_length=4096, examples=["sim:straight"])
 
 
@@ -33,26 +35,21 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
     """Routes over the engine's playback."""
     router = APIRouter(prefix="/api", tags=["playback"])
 
-    @router.get("/healthz")
-    def healthz() -> dict[str, Any]:
-        """Answers while the server lives; ``engine`` is false when its worker does not."""
-        return {"status": "ok", "engine": engine.alive}
-
-    @router.get("/state")
-    def state() -> dict[str, Any]:
+    @router.get("/state", responses={200: {"model": StateJson}})
+    def state() -> JSONResponse:
         """Source, position, playback, notices."""
-        return engine.snapshot.state_json()
+        return JSONResponse(engine.snapshot.state_json())
 
-    @router.get("/result")
-    def result() -> dict[str, Any]:
+    @router.get("/result", responses={200: {"model": ResultJson}})
+    def result() -> JSONResponse:
         """The shown frame's result; 404 before there is one."""
         tick = engine.snapshot.tick
         if tick is None:
             raise HTTPException(404, "no frame is shown yet")
-        return to_json(tick.result)
+        return JSONResponse(to_json(tick.result))
 
     @router.post("/playback", status_code=202)
-    def playback(body: PlaybackChange) -> dict[str, str]:
+    def playback(body: PlaybackChange) -> Done:
         """Ask for a change; the stream brings what comes of it."""
         standing = body.model_dump(include={"playing", "speed", "loop"}, exclude_none=True)
         if standing:
@@ -61,18 +58,19 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
             engine.control.seek(body.seek)
         if body.step is not None:
             engine.control.step(body.step)
-        return {"status": "accepted"}
+        return Done(status="accepted")
 
     @router.get("/sources")
-    def sources() -> dict[str, Any]:
+    def sources() -> SourcesJson:
         """What can be opened without typing, and what is open."""
-        return {"open": engine.snapshot.uri, "sources": [{"uri": uri, "title": title} for uri, title in catalog()]}
+        offered = [SourceJson(uri=uri, title=title) for uri, title in catalog()]
+        return SourcesJson(open=engine.snapshot.uri, sources=offered)
 
     @router.post("/source", status_code=202)
-    def open_source(body: SourceChoice) -> dict[str, str]:
+    def open_source(body: SourceChoice) -> Done:
         """Open another recording. One that cannot be opened leaves the old one, with a notice."""
         engine.control.change(uri=body.uri.strip(), target=None, steps=0)
-        return {"status": "accepted"}
+        return Done(status="accepted")
 
     @router.websocket("/stream")
     async def stream_frames(socket: WebSocket) -> None:

@@ -7,23 +7,14 @@ from pydantic import BaseModel
 
 from app.engine import Engine
 from app.routes.refusals import refusing
+from app.routes.shapes import RecordingJson
 from pipeline.recording.recorder import RecordingState
 
 
 class RecordingChoice(BaseModel):
+    """on: begin, or end."""
+
     on: bool
-
-
-class RecordingJson(BaseModel):
-    """file: the path on the server. seconds: of the drive. dropped: frames that the disk was too slow for; show it
-    whenever it is not 0. error: why the recording ended by itself (a full disk); what came before is kept."""
-
-    file: str
-    frames: int
-    seconds: float
-    bytes: int
-    dropped: int
-    error: str | None
 
 
 def recording_router(engine: Engine) -> APIRouter:
