@@ -35,13 +35,13 @@ class Metrics:
             "cipv_detector_seconds",
             "Of one picture that no cache knew",
             buckets=_BUCKETS_S,
-            **of,
+            registry=to,
         )
         self._latency = Histogram(
             "cipv_result_to_sent_seconds",
             "From a result to its message for all",
             buckets=_BUCKETS_S,
-            **of,
+            registry=to,
         )
         self._registry.register(_Now(engine, stream, self._rate_hz))
         ProcessCollector(registry=self._registry)
