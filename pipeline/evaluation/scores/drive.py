@@ -45,11 +45,13 @@ class FrameScore:
 
 @dataclass(frozen=True)
 class DriveScore:
-    """One drive. judged_s: how long the lead was judged. tracking: null without trackeval."""
+    """One drive. judged_s: how long the lead was judged; guarded_s: for how much of it ego speed was known, and with it
+    warning and braking. tracking: null without trackeval."""
 
     uri: str
     frames: tuple[FrameScore, ...]
     judged_s: float
+    guarded_s: float
     switches: int
     acquisitions: tuple[Acquisition, ...]
     cut_ins: tuple[CutIn, ...]
@@ -69,12 +71,13 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
     if not pairs:
         raise BadInput(f"{truth.uri}: no labelled frame has a result; these results are of another recording")
     index = {tick: n for n, tick in enumerate(truth.ticks)}
-    frames, moments = [], []
+    frames, moments, guarded = [], [], []
     for result, known in pairs:
         judged = judge_lead(result, known.lead, rules.lead) if known.lead_known else None
         frames.append(FrameScore(index[result.t_ns], result.t_ns, result.frame, judged, errors(result, known)))
         if judged is not None:
             moments.append(_moment(result, known, judged))
+            guarded += moments[-1:] if result.acc is not None else []
     notes = truth.notes
     if len(pairs) < len(truth.frames):
         notes = (*notes, f"{len(truth.frames) - len(pairs)} labelled frames have no result and do not count.")
@@ -82,6 +85,7 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
         truth.uri,
         tuple(frames),
         judged_s(moments),
+        judged_s(guarded),
         count_switches(moments),
         tuple(acquisitions(moments)),
         tuple(cut_ins(moments, truth.frames, truth.cut_ins)),

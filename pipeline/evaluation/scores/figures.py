@@ -181,8 +181,8 @@ def _never_acted(kind: Kind, drive: DriveScore) -> Sums:
     return _sums(100.0 * (each.acted_ns is None) for each in _alarms(kind, drive) if each.due_ns is not None)
 
 
-def _without_danger(kind: Kind, drive: DriveScore) -> int:
-    return sum(alarm.due_ns is None for alarm in _alarms(kind, drive))
+def _without_danger(kind: Kind, drive: DriveScore) -> Sums:
+    return float(sum(alarm.due_ns is None for alarm in _alarms(kind, drive))), drive.guarded_s / 60.0
 
 
 FIGURES: tuple[Figure, ...] = (
@@ -212,7 +212,7 @@ FIGURES: tuple[Figure, ...] = (
         "warnings without danger",
         "a minute",
         "lower",
-        partial(_a_minute, partial(_without_danger, "warning")),
+        partial(_without_danger, "warning"),
     ),
     Figure("braking_delay", "braking after it was due", "s", "lower", partial(_delay, "braking")),
     Figure("braking_missing", "due braking not done", "%", "lower", partial(_never_acted, "braking")),
@@ -221,7 +221,7 @@ FIGURES: tuple[Figure, ...] = (
         "braking without danger",
         "a minute",
         "lower",
-        partial(_a_minute, partial(_without_danger, "braking")),
+        partial(_without_danger, "braking"),
     ),
 )
 """In the order of a report. Errors are mean absolute ones."""

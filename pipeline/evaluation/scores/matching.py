@@ -11,6 +11,7 @@ from scipy.optimize import linear_sum_assignment
 from pipeline.evaluation.lead import LABELLED_VEHICLES, nearest_face_m
 from pipeline.evaluation.scores.truth import FrameTruth
 from pipeline.geometry import F64
+from pipeline.params import CipvParams
 from pipeline.path.placing import near_face_middle
 from pipeline.sources.base import TruthObject
 from pipeline.types import VEHICLES, FusedObject, Point2, Result, SourceKind
@@ -18,8 +19,11 @@ from pipeline.types import VEHICLES, FusedObject, Point2, Result, SourceKind
 MAX_RANGE_M = 60.0
 HALF_ANGLE_RAD = np.radians(35.0)
 """Vehicles are looked for ahead to this range and this far to either side: about what a front camera sees."""
-SIDE_M, SHARE, LEAST_M = 2.5, 0.35, 2.0
-"""What may stand for a vehicle: no farther to its side, and no farther off lengthwise than this share of its range."""
+SIDE_M, LEAST_M = 2.5, 2.0
+SHARE: dict[SourceKind, float] = {"V": 0.35, "VL": 0.15, "L": 0.15}
+"""What may stand for a vehicle: no farther to its side, and no farther off lengthwise than this share of its range. A
+LiDAR's range is right or that of another thing; a box height's may be off by a third."""
+CONFIRM_HITS = CipvParams().confirm_hits
 _NEVER = 1e6
 
 
@@ -69,7 +73,8 @@ def _pairs(wanted: Sequence[TruthObject], seen: Sequence[FusedObject]) -> list[t
     believed = _faces(seen)
     off = np.abs(believed[None] - true[:, None])
     ranges = np.array([nearest_face_m(item) for item in wanted])
-    reach = np.maximum(LEAST_M, SHARE * ranges)[:, None]
+    shares = np.array([SHARE[item.source] for item in seen])
+    reach = np.maximum(LEAST_M, ranges[:, None] * shares[None])
     away = np.abs(np.array([item.distance_m for item in seen])[None] - ranges[:, None])
     cost = np.where((off[..., 1] <= SIDE_M) & (away <= reach), np.hypot(off[..., 0], off[..., 1]), _NEVER)
     rows, columns = linear_sum_assignment(cost)
@@ -94,9 +99,13 @@ def _error(item: FusedObject, true: TruthObject, truth: FrameTruth) -> Error:
 
 def claims(result: Result, wanted: Sequence[TruthObject], within_m: float) -> list[FusedObject]:
     """The objects that claim to be vehicles, to be judged as detections: those of a vehicle's class, in the field that
-    is looked at. A nameless LiDAR object claims nothing: it counts where it lies within ``within_m`` of a labelled
-    vehicle that no named one stands for, and is otherwise not judged, as roadside returns must not be."""
+    is looked at, seen in this frame, by both sensors or often enough (as a lead must be).
+
+    A nameless LiDAR object claims nothing: it counts where it lies within ``within_m`` of a labelled vehicle that no
+    named one stands for, and is otherwise not judged, as roadside returns must not be.
+    """
     placed = [item for item in result.objects if item.bev is not None and item.distance_m is not None]
+    placed = [item for item in placed if not item.carried and (item.source == "VL" or item.hits >= CONFIRM_HITS)]
     field = [item for item in placed if _in_field(item)]
     named = [item for item in field if item.label in VEHICLES]
     places = _faces(named).reshape(-1, 2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import numpy as np
 
@@ -21,13 +21,13 @@ _NO_PATH = Path("straight", _NO_LINE, _NO_LINE, _NO_LINE, 0.0, {}, {})
 
 
 def read_results(path: FilePath) -> list[Result]:
-    """The results of ``cipv run --out``, in order of time. Path, gates, layers and health are not read: they stay
-    empty. BadInput names the line that is no result."""
+    """The results of ``cipv run --out``, in order of time. What is not judged (path, gates, health, pedals) is
+    not read and stays empty. BadInput names the line that is no result."""
     try:
         text = path.read_text(encoding="utf-8")
     except (UnicodeDecodeError, ValueError):
         raise BadInput(f"{path}: not a text file; expected the JSON lines of `cipv run --out`") from None
-    results = [_result(line, f"{path}, line {n}") for n, line in enumerate(text.splitlines(), 1) if line.strip()]
+    results = [_result(line, f"{path}, line {n}") for n, line in enumerate(text.split("\n"), 1) if line.strip()]
     if not results:
         raise BadInput(f"{path}: no results in it")
     return sorted(results, key=lambda result: result.t_ns)
@@ -45,9 +45,9 @@ def _result(line: str, where: str) -> Result:
             ego=_ego(row["ego"], int(row["t_ns"])),
             objects=tuple(_object(each) for each in row["objects"]),
             path=_NO_PATH,
-            cipv=Cipv(**row["cipv"]) if row["cipv"] is not None else None,
+            cipv=_cipv(row["cipv"]),
             rejected=(),
-            acc=AccCommand(**row["acc"]) if row["acc"] is not None else None,
+            acc=_acc(row["acc"]),
             notes=(),
             timing_ms={},
             layers=EMPTY,
@@ -67,6 +67,22 @@ def _ego(row: dict[str, Any] | None, t_ns: int) -> EgoState | None:
     return EgoState(t_ns, _number(row["speed_mps"]), None if yaw_rate is None else _number(yaw_rate))
 
 
+def _cipv(row: dict[str, Any] | None) -> Cipv | None:
+    if row is None:
+        return None
+    return Cipv(int(row["id"]), _number(row["distance_m"]), None, None, str(row["reason"]))
+
+
+def _acc(row: dict[str, Any] | None) -> AccCommand | None:
+    """Its state, which is all that is judged of it."""
+    if row is None:
+        return None
+    state = row["state"]
+    if state not in get_args(get_type_hints(AccCommand)["state"]):
+        raise ValueError(state)
+    return AccCommand(state, 0.0, _number(row["accel_mps2"]), 0.0, 0.0, "")
+
+
 def _object(row: dict[str, Any]) -> FusedObject:
     bev = [_numbers(corner, 2) for corner in row["bev"]] if row["bev"] is not None else None
     if bev is not None and len(bev) != 4:
@@ -74,11 +90,13 @@ def _object(row: dict[str, Any]) -> FusedObject:
     box = row["cuboid"]
     if row["source"] not in ("V", "L", "VL"):
         raise ValueError(row["source"])
+    if row["type"] is not None and not isinstance(row["type"], str):
+        raise ValueError(row["type"])
     return FusedObject(
         id=int(row["id"]),
         source=row["source"],
         label=row["type"],
-        score=row["type_score"],
+        score=None,
         bbox=_some(row["bbox"], 4),  # type: ignore[arg-type]
         bev=tuple(bev) if bev is not None else None,  # type: ignore[arg-type]
         cuboid=Cuboid(_numbers(box["center"], 3), _numbers(box["size"], 3), _number(box["yaw_rad"]))  # type: ignore[arg-type]
@@ -86,15 +104,14 @@ def _object(row: dict[str, Any]) -> FusedObject:
         else None,
         closest_point=_some(row["closest_point"], 3),  # type: ignore[arg-type]
         distance_m=_number(row["distance_m"]) if row["distance_m"] is not None else None,
-        distance_sigma_m=row["distance_sigma_m"],
+        distance_sigma_m=None,
         velocity_mps=_some(row["velocity_mps"], 2),  # type: ignore[arg-type]
-        seen_by=row.get("seen_by", "" if row["carried"] else row["source"]),
+        seen_by="" if row["carried"] else row["source"],
         hits=int(row["hits"]),
         lidar_points=int(row["lidar_points"]),
         lidar_track=None,
         vision_track=None,
         in_path=bool(row["in_path"]),
-        ttc_s=row["ttc_s"],
     )
 
 

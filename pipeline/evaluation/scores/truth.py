@@ -66,10 +66,21 @@ def of_source(source: Source, rule: LeadRule) -> DriveTruth:
         labelled = linked(labelled)
         notes = (
             "The labels follow no identity over time: vehicles are linked from frame to frame by nearness. Figures of "
-            "identity and speed rest on that.",
+            "identity rest on that, and speed is judged of leads only.",
         )
-    frames = {tick: FrameTruth(tick, truth, true_lead(truth, rule)) for tick, truth in labelled.items()}
-    return DriveTruth(source.uri, ticks, with_velocities(frames), None, notes)
+    frames = with_velocities(
+        {tick: FrameTruth(tick, truth, true_lead(truth, rule)) for tick, truth in labelled.items()}
+    )
+    if notes:
+        frames = {tick: _only_the_leads(frame) for tick, frame in frames.items()}
+    return DriveTruth(source.uri, ticks, frames, None, notes)
+
+
+def _only_the_leads(frame: FrameTruth) -> FrameTruth:
+    """Without the velocities of all others: what stands beside the road is easily linked to its neighbour."""
+    lead = frame.lead.id if frame.lead is not None else None
+    kept = {key: velocity for key, velocity in (frame.velocity_mps or {}).items() if key == lead}
+    return replace(frame, velocity_mps=kept)
 
 
 def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:

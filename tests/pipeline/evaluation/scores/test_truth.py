@@ -1,0 +1,142 @@
+"""What counts as true: a recording's own labels, and what people accepted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import get_args
+
+import pytest
+
+from pipeline.evaluation.lead import LeadRule
+from pipeline.evaluation.scores.truth import (
+    DriveTruth,
+    FrameTruth,
+    NoTruth,
+    linked,
+    of_labels,
+    of_source,
+    with_velocities,
+)
+from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, Lead, LeadRange, Origin, Sighting, State
+from pipeline.sources import open_source
+from pipeline.sources.base import TruthObject
+from tests.pipeline.build import cuboid
+from tests.pipeline.evaluation.scores.drives import TICK_NS, labelled
+
+PERSON = Origin("person", "someone", 0)
+RULE = LeadRule()
+
+
+def track(key: int, x: float, y: float = 0.0, state: State = "accepted", frames: int = 3) -> LabelTrack:
+    return LabelTrack(key, "car", tuple(Sighting(n, cuboid(x - n, y)) for n in range(frames)), state, PERSON)
+
+
+def labels(*tracks: LabelTrack, leads: tuple[LeadRange, ...] = (), events: tuple[EventLabel, ...] = ()) -> LabelSet:
+    return LabelSet("made:1", ("a", "b", "c"), (0, TICK_NS, 2 * TICK_NS), tracks, leads, events=events)
+
+
+def led(first: int, last: int, lead: Lead, state: State = "accepted") -> LeadRange:
+    return LeadRange(first, last, lead, state, PERSON)
+
+
+def leads(known: DriveTruth) -> list[int | str | None]:
+    """Of each labelled frame: the lead's id, null where none leads, a question mark where nobody knows."""
+    return [
+        (frame.lead.id if frame.lead is not None else None) if frame.lead_known else "?"
+        for frame in known.frames.values()
+    ]
+
+
+def test_without_labelled_leads_the_nearest_in_the_lane_leads() -> None:
+    assert leads(of_labels(labels(track(4, 30.0), track(5, 20.0, 3.5)), RULE)) == [4, 4, 4]
+
+
+@pytest.mark.parametrize(
+    ("ranges", "expected"),
+    [
+        pytest.param((led(0, 2, 5),), [5, 5, 5], id="the one that people say, though it is beside the lane"),
+        pytest.param((led(0, 0, 5), led(1, 2, "none")), [5, None, None], id="none is an answer"),
+        pytest.param((led(0, 1, "unknown"), led(2, 2, 4)), ["?", "?", 4], id="can't tell is not judged"),
+        pytest.param((led(1, 1, 4),), ["?", 4, "?"], id="frames that nobody spoke about are not judged"),
+        pytest.param((led(0, 1, 4), led(2, 2, 5, "proposed")), [4, 4, "?"], id="a proposal is no truth"),
+        pytest.param((led(0, 2, 9),), ["?", "?", "?"], id="a lead whose place is not labelled"),
+    ],
+)
+def test_labelled_leads(ranges: tuple[LeadRange, ...], expected: list[int | str | None]) -> None:
+    assert leads(of_labels(labels(track(4, 30.0), track(5, 20.0, 3.5), leads=ranges), RULE)) == expected
+
+
+@pytest.mark.parametrize("state", get_args(State))
+def test_only_what_somebody_stands_behind_counts(state: State) -> None:
+    known = of_labels(labels(track(4, 30.0), track(5, 20.0, state=state)), RULE)
+    counts = state in ("accepted", "corrected")
+    assert {item.id for item in known.frames[0].objects} == ({4, 5} if counts else {4})
+    assert bool(known.notes) != counts
+
+
+def test_labels_that_nobody_accepted_are_no_truth() -> None:
+    with pytest.raises(NoTruth, match="accepted"):
+        of_labels(labels(track(4, 30.0, state="proposed")), RULE)
+
+
+def test_labelled_cut_ins() -> None:
+    event = EventLabel(1, "cut_in", (4,), "accepted", PERSON)
+    refused = replace(event, frame=2, state="rejected")
+    assert of_labels(labels(track(4, 30.0), events=(event, refused)), RULE).cut_ins == ((TICK_NS, 4),)
+    assert of_labels(labels(track(4, 30.0)), RULE).cut_ins is None
+
+
+def test_velocity_comes_from_the_frames_around() -> None:
+    known = of_labels(labels(track(4, 30.0)), RULE)
+    for frame in known.frames.values():
+        assert frame.velocity_mps is not None
+        assert frame.velocity_mps[4] == pytest.approx((-10.0, 0.0))
+
+
+def test_no_velocity_across_a_gap() -> None:
+    frames = {tick: FrameTruth(tick, (labelled(1, 20.0),), None) for tick in (0, 10_000_000_000)}
+    assert all(frame.velocity_mps == {} for frame in with_velocities(frames).values())
+
+
+def nameless(x: float, y: float = 0.0, label: str = "car") -> TruthObject:
+    return TruthObject(label, cuboid(x, y))
+
+
+def test_labels_without_identity_are_linked_to_the_nearest_of_their_class() -> None:
+    ids = {
+        tick: [item.id for item in items]
+        for tick, items in linked(
+            {
+                0: (nameless(20.0), nameless(40.0)),
+                TICK_NS: (nameless(39.5), nameless(19.5)),
+                2 * TICK_NS: (nameless(19.2, label="truck"), nameless(39.0), nameless(60.0)),
+                9_000_000_000: (nameless(39.0),),
+            }
+        ).items()
+    }
+    assert ids == {0: [1, 2], TICK_NS: [2, 1], 2 * TICK_NS: [3, 2, 4], 9_000_000_000: [5]}
+
+
+def test_a_recording_that_nobody_labelled() -> None:
+    class Unlabelled:
+        uri, title, rate_hz, notes = "made:1", "made", 10.0, ()
+
+        def __len__(self) -> int:
+            return 2
+
+        def t_ns(self, index: int) -> int:
+            return index * TICK_NS
+
+        def truth(self, index: int) -> None:
+            return None
+
+    with pytest.raises(NoTruth, match="made:1: no frame"):
+        of_source(Unlabelled(), RULE)  # type: ignore[arg-type]
+
+
+def test_the_simulators_own_truth() -> None:
+    source = open_source("sim:cut_in")
+    known = of_source(source, RULE)
+    assert len(known.frames) == len(known.ticks) == len(source)
+    assert known.notes == (), "the simulator knows who is who"
+    assert any(frame.lead is not None for frame in known.frames.values())
