@@ -25,6 +25,8 @@ _ERROR_COLUMNS = (
         for which in ("min", "max", "MAE")
     ),
 )
+FEW = 5
+"""With fewer drives a bootstrap interval says little: two drives have but three draws."""
 MOST = 20
 """Rows of a list of frames."""
 
@@ -94,8 +96,11 @@ def _scores(run: Drives) -> Section:
         f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class claims to be no vehicle: it counts where one is. A "
         "vehicle that nobody labelled counts as a false detection.",
     ]
-    if len(run) < 2:
-        text.append("Confidence intervals come from drawing whole drives anew: one drive alone has none.")
+    if len(run) < FEW:
+        text.append(
+            "Confidence intervals come from drawing whole drives anew: one drive alone has none, and those of fewer "
+            f"than {FEW} are too narrow."
+        )
     if not tracking.is_available():
         text.append(tracking.MISSING)
     text += [f"{drive.uri}: {note}" for drive in run for note in drive.notes]
@@ -270,14 +275,25 @@ def _frames(title: str, bad: Sequence[Bad], link: Link) -> Table:
 
 def _comparison(base: Drives, run: Drives, link: Link) -> Section:
     rows = tuple(
-        (each.figure.title, each.figure.unit, each.base, each.run, each.difference, *_ends(each.interval), _word(each))
+        (
+            each.figure.title,
+            each.figure.unit,
+            each.base,
+            each.run,
+            each.difference,
+            *_ends(each.interval),
+            _word(each, len(run)),
+        )
         for each in compare(base, run)
     )
     columns = ("figure", "unit", "base", "run", "run − base", "95 % from", "to", "")
     return Section(
         "comparison",
         "Against the base",
-        ("The same frames, judged by the same truth. Better or worse is said of what the interval sets apart from 0.",),
+        (
+            "The same frames, judged by the same truth. Better or worse is said of what the interval sets apart from 0, "
+            f"from {FEW} drives on.",
+        ),
         (
             Table("Two runs", columns, rows),
             _frames("Frames that changed for the worse or the better", changed(base, run, MOST), link),
@@ -285,8 +301,8 @@ def _comparison(base: Drives, run: Drives, link: Link) -> Section:
     )
 
 
-def _word(each: Compared) -> str:
-    """Better or worse, where the drives agree so far."""
-    if each.interval is None or each.interval.low <= 0.0 <= each.interval.high:
+def _word(each: Compared, drives: int) -> str:
+    """Better or worse, where the drives agree so far and are enough to say so."""
+    if each.interval is None or drives < FEW or each.interval.low <= 0.0 <= each.interval.high:
         return ""
     return "better" if (each.interval.low > 0.0) == (each.figure.better == "higher") else "worse"

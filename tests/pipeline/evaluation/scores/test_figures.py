@@ -138,3 +138,10 @@ def test_the_same_in_json() -> None:
     assert told["figures"]["cipv_correct"]["value"] == pytest.approx(200 / 3)
     assert told["against"]["cipv_correct"]["difference"] == pytest.approx(100 / 3)
     assert told["drives"][0]["worst"][0] == {"frame": "000001", "index": 1, "verdict": "missed", "error_m": None}
+
+
+@pytest.mark.parametrize(("drives", "word"), [(2, ""), (6, "better")])
+def test_better_is_said_from_enough_drives_on(drives: int, word: str) -> None:
+    base, run = ([drive([off, off])] * drives for off in (0.5, 0.3))
+    rows = sections(run, lambda uri, index: uri, base)[0].tables[0].rows
+    assert next(row[-1] for row in rows if row[0] == "distance error of the lead") == word
