@@ -291,8 +291,8 @@ def _comparison(base: Drives, run: Drives, link: Link) -> Section:
         "comparison",
         "Against the base",
         (
-            "The same frames, judged by the same truth. Better or worse is said of what the interval sets apart from 0, "
-            f"from {FEW} drives on.",
+            "The same frames, judged by the same truth. Better or worse is said of what the interval sets apart from "
+            f"0, from {FEW} drives on.",
         ),
         (
             Table("Two runs", columns, rows),

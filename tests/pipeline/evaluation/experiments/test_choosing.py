@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.evaluation.experiments.choosing import Case, Frame, Way, acquired_m, report, run, true_lead
+from pipeline.evaluation.lead import switches
 from pipeline.simulation import scenario, world
 from tests.pipeline.simulation.worlds import with_actors
 
