@@ -64,7 +64,7 @@ def section_html(section: Section, replays: str = "") -> str:
 
 
 def _table(table: Table, replays: str) -> str:
-    worded = [all(isinstance(row[n], str | None) for row in table.rows) for n in range(len(table.columns))]
+    worded = [all(isinstance(row[n], str | Linked | None) for row in table.rows) for n in range(len(table.columns))]
     head = "".join(
         f'<th class="{"word" if words else ""}">{escape(name)}</th>'
         for name, words in zip(table.columns, worded, strict=True)
