@@ -11,10 +11,10 @@ from typing import Annotated
 import tyro
 
 from app.progress import frames_progress
-from pipeline.labels.formats.base import Drive, drive_of
+from pipeline.labels.formats.base import Drive, FormatName, drive_of
 from pipeline.labels.formats.native import from_json, onto
 from pipeline.labels.formats.reading import read_bytes
-from pipeline.labels.formats.registry import FormatName, export_labels, import_labels
+from pipeline.labels.formats.registry import export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.labels.truth import truth_labels
 from pipeline.sources import open_source

@@ -61,10 +61,11 @@ def recover(path: Path, out: Path, progress: Progress = lambda done, total: None
         )
 
 
-def clip(source: SessionSource, first: int, last: int, out: Path) -> int:
+def clip(source: SessionSource, first: int, last: int, out: Path, labels: bytes | None = None) -> int:
     """Frames ``first`` to ``last``, both included, as a session of their own, with results, marks and all else that
     was recorded meanwhile. What these frames refer to from before (calibration, parameters) is moved to right before
-    the first, so that the clip begins where it begins. Returns the number of messages."""
+    the first, so that the clip begins where it begins. Labels name the frames that they are of, so they are kept whole;
+    ``labels`` are put in their place. Returns the number of messages."""
     first_ns = source.log_time_ns(first)
     # a frame's companions (marks, notes) come after it, so the clip goes on to the next frame
     last_ns = source.log_time_ns(last + 1) - 1 if last + 1 < len(source) else 2**63 - 1
@@ -77,8 +78,14 @@ def clip(source: SessionSource, first: int, last: int, out: Path) -> int:
         for at_ns, topic in earlier:
             for stored in source.file.messages((topic,), at_ns, at_ns):
                 yield stored._replace(log_time_ns=to_ns[at_ns])
+        at_ns = first_ns
         for stored in source.file.messages(None, first_ns, last_ns):
-            yield _with_references_moved(stored, to_ns) if stored.channel.topic == topics.FRAMES else stored
+            if stored.channel.topic != topics.LABELS:
+                at_ns = stored.log_time_ns
+                yield _with_references_moved(stored, to_ns) if stored.channel.topic == topics.FRAMES else stored
+        said = labels if labels is not None else source.labels()
+        if said is not None:
+            yield Stored(topics.channel(topics.LABELS), at_ns, source.t_ns(last), said)
 
     copied, _ = _copy(messages(), source.file, out)
     return copied

@@ -11,16 +11,23 @@ from pipeline.sources.base import AnySource, Recorded, Source
 
 
 def save(
-    source: Source, out: Path, first: int = 0, last: int | None = None, progress: Progress = lambda done, total: None
+    source: Source,
+    out: Path,
+    first: int = 0,
+    last: int | None = None,
+    progress: Progress = lambda done, total: None,
+    labels: bytes | None = None,
 ) -> None:
     """Write frames ``first`` to ``last`` (both included; null: to the end) to a new file, inputs and labels.
 
-    A part of a session keeps all that is in it: results, marks, parameters. Run on either, the line gives the same
-    results. BadInput when ``out`` exists; whatever ends this early leaves no file behind.
+    A part of a session keeps all that is in it: results, marks, parameters, labels. Run on either, the line gives the
+    same results. labels: a file of labels to put in, in place of any that are there.
+
+    BadInput when ``out`` exists; whatever ends this early leaves no file behind.
     """
     last = len(source) - 1 if last is None else last
     if isinstance(source, SessionSource):
-        clip(source, first, last, out)
+        clip(source, first, last, out, labels)
         progress(last + 1 - first, last + 1 - first)
         return
     writer = SessionWriter(out, about(source))
@@ -28,6 +35,8 @@ def save(
         for index in range(first, last + 1):
             writer.write(source.frame(index), truth=source.truth(index))
             progress(index + 1 - first, last + 1 - first)
+        if labels is not None:
+            writer.write_labels(labels)
         writer.close()
     except BaseException:
         writer.discard()

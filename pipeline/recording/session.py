@@ -117,6 +117,13 @@ class SessionSource:
                 continue
         return tuple(found)
 
+    def labels(self) -> bytes | None:
+        """The newest file of labels in it, null when there is none."""
+        newest = None
+        for stored in self.file.messages((topics.LABELS,)):
+            newest = stored.data
+        return newest
+
     def close(self) -> None:
         self.file.close()
 

@@ -32,6 +32,7 @@ OBJECTS = "/objects"
 MARKS = "/marks"
 NOTES = "/notes"
 HEALTH = "/health"
+LABELS = "/labels"
 
 EGO_FRAME, CAMERA_FRAME = "ego", "camera"
 """Names of the frames of reference: points are in ``ego``; ``camera`` is the optical frame (z ahead, x right)."""
@@ -86,6 +87,7 @@ _JSON_TITLES = {
     PARAMS: "cipv.Params",
     RESULTS: "cipv.Result",
     HEALTH: "cipv.Health",
+    LABELS: "cipv.Labels",
 }
 
 

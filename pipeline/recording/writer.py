@@ -172,6 +172,10 @@ class SessionWriter:
         """What a person who opens the session should know happened here."""
         self._add(topics.NOTES, self._clock.now(), log_message(topics.NOTES, text, self._header_ns, warning=True))
 
+    def write_labels(self, data: bytes) -> None:
+        """What people say is true of the whole, as a file of labels is; the last one written counts."""
+        self._add(topics.LABELS, self._clock.now(), data)
+
     def flush(self, *, to_disk: bool = False) -> None:
         """See ``Output.flush``."""
         self._output.flush(to_disk=to_disk)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from pipeline.labels.model import LabelSet, Origin
 from pipeline.sources.base import Rectified, Source
 from pipeline.types import F32, F64, Box, CameraCalibration, EgoState
 
+FormatName = Literal["native", "mcap", "openlabel", "kitti", "kitti-tracking", "nuscenes", "coco", "csv"]
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _FEWEST_PAIRS = 3
 
@@ -108,15 +110,12 @@ Read = Callable[[Path, Drive, Origin], Imported]
 
 @dataclass(frozen=True)
 class Format:
-    """One kind of file. holds: what it has a place for. is_folder: it is a folder of files. read_from: what to name
-    when it is read, where that is not what was written."""
+    """One kind of file or folder. holds: what it has a place for."""
 
-    name: str
-    about: str
+    name: FormatName
     holds: frozenset[Part]
     write: Write
     read: Read
-    is_folder: bool = False
 
 
 def check_extrinsic(labels: LabelSet, drive: Drive, what: str) -> None:

@@ -33,8 +33,8 @@ _ENOUGH = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 
 @dataclass(frozen=True)
 class Row:
-    """One line in our terms: ego frame, pixels of the raw picture. kind: as KITTI calls it. said_more: it knew how far it is
-    cut or hidden."""
+    """One line in our terms: ego frame, pixels of the raw picture. kind: as KITTI calls it. said_more: it
+    knew how far it is cut or hidden."""
 
     kind: str
     label: str

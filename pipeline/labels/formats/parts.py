@@ -17,13 +17,17 @@ version."""
 
 EVERYTHING: frozenset[Part] = frozenset(get_args(Part))
 
+_SIGHTING: frozenset[Part] = frozenset(("cuboids", "boxes", "keyframes"))
+"""Where all of these have a place, so has a sighting of neither shape, and a track that was never seen."""
+
 _Marked = LabelTrack | LeadRange | PathLabel | EventLabel
 
 
 def reduce(labels: LabelSet, holds: frozenset[Part]) -> tuple[LabelSet, tuple[str, ...]]:
     """The labels without what cannot be held, and a sentence for each kind of thing that is lost.
 
-    Where there is no place for a state, what a person rejected is left out: it would be read as true.
+    Where there is no place for a state, what a person rejected is left out: it would be read as true. Tracks stay as
+    they are where neither cuboids nor boxes are held: a table may still name them.
     """
     lost = [sentence for sentence in _lost(labels, holds) if sentence]
     if "states" not in holds:
@@ -34,14 +38,10 @@ def reduce(labels: LabelSet, holds: frozenset[Part]) -> tuple[LabelSet, tuple[st
             paths=tuple(each for each in labels.paths if each.state != "rejected"),
             events=tuple(each for each in labels.events if each.state != "rejected"),
         )
-    tracks = tuple(
-        replace(track, sightings=tuple(each for s in track.sightings if (each := _reduced(s, holds)) is not None))
-        for track in labels.tracks
-    )
-    keeps_tracks = bool({"cuboids", "boxes"} & holds)
+    if {"cuboids", "boxes"} & holds:
+        labels = replace(labels, tracks=tuple(_with_reduced_sightings(track, holds) for track in labels.tracks))
     return replace(
         labels,
-        tracks=tracks if keeps_tracks else (),
         leads=labels.leads if "leads" in holds else (),
         paths=labels.paths if "paths" in holds else (),
         events=labels.events if "events" in holds else (),
@@ -49,9 +49,14 @@ def reduce(labels: LabelSet, holds: frozenset[Part]) -> tuple[LabelSet, tuple[st
     ), tuple(lost)
 
 
+def _with_reduced_sightings(track: LabelTrack, holds: frozenset[Part]) -> LabelTrack:
+    kept = (_reduced(each, holds) for each in track.sightings)
+    return replace(track, sightings=tuple(each for each in kept if each is not None))
+
+
 def _reduced(sighting: Sighting, holds: frozenset[Part]) -> Sighting | None:
     """The sighting with what can be held of it; null when that is nothing of what it had."""
-    if {"cuboids", "boxes"} <= holds and "keyframes" in holds:
+    if holds >= _SIGHTING:
         return sighting
     cuboid = sighting.cuboid if "cuboids" in holds else None
     bbox = sighting.bbox if "boxes" in holds else None
@@ -73,7 +78,8 @@ def _lost(labels: LabelSet, holds: frozenset[Part]) -> list[str]:
         return [_count(len(labels.tracks), "{} not written: no place for them", "track", "tracks"), *lost]
     kept = [each for each in sightings if _reduced(each, holds) is not None]
     lost.append(_count(len(sightings) - len(kept), "{} not written: nothing of it has a place", "sighting"))
-    lost.append(_count(sum(not t.sightings for t in labels.tracks), "{} without sightings not written", "track"))
+    if not holds >= _SIGHTING:
+        lost.append(_count(sum(not t.sightings for t in labels.tracks), "{} without sightings not written", "track"))
     if "cuboids" in missing:
         lost.append(_count(sum(s.cuboid is not None for s in sightings), "{} not written: no place for them", "cuboid"))
     if "boxes" in missing:

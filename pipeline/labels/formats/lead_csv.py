@@ -1,0 +1,134 @@
+"""The lead of each frame as a table, for spreadsheets: one row a frame, also where nobody has said who leads.
+
+``lead`` is a track's number, ``none`` or ``unknown``, and empty where nobody has said. ``label``, ``distance_m`` (from
+the ego origin to the cuboid's nearest point, horizontally) and ``x_m y_m`` (of its middle, ego frame) are for the eye:
+they are not read back. Ranges side by side that say the same become one.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from pydantic import TypeAdapter
+
+from pipeline.errors import BadInput
+from pipeline.geometry import closest_on_polygon
+from pipeline.labels.formats.base import Drive, Imported, write_file
+from pipeline.labels.formats.reading import fit, read_bytes
+from pipeline.labels.model import LabelSet, Lead, LeadRange, Origin, State
+
+_TOLD = ("frame", "name", "t_ns", "lead", "state", "maker", "by", "made_unix_ms", "params", "calibration")
+_COLUMNS = (*_TOLD, "label", "distance_m", "x_m", "y_m")
+_LONGEST_NUMBER = 20
+_STATE: TypeAdapter[State] = TypeAdapter(State)
+_MAKER: TypeAdapter[Literal["pipeline", "person", "import"]] = TypeAdapter(Literal["pipeline", "person", "import"])
+
+
+def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(_COLUMNS)
+    told = [each for each in labels.leads if each.state != "rejected"]
+    for index, shot in enumerate(drive.shots):
+        said = next((each for each in told if each.first <= index <= each.last), None)
+        rows.writerow((index, shot.name, shot.t_ns, *_said(said), *_seen(labels, said, index)))
+    write_file(out, text.getvalue().encode())
+    rejected = len(labels.leads) - len(told)
+    return (f"{rejected:,} rejected ranges of the lead left out: a frame has one lead here",) if rejected else ()
+
+
+def read(path: Path, drive: Drive, origin: Origin) -> Imported:
+    data = read_bytes(path).decode("utf-8-sig", "replace")
+    found: dict[int, LeadRange | None] = {}
+    try:
+        rows = csv.DictReader(io.StringIO(data, newline=""), strict=True)
+        if not {"frame", "lead"} <= set(rows.fieldnames or ()):
+            raise BadInput(f"{path}: a table of the lead has at least the columns frame and lead")
+        for row in rows:
+            what = f"{path}, line {rows.line_num}"
+            frame = _frame(row, drive, what)
+            if frame in found:
+                raise BadInput(f"{what}: frame {frame} is there twice")
+            found[frame] = _range(row, frame, origin, what)
+    except csv.Error as error:
+        raise BadInput(f"{path}: no table: {error}") from None
+    leads = _joined([each for _, each in sorted(found.items()) if each is not None])
+    return Imported(replace(drive.empty(), leads=tuple(leads)))
+
+
+def _said(lead: LeadRange | None) -> tuple[str | int, ...]:
+    if lead is None:
+        return ("",) * (len(_TOLD) - 3)
+    by = lead.origin
+    return lead.lead, lead.state, by.maker, by.name, by.t_unix_ms, by.params or "", by.calibration or ""
+
+
+def _seen(labels: LabelSet, lead: LeadRange | None, index: int) -> tuple[str, ...]:
+    """Class, distance and place of the lead in a frame; empty where they are not known."""
+    track = next((each for each in labels.tracks if lead is not None and each.id == lead.lead), None)
+    sighting = track.at(index) if track is not None else None
+    if track is None or sighting is None or sighting.cuboid is None:
+        return (track.label if track is not None else "", "", "", "")
+    distance_m = math.hypot(*closest_on_polygon(sighting.cuboid.footprint()))
+    x, y, _ = sighting.cuboid.center
+    return track.label, f"{distance_m:.3f}", f"{x:.3f}", f"{y:.3f}"
+
+
+def _frame(row: dict[str, str], drive: Drive, what: str) -> int:
+    frame = _whole(row["frame"], what)
+    if not 0 <= frame < len(drive.shots):
+        raise BadInput(f"{what}: frame {frame} of {len(drive.shots)}")
+    if row.get("name") not in (None, "", drive.shots[frame].name):
+        raise BadInput(f"{what}: frame {frame} of this recording has another name: {drive.shots[frame].name}")
+    return frame
+
+
+def _range(row: dict[str, str], frame: int, origin: Origin, what: str) -> LeadRange | None:
+    """What one row says, as a range of one frame; null where nobody has said who leads."""
+    text = (row["lead"] or "").strip()
+    if not text:
+        return None
+    lead: Lead = "none" if text == "none" else "unknown" if text == "unknown" else _whole(text, what)
+    if isinstance(lead, int) and lead < 0:
+        raise BadInput(f"{what}: a lead that is no track")
+    state: State = fit(_STATE, row.get("state") or "accepted", f"{what}, state")
+    return LeadRange(frame, frame, lead, state, _origin(row, what) if row.get("maker") else origin)
+
+
+def _origin(row: dict[str, str], what: str) -> Origin:
+    return Origin(
+        fit(_MAKER, row["maker"], f"{what}, maker"),
+        row.get("by") or "",
+        _whole(row.get("made_unix_ms") or "0", what),
+        row.get("params") or None,
+        row.get("calibration") or None,
+    )
+
+
+def _joined(leads: list[LeadRange]) -> list[LeadRange]:
+    """Ranges side by side that say the same, as one."""
+    joined: list[LeadRange] = []
+    for each in leads:
+        before = joined[-1] if joined else None
+        if (
+            before is not None
+            and before.last + 1 == each.first
+            and each == replace(before, first=each.first, last=each.last)
+        ):
+            joined[-1] = replace(before, last=each.last)
+        else:
+            joined.append(each)
+    return joined
+
+
+def _whole(text: str | None, what: str) -> int:
+    text = (text or "").strip()
+    digits = text.removeprefix("-")
+    if not (digits.isascii() and digits.isdecimal() and len(text) < _LONGEST_NUMBER):
+        raise BadInput(f"{what}: {text[:_LONGEST_NUMBER]!r} is no number")
+    return int(text)

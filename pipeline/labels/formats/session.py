@@ -1,0 +1,34 @@
+"""Labels inside an MCAP session: our own JSON as a message of ``/labels``, beside everything that the drive is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.errors import BadInput
+from pipeline.labels.formats.base import Drive, Imported
+from pipeline.labels.formats.native import from_json, onto, to_json
+from pipeline.labels.model import LabelSet, Origin
+from pipeline.sources import open_source
+
+
+def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
+    """The whole recording as a new session, with these labels in place of any that it had."""
+    from pipeline.recording.save import save  # half a second of imports: only who writes a session pays
+
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save(open_source(drive.uri), out, labels=to_json(labels))
+    return ()
+
+
+def read(path: Path, drive: Drive, origin: Origin) -> Imported:
+    """Of this session, a clip of it, or one that it is a clip of. BadInput when there are no labels in it."""
+    from pipeline.recording.session import SessionSource
+
+    session = SessionSource(str(path), str(path))
+    try:
+        data = session.labels()
+    finally:
+        session.close()
+    if data is None:
+        raise BadInput(f"{path}: a session without labels")
+    return onto(from_json(data, str(path)), drive, str(path))

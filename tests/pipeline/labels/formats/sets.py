@@ -1,0 +1,146 @@
+"""Label sets of every kind, a drive that they are of, and when two are the same up to rounding."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import strategies as st
+
+from pipeline.geometry import Cuboid, inverse, rotation
+from pipeline.labels.formats.base import Drive, Shot
+from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
+from pipeline.types import CameraCalibration, EgoState
+
+COUNT = 6
+CLASSES = ("car", "truck", "bus", "motorcycle", "bicycle", "person", "trailer")
+IMPORT = Origin("import", "file", 1_700_000_000_000)
+CAMERA_AXES = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+
+
+def camera(distortion: tuple[float, ...] = (), pitch_rad: float = 0.03) -> CameraCalibration:
+    """Looks ahead, a little down and to the left, from 1.2 m over the ego origin."""
+    T_ego_camera = np.eye(4)
+    T_ego_camera[:3, :3] = rotation(0.01, pitch_rad, 0.02) @ CAMERA_AXES
+    T_ego_camera[:3, 3] = (-1.0, 0.1, 1.2)
+    K = np.array([[800.0, 0.0, 640.0], [0.0, 810.0, 360.0], [0.0, 0.0, 1.0]])
+    return CameraCalibration(K, np.array(distortion), inverse(T_ego_camera), 1280, 720)
+
+
+def drive(of: CameraCalibration | None = None, yaw_rate_radps: float | None = 0.1) -> Drive:
+    eye = of if of is not None else camera()
+    shots = tuple(
+        Shot(f"{i:06d}", 10**9 + i * 10**8, eye, (1280, 720), eye.T_camera_ego, EgoState(0, 12.0, yaw_rate_radps))
+        for i in range(COUNT)
+    )
+    return Drive("sim:somewhere", shots)
+
+
+NUMBERS = st.floats(-80.0, 80.0, allow_subnormal=False)
+SIZES = st.floats(0.2, 20.0)
+CUBOIDS = st.builds(
+    Cuboid,
+    st.tuples(st.floats(2.0, 120.0), NUMBERS, st.floats(-3.0, 5.0)),
+    st.tuples(SIZES, SIZES, SIZES),
+    st.floats(-math.pi, math.pi),
+)
+BOXES = st.tuples(st.floats(0, 600), st.floats(0, 300), st.floats(2, 600), st.floats(2, 300)).map(
+    lambda b: (b[0], b[1], b[0] + b[2], b[1] + b[3])
+)
+TEXTS = st.text(st.characters(exclude_categories=("Cs", "Cc")), max_size=12)
+STATES = st.sampled_from(["proposed", "accepted", "corrected", "rejected"])
+ORIGINS = st.builds(
+    Origin,
+    st.sampled_from(["pipeline", "person", "import"]),
+    TEXTS,
+    st.integers(0, 2**45),
+    st.none() | st.text("abcdef0123456789", min_size=1, max_size=8),
+    st.none() | st.text("abcdef0123456789", min_size=1, max_size=8),
+)
+FRAMES = st.integers(0, COUNT - 1)
+LINES = st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=4).map(tuple)
+
+
+@st.composite
+def label_sets(draw: st.DrawFn) -> LabelSet:
+    """Everything that a label set can be."""
+    ids = draw(st.lists(st.integers(0, 2**62), unique=True, max_size=4))
+    tracks = []
+    for number in ids:
+        frames = sorted(draw(st.sets(FRAMES)))
+        seen = tuple(
+            Sighting(i, draw(st.none() | CUBOIDS), draw(st.none() | BOXES), draw(st.booleans())) for i in frames
+        )
+        tracks.append(
+            LabelTrack(number, draw(st.sampled_from(CLASSES)), seen, draw(STATES), draw(ORIGINS), draw(TEXTS))
+        )
+    here = drive()
+    return LabelSet(
+        here.uri,
+        here.frames,
+        here.t_ns,
+        tuple(tracks),
+        draw(leads(ids)),
+        tuple(draw(st.lists(st.builds(PathLabel, FRAMES, st.none() | LINES, st.none() | LINES, STATES, ORIGINS), max_size=2))),
+        tuple(draw(st.lists(st.builds(EventLabel, FRAMES, TEXTS, st.lists(st.sampled_from(ids or [7])).map(tuple), STATES, ORIGINS), max_size=2))),
+        tuple(draw(st.lists(st.builds(FrameTag, FRAMES, TEXTS, ORIGINS), max_size=2))),
+        draw(TEXTS),
+    )  # fmt: skip
+
+
+@st.composite
+def leads(draw: st.DrawFn, ids: list[int]) -> tuple[LeadRange, ...]:
+    """Ranges that do not overlap, by their frames."""
+    cuts = sorted(draw(st.sets(st.integers(0, COUNT), max_size=4)))
+    found = []
+    for first, end in zip(cuts, cuts[1:], strict=False):
+        if draw(st.booleans()):
+            who = draw(st.sampled_from([*ids, "none", "unknown"]))
+            found.append(LeadRange(first, end - 1, who, draw(STATES), draw(ORIGINS)))
+    return tuple(found)
+
+
+def plain(labels: LabelSet, *, cuboids: bool = True, boxes: bool = True) -> LabelSet:
+    """Tracks alone, as a format without states and origins gives them back."""
+    tracks = []
+    for track in labels.tracks:
+        seen = (
+            replace(s, cuboid=s.cuboid if cuboids else None, bbox=s.bbox if boxes else None, keyframe=True)
+            for s in track.sightings
+        )
+        kept = tuple(s for s in seen if s.cuboid is not None or s.bbox is not None)
+        if kept and track.state != "rejected":
+            tracks.append(LabelTrack(track.id, track.label, kept, "accepted", IMPORT))
+    tracks.sort(key=lambda track: track.id)
+    return LabelSet(labels.source, labels.frames, labels.t_ns, tuple(tracks))
+
+
+def alone(labels: LabelSet) -> LabelSet:
+    """Each sighting a track of its own, in the order of frames."""
+    found = [(s.frame, track.label, s) for track in labels.tracks for s in track.sightings]
+    found.sort(key=lambda each: each[0])
+    tracks = tuple(LabelTrack(i, label, (s,), "accepted", IMPORT) for i, (_, label, s) in enumerate(found, start=1))
+    return replace(labels, tracks=tracks)
+
+
+def assert_same(found: LabelSet, wanted: LabelSet, tolerance: float = 1e-6) -> None:
+    """Equal, numbers of shapes up to a tolerance and angles up to full turns."""
+    assert replace(found, tracks=(), paths=()) == replace(wanted, tracks=(), paths=())
+    assert [replace(t, sightings=()) for t in found.tracks] == [replace(t, sightings=()) for t in wanted.tracks]
+    assert [replace(p, left=None, right=None) for p in found.paths] == [replace(p, left=None, right=None) for p in wanted.paths]  # fmt: skip
+    for a, b in zip(found.paths, wanted.paths, strict=True):
+        assert (a.left, a.right) == (b.left, b.right)
+    for one, other in zip(found.tracks, wanted.tracks, strict=True):
+        assert [replace(s, cuboid=None, bbox=None) for s in one.sightings] == [replace(s, cuboid=None, bbox=None) for s in other.sightings]  # fmt: skip
+        for s, w in zip(one.sightings, other.sightings, strict=True):
+            assert (s.cuboid is None, s.bbox is None) == (w.cuboid is None, w.bbox is None)
+            if s.bbox is not None and w.bbox is not None:
+                assert s.bbox == pytest.approx(w.bbox, abs=max(tolerance, 1e-5))
+            if s.cuboid is not None and w.cuboid is not None:
+                assert s.cuboid.center == pytest.approx(w.cuboid.center, abs=tolerance)
+                assert s.cuboid.size == pytest.approx(w.cuboid.size, abs=tolerance)
+                assert math.remainder(s.cuboid.yaw_rad - w.cuboid.yaw_rad, math.tau) == pytest.approx(
+                    0.0, abs=tolerance
+                )
