@@ -1,0 +1,163 @@
+"""Every tunable of the line, declared once: default, bounds, step, unit and help.
+
+From this one place come the sliders of the page, ``--set`` and ``--params`` of the command line, the API's schema and
+the preset files. People read and type degrees; the stages turn them into radians where they use them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from pipeline.errors import BadInput
+from pipeline.params.declare import Section
+from pipeline.params.driving import (
+    AccParams,
+    AebParams,
+    CipvParams,
+    LaneParams,
+    MotionParams,
+    PathParams,
+    SyncParams,
+    TimeParams,
+)
+from pipeline.params.lidar import (
+    BoxParams,
+    ClusterParams,
+    DeskewParams,
+    DownsampleParams,
+    GroundParams,
+    LidarTrackingParams,
+)
+from pipeline.params.vision import AlignmentParams, DetectionParams, DistanceParams, FusionParams, VisionTrackingParams
+
+__all__ = [
+    "PRESETS",
+    "AccParams",
+    "AebParams",
+    "AlignmentParams",
+    "BoxParams",
+    "CipvParams",
+    "ClusterParams",
+    "DeskewParams",
+    "DetectionParams",
+    "DistanceParams",
+    "DownsampleParams",
+    "FusionParams",
+    "GroundParams",
+    "LaneParams",
+    "LidarTrackingParams",
+    "MotionParams",
+    "Params",
+    "ParamsError",
+    "PathParams",
+    "Section",
+    "SyncParams",
+    "TimeParams",
+    "VisionTrackingParams",
+    "from_yaml",
+    "preset",
+    "to_yaml",
+    "with_changes",
+]
+
+
+class ParamsError(BadInput):
+    """A parameter that does not exist or a value out of its bounds; the text names it."""
+
+
+class Params(Section):
+    """All parameters of the line, by stage."""
+
+    deskew: DeskewParams = DeskewParams()
+    downsample: DownsampleParams = DownsampleParams()
+    ground: GroundParams = GroundParams()
+    cluster: ClusterParams = ClusterParams()
+    box: BoxParams = BoxParams()
+    lidar_tracking: LidarTrackingParams = LidarTrackingParams()
+    detection: DetectionParams = DetectionParams()
+    distance: DistanceParams = DistanceParams()
+    vision_tracking: VisionTrackingParams = VisionTrackingParams()
+    alignment: AlignmentParams = AlignmentParams()
+    fusion: FusionParams = FusionParams()
+    motion: MotionParams = MotionParams()
+    lanes: LaneParams = LaneParams()
+    path: PathParams = PathParams()
+    cipv: CipvParams = CipvParams()
+    acc: AccParams = AccParams()
+    aeb: AebParams = AebParams()
+    time: TimeParams = TimeParams()
+    sync: SyncParams = SyncParams()
+
+
+PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
+    "default": {},
+    "paper": {
+        "box": {"method": "axis_aligned"},
+        "lidar_tracking": {"filter": "trajectory"},
+        "detection": {"car_prior": 1.0},
+        "distance": {
+            "coefficient": 1829.1,
+            "exponent": -1.093,
+            "depth_along_axis": False,
+            "per_class": False,
+            "binning": True,
+            "max_m": 60.0,
+        },
+        "vision_tracking": {"filter": "queue"},
+        "alignment": {"model": "angular"},
+        "fusion": {"assignment": "greedy", "min_iou": 0.0, "ring_gap_deg": 0.0, "range_gate": False},
+        "cipv": {"confirm_hits": 1, "carried_may_become_lead": True, "hysteresis_m": 0.0, "decide_s": 0.0},
+        "aeb": {"enabled": False},
+    },
+}
+"""What a preset changes against the declared defaults."""
+
+
+def preset(name: str) -> Params:
+    """The named preset. ParamsError for an unknown name."""
+    if name not in PRESETS:
+        raise ParamsError(f"no preset named {name!r}; there are {', '.join(PRESETS)}")
+    return _validated(dict(PRESETS[name]))
+
+
+def with_changes(params: Params, changes: Mapping[str, Any]) -> Params:
+    """``params`` with dotted names replaced: ``{"cluster.z_weight": 0.4}``. ParamsError names what is wrong."""
+    data: dict[str, dict[str, Any]] = params.model_dump()
+    for name, value in changes.items():
+        section, _, key = name.partition(".")
+        if section not in data or key not in data[section]:
+            raise ParamsError(f"no parameter named {name!r}")
+        data[section][key] = value
+    return _validated(data)
+
+
+def from_yaml(path: Path, base: Params) -> Params:
+    """``base`` with a preset file's values: a mapping of section to parameter to value."""
+    try:
+        loaded = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
+    except OSError as error:
+        raise ParamsError(f"{path}: {error.strerror}") from None
+    except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
+        raise ParamsError(f"{path}: not a parameter file: {str(error).splitlines()[0]}") from None
+    if not isinstance(loaded, dict) or not all(isinstance(values, dict) for values in loaded.values()):
+        raise ParamsError(f"{path}: expected sections with parameters below them")
+    changes = {f"{section}.{key}": value for section, values in loaded.items() for key, value in values.items()}
+    return with_changes(base, changes)
+
+
+def to_yaml(params: Params) -> str:
+    """A preset file that ``from_yaml`` and ``--params`` take back."""
+    return yaml.safe_dump(params.model_dump(), sort_keys=False)
+
+
+def _validated(data: Mapping[str, Any]) -> Params:
+    try:
+        return Params.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ParamsError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
