@@ -10,7 +10,7 @@ from app.clips.exports import Clip, Kind, submit
 from app.clips.jobs import Job, Jobs, JobState
 from app.engine import Engine
 from app.routes.refusals import open_recording, refusing
-from app.routes.shapes import Done
+from app.routes.shapes import Done, file_of
 
 
 class ClipChoice(BaseModel):
@@ -36,6 +36,8 @@ class JobJson(BaseModel):
 
 
 class JobList(BaseModel):
+    """Exports, the oldest first."""
+
     jobs: list[JobJson]
 
 
@@ -69,7 +71,7 @@ def clips_router(engine: Engine, jobs: Jobs) -> APIRouter:
             raise HTTPException(404, "there is no such export")
         return Done(status="removed")
 
-    @router.get("/jobs/{number}/file", response_class=FileResponse)
+    @router.get("/jobs/{number}/file", response_class=FileResponse, responses=file_of("application/octet-stream"))
     def download(number: str) -> FileResponse:
         """The file of an export that is done."""
         job, path = jobs.get(number), jobs.path(number)

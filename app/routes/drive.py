@@ -47,6 +47,8 @@ class Curve(BaseModel):
 
 
 class EventJson(BaseModel):
+    """Something that happened. ids: of the objects it is about. mark: its number, when a person made it."""
+
     kind: Kind
     index: int
     t_s: float
@@ -57,6 +59,8 @@ class EventJson(BaseModel):
 
 
 class Events(BaseModel):
+    """Events of a run, by frame."""
+
     run: int | None
     events: list[EventJson]
 
@@ -69,6 +73,8 @@ class NewMark(BaseModel):
 
 
 class MarkJson(BaseModel):
+    """A marked moment."""
+
     id: int
     index: int
     text: str

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
 from app.engine import Engine
-from app.routes.shapes import ParamsJson
+from app.routes.shapes import ParamsJson, file_of
 from pipeline.alignment import angular_from_calibration
 from pipeline.params import PRESETS, Params, ParamsError, preset, to_yaml, with_changes
 from pipeline.types import CameraCalibration
@@ -89,7 +89,7 @@ def params_router(engine: Engine) -> APIRouter:
             raise HTTPException(422, str(error)) from None
         return _params_json(engine)
 
-    @router.get("/params.yaml", response_class=Response)
+    @router.get("/params.yaml", response_class=Response, responses=file_of("application/yaml"))
     def download() -> Response:
         """The values as a file for `cipv run --params`."""
         headers = {"content-disposition": 'attachment; filename="cipv-params.yaml"'}

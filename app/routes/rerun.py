@@ -17,6 +17,7 @@ from app.clips.exports import WRITERS
 from app.engine import Engine
 from app.routes.clips import clip_of
 from app.routes.refusals import open_recording, refusing
+from app.routes.shapes import file_of
 from app.views.rerun_web import FILES, ViewerFiles
 
 AROUND = 50
@@ -57,7 +58,7 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
         query = urlencode({"first": first, "last": last, "paused": 1})
         return Address(url=f"/rerun/?{query}", first=first, last=last)
 
-    @router.get("/api/rerun.rrd", response_class=FileResponse)
+    @router.get("/api/rerun.rrd", response_class=FileResponse, responses=file_of("application/octet-stream"))
     def replay(
         first: int | None = Query(None, ge=0),
         last: int | None = Query(None, ge=0),

@@ -16,6 +16,7 @@ from app.engine import Engine
 from app.routes.drive import Columns, columns_of, current
 from app.routes.params import flat
 from app.routes.refusals import open_recording, refusing
+from app.routes.shapes import file_of
 from pipeline.params import Params, to_yaml
 
 _MOST_SENTENCES = 100
@@ -48,10 +49,14 @@ class Runs(BaseModel):
 
 
 class Name(BaseModel):
+    """A person's name for a run."""
+
     name: str = Field("", max_length=LONGEST_NAME)
 
 
 class MetricJson(BaseModel):
+    """One figure of both runs; better: which way is, null where neither."""
+
     name: str
     unit: str
     base: float | None
@@ -126,7 +131,7 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
         drives.changed()
         return _runs_json(recording)
 
-    @router.get("/runs/{number}/params.yaml", response_class=Response)
+    @router.get("/runs/{number}/params.yaml", response_class=Response, responses=file_of("application/yaml"))
     def preset_file(number: int) -> Response:
         """A run's parameters as a file for `cipv run --params`."""
         with refusing():

@@ -14,6 +14,11 @@ Point = tuple[float, float]
 Sees = Literal["V", "L", "VL"]
 
 
+def file_of(media_type: str) -> dict[int | str, dict[str, Any]]:
+    """What OpenAPI says of an answer that is a file."""
+    return {200: {"content": {media_type: {}}, "description": "The file"}}
+
+
 class _Exact(BaseModel):
     """No key more than is said."""
 

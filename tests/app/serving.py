@@ -1,0 +1,30 @@
+"""A real server for a while."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from fastapi import FastAPI
+
+from app.server import Server, listen_socket
+
+WAIT_S = 60.0
+
+
+@contextmanager
+def serving(app: FastAPI) -> Iterator[str]:
+    """Its address, as soon as it answers there."""
+    bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
+    address = f"http://127.0.0.1:{bound.getsockname()[1]}"
+    server = Server(app, address, lambda _: is_ready.set())
+    thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
+    thread.start()
+    assert is_ready.wait(WAIT_S)
+    try:
+        yield address
+    finally:
+        server.should_exit = True
+        thread.join()
+        bound.close()
