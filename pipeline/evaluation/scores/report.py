@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from pipeline.evaluation.experiments.sections import Cell, Chart, Linked, Section, Series, Table
+from pipeline.evaluation.experiments.sections import Linked, Section, Table
 from pipeline.evaluation.scores import tracking
 from pipeline.evaluation.scores.drive import DriveScore
+from pipeline.evaluation.scores.error_tables import COLUMNS, error_rows, errors_section
 from pipeline.evaluation.scores.figures import Compared, Drives, Interval, Measured, compare, measure
-from pipeline.evaluation.scores.matching import MAX_RANGE_M, Error
+from pipeline.evaluation.scores.matching import MAX_RANGE_M
 from pipeline.evaluation.scores.worst import Bad, changed, worst
 
 Link = Callable[[str, int], str]
 """The address that opens a recording's URI at a frame."""
-SOURCES = ("VL", "V", "L")
-BIN_M = 10
-_ERRORS = ("distance_m", "lateral_m", "longitudinal_m", "speed_mps")
-_ERROR_COLUMNS = (
-    *("vehicles", "seen by", "count"),
-    *(
-        f"{what} {which}"
-        for what in ("distance", "lateral", "longitudinal", "speed")
-        for which in ("min", "max", "MAE")
-    ),
-)
 FEW = 5
 """With fewer drives a bootstrap interval says little: two drives have but three draws."""
 MOST = 20
@@ -33,7 +23,7 @@ MOST = 20
 
 def sections(run: Drives, link: Link, base: Drives | None = None) -> list[Section]:
     """The report of a run over some drives; with ``base``, another run over the same ones, of how the two differ."""
-    found = [_scores(run), _errors(run), _moments(run, link), _worst(run, link)]
+    found = [_scores(run), errors_section(run), _moments(run, link), _worst(run, link)]
     return [_comparison(base, run, link), *found] if base is not None else found
 
 
@@ -52,7 +42,7 @@ def as_json(run: Drives, base: Drives | None = None) -> dict[str, Any]:
             for drive in run
         ],
         "figures": {each.figure.name: _measured_json(each) for each in measure(run)},
-        "errors": [dict(zip(_ERROR_COLUMNS, row, strict=True)) for row in _error_rows(run)],
+        "errors": [dict(zip(COLUMNS, row, strict=True)) for row in error_rows(run)],
         "cut_ins": [_cut_in_json(drive, n) for drive in run for n in range(len(drive.cut_ins))],
     }
     if base is not None:
@@ -134,66 +124,6 @@ def _ends(interval: Interval | None) -> tuple[float | None, float | None]:
 
 def _many(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
-
-
-# ---------------------------------------------------------------- errors
-
-
-def _all_errors(run: Drives) -> list[Error]:
-    return [error for drive in run for frame in drive.frames for error in frame.errors]
-
-
-def _errors(run: Drives) -> Section:
-    every = _all_errors(run)
-    return Section(
-        "errors",
-        "Errors by distance and by sensor",
-        (
-            "Sizes of errors: smallest, largest, mean. Distance: to the nearest point. Lateral and longitudinal: of "
-            "the middle of the nearest face. Speed: relative to ego, along the car's axis, against what neighbouring "
-            "labelled frames show.",
-        ),
-        (Table("Errors, m and m/s", _ERROR_COLUMNS, _error_rows(run), decimals=3),),
-        (
-            Chart(
-                "Distance error over range",
-                "true range m",
-                "believed − true m",
-                tuple(
-                    Series(
-                        source,
-                        tuple(error.range_m for error in every if error.source == source),
-                        tuple(error.distance_m for error in every if error.source == source),
-                        points_only=True,
-                    )
-                    for source in SOURCES
-                ),
-            ),
-        ),
-    )
-
-
-def _error_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
-    """By who saw it over all ranges, then by range bin, all together and by who saw it. Empty groups are left out."""
-    every = _all_errors(run)
-    groups: list[tuple[str, str, list[Error]]] = [("all", "any", every)]
-    groups += [("all", source, [e for e in every if e.source == source]) for source in SOURCES]
-    for low in range(0, int(MAX_RANGE_M), BIN_M):
-        inside = [error for error in every if low <= error.range_m < low + BIN_M]
-        name = f"{low}–{low + BIN_M} m"
-        groups.append((name, "any", inside))
-        groups += [(name, source, [e for e in inside if e.source == source]) for source in SOURCES]
-    return tuple((name, source, len(errors), *_table_4(errors)) for name, source, errors in groups if errors)
-
-
-def _table_4(errors: Iterable[Error]) -> tuple[float | None, ...]:
-    """Min, max and MAE of each error (paper, Table 4)."""
-    rows = list(errors)
-    figures: list[float | None] = []
-    for name in _ERRORS:
-        sizes = [abs(value) for error in rows if (value := getattr(error, name)) is not None]
-        figures += [min(sizes), max(sizes), sum(sizes) / len(sizes)] if sizes else [None, None, None]
-    return tuple(figures)
 
 
 # ---------------------------------------------------------------- what happened when

@@ -1,0 +1,81 @@
+"""Errors of place and speed by range and by sensor, in the form of the paper's Table 4: smallest, largest, mean."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from pipeline.evaluation.experiments.sections import Cell, Chart, Section, Series, Table
+from pipeline.evaluation.scores.figures import Drives
+from pipeline.evaluation.scores.matching import MAX_RANGE_M, Error
+
+SOURCES = ("VL", "V", "L")
+BIN_M = 10
+_ERRORS = ("distance_m", "lateral_m", "longitudinal_m", "speed_mps")
+COLUMNS = (
+    *("vehicles", "seen by", "count"),
+    *(
+        f"{what} {which}"
+        for what in ("distance", "lateral", "longitudinal", "speed")
+        for which in ("min", "max", "MAE")
+    ),
+)
+
+
+def _all_errors(run: Drives) -> list[Error]:
+    return [error for drive in run for frame in drive.frames for error in frame.errors]
+
+
+def errors_section(run: Drives) -> Section:
+    """A table and a chart of each error."""
+    every = _all_errors(run)
+    return Section(
+        "errors",
+        "Errors by distance and by sensor",
+        (
+            "Sizes of errors: smallest, largest, mean. Distance: to the nearest point. Lateral and longitudinal: of "
+            "the middle of the nearest face. Speed: relative to ego, along the car's axis, against what neighbouring "
+            "labelled frames show.",
+        ),
+        (Table("Errors, m and m/s", COLUMNS, error_rows(run), decimals=3),),
+        tuple(_scatter(title, unit, name, every) for name, (title, unit) in _CHARTS.items()),
+    )
+
+
+_CHARTS = {
+    "distance_m": ("Distance error over range", "m"),
+    "lateral_m": ("Lateral error over range", "m"),
+    "longitudinal_m": ("Longitudinal error over range", "m"),
+    "speed_mps": ("Speed error over range", "m/s"),
+}
+
+
+def _scatter(title: str, unit: str, name: str, errors: Sequence[Error]) -> Chart:
+    """One error of every vehicle in every frame, by who saw it."""
+    lines = []
+    for source in SOURCES:
+        pairs = [(e.range_m, value) for e in errors if e.source == source and (value := getattr(e, name)) is not None]
+        lines.append(Series(source, tuple(x for x, _ in pairs), tuple(y for _, y in pairs), points_only=True))
+    return Chart(title, "true range m", f"believed − true {unit}", tuple(lines))
+
+
+def error_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
+    """By who saw it over all ranges, then by range bin, all together and by who saw it. Empty groups are left out."""
+    every = _all_errors(run)
+    groups: list[tuple[str, str, list[Error]]] = [("all", "any", every)]
+    groups += [("all", source, [e for e in every if e.source == source]) for source in SOURCES]
+    for low in range(0, int(MAX_RANGE_M), BIN_M):
+        inside = [error for error in every if low <= error.range_m < low + BIN_M]
+        name = f"{low}–{low + BIN_M} m"
+        groups.append((name, "any", inside))
+        groups += [(name, source, [e for e in inside if e.source == source]) for source in SOURCES]
+    return tuple((name, source, len(errors), *_table_4(errors)) for name, source, errors in groups if errors)
+
+
+def _table_4(errors: Iterable[Error]) -> tuple[float | None, ...]:
+    """Min, max and MAE of each error (paper, Table 4)."""
+    rows = list(errors)
+    figures: list[float | None] = []
+    for name in _ERRORS:
+        sizes = [abs(value) for error in rows if (value := getattr(error, name)) is not None]
+        figures += [min(sizes), max(sizes), sum(sizes) / len(sizes)] if sizes else [None, None, None]
+    return tuple(figures)
