@@ -60,8 +60,8 @@ class DriveScore:
     notes: tuple[str, ...] = ()
 
     def index_of(self, t_ns: int) -> int:
-        """The frame at a tick."""
-        return next(frame.index for frame in self.frames if frame.t_ns == t_ns)
+        """The judged frame nearest to a tick."""
+        return min(self.frames, key=lambda frame: abs(frame.t_ns - t_ns)).index
 
 
 def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> DriveScore:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import Any, get_args, get_type_hints
 
@@ -22,7 +23,8 @@ _NO_PATH = Path("straight", _NO_LINE, _NO_LINE, _NO_LINE, 0.0, {}, {})
 
 def read_results(path: FilePath) -> list[Result]:
     """The results of ``cipv run --out``, in order of time. What is not judged (path, gates, health, pedals) is
-    not read and stays empty. BadInput names the line that is no result."""
+    not read and stays empty. BadInput names the line that is no result, or the
+    frame that has two."""
     try:
         text = path.read_text(encoding="utf-8")
     except (UnicodeDecodeError, ValueError):
@@ -30,7 +32,11 @@ def read_results(path: FilePath) -> list[Result]:
     results = [_result(line, f"{path}, line {n}") for n, line in enumerate(text.split("\n"), 1) if line.strip()]
     if not results:
         raise BadInput(f"{path}: no results in it")
-    return sorted(results, key=lambda result: result.t_ns)
+    results.sort(key=lambda result: result.t_ns)
+    twice = next((a.frame for a, b in pairwise(results) if a.t_ns == b.t_ns), None)
+    if twice is not None:
+        raise BadInput(f"{path}: two results of one time, at frame {twice}; is it the output of several runs?")
+    return results
 
 
 def _result(line: str, where: str) -> Result:

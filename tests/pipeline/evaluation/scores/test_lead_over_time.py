@@ -76,6 +76,11 @@ def test_a_labelled_cut_in_counts_from_when_people_saw_it() -> None:
     assert (cut_in.t_ns, cut_in.latency_s) == (4 * TICK_NS, pytest.approx(0.1))
 
 
+def test_a_moment_between_judged_frames_leads_to_the_nearest_one() -> None:
+    score = judged([7, 7], truth({1: (40.0, 0.0)}, {1: (39.0, 0.0)}))
+    assert [score.index_of(t_ns) for t_ns in (0, TICK_NS, 5 * TICK_NS)] == [0, 1, 1]
+
+
 def test_nothing_is_compared_across_a_gap() -> None:
     frames = [{1: (40.0, 0.0)}, {1: (39.0, 0.0)}, *[None] * 20, {1: (18.0, 0.0)}, {1: (17.0, 0.0)}]
     known = truth(*frames)

@@ -64,6 +64,7 @@ GOOD = json.loads(to_line(RESULTS[1]))
         pytest.param("{}\n", "line 1", id="nothing in it"),
         pytest.param(json.dumps({**GOOD, "version": 2}) + "\n", "version 2", id="another version"),
         pytest.param(to_line(RESULTS[0]) + "{}\n", "line 2", id="the second line"),
+        pytest.param(to_line(RESULTS[0]) * 2, "two results of one time", id="two runs in one file"),
         pytest.param("[" * 100_000 + "\n", "line 1", id="nested without end"),
         pytest.param(json.dumps(GOOD).replace("39.5", "NaN") + "\n", "line 1", id="not a number"),
         pytest.param(json.dumps(GOOD).replace("39.5", "1e999") + "\n", "line 1", id="beyond all numbers"),
