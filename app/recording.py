@@ -72,7 +72,7 @@ class RecordingDesk:
     def take(self, tick: Tick) -> None:
         """A tick that the line ran; the same frame again, with other parameters, is not recorded twice."""
         recorder, last = self._recorder, self._last
-        if recorder is None or (last is not None and last.frame is tick.frame):
+        if recorder is None or (last is not None and last.frame.t_ns == tick.frame.t_ns):
             return
         self._last = tick
         received_ns = time.time_ns() if self._is_live else None
