@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.errors import BadInput
-from pipeline.geometry import inverse
 from pipeline.labels.formats import kitti_rows
 from pipeline.labels.formats.base import Drive, Imported, Shot, make_folder
 from pipeline.labels.formats.kitti_rows import Row
@@ -118,7 +117,9 @@ def read_tracking(path: Path, drive: Drive, origin: Origin) -> Imported:
 
 
 def _sightings(labels: LabelSet) -> Iterator[tuple[LabelTrack, Sighting]]:
-    return ((track, sighting) for track in labels.tracks for sighting in track.sightings)
+    """By track, then frame."""
+    in_order = sorted(labels.tracks, key=lambda track: track.id)
+    return ((track, sighting) for track in in_order for sighting in track.sightings)
 
 
 def _view(shot: Shot) -> tuple[F64, CameraCalibration]:
@@ -214,7 +215,7 @@ def _tracking_calibration(T_rect_ego: F64, camera: CameraCalibration) -> str:
 
 def _projection(T_rect_ego: F64, camera: CameraCalibration) -> F64:
     """(3, 4) from the labels' frame to pixels."""
-    return np.asarray(camera.K @ (camera.T_camera_ego @ inverse(T_rect_ego))[:3])
+    return np.asarray(camera.K @ (camera.T_camera_ego @ np.linalg.inv(T_rect_ego))[:3])
 
 
 def _numbers(values: F64) -> str:

@@ -75,7 +75,8 @@ def _lost(labels: LabelSet, holds: frozenset[Part]) -> list[str]:
     }
     lost = [_count(*counted[part]) for part in counted if part in missing]
     if {"cuboids", "boxes"} <= missing:
-        return [_count(len(labels.tracks), "{} not written: no place for them", "track", "tracks"), *lost]
+        tracks = _count(len(labels.tracks), "{} not written: no place for them", "track")
+        return [tracks, *lost, *_lost_marks(labels, missing)]
     kept = [each for each in sightings if _reduced(each, holds) is not None]
     lost.append(_count(len(sightings) - len(kept), "{} not written: nothing of it has a place", "sighting"))
     if not holds >= _SIGHTING:

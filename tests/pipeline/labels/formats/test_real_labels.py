@@ -1,0 +1,84 @@
+"""The labels that come with Astyx and KITTI, out and back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.labels.formats.base import Drive, drive_of
+from pipeline.labels.formats.registry import export_labels, import_labels
+from pipeline.labels.truth import truth_labels
+from pipeline.sources import open_source
+
+from .sets import IMPORT, assert_same
+
+
+@pytest.fixture(scope="module")
+def kitti(data_dir: Path) -> tuple[Path, Drive]:
+    folder = data_dir / "kitti_0052"
+    if not folder.is_dir():
+        pytest.skip(f"no KITTI drive at {folder}")
+    return folder, drive_of(open_source(f"kitti:{folder}"))
+
+
+@pytest.fixture(scope="module")
+def astyx(data_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Drive]:
+    """Every fourth frame of the recording."""
+    whole, part = data_dir / "astyx", tmp_path_factory.mktemp("astyx")
+    if not whole.is_dir():
+        pytest.skip(f"no Astyx recording at {whole}")
+    names = sorted(path.stem for path in (whole / "lidar_vlp16").iterdir())[::4]
+    for kind in ("lidar_vlp16", "camera_front", "calibration", "groundtruth_obj3d"):
+        (part / kind).mkdir()
+        for path in (whole / kind).iterdir():
+            if path.stem in names:
+                (part / kind / path.name).symlink_to(path)
+    uri = f"astyx:{part}"
+    return uri, drive_of(open_source(uri))
+
+
+def test_kitti_lines_are_what_they_were(kitti: tuple[Path, Drive], tmp_path: Path) -> None:
+    """All but what labels do not keep: how far an object is cut or hidden, and that a van is one."""
+    folder, drive = kitti
+    found = import_labels(folder / "label_2", drive, "kitti", IMPORT)
+    assert len(found.labels.tracks) == 24
+    assert "9 Van are taken for class 'car'" in found.notes
+    assert any(note.startswith("how far 17 objects are cut or hidden") for note in found.notes)
+    export_labels(found.labels, drive, "kitti", tmp_path / "out")
+    for path in sorted((folder / "label_2").iterdir()):
+        theirs = [line.split() for line in path.read_text().splitlines() if not line.startswith("DontCare")]
+        ours = [line.split() for line in (tmp_path / "out/label_2" / path.name).read_text().splitlines()]
+        assert [line[0] for line in ours] == [line[0].replace("Van", "Car") for line in theirs]
+        for mine, yours in zip(ours, theirs, strict=True):
+            assert [f"{float(v):.2f}" for v in mine[4:]] == [f"{float(v):.2f}" for v in yours[4:]]
+            if yours[1] == "0.00":  # of a cut object KITTI has the angle to what is seen of it
+                assert float(mine[3]) == pytest.approx(float(yours[3]), abs=0.03)
+    again = import_labels(tmp_path / "out", drive, "kitti", IMPORT)
+    assert_same(again.labels, found.labels)
+
+
+def test_kitti_export_opens_as_a_kitti_recording_with_the_same_truth(kitti: tuple[Path, Drive], tmp_path: Path) -> None:
+    folder, drive = kitti
+    labels = import_labels(folder / "label_2", drive, "kitti", IMPORT).labels
+    export_labels(labels, drive, "kitti", tmp_path / "out")
+    (tmp_path / "out/velodyne").symlink_to(folder / "velodyne")
+    (tmp_path / "out/image_02").symlink_to(folder / "image_02")
+    ours, theirs = open_source(f"kitti:{tmp_path / 'out'}"), open_source(f"kitti:{folder}")
+    for index in (7, 14, 21):
+        mine, yours = ours.truth(index) or (), theirs.truth(index) or ()
+        assert [each.label for each in mine] == [each.label for each in yours]
+        for one, other in zip(mine, yours, strict=True):
+            assert one.cuboid.center == pytest.approx(other.cuboid.center, abs=1e-5)
+            assert one.cuboid.yaw_rad == pytest.approx(other.cuboid.yaw_rad, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["kitti", "kitti-tracking", "nuscenes", "openlabel", "native"])
+def test_astyx_truth_comes_back(astyx: tuple[str, Drive], name: str, tmp_path: Path) -> None:
+    uri, drive = astyx
+    labels, notes = truth_labels(open_source(uri), drive.frames, IMPORT)
+    assert len(labels.tracks) > 20
+    assert any("no identities over time" in note for note in notes)
+    export_labels(labels, drive, name, tmp_path / "out")  # type: ignore[arg-type]
+    back = import_labels(tmp_path / "out", drive, name, IMPORT)  # type: ignore[arg-type]
+    assert_same(back.labels, labels, 1e-5)
