@@ -122,6 +122,13 @@ def test_a_link_restores_moment_selection_parameters_and_layout(page: Page, site
     assert urlsplit(second.url).fragment == "", "a reload does not turn back time"
 
 
+def test_a_link_to_a_moment_stops_there(open_page: OpenPage, site: Site):
+    site.engine.control.change(playing=True)
+    site.engine.wait_for(lambda s: s.playing, WAIT_S)
+    open_page(address=f"{site.address}/#uri=sim%3Astraight&frame=90")
+    site.engine.wait_for(lambda s: s.index == 90 and not s.playing, WAIT_S)
+
+
 def test_a_link_to_another_file_asks_first(open_page: OpenPage, site: Site):
     page = open_page(address=f"{site.address}/#uri=kitti%3A%2Fnowhere&frame=3")
     dialog = page.get_by_role("dialog", name="Link")

@@ -2,7 +2,7 @@
  * A link to what is on the screen: recording, frame, selection, parameters, layout. It is the address's hash, which no
  * server sees. A link is applied once and then taken off the address, so that a reload does not turn back time.
  */
-import { request } from "../api.js";
+import { playback, request } from "../api.js";
 import { $, el } from "../dom.js";
 import { seekTo } from "../drive/seek.js";
 import { get, on, set } from "../store.js";
@@ -99,7 +99,10 @@ async function apply(shared) {
     const body = { preset: shared.preset, values: shared.values };
     await request("api/params", "POST", body).catch((problem) => show("This link's parameters do not fit", problem.message));
   }
-  if (shared.index !== null) seekTo(shared.index);
+  if (shared.index !== null) {
+    playback({ playing: false }); // it leads to a moment, which playing would leave at once
+    seekTo(shared.index);
+  }
   set("selection", shared.selection);
 }
 
