@@ -88,7 +88,7 @@ def _labels_of(source: Source, drive: Drive, file: Path | None) -> tuple[LabelSe
 
 def _amount(labels: LabelSet) -> str:
     sightings = sum(len(track.sightings) for track in labels.tracks)
-    return f"{len(labels.tracks):,} tracks with {sightings:,} sightings, {len(labels.leads):,} ranges of the lead"
+    return f"tracks {len(labels.tracks):,}, sightings {sightings:,}, ranges of the lead {len(labels.leads):,}"
 
 
 def _say(*sentences: str) -> None:
