@@ -9,10 +9,10 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.geometry import closest_on_polygon
+from pipeline.geometry import closest_on_polygon, iou_matrix
 from pipeline.path.placing import near_face_middle
 from pipeline.sources.base import TruthObject
-from pipeline.types import VEHICLES, Point2, Result
+from pipeline.types import VEHICLES, Box, Point2, Result
 
 Verdict = Literal["correct", "none", "missed", "false", "wrong"]
 """correct: the right vehicle · none: rightly nothing · missed: a lead, not found · false: a CIPV, no lead · wrong:
@@ -20,6 +20,9 @@ a CIPV that is another object than the lead."""
 
 LABELLED_VEHICLES = VEHICLES | {"van", "tram", "trailer", "other vehicle", "motorcyclist"}
 """Label names of the recordings that may be a lead, lower case."""
+
+
+SAME_BOX_IOU = 0.5
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,16 @@ def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judg
     lengthwise = abs(chosen.distance_m - truth_m) <= max(2.0, rule.range_slack * truth_m)
     on_it = lateral == 0.0 and lengthwise
     return Judged(result.frame, "correct" if on_it else "wrong", truth_m, chosen.distance_m, lateral)
+
+
+def judge_lead_box(result: Result, bbox: Box) -> Judged:
+    """One frame's CIPV against a lead that only the picture shows: correct when half of their boxes' union is common.
+    Nobody knows how far off it is."""
+    chosen = next((item for item in result.objects if result.cipv is not None and item.id == result.cipv.id), None)
+    if chosen is None:
+        return Judged(result.frame, "missed", None, None, None)
+    on_it = chosen.bbox is not None and iou_matrix(np.array([chosen.bbox]), np.array([bbox]))[0, 0] >= SAME_BOX_IOU
+    return Judged(result.frame, "correct" if on_it else "wrong", None, chosen.distance_m, None)
 
 
 def _lateral_error(bev: tuple[Point2, Point2, Point2, Point2], lead: TruthObject) -> float:

@@ -58,11 +58,12 @@ class _Moment:
 
 
 def alarms(frames: Sequence[tuple[Result, FrameTruth]], params: AebParams) -> list[Alarm]:
-    """Every warning and braking that was due or done, where it is known who leads. None without ego speed."""
+    """Every warning and braking that was due or done, where it is known who leads, and where. None without ego
+    speed."""
     moments = [
         _Moment(truth.t_ns, *_danger(truth, params), result.acc)
         for result, truth in frames
-        if result.acc is not None and truth.lead_known
+        if result.acc is not None and truth.lead_known and truth.lead_box is None
     ]
     warn_due = _due(params.warn_ttc_s, inf)
     brake_due = _due(params.partial_ttc_s, params.partial_when_mps2)

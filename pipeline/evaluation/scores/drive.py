@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from pipeline.errors import BadInput
-from pipeline.evaluation.lead import Judged, LeadRule, judge_lead
+from pipeline.evaluation.lead import Judged, LeadRule, judge_lead, judge_lead_box
 from pipeline.evaluation.scores import tracking
 from pipeline.evaluation.scores.alarms import Alarm, alarms
 from pipeline.evaluation.scores.episodes import (
@@ -73,11 +73,11 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
     index = {tick: n for n, tick in enumerate(truth.ticks)}
     frames, moments, guarded = [], [], []
     for result, known in pairs:
-        judged = judge_lead(result, known.lead, rules.lead) if known.lead_known else None
+        judged = _judged(result, known, rules)
         frames.append(FrameScore(index[result.t_ns], result.t_ns, result.frame, judged, errors(result, known)))
         if judged is not None:
             moments.append(_moment(result, known, judged))
-            guarded += moments[-1:] if result.acc is not None else []
+            guarded += moments[-1:] if result.acc is not None and known.lead_box is None else []
     notes = truth.notes
     if len(pairs) < len(truth.frames):
         notes = (*notes, f"{len(truth.frames) - len(pairs)} labelled frames have no result and do not count.")
@@ -95,7 +95,15 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
     )
 
 
+def _judged(result: Result, known: FrameTruth, rules: Rules) -> Judged | None:
+    if known.lead_box is not None:
+        return judge_lead_box(result, known.lead_box[1])
+    return judge_lead(result, known.lead, rules.lead) if known.lead_known else None
+
+
 def _moment(result: Result, known: FrameTruth, judged: Judged) -> Moment:
     """A lead beyond the range asked for is none."""
     lead = known.lead.id if known.lead is not None and judged.truth_m is not None else None
+    if known.lead_box is not None:
+        lead = known.lead_box[0]
     return Moment(result.t_ns, lead, result.cipv.id if result.cipv is not None else None, judged)

@@ -124,7 +124,7 @@ def _labelled(reigns: Sequence[Sequence[Moment]], tick: int, lead: int) -> CutIn
 
 def _cuts_in(start: Moment, earlier: FrameTruth) -> bool:
     item = next((each for each in earlier.objects if each.id == start.lead), None)
-    if item is None or not earlier.lead_known:
+    if item is None or not earlier.lead_known or earlier.lead_box is not None:
         return False
     return earlier.lead is None or (earlier.lead.id != item.id and nearest_face_m(item) < nearest_face_m(earlier.lead))
 

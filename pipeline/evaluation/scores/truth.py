@@ -15,7 +15,7 @@ from pipeline.evaluation.lead import LeadRule, true_lead
 from pipeline.labels.model import LabelSet, LabelTrack
 from pipeline.params import TimeParams
 from pipeline.sources.base import Source, TruthObject
-from pipeline.types import Point2
+from pipeline.types import Box, Point2
 
 MAX_GAP_S = TimeParams().reset_gap_s
 """After a longer gap the line's trackers start anew, so nothing is compared across it."""
@@ -31,13 +31,14 @@ class NoTruth(BadInput):
 class FrameTruth:
     """A labelled frame. lead: null where none leads. lead_known: false where one can't tell, or the lead's place is not
     labelled. velocity_mps: relative to ego in the turning ego frame, by object id, of those that neighbouring frames
-    show."""
+    show. lead_box: the lead's id and picture box where only the picture shows it; ``lead`` is null then."""
 
     t_ns: int
     objects: tuple[TruthObject, ...]
     lead: TruthObject | None
     lead_known: bool = True
     velocity_mps: Mapping[int, Point2] | None = None
+    lead_box: tuple[int, Box] | None = None
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,8 @@ def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
             continue
         said = next((each.lead for each in ranges if each.first <= index <= each.last), None)
         lead = next((item for item in items if item.id == said), None)
-        frames[tick] = FrameTruth(tick, items, lead, lead is not None or said == "none")
+        box = _box_of(tracks.get(said), index) if lead is None and isinstance(said, int) else None
+        frames[tick] = FrameTruth(tick, items, lead, lead is not None or box is not None or said == "none", None, box)
     if not frames:
         raise NoTruth(f"{labels.source}: none of these labels has been accepted")
     events = [each for each in labels.events if each.kind == "cut_in" and each.state in _COUNTED and each.tracks]
@@ -110,6 +112,11 @@ def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
     left_out = len(labels.tracks) - len(tracks)
     notes = (f"{left_out} of {len(labels.tracks)} tracks are not accepted and do not count.",) if left_out else ()
     return DriveTruth(labels.source, labels.t_ns, with_velocities(frames), cut_ins, notes)
+
+
+def _box_of(track: LabelTrack | None, index: int) -> tuple[int, Box] | None:
+    seen = track.at(index) if track is not None else None
+    return (track.id, seen.bbox) if track is not None and seen is not None and seen.bbox is not None else None
 
 
 def _objects_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[TruthObject, ...]]:

@@ -8,6 +8,7 @@ from typing import get_args
 import pytest
 
 from pipeline.evaluation.lead import LeadRule
+from pipeline.evaluation.scores.drive import Rules, score_drive
 from pipeline.evaluation.scores.truth import (
     DriveTruth,
     FrameTruth,
@@ -20,8 +21,9 @@ from pipeline.evaluation.scores.truth import (
 from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, Lead, LeadRange, Origin, Sighting, State
 from pipeline.sources import open_source
 from pipeline.sources.base import TruthObject
-from tests.pipeline.build import cuboid
-from tests.pipeline.evaluation.scores.drives import TICK_NS, labelled
+from pipeline.types import FusedObject
+from tests.pipeline.build import cuboid, fused
+from tests.pipeline.evaluation.scores.drives import TICK_NS, believed, labelled
 
 PERSON = Origin("person", "someone", 0)
 RULE = LeadRule()
@@ -64,6 +66,28 @@ def test_without_labelled_leads_the_nearest_in_the_lane_leads() -> None:
 )
 def test_labelled_leads(ranges: tuple[LeadRange, ...], expected: list[int | str | None]) -> None:
     assert leads(of_labels(labels(track(4, 30.0), track(5, 20.0, 3.5), leads=ranges), RULE)) == expected
+
+
+@pytest.mark.parametrize(
+    ("objects", "verdict"),
+    [
+        pytest.param([], "missed", id="nothing chosen"),
+        pytest.param([fused(7, 20.0)], "correct", id="its box"),
+        pytest.param([replace(fused(7, 20.0), bbox=(6.0, 0.0, 16.0, 10.0))], "wrong", id="a box beside it"),
+        pytest.param([replace(fused(7, 20.0), bbox=None)], "wrong", id="seen by the LiDAR alone"),
+    ],
+)
+def test_a_lead_that_only_the_picture_shows(objects: list[FusedObject], verdict: str) -> None:
+    only_box = LabelTrack(4, "car", (Sighting(0, None, (0.0, 0.0, 10.0, 9.0)),), "accepted", PERSON)
+    known = of_labels(labels(only_box, leads=(led(0, 0, 4),)), RULE)
+    result = believed(0, objects, 7 if objects else None, "warn")
+    score = score_drive([result], known, Rules())
+    (frame,) = score.frames
+    assert frame.judged is not None
+    assert frame.judged.verdict == verdict
+    assert frame.judged.error_m is None
+    assert [each.lead for each in score.acquisitions] == [4]
+    assert score.alarms == (), "nobody knows how far off it is"
 
 
 @pytest.mark.parametrize("state", get_args(State))
