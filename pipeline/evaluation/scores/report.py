@@ -83,8 +83,8 @@ def _scores(run: Drives) -> Section:
         "lead, none is chosen. Wrong: another vehicle, or the lead at a distance that is too far off. Errors are mean "
         "absolute ones, of every labelled vehicle that an object stands for.",
         f"Vehicles are looked for to {MAX_RANGE_M:.0f} m and 35° to either side. Two places are one within "
-        f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class claims to be no vehicle: it counts where one is. A "
-        "vehicle that nobody labelled counts as a false detection.",
+        f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class claims to be no vehicle: it counts where one is, "
+        "so the LiDAR alone never detects falsely. A vehicle that nobody labelled counts as a false detection.",
     ]
     if len(run) < FEW:
         text.append(

@@ -20,6 +20,10 @@ from pipeline.types import Box, Point2
 MAX_GAP_S = TimeParams().reset_gap_s
 """After a longer gap the line's trackers start anew, so nothing is compared across it."""
 _LINK_M, _LINK_MPS = 2.0, 10.0
+_NOT_FOLLOWED = (
+    "The labels follow no identity over time: vehicles are linked from frame to frame by nearness. Figures of identity "
+    "rest on that, and speed is judged of leads only."
+)
 _COUNTED = ("accepted", "corrected")
 
 
@@ -62,19 +66,24 @@ def of_source(source: Source, rule: LeadRule) -> DriveTruth:
     labelled = {tick: truth for index, tick in enumerate(ticks) if (truth := source.truth(index)) is not None}
     if not labelled:
         raise NoTruth(f"{source.uri}: no frame of this recording is labelled")
-    notes: tuple[str, ...] = ()
-    if any(item.id is None for truth in labelled.values() for item in truth):
-        labelled = linked(labelled)
-        notes = (
-            "The labels follow no identity over time: vehicles are linked from frame to frame by nearness. Figures of "
-            "identity rest on that, and speed is judged of leads only.",
-        )
-    frames = with_velocities(
-        {tick: FrameTruth(tick, truth, true_lead(truth, rule)) for tick, truth in labelled.items()}
-    )
-    if notes:
-        frames = {tick: _only_the_leads(frame) for tick, frame in frames.items()}
-    return DriveTruth(source.uri, ticks, frames, None, notes)
+    frames = {tick: FrameTruth(tick, truth, true_lead(truth, rule)) for tick, truth in labelled.items()}
+    followed = all(item.id is not None for truth in labelled.values() for item in truth)
+    return DriveTruth(source.uri, ticks, _over_time(frames, followed), None, () if followed else (_NOT_FOLLOWED,))
+
+
+def _over_time(frames: Mapping[int, FrameTruth], followed: bool) -> dict[int, FrameTruth]:
+    """The frames with velocities. Where the labels do not follow who is who, objects are linked by nearness first."""
+    if followed:
+        return with_velocities(frames)
+    objects = linked({tick: frame.objects for tick, frame in frames.items()})
+    renamed = {tick: _renamed(frame, objects[tick]) for tick, frame in frames.items()}
+    return {tick: _only_the_leads(frame) for tick, frame in with_velocities(renamed).items()}
+
+
+def _renamed(frame: FrameTruth, objects: tuple[TruthObject, ...]) -> FrameTruth:
+    """The frame with other ids, in the same order."""
+    lead = next((new for old, new in zip(frame.objects, objects, strict=True) if old is frame.lead), None)
+    return replace(frame, objects=objects, lead=lead)
 
 
 def _only_the_leads(frame: FrameTruth) -> FrameTruth:
@@ -89,7 +98,7 @@ def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
     the pipeline's own opinion, and a rejected one is nobody's.
 
     Where no lead is labelled at all, it is the nearest vehicle in the lane, the lane taken as straight. NoTruth when
-    nothing counts.
+    nothing counts. Where each track is in one frame only, they are linked by nearness.
     """
     tracks = {track.id: track for track in labels.tracks if track.state in _COUNTED}
     ranges = [each for each in labels.leads if each.state in _COUNTED]
@@ -110,8 +119,10 @@ def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
     events = [each for each in labels.events if each.kind == "cut_in" and each.state in _COUNTED and each.tracks]
     cut_ins = tuple((labels.t_ns[each.frame], each.tracks[0]) for each in events) or None
     left_out = len(labels.tracks) - len(tracks)
-    notes = (f"{left_out} of {len(labels.tracks)} tracks are not accepted and do not count.",) if left_out else ()
-    return DriveTruth(labels.source, labels.t_ns, with_velocities(frames), cut_ins, notes)
+    followed = len(frames) < 2 or any(len(track.sightings) > 1 for track in tracks.values()) or not tracks
+    notes = [f"{left_out} of {len(labels.tracks)} tracks are not accepted and do not count."] if left_out else []
+    notes += [] if followed else [_NOT_FOLLOWED]
+    return DriveTruth(labels.source, labels.t_ns, _over_time(frames, followed), cut_ins, tuple(notes))
 
 
 def _box_of(track: LabelTrack | None, index: int) -> tuple[int, Box] | None:

@@ -141,6 +141,15 @@ def test_labels_without_identity_are_linked_to_the_nearest_of_their_class() -> N
     assert ids == {0: [1, 2], TICK_NS: [2, 1], 2 * TICK_NS: [3, 2, 4], 9_000_000_000: [5]}
 
 
+def test_tracks_of_one_frame_each_are_linked_too() -> None:
+    """As a file of KITTI's object labels gives them."""
+    alone = [LabelTrack(n + 1, "car", (Sighting(n, cuboid(30.0 - n, 0.0)),), "accepted", PERSON) for n in range(3)]
+    known = of_labels(labels(*alone), RULE)
+    assert leads(known) == [1, 1, 1]
+    assert any("linked" in note for note in known.notes)
+    assert known.frames[0].velocity_mps == {1: pytest.approx((-10.0, 0.0))}
+
+
 def test_a_recording_that_nobody_labelled() -> None:
     class Unlabelled:
         uri, title, rate_hz, notes = "made:1", "made", 10.0, ()
