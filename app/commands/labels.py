@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -19,6 +18,9 @@ from pipeline.labels.model import LabelSet, Origin
 from pipeline.labels.truth import truth_labels
 from pipeline.sources import open_source
 from pipeline.sources.base import Source
+
+_NOBODY_KNOWS_WHEN = 0
+"""The truth of a recording was made before it was opened; the same recording gives the same file."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,9 @@ class ImportLabels:
     def __call__(self) -> int:
         source = open_source(self.source)
         drive = _drive(source)
-        origin = Origin("import", self.file.name, time.time_ns() // 1_000_000)
-        found = import_labels(self.file.expanduser(), drive, self.format, origin)
+        file = self.file.expanduser()
+        origin = Origin("import", file.name, file.stat().st_mtime_ns // 1_000_000)
+        found = import_labels(file, drive, self.format, origin)
         export_labels(found.labels, drive, "native", self.out)
         _say(*found.notes, f"{self.out}: {_amount(found.labels)}")
         return 0
@@ -83,7 +86,7 @@ def _labels_of(source: Source, drive: Drive, file: Path | None) -> tuple[LabelSe
     if file is not None:
         placed = onto(from_json(read_bytes(file.expanduser()), str(file)), drive, str(file))
         return placed.labels, placed.notes
-    return truth_labels(source, drive.frames, Origin("import", source.title, time.time_ns() // 1_000_000))
+    return truth_labels(source, drive.frames, Origin("import", source.title, _NOBODY_KNOWS_WHEN))
 
 
 def _amount(labels: LabelSet) -> str:

@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
-from pipeline.alignment import Pinhole, project_cuboid
+from pipeline.alignment import Pinhole, project_cuboids
 from pipeline.errors import BadInput
-from pipeline.geometry import iou_matrix
+from pipeline.geometry import Cuboid, corners_of
 from pipeline.labels.formats.parts import Part
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.sources.base import Rectified, Source
@@ -121,28 +119,34 @@ class Format:
 def check_extrinsic(labels: LabelSet, drive: Drive, what: str) -> None:
     """BadInput when cuboids and boxes of the same sightings lie apart in the picture: the sign of an extrinsic that was
     taken the wrong way round, or of labels of another recording."""
-    pairs = list(_pairs(labels, drive))
-    apart = sum(
-        projected is None or iou_matrix(np.array(box), np.array(projected))[0, 0] == 0.0 for box, projected in pairs
-    )
-    if len(pairs) >= _FEWEST_PAIRS and apart > len(pairs) / 2:
+    count, apart = 0, 0
+    for frame, pairs in _pairs(labels).items():
+        camera = drive.shots[frame].camera
+        if camera is not None:
+            view = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
+            corners = corners_of([cuboid for cuboid, _ in pairs])
+            seen = project_cuboids(view, corners, camera.width, camera.height)
+            count += len(pairs)
+            apart += sum(not _touch(one, box) for one, (_, box) in zip(seen, pairs, strict=True))
+    if count >= _FEWEST_PAIRS and apart > count / 2:
         raise BadInput(
-            f"{what}: {apart} of {len(pairs)} cuboids do not fall where their boxes are in the picture; "
+            f"{what}: {apart} of {count} cuboids do not fall where their boxes are in the picture; "
             "is an extrinsic taken the wrong way round?"
         )
 
 
-def _pairs(labels: LabelSet, drive: Drive) -> list[tuple[Box, Box | None]]:
-    """(box, projected cuboid) of every sighting that has both, where there is a camera."""
-    found: list[tuple[Box, Box | None]] = []
+def _pairs(labels: LabelSet) -> dict[int, list[tuple[Cuboid, Box]]]:
+    """Frame → (cuboid, box) of every sighting that has both."""
+    found: dict[int, list[tuple[Cuboid, Box]]] = {}
     for track in labels.tracks:
         for sighting in track.sightings:
-            camera = drive.shots[sighting.frame].camera
-            if sighting.cuboid is not None and sighting.bbox is not None and camera is not None:
-                view = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
-                corners = np.asarray(sighting.cuboid.corners())
-                found.append((sighting.bbox, project_cuboid(view, corners, camera.width, camera.height)))
+            if sighting.cuboid is not None and sighting.bbox is not None:
+                found.setdefault(sighting.frame, []).append((sighting.cuboid, sighting.bbox))
     return found
+
+
+def _touch(one: Box | None, other: Box) -> bool:
+    return one is not None and one[0] < other[2] and other[0] < one[2] and one[1] < other[3] and other[1] < one[3]
 
 
 def make_folder(out: Path) -> Path:

@@ -9,6 +9,7 @@ ego frame is it. A track's number is its instance's token, written with 32 hexad
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from hashlib import blake2b
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.geometry import Cuboid, inverse, rotation, transform
+from pipeline.geometry import Cuboid, inverse, rotation
 from pipeline.labels.formats.base import Drive, Shot, make_folder
 from pipeline.labels.model import LabelSet, LabelTrack, Sighting
 from pipeline.sources.files import check_looks_ahead
@@ -78,7 +79,8 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
 
 def _annotations(labels: LabelSet, drive: Drive, poses: list[F64]) -> dict[int, list[Row]]:
     """Rows by track."""
-    clouds: dict[int, F32 | None] = {}
+    inside = _points_inside(labels, drive)
+    turns = [_quaternion(pose[:3, :3]) for pose in poses]
     rows: dict[int, list[Row]] = {}
     for track in labels.tracks:
         seen = [each for each in track.sightings if each.cuboid is not None]
@@ -90,10 +92,10 @@ def _annotations(labels: LabelSet, drive: Drive, poses: list[F64]) -> dict[int, 
                 "instance_token": instance_token(track.id),
                 "visibility_token": "",
                 "attribute_tokens": [],
-                **_box(each, poses[each.frame]),
+                **_box(each, poses[each.frame], turns[each.frame]),
                 "prev": tokens[place - 1] if place else "",
                 "next": tokens[place + 1] if place + 1 < len(tokens) else "",
-                "num_lidar_pts": _points_inside(each, drive, clouds),
+                "num_lidar_pts": inside.get((track.id, each.frame), 0),
                 "num_radar_pts": 0,
             }
             for place, each in enumerate(seen)
@@ -101,25 +103,38 @@ def _annotations(labels: LabelSet, drive: Drive, poses: list[F64]) -> dict[int, 
     return rows
 
 
-def _box(sighting: Sighting, T_global_ego: F64) -> Row:
+def _box(sighting: Sighting, T_global_ego: F64, turn: list[float]) -> Row:
+    """turn: of the ego frame, w x y z."""
     assert sighting.cuboid is not None
     length, width, height = sighting.cuboid.size
-    turn = T_global_ego[:3, :3] @ rotation(0.0, 0.0, sighting.cuboid.yaw_rad)
-    center = transform(T_global_ego, np.array([sighting.cuboid.center]))[0]
-    return {"translation": center.tolist(), "size": [width, length, height], "rotation": _quaternion(turn)}
+    center = T_global_ego[:3, :3] @ sighting.cuboid.center + T_global_ego[:3, 3]
+    w, x, y, z = turn
+    c, s = math.cos(sighting.cuboid.yaw_rad / 2), math.sin(sighting.cuboid.yaw_rad / 2)
+    rotation_wxyz = [w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s]
+    return {"translation": center.tolist(), "size": [width, length, height], "rotation": rotation_wxyz}
 
 
-def _points_inside(sighting: Sighting, drive: Drive, clouds: dict[int, F32 | None]) -> int:
-    """LiDAR points in a cuboid, which the benchmark filters by; 0 without a LiDAR."""
-    if sighting.frame not in clouds:
-        clouds[sighting.frame] = drive.points(sighting.frame)
-    points = clouds[sighting.frame]
-    return 0 if points is None or sighting.cuboid is None else count_inside(sighting.cuboid, points)
+def _points_inside(labels: LabelSet, drive: Drive) -> dict[tuple[int, int], int]:
+    """(track, frame) → LiDAR points in the cuboid, which the benchmark filters by; frames without a LiDAR have none."""
+    by_frame: dict[int, list[tuple[int, Cuboid]]] = {}
+    for track in labels.tracks:
+        for each in track.sightings:
+            if each.cuboid is not None:
+                by_frame.setdefault(each.frame, []).append((track.id, each.cuboid))
+    counts: dict[tuple[int, int], int] = {}
+    for frame, cuboids in by_frame.items():
+        points = drive.points(frame)
+        if points is not None:
+            by_x = points[np.argsort(points[:, 0]), :3]
+            counts |= {(number, frame): count_inside(cuboid, by_x) for number, cuboid in cuboids}
+    return counts
 
 
 def count_inside(cuboid: Cuboid, points: F32) -> int:
-    """How many of (N, 3+) ego points are in a cuboid."""
-    off = points[:, :3].astype(np.float64) - cuboid.center
+    """How many of (N, 3) ego points, in order of x, are in a cuboid."""
+    reach_m = math.hypot(*cuboid.size[:2]) / 2
+    first, last = np.searchsorted(points[:, 0], [cuboid.center[0] - reach_m, cuboid.center[0] + reach_m])
+    off = points[first:last].astype(np.float64) - cuboid.center
     along = off @ rotation(0.0, 0.0, cuboid.yaw_rad)
     return int(np.count_nonzero(np.all(np.abs(along) <= np.array(cuboid.size) / 2, axis=1)))
 

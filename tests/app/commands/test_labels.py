@@ -34,6 +34,12 @@ def test_truth_goes_out_and_comes_back(drive: Path, tmp_path: Path, capsys: pyte
     assert "cipv: 1 track not written: no place for them" in capsys.readouterr().err
 
 
+def test_the_same_recording_gives_the_same_file(drive: Path, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        assert cipv("labels", "export", drive, "--format", "native", "--out", tmp_path / name) == 0
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
 BAD = {
     "no such format": ("labels", "export", "{drive}", "--format", "word", "--out", "{tmp}/x"),
     "no such file": ("labels", "import", "{drive}", "{tmp}/none", "--format", "csv", "--out", "{tmp}/x"),
