@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import httpx
 import pytest
@@ -23,7 +24,7 @@ from app.server import serve
 from pipeline.params import Params
 from tests.app.recording import CountingDetector, Recording, opener
 engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car", playing=True)
-serve(engine, port=int(sys.argv[1]))
+serve(engine, port=int(sys.argv[1]), host=sys.argv[2])
 """
 
 
@@ -37,7 +38,7 @@ def taken_port() -> Iterator[int]:
 
 def test_it_passes_over_a_taken_port_answers_and_ends_with_open_streams(taken_port: int):
     program = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(taken_port)],
+        [sys.executable, "-c", PROGRAM, str(taken_port), "127.0.0.1"],
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE,
@@ -59,3 +60,34 @@ def test_it_passes_over_a_taken_port_answers_and_ends_with_open_streams(taken_po
     finally:
         program.kill()
         program.wait()
+
+
+def test_for_other_machines_it_shows_links_with_tokens_and_lets_nobody_else_in():
+    token = "chosen-for-the-display-1234"
+    program = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, "0", "0.0.0.0"],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "CIPV_DISPLAY_TOKEN": token},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert program.stdout is not None
+        address, person, display = (program.stdout.readline().strip() for _ in range(3))
+        port = urlsplit(address).port
+        assert "0.0.0.0" not in address
+        assert person.startswith(f"everything:         {address}/?token=")
+        assert display == f"display in the car: {address}/drive/?token={token}"
+        here = f"http://127.0.0.1:{port}"
+        assert httpx.get(f"{here}/api/state", timeout=60).status_code == 401
+        assert httpx.get(f"{here}/healthz", timeout=60).status_code == 200
+        with httpx.Client(base_url=here, timeout=60) as client:
+            assert client.get("/", params={"token": person.partition("token=")[2]}).status_code == 200
+            assert client.get("/api/state").json()["speed"] == 1.0
+        program.send_signal(signal.SIGINT)
+        out, errors = program.communicate(timeout=30)
+        assert out == ""
+        assert "token" not in errors, "it is shown once"
+    finally:
+        program.kill()
