@@ -6,5 +6,5 @@ native.py     our own JSON, which holds everything                   session.py 
 kitti.py      object and tracking labels; kitti_rows.py: their lines
 nuscenes.py   the JSON tables; nuscenes_read.py: back
 coco.py       boxes in pictures                                      lead_csv.py the lead of each frame as a table
-openlabel.py  ASAM OpenLABEL 1.0; openlabel_read.py: back
+openlabel.py  ASAM OpenLABEL 1.0; openlabel_read.py, openlabel_form.py: back
 """

@@ -6,15 +6,16 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from pydantic import BaseModel, Field, TypeAdapter
+from pydantic import TypeAdapter
 
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid, transform
 from pipeline.labels.formats import openlabel as ol
 from pipeline.labels.formats.base import Drive, Imported
+from pipeline.labels.formats.openlabel_form import Agent, Content, Data, Element, File, Shape
 from pipeline.labels.formats.reading import fit, parse_as, read_bytes
 from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, Lead, LeadRange, Origin, PathLabel, Sighting, State
 from pipeline.sources.files import rigid_transform
@@ -27,90 +28,7 @@ _LARGEST_ID = 2**63
 _DEEPEST = 32
 
 
-class _Value(BaseModel):
-    name: str = ""
-    val: Any = None
-    coordinate_system: str = ""
-
-
-class _Shape(BaseModel):
-    val: list[float]
-    name: str = ""
-    coordinate_system: str = ""
-
-
-class _Data(BaseModel):
-    text: list[_Value] = Field(default_factory=list)
-    num: list[_Value] = Field(default_factory=list)
-    boolean: list[_Value] = Field(default_factory=list)
-    cuboid: list[_Shape] = Field(default_factory=list)
-    bbox: list[_Shape] = Field(default_factory=list)
-    poly3d: list[_Shape] = Field(default_factory=list)
-
-    def said(self, name: str) -> Any:
-        return next((each.val for each in (*self.text, *self.num, *self.boolean) if each.name == name), None)
-
-
-class _Interval(BaseModel):
-    frame_start: int
-    frame_end: int
-
-
-class _Agent(BaseModel):
-    type: str = "object"
-    uid: str
-
-
-class _Element(BaseModel):
-    name: str = ""
-    type: str = ""
-    frame_intervals: list[_Interval] = Field(default_factory=list)
-    object_data: _Data = Field(default_factory=_Data)
-    action_data: _Data = Field(default_factory=_Data)
-    event_data: _Data = Field(default_factory=_Data)
-    context_data: _Data = Field(default_factory=_Data)
-    rdf_subjects: list[_Agent] = Field(default_factory=list)
-    rdf_objects: list[_Agent] = Field(default_factory=list)
-
-
-class _InFrame(BaseModel):
-    object_data: _Data = Field(default_factory=_Data)
-
-
-class _Properties(BaseModel):
-    timestamp: str | float | None = None
-
-
-class _Frame(BaseModel):
-    objects: dict[str, _InFrame] = Field(default_factory=dict)
-    frame_properties: _Properties = Field(default_factory=_Properties)
-
-
-class _Pose(BaseModel):
-    matrix4x4: list[float] | None = None
-
-
-class _System(BaseModel):
-    parent: str = ""
-    pose_wrt_parent: _Pose | None = None
-
-
-class _Content(BaseModel):
-    metadata: dict[str, Any]
-    objects: dict[str, _Element] = Field(default_factory=dict)
-    actions: dict[str, _Element] = Field(default_factory=dict)
-    relations: dict[str, _Element] = Field(default_factory=dict)
-    events: dict[str, _Element] = Field(default_factory=dict)
-    contexts: dict[str, _Element] = Field(default_factory=dict)
-    frames: dict[str, _Frame] = Field(default_factory=dict)
-    coordinate_systems: dict[str, _System] = Field(default_factory=dict)
-
-
-class _File(BaseModel):
-    openlabel: _Content
-
-
-_FILE = TypeAdapter(_File)
+_FILE = TypeAdapter(File)
 
 
 def read(path: Path, drive: Drive, origin: Origin) -> Imported:
@@ -121,7 +39,7 @@ def read(path: Path, drive: Drive, origin: Origin) -> Imported:
 class _Reading:
     """One file on its way to labels."""
 
-    def __init__(self, content: _Content, drive: Drive, origin: Origin, what: str) -> None:
+    def __init__(self, content: Content, drive: Drive, origin: Origin, what: str) -> None:
         self.content, self.drive, self.origin, self.what = content, drive, origin, what
         self.is_ours = ol.OURS in content.metadata
         if str(content.metadata.get("schema_version")) != "1.0.0":
@@ -171,7 +89,7 @@ class _Reading:
             comment = str(each.object_data.said("comment") or "")
             yield LabelTrack(number, label, seen_in_order, state, origin, comment)
 
-    def _sighting(self, frame: int, data: _Data) -> Sighting:
+    def _sighting(self, frame: int, data: Data) -> Sighting:
         cuboid = self._cuboid(data.cuboid[0]) if data.cuboid else None
         bbox = None
         if data.bbox:
@@ -180,7 +98,7 @@ class _Reading:
         keyframe = data.said("keyframe")
         return Sighting(frame, cuboid, bbox, keyframe if isinstance(keyframe, bool) else True)
 
-    def _cuboid(self, shape: _Shape) -> Cuboid:
+    def _cuboid(self, shape: Shape) -> Cuboid:
         """Nine numbers with Euler angles, or ten with a quaternion; only its turn about z is kept."""
         val = _of_length(shape.val, (9, 10), f"{self.what}: a cuboid")
         if len(val) == 10:
@@ -234,7 +152,7 @@ class _Reading:
             raise BadInput(f"{self.what}: the lead {uid[:20]!r} is no track")
         return self._track_of(relation.rdf_subjects)
 
-    def _track_of(self, subjects: list[_Agent]) -> int:
+    def _track_of(self, subjects: list[Agent]) -> int:
         if len(subjects) != 1:
             raise BadInput(f"{self.what}: a lead of {len(subjects)} vehicles")
         return self._number(subjects[0].uid)
@@ -276,13 +194,13 @@ class _Reading:
             if each.type == ol.TAG_TYPE:
                 yield FrameTag(self._span(each)[0], each.name, self._made(each.context_data)[1])
 
-    def _span(self, each: _Element) -> tuple[int, int]:
+    def _span(self, each: Element) -> tuple[int, int]:
         if len(each.frame_intervals) != 1:
             raise BadInput(f"{self.what}: {each.name[:40]!r} has {len(each.frame_intervals)} frame intervals, not one")
         (interval,) = each.frame_intervals
         return self._frame(interval.frame_start), self._frame(interval.frame_end)
 
-    def _made(self, data: _Data) -> tuple[State, Origin]:
+    def _made(self, data: Data) -> tuple[State, Origin]:
         """State and origin, where the file says them."""
         if data.said("maker") is None:
             return "accepted", self.origin
@@ -303,7 +221,7 @@ class _Reading:
             yield "the file says of no frame who leads"
 
 
-def _is_track(uid: str, each: _Element) -> bool:
+def _is_track(uid: str, each: Element) -> bool:
     return uid != ol.EGO_UID and each.type not in (ol.PATH_TYPE, ol.EGO_TYPE)
 
 
