@@ -26,7 +26,8 @@ class Ahead:
         self._ready: int | None = None
         self._ended = False
         # a read that hangs must not keep the program from ending
-        threading.Thread(target=self._work, name="cipv-ahead", daemon=True).start()
+        self._thread = threading.Thread(target=self._work, name="cipv-ahead", daemon=True)
+        self._thread.start()
 
     @property
     def ready(self) -> int | None:
@@ -48,11 +49,13 @@ class Ahead:
             self._wanted = index
             self._condition.notify()
 
-    def end(self) -> None:
-        """Begin nothing more."""
+    def end(self, patience_s: float = 0.0) -> None:
+        """Begin nothing more, and wait for what is under way, but not for ever."""
         with self._condition:
             self._ended = True
             self._condition.notify()
+        if patience_s > 0:
+            self._thread.join(patience_s)
 
     def _work(self) -> None:
         while True:

@@ -32,6 +32,7 @@ from pipeline.step import warm_up
 logger = logging.getLogger("cipv.engine")
 
 _PATIENCE_S = 10.0
+_READ_PATIENCE_S = 1.0
 """A read that hangs must not keep the program from ending; the worker is a daemon."""
 
 _LIVE_WAIT_S = 0.02
@@ -92,6 +93,8 @@ class Engine:
         self.drives.stop()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
+        if self._ahead is not None:
+            self._ahead.end(_READ_PATIENCE_S)
         self.desk.stop()
 
     @property

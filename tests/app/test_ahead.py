@@ -71,3 +71,11 @@ def test_what_cannot_be_prepared_is_ready_all_the_same(work: Work):
     assert work.told.acquire(timeout=WAIT_S)
     assert ahead.ready == -1
     ahead.end()
+
+
+def test_who_ends_it_with_patience_leaves_no_thread_behind():
+    before = set(threading.enumerate())
+    ahead = Ahead(lambda index: None, lambda: None)
+    assert set(threading.enumerate()) - before
+    ahead.end(patience_s=60.0)
+    assert set(threading.enumerate()) <= before
