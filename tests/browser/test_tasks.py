@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs, quote, urlsplit
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -114,6 +114,10 @@ def test_a_link_restores_moment_selection_parameters_and_layout(page: Page, site
     site.engine.control.seek(0)
     site.engine.wait_for(lambda s: s.index == 0 and s.params == Params(), WAIT_S)
     second = open_page(address=link)
+    dialog = second.get_by_role("dialog", name="Link")
+    expect(dialog).to_contain_text("change path.half_width_m")
+    assert site.engine.snapshot.params == Params(), "a link changes nothing of others unasked"
+    dialog.get_by_role("button", name="Follow it").click()
     wait_for_frame(second, 90)
     site.engine.wait_for(lambda s: s.params.path.half_width_m == WIDE["path.half_width_m"], WAIT_S)
     expect(second.locator(".table-pane")).to_be_hidden()
@@ -135,6 +139,13 @@ def test_a_link_to_another_file_asks_first(open_page: OpenPage, site: Site):
     expect(dialog).to_contain_text("kitti:/nowhere")
     dialog.get_by_role("button", name="Stay here").click()
     assert site.engine.snapshot.uri == "sim:straight"
+
+
+def test_a_link_with_a_broken_layout_still_leads_to_its_moment(open_page: OpenPage, site: Site):
+    layout = quote(json.dumps({"hidden": None, "tab": 7, "grown": "nowhere", "sizes": {"timeline": "x"}, "layers": 3}))
+    page = open_page(address=f"{site.address}/#uri=sim%3Astraight&frame=33&layout={layout}")
+    wait_for_frame(page, 33)
+    expect(page.locator(".camera-pane")).to_be_visible()
 
 
 def test_a_clip_is_marked_and_exported(page: Page):

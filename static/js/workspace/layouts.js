@@ -49,6 +49,24 @@ export function apply({ layers, ...panes }) {
   close();
 }
 
+/** What of an object from outside is a layout; null for none. @param {any} given @returns {Saved|null} */
+export function checked(given) {
+  if (!given) return null;
+  /** @type {Saved} */
+  const layout = {};
+  if (Array.isArray(given.hidden)) layout.hidden = given.hidden.filter((/** @type {string} */ pane) => pane in PANES);
+  if (["plan", "3d", "rerun"].includes(given.tab)) layout.tab = given.tab;
+  if (given.grown in PANES) layout.grown = given.grown;
+  layout.sizes = only(given.sizes, Number.isFinite);
+  layout.layers = only(given.layers, (value) => typeof value === "boolean");
+  return layout;
+}
+
+/** The entries whose value fits. @param {any} given @param {(value: unknown) => boolean} fits @returns {any} */
+function only(given, fits) {
+  return Object.fromEntries(Object.entries(given ?? {}).filter(([, value]) => fits(value)));
+}
+
 /** What `apply` takes back. @returns {Saved} */
 export function current() {
   return { ...(get("layout") ?? EVERYTHING), layers: get("layers") ?? {} };

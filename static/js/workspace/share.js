@@ -20,8 +20,8 @@ import * as layouts from "./layouts.js";
  */
 
 const SAID_MS = 1500;
-/** The simulator reads no more than a scenario. */
-const HARMLESS = "sim:";
+/** The built-in drives read no file. */
+const BUILT_IN = /^sim:\w+$/;
 const dialog = $("#link-dialog", HTMLDialogElement);
 
 export function setUp() {
@@ -51,7 +51,7 @@ export function parse(hash) {
   const query = new URLSearchParams(hash.replace(/^#/, ""));
   if (!query.has("uri") && !query.has("frame")) return null;
   const whole = (/** @type {string} */ name) => (/^\d{1,9}$/.test(query.get(name) ?? "") ? Number(query.get(name)) : null);
-  return { uri: query.get("uri"), index: whole("frame"), selection: whole("select"), preset: query.get("preset"), values: object(query.get("params")) ?? {}, layout: object(query.get("layout")) };
+  return { uri: query.get("uri"), index: whole("frame"), selection: whole("select"), preset: query.get("preset"), values: object(query.get("params")) ?? {}, layout: layouts.checked(object(query.get("layout"))) };
 }
 
 /** @param {string|null} json @returns {any} */
@@ -90,30 +90,53 @@ function begin() {
   });
 }
 
-/** @param {Shared} shared */
-async function apply(shared) {
+/**
+ * A link may come from anywhere, a hostile page too: what it would change for others happens only when a person says so.
+ * @param {Shared} shared @param {boolean} [agreed]
+ */
+async function apply(shared, agreed = false) {
   const { uri } = shared;
-  if (uri && uri !== get("state")?.uri) return uri.startsWith(HARMLESS) ? open(uri, shared) : ask(uri, shared);
+  const changes = agreed ? [] : await whatItChanges(shared);
+  if (changes.length) return ask(changes, shared);
+  if (uri && uri !== get("state")?.uri) return open(uri, shared);
   if (shared.layout) layouts.apply(shared.layout);
   if (shared.preset) {
     const body = { preset: shared.preset, values: shared.values };
     await request("api/params", "POST", body).catch((problem) => show("This link's parameters do not fit", problem.message));
   }
-  if (shared.index !== null) {
+  if (shared.index !== null && !get("state")?.live) {
     playback({ playing: false }); // it leads to a moment, which playing would leave at once
     seekTo(shared.index);
   }
   set("selection", shared.selection);
 }
 
-/** A link may come from anywhere: files and devices are opened only when a person says so. @param {string} uri @param {Shared} shared */
-function ask(uri, shared) {
-  const yes = el("button", { type: "button", textContent: "Open it" });
+/** What the link would do to more than this page, in words. @param {Shared} shared @returns {Promise<string[]>} */
+async function whatItChanges(shared) {
+  const state = get("state"), changes = [];
+  const opens = shared.uri && shared.uri !== state?.uri;
+  if (opens && !BUILT_IN.test(shared.uri ?? "")) changes.push(`open ${shared.uri}`);
+  if (opens && state?.live) changes.push("let go of the live sensors");
+  if (opens && state?.recording) changes.push("end the recording");
+  if (shared.preset) {
+    /** @type {{preset: string, values: Record<string, ParamValue>, base: Record<string, ParamValue>}} */
+    const now = await request("api/params");
+    const wanted = { ...now.base, ...shared.values };
+    const differing = Object.keys(wanted).filter((name) => wanted[name] !== now.values[name]);
+    if (shared.preset !== now.preset) changes.push(`take the preset ${shared.preset}`);
+    else if (differing.length) changes.push(`change ${differing.join(", ")}`);
+  }
+  return changes;
+}
+
+/** @param {string[]} changes @param {Shared} shared */
+function ask(changes, shared) {
+  const yes = el("button", { type: "button", textContent: "Follow it" });
   yes.addEventListener("click", () => {
     dialog.close();
-    open(uri, shared);
+    apply(shared, true);
   });
-  dialog.replaceChildren(el("h2", { textContent: "This link shows another recording" }), el("p", {}, el("code", { textContent: uri })),
+  dialog.replaceChildren(el("h2", { textContent: "This link wants to" }), el("ul", {}, ...changes.map((words) => el("li", {}, el("code", { textContent: words })))),
     el("form", { class: "dialog-buttons", method: "dialog" }, yes, el("button", { textContent: "Stay here" })));
   dialog.showModal();
 }
@@ -124,7 +147,7 @@ async function open(uri, shared) {
   on(["state"], () => {
     if (isDone || get("state")?.uri !== uri || !get("state")?.frame) return;
     isDone = true;
-    apply(shared);
+    apply(shared, true);
   });
   await request("api/source", "POST", { uri }).catch(() => (isDone = true));
 }
