@@ -28,6 +28,7 @@ from pipeline.params import Params
 from pipeline.run import Detectors, Sensors
 from pipeline.sources.base import AnySource, LiveSource, Source, SourceError, is_live_source, is_simulated
 from pipeline.step import warm_up
+from pipeline.types import Frame
 
 logger = logging.getLogger("cipv.engine")
 
@@ -123,17 +124,27 @@ class Engine:
             if wish.stop:
                 return self._close_live()
             try:
-                with self.drives.turn.foreground():
-                    self._serve(wish)
+                self._serve(wish)
             except Exception as error:  # the worker outlives whatever a recording or a network does
                 logger.exception("while serving %s", self.snapshot.uri)
                 self._fail(f"{type(error).__name__}: {_first_line(error)}")
 
     def _serve(self, wish: Wish) -> None:
-        if wish.uri is not None and not self._open(wish.uri):
-            return None
+        """All in front, but for the wait for sensors: others may work then."""
+        turn, came = self.drives.turn, None
+        if wish.uri is not None:
+            with turn.foreground():
+                if not self._open(wish.uri):
+                    return
         if self._live is not None:
-            return self._serve_live(self._live, wish)
+            came = self._live.wait(wish.params, _LIVE_WAIT_S)
+        with turn.foreground():
+            if self._live is not None:
+                self._serve_live(self._live, came, wish)
+            else:
+                self._serve_recording(wish)
+
+    def _serve_recording(self, wish: Wish) -> None:
         if self._line is None:
             return self._show(wish, None)
         shown = self.snapshot
@@ -202,12 +213,11 @@ class Engine:
         self.control.change(playing=False)
         return None
 
-    def _serve_live(self, live: LiveLine, wish: Wish) -> None:
+    def _serve_live(self, live: LiveLine, came: Frame | None, wish: Wish) -> None:
         """The line goes on whether or not it is shown: paused, the shown tick is held and can be run again with other
         parameters; playing on jumps to now."""
-        came = live.look(wish.params, _LIVE_WAIT_S)
         if came is not None:
-            self.desk.take(came)
+            self.desk.take(live.run(came, wish.params))
         held, newest = self.snapshot.tick, live.tick
         is_behind = newest is not None and (held is None or newest.frame is not held.frame)
         if wish.playing and is_behind:

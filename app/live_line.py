@@ -22,7 +22,7 @@ _SILENCE_S = 1.0
 
 
 class LiveLine:
-    """``open`` sensors, ``look`` again and again, ``close``. tick: the newest."""
+    """``open`` sensors, ``wait`` for a frame and ``run`` it again and again, ``close``. tick: the newest."""
 
     def __init__(self, source: LiveSource, detectors: Detectors, sensors: Sensors) -> None:
         self.source = source
@@ -38,11 +38,12 @@ class LiveLine:
     def close(self) -> None:
         self.source.close()
 
-    def look(self, params: Params, timeout_s: float) -> Tick | None:
-        """The newest tick through the line; null when none came in time."""
-        frame = self.source.next(timeout_s, params.sync)
-        if frame is None:
-            return None
+    def wait(self, params: Params, timeout_s: float) -> Frame | None:
+        """The newest tick of the sensors; null when none came in time."""
+        return self.source.next(timeout_s, params.sync)
+
+    def run(self, frame: Frame, params: Params) -> Tick:
+        """What ``wait`` gave, through the line."""
         self._ticked_s = monotonic()
         self._first_ns = frame.t_ns if self._first_ns is None else self._first_ns
         before = self.tick.after if self.tick is not None else State()

@@ -14,6 +14,9 @@ from contextlib import contextmanager
 _SHARE_S = 0.03
 """Work for each frame that is played; a piece that was begun is finished."""
 _LONGEST_WAIT_S = 0.3
+_LONGEST_FRONT_S = 1.0
+"""Work in front that never ends, as of sensors that tick faster than the line runs, slows the background down; it does not
+stop it."""
 
 
 class Turn:
@@ -29,7 +32,7 @@ class Turn:
 
     @contextmanager
     def foreground(self) -> Iterator[None]:
-        """Work that goes first."""
+        """Work that goes first. Not for waiting: nobody else works meanwhile."""
         with self._condition:
             self._in_front += 1
         try:
@@ -61,4 +64,4 @@ class Turn:
                 self._condition.wait_for(
                     lambda: self._ended or not self._playing or self._served > served, _LONGEST_WAIT_S
                 )
-            self._condition.wait_for(lambda: self._ended or not self._in_front)
+            self._condition.wait_for(lambda: self._ended or not self._in_front, _LONGEST_FRONT_S)
