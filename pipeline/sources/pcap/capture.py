@@ -8,6 +8,7 @@ and reads gigabytes for one packet, and because its times are floating-point num
 from __future__ import annotations
 
 import struct
+from bisect import bisect_right
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -40,6 +41,22 @@ class Datagram(NamedTuple):
     payload: bytes
 
 
+class _Interface(NamedTuple):
+    """origin: where it is described in the file; no packet before is of it. link: its type."""
+
+    origin: int
+    link: int
+    tick_ns: float | int
+
+
+class _Section(NamedTuple):
+    """A stretch of a pcapng file with a byte order and interfaces of its own. origin: where it begins."""
+
+    origin: int
+    order: str
+    interfaces: list[_Interface]
+
+
 class Capture:
     """One file. damage: why reading ended before the file did, null while it has not."""
 
@@ -47,7 +64,10 @@ class Capture:
         self.path = path
         self.damage: str | None = None
         with self._open() as file:
-            self._magic = file.read(4)
+            head = file.read(12)
+        self._magic = head[:4]
+        self._sections = [_Section(0, _BYTE_ORDER.get(head[8:], "<"), [])]
+        self._described_to = 0
         if self._magic not in _CLASSIC and self._magic != struct.pack("<I", _SECTION):
             raise SourceError(f"{path.name}: neither a pcap nor a pcapng file")
 
@@ -97,15 +117,18 @@ class Capture:
             origin += 16 + length
 
     def _pcapng(self, file: BinaryIO, begin: int) -> Iterator[tuple[int, int, int, bytes]]:
-        """Blocks from the beginning, because interfaces are described there; packets only from ``begin`` on."""
-        order, interfaces, origin = "<", list[tuple[int, float]](), 0
+        """Packets from ``begin`` on. Which sections and interfaces come before is kept from the first time the file was
+        read that far; what has not been read yet is gone through."""
+        origin = min(begin, self._described_to)
+        file.seek(origin)
         while head := file.read(12):
             if len(head) < 12:
                 self.damage = f"cut off after {origin} bytes"
                 return
-            if head[:4] == self._magic:
-                order, interfaces = _BYTE_ORDER.get(head[8:12], "<"), []
-            kind, length = struct.unpack(order + "II", head[:8])
+            section, is_new = self._section_at(origin), origin >= self._described_to
+            if head[:4] == self._magic and origin > section.origin:
+                section = _Section(origin, _BYTE_ORDER.get(head[8:12], "<"), [])
+            kind, length = struct.unpack(section.order + "II", head[:8])
             if length < 12 or length % 4 or length > _MAX_RECORD:
                 self.damage = f"damaged after {origin} bytes"
                 return
@@ -113,17 +136,21 @@ class Capture:
             if len(body) < length - 8:
                 self.damage = f"cut off after {origin} bytes"
                 return
-            if kind == _INTERFACE and len(body) >= 12:
-                interfaces.append((struct.unpack_from(order + "H", body)[0], _resolution_ns(body[8:-4], order)))
+            if kind == _SECTION and is_new and origin > 0:
+                self._sections.append(section)
+            elif kind == _INTERFACE and is_new and len(body) >= 12:
+                (link,) = struct.unpack_from(section.order + "H", body)
+                section.interfaces.append(_Interface(origin, link, _resolution_ns(body[8:-4], section.order)))
             elif kind == _ENHANCED and len(body) >= 24 and origin >= begin:
-                number, high, low, captured = struct.unpack_from(order + "IIII", body)
-                if number < len(interfaces):
-                    link, tick_ns = interfaces[number]
+                number, high, low, captured = struct.unpack_from(section.order + "IIII", body)
+                if number < len(section.interfaces) and section.interfaces[number].origin < origin:
+                    _, link, tick_ns = section.interfaces[number]
                     yield origin, round((high << 32 | low) * tick_ns), link, body[20 : 20 + captured]
             origin += length
-            if origin < begin and interfaces:
-                origin = begin
-                file.seek(origin)
+            self._described_to = max(self._described_to, origin)
+
+    def _section_at(self, origin: int) -> _Section:
+        return self._sections[bisect_right(self._sections, origin, key=lambda section: section.origin) - 1]
 
 
 def _resolution_ns(options: bytes, order: str) -> float | int:

@@ -35,7 +35,9 @@ def pcap(datagrams: Datagrams, order: str = "<", nano: bool = False, link: int =
     return b"".join(parts)
 
 
-def pcapng(datagrams: Datagrams, order: str = "<", nano: bool = True) -> bytes:
+def pcapng(datagrams: Datagrams, order: str = "<", nano: bool = True, interface: int = 0) -> bytes:
+    """interface: the number of the one that the datagrams come through; those before it are silent, and of raw IP."""
+
     def block(kind: int, body: bytes) -> bytes:
         body += bytes(-len(body) % 4)
         length = 12 + len(body)
@@ -44,11 +46,12 @@ def pcapng(datagrams: Datagrams, order: str = "<", nano: bool = True) -> bytes:
     resolution = struct.pack(order + "HHB3x", 9, 1, 9) if nano else b""
     parts = [
         block(0x0A0D0D0A, struct.pack(order + "IHHq", 0x1A2B3C4D, 1, 0, -1)),
+        *[block(1, struct.pack(order + "HHI", 101, 0, 65535) + bytes(4))] * interface,
         block(1, struct.pack(order + "HHI", 1, 0, 65535) + resolution + bytes(4)),
     ]
     for t_ns, port, payload in datagrams:
         frame, ticks = ethernet(port, payload), t_ns if nano else t_ns // 1000
-        head = struct.pack(order + "IIIII", 0, ticks >> 32, ticks & 0xFFFFFFFF, len(frame), len(frame))
+        head = struct.pack(order + "IIIII", interface, ticks >> 32, ticks & 0xFFFFFFFF, len(frame), len(frame))
         parts.append(block(6, head + frame))
     return b"".join(parts)
 

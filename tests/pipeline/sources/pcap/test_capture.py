@@ -21,6 +21,8 @@ KINDS: dict[str, Callable[[], bytes]] = {
     "pcap, Linux cooked": lambda: pcap(SENT, link=113),
     "pcap, raw IP": lambda: pcap(SENT, link=101),
     "pcapng": lambda: pcapng(SENT),
+    "pcapng, third interface": lambda: pcapng(SENT, interface=2),
+    "pcapng, two sections": lambda: pcapng(SENT[:1]) + pcapng(SENT[1:], ">", nano=False, interface=1),
     "pcapng, µs, big-endian": lambda: pcapng(SENT, ">", nano=False),
 }
 
@@ -39,6 +41,8 @@ def test_every_datagram_with_its_time(kind: str, tmp_path: Path) -> None:
     assert capture.damage is None
     again = list(capture.datagrams(found[2].origin, found[3].origin))
     assert again == found[2:4]
+    never_read = Capture(capture.path)
+    assert list(never_read.datagrams(found[2].origin, found[3].origin)) == found[2:4]
 
 
 @pytest.mark.parametrize("kind", ["pcap", "pcapng"])

@@ -61,6 +61,12 @@ def test_frames_in_any_order_are_the_same(tmp_path: Path) -> None:
         assert np.array_equal(frame.picture.bgr, forward[index].picture.bgr)  # type: ignore[union-attr]
 
 
+def test_a_lidar_on_the_second_interface(tmp_path: Path) -> None:
+    source = opened(tmp_path, pcapng(lidar(3), interface=1))
+    sweeps = [source.frame(index).sweep for index in range(3)]
+    assert [len(sweep.points) for sweep in sweeps if sweep is not None] == [14_400] * 3
+
+
 def test_the_line_runs_on_it(tmp_path: Path) -> None:
     source = opened(tmp_path, pcap(lidar(3)))
     results = [result for _, result in run(source, Params(), Detectors())]
