@@ -12,7 +12,7 @@ import cv2
 import httpx
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, CDPSession, Page, expect
+from playwright.sync_api import Browser, CDPSession, Page, WebSocketRoute, expect
 
 from app.engine import Engine
 from app.recording import RecordingDesk
@@ -153,7 +153,53 @@ def test_a_paused_recording_is_not_old_but_says_so(open_display: OpenDisplay, ow
     is_now(page, "fresh")
 
 
+def test_a_connection_that_says_nothing_any_more_is_left_for_another(browser: Browser, own: tuple[Site, Recording]):
+    """As when a cable is pulled: the system takes the connection for open, and no end of it ever comes."""
+    site, _ = own
+    context = browser.new_context()
+    page = context.new_page()
+    opened: list[WebSocketRoute] = []
+
+    def silent_at_first(route: WebSocketRoute) -> None:
+        opened.append(route)
+        if len(opened) > 1:
+            route.connect_to_server()
+
+    try:
+        page.route_web_socket("**/api/stream**", silent_at_first)
+        page.clock.install()
+        page.goto(f"{site.address}/drive/")
+        is_now(page, "waiting")
+        for _ in range(5):
+            page.clock.run_for(2000)  # one ping of the page each
+        expect(page.locator("#distance")).not_to_have_text("–")
+        assert len(opened) == 2
+    finally:
+        context.close()
+
+
 # ------------------------------------------------------------ what is seen
+
+STREAMS = """async () => {
+  const { get, set } = await import("/js/store.js");
+  const stream = (state, rate_hz) => ({ state, rate_hz, age_ms: 10, jitter_ms: 1, lost: 0, note: "" });
+  const streams = { lidar: stream("ok", 10), camera: stream("stale", 5), gnss: stream("silent", null) };
+  set("state", { ...get("state"), streams });
+  return [...document.querySelectorAll("#sensors li")].map((one) =>
+    [one.textContent, getComputedStyle(one).color, one.querySelector("path").getAttribute("d")]);
+}"""
+"""How sensors look in one that is well, one that is late and one that is silent."""
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_a_sensor_that_fails_is_seen_by_colour_word_and_shape(open_display: OpenDisplay, site: Site):
+    page = open_display(site.address)
+    expect(page.locator("#sensors li")).to_have_count(3)
+    works, late, own_speed, gone = page.evaluate(STREAMS)
+    assert [works[0], late[0], own_speed[0], gone[0]] == ["LiDAR10 Hz", "Camerastale", "Own speed", "GNSSsilent"]
+    for column in (1, 2):
+        assert len({works[column], late[column], gone[column]}) == 3
+
 
 CUT_OFF = """() => {
   const { right } = document.querySelector(".lead").getBoundingClientRect();
