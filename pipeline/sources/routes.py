@@ -78,7 +78,10 @@ def _reader(suffix: str, text: str) -> Callable[[str, str], tuple[Rows, float]]:
 def _csv(text: str, path: str) -> tuple[Rows, float]:
     sample = text[:4096]
     delimiter = max(",;\t ", key=sample.count)
-    lines = [row for row in csv.reader(io.StringIO(text.lstrip("\ufeff")), delimiter=delimiter) if row]
+    try:
+        lines = [row for row in csv.reader(io.StringIO(text.lstrip("\ufeff")), delimiter=delimiter) if row]
+    except csv.Error as error:
+        raise RouteError(f"{path}: not CSV: {error}") from None
     if not lines:
         return [], _UNKNOWN_SIGMA_M
     names = [cell.strip().lower() for cell in lines[0]]
@@ -110,26 +113,31 @@ def _gpx(text: str, path: str) -> tuple[Rows, float]:
 
 
 def _nmea(text: str, path: str) -> tuple[Rows, float]:
-    """Sentences with a wrong checksum, and those of other kinds, are passed over."""
     places: dict[str, Rows] = {"GGA": [], "RMC": []}
-    sigmas = []
+    sigmas: dict[str, list[float]] = {"GGA": [], "RMC": []}
     for line in text.splitlines():
-        try:
-            sentence = pynmea2.parse(line[line.index("$") :].strip(), check=True)
-        except (pynmea2.ParseError, ValueError):
-            continue
+        found = _nmea_place(line)
+        if found is not None:
+            kind, place, sigma_m = found
+            places[kind].append(place)
+            sigmas[kind].append(sigma_m)
+    kind = "GGA" if places["GGA"] else "RMC"
+    return places[kind], median(sigmas[kind] or [_UNKNOWN_SIGMA_M])
+
+
+def _nmea_place(line: str) -> tuple[str, tuple[float, float], float] | None:
+    """Kind, latitude and longitude in degrees, and sigma in metres; null for a sentence of another kind, without a fix,
+    with a wrong checksum, or with something else where its numbers should be."""
+    try:
+        sentence = pynmea2.parse(line[line.index("$") :].strip(), check=True)
         kind = getattr(sentence, "sentence_type", "")
-        if kind not in places or not getattr(sentence, "lat", ""):
-            continue
-        quality = int(getattr(sentence, "gps_qual", 0) or 0) if kind == "GGA" else 0
-        if (kind == "GGA" and quality == 0) or (kind == "RMC" and sentence.status != "A"):
-            continue
-        places[kind].append((float(sentence.latitude), float(sentence.longitude)))
-        if kind == "GGA":
-            sigmas.append(SIGMA_BY_NMEA_QUALITY_M.get(quality, SIGMA_BY_NMEA_QUALITY_M[1]))
-    if places["GGA"]:
-        return places["GGA"], median(sigmas)
-    return places["RMC"], SIGMA_BY_NMEA_QUALITY_M[1]
+        if kind not in ("GGA", "RMC") or not sentence.lat:
+            return None
+        quality = int(sentence.gps_qual or 0) if kind == "GGA" else int(sentence.status == "A")
+        place = float(sentence.latitude), float(sentence.longitude)
+    except (pynmea2.ParseError, ValueError, TypeError, IndexError, AttributeError):
+        return None
+    return (kind, place, SIGMA_BY_NMEA_QUALITY_M.get(quality, SIGMA_BY_NMEA_QUALITY_M[1])) if quality else None
 
 
 def _from_session(path: str, name: str) -> Route:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import xor
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +24,12 @@ RMC = (
     "$GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\n"
     "$GPRMC,123520,A,4807.138,N,01131.000,E,022.4,084.4,230394,003.1,W*61\n"
 )
+
+
+def gga(latitude: str, quality: str) -> str:
+    """A sentence with a right checksum, whatever is in it."""
+    body = f"GPGGA,123521,{latitude},N,01131.000,E,{quality},08,0.9,545.4,M,46.9,M,,"
+    return f"${body}*{reduce(xor, body.encode()):02X}\n"
 
 
 def written(folder: Path, name: str, text: str) -> str:
@@ -47,7 +55,15 @@ def test_places(tmp_path: Path, name: str, text: str, sigma_m: float) -> None:
     assert (route.name, route.sigma_m) == ("a", sigma_m)
 
 
-@pytest.mark.parametrize(("text", "sigma_m"), [(GGA, 0.02), (RMC, 2.0), (GGA + RMC + "$GPXXX,1*00\nrubbish\n", 0.02)])
+@pytest.mark.parametrize(
+    ("text", "sigma_m"),
+    [
+        (GGA, 0.02),
+        (RMC, 2.0),
+        (GGA + RMC + "$GPXXX,1*00\nrubbish\n", 0.02),
+        (GGA + gga("4807.038", "x") + gga("abc", "4") + gga("4807.038", "0"), 0.02),
+    ],
+)
 def test_nmea_logs_say_how_good_they_are(tmp_path: Path, text: str, sigma_m: float) -> None:
     route = load_route(written(tmp_path, "log.nmea", text))
     assert route.lat_deg == pytest.approx([48.1173, 48.1189667], abs=1e-6)
@@ -62,6 +78,7 @@ def test_nmea_logs_say_how_good_they_are(tmp_path: Path, text: str, sigma_m: flo
         pytest.param("a.csv", "a,b\n1,2\n", "no columns named lat and lon", id="other columns"),
         pytest.param("a.csv", "lat,lon\n48,11\n48,11\n", "1 places on the Earth", id="one place"),
         pytest.param("a.csv", "lat,lon\n480,11\n481,11\n", "0 places on the Earth", id="not on the Earth"),
+        pytest.param("a.csv", 'lat,lon\n"48,11\n' + "48.1,11.2\n" * 20_000, "not CSV: field larger", id="open quote"),
         pytest.param("a.gpx", "<gpx", "not XML", id="cut off"),
         pytest.param("a.gpx", '<!DOCTYPE x [<!ENTITY a "b">]><gpx/>', "no document type", id="entities"),
         pytest.param("a.nmea", GGA.replace("E,4,", "E,0,"), "no route in it", id="no fix, wrong checksums"),
