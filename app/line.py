@@ -17,6 +17,7 @@ from app.playback import timeline_s
 from pipeline.params import Params
 from pipeline.run import Detectors, Detects, Seen, Sensors, advance, detect
 from pipeline.sources.base import Source
+from pipeline.sources.fingerprint import fingerprint
 from pipeline.step import State, step
 from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result
 
@@ -48,15 +49,15 @@ class Tick:
 
 class DetectionCache:
     """What detectors answered, by (source, frame, detector), bounded; it outlives the source, so reopening costs no
-    network. Any thread."""
+    network, unless the source's files have changed. Any thread."""
 
     def __init__(self, limit: int = _CACHED_ANSWERS) -> None:
         self._lock = threading.Lock()
         self._answers: BoundedCache[tuple[str, int, str], RawBoxes | RawLanes] = BoundedCache(limit, lambda _: 1)
 
     def asker(self, uri: str) -> Asker:
-        """How to ask about the pictures of one source."""
-        return Asker(self, uri)
+        """How to ask about the pictures of one source, as its files are now."""
+        return Asker(self, fingerprint(uri))
 
     def get(self, key: tuple[str, int, str]) -> RawBoxes | RawLanes | None:
         with self._lock:
@@ -70,12 +71,16 @@ class DetectionCache:
 class Asker:
     """Asks the cache first. Used by one thread; spent_ms: how long detectors have run for it in all."""
 
-    def __init__(self, cache: DetectionCache, uri: str) -> None:
+    def __init__(self, cache: DetectionCache, source: str) -> None:
         self.spent_ms = 0.0
-        self._cache, self._uri = cache, uri
+        self._cache, self._source = cache, source
+
+    def another(self) -> Asker:
+        """The same for a second thread."""
+        return Asker(self._cache, self._source)
 
     def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
-        key = (self._uri, frame.index, detector.name)
+        key = (self._source, frame.index, detector.name)
         held = self._cache.get(key)
         if held is not None:
             return cast("Seen", held)
@@ -109,7 +114,8 @@ class Line:
         self.tick: Tick | None = None
         self._detectors = detectors
         self._state_before = state_before
-        self._ask, self._ask_ahead = detections.asker(source.uri), detections.asker(source.uri)
+        self._ask = detections.asker(source.uri)
+        self._ask_ahead = self._ask.another()
         self._ahead_ms: tuple[int, float] = (-1, 0.0)
         self._reading = threading.Lock()
         self._sensors = sensors

@@ -15,8 +15,8 @@ _SHARE_S = 0.03
 """Work for each frame that is played; a piece that was begun is finished."""
 _LONGEST_WAIT_S = 0.3
 _LONGEST_FRONT_S = 1.0
-"""Work in front that never ends, as of sensors that tick faster than the line runs, slows the background down; it does not
-stop it."""
+"""Work in front that never ends, as of sensors that tick faster than the line runs, slows the background down; it does
+not stop it."""
 
 
 class Turn:

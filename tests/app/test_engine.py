@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
 
@@ -191,6 +192,18 @@ def test_reopening_costs_no_network_either(start: Start):
     engine.control.change(uri=recording.uri)
     engine.wait_for(at(0), WAIT_S)
     assert detector.calls == calls
+
+
+def test_a_recording_replaced_under_its_name_is_looked_at_anew(tmp_path: Path):
+    file = tmp_path / "my.yaml"
+    file.write_text("before")
+    cache, detector, source = DetectionCache(), CountingDetector(), Recording(f"sim:{file}")
+    for calls in (1, 1):
+        Line(source, Detectors(detector), cache, "both").seek(0, Params())
+        assert detector.calls == calls
+    file.write_text("and after")
+    Line(source, Detectors(detector), cache, "both").seek(0, Params())
+    assert detector.calls == 2
 
 
 def test_an_overtaken_seek_is_dropped_on_the_way(start: Start):

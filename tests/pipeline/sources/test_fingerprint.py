@@ -1,0 +1,63 @@
+"""A fingerprint is another when, and only when, a file of the recording is another."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pipeline.sources.fingerprint import fingerprint
+
+
+def _edit(path: Path) -> None:
+    path.write_text("other words")
+
+
+def _touch_later(path: Path) -> None:
+    os.utime(path, ns=(2 * 10**18, 2 * 10**18))
+
+
+def _replace(path: Path) -> None:
+    """By another file of the same size and time."""
+    times = path.stat()
+    other = path.with_name("other.tmp")
+    other.write_text("x" * times.st_size)
+    os.utime(other, ns=(times.st_atime_ns, times.st_mtime_ns))
+    other.replace(path)
+
+
+@pytest.mark.parametrize("change", [_edit, _touch_later, _replace])
+@pytest.mark.parametrize(
+    ("uri", "changed"),
+    [
+        ("sim:{}/my.yaml", "my.yaml"),
+        ("{}/drive.mcap", "drive.mcap"),
+        ("mcap:{}/drive.mcap", "drive.mcap"),
+        ("pcap:{}/drive.pcap", "drive.mp4"),
+        ("pcap:{}/drive.pcap?video=elsewhere.avi", "elsewhere.avi"),
+        ("pcd:{}/clouds", "clouds/image_02/000001.png"),
+        ("pcd:{}/clouds?rig=mine.yaml", "clouds/mine.yaml"),
+    ],
+)
+def test_an_edited_or_replaced_recording_is_another(
+    tmp_path: Path, uri: str, changed: str, change: Callable[[Path], None]
+) -> None:
+    names = ["my.yaml", "drive.mcap", "drive.pcap", "drive.mp4", "elsewhere.avi", "clouds/1.pcd", "clouds/mine.yaml"]
+    for name in [*names, "clouds/image_02/000001.png"]:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("words")
+    uri = uri.format(tmp_path)
+    before = fingerprint(uri)
+    assert fingerprint(uri) == before
+    (tmp_path / "unrelated.txt").write_text("words")
+    assert fingerprint(uri) == before
+    change(tmp_path / changed)
+    assert fingerprint(uri) != before
+
+
+@pytest.mark.parametrize("uri", ["sim:straight", "mcap:/no/such.mcap", "pcd:~nobody-here/x", "", "a\0b:\0", "sim:"])
+def test_what_names_no_file_has_one_too(uri: str) -> None:
+    assert fingerprint(uri) == fingerprint(uri)
+    assert fingerprint(uri) != fingerprint(uri + "x")
