@@ -23,6 +23,7 @@ from pipeline.sources.files import (
     check_looks_ahead,
     decode_picture,
     files_by_name,
+    in_order,
     picture_of,
     read_bytes,
     recording_folder,
@@ -53,7 +54,7 @@ class AstyxSource:
         self._pictures = files_by_name(folder / "camera_front", (".jpg", ".jpeg", ".png"))
         self._labels = files_by_name(folder / "groundtruth_obj3d", (".json",))
         self._calibrations = files_by_name(folder / "calibration", (".json",))
-        self._names = sorted(self._sweeps.keys() | self._pictures.keys())
+        self._names = in_order(self._sweeps.keys() | self._pictures.keys())
         if not self._names:
             raise SourceError(f"{path}: no Astyx recording: neither lidar_vlp16/*.txt nor camera_front/*.jpg in it")
         if not self._calibrations:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
+from decimal import Decimal
 from pathlib import Path
 
 import cv2
@@ -14,6 +17,7 @@ from pipeline.types import F64, U8, CameraCalibration, Picture
 _JPEG_START = b"\xff\xd8"
 _MARKERS = ((_JPEG_START, b"\xff\xd9"), (b"\x89PNG", b"IEND"))
 _END_BYTES = 64
+_NUMBER = re.compile(r"\d+(\.\d+)?")
 
 
 def recording_folder(path: str) -> Path:
@@ -49,12 +53,18 @@ def recording_file(path: str) -> Path:
 
 
 def files_by_name(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
-    """Files of a folder by their name without suffix, in order of name; empty when there is no such folder."""
+    """Files of a folder by their name without suffix, ``in_order``; empty when there is no such folder."""
     try:
-        found = [path for path in folder.iterdir() if path.suffix.lower() in suffixes]
+        found = {path.stem: path for path in sorted(folder.iterdir()) if path.suffix.lower() in suffixes}
     except OSError:
         return {}
-    return {path.stem: path for path in sorted(found, key=lambda path: path.name)}
+    return {name: found[name] for name in in_order(found)}
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Names of frames, by number where all of them are numbers (``2`` before ``10``), else by letter."""
+    by_letter = sorted(names)
+    return sorted(by_letter, key=Decimal) if all(map(_NUMBER.fullmatch, by_letter)) else by_letter
 
 
 def read_bytes(path: Path) -> bytes:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.sources.base import SourceError, TruthObject
-from pipeline.sources.files import decode_picture, files_by_name, picture_of, read_bytes, recording_folder
+from pipeline.sources.files import decode_picture, files_by_name, in_order, picture_of, read_bytes, recording_folder
 from pipeline.sources.hdl64 import keep_rings, match_vlp16, ring_elevations_deg, turns
 from pipeline.sources.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
 from pipeline.sources.kitti_records import parse_labels, parse_oxts, parse_timestamps
@@ -50,7 +50,7 @@ class KittiSource:
         folder = recording_folder(path)
         self.uri, self.title, self.rate_hz = uri, folder.resolve().name, 10.0
         self._files = _raw_files(folder) if _is_raw(folder) else _object_files(folder)
-        self._names = sorted(self._files.sweeps.keys() | self._files.pictures.keys())
+        self._names = in_order(self._files.sweeps.keys() | self._files.pictures.keys())
         if not self._names:
             raise SourceError(f"{path}: no KITTI recording: {_what_it_holds(folder)}")
         self._size = self._picture_size()

@@ -111,6 +111,18 @@ def test_names_that_are_no_times_are_ten_a_second(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "names",
+    [["0", "1", "2", "9", "10", "11"], ["9.5", "10.25", "010.3"], ["a1", "a10", "a2"], ["1", "10", "2", "last"]],
+    ids=["numbers", "fractions", "names", "names among numbers"],
+)
+def test_frames_come_in_order_of_their_numbers(names: list[str], tmp_path: Path) -> None:
+    for name in names:
+        (tmp_path / f"{name}.pcd").write_bytes(pcd(ROWS[:1]))
+    source = open_source(f"pcd:{tmp_path}")
+    assert [source.frame(index).name for index in range(len(source))] == names
+
+
+@pytest.mark.parametrize(
     ("name", "t_ns"),
     [
         ("1700000000.5", 1_700_000_000_500_000_000),
