@@ -1,6 +1,6 @@
 /** The vehicle ahead in large numerals: how far, how fast the gap changes, how long that lasts. */
 import { $, mark, text } from "../js/dom.js";
-import { DASH, kmh, num } from "../js/format.js";
+import { DASH, kmh, num, ttc as ttcWords } from "../js/format.js";
 import { get, on } from "../js/store.js";
 import { urgencyOf } from "../js/urgency.js";
 
@@ -26,7 +26,7 @@ function update() {
   updateClosing(kmh(cipv?.closing_speed_mps));
   const left_s = cipv?.ttc_s ?? null;
   mark(ttc, "alarm", urgencyOf(left_s));
-  text(ttcValue, left_s === null ? DASH : `${num(left_s)} s`);
+  text(ttcValue, left_s === null ? DASH : `${ttcWords(left_s)} s`);
   bar.style.setProperty("--fill", `${left_s === null ? 0 : 100 * Math.max(0, 1 - left_s / BAR_S)}%`);
   bar.setAttribute("aria-valuenow", String(Math.min(BAR_S, left_s ?? BAR_S)));
   bar.setAttribute("aria-valuetext", ttcValue.textContent ?? DASH);

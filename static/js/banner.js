@@ -1,7 +1,7 @@
 /** The answer, large: which vehicle, how far, how fast the gap shrinks, how long that lasts, and what ACC makes of it. */
 import { get, on } from "./store.js";
 import { $, el, mark, text } from "./dom.js";
-import { DASH, kmh, num, signed } from "./format.js";
+import { DASH, kmh, num, signed, ttc as ttcWords } from "./format.js";
 import { ACC_WORDS, urgencyOf } from "./urgency.js";
 
 /** @typedef {import("./types.js").Result} Result */
@@ -50,7 +50,7 @@ function update() {
   say(reason, cipv ? cipv.reason : whyNone(result));
   text(distance.value, num(cipv?.distance_m));
   text(closing.value, cipv ? signed(kmh(cipv.closing_speed_mps)) : DASH);
-  text(ttc.value, num(cipv?.ttc_s));
+  text(ttc.value, ttcWords(cipv?.ttc_s));
   mark(ttc.card, "alarm", urgencyOf(cipv?.ttc_s));
   updateAcc(result);
 }

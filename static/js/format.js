@@ -16,6 +16,11 @@ export function signed(value, digits = 1) {
 /** m/s → km/h @param {number|null|undefined} mps */
 export const kmh = (mps) => (mps === null || mps === undefined ? null : mps * 3.6);
 
+const LONG_S = 60;
+
+/** Time to collision: nobody reads tenths of minutes. @param {number|null|undefined} seconds */
+export const ttc = (seconds) => ((seconds ?? 0) > LONG_S ? `> ${LONG_S}` : num(seconds));
+
 /** Seconds as m:ss.s @param {number} seconds */
 export function clock(seconds) {
   const minutes = Math.floor(seconds / 60);
