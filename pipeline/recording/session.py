@@ -18,7 +18,7 @@ from pipeline.recording.packets import sweep_of_packets
 from pipeline.recording.tick import PictureRef, Tick, route_from, tick_from
 from pipeline.recording.writer import VERSION, About
 from pipeline.sources.base import SourceError, TruthObject
-from pipeline.types import CameraCalibration, Frame, Picture, Route, Sweep
+from pipeline.types import CameraCalibration, Frame, GnssFix, Picture, Route, Sweep
 
 _T = TypeVar("_T")
 I64 = npt.NDArray[np.int64]
@@ -116,6 +116,16 @@ class SessionSource:
             except Damaged:
                 continue
         return tuple(found)
+
+    def fixes(self) -> tuple[GnssFix, ...]:
+        """Where the car was, frame by frame; points and pictures are left packed."""
+        found = []
+        for stored in self.file.messages((topics.FRAMES,)):
+            try:
+                found.append(tick_from(stored.data).gnss)
+            except Damaged:
+                continue
+        return tuple(fix for fix in found if fix is not None)
 
     def labels(self) -> bytes | None:
         """The newest file of labels in it, null when there is none."""

@@ -19,7 +19,6 @@ import numpy as np
 import pynmea2
 
 from pipeline.errors import BadInput
-from pipeline.sources import open_source
 from pipeline.types import GnssFix, Route
 
 _LAT_NAMES = ("lat", "lat_deg", "latitude", "latitude_deg")
@@ -141,9 +140,13 @@ def _nmea_place(line: str) -> tuple[str, tuple[float, float], float] | None:
 
 
 def _from_session(path: str, name: str) -> Route:
-    session = open_source(f"mcap:{path}")
-    fixes = (session.frame(index).gnss for index in range(len(session)))
-    return from_fixes(name, [fix for fix in fixes if fix is not None])
+    from pipeline.recording.session import SessionSource  # half a second of imports: only who opens one pays
+
+    session = SessionSource(f"mcap:{path}", path)
+    try:
+        return from_fixes(name, session.fixes())
+    finally:
+        session.close()
 
 
 def _is(element: ElementTree.Element, name: str) -> bool:

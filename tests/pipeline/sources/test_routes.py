@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import reduce
 from operator import xor
 from pathlib import Path
@@ -9,10 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.recording.writer import SessionWriter
 from pipeline.sources import open_source
 from pipeline.sources.along_route import along_route
 from pipeline.sources.routes import RouteError, from_fixes, load_route
 from pipeline.types import GnssFix, Route
+from tests.pipeline.recording.frames import ABOUT, full
 
 GPX = '<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/{}" version="1.{}">{}</gpx>'
 POINTS = '<{0} lat="48.1" lon="11.2"/><{0} lat="48.2" lon="11.3"><ele>500</ele></{0}>'
@@ -104,6 +107,24 @@ def test_an_earlier_drive() -> None:
     assert route.sigma_m == 0.01
     with pytest.raises(RouteError, match="no route in it"):
         from_fixes("nothing", [])
+
+
+def test_of_an_earlier_session_the_fixes_alone_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    writer = SessionWriter(tmp_path / "earlier.mcap", ABOUT)
+    frames = [full(index) for index in range(3)]
+    for frame in frames:
+        fix = frame.gnss
+        assert fix is not None
+        writer.write(replace(frame, gnss=replace(fix, lat_deg=fix.lat_deg + 1e-4 * frame.index)))
+    writer.write(replace(full(3), gnss=None))
+    writer.close()
+    for decoder in ("sweep_from", "picture_from"):
+        monkeypatch.setattr(f"pipeline.recording.session.{decoder}", lambda *of: pytest.fail("decoded"))
+    route = load_route(str(tmp_path / "earlier.mcap"))
+    first = frames[0].gnss
+    assert first is not None
+    assert route.lat_deg == pytest.approx([first.lat_deg + 1e-4 * index for index in range(3)])
+    assert (route.name, route.sigma_m) == ("earlier", first.sigma_m)
 
 
 def test_a_source_along_a_route() -> None:
