@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 
@@ -24,7 +24,7 @@ def answering(answer: bytes) -> Iterator[str]:
 
         def serve() -> None:
             client, _ = listener.accept()
-            with client:
+            with client, suppress(ConnectionError):  # whoever asked may have heard enough
                 client.settimeout(10.0)
                 client.recv(65536)
                 client.sendall(answer)
@@ -35,11 +35,23 @@ def answering(answer: bytes) -> Iterator[str]:
         thread.join(10.0)
 
 
-def received(answer: bytes) -> tuple[list[tuple[bytes, int | None]], Exception | None]:
+class StopAtLook(Stop):
+    """Set when it is looked at for the n-th time."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self._looks_left = number
+
+    def __bool__(self) -> bool:
+        self._looks_left -= 1
+        return self._looks_left <= 0
+
+
+def received(answer: bytes, stop: Stop | None = None) -> tuple[list[tuple[bytes, int | None]], Exception | None]:
     found: list[tuple[bytes, int | None]] = []
     with answering(answer) as url:
         try:
-            read_mjpeg(url, lambda data, stamp: found.append((data, stamp)), Stop())
+            read_mjpeg(url, lambda data, stamp: found.append((data, stamp)), Stop() if stop is None else stop)
         except (DeviceLost, NotMjpeg) as error:
             return found, error
     return found, None
@@ -76,6 +88,8 @@ def test_pictures_come_as_they_are(
         ("no HTTP", b"\x00\x01\x02\r\n\r\n", "not understood"),
         ("nothing", b"", "not understood"),
         ("cut in a picture", MULTIPART + part(small_jpeg(), "Content-Length: 99999"), "closed the connection"),
+        ("headers without end", MULTIPART + b"A: b\r\n" * 1000 + part(small_jpeg()), "headers without end"),
+        ("a line without end", MULTIPART + b"A:" + b"b" * 100_000 + b"\n" + part(small_jpeg()), "headers without end"),
         ("garbage for parts", MULTIPART + bytes(range(256)) * 64, "closed the connection"),
     ],
 )
@@ -83,6 +97,11 @@ def test_what_is_no_camera_is_said(case: str, answer: bytes, complaint: str) -> 
     found, error = received(answer)
     assert found == []
     assert complaint in str(error)
+
+
+@pytest.mark.parametrize("look", [2, 3, 6], ids=["before the headers", "among the headers", "in the picture"])
+def test_it_ends_when_asked_in_the_middle_of_a_part(look: int) -> None:
+    assert received(MULTIPART + part(small_jpeg()), StopAtLook(look)) == ([], None)
 
 
 def test_an_address_that_gives_something_else_is_left_to_the_video_reader() -> None:
