@@ -61,11 +61,18 @@ def recover(path: Path, out: Path, progress: Progress = lambda done, total: None
         )
 
 
-def clip(source: SessionSource, first: int, last: int, out: Path, labels: bytes | None = None) -> int:
+def clip(
+    source: SessionSource,
+    first: int,
+    last: int,
+    out: Path,
+    labels: bytes | None = None,
+    progress: Progress = lambda done, total: None,
+) -> int:
     """Frames ``first`` to ``last``, both included, as a session of their own, with results, marks and all else that
     was recorded meanwhile. What these frames refer to from before (calibration, parameters) is moved to right before
     the first, so that the clip begins where it begins. Labels name the frames that they are of, so they are kept whole;
-    ``labels`` are put in their place. Returns the number of messages."""
+    ``labels`` are put in their place. ``progress`` counts frames. Returns the number of messages."""
     first_ns = source.log_time_ns(first)
     # a frame's companions (marks, notes) come after it, so the clip goes on to the next frame
     last_ns = source.log_time_ns(last + 1) - 1 if last + 1 < len(source) else 2**63 - 1
@@ -78,11 +85,14 @@ def clip(source: SessionSource, first: int, last: int, out: Path, labels: bytes 
         for at_ns, topic in earlier:
             for stored in source.file.messages((topic,), at_ns, at_ns):
                 yield stored._replace(log_time_ns=to_ns[at_ns])
-        at_ns = first_ns
+        at_ns, done = first_ns, 0
         for stored in source.file.messages(None, first_ns, last_ns):
             if stored.channel.topic != topics.LABELS:
-                at_ns = stored.log_time_ns
-                yield _with_references_moved(stored, to_ns) if stored.channel.topic == topics.FRAMES else stored
+                at_ns, is_frame = stored.log_time_ns, stored.channel.topic == topics.FRAMES
+                yield _with_references_moved(stored, to_ns) if is_frame else stored
+                if is_frame:
+                    done += 1
+                    progress(done, last + 1 - first)
         said = labels if labels is not None else source.labels()
         if said is not None:
             yield Stored(topics.channel(topics.LABELS), at_ns, source.t_ns(last), said)

@@ -27,8 +27,7 @@ def save(
     """
     last = len(source) - 1 if last is None else last
     if isinstance(source, SessionSource):
-        clip(source, first, last, out, labels)
-        progress(last + 1 - first, last + 1 - first)
+        clip(source, first, last, out, labels, progress)
         return
     writer = SessionWriter(out, about(source))
     try:

@@ -68,6 +68,20 @@ def test_a_clip_of_a_clip(drive: SessionSource, tmp_path: Path) -> None:
     assert [same(inner.frame(k), replace(frame_of(5 + k), index=k)) for k in range(len(inner))] == [True] * 2
 
 
+def test_a_clip_tells_how_far_it_is_and_can_be_given_up(drive: SessionSource, tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    save(drive, tmp_path / "clip.mcap", 5, 9, lambda done, total: told.append((done, total)))
+    assert told == [(done, 5) for done in range(1, 6)]
+
+    def give_up(done: int, total: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        save(drive, tmp_path / "new.mcap", 5, 9, give_up)
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["clip.mcap", "drive.mcap"]
+
+
 def test_what_is_there_is_not_written_over_and_what_fails_leaves_nothing(drive: SessionSource, tmp_path: Path) -> None:
     before = drive.file.path.read_bytes()
     with pytest.raises(BadInput, match="already"):
