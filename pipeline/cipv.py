@@ -39,11 +39,12 @@ class CipvState:
 
 class Candidate(NamedTuple):
     """An object with what its tests need to know: its place against the path, the running log-odds of being in it,
-    whether it led in the frame before, and the path."""
+    whether these put it in, whether it led in the frame before, and the path."""
 
     item: FusedObject
     place: Place | None
     odds: float
+    inside: bool
     leads: bool
     path: Path
     params: CipvParams
@@ -82,15 +83,16 @@ def choose(
             now = where.log_odds(_widening_m(leads, params), moves_m)
             before = state.odds.get(item.id, now)
             odds[item.id] = before + fresh * (now - before)
-        candidate = Candidate(item, where, odds.get(item.id, 0.0), leads, path, params)
-        if where is not None and where.margin_m() >= 0.0 and where.ahead_m > 0.0 and not _in_path(candidate):
+        now_in = where is not None and where.ahead_m > 0.0 and odds[item.id] > 0.0
+        candidate = Candidate(item, where, odds.get(item.id, 0.0), now_in, leads, path, params)
+        if where is not None and where.margin_m() >= 0.0 and where.ahead_m > 0.0 and not now_in:
             crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
         checks = [ask(candidate) for ask in _ELIGIBILITY]
         item = evolve(
             item,
             gates=(*item.gates, *[gate for gate, _ in checks]),
             path_offset_m=where.offset_m if where is not None else None,
-            in_path=_in_path(candidate),
+            in_path=now_in,
             in_path_probability=where.probability() if where is not None else None,
             lateral_mps=where.sideways_mps if where is not None else None,
             crossing_s=crossing_s,
@@ -174,7 +176,8 @@ def _next_lead(
 def _is_vehicle(who: Candidate) -> Check:
     """A named object must be a vehicle; a nameless one (L) is judged by its size."""
     label = who.item.label
-    return Gate("vehicle_class", None, 1.0, label is None or label in VEHICLES), f"class {label}"
+    passed = label is None or label in VEHICLES
+    return Gate("vehicle_class", None, 1.0, passed), "" if passed else f"class {label}"
 
 
 def _has_distance(who: Candidate) -> Check:
@@ -232,11 +235,7 @@ def _widening_m(leads: bool, params: CipvParams) -> float:
 
 def _is_in_path(who: Candidate) -> Check:
     """By the running mean of what the sightings say."""
-    return Gate("path_odds", who.odds, 0.0, _in_path(who)), "in path for a moment only"
-
-
-def _in_path(who: Candidate) -> bool:
-    return who.place is not None and who.place.ahead_m > 0.0 and who.odds > 0.0
+    return Gate("path_odds", who.odds, 0.0, who.inside), "in path for a moment only"
 
 
 def _is_placed(who: Candidate) -> Check:

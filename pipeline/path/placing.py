@@ -35,23 +35,20 @@ SURE = 4.0
 
 class Place(NamedTuple):
     """One object against the path. offset_m: of the middle of its nearest face, positive to the left of the centre;
-    ahead_m: path length to its foot. low_m, high_m: from where to where it reaches across the path. left_m, right_m:
-    how far its middle may lie to either side and still be in the path. sigma_m: of its sideways place against the path,
-    both errors together. sideways_mps: how fast it moves to the left of the path, over ground; null where its velocity
-    is not known."""
+    ahead_m: path length to its foot. low_m, high_m: from where to where it reaches across the path, middle_m: between
+    them. left_m, right_m: how far that may lie to either side and still be in the path. sigma_m: of its sideways place
+    against the path, both errors together. sideways_mps: how fast it moves to the left of the path, over ground; null
+    where its velocity is not known."""
 
     offset_m: float
     ahead_m: float
     low_m: float
     high_m: float
+    middle_m: float
     left_m: float
     right_m: float
     sigma_m: float
     sideways_mps: float | None
-
-    @property
-    def middle_m(self) -> float:
-        return 0.5 * (self.low_m + self.high_m)
 
     @property
     def limit_m(self) -> float:
@@ -123,16 +120,26 @@ def place(
     spare = 0.5 * (high - low) - np.minimum(params.min_overlap_m, 0.5 * (high - low))
     sigma = np.hypot(path.profile_m[k] if len(path.profile_m) else 0.0, _sigmas_m(known, points[:, 0], heading))
     speeds = _sideways_mps(known, points[:, 0], heading, ego)
-    columns = (offsets[:, 0], ahead, low, high, half_left + spare, half_right + spare, sigma, speeds)
+    columns = (
+        offsets[:, 0],
+        ahead,
+        low,
+        high,
+        0.5 * (low + high),
+        half_left + spare,
+        half_right + spare,
+        sigma,
+        speeds,
+    )
     placed = []
-    for item, (offset, along, lowest, highest, left, right, both, moves), edges in zip(
+    for item, (offset, along, lowest, highest, middle, left, right, both, moves), edges in zip(
         known,
         zip(*(column.tolist() for column in columns), strict=True),
         zip(half_left.tolist(), half_right.tolist(), strict=True),
         strict=True,
     ):
         sideways_mps = moves if item.velocity_mps is not None else None
-        there = Place(offset, along, lowest, highest, left, right, both, sideways_mps)
+        there = Place(offset, along, lowest, highest, middle, left, right, both, sideways_mps)
         placed.append((there, there.crossing_s(believed_mps(there.sideways_mps, item), *edges)))
     following = iter(placed)
     return [next(following) if item.bev is not None else None for item in objects]
