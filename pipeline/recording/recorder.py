@@ -11,6 +11,7 @@ import logging
 import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -31,6 +32,9 @@ _QUEUED = 64
 
 _BATCH = 76
 """A VLP-16 sends about so many packets a rotation."""
+
+_PATIENCE_S = 15.0
+"""A disk that takes nothing for so long at the end is not waited for."""
 
 _Job = Callable[[Segments], None]
 
@@ -62,7 +66,8 @@ class RecordingState:
 
 class Recorder:
     """Starts at once. BadInput when there is such a file already, OSError when it cannot be made. ``stop`` it in the
-    end. ``queued``: how many frames may wait for the disk. ``raw_lidar``: ``put_packets`` instead of clouds."""
+    end. ``queued``: how many frames may wait for the disk. ``raw_lidar``: ``put_packets`` instead of clouds. hangs:
+    whether ``stop`` has given up on the disk."""
 
     def __init__(
         self,
@@ -75,10 +80,14 @@ class Recorder:
     ) -> None:
         self._segments = Segments(path, about, rotation, "lz4", raw_lidar)
         self._jobs: queue.Queue[_Job | None] = queue.Queue(queued)
-        self._marks: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._lock = threading.Lock()
+        self._taken, self._done = 0, 0
+        self._marks: deque[tuple[int, str]] = deque()
         self._batch: list[tuple[int, bytes]] = []
         self._dropped = 0
         self._error: str | None = None
+        self._ending = False
+        self.hangs = False
         self._thread = threading.Thread(target=self._work, name="cipv-recorder", daemon=True)
         self._thread.start()
 
@@ -106,9 +115,14 @@ class Recorder:
             batch, self._batch = self._batch, []
             self.put_packets(batch)
 
-    def mark(self, text: str) -> None:
-        """ "Something happened here": never dropped. Returns at once."""
-        self._marks.put(text)
+    def mark(self, text: str) -> bool:
+        """ "Something happened here", right after what was put last: never dropped. Returns at once; false when
+        recording has ended by itself."""
+        with self._lock:
+            if self._error is not None:
+                return False
+            self._marks.append((self._taken, text))
+            return True
 
     @property
     def state(self) -> RecordingState:
@@ -125,19 +139,30 @@ class Recorder:
         )
 
     def stop(self) -> RecordingState:
-        """Write what is queued, close the file, and say how it went. Safe to call twice."""
-        if self._thread.is_alive():
+        """Write what is queued, close the file, and say how it went. Safe to call twice. A disk that hangs is waited
+        for ``_PATIENCE_S``, and the error says so."""
+        if self._thread.is_alive() and not self.hangs:
             if self._batch:
-                self.put_packets(self._batch)
-            self._jobs.put(None)
-            self._thread.join()
+                batch, self._batch = self._batch, []
+                self.put_packets(batch)
+            self._ending = True
+            with suppress(queue.Full):  # then the writer looks when it has written what is queued
+                self._jobs.put_nowait(None)
+            self._thread.join(_PATIENCE_S)
+            if self._thread.is_alive():
+                self.hangs = True
+                kept = self._segments.kept_frames
+                self._error = f"recording stopped: the disk does not answer; {kept} frames until then are kept"
+                logger.error("%s: %s", self._segments.files[-1], self._error)
         return self.state
 
     def _put(self, job: _Job) -> bool:
         if self._error is not None:
             return False
         try:
-            self._jobs.put_nowait(job)
+            with self._lock:
+                self._jobs.put_nowait(job)
+                self._taken += 1
         except queue.Full:
             self._dropped += 1
             if self._dropped == 1:
@@ -165,8 +190,10 @@ class Recorder:
                 if job is None:
                     return self._write_marks()
                 job(self._segments)
+                self._done += 1
             except queue.Empty:
-                pass
+                if self._ending:
+                    return self._write_marks()
             self._write_marks()
             if self._dropped > dropped:
                 self._segments.write_note(f"{self._dropped - dropped} frames were dropped here: the disk was too slow")
@@ -178,13 +205,15 @@ class Recorder:
                 flushed_s, synced_s = now_s, now_s if is_due else synced_s
 
     def _write_marks(self) -> None:
-        while not self._marks.empty():
-            self._segments.write_mark(self._marks.get_nowait())
+        """Those whose frame is written."""
+        while self._marks and self._marks[0][0] <= self._done:
+            self._segments.write_mark(self._marks.popleft()[1])
 
     def _fail(self, error: Exception) -> None:
         """Recording ends here; the line goes on."""
         reason = (error.strerror if isinstance(error, OSError) else None) or f"{type(error).__name__}: {error}"
-        self._error = f"recording stopped: {reason}; {self._segments.kept_frames} frames until then are kept"
+        with self._lock:
+            self._error = f"recording stopped: {reason}; {self._segments.kept_frames} frames until then are kept"
         logger.error("%s: %s", self._segments.files[-1], self._error)
         while not self._jobs.empty():  # the frames that wait hold memory
             self._jobs.get_nowait()

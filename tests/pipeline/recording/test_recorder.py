@@ -19,10 +19,11 @@ from mcap.reader import NonSeekingReader
 
 from pipeline.errors import BadInput
 from pipeline.params import Params, with_changes
-from pipeline.recording.recorder import Recorder
+from pipeline.recording import recorder as recorder_module
+from pipeline.recording.recorder import Recorder, RecordingState
 from pipeline.recording.rewrite import recover
 from pipeline.recording.segments import Rotation, Segments
-from pipeline.recording.session import SessionSource
+from pipeline.recording.session import Mark, SessionSource
 from tests.conftest import ROOT
 from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, same, sweep
 
@@ -90,6 +91,48 @@ def test_a_slow_disk_holds_nobody_up_and_what_is_dropped_is_counted_and_noted(
     notes = b"".join(stored.data for stored in session.file.messages(("/notes",)))
     assert f"{state.dropped} frames were dropped here".encode() in notes
     assert len(session.marks()) == 1
+
+
+def test_a_mark_stays_with_its_frame_however_many_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with slow_disk(monkeypatch) as may_write:
+        recorder = Recorder(tmp_path / "a.mcap", ABOUT)
+        for index in range(6):
+            recorder.put(full(index))
+            assert recorder.mark(str(index))
+        may_write.set()
+        recorder.stop()
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    assert session.marks() == tuple(Mark(session.t_ns(index), str(index)) for index in range(6))
+
+
+def test_a_recording_that_has_failed_takes_no_marks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Segments, "write", fail)
+    recorder = Recorder(tmp_path / "a.mcap", ABOUT)
+    recorder.put(full(0))
+    assert recorder.stop().error is not None
+    assert not recorder.mark("lost")
+
+
+def test_a_disk_that_hangs_is_not_waited_for_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recorder_module, "_PATIENCE_S", 0.05)
+    with slow_disk(monkeypatch) as may_write:
+        recorder = Recorder(tmp_path / "a.mcap", ABOUT, queued=2)
+        while recorder.put(full(0)):  # until the queue is full
+            pass
+        stopped: list[RecordingState] = []
+        stopping = threading.Thread(target=lambda: stopped.append(recorder.stop()), daemon=True)
+        stopping.start()
+        stopping.join(10.0)
+        assert not stopping.is_alive()
+        assert stopped[0].error == "recording stopped: the disk does not answer; 0 frames until then are kept"
+        assert recorder.stop() == stopped[0]
+        may_write.set()
+        recorder._thread.join(10.0)
+    assert not recorder._thread.is_alive(), "it ends once the disk answers"
+    assert len(SessionSource("a", str(tmp_path / "a.mcap"))) == recorder.state.frames >= 2
 
 
 def test_a_file_that_exists_is_never_written_over(tmp_path: Path) -> None:
