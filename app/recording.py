@@ -23,7 +23,8 @@ class RecordingDesk:
     """At most one recording at a time, of one source, into ``folder``. Any thread; ``take`` on the engine's.
 
     A recording holds what was shown: playing a drive at double speed or seeking leaves out what was skipped. Of live
-    sensors it holds every tick that the line ran, also while the page is paused.
+    sensors it holds every tick that the line ran, also while the page is paused. A frame whose result is not exact yet
+    waits, with its marks, for the exact one, until the next frame comes or recording ends.
     """
 
     def __init__(self, folder: Path = SESSIONS) -> None:
@@ -31,7 +32,10 @@ class RecordingDesk:
         self._lock = threading.Lock()
         self._recorder: Recorder | None = None
         self._is_live = False
+        self._feeding = threading.RLock()
         self._last: Tick | None = None
+        self._waits = False
+        self._marks: list[str] = []
 
     @property
     def state(self) -> RecordingState | None:
@@ -51,11 +55,12 @@ class RecordingDesk:
             if source is None:
                 raise BadInput("nothing is open that could be recorded")
             try:
-                self._recorder = Recorder(new_session(self._folder, source.title), about(source))
+                recorder = Recorder(new_session(self._folder, source.title), about(source))
             except OSError as error:
                 raise BadInput(f"{self._folder}: no recording can be made: {error.strerror}") from None
-            self._is_live, self._last = is_live_source(source), None
-            return self._recorder.state
+            with self._feeding:
+                self._is_live, self._last, self._recorder = is_live_source(source), None, recorder
+            return recorder.state
 
     def stop(self) -> RecordingState | None:
         """End the recording, wait until it is written, and say how it went; null (and no file) when it is empty."""
@@ -63,27 +68,51 @@ class RecordingDesk:
             return self._end()
 
     def mark(self, text: str) -> bool:
-        """A mark right after the newest frame; false when nothing is recorded."""
-        recorder = self._recorder
-        if recorder is not None:
-            recorder.mark(text)
-        return recorder is not None
+        """A mark right after the newest frame; false when nothing is recorded, or no more."""
+        with self._feeding:
+            if self._recorder is None:
+                return False
+            if not self._waits:
+                return self._recorder.mark(text)
+            self._marks.append(text)
+            return self._recorder.state.error is None
 
     def take(self, tick: Tick) -> None:
-        """A tick that the line ran; the same frame again, with other parameters, is not recorded twice."""
-        recorder, last = self._recorder, self._last
-        if recorder is None or (last is not None and last.frame.t_ns == tick.frame.t_ns):
+        """A tick that the line ran. The same frame again, with other parameters, is not recorded twice."""
+        with self._feeding:
+            recorder, last = self._recorder, self._last
+            if recorder is None:
+                return
+            if last is not None and last.frame.t_ns == tick.frame.t_ns:
+                if not self._waits or tick.params != last.params:
+                    return
+            else:
+                self._write_waiting(recorder)
+            self._last, self._waits = tick, True
+            if tick.exact:
+                self._write_waiting(recorder)
+
+    def _write_waiting(self, recorder: Recorder) -> None:
+        """The frame that waits, if one does, as it is known now."""
+        if not self._waits or self._last is None:
             return
-        self._last = tick
+        tick, self._waits = self._last, False
         received_ns = time.time_ns() if self._is_live else None
         recorder.put(tick.frame, tick.result, tick.params, received_ns=received_ns)
+        marks, self._marks = self._marks, []
+        for text in marks:
+            recorder.mark(text)
 
     def _end(self) -> RecordingState | None:
-        recorder, self._recorder, self._last = self._recorder, None, None
+        with self._feeding:
+            recorder, self._recorder = self._recorder, None
+            if recorder is not None:
+                self._write_waiting(recorder)
+            self._last = None
         if recorder is None:
             return None
         state = recorder.stop()
-        if state.frames == 0:
+        if state.frames == 0 and not recorder.hangs:
             state.file.unlink(missing_ok=True)
             return None
         return state

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +14,14 @@ import pytest
 
 from app.catalog import sessions
 from app.engine import Engine
+from app.line import DetectionCache, Line
 from app.recording import RecordingDesk, new_session
 from app.server import create_app
-from pipeline.params import Params
+from pipeline.params import Params, with_changes
 from pipeline.recording.segments import Segments
-from pipeline.recording.session import SessionSource
+from pipeline.recording.session import Mark, SessionSource
 from pipeline.results import to_json
+from pipeline.run import Detectors, run
 from tests.app.recording import CountingDetector, Recording, opener
 from tests.pipeline.recording.frames import same
 
@@ -63,11 +66,16 @@ def client(engine: Engine) -> Client:
 
 
 def show(engine: Engine, index: int) -> dict[str, Any]:
-    """Seek, wait, and what is believed of the frame."""
+    """Seek, wait, and what is believed of the frame once all is known of it."""
     engine.control.seek(index)
-    shown = engine.wait_for(lambda shown: shown.tick is not None and shown.index == index, WAIT_S)
+    shown = engine.wait_for(lambda shown: shown.tick is not None and shown.index == index and shown.tick.warmed, WAIT_S)
     assert shown.tick is not None
     return to_json(shown.tick.result)
+
+
+def without_timing(result: dict[str, Any] | None) -> dict[str, Any]:
+    assert result is not None
+    return {name: value for name, value in result.items() if name != "timing_ms"}
 
 
 def test_what_is_shown_between_start_and_stop_is_in_the_session(client: Client, engine: Engine) -> None:
@@ -85,6 +93,8 @@ def test_what_is_shown_between_start_and_stop_is_in_the_session(client: Client, 
     session = SessionSource("a", stopped["file"])
     assert [session.frame(k).name for k in range(len(session))] == ["000003", "000007", "000004", "000009"]
     assert [session.result(k) for k in range(4)] == results
+    ran = [to_json(result) for _, result in run(Recording(), Params(), Detectors(CountingDetector()))]
+    assert [without_timing(session.result(k)) for k in range(3)] == [without_timing(ran[k]) for k in (3, 7, 4)]
     assert [mark.text for mark in session.marks()] == ["he braked"]
     assert [session.params(k).cluster.z_weight for k in range(4)][2:] == [Params().cluster.z_weight, 0.35]  # type: ignore[union-attr]
     assert same(session.frame(0).sweep, Recording().frame(3).sweep)
@@ -92,6 +102,32 @@ def test_what_is_shown_between_start_and_stop_is_in_the_session(client: Client, 
     show(engine, 2)
     assert client.get("/api/recording").json() is None
     assert len(SessionSource("a", stopped["file"])) == 4
+
+
+def test_a_frame_waits_for_its_exact_result_and_its_marks_with_it(tmp_path: Path) -> None:
+    desk, source = RecordingDesk(tmp_path), Recording()
+    line = Line(source, Detectors(CountingDetector()), DetectionCache(), "both")
+    exact = line.seek(8, Params())
+    assert exact is not None
+    guess = replace(exact, result=replace(exact.result, notes=("a guess",)), exact=False)
+    last = line.seek(20, Params())
+    assert last is not None
+    assert not last.exact
+    desk.start(source)
+    desk.take(guess)
+    assert desk.mark("at eight")
+    other = with_changes(Params(), {"cipv.confirm_hits": 5})
+    desk.take(replace(exact, params=other, result=replace(exact.result, notes=("of other parameters",))))
+    desk.take(exact)
+    desk.take(guess)
+    desk.take(last)
+    assert desk.mark("at twenty")
+    state = desk.stop()
+    assert state is not None
+    session = SessionSource("a", str(state.file))
+    assert [session.result(k) for k in range(len(session))] == [to_json(exact.result), to_json(last.result)]
+    assert [session.params(k) for k in range(2)] == [Params()] * 2
+    assert session.marks() == (Mark(exact.frame.t_ns, "at eight"), Mark(last.frame.t_ns, "at twenty"))
 
 
 def test_the_state_tells_how_it_goes(client: Client, engine: Engine) -> None:
@@ -143,6 +179,7 @@ def test_what_goes_wrong_is_one_sentence(
         if state is not None and state.error is not None:
             break
     assert "No space left on device" in client.get("/api/recording").json()["error"]
+    assert not engine.desk.mark("lost")
     show(engine, 2), "the line goes on"
 
 
