@@ -11,7 +11,7 @@ from app.line import Tick
 from pipeline.errors import BadInput
 from pipeline.recording.recorder import Recorder, RecordingState
 from pipeline.recording.save import about
-from pipeline.sources.base import AnySource, is_live_source
+from pipeline.sources.base import AnySource, LiveSource, is_live_source
 
 SESSIONS = Path(__file__).resolve().parent.parent / "sessions"
 """What this machine keeps: recordings, marks."""
@@ -31,7 +31,7 @@ class RecordingDesk:
         self._folder = folder
         self._lock = threading.Lock()
         self._recorder: Recorder | None = None
-        self._is_live = False
+        self._live: LiveSource | None = None
         self._feeding = threading.RLock()
         self._last: Tick | None = None
         self._waits = False
@@ -59,7 +59,8 @@ class RecordingDesk:
             except OSError as error:
                 raise BadInput(f"{self._folder}: no recording can be made: {error.strerror}") from None
             with self._feeding:
-                self._is_live, self._last, self._recorder = is_live_source(source), None, recorder
+                self._live = source if is_live_source(source) else None
+                self._last, self._recorder = None, recorder
             return recorder.state
 
     def stop(self) -> RecordingState | None:
@@ -97,7 +98,7 @@ class RecordingDesk:
         if not self._waits or self._last is None:
             return
         tick, self._waits = self._last, False
-        received_ns = time.time_ns() if self._is_live else None
+        received_ns = self._live.now_ns() if self._live is not None else None
         recorder.put(tick.frame, tick.result, tick.params, received_ns=received_ns)
         marks, self._marks = self._marks, []
         for text in marks:

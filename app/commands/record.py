@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import signal
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
@@ -78,15 +77,17 @@ class Record:
         detectors = self.line.open_detectors(source)
         recorder = self._recorder(source)
         _say_where(recorder.state.file)
-        with frames_progress() as bar:
-            task = bar.add_task(source.title, total=None)
-            ran = run_live(source, params, detectors, on_silence=lambda: _end_if(asked))
-            for frame, result in self._until_enough(ran, asked):
-                recorder.put(frame, result, params, received_ns=time.time_ns())
-                if recorder.state.error is not None:
-                    break
-                bar.advance(task)
-        state = recorder.stop()
+        try:
+            with frames_progress() as bar:
+                task = bar.add_task(source.title, total=None)
+                ran = run_live(source, params, detectors, on_silence=lambda: _end_if(asked))
+                for frame, result in self._until_enough(ran, asked):
+                    recorder.put(frame, result, params, received_ns=source.now_ns())
+                    if recorder.state.error is not None:
+                        break
+                    bar.advance(task)
+        finally:
+            state = recorder.stop()
         _say(list(state.files), state.frames, state.bytes)
         if state.dropped:
             print(f"cipv: {state.dropped} frames were dropped: the disk was too slow", file=sys.stderr)

@@ -100,7 +100,7 @@ class Recorder:
         received_ns: int | None = None,
     ) -> bool:
         """Record a frame, what was believed of it and with which parameters. Returns at once; false when it was
-        dropped. received_ns: when a live frame was made, by the host's clock; null for one from a recording."""
+        dropped. received_ns: when a live frame was made, by its source's clock; null for one from a recording."""
         return self._put(lambda segments: segments.write(frame, result, params, received_ns=received_ns))
 
     def put_packets(self, packets: list[tuple[int, bytes]]) -> bool:

@@ -88,6 +88,10 @@ class LiveSource(Protocol):
         """Have each of the LiDAR's data packets told, with when it arrived in ns, on another thread."""
         ...
 
+    def now_ns(self) -> int:
+        """Now on the steady timeline that frames' times are on; setting the host's clock moves nothing on it."""
+        ...
+
     def health(self) -> tuple[StreamHealth, ...]:
         """How each sensor does now, also while none ticks."""
         ...

@@ -5,12 +5,15 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
 from app.engine import Engine
+from app.recording import RecordingDesk
 from app.snapshot import Snapshot
 from pipeline.params import Params, SyncParams, with_changes
+from pipeline.recording.session import SessionSource
 from pipeline.sources.base import AnySource, SourceError
 from pipeline.types import CameraCalibration, Frame, StreamHealth
 from tests.app.recording import CountingDetector, Recording
@@ -33,11 +36,12 @@ class Sensors:
         self._recording = Recording()
         self._came = threading.Condition()
         self._newest: Frame | None = None
+        self.given = 0
 
     def give(self, index: int) -> None:
         with self._came:
             self.dropped += self._newest is not None
-            self._newest = self._recording.frame(index)
+            self._newest, self.given = self._recording.frame(index), index
             self._came.notify_all()
 
     def start(self) -> None:
@@ -53,6 +57,9 @@ class Sensors:
             newest, self._newest = self._newest, None
             return replace(newest, streams=self.health()) if newest is not None else None
 
+    def now_ns(self) -> int:
+        return 10**18 + self._recording.t_ns(self.given)
+
     def health(self) -> tuple[StreamHealth, ...]:
         return (StreamHealth("lidar", self.state, 10.0, 60.0, 1.0, 0),)  # type: ignore[arg-type]
 
@@ -64,7 +71,7 @@ Start = Callable[..., tuple[Engine, Sensors, CountingDetector]]
 def start() -> Iterator[Start]:
     engines: list[Engine] = []
 
-    def begin() -> tuple[Engine, Sensors, CountingDetector]:
+    def begin(desk: RecordingDesk | None = None) -> tuple[Engine, Sensors, CountingDetector]:
         sensors, detector = Sensors(), CountingDetector()
 
         def open_source(uri: str) -> AnySource:
@@ -74,7 +81,7 @@ def start() -> Iterator[Start]:
                 return Recording()
             raise SourceError(f"{uri}: no such thing")
 
-        engine = Engine(open_source, lambda _: detector, Params(), uri=sensors.uri, playing=True)
+        engine = Engine(open_source, lambda _: detector, Params(), uri=sensors.uri, playing=True, desk=desk)
         engines.append(engine)
         engine.start()
         engine.wait_for(lambda s: s.live, WAIT_S)
@@ -165,6 +172,19 @@ def test_what_the_line_left_out_is_counted(start: Start) -> None:
     shown_after(engine, sensors, 0)
     sensors.dropped += 3
     assert shown_after(engine, sensors, 5).skipped >= 3
+
+
+def test_a_session_of_them_is_on_their_own_steady_timeline(start: Start, tmp_path: Path) -> None:
+    engine, sensors, _ = start(RecordingDesk(tmp_path))
+    engine.desk.start(engine.source)
+    for index in range(3):
+        shown_after(engine, sensors, index)
+    state = engine.desk.stop()
+    assert state is not None
+    session = SessionSource("a", str(state.file))
+    times_ns = [Recording().t_ns(index) for index in range(3)]
+    assert [session.log_time_ns(index) - 10**18 for index in range(3)] == times_ns
+    assert [session.t_ns(index) for index in range(3)] == times_ns
 
 
 def test_opening_a_recording_gives_the_sensors_back_and_the_other_way_round(start: Start) -> None:

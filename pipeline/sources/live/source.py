@@ -106,6 +106,10 @@ class LiveSensors:
         together = self._wait(timeout_s, params or SyncParams())
         return self._frame(together) if together is not None else None
 
+    def now_ns(self) -> int:
+        """Now on the timeline of the ticks."""
+        return self._clock.now_ns()
+
     def health(self) -> tuple[StreamHealth, ...]:
         """How each configured sensor does now."""
         now_ns = self._clock.now_ns()

@@ -10,8 +10,13 @@ import pytest
 import yaml
 
 from app.cli import main
+from app.commands.record import Record
+from app.options import LineOptions, SourceOptions
+from pipeline.params import SyncParams
 from pipeline.recording.session import SessionSource
 from pipeline.replay.messages import Message
+from pipeline.types import Frame
+from tests.app.test_live_engine import Sensors
 from tests.pipeline.sources.live.bench import MS, messages
 from tests.pipeline.sources.live.rig import Replaying, loopback_config
 
@@ -20,6 +25,30 @@ def endless() -> Iterator[Message]:
     for second in count():
         for message in messages(1.0, 30.0):
             yield message._replace(t_ns=message.t_ns + second * 1000 * MS)
+
+
+class Unplugged(Sensors):
+    """Sensors that give two frames and then break the line."""
+
+    lidar_mount = None
+
+    def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
+        if self.given == 2:
+            raise RuntimeError("unplugged")
+        self.give(self.given + 1)
+        return super().next(timeout_s, params)
+
+
+def test_what_was_recorded_until_an_error_is_a_whole_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sensors = Unplugged()
+    monkeypatch.setattr(SourceOptions, "open_live", lambda self: sensors)
+    out = tmp_path / "drive.mcap"
+    with pytest.raises(RuntimeError, match="unplugged"):
+        Record(SourceOptions("live:test"), out, LineOptions(lanes="off"))()
+    session = SessionSource("a", str(out))
+    assert (len(session), session.file.directory.is_cut) == (2, False)
+    received_ns = [session.log_time_ns(index) for index in range(2)]
+    assert received_ns == [10**18 + session.t_ns(index) for index in range(2)]
 
 
 @pytest.mark.parametrize("arguments", [(), ("--packets",)], ids=["clouds", "packets"])
