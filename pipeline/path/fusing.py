@@ -104,7 +104,7 @@ def moved(path: FusedPath, travelled_m: float, turned_rad: float, dt_s: float) -
     """The path of ``dt_s`` ago as the car sees it now, having driven a little arc. It is less sure by what speed and
     yaw rate may be off by: 0.3 m sideways and 0.003 rad in a second, growing with the root of time."""
     rows = np.column_stack([path.sigma_m, path.left_m, path.right_m, path.shares])
-    center, rows = _moved(path.center, rows, travelled_m, turned_rad)
+    center, rows = _moved(path.center, rows, travelled_m, turned_rad, STEP_M)
     s = np.arange(len(center)) * STEP_M
     grown = np.sqrt(rows[:, 0] ** 2 + (0.3**2 + (0.003 * s) ** 2) * dt_s)
     return FusedPath(center, grown, rows[:, 1], rows[:, 2], rows[:, 3:], np.zeros(len(center)))
@@ -216,7 +216,7 @@ def _blend(fresh, fresh_sigma, old, old_sigma, keep, largest):  # type: ignore[n
 
 
 @numba.njit(cache=True, nogil=True)
-def _moved(center, rows, travelled, turned):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _moved(center, rows, travelled, turned, spacing):  # type: ignore[no-untyped-def]  # pragma: no cover
     """Points turned and moved into the new ego frame, and sampled anew from the foot of its origin on. Beyond the last
     point the line goes straight on, a tenth of a metre less sure a metre."""
     size, columns = rows.shape
@@ -249,5 +249,5 @@ def _moved(center, rows, travelled, turned):  # type: ignore[no-untyped-def]  # 
         for j in range(columns):
             new_rows[n, j] = rows[k, j] + share * (rows[k + 1, j] - rows[k, j])
         new_rows[n, 0] += 0.1 * max(into - length, 0.0)
-        into += 1.0
+        into += spacing
     return new, new_rows

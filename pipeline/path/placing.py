@@ -16,6 +16,7 @@ import numpy as np
 from pipeline.geometry import F64
 from pipeline.params import CipvParams
 from pipeline.path.corridor import nearest_on_path
+from pipeline.path.estimates import STEP_M
 from pipeline.path.yaw_rate import usable_rate
 from pipeline.types import EgoState, FusedObject, Path, Point2
 
@@ -110,7 +111,7 @@ def place(
     points = _outlines(known)
     offsets, reached = (row.reshape(-1, 5) for row in nearest_on_path(path, points.reshape(-1, 2)))
     ahead = reached[:, 0]
-    k = np.clip(ahead.astype(np.intp), 0, len(path.center) - 2)
+    k = np.clip((ahead / STEP_M).astype(np.intp), 0, len(path.center) - 2)
     way = path.center[k + 1] - path.center[k]
     heading = np.arctan2(way[:, 1], way[:, 0])
     # columns 1 and 2 are the nearest face; the far corners count for what stands across the path

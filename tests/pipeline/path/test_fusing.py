@@ -98,6 +98,14 @@ def test_a_path_moves_with_the_car() -> None:
     assert np.all(moved.sigma_m > path.sigma_m)
 
 
+def test_a_moved_path_keeps_its_spacing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fusing, "STEP_M", 0.5)
+    center, _ = arc(0.0, S / 2)
+    rows = np.full(len(S), 0.2)
+    path = FusedPath(center, rows, rows, rows, np.ones((len(S), 4)), np.zeros(len(S)))
+    assert fusing.moved(path, 2.0, 0.0, 0.1).center == pytest.approx(center)
+
+
 def test_beyond_its_end_a_moved_path_is_less_sure() -> None:
     path, _ = fused(estimate("gnss", 0.0, 0.2))
     moved = fusing.moved(path, 10.0, 0.0, 0.1)

@@ -11,6 +11,7 @@ import pytest
 from pipeline.geometry import Cuboid
 from pipeline.motion import describe
 from pipeline.params import CipvParams, MotionParams, PathParams
+from pipeline.path import placing
 from pipeline.path.corridor import corridor
 from pipeline.path.estimates import arc, samples
 from pipeline.path.placing import Place, place
@@ -50,6 +51,18 @@ def test_lines_need_not_be_parallel_to_the_centre() -> None:
     path = dataclasses.replace(STRAIGHT, left=left)
     assert placed(fused(1, 20.0, 2.8), path)[0].margin_m() < 0.0
     assert placed(fused(1, 60.0, 2.8), path)[0].margin_m() > 0.0
+
+
+def test_a_finer_path_is_looked_up_by_path_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A point every half metre: the edges at 20 m are those of its fortieth."""
+    monkeypatch.setattr(placing, "STEP_M", 0.5)
+    center, _ = arc(0.0, samples(100.0) / 2)
+    aside = np.column_stack([np.zeros(len(center)), 1.5 + 0.03 * center[:, 0]])
+    left, right = center + aside, center - aside
+    fine = dataclasses.replace(STRAIGHT, center=center, left=left, right=right, profile_m=np.zeros(0))
+    found, _ = placed(fused(1, 20.0, 0.0), fine)
+    assert found.ahead_m == pytest.approx(20.0, abs=3.0)
+    assert found.left_m == pytest.approx(1.5 + 0.03 * found.ahead_m, abs=0.02)
 
 
 def test_what_stands_across_the_path_is_in_it_while_any_of_it_reaches_in() -> None:
