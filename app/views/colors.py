@@ -5,7 +5,7 @@ LiDAR is magenta and vision cyan, as in the paper's figures; both together viole
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Literal
 
 from pipeline.types import FusedObject
@@ -71,11 +71,6 @@ def shade_of(color: Rgb, identity: int) -> Rgb:
     """The colour a little darker or not, always the same for one identity, so that neighbours can be told apart."""
     factor = (1.0, 0.82, 0.91, 0.73)[identity % 4]
     return int(color[0] * factor), int(color[1] * factor), int(color[2] * factor)
-
-
-def palette_json() -> dict[str, dict[str, str]]:
-    """``{role: {"dark": "#…", "light": "#…"}}`` for a page."""
-    return {role: asdict(shades) for role, shades in PALETTE.items()}
 
 
 def palette_css(theme: Literal["dark", "light"]) -> str:

@@ -12,9 +12,6 @@ import numpy.typing as npt
 F64 = npt.NDArray[np.float64]
 Side = Literal["left", "right"]
 
-TERMS = 4
-"""Coefficients of a line: y(x) = c0 + c1·x + c2·x² + c3·x³."""
-
 
 def powers(x_m: npt.ArrayLike) -> F64:
     """``1 x x² x³`` of each x: (..., 4) float64, so that ``powers(x) @ coefficients`` is y."""

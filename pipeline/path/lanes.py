@@ -67,8 +67,8 @@ class LaneMeasurement:
 
 @dataclass(frozen=True, eq=False)
 class LaneState:
-    """What one frame leaves to the next. plane: (3,) a, b, c of the road z = a·x + b·y + c, the mean of
-    late, and sweeps: how many it is of; null before one showed it."""
+    """What one frame leaves to the next. plane: (3,) a, b, c of the road z = a·x + b·y + c, a running mean over the
+    sweeps that showed it; null before one did. sweeps: how many those are."""
 
     tracks: lane_tracking.LaneTracks = lane_tracking.LaneTracks()
     pitch: Pitch | None = None

@@ -69,20 +69,6 @@ def evaluate(detector: Detector, pictures: Iterable[Moment], params: DetectionPa
     return bins
 
 
-def merged(bins: Iterable[Bin]) -> Bin:
-    """Several bins as one."""
-    total = Bin()
-    for part in bins:
-        total.vehicles += part.vehicles
-        total.found += part.found
-        total.named += part.named
-        total.leads += part.leads
-        total.leads_found += part.leads_found
-        total.wrong += part.wrong
-        total.height_errors += part.height_errors
-    return total
-
-
 def _count(truth: tuple[Label, ...], detections: tuple[Detection, ...], focal_px: float, bins: list[Bin]) -> None:
     boxes = np.array([label.box for label in truth]).reshape(-1, 4)
     found = np.array([detection.bbox for detection in detections]).reshape(-1, 4)

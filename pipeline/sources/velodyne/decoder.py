@@ -7,8 +7,7 @@ from velodyne_decoder import Config, Model, PacketVector, ScanDecoder, VelodyneP
 
 from pipeline.sources.velodyne.clock import SensorClock
 from pipeline.sources.velodyne.cutter import DecoderCounts, Rotation, RotationCutter
-from pipeline.sources.velodyne.packet import HOUR_US, BadPacket
-from pipeline.sources.velodyne.position import Position, read_position
+from pipeline.sources.velodyne.packet import HOUR_US
 from pipeline.types import F32, F64, Sweep
 
 CHANNELS = 16
@@ -40,16 +39,6 @@ class Vlp16Decoder:
         packet of a VLP-16 is refused and counted by reason.
         """
         return self._decode(self._cutter.push(packet, t_host_ns))
-
-    def push_position(self, packet: bytes) -> Position | None:
-        """Take one position packet: from here on the sensor's time is UTC, or it is not. Null when it is none."""
-        try:
-            position = read_position(packet)
-        except BadPacket as bad:
-            self.counts.refused[f"position: {bad.reason}"] += 1
-            return None
-        self.clock.follow_gps(position.locked)
-        return position
 
     def flush(self) -> Sweep | None:
         """The sweep under way at the end of a stream, if it is whole. The next packet starts anew."""

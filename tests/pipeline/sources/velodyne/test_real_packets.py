@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial import cKDTree
 
-from pipeline.sources.velodyne import SensorClock, Vlp16Decoder
+from pipeline.sources.velodyne import SensorClock, Vlp16Decoder, read_position
 
 from .streams import decoded, einride, mrpt
 
@@ -41,8 +41,8 @@ def test_mrpt_follows_gps(data_dir: Path) -> None:
     sweeps = []
     for payload, t_host_ns, port in mrpt(data_dir):
         if port == 8308:
-            position = decoder.push_position(payload)
-            assert position is not None
+            position = read_position(payload)
+            decoder.clock.follow_gps(position.locked)
             assert position.nmea.startswith("$GPRMC,0818")
         else:
             sweeps.append(decoder.push(payload, t_host_ns))
