@@ -12,7 +12,7 @@ from time import monotonic, perf_counter
 from app.line import Tick
 from app.snapshot import Notice
 from pipeline.params import Params
-from pipeline.run import Detectors, Detects, Seen, Sensors, advance
+from pipeline.run import Detectors, Detects, LiveDetectors, Seen, Sensors, advance
 from pipeline.sources.base import LiveSource
 from pipeline.sources.live.health import not_delivering
 from pipeline.step import State, step
@@ -27,7 +27,7 @@ class LiveLine:
     def __init__(self, source: LiveSource, detectors: Detectors, sensors: Sensors) -> None:
         self.source = source
         self.tick: Tick | None = None
-        self._detectors, self._sensors = detectors, sensors
+        self._detectors, self._sensors = LiveDetectors(detectors), sensors
         self._first_ns: int | None = None
         self._ticked_s = monotonic()
         self._silence: Notice | None = None
@@ -48,7 +48,7 @@ class LiveLine:
         self._first_ns = frame.t_ns if self._first_ns is None else self._first_ns
         before = self.tick.after if self.tick is not None else State()
         ask = _TimedLook()
-        frame, after, result = advance(before, frame, params, self._detectors, self._sensors, ask)
+        frame, after, result = advance(before, frame, params, self._detectors.of(frame), self._sensors, ask)
         self.tick = Tick(before, frame, after, result, params, ask.spent_ms, exact=True)
         return self.tick
 

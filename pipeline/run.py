@@ -40,13 +40,29 @@ class Detects(Protocol[Seen_co]):
 class Detectors:
     """What looks at the pictures before the line runs; null: nothing does.
 
-    boxes: finds vehicles. lanes: finds lane lines, in every ``lanes_every``-th frame; between, the lane tracker counts
-    their age.
+    boxes: finds vehicles. lanes: finds lane lines, in every ``lanes_every``-th frame of a recording, whatever the
+    order they are asked for in; between, the lane tracker counts their age. Of live sensors see ``LiveDetectors``.
     """
 
     boxes: Detects[RawBoxes] | None = None
     lanes: Detects[RawLanes] | None = None
     lanes_every: int = 1
+
+
+class LiveDetectors:
+    """Detectors for each tick of live sensors that is run, in turn. The lanes' turn comes when ``lanes_every`` ticks
+    were run since their last one: an index also counts ticks that were dropped, so its rhythm would be that of the
+    drops."""
+
+    def __init__(self, detectors: Detectors) -> None:
+        self._detectors = detectors
+        self._since_lanes = detectors.lanes_every
+
+    def of(self, frame: Frame) -> Detectors:
+        """To be asked once for each tick. A lanes' turn without a picture passes to the next tick."""
+        is_due = self._since_lanes >= self._detectors.lanes_every and frame.picture is not None
+        self._since_lanes = 1 if is_due else self._since_lanes + 1
+        return replace(self._detectors, lanes=self._detectors.lanes if is_due else None, lanes_every=1)
 
 
 class Look(Protocol):
@@ -135,17 +151,23 @@ def run_live(
 ) -> Iterator[tuple[Frame, Result]]:
     """Each tick with its result, the newest only, for as long as it is asked for; the sensors are given back then.
     on_silence: called while no sensor ticks, every half second."""
-    return through(_ticks(source, params, on_silence), params, detectors, sensors)
+    return _through(_ticks(source, params, on_silence), params, LiveDetectors(detectors).of, sensors)
 
 
 def through(
     frames: Iterable[Frame], params: Params, detectors: Detectors, sensors: Sensors = "both"
 ) -> Iterator[tuple[Frame, Result]]:
     """Each frame through the line, one after the other."""
+    return _through(frames, params, lambda _: detectors, sensors)
+
+
+def _through(
+    frames: Iterable[Frame], params: Params, detectors_of: Callable[[Frame], Detectors], sensors: Sensors
+) -> Iterator[tuple[Frame, Result]]:
     warm_up()
     state = State()
     for frame in frames:
-        seen, state, result = advance(state, frame, params, detectors, sensors)
+        seen, state, result = advance(state, frame, params, detectors_of(frame), sensors)
         yield seen, result
 
 

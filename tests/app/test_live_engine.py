@@ -7,15 +7,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.engine import Engine
+from app.live_line import LiveLine
 from app.recording import RecordingDesk
 from app.snapshot import Snapshot
 from pipeline.params import Params, SyncParams, with_changes
 from pipeline.recording.session import SessionSource
+from pipeline.run import Detectors
 from pipeline.sources.base import AnySource, SourceError
-from pipeline.types import CameraCalibration, Frame, StreamHealth
+from pipeline.types import U8, CameraCalibration, Frame, RawLanes, StreamHealth
 from tests.app.recording import CountingDetector, Recording
 
 WAIT_S = 30.0
@@ -62,6 +65,16 @@ class Sensors:
 
     def health(self) -> tuple[StreamHealth, ...]:
         return (StreamHealth("lidar", self.state, 10.0, 60.0, 1.0, 0),)  # type: ignore[arg-type]
+
+
+class NoLanes:
+    """Finds none, and counts how often it was asked."""
+
+    name, notes, calls = "none", (), 0
+
+    def detect(self, bgr: U8) -> RawLanes:
+        self.calls += 1
+        return RawLanes(self.name, np.zeros((0, 2), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int32))
 
 
 Start = Callable[..., tuple[Engine, Sensors, CountingDetector]]
@@ -185,6 +198,17 @@ def test_a_session_of_them_is_on_their_own_steady_timeline(start: Start, tmp_pat
     times_ns = [Recording().t_ns(index) for index in range(3)]
     assert [session.log_time_ns(index) - 10**18 for index in range(3)] == times_ns
     assert [session.t_ns(index) for index in range(3)] == times_ns
+
+
+def test_lanes_are_looked_for_as_often_as_the_line_runs_whatever_is_dropped() -> None:
+    sensors, lanes = Sensors(), NoLanes()
+    line = LiveLine(sensors, Detectors(None, lanes, lanes_every=3), "both")
+    for index in range(1, 22, 3):
+        sensors.give(index)
+        came = line.wait(Params(), WAIT_S)
+        assert came is not None
+        line.run(came, Params())
+    assert lanes.calls == 3
 
 
 def test_opening_a_recording_gives_the_sensors_back_and_the_other_way_round(start: Start) -> None:
