@@ -180,26 +180,28 @@ def _nearest(center, points):  # type: ignore[no-untyped-def]  # pragma: no cove
         along[k + 1] = along[k] + length
         longest = max(longest, length)
     offset, reached = np.empty(len(points)), np.empty(len(points))
-    last = len(center) - 2
-    way, length, start = np.empty((last + 1, 2)), np.empty(last + 1), np.zeros(last + 2)
-    for k in range(last + 1):
-        dx, dy = center[k + 1, 0] - center[k, 0], center[k + 1, 1] - center[k, 1]
-        length[k] = np.sqrt(dx * dx + dy * dy)
-        way[k, 0], way[k, 1] = dx / length[k], dy / length[k]
-        start[k + 1] = start[k] + length[k]
     for n in range(len(points)):
-        best2 = np.inf
-        for k in range(last + 1):
-            rx, ry = points[n, 0] - center[k, 0], points[n, 1] - center[k, 1]
-            t = rx * way[k, 0] + ry * way[k, 1]
-            if t < 0.0 and k > 0:
+        best = np.inf
+        guess = min(
+            max(int(points[n, 0] / longest), 0), pieces - 1
+        )  # a near one first, so that far ones are passed over
+        k = -1
+        while k < pieces:
+            here = guess if k < 0 else k
+            rx, ry = points[n, 0] - center[here, 0], points[n, 1] - center[here, 1]
+            dx, dy, length = way[here, 0], way[here, 1], way[here, 2]
+            t = rx * dx + ry * dy
+            if t < 0.0 and here > 0:
                 t = 0.0
-            if t > length[k] and k < last:
-                t = length[k]
-            ex, ey = rx - t * way[k, 0], ry - t * way[k, 1]
-            distance2 = ex * ex + ey * ey
-            if distance2 < best2:
-                best2 = distance2
-                side = 1.0 if way[k, 0] * ry - way[k, 1] * rx >= 0.0 else -1.0
-                offset[n], reached[n] = side * np.sqrt(distance2), start[k] + t
+            if t > length and here < pieces - 1:
+                t = length
+            ex, ey = rx - t * dx, ry - t * dy
+            distance = np.sqrt(ex * ex + ey * ey)
+            if distance < best:
+                best = distance
+                side = 1.0 if dx * ry - dy * rx >= 0.0 else -1.0
+                offset[n], reached[n] = side * distance, along[here] + t
+            skip = max(1, int((distance - best) / longest)) if k >= 0 else 1
+            # the last piece goes on for ever, so it is never passed over
+            k = pieces - 1 if k < pieces - 1 and k + skip > pieces - 1 else k + skip
     return offset, reached
