@@ -113,10 +113,11 @@ class Segments:
 
     def _rotate(self) -> None:
         self._writer.close()
-        self._earlier_frames, self._earlier_bytes, self._earlier_s = self.frames, self.bytes_written, self.seconds
         first = self.files[0]
         path = first.with_name(f"{first.stem}_{len(self.files):03d}{first.suffix}")
-        self._writer = self._open(path)
+        writer = self._open(path)
+        self._earlier_frames, self._earlier_bytes, self._earlier_s = self.frames, self.bytes_written, self.seconds
+        self._writer = writer
         self.files.append(path)
         for packets in self._recent_packets:  # of the sweep that the first frame of the new file shows
             self._writer.write_packets(packets)

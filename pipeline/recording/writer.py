@@ -112,7 +112,7 @@ class SessionWriter:
 
     @property
     def kept_frames(self) -> int:
-        """Of ``frames``, those in whole chunks: what stays when the file can take no more."""
+        """Of ``frames``, those in whole chunks, in the end all: what stays when the file can take no more."""
         return self._kept_frames
 
     @property
@@ -186,7 +186,8 @@ class SessionWriter:
         if self._output.is_open:
             data = np.array(self._index, dtype="<i8").tobytes()
             self._output.add_attachment(topics.INDEX, "application/octet-stream", data)
-        self._output.close()
+            self._output.close()
+            self._kept_frames = len(self._index)
 
     def discard(self) -> None:
         """Remove the file: what it was to hold could not be made."""

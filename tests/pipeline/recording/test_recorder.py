@@ -162,6 +162,19 @@ def test_each_file_of_a_long_recording_can_be_read_alone(rotation: Rotation, tmp
         assert [len(session) for session in sessions] == [11, 11, 11, 2]
 
 
+def test_frames_are_counted_once_when_the_next_file_cannot_be_made(tmp_path: Path) -> None:
+    (tmp_path / "a_001.mcap").write_text("in the way")
+    recorder = Recorder(tmp_path / "a.mcap", ABOUT, Rotation(max_s=0.3))
+    for index in range(6):
+        recorder.put(full(index))
+    state = recorder.stop()
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    assert state.frames == len(session) == 4
+    assert state.bytes == (tmp_path / "a.mcap").stat().st_size
+    assert state.seconds == pytest.approx(0.3)
+    assert "4 frames until then are kept" in str(state.error)
+
+
 _RECORD_FOR_EVER = """
 import resource, sys
 from dataclasses import replace
