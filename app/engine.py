@@ -291,6 +291,7 @@ class Engine:
     def _open_live(self, source: LiveSource, detectors: Detectors) -> None:
         """Sensors instead of a recording, shown from the first tick on."""
         self._line = None
+        self._end_ahead()
         self.drives.open(None)
         self._live = LiveLine(source, detectors, self._sensors)
         self._live.open()
@@ -304,12 +305,17 @@ class Engine:
     def _line_of(self, source: Source, detectors: Detectors) -> Line:
         """The line for a recording, whose whole drive is computed beside it from now on."""
         line = Line(source, detectors, self._detections, self._sensors, self.drives.state_before)
-        if self._ahead is not None:
-            self._ahead.end()
+        self._end_ahead()
         self._ahead = Ahead(lambda index: self._prepare(line, index), self.control.change)
         recipe = Recipe(source.uri, len(source), line.timeline_s, detectors, self._sensors, is_simulated(source))
         self.drives.open(recipe if self._whole_drives else None)
         return line
+
+    def _end_ahead(self) -> None:
+        """What reads ahead holds the line that it reads for."""
+        if self._ahead is not None:
+            self._ahead.end()
+            self._ahead = None
 
     def _prepare(self, line: Line, index: int) -> None:
         """On the thread that works ahead."""

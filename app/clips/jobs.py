@@ -99,6 +99,7 @@ class Jobs:
                 return False
             if job.state in ("waiting", "running"):
                 self._jobs[number] = replace(job, state="cancelled")
+                self._work.pop(number, None)
             else:
                 self._forget(number)
             return True
@@ -110,6 +111,7 @@ class Jobs:
             for number, job in self._jobs.items():
                 if job.state in ("waiting", "running"):
                     self._jobs[number] = replace(job, state="cancelled")
+            self._work.clear()
             self._condition.notify_all()
         if self._thread is not None:
             self._thread.join(_PATIENCE_S)
@@ -134,28 +136,31 @@ class Jobs:
         (self._folder / number).unlink(missing_ok=True)
 
     def _run(self) -> None:
-        while (number := self._next()) is not None:
-            work = self._work.pop(number)
-            path = self._folder / number
-            try:
-                work(path, lambda done, total, number=number: self._progress(number, done, total))  # type: ignore[misc]
-                self._end(number, "done", size=path.stat().st_size)
-            except Cancelled:
-                self._end(number, "cancelled")
-            except BadInput as error:
-                self._end(number, "failed", note=str(error))
-            except Exception as error:  # one export that fails takes no other with it
-                logger.exception("job %s", number)
-                self._end(number, "failed", note=f"{type(error).__name__}: {error}")
+        while (begun := self._next()) is not None:
+            self._do(*begun)
+            del begun  # a job's work holds its recording, and the next one may be long in coming
 
-    def _next(self) -> str | None:
-        """Wait for a job to begin; null at the end."""
+    def _do(self, number: str, work: Work) -> None:
+        path = self._folder / number
+        try:
+            work(path, lambda done, total: self._progress(number, done, total))
+            self._end(number, "done", size=path.stat().st_size)
+        except Cancelled:
+            self._end(number, "cancelled")
+        except BadInput as error:
+            self._end(number, "failed", note=str(error))
+        except Exception as error:  # one export that fails takes no other with it
+            logger.exception("job %s", number)
+            self._end(number, "failed", note=f"{type(error).__name__}: {error}")
+
+    def _next(self) -> tuple[str, Work] | None:
+        """Wait for a job to begin, and its work; null at the end."""
         with self._condition:
             while not self._ended:
                 waiting = [number for number, job in self._jobs.items() if job.state == "waiting"]
                 if waiting:
                     self._jobs[waiting[0]] = replace(self._jobs[waiting[0]], state="running")
-                    return waiting[0]
+                    return waiting[0], self._work.pop(waiting[0])
                 self._condition.wait()
             return None
 

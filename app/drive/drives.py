@@ -140,6 +140,7 @@ class Drives:
         while (work := self._next()) is not None:
             self.turn.wait(worked_s)
             worked_s = self._advance(*work)
+            del work  # a recording that is open no more is not kept while there is nothing to do
 
     def _next(self) -> tuple[Recording, DriveRun] | None:
         """Wait for a run that is not finished; null at the end."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -222,6 +224,18 @@ def test_opening_a_recording_gives_the_sensors_back_and_the_other_way_round(star
     engine.wait_for(lambda s: s.live, WAIT_S)
     assert sensors.is_open is True
     assert shown_after(engine, sensors, 3).playing
+
+
+def test_with_sensors_open_nothing_is_kept_of_the_recording_before(start: Start) -> None:
+    engine, sensors, _ = start()
+    engine.control.change(uri="test:car", playing=True)
+    engine.wait_for(lambda s: s.uri == "test:car" and s.index > 0, WAIT_S)
+    line = weakref.ref(engine._line)  # type: ignore[type-var]
+    assert line() is not None
+    engine.control.change(uri="live:test")
+    engine.wait_for(lambda s: s.live, WAIT_S)
+    assert wait_until(lambda: gc.collect() >= 0 and line() is None)
+    shown_after(engine, sensors, 3)
 
 
 def test_seeking_and_stepping_mean_nothing_to_sensors(start: Start) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -126,6 +128,33 @@ def test_a_cancelled_job_stops_and_leaves_no_file(jobs: Jobs, ended: Ended):
     assert {job.state for job in jobs.all()} == {"cancelled"}
     assert not waiting.began.is_set()
     assert list(jobs._folder.iterdir()) == []
+
+
+def test_a_jobs_work_is_let_go_when_it_has_ended_or_was_cancelled(jobs: Jobs, ended: Ended):
+    """It holds a whole recording."""
+    held, waiting = Held(), Held()
+    first, second = submit(jobs, held), submit(jobs, waiting)
+    assert held.began.wait(WAIT_S)
+    gone = [weakref.ref(held), weakref.ref(waiting)]
+    jobs.cancel(second.id)
+    del waiting
+    gc.collect()
+    assert gone[1]() is None
+    held.go.set()
+    ended.wait(1)
+    del held
+    assert let_go(gone[0]), first
+
+
+def let_go(what: weakref.ref[Held]) -> bool:
+    """Look again and again: the worker ends its call a moment after it has told so."""
+    looking = threading.Event()
+    for _ in range(round(WAIT_S / 0.01)):
+        gc.collect()
+        if what() is None:
+            return True
+        looking.wait(0.01)
+    return False
 
 
 def test_so_many_jobs_and_no_more(jobs: Jobs, ended: Ended):
