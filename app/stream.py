@@ -229,7 +229,7 @@ def _is_id_or_null(value: Any) -> bool:
 
 def _width(shown_px: Any) -> int | None:
     """The width to send to who shows it so wide; null for what is no width."""
-    shown = _number(float(shown_px) if isinstance(shown_px, str) and shown_px.isdigit() else shown_px, _WIDEST_PX)
+    shown = _number(float(shown_px) if isinstance(shown_px, str) and shown_px.isdecimal() else shown_px, _WIDEST_PX)
     return None if shown is None or shown <= 0 else width_for(shown)
 
 

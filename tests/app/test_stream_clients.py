@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -186,6 +187,12 @@ def test_a_nonsense_width_changes_nothing(site: Site, said: str):
         site.show(1)
         width = next_header(client)["picture"]["width"]
     assert width == MAX_WIDTH_PX
+
+
+@pytest.mark.parametrize("said", ["²", "wide", "9" * 400, ""])
+def test_a_nonsense_width_in_the_address_changes_nothing(site: Site, said: str):
+    with site.connected(f"?picture_px={quote(said)}") as client:
+        assert next_header(client)["picture"]["width"] == MAX_WIDTH_PX
 
 
 def test_what_a_page_looks_at_is_heard_until_it_leaves(site: Site):
