@@ -28,7 +28,7 @@ class BodyLimit:
         if scope["type"] != "http":
             return await self._app(scope, receive, send)
         said = Headers(scope=scope).get("content-length", "0")
-        if not said.isdigit() or int(said) > self._largest:
+        if not said.isdecimal() or int(said) > self._largest:
             return await JSONResponse({"detail": _TOO_LARGE}, 413, _GOODBYE)(scope, receive, send)
         await self._app(scope, self._counted(receive), send)
 
