@@ -218,7 +218,9 @@ def _report(
         "frames": len(watcher.shown),
         "dropped_ticks": dropped,
         "stages": stages,
-        "slowest_recovery_s": max((each["seconds"] or np.inf for each in recoveries), default=0.0),
+        "slowest_recovery_s": max(
+            (np.inf if each["seconds"] is None else each["seconds"] for each in recoveries), default=0.0
+        ),
         "recoveries": recoveries,
         "resident_MB": round(resident / 1e6, 1),
         "grown_MB": round(grown / 1e6, 2),
