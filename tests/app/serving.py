@@ -1,4 +1,4 @@
-"""A real server for a while."""
+"""A running engine and a real server, for a while."""
 
 from __future__ import annotations
 
@@ -8,9 +8,33 @@ from contextlib import contextmanager
 
 from fastapi import FastAPI
 
+from app.engine import Engine
+from app.recording import RecordingDesk
 from app.server import Server, listen_socket
+from pipeline.params import Params
+from tests.app.recording import CountingDetector, Recording, opener
 
 WAIT_S = 60.0
+
+
+@contextmanager
+def running(desk: RecordingDesk | None = None, *, whole_drives: bool = False) -> Iterator[Engine]:
+    """An engine on a made-up recording, which shows its first frame."""
+    recording = Recording()
+    engine = Engine(
+        opener(recording),
+        lambda _: CountingDetector(),
+        Params(),
+        uri=recording.uri,
+        desk=desk,
+        whole_drives=whole_drives,
+    )
+    engine.start()
+    try:
+        engine.wait_for(lambda shown: shown.tick is not None, WAIT_S)
+        yield engine
+    finally:
+        engine.stop()
 
 
 @contextmanager

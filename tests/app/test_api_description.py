@@ -18,8 +18,8 @@ from app.recording import RecordingDesk
 from app.routes import shapes
 from app.server import create_app
 from pipeline.params import Params
-from tests.app.recording import CountingDetector, Recording, opener
-from tests.app.serving import WAIT_S, serving
+from tests.app.recording import Recording, opener
+from tests.app.serving import WAIT_S, running, serving
 
 FILES = {"/palette.css", "/viser", "/viser/{path:path}", "/rerun/", "/rerun/re_viewer.js", "/rerun/re_viewer_bg.wasm"}
 """Parts of pages and of foreign viewers, which are no API."""
@@ -27,13 +27,8 @@ FILES = {"/palette.css", "/viser", "/viser/{path:path}", "/rerun/", "/rerun/re_v
 
 @pytest.fixture(scope="module")
 def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Engine]:
-    recording = Recording()
-    desk = RecordingDesk(tmp_path_factory.mktemp("sessions"))
-    engine = Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri, desk=desk)
-    engine.start()
-    engine.wait_for(lambda shown: shown.tick is not None, WAIT_S)
-    yield engine
-    engine.stop()
+    with running(RecordingDesk(tmp_path_factory.mktemp("sessions"))) as engine:
+        yield engine
 
 
 @pytest.fixture(scope="module")

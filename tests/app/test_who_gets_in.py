@@ -20,9 +20,7 @@ from app.limits import LARGEST_BODY
 from app.recording import RecordingDesk
 from app.server import create_app
 from app.tokens import Tokens
-from pipeline.params import Params
-from tests.app.recording import CountingDetector, Recording, opener
-from tests.app.serving import WAIT_S, serving
+from tests.app.serving import WAIT_S, running, serving
 
 TOKENS = Tokens("person-0123456789abcdef", "display-0123456789abcde")
 EVIL = "http://evil.example"
@@ -30,13 +28,8 @@ EVIL = "http://evil.example"
 
 @pytest.fixture(scope="module")
 def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Engine]:
-    recording = Recording()
-    desk = RecordingDesk(tmp_path_factory.mktemp("sessions"))
-    engine = Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri, desk=desk)
-    engine.start()
-    engine.wait_for(lambda shown: shown.tick is not None, WAIT_S)
-    yield engine
-    engine.stop()
+    with running(RecordingDesk(tmp_path_factory.mktemp("sessions"))) as engine:
+        yield engine
 
 
 @pytest.fixture(scope="module")
@@ -305,8 +298,10 @@ def test_a_message_beyond_the_limit_ends_its_socket_only(address: str):
     url = address.replace("http", "ws") + "/api/stream"
     with connect(url, additional_headers=headers, max_size=None, open_timeout=WAIT_S) as other:
         with connect(url, additional_headers=headers, max_size=None, open_timeout=WAIT_S) as socket:
-            socket.send("x" * (2 << 20))
-            with pytest.raises(ConnectionClosedError, match="1009"):
+            with pytest.raises(ConnectionClosedError) as ended:
+                socket.send("x" * (2 << 20))
                 deque(iter(lambda: socket.recv(WAIT_S), None), maxlen=0)
+            # a server that hangs up on unread bytes may cut its own last word off
+            assert ended.value.rcvd is None or ended.value.rcvd.code == 1009
         other.send('{"ping": 1}')
         assert other.recv(WAIT_S)

@@ -6,13 +6,13 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+from app.bench.page import CHROMIUM, FLAGS
 from app.engine import Engine
 from app.recording import RecordingDesk
 from app.server import Server, create_app, listen_socket
@@ -23,17 +23,6 @@ from pipeline.types import U8, RawBoxes
 from pipeline.vision.detector import Detector
 from pipeline.vision.runtime import DetectorMissing
 
-CHROMIUM = Path("/usr/bin/chromium")
-FLAGS = [
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 WAIT_MS = 60_000
 START = 60
 """A frame of the scenario with traffic around."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,42 +14,28 @@ import yaml
 from app.drive.columns import COLUMNS
 from app.drive.marks import Marks
 from app.engine import Engine
-from app.server import Server, create_app, listen_socket
+from app.server import create_app
 from pipeline.params import Params, from_yaml, preset, with_changes
 from pipeline.run import Detectors, run
 from tests.app.recording import CountingDetector, Recording, opener
-
-WAIT_S = 60.0
+from tests.app.serving import WAIT_S, running, serving
 
 
 @pytest.fixture(scope="module")
 def engine() -> Iterator[Engine]:
-    recording = Recording()
-    engine = Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri, whole_drives=True)
-    engine.start()
-    engine.wait_for(lambda shown: shown.tick is not None, WAIT_S)
-    yield engine
-    engine.stop()
+    with running(whole_drives=True) as engine:
+        yield engine
 
 
 @contextmanager
-def serving(engine: Engine, marks: Marks | None = None) -> Iterator[httpx.Client]:
-    bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
-    address = f"http://127.0.0.1:{bound.getsockname()[1]}"
-    server = Server(create_app(engine, marks=marks), address, lambda _: is_ready.set())
-    thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
-    thread.start()
-    assert is_ready.wait(WAIT_S)
-    with httpx.Client(base_url=address, timeout=WAIT_S) as client:
+def client_of(engine: Engine, marks: Marks | None = None) -> Iterator[httpx.Client]:
+    with serving(create_app(engine, marks=marks)) as address, httpx.Client(base_url=address, timeout=WAIT_S) as client:
         yield client
-    server.should_exit = True
-    thread.join()
-    bound.close()
 
 
 @pytest.fixture(scope="module")
 def client(engine: Engine) -> Iterator[httpx.Client]:
-    with serving(engine) as client:
+    with client_of(engine) as client:
         yield client
 
 
@@ -141,9 +126,9 @@ def test_what_is_no_mark_is_refused(client: httpx.Client, body: dict[str, Any]):
 
 
 def test_marks_outlive_the_server(engine: Engine, tmp_path: Path):
-    with serving(engine, Marks(tmp_path)) as client:
+    with client_of(engine, Marks(tmp_path)) as client:
         client.post("/api/marks", json={"index": 3, "text": "kept"})
-    with serving(engine, Marks(tmp_path)) as client:
+    with client_of(engine, Marks(tmp_path)) as client:
         assert "kept" in [event["text"] for event in client.get("/api/drive/events").json()["events"]]
 
 
@@ -279,7 +264,7 @@ def test_without_a_whole_drive_the_routes_say_so():
     engine.start()
     try:
         engine.wait_for(lambda s: s.tick is not None, WAIT_S)
-        with serving(engine) as client:
+        with client_of(engine) as client:
             for route in ("/api/drive", "/api/compare", "/api/rerun.rrd", "/api/rerun/open"):
                 assert client.get(route).status_code == 404
             assert client.get("/api/runs").json() == {"base": None, "run": None, "runs": []}

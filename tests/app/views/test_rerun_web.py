@@ -4,39 +4,24 @@ from __future__ import annotations
 
 import stat
 import sys
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import httpx
 import pytest
 
-from app.engine import Engine
-from app.server import Server, create_app, listen_socket
+from app.server import create_app
 from app.views.rerun_web import FILES, NoViewer, ViewerFiles
-from pipeline.params import Params
-from tests.app.recording import CountingDetector, Recording, opener
-
-WAIT_S = 60.0
+from tests.app.serving import WAIT_S, running, serving
 
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[httpx.Client]:
     """A real server on a small drive."""
-    engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car", whole_drives=True)
-    engine.start()
-    engine.wait_for(lambda s: s.tick is not None and s.drive.run is not None, WAIT_S)
-    bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
-    address = f"http://127.0.0.1:{bound.getsockname()[1]}"
-    server = Server(create_app(engine), address, lambda _: is_ready.set())
-    thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
-    thread.start()
-    assert is_ready.wait(WAIT_S)
-    with httpx.Client(base_url=address, timeout=WAIT_S) as client:
-        yield client
-    server.should_exit = True
-    thread.join()
-    engine.stop()
+    with running(whole_drives=True) as engine:
+        engine.wait_for(lambda shown: shown.drive.run is not None, WAIT_S)
+        with serving(create_app(engine)) as address, httpx.Client(base_url=address, timeout=WAIT_S) as client:
+            yield client
 
 
 def test_the_viewer_is_opened_at_the_shown_frame_with_every_file_from_here(client: httpx.Client):

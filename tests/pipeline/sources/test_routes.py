@@ -63,7 +63,7 @@ def test_places(tmp_path: Path, name: str, text: str, sigma_m: float) -> None:
     [
         (GGA, 0.02),
         (RMC, 2.0),
-        (GGA + RMC + "$GPXXX,1*00\nrubbish\n", 0.02),
+        (GGA + RMC + "$GPZDA,1*00\nrubbish\n", 0.02),
         (GGA + gga("4807.038", "x") + gga("abc", "4") + gga("4807.038", "0"), 0.02),
     ],
 )
