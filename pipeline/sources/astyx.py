@@ -21,10 +21,10 @@ from pipeline.sources.base import SourceError, TruthObject
 from pipeline.sources.files import (
     camera_matrix,
     check_looks_ahead,
-    decode_picture,
     files_by_name,
     in_order,
     picture_of,
+    picture_size,
     read_bytes,
     recording_folder,
     rigid_transform,
@@ -36,6 +36,7 @@ _CHANNELS = 16
 _HALF_ROTATION_NS = 50_000_000
 _NOMINAL_STEP_NS = 300_000_000
 _NOMINAL_SIZE = (2048, 618)
+"""What the calibration files do not say, where no picture does."""
 _COLUMNS = 6  # X Y Z Reflectivity LaserID Timestamp
 _HEAD_BYTES = 4096
 _LABELS = {"motorcyclist": "motorcycle", "cyclist": "bicycle", "towed object": "trailer"}
@@ -59,7 +60,7 @@ class AstyxSource:
             raise SourceError(f"{path}: no Astyx recording: neither lidar_vlp16/*.txt nor camera_front/*.jpg in it")
         if not self._calibrations:
             raise SourceError(f"{path}: no calibration/*.json")
-        self._size = self._picture_size()
+        self._size = picture_size(self._pictures.values()) or _NOMINAL_SIZE
         self._calibration = _read_calibration(next(iter(self._calibrations.values())), self._size)
         self._stamps = _fill_gaps([_first_stamp_ns(self._sweeps.get(name)) for name in self._names])
         self.rate_hz = _rate_hz(self._stamps)
@@ -107,16 +108,6 @@ class AstyxSource:
         except SourceError as error:
             notes.append(str(error))
             return None
-
-    def _picture_size(self) -> tuple[int, int]:
-        """Width and height of the first readable picture; the calibration files do not say."""
-        for path in self._pictures.values():
-            try:
-                bgr, _ = decode_picture(path)
-            except SourceError:
-                continue
-            return bgr.shape[1], bgr.shape[0]
-        return _NOMINAL_SIZE
 
 
 def parse_sweep(data: bytes, file: str, t_ns: int, T_ego_lidar: F64, notes: list[str]) -> Sweep:

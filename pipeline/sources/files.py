@@ -80,6 +80,17 @@ def decode_picture(path: Path) -> tuple[U8, bytes | None]:
     return decode_image(read_bytes(path), path.name)
 
 
+def picture_size(paths: Iterable[Path]) -> tuple[int, int] | None:
+    """Width and height of the first readable picture; null where there is none."""
+    for path in paths:
+        try:
+            bgr, _ = decode_picture(path)
+        except SourceError:
+            continue
+        return bgr.shape[1], bgr.shape[0]
+    return None
+
+
 def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
     """(H, W, 3) uint8 blue green red, and the data itself where it is a JPEG. SourceError when it is no whole picture.
 

@@ -24,7 +24,8 @@ from pipeline.sources.live.lidar import LidarInput
 from pipeline.sources.live.own_motion import MotionFromGnss
 from pipeline.sources.live.pictures import Shot
 from pipeline.sources.live.sync import Stream, Synchroniser, Together
-from pipeline.types import F64, CameraCalibration, Frame, GnssFix, Picture, StreamHealth, Sweep
+from pipeline.sources.rig import calibration_for
+from pipeline.types import F64, Frame, GnssFix, Picture, StreamHealth, Sweep
 
 T = TypeVar("T")
 
@@ -165,7 +166,7 @@ class LiveSensors:
             together.t_ns,
             sweep=_sweep(together),
             picture=picture,
-            camera=self._calibration_for(picture, notes),
+            camera=calibration_for(self.camera, picture, notes),
             ego=together.ego,
             notes=tuple(notes),
             gnss=together.gnss,
@@ -186,17 +187,6 @@ class LiveSensors:
             notes.append("the picture is damaged")
             return None
         return Picture(together.picture.t_ns, bgr, shot.encoded)
-
-    def _calibration_for(self, picture: Picture | None, notes: list[str]) -> CameraCalibration | None:
-        """The calibration, if it is this picture's."""
-        camera = self.camera
-        if camera is None or picture is None:
-            return camera
-        height, width = picture.bgr.shape[:2]
-        if (width, height) == (camera.width, camera.height):
-            return camera
-        notes.append(f"pictures are {width}×{height}, the calibration is for {camera.width}×{camera.height}: not used")
-        return None
 
 
 def _sweep(together: Together[Shot]) -> Sweep | None:

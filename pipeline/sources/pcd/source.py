@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.sources import rig as rig_files
 from pipeline.sources.base import SourceError, TruthObject
 from pipeline.sources.clouds import cloud_of
-from pipeline.sources.files import decode_picture, files_by_name, picture_of, read_bytes, recording_folder
+from pipeline.sources.files import files_by_name, picture_of, picture_size, read_bytes, recording_folder
 from pipeline.sources.options import split_options
 from pipeline.sources.pcd.file import parse_pcd
 from pipeline.types import Frame, Sweep
@@ -42,7 +42,7 @@ class PcdSource:
         self._pictures = next(
             (found for name in _PICTURES if (found := files_by_name(folder / name, _PICTURE_SUFFIXES))), {}
         )
-        self._size = self._picture_size()
+        self._size = picture_size(self._pictures.values()) or (0, 0)
         rig = _rig(folder, options)
         self._T_ego_lidar, self._camera = rig.lidar.mount.T_ego_sensor(), rig.camera_calibration()
         stamps = [_stamp_ns(name) for name in self._names]
@@ -80,16 +80,6 @@ class PcdSource:
             notes.append(str(error) if path.name in str(error) else f"{path.name}: {error}")
             return None
         return cloud.sweep(t_ns, self._T_ego_lidar)
-
-    def _picture_size(self) -> tuple[int, int]:
-        """Width and height of the first readable picture."""
-        for path in self._pictures.values():
-            try:
-                bgr, _ = decode_picture(path)
-            except SourceError:
-                continue
-            return bgr.shape[1], bgr.shape[0]
-        return 0, 0
 
     def _about(self) -> tuple[str, ...]:
         notes = [] if self._has_times else ["no time stamps in the files' names: taken as 10 Hz"]
