@@ -23,6 +23,7 @@ class ParamsGui:
         self._on_change = on_change
         self._inputs: dict[str, Any] = {}
         self._autos: dict[str, Any] = {}
+        self._known: dict[str, Any] = {}
         schema = Params.model_json_schema()
         values = params.model_dump()
         with gui.add_folder("Parameters", expand_by_default=False):
@@ -38,12 +39,18 @@ class ParamsGui:
         return tuple(self._inputs)
 
     def set(self, params: Params) -> None:
-        """Show these values to everybody. Nobody is told of a change."""
+        """Show these values to everybody. Nobody is told of a change.
+
+        Only what differs is written: a slider that a person has just moved, and whose word is still on its way to
+        ``on_change``, would otherwise be put back and the move lost."""
         for section, values in params.model_dump().items():
             for key, value in values.items():
-                self._show(f"{section}.{key}", value)
+                name = f"{section}.{key}"
+                if value != self._known[name]:
+                    self._show(name, value)
 
     def _show(self, name: str, value: Any) -> None:
+        self._known[name] = value
         auto = self._autos.get(name)
         if auto is not None:
             auto.value = value is None
@@ -59,6 +66,7 @@ class ParamsGui:
             auto.on_update(lambda event: self._auto_moved(name, event))
         handle = self._input(label, hint, spec, value)
         self._inputs[name] = handle
+        self._known[name] = value
         handle.on_update(lambda event: self._moved(name, event))
 
     def _input(self, label: str, hint: str, spec: Mapping[str, Any], value: Any) -> Any:
@@ -76,13 +84,19 @@ class ParamsGui:
 
     def _moved(self, name: str, event: viser.GuiEvent[Any]) -> None:
         if event.client_id is not None:
-            self._on_change(name, event.target.value)
+            if name in self._autos:
+                self._autos[name].value = False
+            self._tell(name, event.target.value)
 
     def _auto_moved(self, name: str, event: viser.GuiEvent[Any]) -> None:
         if event.client_id is not None:
             handle = self._inputs[name]
             handle.disabled = bool(event.target.value)
-            self._on_change(name, None if event.target.value else handle.value)
+            self._tell(name, None if event.target.value else handle.value)
+
+    def _tell(self, name: str, value: Any) -> None:
+        self._known[name] = value
+        self._on_change(name, value)
 
 
 _UNIT_SUFFIXES = frozenset({"m", "px", "deg", "s", "mps", "mps2", "kmh"})

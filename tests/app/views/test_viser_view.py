@@ -175,6 +175,25 @@ def test_parameters_set_from_outside_reach_browsers_and_nobody_is_told(
     assert changes.get(timeout=20) == ("cluster.z_weight", 0.3), "only the person's own move is told"
 
 
+def test_a_slider_just_moved_is_not_put_back_by_parameters_that_say_nothing_new(view: ViserView) -> None:
+    slider = view._params._inputs["cluster.z_weight"]
+    slider.value = 0.25  # as viser does when a person moves it, before anybody has heard of it
+    view.set_params(with_changes(Params(), {"cluster.front_only": False}))
+    assert slider.value == 0.25
+
+
+def test_a_refused_value_is_put_back(view: ViserView, changes: Changes, open_scene: Any) -> None:
+    client = open_scene(view.port)
+    client.read_present_state()
+    (slider,) = client.inputs("Z weight")
+    client.move(slider["uuid"], 0.25)
+    changes.get(timeout=20)
+    view.set_params(Params())
+    client.read_until(
+        lambda each: each.get("uuid") == slider["uuid"] and each.get("updates") == {"value": Params().cluster.z_weight}
+    )
+
+
 def test_a_parameter_that_may_be_null_has_a_switch(view: ViserView, changes: Changes, open_scene: Any) -> None:
     client = open_scene(view.port)
     client.read_present_state()
