@@ -31,6 +31,7 @@ from app.routes.drive import drive_router
 from app.routes.health import health_router
 from app.routes.params import params_router
 from app.routes.playback import playback_router
+from app.routes.project import project_router
 from app.routes.recording import recording_router
 from app.routes.rerun import rerun_router
 from app.routes.runs import runs_router
@@ -88,6 +89,7 @@ def create_app(
     app.include_router(runs_router(engine, engine.drives))
     app.include_router(clips_router(engine, jobs))
     app.include_router(alignment_router(engine))
+    app.include_router(project_router(engine))
     app.include_router(rerun_router(engine, viewer))
     app.include_router(viser_router(viser_port, access.allowed))
     app.add_api_route("/palette.css", _palette, include_in_schema=False)

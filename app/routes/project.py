@@ -1,0 +1,62 @@
+"""/api/project: where cuboids lie in the shown picture. The page that draws a cuboid under a hand asks here."""
+
+from __future__ import annotations
+
+import numpy as np
+from fastapi import APIRouter
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from app.engine import Engine
+from pipeline.alignment import resolve
+from pipeline.geometry import Cuboid, corners_of
+
+MOST_CUBOIDS = 500
+
+Pixel = tuple[float, float]
+
+
+class GivenCuboid(BaseModel):
+    """Ego frame, metres: centre x y z, length width height, heading in radians."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    center: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    size: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    yaw_rad: FiniteFloat
+
+
+class Given(BaseModel):
+    """Cuboids of one frame."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    cuboids: list[GivenCuboid] = Field(max_length=MOST_CUBOIDS)
+
+
+class Projected(BaseModel):
+    """For each cuboid the pixels of its 8 corners in the camera's own picture, the four at the bottom first; null where
+    a corner lies behind the camera. pixels is null where nothing says how LiDAR and camera lie to each other."""
+
+    pixels: list[list[Pixel | None]] | None
+
+
+def project_router(engine: Engine) -> APIRouter:
+    """The route over the shown frame's camera and the present alignment."""
+    router = APIRouter(prefix="/api", tags=["alignment"])
+
+    @router.post("/project")
+    def project(body: Given) -> Projected:
+        """Cuboids as the shown frame's camera sees them with the present parameters."""
+        shown = engine.snapshot
+        tick = shown.tick
+        aligned = resolve(shown.params.alignment, tick.frame.camera) if tick is not None else None
+        if aligned is None:
+            return Projected(pixels=None)
+        if not body.cuboids:
+            return Projected(pixels=[])
+        corners = corners_of([Cuboid(each.center, each.size, each.yaw_rad) for each in body.cuboids])
+        pixels = np.round(aligned.project(corners.reshape(-1, 3)), 2).tolist()
+        seen = [(u, v) if np.isfinite((u, v)).all() else None for u, v in pixels]
+        return Projected(pixels=[seen[start : start + 8] for start in range(0, len(seen), 8)])
+
+    return router
