@@ -13,7 +13,7 @@ from time import perf_counter
 from typing import cast
 
 from app.lru import BoundedCache
-from app.playback import timeline_s
+from app.playing.playback import timeline_s
 from pipeline.params import Params
 from pipeline.run import Detectors, Detects, Seen, Sensors, advance, detect
 from pipeline.sources.base import Source

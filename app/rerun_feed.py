@@ -8,6 +8,7 @@ import threading
 from urllib.parse import urlsplit
 
 from app.engine import Engine
+from app.newest import Newest
 from app.snapshot import Snapshot
 from app.views.rerun_view import ReplayError, RerunSink, ViewerAddress
 
@@ -32,9 +33,7 @@ class RerunFeed:
         self._place = (parts.hostname, parts.port)
         self._viewer = ViewerAddress(url)
         self._engine = engine
-        self._condition = threading.Condition()
-        self._newest: Snapshot | None = None
-        self._ended = False
+        self._newest = Newest[Snapshot]()
         self.sent = 0
         self._thread = threading.Thread(target=self._work, name="cipv-rerun", daemon=True)
 
@@ -46,21 +45,17 @@ class RerunFeed:
 
     def __exit__(self, *_: object) -> None:
         self._stop_listening()
-        with self._condition:
-            self._ended = True
-            self._condition.notify_all()
+        self._newest.end()
         self._thread.join(2 * _PATIENCE_S)
 
     def _offer(self, snapshot: Snapshot) -> None:
         if snapshot.tick is not None:
-            with self._condition:
-                self._newest = snapshot
-                self._condition.notify_all()
+            self._newest.put(snapshot)
 
     def _work(self) -> None:
         sink: RerunSink | None = None
         sent: Snapshot | None = None
-        while (newest := self._next()) is not None:
+        while (newest := self._newest.take()) is not None:
             if sent is not None and newest.tick is sent.tick:
                 continue
             if sink is not None and sent is not None and newest.uri != sent.uri:
@@ -73,29 +68,19 @@ class RerunFeed:
             sink.show(newest.tick.frame, newest.tick.result)
             if sink.flush(_PATIENCE_S):
                 sent = newest
-                with self._condition:
-                    self.sent += 1
-                    self._condition.notify_all()
+                self.sent += 1
             else:
                 sink.abandon()
                 sink = None
         if sink is not None:
             sink.abandon()
 
-    def _next(self) -> Snapshot | None:
-        """Wait for a snapshot; null at the end."""
-        with self._condition:
-            self._condition.wait_for(lambda: self._ended or self._newest is not None)
-            newest, self._newest = self._newest, None
-            return None if self._ended else newest
-
     def _connect(self, snapshot: Snapshot) -> RerunSink | None:
         """A sink, if somebody listens; else null, after a while, with the frame to be tried again."""
         try:
             socket.create_connection(self._place, _PATIENCE_S).close()
         except OSError:
-            with self._condition:
-                self._condition.wait_for(lambda: self._ended, _RETRY_S)
-                self._newest = self._newest or snapshot
+            self._newest.ends_within(_RETRY_S)
+            self._newest.put_back(snapshot)
             return None
         return RerunSink(self._viewer, snapshot.title, snapshot.params.alignment)

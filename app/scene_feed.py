@@ -7,6 +7,7 @@ from typing import Any
 
 from app.engine import Engine
 from app.looks import Looks
+from app.newest import Newest
 from app.snapshot import Snapshot
 from app.views.viser_view import ViserView
 from pipeline.params import ParamsError
@@ -23,9 +24,7 @@ class SceneFeed:
         self._engine = engine
         self._looks = looks or Looks()
         self._view = ViserView(engine.snapshot.params, self._moved)
-        self._condition = threading.Condition()
-        self._newest: Snapshot | None = None
-        self._ended = False
+        self._newest = Newest[Snapshot]()
         self.drawn = 0
         self._thread = threading.Thread(target=self._work, name="cipv-scene", daemon=True)
 
@@ -35,24 +34,17 @@ class SceneFeed:
         return self._view.port
 
     def __enter__(self) -> SceneFeed:
-        self._view.on_watched(lambda: self._offer(self._engine.snapshot))
-        self._looks.on_change(lambda: self._offer(self._engine.snapshot))
-        self._stop_listening = self._engine.listen(self._offer)
+        self._view.on_watched(lambda: self._newest.put(self._engine.snapshot))
+        self._looks.on_change(lambda: self._newest.put(self._engine.snapshot))
+        self._stop_listening = self._engine.listen(self._newest.put)
         self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._stop_listening()
-        with self._condition:
-            self._ended = True
-            self._condition.notify()
+        self._newest.end()
         self._thread.join()
         self._view.close()
-
-    def _offer(self, snapshot: Snapshot) -> None:
-        with self._condition:
-            self._newest = snapshot
-            self._condition.notify()
 
     def _moved(self, name: str, value: Any) -> None:
         """A slider in the 3D view was moved. viser's own bounds are the schema's, so only a race can be refused."""
@@ -64,13 +56,7 @@ class SceneFeed:
 
     def _work(self) -> None:
         drawn: Snapshot | None = None
-        while True:
-            with self._condition:
-                self._condition.wait_for(lambda: self._ended or self._newest is not None)
-                if self._ended:
-                    return
-                newest, self._newest = self._newest, None
-            assert newest is not None
+        while (newest := self._newest.take()) is not None:
             if self._view.watchers <= self._looks.hiding:
                 continue
             self._view.select(self._looks.selected)

@@ -15,7 +15,7 @@ from rich.table import Table
 
 from app.export import Kind, export_clip
 from app.options import LineOptions, SourceOptions
-from app.playback import timeline_s
+from app.playing.playback import timeline_s
 from app.progress import frames_progress
 from pipeline.errors import BadInput
 from pipeline.recording.info import Info, Rhythm, info, info_of_source

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from app.engine import Engine
-from app.live_line import LiveLine
+from app.playing.live_line import LiveLine
 from app.recording import RecordingDesk
 from app.snapshot import Snapshot
 from pipeline.params import Params, SyncParams, with_changes
@@ -22,6 +22,7 @@ from pipeline.run import Detectors
 from pipeline.sources.base import AnySource, SourceError
 from pipeline.types import U8, CameraCalibration, Frame, RawLanes, StreamHealth
 from tests.app.recording import CountingDetector, Recording
+from tests.app.waiting import wait_until
 
 WAIT_S = 30.0
 
@@ -230,7 +231,7 @@ def test_with_sensors_open_nothing_is_kept_of_the_recording_before(start: Start)
     engine, sensors, _ = start()
     engine.control.change(uri="test:car", playing=True)
     engine.wait_for(lambda s: s.uri == "test:car" and s.index > 0, WAIT_S)
-    line = weakref.ref(engine._line)  # type: ignore[type-var]
+    line = weakref.ref(engine._player)  # type: ignore[type-var]
     assert line() is not None
     engine.control.change(uri="live:test")
     engine.wait_for(lambda s: s.live, WAIT_S)
@@ -251,13 +252,3 @@ def test_ending_the_engine_gives_the_sensors_back(start: Start) -> None:
     engine, sensors, _ = start()
     engine.stop()
     assert sensors.is_open is False
-
-
-def wait_until(condition: Callable[[], bool]) -> bool:
-    """Look again and again; the engine has no event for what it does not show."""
-    woken = threading.Event()
-    for _ in range(round(WAIT_S / 0.01)):
-        if condition():
-            return True
-        woken.wait(0.01)
-    return False

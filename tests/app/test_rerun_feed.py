@@ -16,6 +16,7 @@ from app.views.rerun_view import ReplayError
 from app.views.rerun_web import free_ports
 from pipeline.params import Params
 from tests.app.recording import CountingDetector, Recording, opener
+from tests.app.waiting import wait_until
 
 WAIT_S = 60.0
 
@@ -30,8 +31,7 @@ def engine() -> Iterator[Engine]:
 
 
 def wait_sent(feed: RerunFeed, count: int) -> None:
-    with feed._condition:
-        assert feed._condition.wait_for(lambda: feed.sent >= count, WAIT_S)
+    assert wait_until(lambda: feed.sent >= count)
 
 
 def test_shown_frames_reach_a_viewer_also_one_that_comes_late(engine: Engine, tmp_path: Path):

@@ -22,7 +22,7 @@ from app.drive.recording import Recipe
 from app.drive.recording import Recording as DriveRecording
 from app.drive.turn import Turn
 from app.line import DetectionCache
-from app.playback import timeline_s
+from app.playing.playback import timeline_s
 from app.views.colors import rgb
 from pipeline.errors import BadInput
 from pipeline.params import Params

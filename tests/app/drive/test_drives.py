@@ -15,7 +15,7 @@ from app.drive.recording import Recording as DriveRecording
 from app.drive.run import DriveRun, digest
 from app.drive.turn import Turn
 from app.line import DetectionCache
-from app.playback import timeline_s
+from app.playing.playback import timeline_s
 from pipeline.params import Params, with_changes
 from pipeline.run import Detectors, run
 from pipeline.step import State, step

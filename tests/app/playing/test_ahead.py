@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from app.ahead import Ahead
+from app.playing.ahead import Ahead
 
 WAIT_S = 20.0
 

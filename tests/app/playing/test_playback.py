@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.playback import LONGEST_GAP_S, PlaybackClock, timeline_s
+from app.playing.playback import LONGEST_GAP_S, PlaybackClock, timeline_s
 
 TIMELINES = {
     "even steps": ([0, 1, 2], [0.0, 1e-9 * 1, 2e-9]),
