@@ -58,6 +58,7 @@ class Slot:
         self._under_way = 0
         self._unsent: dict[str, str | bytes] = {}
         self._newest: dict[str, int] = {}
+        self._state_after_frame: str | bytes | None = None
         self._filled = asyncio.Event()
 
     def put(self, kind: str, message: str | bytes, order: int = 0) -> None:
@@ -68,6 +69,10 @@ class Slot:
         replaced = self._unsent.pop(kind, None)  # so that the kinds stand in the order in which they came
         self._traffic.dropped += kind == "frame" and replaced is not None
         self._unsent[kind] = message
+        if kind == "frame":
+            self._state_after_frame = None
+        elif kind == "state" and "frame" in self._unsent:
+            self._state_after_frame = message
         self._filled.set()
 
     def painted(self) -> None:
@@ -85,9 +90,11 @@ class Slot:
             self._under_way += "frame" in ready
             self._traffic.sent += "frame" in ready
             self._unsent = {kind: message for kind, message in self._unsent.items() if kind not in ready}
-            kinds = list(ready)
-            if "frame" in kinds and "state" in kinds and kinds.index("state") < kinds.index("frame"):
-                del ready["state"]  # the frame came after it and says the same
+            if "frame" in ready:
+                ready.pop("state", None)  # what came before the frame the frame says too
+                if self._state_after_frame is not None:  # also when it has been sent: the frame, late, says what was
+                    ready["state"] = self._state_after_frame
+                    self._state_after_frame = None
             if ready:
                 return list(ready.values())
 

@@ -66,10 +66,23 @@ def test_a_paced_client_gets_no_frame_ahead_of_what_it_has_painted(taken: Taken)
     for number in (10, 11):
         slot.put("frame", b"%d" % number, number)
         assert taken(slot) is None
-    slot.put("state", "still told")
-    assert taken(slot) == ["still told"]
     slot.painted()
     assert taken(slot) == [b"11"]
+
+
+def test_the_newest_state_comes_last_also_when_a_frame_had_to_wait(taken: Taken):
+    """Else the frame, made before it, would have a page take what was for what is."""
+    slot = Slot(paced=True)
+    for number in range(FRAMES_UNDER_WAY):
+        slot.put("frame", b"%d" % number, number)
+        assert taken(slot) == [b"%d" % number]
+    slot.put("frame", b"playing", 8)
+    slot.put("state", "paused")
+    assert taken(slot) == ["paused"]
+    slot.painted()
+    assert taken(slot) == [b"playing", "paused"]
+    slot.painted()
+    assert taken(slot) is None
 
 
 def test_a_client_that_is_not_paced_gets_every_frame_it_can_take(taken: Taken):
