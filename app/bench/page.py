@@ -22,7 +22,6 @@ from pipeline.errors import BadInput
 CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = (
     "--no-sandbox",
-    "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader",
     "--disable-quic",
     "--no-first-run",
@@ -30,7 +29,8 @@ FLAGS = (
     "--disable-component-update",
     "--disable-sync",
 )
-"""Drawing without a graphics card: the slowest case."""
+"""As a browser starts by itself where there is no graphics card: the page is composed by the processor, and WebGL
+is there for the 3D views."""
 SIZE_PX = (1440, 900)
 _SETTLE_S = 4.0
 _PARAMETER_EVERY_S = 0.23
