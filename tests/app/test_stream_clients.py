@@ -45,12 +45,13 @@ class Site:
         self.stream.publish(replace(self.first, sequence=sequence, index=sequence, **changes))
 
     def connected(self, query: str = "") -> AbstractContextManager[ClientConnection]:
-        """A client with little room for what it has not read yet."""
+        """A client with little room for what it has not read yet, and that does not wait long to be let go."""
         end = socket.socket()
         end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 16)
         end.connect(("127.0.0.1", self.port))
         url = f"ws://127.0.0.1:{self.port}/{query}"
-        return connect(url, sock=end, max_size=None, open_timeout=WAIT_S, compression=None, max_queue=1)
+        patience = {"open_timeout": WAIT_S, "close_timeout": 0.5}
+        return connect(url, sock=end, max_size=None, compression=None, max_queue=1, **patience)
 
 
 @pytest.fixture
