@@ -1,0 +1,152 @@
+"""The database that labels are kept in: SQLite in a file of this machine, or a team's PostgreSQL.
+
+What a transaction has committed is on disk: SQLite writes its log through to it (``synchronous=FULL``), and so does
+PostgreSQL as it comes. Writers come one after the other: SQLite takes its one lock at the beginning, PostgreSQL
+locks the drive that an act is on.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import Connection, create_engine, event, text
+from sqlalchemy.engine import URL, Engine, make_url
+from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
+
+from pipeline.errors import BadInput
+
+logger = logging.getLogger("cipv.labels")
+
+URL_VARIABLE = "CIPV_LABELS_URL"
+_MIGRATIONS = Path(__file__).resolve().parent / "migrations"
+_BUSY_S = 30.0
+_CONNECT_S = 10
+_MIGRATION_LOCK = 0x63697076
+"""Any number that only this program takes in PostgreSQL."""
+
+
+class DatabaseError(BadInput):
+    """The database cannot be reached, read or written; the text says which and why, never with a password."""
+
+
+class Database:
+    """Open, and at the newest schema. Any thread, any number of processes."""
+
+    def __init__(self, url: str | URL) -> None:
+        """DatabaseError when it cannot be opened or is newer than this program."""
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        try:
+            self.url = make_url(url)
+            self._engine = _engine(self.url)
+        except (ArgumentError, NoSuchModuleError, ImportError) as error:
+            raise DatabaseError(f"labels: no database address that is understood: {_first_line(error)}") from None
+        self.is_sqlite = self._engine.dialect.name == "sqlite"
+        with self.writing() as connection:
+            if not self.is_sqlite:
+                connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _MIGRATION_LOCK})
+            self._migrate(connection)
+
+    @staticmethod
+    def in_file(file: Path) -> Database:
+        """SQLite; the folder is made. DatabaseError when it cannot be."""
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DatabaseError(f"{file}: labels cannot be kept there: {error.strerror}") from None
+        return Database(URL.create("sqlite", database=str(file)))
+
+    @staticmethod
+    def temporary() -> Database:
+        """One that is gone when it is closed."""
+        folder = tempfile.TemporaryDirectory(prefix="cipv-labels-", ignore_cleanup_errors=True)
+        database = Database.in_file(Path(folder.name) / "labels.db")
+        database._folder = folder
+        return database
+
+    @property
+    def name(self) -> str:
+        """For people: the file, or the address without its password."""
+        return str(self.url.database) if self.is_sqlite else self.url.render_as_string(hide_password=True)
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """One consistent view. DatabaseError for whatever the database says."""
+        with self._speaking(), self._engine.connect() as connection, connection.begin():
+            yield connection
+
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
+        """A transaction: on disk when the block has ended, and not at all when it raised."""
+        with self._speaking(), self._engine.connect().execution_options(writes=True) as connection, connection.begin():
+            yield connection
+
+    def close(self) -> None:
+        """Safe to call twice."""
+        self._engine.dispose()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    @contextmanager
+    def _speaking(self) -> Iterator[None]:
+        try:
+            yield
+        except DBAPIError as error:
+            raise DatabaseError(f"labels, {self.name}: {_first_line(error.orig or error)}") from None
+
+    def _migrate(self, connection: Connection) -> None:
+        """To the newest schema, in the transaction."""
+        config = Config()
+        config.set_main_option("script_location", str(_MIGRATIONS).replace("%", "%%"))
+        config.attributes["connection"] = connection
+        known = ScriptDirectory.from_config(config)
+        at = MigrationContext.configure(connection).get_current_revision()
+        if at == known.get_current_head():
+            return
+        if at is not None and at not in {script.revision for script in known.walk_revisions()}:
+            raise DatabaseError(f"labels, {self.name}: written by a newer program; this one does not know its form")
+        command.upgrade(config, "head")
+
+
+def open_database(url: str | None, file: Path) -> Database:
+    """The one at ``url`` (or of the environment), else in a file of this machine."""
+    wanted = url or os.environ.get(URL_VARIABLE)
+    return Database(wanted) if wanted else Database.in_file(file)
+
+
+def _engine(url: URL) -> Engine:
+    if url.get_backend_name() == "sqlite":
+        engine = create_engine(url, connect_args={"timeout": _BUSY_S, "check_same_thread": False})
+        event.listen(engine, "connect", _as_sqlite)
+        event.listen(engine, "begin", _begin_sqlite)
+        return engine
+    if url.get_backend_name() == "postgresql":
+        if url.drivername == "postgresql":
+            url = url.set(drivername="postgresql+psycopg")
+        return create_engine(url, pool_pre_ping=True, connect_args={"connect_timeout": _CONNECT_S})
+    raise ArgumentError(f"{url.get_backend_name()}: sqlite or postgresql is kept labels in")
+
+
+def _as_sqlite(connection: Any, _: Any) -> None:
+    connection.isolation_level = None  # we say BEGIN ourselves: the driver would let a transaction begin too late
+    connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute("PRAGMA synchronous=FULL")
+    connection.execute("PRAGMA foreign_keys=ON")
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    writes = connection.get_execution_options().get("writes", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).strip().splitlines() or ["no reason given"])[0]

@@ -1,0 +1,288 @@
+"""The acts on one drive: each is one transaction and one row, and can be taken back and done again.
+
+A person takes back what that person did, newest first, and no other's: not even when both changed the same label, where
+it is refused instead. Parameters belong to the machine they were changed on (``station``); who changes them without
+a name there does it for everybody there.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from sqlalchemy import ColumnElement, Connection, and_, func, insert, or_, select, update
+from sqlalchemy.orm import aliased
+
+from app.labels.database import Database
+from app.labels.draft import Draft, name_of
+from app.labels.refusals import ActRefused
+from app.labels.tables import ActRow, ChangeRow, DriveRow
+from app.labels.values import ItemKind, unpack, unpack_content
+
+Way = Literal["undo", "redo"]
+_OF_PARAMS = ("params", "nudge")
+_WAYS = ("undo", "redo")
+_LONGEST_HISTORY = 200
+
+
+@dataclass(frozen=True)
+class Acted:
+    """What was done. revision: the drive's; act: its number, null when nothing changed. params: what parameters of this
+    program are to be now, by name."""
+
+    revision: int
+    act: int | None
+    what: str
+    params: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class HistoryEntry:
+    """One act in the life of an item; contents as plain values, null where it was not there."""
+
+    act: int
+    what: str
+    person: str
+    t_unix_ms: int
+    before: dict[str, Any] | None
+    after: dict[str, Any] | None
+    undone: bool
+
+
+Apply = Callable[[Draft], str]
+"""Changes labels in a draft and says in a few words what it did: ``moved #7 in frame 12``."""
+
+
+class Log:
+    """Of one drive. Any thread."""
+
+    def __init__(self, database: Database, drive_id: int, station: str | None = None) -> None:
+        self._database, self._drive_id = database, drive_id
+        self._station = socket.gethostname() if station is None else station
+
+    # ------------------------------------------------------------ doing
+
+    def act(self, kind: str, person: str, apply: Apply) -> Acted:
+        """Do it; on disk when this returns. What ``apply`` raises leaves everything as it was."""
+        with self._database.writing() as connection:
+            draft = self._draft(connection, person)
+            what = apply(draft)
+            if not draft.write():
+                connection.get_transaction().rollback()  # type: ignore[union-attr]
+                return Acted(draft.number - 1, None, "nothing changed")
+            self._drop_redo(connection, person)
+            self._write(connection, draft, kind, what)
+            return Acted(draft.number, draft.number, what)
+
+    def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
+        """Parameters that were changed, by name: before and after. merges: one step with the change before it, when
+        that was of the same parameters, and merged too."""
+        if not changes:
+            return
+        with self._database.writing() as connection:
+            draft = self._draft(connection, person)
+            for name, (before, after) in changes.items():
+                draft.put_param(name, before, after)
+            if not draft.write():
+                connection.get_transaction().rollback()  # type: ignore[union-attr]
+                return
+            step = self._step_before(connection, draft.number - 1, person, set(changes)) if merges else None
+            self._drop_redo(connection, person)
+            named = ", ".join(f"{name} {_short(old)} → {_short(new)}" for name, (old, new) in list(changes.items())[:3])
+            more = f" and {len(changes) - 3} more" if len(changes) > 3 else ""
+            self._write(connection, draft, "nudge" if merges else "params", named + more, step=step)
+
+    # ------------------------------------------------------------ going back and forth
+
+    def move(self, way: Way, person: str) -> Acted:
+        """Take back the person's newest act, or do again the one taken back last. ActRefused when there is none, or
+        when somebody else changed the same label or parameter since."""
+        with self._database.writing() as connection:
+            draft = self._draft(connection, person)
+            step = self._next(connection, way, person)
+            if step is None:
+                raise ActRefused(f"there is nothing to {way}")
+            acts = self._acts_of(connection, step)
+            self._check_untouched(connection, [number for number, _ in acts], person, way)
+            for number, _ in reversed(acts) if way == "undo" else acts:
+                self._put(connection, draft, number, way)
+            draft.write()
+            what = acts[-1][1]
+            status = "undone" if way == "undo" else "done"
+            connection.execute(
+                update(ActRow)
+                .where(ActRow.drive_id == self._drive_id, ActRow.number.in_([number for number, _ in acts]))
+                .values(status=status)
+            )
+            said = f"took back: {what}" if way == "undo" else f"did again: {what}"
+            self._write(connection, draft, way, said, target=step)
+            return Acted(draft.number, draft.number, what, draft.params)
+
+    def possible(self, person: str | None = None) -> tuple[bool, bool]:
+        """(there is something to take back, something to do again) for a person; null: for anyone here."""
+        with self._database.reading() as connection:
+            return (
+                self._next(connection, "undo", person) is not None,
+                self._next(connection, "redo", person) is not None,
+            )
+
+    # ------------------------------------------------------------ looking back
+
+    def history(self, kind: ItemKind, number: int) -> list[HistoryEntry]:
+        """The acts that changed an item, newest first."""
+        with self._database.reading() as connection:
+            found = connection.execute(
+                select(ActRow, ChangeRow.before, ChangeRow.after)
+                .join(ActRow, and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act))
+                .where(ChangeRow.drive_id == self._drive_id, ChangeRow.kind == kind, ChangeRow.item == str(number))
+                .order_by(ActRow.number.desc())
+                .limit(_LONGEST_HISTORY)
+            ).all()
+        return [
+            HistoryEntry(
+                row.number,
+                row.what,
+                row.person,
+                row.t_unix_ms,
+                unpack(row.before) if row.before is not None else None,
+                unpack(row.after) if row.after is not None else None,
+                row.status != "done",
+            )
+            for row in found
+        ]
+
+    # ------------------------------------------------------------ the transaction
+
+    def _draft(self, connection: Connection, person: str) -> Draft:
+        """The first statement of an act, and what makes acts of one drive wait for each other."""
+        number = connection.execute(
+            update(DriveRow)
+            .where(DriveRow.id == self._drive_id)
+            .values(revision=DriveRow.revision + 1)
+            .returning(DriveRow.revision)
+        ).scalar_one()
+        return Draft(connection, self._drive_id, number, person, int(time.time() * 1000))
+
+    def _write(
+        self,
+        connection: Connection,
+        draft: Draft,
+        kind: str,
+        what: str,
+        *,
+        step: int | None = None,
+        target: int | None = None,
+    ) -> None:
+        connection.execute(
+            insert(ActRow).values(
+                drive_id=self._drive_id,
+                number=draft.number,
+                kind=kind,
+                what=what,
+                person=draft.person,
+                station=self._station,
+                t_unix_ms=draft.t_unix_ms,
+                step=step or draft.number,
+                status="done",
+                target=target,
+            )
+        )
+
+    def _put(self, connection: Connection, draft: Draft, act: int, way: Way) -> None:
+        """What an act found (undo) or left (redo), again."""
+        rows = connection.execute(
+            select(ChangeRow).where(ChangeRow.drive_id == self._drive_id, ChangeRow.act == act)
+        ).all()
+        for row in rows:
+            here, there = (row.after, row.before) if way == "undo" else (row.before, row.after)
+            if row.kind == "param":
+                draft.put_param(row.item, unpack(here), unpack(there))
+                continue
+            kind: ItemKind = row.kind
+            was = unpack_content(kind, here)
+            to = unpack_content(kind, there, was.frames)
+            draft.put(kind, int(row.item), to.value)
+            if kind == "track":
+                draft.put_sightings(int(row.item), to.frames)
+
+    def _check_untouched(self, connection: Connection, acts: Iterable[int], person: str, way: Way) -> None:
+        """ActRefused when an act in force, of somebody else, changed the same thing later."""
+        mine, other = aliased(ChangeRow), aliased(ChangeRow)
+        found = connection.execute(
+            select(other.kind, other.item, ActRow.person)
+            .join(
+                mine,
+                and_(
+                    mine.drive_id == other.drive_id,
+                    mine.kind == other.kind,
+                    mine.item == other.item,
+                    mine.act < other.act,
+                ),
+            )
+            .join(ActRow, and_(ActRow.drive_id == other.drive_id, ActRow.number == other.act))
+            .where(
+                mine.drive_id == self._drive_id,
+                mine.act.in_(list(acts)),
+                ActRow.person != person,
+                ActRow.status == "done",
+                ActRow.kind.not_in(_WAYS),
+                or_(other.kind != "param", and_(ActRow.station == self._station, ActRow.person != "")),
+            )
+            .order_by(other.act)
+            .limit(1)
+        ).first()
+        if found is not None:
+            named = found.item if found.kind == "param" else name_of(found.kind, int(found.item))
+            raise ActRefused(f"{found.person} changed {named} since; {way} would take that back too")
+
+    # ------------------------------------------------------------ whose acts
+
+    def _mine(self, person: str | None) -> ColumnElement[bool]:
+        """The acts that a person can take back or do again; null: that anyone here can."""
+        of_params: ColumnElement[bool] = and_(ActRow.kind.in_(_OF_PARAMS), ActRow.station == self._station)
+        of_labels: ColumnElement[bool] = ActRow.kind.not_in((*_OF_PARAMS, *_WAYS))
+        if person is not None:
+            of_params = and_(of_params, ActRow.person.in_(("", person)))
+            of_labels = and_(of_labels, ActRow.person == person)
+        return and_(ActRow.drive_id == self._drive_id, or_(of_params, of_labels))
+
+    def _next(self, connection: Connection, way: Way, person: str | None) -> int | None:
+        """The step that is next to be taken back or done again."""
+        if way == "undo":
+            wanted = select(func.max(ActRow.step)).where(self._mine(person), ActRow.status == "done")
+        else:
+            wanted = select(func.min(ActRow.step)).where(self._mine(person), ActRow.status == "undone")
+        return connection.scalar(wanted)
+
+    def _acts_of(self, connection: Connection, step: int) -> list[tuple[int, str]]:
+        found = connection.execute(
+            select(ActRow.number, ActRow.what)
+            .where(ActRow.drive_id == self._drive_id, ActRow.step == step, ActRow.kind.not_in(_WAYS))
+            .order_by(ActRow.number)
+        )
+        return [(row.number, row.what) for row in found]
+
+    def _drop_redo(self, connection: Connection, person: str) -> None:
+        """Who does something else does not do again what was taken back."""
+        connection.execute(update(ActRow).where(self._mine(person), ActRow.status == "undone").values(status="dropped"))
+
+    def _step_before(self, connection: Connection, number: int, person: str, names: set[str]) -> int | None:
+        """The step of act ``number``, when it nudged the same parameters; else null."""
+        row = connection.execute(
+            select(ActRow.step, ActRow.kind, ActRow.person, ActRow.station, ActRow.status).where(
+                ActRow.drive_id == self._drive_id, ActRow.number == number
+            )
+        ).first()
+        if row is None or tuple(row[1:]) != ("nudge", person, self._station, "done"):
+            return None
+        before = connection.scalars(
+            select(ChangeRow.item).where(ChangeRow.drive_id == self._drive_id, ChangeRow.act == number)
+        )
+        return row.step if set(before) == names else None
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,1 @@
+"""The schema's history: every form that the tables have had."""

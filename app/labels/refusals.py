@@ -1,0 +1,23 @@
+"""Why an act on labels is not done."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pipeline.errors import BadInput
+
+
+class ActRefused(BadInput):
+    """It cannot be done to these labels as they stand; nothing was written."""
+
+
+class NoSuchLabel(BadInput):
+    """What it is about is not, or no longer, there."""
+
+
+class Stale(ActRefused):
+    """Somebody changed the item since. theirs: the item as it stands; null where it was removed."""
+
+    def __init__(self, text: str, theirs: dict[str, Any] | None) -> None:
+        super().__init__(text)
+        self.theirs = theirs
