@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+from itertools import tee
 from pathlib import Path
 from typing import Any
 
@@ -15,20 +16,32 @@ import pytest
 
 from pipeline.params import preset
 from pipeline.results import to_json
-from pipeline.run import Detectors, detector_for, run
+from pipeline.run import Detectors, detector_for, through
 from pipeline.sources import open_source
 
 FOLDER = Path(__file__).parent
 EVERY = 5
 
 
-def summary(name: str) -> list[dict[str, Any]]:
-    """Every fifth frame of the drive with the LiDAR alone: who leads, how far, why, and what ACC does."""
-    kept = []
-    for frame, result in run(open_source("sim:straight"), preset(name), Detectors()):
-        if frame.index % EVERY == 0:
-            kept.append(_decisions(to_json(result)))
-    return kept
+@pytest.fixture(scope="module")
+def drive() -> dict[str, list[dict[str, Any]]]:
+    """The line's results under each preset with the LiDAR alone, and under the default one with both sensors. Drawing
+    the drive is what takes long: it is done once, and all three go through it side by side."""
+    source = open_source("sim:straight")
+    lines = {
+        "default": ("default", Detectors()),
+        "paper": ("paper", Detectors()),
+        "both sensors": ("default", Detectors(detector_for(source))),
+    }
+    copies = tee((source.frame(index) for index in range(len(source))), len(lines))
+    runs = [through(frames, preset(name), seen) for frames, (name, seen) in zip(copies, lines.values(), strict=True)]
+    results = [[to_json(result) for _, result in side_by_side] for side_by_side in zip(*runs, strict=True)]
+    return {name: [row[place] for row in results] for place, name in enumerate(lines)}
+
+
+def summary(results: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Every fifth frame: who leads, how far, why, and what ACC does."""
+    return [_decisions(each) for each in results[::EVERY]]
 
 
 def _decisions(full: dict[str, Any]) -> dict[str, Any]:
@@ -43,8 +56,8 @@ def _decisions(full: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", ["default", "paper"])
-def test_golden(name: str) -> None:
-    file, now = FOLDER / f"straight_{name}.json", summary(name)
+def test_golden(drive: dict[str, list[dict[str, Any]]], name: str) -> None:
+    file, now = FOLDER / f"straight_{name}.json", summary(drive[name])
     if os.environ.get("CIPV_UPDATE_GOLDEN"):
         file.write_text("[\n" + ",\n".join(json.dumps(row) for row in now) + "\n]\n", encoding="utf-8")
     golden = json.loads(file.read_text(encoding="utf-8"))
@@ -64,12 +77,9 @@ def same(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
-def test_nothing_brakes_hard_on_a_drive_that_needs_none() -> None:
+def test_nothing_brakes_hard_on_a_drive_that_needs_none(drive: dict[str, list[dict[str, Any]]]) -> None:
     """With both sensors and the embedded detector: neither ACC's TTC rule nor emergency braking finds a phantom."""
-    source = open_source("sim:straight")
-    states = {
-        frame.name: result.acc for frame, result in run(source, preset("default"), Detectors(detector_for(source)))
-    }
-    assert all(command is not None for command in states.values())
-    phantoms = {name: c.reason for name, c in states.items() if c and c.state not in ("cruise", "follow")}
+    commands = {result["frame"]: result["acc"] for result in drive["both sensors"]}
+    assert len(commands) == 200
+    phantoms = {frame: c["reason"] for frame, c in commands.items() if c["state"] not in ("cruise", "follow")}
     assert not phantoms
