@@ -7,7 +7,7 @@ cannot cut a rotation short or move its time.
 
 from __future__ import annotations
 
-from bisect import bisect
+from bisect import bisect, insort
 from collections import Counter
 from dataclasses import dataclass, field
 from enum import Enum
@@ -75,6 +75,9 @@ class _Place(Enum):
     HERE, NEXT, AFTER_GAP, ANEW = range(4)
 
 
+_HERE, _NEXT, _AFTER_GAP, _ANEW = _Place  # looking a member up in its class takes longer than all the rest
+
+
 class RotationCutter:
     """One sensor's stream. T_ego_lidar: (4, 4), where the sensor sits, which says where behind is. keeps_partial: give
     rotations seen in part too."""
@@ -96,19 +99,24 @@ class RotationCutter:
         """Take one data packet; the rotation that it completes, if it is the first of the next. Never raises."""
         self.counts.packets += 1
         try:
-            placed = self._placed(read_packet(data), t_host_ns, origin)
+            packet = read_packet(data)
+            placed = self._placed(packet, t_host_ns, origin)
             place = self._accept(placed)
         except BadPacket as bad:
             self.counts.refused[bad.reason] += 1
             if bad.model is not None:
                 self.counts.models[bad.model] += 1
             return None
-        done = self._finish(place is _Place.NEXT) if place is not _Place.HERE else None
-        if place is _Place.ANEW:
+        done = self._finish(place is _NEXT) if place is not _HERE else None
+        if place is _ANEW:
             self.clock.restart()
         if t_host_ns is not None:
-            self.clock.observe(round(placed.time_us + placed.packet.span_us), t_host_ns)
-        self._packets.insert(bisect(self._packets, placed.time_us, key=_time_us), placed)
+            self.clock.observe(round(placed.time_us + packet.span_us), t_host_ns)
+        packets = self._packets
+        if not packets or placed.time_us > packets[-1].time_us:
+            packets.append(placed)  # in order, as nearly all
+        else:
+            insort(packets, placed, key=_time_us)
         return done
 
     def flush(self) -> Rotation | None:
@@ -122,7 +130,9 @@ class RotationCutter:
         time_us = packet.time_us
         if self._last is not None:
             passed_us = (_host_gap_us(self._last, t_host_ns) or 0) + self._last.time_us
-            time_us += round((passed_us - time_us) / HOUR_US) * HOUR_US
+            hours = (passed_us - time_us) / HOUR_US
+            if not -0.5 < hours < 0.5:
+                time_us += round(hours) * HOUR_US
         phase_cdeg = (packet.azimuth_cdeg - self._behind_cdeg) % ROTATION_CDEG
         return Placed(time_us, phase_cdeg, packet, t_host_ns, origin)
 
@@ -135,27 +145,27 @@ class RotationCutter:
         self._suspect = None
         if last is None:
             self._last = placed
-            return _Place.HERE
+            return _HERE
         if self._is_doubled(placed):
             raise BadPacket("doubled")
         ahead_us = placed.time_us - last.time_us
         if 0 < ahead_us <= _CONTINUES_US and (turns := _turns(last, placed)) is not None:
             self._last = placed
             if turns == 0:
-                return _Place.HERE
-            return _Place.NEXT if ahead_us <= _SEEN_PASSING_US else _Place.AFTER_GAP
+                return _HERE
+            return _NEXT if ahead_us <= _SEEN_PASSING_US else _AFTER_GAP
         if -_CONTINUES_US <= ahead_us < 0 and _turns(placed, last) is not None:
             first = self._packets[0]
             if placed.time_us > first.time_us or _turns(placed, first) == 0:
-                return _Place.HERE
+                return _HERE
             raise BadPacket("late")
         host_gap_us = _host_gap_us(last, placed.t_host_ns)
         if host_gap_us is not None and ahead_us > _CONTINUES_US and abs(host_gap_us - ahead_us) < _PAUSE_AGREES_US:
             self._last = placed
-            return _Place.AFTER_GAP
+            return _AFTER_GAP
         if suspect is not None and _follows(suspect, placed):
             self._last = placed
-            return _Place.ANEW
+            return _ANEW
         self._suspect = placed
         raise BadPacket("time or azimuth out of order")
 

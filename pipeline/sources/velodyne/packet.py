@@ -12,8 +12,9 @@ azimuths do not advance evenly.
 
 from __future__ import annotations
 
-import struct
 from typing import NamedTuple
+
+import numba
 
 PACKET_BYTES = 1206
 BLOCK_US = 110.592
@@ -21,15 +22,21 @@ BLOCK_US = 110.592
 ROTATION_CDEG = 36_000
 HOUR_US = 3_600_000_000
 
-_LAYOUT = struct.Struct("<" + "HH96x" * 12 + "IBB")
-_FLAG = 0xEEFF
-_FLAGS = (_FLAG,) * 12
 _VLP16 = 0x22
 _OTHER_MODELS = {0x21: "HDL-32E", 0x24: "Puck Hi-Res", 0x28: "VLP-32C", 0x31: "Velarray", 0xA1: "VLS-128 (Alpha Prime)"}
 _STRONGEST, _LAST, _DUAL = 0x37, 0x38, 0x39
-_LOWER_BLOCK_OF_HDL64 = 0xDDFF
+_LOWER_BLOCK_OF_HDL64 = b"\xff\xdd"
 _MIN_STEP_CDEG, _MAX_STEP_CDEG = 8.0, 100.0  # between blocks: 120 to 1500 rpm; the VLP-16 turns at 300 to 1200
 _STEP_JITTER_CDEG = 12.0  # real packets: 3
+_SPAN_US = (12 * BLOCK_US, 6 * BLOCK_US)  # single, dual
+
+_NO_FLAG, _OTHER_PRODUCT, _OTHER_MODE, _BEYOND_HOUR, _BEYOND_CIRCLE, _UNEVEN = range(1, 7)
+_FAULTS = {
+    _OTHER_MODE: "unknown return mode",
+    _BEYOND_HOUR: "time beyond the hour",
+    _BEYOND_CIRCLE: "azimuth of 360° or more",
+    _UNEVEN: "azimuths do not advance evenly",
+}
 
 
 class BadPacket(Exception):
@@ -61,46 +68,71 @@ def read_packet(data: bytes) -> Packet:
     """
     if len(data) != PACKET_BYTES:
         raise BadPacket(f"not {PACKET_BYTES} bytes")
-    fields = _LAYOUT.unpack(data)
-    time_us, mode, product = fields[24:]
-    if fields[0:24:2] != _FLAGS:
-        raise _bad_flags(data, fields)
-    if product != _VLP16:
-        model = _OTHER_MODELS.get(product)
-        raise BadPacket(f"not a VLP-16 but {model or 'another product'}", model)
-    if mode not in (_STRONGEST, _LAST, _DUAL):
-        raise BadPacket("unknown return mode")
+    fault, time_us, azimuth_cdeg, rate_cdeg_us, dual = _inspect(data)
+    if fault:
+        raise _bad_packet(fault, data)
+    return Packet(time_us, azimuth_cdeg, rate_cdeg_us, _SPAN_US[dual], dual, data)
+
+
+def warm_up() -> None:
+    """Compile what looks at packets."""
+    _inspect(bytes(PACKET_BYTES))
+
+
+@numba.njit(cache=True, nogil=True)
+def _inspect(data):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(fault, time_us, azimuth_cdeg, rate_cdeg_us, dual) of 1206 bytes; fault 0 for none. Compiled: 150 packets of a
+    sweep in dual return mode would take Python as long as decoding them."""
+    nothing = 0, 0, 0.0, False
+    for block in range(12):
+        if data[block * 100] != 0xFF or data[block * 100 + 1] != 0xEE:
+            return _NO_FLAG, *nothing
+    mode = data[1204]
+    if data[1205] != _VLP16:
+        return _OTHER_PRODUCT, *nothing
+    if mode != _STRONGEST and mode != _LAST and mode != _DUAL:
+        return _OTHER_MODE, *nothing
+    time_us = data[1200] + (data[1201] << 8) + (data[1202] << 16) + (data[1203] << 24)
     if time_us >= HOUR_US:
-        raise BadPacket("time beyond the hour")
-    azimuths = fields[1:24:2]
-    if max(azimuths) >= ROTATION_CDEG:
-        raise BadPacket("azimuth of 360° or more")
+        return _BEYOND_HOUR, *nothing
+    for block in range(12):
+        if data[block * 100 + 2] + (data[block * 100 + 3] << 8) >= ROTATION_CDEG:
+            return _BEYOND_CIRCLE, *nothing
     dual = mode == _DUAL
     if dual:
-        if azimuths[0::2] != azimuths[1::2]:
-            raise BadPacket("azimuths do not advance evenly")
-        azimuths = azimuths[0::2]
-    return Packet(time_us, azimuths[0], _rate(azimuths), len(azimuths) * BLOCK_US, dual, data)
-
-
-def _rate(azimuths: tuple[int, ...]) -> float:
-    """Hundredths of a degree per µs, from first to last firing. BadPacket unless every step is nearly the same."""
-    steps = len(azimuths) - 1
-    mean = ((azimuths[-1] - azimuths[0]) % ROTATION_CDEG) / steps
+        for block in range(0, 12, 2):
+            at = block * 100
+            if data[at + 2] != data[at + 102] or data[at + 3] != data[at + 103]:
+                return _UNEVEN, *nothing
+    stride = 200 if dual else 100
+    steps = 1200 // stride - 1
+    first = data[2] + (data[3] << 8)
+    last = data[steps * stride + 2] + (data[steps * stride + 3] << 8)
+    mean = ((last - first) % ROTATION_CDEG) / steps
     if not _MIN_STEP_CDEG <= mean <= _MAX_STEP_CDEG:
-        raise BadPacket("azimuths do not advance evenly")
-    low, high = mean - _STEP_JITTER_CDEG, mean + _STEP_JITTER_CDEG
-    before = azimuths[0]
-    for azimuth in azimuths[1:]:
-        if not low <= (azimuth - before) % ROTATION_CDEG <= high:
-            raise BadPacket("azimuths do not advance evenly")
+        return _UNEVEN, *nothing
+    before = first
+    for step in range(1, steps + 1):
+        azimuth = data[step * stride + 2] + (data[step * stride + 3] << 8)
+        if not mean - _STEP_JITTER_CDEG <= (azimuth - before) % ROTATION_CDEG <= mean + _STEP_JITTER_CDEG:
+            return _UNEVEN, *nothing
         before = azimuth
-    return mean / BLOCK_US
+    return 0, time_us, first, mean / BLOCK_US, dual
 
 
-def _bad_flags(data: bytes, fields: tuple[int, ...]) -> BadPacket:
+def _bad_packet(fault: int, data: bytes) -> BadPacket:
+    """A fault in words."""
+    if fault == _NO_FLAG:
+        return _bad_flags(data)
+    if fault == _OTHER_PRODUCT:
+        model = _OTHER_MODELS.get(data[1205])
+        return BadPacket(f"not a VLP-16 but {model or 'another product'}", model)
+    return BadPacket(_FAULTS[fault])
+
+
+def _bad_flags(data: bytes) -> BadPacket:
     if not any(data):
         return BadPacket("all zero")
-    if _LOWER_BLOCK_OF_HDL64 in fields[0:24:2]:
+    if any(data[at : at + 2] == _LOWER_BLOCK_OF_HDL64 for at in range(0, 1200, 100)):
         return BadPacket("not a VLP-16 but HDL-64E", "HDL-64E")
     return BadPacket("block without its flag FF EE")
