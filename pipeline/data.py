@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from pathlib import Path
 
@@ -12,3 +13,9 @@ def data_dir() -> Path:
     """``$CIPV_DATA``; without the variable, the folder ``shared/data`` beside the project. It need not exist."""
     named = os.environ.get("CIPV_DATA")
     return Path(named) if named else _PROJECT.parent / "shared" / "data"
+
+
+def file_sha256(path: Path) -> str:
+    """Hexadecimal SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -168,7 +168,7 @@ def _perceive_picture(
     if frame.raw_boxes is None:
         return None
     detections = select.select(frame.raw_boxes, params.detection)
-    return distance.measure(detections, aligned, frame.camera, params.distance)
+    return distance.measure(detections, aligned, frame.camera, params.distance, frame.raw_boxes.law)
 
 
 def _continue_or_restart(state: State, frame: Frame, params: Params) -> tuple[State, float | None]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -13,8 +15,12 @@ from rich.console import Console
 from rich.table import Table
 
 from app.options import LineOptions, SourceOptions
-from pipeline.calibration.distance import as_overrides, collect_pairs, fit_laws
+from pipeline.calibration.distance import LawFit, as_law, as_overrides, collect_pairs, fit_laws
+from pipeline.errors import BadInput
 from pipeline.run import detector_for
+from pipeline.sources.base import Source
+from pipeline.vision.laws import keep_law
+from pipeline.vision.models import EMBEDDED, find
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,8 @@ class Calibrate:
     """Fit b too, as in print. By default b is −1, which a pinhole camera must give and which carries over better"""
     out: Path | None = None
     """Write a preset file for `cipv run --params`"""
+    keep: bool = False
+    """Keep the law with the detector: it is then used with that network wherever no parameter says otherwise"""
     json: bool = False
     """Print the laws and their figures as JSON"""
 
@@ -41,6 +49,10 @@ class Calibrate:
         params = self.line.parameters()
         source = self.source.open()
         detector = detector_for(source, self.line.detector)
+        if self.keep and detector.path == find(EMBEDDED):
+            raise BadInput("the embedded detector's law comes with the program; use --out, and --params where it runs")
+        if self.keep and not params.distance.scale_to_camera:
+            raise BadInput("--keep with distance.scale_to_camera off: a kept law must serve every camera; use --out")
         pairs = collect_pairs(source, detector, self.truth, params)
         fits = fit_laws(pairs, None if self.free_exponent else -1.0)
         if self.json:
@@ -54,4 +66,15 @@ class Calibrate:
             Console().print(table)
         if self.out is not None:
             self.out.write_text(yaml.safe_dump(as_overrides(fits), sort_keys=False), encoding="utf-8")
+        if self.keep:
+            kept = keep_law(detector.path, as_law(fits, params.distance.reference_focal_px), self._about(source, fits))
+            print(f"{kept}: used with {detector.path.name} from now on", file=sys.stderr)
         return 0
+
+    def _about(self, source: Source, fits: Mapping[str, LawFit]) -> dict[str, object]:
+        """What a kept law was fitted to, and how well."""
+        figures = {
+            label: {"pairs": fit.pairs, "mean_relative_error": round(fit.mean_relative_error, 4)}
+            for label, fit in fits.items()
+        }
+        return {"to": source.title, "truth": self.truth, "classes": figures}

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from app.progress import bytes_progress
 from pipeline.path.lane_network import open_lane_network
+from pipeline.types import REAL_VEHICLES
 from pipeline.vision.detector import open_detector
 from pipeline.vision.models import ModelEntry, known_model, list_models, pull, register, store
 
@@ -98,9 +99,16 @@ class Models:
 
 
 def _table(entries: tuple[ModelEntry, ...]) -> Table:
-    table = Table("", "name", "task", "licence", "here", "what it is", title=f"Networks in {store()}")
+    table = Table("", "name", "task", "licence", "here", "what it is", "distance law", title=f"Networks in {store()}")
     for entry in entries:
-        mark = "●" if entry.default else ""
-        table.add_row(mark, entry.name, entry.task, entry.licence or "", str(entry.path or "—"), entry.note)
-    table.caption = "● used when none is named"
+        mark, path = "●" if entry.default else "", str(entry.path or "—")
+        table.add_row(mark, entry.name, entry.task, entry.licence or "", path, entry.note, _law(entry))
+    table.caption = "● used when none is named; distance law: of cars, by box height h at that focal length"
     return table
+
+
+def _law(entry: ModelEntry) -> str:
+    if entry.task != "detector":
+        return ""
+    law, whose = (entry.law, "its own") if entry.law is not None else (REAL_VEHICLES, "for real cars")
+    return f"{law.coefficient:.0f} · h^{law.exponent:g} at {law.focal_px:.0f} px, {whose}"

@@ -14,13 +14,13 @@ from app.engine import Engine
 from app.routes.shapes import ParamsJson, file_of
 from pipeline.alignment import angular_from_calibration
 from pipeline.params import PRESETS, Params, ParamsError, preset, to_yaml, with_changes
-from pipeline.types import CameraCalibration
+from pipeline.types import REAL_VEHICLES, Frame
 
 _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": ParamsJson}}
 
 
 class Changes(BaseModel):
-    """Dotted names with their new values; null takes the recording's calibration where the parameter permits it."""
+    """Dotted names with their new values; null, where permitted, takes the calibration's or the detector's own."""
 
     changes: dict[str, Any] = Field(min_length=1, examples=[{"cluster.z_weight": 0.4}])
     final: bool = Field(True, description="False while a slider is dragged: shown, but no step and no whole-drive run")
@@ -110,12 +110,21 @@ def describe() -> list[dict[str, Any]]:
     ]
 
 
-def effective(camera: CameraCalibration | None) -> dict[str, float]:
-    """What a parameter that is null stands for, from the shown frame's calibration."""
-    if camera is None:
-        return {}
-    model = angular_from_calibration(camera)
-    return {
+def effective(frame: Frame | None, params: Params) -> dict[str, float]:
+    """What a parameter that is null stands for, from the shown frame's calibration and its detector's distance law."""
+    boxes = frame.raw_boxes if frame is not None else None
+    law = (boxes.law if boxes is not None else REAL_VEHICLES).at_focal(params.distance.reference_focal_px)
+    answer = {
+        "distance.coefficient": round(law.coefficient, 1),
+        "distance.exponent": round(law.exponent, 4),
+        "distance.truck_ratio": round(law.truck_ratio, 3),
+        "distance.bus_ratio": round(law.bus_ratio, 3),
+        "distance.motorcycle_ratio": round(law.motorcycle_ratio, 3),
+    }
+    if frame is None or frame.camera is None:
+        return answer
+    model = angular_from_calibration(frame.camera)
+    return answer | {
         "alignment.h_res_deg": round(float(np.degrees(model.h_res_rad)), 5),
         "alignment.v_res_deg": round(float(np.degrees(model.v_res_rad)), 5),
         "alignment.cx_px": round(model.cx, 1),
@@ -134,7 +143,7 @@ def _params_json(engine: Engine) -> JSONResponse:
         "sections": describe(),
         "values": flat(wish.params),
         "base": flat(preset(wish.preset)),
-        "effective": effective(tick.frame.camera if tick else None),
+        "effective": effective(tick.frame if tick else None, wish.params),
     }
     return JSONResponse(answer)
 

@@ -247,7 +247,8 @@ class ParamSectionJson(_Exact):
 
 
 class ParamsJson(_Exact):
-    """values and base (the preset's) by dotted name; effective: what null stands for with the shown camera."""
+    """values and base (the preset's) by dotted name; effective: what null stands for with the shown camera and the
+    detector in use."""
 
     preset: str
     presets: list[str]

@@ -7,7 +7,7 @@ boxes say how far an object is wherever they and a detection overlap in the pict
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,7 +18,7 @@ from pipeline.geometry import Cuboid, closest_on_polygon, iou_matrix, transform
 from pipeline.lidar import boxes, cluster, downsample, ground
 from pipeline.params import Params
 from pipeline.sources.base import Source
-from pipeline.types import VEHICLES, CameraCalibration, Frame
+from pipeline.types import REAL_VEHICLES, VEHICLES, CameraCalibration, DistanceLaw, Frame
 from pipeline.vision.detector import Detector
 from pipeline.vision.distance import PowerLaw, fit_power_law, height_at_reference, is_cut
 from pipeline.vision.select import select
@@ -105,6 +105,12 @@ def as_overrides(fits: Mapping[str, LawFit]) -> dict[str, dict[str, float]]:
         if label in fits:
             section[f"{label}_ratio"] = round(_height_ratio(car, fits[label]), 2)
     return {"distance": section}
+
+
+def as_law(fits: Mapping[str, LawFit], focal_px: float) -> DistanceLaw:
+    """The fitted laws as a detector's own, of heights at ``focal_px``. A class that was not seen keeps the height that
+    it has among real vehicles. TooFewPairs when there is no car."""
+    return replace(REAL_VEHICLES, focal_px=focal_px, **as_overrides(fits)["distance"])
 
 
 def _height_ratio(car: PowerLaw, other: LawFit) -> float:

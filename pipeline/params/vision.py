@@ -18,31 +18,34 @@ class DetectionParams(Section):
 
 
 class DistanceParams(Section):
-    """Power law d = a·h^b from the box height in pixels (paper, Distance Estimation with Regression).
-
-    The default is a pinhole camera's law, b = −1, with a fitted by ``pipeline.calibration.distance`` to 38 labelled
-    cars of two real cameras (Astyx 047–051 and 057–059, KITTI 2011_09_26 drive 0052): cars 1.59 m tall. The printed
-    law is in the preset ``paper``.
+    """Power law d = a·h^b from the box height in pixels (paper, Distance Estimation with Regression). Null: the law of
+    the detector that drew the boxes (``pipeline.types.DistanceLaw``). The printed law is in the preset ``paper``.
     """
 
-    coefficient: float = slider(1444.0, 100.0, 10000.0, 1.0, "", "a, for a camera of the reference focal length")
-    exponent: float = slider(-1.0, -2.0, -0.5, 0.001, "", "b; −1 is a pinhole camera's (print: −1.093)")
+    coefficient: float | None = slider(
+        None, 100.0, 10000.0, 1.0, "", "a, for a camera of the reference focal length; null: the detector's own"
+    )
+    exponent: float | None = slider(
+        None, -2.0, -0.5, 0.001, "", "b; −1 is a pinhole camera's (print: −1.093); null: the detector's own"
+    )
     reference_focal_px: float = slider(
         907.0,
         100.0,
         5000.0,
         1.0,
         "px",
-        "Focal length the law was fitted at; box heights are scaled to it. 907 px is 720p with a 78° diagonal",
+        "Focal length that a is given for; box heights are scaled to it. 907 px is 720p with a 78° diagonal",
     )
     scale_to_camera: bool = choice(
         True, "Scale box heights by the camera's focal length (off: the law is this camera's)"
     )
     depth_along_axis: bool = choice(True, "The law gives depth along the optical axis; range follows from the bearing")
     per_class: bool = choice(True, "Trucks, buses and motorcycles have laws of their own; off: cars only, as in print")
-    truck_ratio: float = slider(1.6, 0.5, 4.0, 0.05, "", "Height of a truck, in cars")
-    bus_ratio: float = slider(2.0, 0.5, 4.0, 0.05, "", "Height of a bus, in cars")
-    motorcycle_ratio: float = slider(0.75, 0.3, 4.0, 0.05, "", "Height of a motorcycle without its rider, in cars")
+    truck_ratio: float | None = slider(None, 0.5, 4.0, 0.05, "", "Height of a truck's box, in cars; null: as above")
+    bus_ratio: float | None = slider(None, 0.5, 4.0, 0.05, "", "Height of a bus's box, in cars; null: as above")
+    motorcycle_ratio: float | None = slider(
+        None, 0.3, 4.0, 0.05, "", "Height of a motorcycle's box, in cars; null: as above"
+    )
     binning: bool = choice(False, "Round estimates to bins of 10 m between 5 and 60 m, as in print")
     max_m: float = slider(120.0, 20.0, 200.0, 1.0, "m", "Estimates beyond this are discarded (print: 60)")
     height_sigma_px: float = slider(2.0, 0.2, 20.0, 0.1, "px", "Noise of a box's height: it sets the distance's sigma")

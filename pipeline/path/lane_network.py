@@ -12,9 +12,9 @@ import cv2
 import numpy as np
 import onnxruntime as ort
 
+from pipeline.data import file_sha256
 from pipeline.path.lane_heads import Head, Size, UnknownLaneHead, pick_head
 from pipeline.types import F32, U8, RawLanes
-from pipeline.vision import models
 from pipeline.vision.graph import input_size, with_input_size
 from pipeline.vision.runtime import DetectorError, DetectorMissing, find_graph, open_session, read_graph, run_session
 
@@ -108,7 +108,7 @@ def _loaded(path: Path, threads: int) -> LaneNetwork:
         head = pick_head(probe, [output.name for output in session.get_outputs()])
     except UnknownLaneHead as error:
         raise DetectorError(f"{path.name}: {error}") from None
-    name = f"{path.stem}-{models.file_sha256(path)[:12]}"
+    name = f"{path.stem}-{file_sha256(path)[:12]}"
     notes = (f"lane lines by the network {path.stem}",)
     return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, threads, session)
 

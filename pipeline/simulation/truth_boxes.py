@@ -12,11 +12,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.alignment import Pinhole, project_cuboid
+from pipeline.simulation.actors import SIZES_M
 from pipeline.simulation.world import ActorState, World
-from pipeline.types import F64, Box, CameraCalibration, RawBoxes
+from pipeline.types import F64, Box, CameraCalibration, DistanceLaw, RawBoxes
 
 LABELS = {"car": "car", "van": "car", "truck": "truck", "bus": "bus", "motorcycle": "motorcycle"}
 """What a network taught on COCO calls each kind of actor; it has no vans."""
+LAW = DistanceLaw(
+    coefficient=907.0 * SIZES_M["car"][2],
+    exponent=-1.0,
+    focal_px=907.0,
+    truck_ratio=SIZES_M["truck"][2] / SIZES_M["car"][2],
+    bus_ratio=SIZES_M["bus"][2] / SIZES_M["car"][2],
+    motorcycle_ratio=SIZES_M["motorcycle"][2] / SIZES_M["car"][2],
+)
+"""What a true box's height tells: a pinhole camera's law, of vehicles as tall as the simulator's usually are."""
 _SCORE = 0.9
 _SAMPLES = 12
 
@@ -70,7 +80,7 @@ def boxes(now: World, camera: CameraCalibration, noise: BoxNoise, seed: int, ind
             found.append(box)
             labels.append(LABELS[actor.kind])
     edges = np.array(found, dtype=np.float32).reshape(-1, 4)
-    return RawBoxes("truth", edges, np.full(len(edges), _SCORE, np.float32), tuple(labels))
+    return RawBoxes("truth", edges, np.full(len(edges), _SCORE, np.float32), tuple(labels), LAW)
 
 
 def in_picture(now: World, camera: CameraCalibration) -> tuple[Seen, ...]:

@@ -7,7 +7,9 @@ treated as read-only. What a frame makes by the hundred is a named tuple, which 
 
 from pipeline.types.arrays import F32, F64, I32, I64, U8, VEHICLES, Box, Mask, Point2, Point3, SourceKind
 from pipeline.types.frame import (
+    REAL_VEHICLES,
     CameraCalibration,
+    DistanceLaw,
     EgoState,
     Frame,
     GnssFix,
@@ -50,6 +52,7 @@ __all__ = [
     "GROUND",
     "I32",
     "I64",
+    "REAL_VEHICLES",
     "U8",
     "UNCLUSTERED",
     "VEHICLES",
@@ -58,6 +61,7 @@ __all__ = [
     "CameraCalibration",
     "Cipv",
     "Detection",
+    "DistanceLaw",
     "EgoState",
     "Frame",
     "FusedObject",

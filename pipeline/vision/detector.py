@@ -5,6 +5,7 @@ The paper runs YOLOv3 under TensorRT; here the best provider that works is taken
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,11 +15,13 @@ import numpy as np
 import onnx
 import onnxruntime as ort
 
-from pipeline.types import F32, U8, RawBoxes
+from pipeline.data import file_sha256
+from pipeline.types import F32, REAL_VEHICLES, U8, DistanceLaw, RawBoxes
 from pipeline.vision import models
 from pipeline.vision.decode import Decoder, Size, UnknownHead, pick_decoder
 from pipeline.vision.graph import MULTIPLE, fitting_size, input_size, with_input_size
 from pipeline.vision.labels import class_names
+from pipeline.vision.laws import find_law
 from pipeline.vision.runtime import (
     DetectorError,
     DetectorMissing,
@@ -43,15 +46,17 @@ _SIMULATED_ONLY = (
 class Detector:
     """A loaded network.
 
-    name: file, digest and input size, so that equal names give equal boxes: the key of caches. input_size: (height,
-    width). labels: class names in COCO's spelling. notes: what a person should know about how it was loaded. graph: the
-    ONNX file as it runs, at this input size.
+    path: its file. name: file, digest, input size and law, so that equal names give equal boxes: the key of caches.
+    input_size: (height, width). labels: class names in COCO's spelling. law: what its boxes tell of distance. notes:
+    what a person should know about how it was loaded. graph: the ONNX file as it runs, at this input size.
     """
 
+    path: Path
     name: str
     providers: tuple[str, ...]
     input_size: Size
     labels: tuple[str, ...]
+    law: DistanceLaw
     head: str
     notes: tuple[str, ...]
     threads: int
@@ -86,7 +91,7 @@ class Detector:
         keep = (boxes[:, 2] > boxes[:, 0]) & (boxes[:, 3] > boxes[:, 1]) & (classes >= 0) & (classes < len(self.labels))
         best_first = np.flatnonzero(keep)[np.argsort(-scores[keep], kind="stable")]
         labels = tuple(self.labels[index] for index in classes[best_first])
-        return RawBoxes(self.name, boxes[best_first].astype(np.float32), scores[best_first], labels)
+        return RawBoxes(self.name, boxes[best_first].astype(np.float32), scores[best_first], labels, self.law)
 
 
 def open_detector(
@@ -152,10 +157,27 @@ def _at_size(
         # The grid inside such a graph may be of the old width: the run cannot fail, and every box would be elsewhere.
         raise DetectorError("the grid inside the graph may belong to its own size")
     labels = class_names(decoder.classes, metadata)
-    name = f"{path.stem}-{models.file_sha256(path)[:12]}-{size[1]}x{size[0]}"
+    found = find_law(path)
+    name = f"{path.stem}-{file_sha256(path)[:12]}-{size[1]}x{size[0]}{_name_of(found.law)}"
     return Detector(
-        name, tuple(session.get_providers()), size, labels, decoder.name, notes, threads, graph, session, decoder
+        path,
+        name,
+        tuple(session.get_providers()),
+        size,
+        labels,
+        found.law or REAL_VEHICLES,
+        decoder.name,
+        (*notes, *((found.note,) if found.note else ())),
+        threads,
+        graph,
+        session,
+        decoder,
     )
+
+
+def _name_of(law: DistanceLaw | None) -> str:
+    """Its part of a detector's name; none for a detector without a law of its own."""
+    return f"-law{hashlib.sha256(repr(law).encode()).hexdigest()[:8]}" if law is not None else ""
 
 
 def _scale(picture: Size, size: Size) -> float:

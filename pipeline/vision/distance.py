@@ -4,14 +4,15 @@ The paper fits d = 1829.1·h^−1.093 to one 720p camera and one car. A box's he
 along the optical axis, so the same law serves another camera when heights are scaled by the focal lengths, another
 class when they are scaled by the objects' heights, and the range follows from the depth by the bearing. The print does
 none of the three (it applies the law to class "car" only, and takes the depth for the range, 22 % short at 35° off
-axis); each is a parameter here.
+axis); each is a parameter here. The law is the detector's own (``pipeline.types.DistanceLaw``), number by number unless
+a parameter says otherwise.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +20,7 @@ import numpy.typing as npt
 from pipeline.alignment import Alignment, Angular
 from pipeline.geometry import F64, transform
 from pipeline.params import DistanceParams
-from pipeline.types import Box, CameraCalibration, Detection, VisionMeasurement
+from pipeline.types import REAL_VEHICLES, Box, CameraCalibration, Detection, DistanceLaw, VisionMeasurement
 
 BIN_M, BIN_LOW_M, BIN_HIGH_M = 10.0, 5.0, 60.0
 _BORDER_PX, _BORDER_SHARE = 1.0, 0.02
@@ -86,21 +87,24 @@ def measure(
     alignment: Alignment | None,
     camera: CameraCalibration | None,
     params: DistanceParams,
+    own: DistanceLaw = REAL_VEHICLES,
 ) -> tuple[VisionMeasurement, ...]:
     """Each detection with its range, its uncertainty and its place; all three null where the box tells none: no law
     for its class, cut by the picture's upper or lower edge (such a height is only a lower bound), or beyond ``max_m``.
-    Without an alignment there is no bearing: the depth stands for the range, and the place is null.
+    Without an alignment there is no bearing: the depth stands for the range, and the place is null. own: the
+    detector's law.
     """
     if not detections:
         return ()
     boxes = np.array([detection.bbox for detection in detections], dtype=np.float64)
-    depth_m = _depths(detections, boxes, _focal_px(alignment, camera), camera, params)
+    law = law_in_use(params, own)
+    depth_m = _depths(detections, boxes, _focal_px(alignment, camera), camera, params, law)
     range_m = depth_m
     if alignment is not None and params.depth_along_axis:
         range_m = range_at_depth(_centres(boxes), depth_m, alignment, camera)
     range_m = np.where(range_m <= params.max_m, range_m, np.nan)
     share = np.hypot(
-        params.exponent * params.height_sigma_px / np.maximum(boxes[:, 3] - boxes[:, 1], 1.0), params.size_spread
+        law.exponent * params.height_sigma_px / np.maximum(boxes[:, 3] - boxes[:, 1], 1.0), params.size_spread
     )
     sigma_m = range_m * share
     if params.binning:
@@ -119,12 +123,25 @@ def measure(
     )
 
 
-def laws(params: DistanceParams) -> Mapping[str, PowerLaw]:
-    """The law of each class that has one, for box heights at the reference focal length."""
-    car = PowerLaw(params.coefficient, params.exponent)
-    if not params.per_class:
+def law_in_use(params: DistanceParams, own: DistanceLaw) -> DistanceLaw:
+    """The detector's law at the parameters' focal length, with each number that a parameter gives in its place."""
+    given = {
+        "coefficient": params.coefficient,
+        "exponent": params.exponent,
+        "truck_ratio": params.truck_ratio,
+        "bus_ratio": params.bus_ratio,
+        "motorcycle_ratio": params.motorcycle_ratio,
+    }
+    changed = {name: value for name, value in given.items() if value is not None}
+    return replace(own.at_focal(params.reference_focal_px), **changed)
+
+
+def _by_class(law: DistanceLaw, per_class: bool) -> Mapping[str, PowerLaw]:
+    """The law of each class that has one, for box heights at the law's focal length."""
+    car = PowerLaw(law.coefficient, law.exponent)
+    if not per_class:
         return {"car": car}
-    ratios = {"truck": params.truck_ratio, "bus": params.bus_ratio, "motorcycle": params.motorcycle_ratio}
+    ratios = {"truck": law.truck_ratio, "bus": law.bus_ratio, "motorcycle": law.motorcycle_ratio}
     return {"car": car} | {label: car.for_taller(ratio) for label, ratio in ratios.items()}
 
 
@@ -165,9 +182,10 @@ def _depths(
     focal_px: float | None,
     camera: CameraCalibration | None,
     params: DistanceParams,
+    law_of_cars: DistanceLaw,
 ) -> F64:
     """(N,) depths in metres by each class's law, NaN where the box tells none."""
-    by_class = laws(params)
+    by_class = _by_class(law_of_cars, params.per_class)
     depths = np.full(len(boxes), np.nan)
     for row, detection in enumerate(detections):
         law = by_class.get(detection.label)

@@ -18,8 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from pipeline.data import data_dir
+from pipeline.data import data_dir, file_sha256
 from pipeline.errors import BadInput
+from pipeline.types import DistanceLaw
+from pipeline.vision.laws import find_law, law_file
 
 Task = Literal["detector", "lanes"]
 Progress = Callable[[int, int], None]
@@ -89,7 +91,8 @@ KNOWN: tuple[KnownModel, ...] = (
 
 @dataclass(frozen=True)
 class ModelEntry:
-    """One row of ``cipv models``. ``path`` is null while it is not here."""
+    """One row of ``cipv models``. ``path`` is null while it is not here. law: the distance law measured for it, null
+    where it has none and the one for real vehicles is used."""
 
     name: str
     task: Task
@@ -98,6 +101,7 @@ class ModelEntry:
     licence: str | None
     url: str | None
     note: str
+    law: DistanceLaw | None = None
 
 
 def store() -> Path:
@@ -108,27 +112,22 @@ def store() -> Path:
 
 def list_models() -> tuple[ModelEntry, ...]:
     """Known networks in their order, the embedded one, then registered ones by name."""
-    registry = _read_registry()
     defaults = {task: default_model(task) for task in ("detector", "lanes")}
-    entries = []
-    for known in KNOWN:
-        path = _located(known.name)
-        entries.append(
-            ModelEntry(
-                known.name, known.task, path, _same(path, defaults[known.task]), known.licence, known.url, known.note
-            )
-        )
-    own = _located(EMBEDDED)
-    note = "part of the program: simulated vehicles only, 0.5 M parameters"
-    entries.append(ModelEntry(EMBEDDED, "detector", own, _same(own, defaults["detector"]), None, None, note))
-    known_names = {known.name for known in KNOWN}
-    for name, row in sorted(registry["models"].items()):
-        if name not in known_names:
-            path = _located(name)
-            entries.append(
-                ModelEntry(name, row["task"], path, _same(path, defaults[row["task"]]), None, None, "registered")
-            )
-    return tuple(entries)
+
+    def entry(name: str, task: Task, licence: str | None, url: str | None, note: str) -> ModelEntry:
+        path = _located(name)
+        law = find_law(path).law if path is not None and task == "detector" else None
+        return ModelEntry(name, task, path, _same(path, defaults[task]), licence, url, note, law)
+
+    known = [entry(each.name, each.task, each.licence, each.url, each.note) for each in KNOWN]
+    own = "part of the program: simulated vehicles only, 0.5 M parameters"
+    names = {each.name for each in KNOWN}
+    registered = [
+        entry(name, row["task"], None, None, "registered")
+        for name, row in sorted(_read_registry()["models"].items())
+        if name not in names
+    ]
+    return (*known, entry(EMBEDDED, "detector", None, None, own), *registered)
 
 
 def find(spec: str) -> Path | None:
@@ -150,7 +149,8 @@ def default_model(task: Task) -> Path | None:
 
 
 def register(path: Path, name: str, task: Task = "detector", default: bool = True) -> Path:
-    """Copy a file into the folder under ``name`` and, unless told otherwise, make it its task's default."""
+    """Copy a file, with the distance law beside it, into the folder under ``name`` and, unless told otherwise, make it
+    its task's default."""
     if not _is_name(name):
         raise ModelError(f"{name!r} cannot be a network's name: use letters, digits, '-', '_' and '.'")
     if name == EMBEDDED:
@@ -164,6 +164,9 @@ def register(path: Path, name: str, task: Task = "detector", default: bool = Tru
             part = target.with_suffix(".part")
             shutil.copyfile(path, part)
             part.replace(target)
+            law_file(target).unlink(missing_ok=True)
+            if law_file(path).is_file():
+                shutil.copyfile(law_file(path), law_file(target))
     except OSError as error:
         raise ModelError(f"{target} cannot be written: {error.strerror or error}") from None
     registry = _read_registry()
@@ -202,12 +205,6 @@ def pull(name: str, progress: Progress | None = None) -> Path:
     finally:
         part.unlink(missing_ok=True)
     return target
-
-
-def file_sha256(path: Path) -> str:
-    """Hexadecimal SHA-256 of a file."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _download(known: KnownModel, size: int, part: Path, progress: Progress | None) -> None:

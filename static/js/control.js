@@ -18,7 +18,7 @@ const AROUND = 2;
 export function control(name, param, change) {
   const id = `param-${name}`;
   const input = { boolean: toggle, choice: choices, number: slider, integer: slider }[param.kind](id, param, change);
-  const auto = el("span", { class: "auto", textContent: "auto", hidden: true, title: "Taken from the recording's calibration" });
+  const auto = el("span", { class: "auto", textContent: "auto", hidden: true, title: "Taken from the recording's calibration, or the detector's own" });
   const reset = el("button", { type: "button", class: "reset", textContent: "↺", title: "Back to the preset's value", aria: { label: `Reset ${words(param.key)}` } });
   const label = el("label", { htmlFor: id, textContent: words(param.key) });
   const head = el("div", { class: "head" }, label, auto, el("span", { class: "unit", textContent: param.unit ?? "" }), reset);

@@ -16,9 +16,8 @@ from typing import Literal
 import numpy as np
 
 from pipeline.evaluation.experiments.sections import Cell, Chart, Experiment, Section, Series, Table
-from pipeline.evaluation.experiments.track import SCENE_LAW
 from pipeline.evaluation.lead import switches
-from pipeline.params import Params, PathParams, with_changes
+from pipeline.params import Params, PathParams
 from pipeline.path.corridor import nearest_on_path
 from pipeline.path.placing import near_face_middle
 from pipeline.run import Sensors
@@ -74,7 +73,7 @@ def cases(short: bool) -> list[Case]:
 def run(case: Case) -> list[Frame]:
     scene = scenario.load(case.scene)
     scene = scene.model_copy(update={"seed": scene.seed + 100 * case.seed})
-    setup = Setup(with_changes(Params(), SCENE_LAW), case.sensors, closed=False)
+    setup = Setup(Params(), case.sensors, closed=False)
     way = Way.of(scene)
     return [judge(way, tick) for tick in drive(scene, setup)]
 

@@ -18,7 +18,6 @@ import numpy as np
 from pipeline.evaluation.experiments import bends
 from pipeline.evaluation.experiments.choosing import Way, is_hidden, same_place, true_lead
 from pipeline.evaluation.experiments.sections import Cell, Experiment, Section, Table
-from pipeline.evaluation.experiments.track import SCENE_LAW
 from pipeline.params import Params, with_changes
 from pipeline.path.corridor import nearest_on_path
 from pipeline.path.placing import near_face_middle
@@ -97,7 +96,7 @@ def run(case: Case) -> Outcome:
 def _drive(scene: Scenario, names: Sequence[str]) -> dict[str, list[tuple[World, Frame, Result]]]:
     """Every frame once through the sensors, and through the line once for each set of sources."""
     warm_up()
-    settings = {name: with_changes(Params(), {**SCENE_LAW, **SOURCES[name]}) for name in names}
+    settings = {name: with_changes(Params(), SOURCES[name]) for name in names}
     states = dict.fromkeys(names, State())
     rows: dict[str, list[tuple[World, Frame, Result]]] = {name: [] for name in names}
     for now, frame in seen(scene):

@@ -15,13 +15,13 @@ import numpy as np
 
 from pipeline.evaluation.experiments.layouts import LAYOUTS, Case, cases, scenario
 from pipeline.evaluation.experiments.sections import Chart, Experiment, Section, Series, Table
-from pipeline.evaluation.experiments.track import SCENE_LAW, TARGET, true_range_m
+from pipeline.evaluation.experiments.track import TARGET, true_range_m
 from pipeline.geometry import closest_on_polygon, transform
 from pipeline.params import DistanceParams, preset
 from pipeline.simulation import truth_boxes, world
 from pipeline.simulation.camera import calibration
 from pipeline.simulation.truth_boxes import BoxNoise
-from pipeline.types import CameraCalibration
+from pipeline.types import REAL_VEHICLES, CameraCalibration
 from pipeline.vision.distance import PowerLaw, fit_power_law, height_at_reference, is_cut
 
 _BINS_M = (5.0, 15.0, 25.0, 35.0, 45.0, 55.0, 65.0, 75.0)
@@ -75,9 +75,9 @@ def report(cases: Sequence[Case], runs: Sequence[list[Sample]]) -> Section:
         "Distance from box height",
         (
             f"Fitted here: d = {free.coefficient:.1f} · h^{free.exponent:.3f}; with the pinhole exponent "
-            f"{pinhole.coefficient:.1f} · h^−1. Printed: 1829.1 · h^−1.093. The default is fitted to real cars, which "
-            "are 1.59 m tall; these are 1.48 m. Depth is along the optical axis. Boxes cut by the picture's edge are "
-            "left out.",
+            f"{pinhole.coefficient:.1f} · h^−1. Printed: 1829.1 · h^−1.093. The law of YOLOX is fitted to real cars, "
+            "which are 1.59 m tall; these are 1.48 m. Depth is along the optical axis. Boxes cut by the picture's edge "
+            "are left out.",
         ),
         (
             _law_table(free, pinhole, judged),
@@ -100,16 +100,18 @@ def report(cases: Sequence[Case], runs: Sequence[list[Sample]]) -> Section:
 @cache
 def _printed() -> PowerLaw:
     paper = preset("paper").distance
+    assert paper.coefficient is not None
+    assert paper.exponent is not None
     return PowerLaw(paper.coefficient, paper.exponent)
 
 
 def _law_table(free: PowerLaw, pinhole: PowerLaw, judged: dict[str, list[Sample]]) -> Table:
-    default = DistanceParams()
+    own = truth_boxes.LAW
     laws = (
         ("printed, as range", _printed(), True),
         ("printed, as depth", _printed(), False),
-        ("default (real cars)", PowerLaw(default.coefficient, default.exponent), False),
-        ("used in these experiments", PowerLaw(SCENE_LAW["distance.coefficient"], -1.0), False),
+        ("of YOLOX on real cars", PowerLaw(REAL_VEHICLES.coefficient, REAL_VEHICLES.exponent), False),
+        ("used in these experiments", PowerLaw(own.coefficient, own.exponent), False),
         ("fitted, free exponent", free, False),
         ("fitted, exponent −1", pinhole, False),
     )

@@ -16,9 +16,6 @@ from pipeline.simulation.world import ActorState
 
 TARGET = 1
 LANE = -2
-SCENE_LAW = {"distance.coefficient": 1342.0}
-"""The distance law of this simulator's camera and cars, as the experiment ``regression`` fits it: its cars are 1.48 m
-tall, those the default was fitted to 1.59 m."""
 CONTROLLERS: Mapping[str, Mapping[str, Any]] = {
     "ACC": {"aeb.enabled": False},
     "ACC + AEB": {},
@@ -47,9 +44,9 @@ def scene(ego_speed: Mapping[float, float], target: Mapping[str, Any], duration_
 
 
 def parameters(controller: str, set_speed_mps: float, changes: Mapping[str, Any] | None = None) -> Params:
-    """The default parameters with this simulator's distance law, one controller and its set speed."""
+    """The default parameters with one controller and its set speed."""
     set_speed = {"acc.set_speed_kmh": set_speed_mps * 3.6}
-    return with_changes(Params(), {**SCENE_LAW, **set_speed, **CONTROLLERS[controller], **(changes or {})})
+    return with_changes(Params(), {**set_speed, **CONTROLLERS[controller], **(changes or {})})
 
 
 @dataclass(frozen=True)

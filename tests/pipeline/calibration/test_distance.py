@@ -15,6 +15,7 @@ from pipeline.geometry import iou_matrix
 from pipeline.params import Params, with_changes
 from pipeline.sources import open_source
 from pipeline.sources.base import Source
+from pipeline.types import REAL_VEHICLES
 from pipeline.vision import distance, select, tracking
 from pipeline.vision.detector import Detector, open_detector
 
@@ -59,7 +60,7 @@ def test_real_cars_obey_a_pinhole_law(astyx: Recording, kitti: Recording) -> Non
 def test_the_default_law_is_the_one_fitted_to_drives_that_are_not_judged(astyx: Recording, kitti: Recording) -> None:
     unseen = [pair for pair in astyx.pairs if not any(_within(pair.frame, frames) for frames in JUDGED.values())]
     fit = fit_laws([*unseen, *kitti.pairs], exponent=-1.0)["car"]
-    assert Params().distance.coefficient == pytest.approx(fit.law.coefficient, rel=0.02)
+    assert REAL_VEHICLES.coefficient == pytest.approx(fit.law.coefficient, rel=0.02)
 
 
 def test_the_camera_alone_with_a_law_that_never_saw_the_drive(astyx: Recording, kitti: Recording) -> None:

@@ -16,7 +16,6 @@ import pytest
 
 from pipeline.evaluation.experiments import bends, curves
 from pipeline.evaluation.experiments.choosing import Way
-from pipeline.evaluation.experiments.track import SCENE_LAW
 from pipeline.params import Params, with_changes
 from pipeline.records import evolve
 from pipeline.simulation.world import World
@@ -26,7 +25,7 @@ from pipeline.types import CameraCalibration, Frame, Result
 LAYOUT = bends.LAYOUTS["r250"]
 BREAKS_S, ENDS_S = 4.0, 7.0
 """In the bend from 3 s on."""
-PARAMS = with_changes(Params(), SCENE_LAW)
+PARAMS = Params()
 Break = Callable[[Frame], Frame]
 
 

@@ -7,7 +7,7 @@ import pytest
 from pipeline.evaluation.experiments.layouts import Case, cases, scenario
 from pipeline.evaluation.experiments.regression import report, run
 from pipeline.evaluation.experiments.sections import Table
-from pipeline.evaluation.experiments.track import SCENE_LAW
+from pipeline.simulation import truth_boxes
 
 
 @pytest.fixture(scope="module")
@@ -23,12 +23,12 @@ def row(table: Table, name: str) -> tuple[float, ...]:
 def test_the_fit_finds_the_law_that_the_experiments_use(laws: Table) -> None:
     coefficient, exponent, *_ = row(laws, "fitted, exponent −1")
     assert exponent == -1.0
-    assert coefficient == pytest.approx(SCENE_LAW["distance.coefficient"], rel=0.03)
+    assert coefficient == pytest.approx(truth_boxes.LAW.coefficient, rel=0.03)
     assert row(laws, "fitted, free exponent")[1] == pytest.approx(-1.0, abs=0.05)
 
 
 def test_a_law_fitted_here_beats_one_from_elsewhere(laws: Table) -> None:
-    fitted, default = row(laws, "fitted, exponent −1"), row(laws, "default (real cars)")
+    fitted, default = row(laws, "fitted, exponent −1"), row(laws, "of YOLOX on real cars")
     assert all(ours < theirs for ours, theirs in zip(fitted[2:], default[2:], strict=True))
     assert max(fitted[2:]) < 10.0
 
