@@ -69,10 +69,10 @@ class Draft:
             removed_by = self._last_change(kind, number)
             if removed_by is None:
                 raise NoSuchLabel(f"there is no {kind} {number}")
-            raise Stale(f"{self._who(removed_by)} removed {name_of(kind, number)} since", None)
+            raise Stale(f"{self.who(removed_by)} removed {name_of(kind, number)} since", None)
         if found.revision != revision and (kind, number) not in self._after:
             theirs = {"id": number, **value_to_json(kind, found.value), "revision": found.revision}
-            raise Stale(f"{self._who(found.revision)} changed {name_of(kind, number)} since", theirs)
+            raise Stale(f"{self.who(found.revision)} changed {name_of(kind, number)} since", theirs)
         return found
 
     def all(self, kind: ItemKind) -> dict[int, Item]:
@@ -172,7 +172,8 @@ class Draft:
             )
         )
 
-    def _who(self, act: int) -> str:
+    def who(self, act: int) -> str:
+        """The person of an act."""
         person = self._connection.scalar(
             select(ActRow.person).where(ActRow.drive_id == self._drive_id, ActRow.number == act)
         )

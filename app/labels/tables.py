@@ -69,8 +69,8 @@ class SightingRow(Base):
 
 class ActRow(Base):
     """What a person did. number: from 1, by drive. step: the act that this one goes on with, else itself; they are
-    taken back together. station: the machine whose parameters it changed. status: done, undone (can be redone) or dropped
-    (was undone, and something else was done since). target: of an undo or redo, the step that it is about."""
+    taken back together. station: the machine whose parameters it changed. status: done, undone (can be redone) or
+    dropped (was undone, and something else was done since). target: of an undo or redo, the step that it is about."""
 
     __tablename__ = "act"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)

@@ -37,6 +37,15 @@ def check(labels: LabelSet, what: str) -> LabelSet:
     return labels
 
 
+def check_sighting(sighting: Sighting, what: str) -> Sighting:
+    """The sighting itself. BadInput, beginning with ``what``, when it cannot be."""
+    try:
+        _check_sighting(sighting, what)
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+    return sighting
+
+
 def _check_frames(labels: LabelSet) -> None:
     _require(len(labels.frames) == len(labels.t_ns), f"{len(labels.frames)} frames but {len(labels.t_ns)} times")
     _require(all(_fits(t_ns) for t_ns in labels.t_ns), "a time that no clock shows")

@@ -1,0 +1,52 @@
+"""What every act must know besides the labels themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TypeVar, cast
+
+from app.labels.draft import Draft
+from app.labels.values import Item
+from pipeline.errors import BadInput
+from pipeline.labels.model import EventLabel, LabelTrack, LeadRange, Origin, PathLabel
+
+Stated = LabelTrack | LeadRange | PathLabel | EventLabel
+S = TypeVar("S", LabelTrack, LeadRange, PathLabel, EventLabel)
+
+
+@dataclass(frozen=True)
+class Scope:
+    """t_ns: the ticks of all frames."""
+
+    t_ns: tuple[int, ...]
+
+    def check(self, first: int, last: int | None = None) -> None:
+        """BadInput for frames that the recording does not have."""
+        count, last = len(self.t_ns), first if last is None else last
+        if not 0 <= first <= last < count:
+            frames = f"frame {first}" if first == last else f"frames {first} to {last}"
+            raise BadInput(f"{frames}: the recording has {count}, counted from 0")
+
+
+def by_person(draft: Draft) -> Origin:
+    return Origin("person", draft.person, draft.t_unix_ms)
+
+
+def track_of(draft: Draft, number: int, revision: int | None = None) -> LabelTrack:
+    return cast("LabelTrack", draft.get("track", number, revision).value)
+
+
+def corrected(draft: Draft, track: LabelTrack) -> None:
+    """A person changed it: no proposal any more, and who says so is that person."""
+    draft.put("track", track.id, replace(track, state="corrected", origin=by_person(draft)))
+
+
+def stated(item: Item) -> Stated:
+    """Its value, which has a state. BadInput for a tag."""
+    if item.kind == "tag":
+        raise BadInput("a tag is neither accepted nor rejected")
+    return cast("Stated", item.value)
+
+
+def frames_text(first: int, last: int) -> str:
+    return f"frame {first}" if first == last else f"frames {first}–{last}"

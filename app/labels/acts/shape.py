@@ -1,0 +1,77 @@
+"""Where a track is: keyframes, sizes, frames in which it is not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from app.labels.acts.scope import Scope, corrected, frames_text, track_of
+from app.labels.draft import Draft
+from app.labels.refusals import ActRefused
+from app.labels.requests import DropKeyframe, DropSightings, SetSighting, SizeAlong
+from pipeline.labels import interpolate
+from pipeline.labels.model import Sighting
+
+
+def set_sighting(draft: Draft, scope: Scope, act: SetSighting) -> str:
+    scope.check(act.frame)
+    track = track_of(draft, act.track, act.revision)
+    old, new = draft.sightings(track.id), act.sighting()
+    after = interpolate.put_keyframe(old, new, scope.t_ns, interpolate=act.interpolate)
+    _put(draft, track.id, old, after)
+    corrected(draft, track)
+    return f"{_verb(old.get(act.frame), new)} #{track.id} in frame {act.frame}"
+
+
+def drop_keyframe(draft: Draft, scope: Scope, act: DropKeyframe) -> str:
+    track = track_of(draft, act.track, act.revision)
+    old = draft.sightings(track.id)
+    if act.frame not in old or not old[act.frame].keyframe:
+        raise ActRefused(f"#{track.id} has no keyframe in frame {act.frame}")
+    _put(draft, track.id, old, interpolate.drop_keyframe(old, act.frame, scope.t_ns))
+    corrected(draft, track)
+    return f"interpolated #{track.id} in frame {act.frame}"
+
+
+def drop_sightings(draft: Draft, scope: Scope, act: DropSightings) -> str:
+    scope.check(act.first, act.last)
+    track = track_of(draft, act.track, act.revision)
+    there = draft.sightings(track.id, act.first, act.last)
+    if not there:
+        raise ActRefused(f"#{track.id} is not in {frames_text(act.first, act.last)}")
+    draft.put_sightings(track.id, dict.fromkeys(there))
+    corrected(draft, track)
+    return f"took #{track.id} out of {frames_text(act.first, act.last)}"
+
+
+def size_along(draft: Draft, scope: Scope, act: SizeAlong) -> str:
+    track = track_of(draft, act.track, act.revision)
+    old = draft.sightings(track.id)
+    after = {
+        frame: replace(each, cuboid=interpolate.resized(each.cuboid, act.size)) if each.cuboid is not None else each
+        for frame, each in old.items()
+    }
+    if not any(each.cuboid is not None for each in old.values()):
+        raise ActRefused(f"#{track.id} has no cuboid in any frame")
+    _put(draft, track.id, old, after)
+    corrected(draft, track)
+    return "sized #{} {} m in every frame".format(track.id, " × ".join(f"{side:.2f}" for side in act.size))
+
+
+def _put(draft: Draft, track: int, old: Mapping[int, Sighting], new: Mapping[int, Sighting]) -> None:
+    """The frames that are others."""
+    changed: dict[int, Sighting | None] = {frame: each for frame, each in new.items() if old.get(frame) != each}
+    changed.update(dict.fromkeys(old.keys() - new.keys()))
+    draft.put_sightings(track, changed)
+
+
+def _verb(old: Sighting | None, new: Sighting) -> str:
+    if old is None:
+        return "placed"
+    if old.cuboid is None or new.cuboid is None or old.cuboid == new.cuboid:
+        return "boxed" if old.bbox != new.bbox else "placed"
+    if old.cuboid.center != new.cuboid.center and old.cuboid.size == new.cuboid.size:
+        return "moved"
+    if old.cuboid.size != new.cuboid.size:
+        return "resized"
+    return "turned"

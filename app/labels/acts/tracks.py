@@ -1,0 +1,75 @@
+"""Which vehicles there are: adding, naming, splitting and merging tracks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import cast
+
+from app.labels.acts.scope import Scope, by_person, corrected, track_of
+from app.labels.draft import Draft
+from app.labels.refusals import ActRefused
+from app.labels.requests import AddTrack, Merge, Relabel, Split
+from app.labels.values import Frames
+from pipeline.labels.model import EventLabel, LabelTrack, LeadRange
+from pipeline.vision.labels import canonical
+
+
+def add_track(draft: Draft, scope: Scope, act: AddTrack) -> str:
+    scope.check(act.frame)
+    number = draft.next_number("track")
+    draft.add("track", LabelTrack(number, canonical(act.label), (), "corrected", by_person(draft)))
+    draft.put_sightings(number, {act.frame: act.sighting()})
+    return f"added #{number}, a {canonical(act.label)}, in frame {act.frame}"
+
+
+def relabel(draft: Draft, scope: Scope, act: Relabel) -> str:
+    track, label = track_of(draft, act.track, act.revision), canonical(act.label)
+    corrected(draft, replace(track, label=label))
+    return f"called #{track.id} a {label}"
+
+
+def split(draft: Draft, scope: Scope, act: Split) -> str:
+    """Ranges of the lead and events from that frame on name the new one."""
+    scope.check(act.frame)
+    track = track_of(draft, act.track, act.revision)
+    there = draft.sightings(track.id)
+    later: Frames = {frame: each for frame, each in there.items() if frame >= act.frame}
+    if not later or len(later) == len(there):
+        raise ActRefused(f"#{track.id} cannot be split at frame {act.frame}: it is on one side of it only")
+    number = draft.next_number("track")
+    corrected(draft, track)
+    draft.add("track", replace(track, id=number, state="corrected", origin=by_person(draft), comment=""))
+    draft.put_sightings(track.id, dict.fromkeys(later))
+    draft.put_sightings(number, later)
+    _rename_from(draft, track.id, number, act.frame)
+    return f"split #{track.id} at frame {act.frame}: from there it is #{number}"
+
+
+def merge(draft: Draft, scope: Scope, act: Merge) -> str:
+    first, second = (track_of(draft, ref.id, ref.revision) for ref in act.tracks)
+    if first.id == second.id:
+        raise ActRefused("one track cannot be merged with itself")
+    ours, theirs = draft.sightings(first.id), draft.sightings(second.id)
+    draft.put_sightings(first.id, {frame: each for frame, each in theirs.items() if frame not in ours})
+    corrected(draft, first)
+    _rename_from(draft, second.id, first.id, 0)
+    draft.put("track", second.id, None)
+    return f"merged #{second.id} into #{first.id}"
+
+
+def _rename_from(draft: Draft, old: int, new: int, frame: int) -> None:
+    """Ranges of the lead and events name another track from a frame on."""
+    for number, item in draft.all("lead").items():
+        lead = cast("LeadRange", item.value)
+        if lead.lead != old or lead.last < frame:
+            continue
+        if lead.first >= frame:
+            draft.put("lead", number, replace(lead, lead=new))
+        else:
+            draft.put("lead", number, replace(lead, last=frame - 1))
+            draft.add("lead", replace(lead, first=frame, lead=new))
+    for number, item in draft.all("event").items():
+        event = cast("EventLabel", item.value)
+        if old in event.tracks and event.frame >= frame:
+            renamed = tuple(dict.fromkeys(new if track == old else track for track in event.tracks))
+            draft.put("event", number, replace(event, tracks=renamed))
