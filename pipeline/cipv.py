@@ -50,8 +50,12 @@ class Candidate(NamedTuple):
     params: CipvParams
 
 
-Check = tuple[Gate, str]
-"""The answer to one question to a candidate: the gate with its number, and the sentence that says why it failed."""
+class Test(NamedTuple):
+    """One question to a candidate: the gate with its number and limit, and the sentence that says why it failed, which
+    is only made for the one failure of an object that is given as its reason."""
+
+    ask: Callable[[Candidate], Gate]
+    why_not: Callable[[Candidate], str]
 
 
 class Choice(NamedTuple):
@@ -87,10 +91,10 @@ def choose(
         candidate = Candidate(item, where, odds.get(item.id, 0.0), now_in, leads, path, params)
         if where is not None and where.margin_m() >= 0.0 and where.ahead_m > 0.0 and not now_in:
             crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
-        checks = [ask(candidate) for ask in _ELIGIBILITY]
+        gates = [ask(candidate) for ask in _QUESTIONS]
         item = evolve(
             item,
-            gates=(*item.gates, *[gate for gate, _ in checks]),
+            gates=(*item.gates, *gates),
             path_offset_m=where.offset_m if where is not None else None,
             in_path=now_in,
             in_path_probability=where.probability() if where is not None else None,
@@ -98,11 +102,11 @@ def choose(
             crossing_s=crossing_s,
         )
         judged.append(item)
-        failed = next((reason for gate, reason in checks if not gate.passed), None)
+        failed = next((k for k, gate in enumerate(gates) if not gate.passed), None)
         if failed is None:
             able.append(item)
         else:
-            failures[item.id] = failed
+            failures[item.id] = _ELIGIBILITY[failed].why_not(candidate)
     nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
     lead = _surer(nearest, able) if nearest is not None else None
     if lead is not None:
@@ -173,59 +177,75 @@ def _next_lead(
 # ---------------------------------------------------------------- who may be a lead
 
 
-def _is_vehicle(who: Candidate) -> Check:
+def _vehicle_class(who: Candidate) -> Gate:
     """A named object must be a vehicle; a nameless one (L) is judged by its size."""
     label = who.item.label
-    passed = label is None or label in VEHICLES
-    return Gate("vehicle_class", None, 1.0, passed), "" if passed else f"class {label}"
+    return Gate("vehicle_class", None, 1.0, label is None or label in VEHICLES)
 
 
-def _has_distance(who: Candidate) -> Check:
-    distance = who.item.distance_m
-    return Gate("distance_known", distance, 0.0, distance is not None), "distance not known"
+def _distance_known(who: Candidate) -> Gate:
+    distance_m = who.item.distance_m
+    return Gate("distance_known", distance_m, 0.0, distance_m is not None)
 
 
-def _is_confirmed(who: Candidate) -> Check:
+def _hits(who: Candidate) -> Gate:
     """Two sensors that both see it now are enough at once; one alone must see it again. The lead is confirmed."""
     hits, needed = who.item.hits, 1 if who.item.seen_by == "VL" or who.leads else who.params.confirm_hits
-    passed = hits >= needed
-    return Gate("hits", hits, needed, passed), "" if passed else f"seen {hits} of {needed} times"
+    return Gate("hits", hits, needed, hits >= needed)
 
 
-def _is_seen(who: Candidate) -> Check:
+def _seen(who: Candidate) -> Gate:
     """An object whose distance was not measured in this frame may stay the lead, so that the lead does not flicker; it
     may not become it, because where it is now is only a guess."""
-    known = not who.item.carried and who.item.measured
+    known = bool(who.item.seen_by) and who.item.measured
     passed = known or who.leads or who.params.carried_may_become_lead
-    reason = "not seen in this frame" if who.item.carried else "its distance was not measured in this frame"
-    return Gate("seen", float(known), 0.0 if who.leads else 1.0, passed), reason
+    return Gate("seen", float(known), 0.0 if who.leads else 1.0, passed)
 
 
-def _is_vehicle_sized(who: Candidate) -> Check:
+def _not_seen(who: Candidate) -> str:
+    return "not seen in this frame" if who.item.carried else "its distance was not measured in this frame"
+
+
+def _size(who: Candidate) -> Gate:
     """An L object must be as large as a vehicle's rear or side: kerbs, posts and hedges are not leads."""
     item, params = who.item, who.params
     if item.source != "L" or item.cuboid is None:
-        return Gate("size", None, params.min_width_m, True), ""
+        return Gate("size", None, params.min_width_m, True)
     length, width, height = item.cuboid.size
-    across = max(length, width)
+    across = length if length > width else width
     if across < params.min_width_m:
-        return Gate("size", across, params.min_width_m, False), f"only {across:.1f} m across"
+        return Gate("size", across, params.min_width_m, False)
     if height < params.min_height_m:
-        return Gate("size", height, params.min_height_m, False), f"only {height:.1f} m high"
-    passed = across <= params.max_size_m
-    return Gate("size", across, params.max_size_m, passed), "" if passed else f"{across:.0f} m long: not a vehicle"
+        return Gate("size", height, params.min_height_m, False)
+    return Gate("size", across, params.max_size_m, across <= params.max_size_m)
 
 
-def _is_near_path(who: Candidate) -> Check:
+def _wrong_size(who: Candidate) -> str:
+    length, width, height = who.item.cuboid.size if who.item.cuboid is not None else (0.0, 0.0, 0.0)
+    across = max(length, width)
+    if across < who.params.min_width_m:
+        return f"only {across:.1f} m across"
+    if height < who.params.min_height_m:
+        return f"only {height:.1f} m high"
+    return f"{across:.0f} m long: not a vehicle"
+
+
+def _path_offset(who: Candidate) -> Gate:
     """As of now, in metres. A moment outside does not stop what its sightings so far say is inside."""
+    place = who.place
+    if place is None:
+        return Gate("path_offset", None, who.path.half_width_m, False)
+    aside, limit = abs(place.middle_m), place.limit_m + _widening_m(who.leads, who.params)
+    return Gate("path_offset", aside, limit, place.ahead_m > 0.0 and (aside <= limit or who.odds > 0.0))
+
+
+def _out_of_path(who: Candidate) -> str:
     if who.place is None:
-        return Gate("path_offset", None, who.path.half_width_m, False), "place not known"
-    aside = abs(who.place.middle_m)
-    limit = who.place.limit_m + _widening_m(who.leads, who.params)
+        return "place not known"
     if who.place.ahead_m <= 0.0:
-        return Gate("path_offset", aside, limit, False), "beside or behind the bumper"
-    passed = aside <= limit or who.odds > 0.0
-    return Gate("path_offset", aside, limit, passed), "" if passed else f"out of path by {aside - limit:.1f} m"
+        return "beside or behind the bumper"
+    aside = abs(who.place.middle_m) - who.place.limit_m - _widening_m(who.leads, who.params)
+    return f"out of path by {aside:.1f} m"
 
 
 def _widening_m(leads: bool, params: CipvParams) -> float:
@@ -233,32 +253,35 @@ def _widening_m(leads: bool, params: CipvParams) -> float:
     return params.hysteresis_m if leads else 0.0
 
 
-def _is_in_path(who: Candidate) -> Check:
+def _path_odds(who: Candidate) -> Gate:
     """By the running mean of what the sightings say."""
-    return Gate("path_odds", who.odds, 0.0, who.inside), "in path for a moment only"
+    return Gate("path_odds", who.odds, 0.0, who.inside)
 
 
-def _is_placed(who: Candidate) -> Check:
+def _path_sigma(who: Candidate) -> Gate:
     """So far ahead that its place against the path is uncertain by more than a lane, nobody can be said to be in it.
     On a path that is too vague to be driven after, only what lies where it is known well may lead."""
     limit = who.params.max_sigma_m * (STAYS_UP_TO if who.leads else 1.0)
     limit *= 1.0 if who.path.usable else ON_A_VAGUE_PATH
     sigma = who.place.sigma_m if who.place is not None else 0.0
-    passed = sigma <= limit
-    reason = "" if passed else f"its place against the path is uncertain by {sigma:.1f} m"
-    return Gate("path_sigma", sigma, limit, passed), reason
+    return Gate("path_sigma", sigma, limit, sigma <= limit)
 
 
-_ELIGIBILITY: tuple[Callable[[Candidate], Check], ...] = (
-    _is_vehicle,
-    _has_distance,
-    _is_confirmed,
-    _is_seen,
-    _is_vehicle_sized,
-    _is_near_path,
-    _is_in_path,
-    _is_placed,
+def _uncertain(who: Candidate) -> str:
+    return f"its place against the path is uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
+
+
+_ELIGIBILITY = (
+    Test(_vehicle_class, lambda who: f"class {who.item.label}"),
+    Test(_distance_known, lambda _: "distance not known"),
+    Test(_hits, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
+    Test(_seen, _not_seen),
+    Test(_size, _wrong_size),
+    Test(_path_offset, _out_of_path),
+    Test(_path_odds, lambda _: "in path for a moment only"),
+    Test(_path_sigma, _uncertain),
 )
+_QUESTIONS = tuple(test.ask for test in _ELIGIBILITY)
 _BESIDE_PLACE = frozenset({"vehicle_class", "distance_known", "hits", "size"})
 """The gates that one which is not in the path yet must pass all the same."""
 

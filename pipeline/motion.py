@@ -7,8 +7,7 @@ that pulls away has a negative closing speed and no TTC.
 from __future__ import annotations
 
 from collections.abc import Iterable
-
-import numpy as np
+from math import hypot
 
 from pipeline.params import MotionParams
 from pipeline.path.yaw_rate import usable_rate
@@ -39,10 +38,10 @@ def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) ->
     shrinks = closing is not None and closing >= SMALLEST_CLOSING_MPS and item.distance_m is not None
     ttc = item.distance_m / closing if shrinks else None  # type: ignore[operator]
     if ego is None or item.velocity_mps is None or item.closest_point is None:
-        return evolve(item, ttc_s=ttc)
+        return item if ttc == item.ttc_s else evolve(item, ttc_s=ttc)
     yaw_rate = usable_rate(ego) or 0.0
     x, y, _ = item.closest_point
     vx = item.velocity_mps[0] + ego.speed_mps - yaw_rate * y
     vy = item.velocity_mps[1] + yaw_rate * x
-    speed = float(np.hypot(vx, vy))
+    speed = hypot(vx, vy)
     return evolve(item, ttc_s=ttc, speed_over_ground_mps=speed, moving=speed > params.moving_mps)

@@ -9,13 +9,14 @@ Record = TypeVar("Record")
 
 def evolve(record: Record, **values: Any) -> Record:
     """``dataclasses.replace`` for the hot path: it copies the fields without running ``__init__`` again, which for a
-    record of 25 fields takes a tenth of the time; a frame makes some two hundred.
+    record of 25 fields takes a fifth of the time; a frame makes some two hundred.
 
     For frozen dataclasses without ``__slots__`` and ``__post_init__``. TypeError for a field that does not exist.
     """
-    fields = record.__dict__
-    if not values.keys() <= fields.keys():
-        raise TypeError(f"{type(record).__name__} has no field {', '.join(sorted(values.keys() - fields.keys()))}")
+    before = record.__dict__
+    fields = before | values
+    if len(fields) != len(before):
+        raise TypeError(f"{type(record).__name__} has no field {', '.join(sorted(values.keys() - before.keys()))}")
     changed = object.__new__(type(record))
-    changed.__dict__.update(fields, **values)
+    object.__setattr__(changed, "__dict__", fields)  # frozen records refuse the plain assignment
     return changed

@@ -163,45 +163,49 @@ def offset(path: Path, points: F64) -> F64:
 def nearest_on_path(path: Path, points: F64) -> tuple[F64, F64]:
     """Signed offset (N,) and path length (N,) of each point's foot on the centre line. A point before the first or
     beyond the last piece is measured against that piece's extension."""
-    return _nearest(path.center, np.asarray(points, dtype=np.float64))
+    return nearest(path.center, np.asarray(points, dtype=np.float64))
 
 
 @numba.njit(cache=True, nogil=True)
-def _nearest(center, points):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """For each point, the foot on each piece of the line; the nearest foot wins, the first of equals. From a foot that
-    is d farther away than the nearest so far, the next d metres of the line hold no nearer one and are passed over."""
+def nearest(center, points):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Kernel of ``nearest_on_path``, for other kernels: the nearest foot wins, the first of equals."""
     pieces = len(center) - 1
-    way, along = np.empty((pieces, 3)), np.zeros(pieces + 1)
-    longest = 0.0
+    # a column each: separate arrays are what vector instructions can read
+    x, y, dx, dy = np.empty(pieces), np.empty(pieces), np.empty(pieces), np.empty(pieces)
+    first, last, along = np.zeros(pieces), np.empty(pieces), np.zeros(pieces + 1)
     for k in range(pieces):
-        dx, dy = center[k + 1, 0] - center[k, 0], center[k + 1, 1] - center[k, 1]
-        length = np.sqrt(dx * dx + dy * dy)
-        way[k, 0], way[k, 1], way[k, 2] = dx / length, dy / length, length
-        along[k + 1] = along[k] + length
-        longest = max(longest, length)
-    offset, reached = np.empty(len(points)), np.empty(len(points))
+        x[k], y[k] = center[k, 0], center[k, 1]
+        wx, wy = center[k + 1, 0] - x[k], center[k + 1, 1] - y[k]
+        last[k] = np.sqrt(wx * wx + wy * wy)
+        dx[k], dy[k] = wx / last[k], wy / last[k]
+        along[k + 1] = along[k] + last[k]
+    first[0], last[-1] = -np.inf, np.inf  # the ends go on for ever
+    offset, reached, away2 = np.empty(len(points)), np.empty(len(points)), np.empty(pieces)
     for n in range(len(points)):
-        best = np.inf
-        guess = min(
-            max(int(points[n, 0] / longest), 0), pieces - 1
-        )  # a near one first, so that far ones are passed over
-        k = -1
-        while k < pieces:
-            here = guess if k < 0 else k
-            rx, ry = points[n, 0] - center[here, 0], points[n, 1] - center[here, 1]
-            dx, dy, length = way[here, 0], way[here, 1], way[here, 2]
-            t = rx * dx + ry * dy
-            if t < 0.0 and here > 0:
-                t = 0.0
-            if t > length and here < pieces - 1:
-                t = length
-            ex, ey = rx - t * dx, ry - t * dy
-            distance = np.sqrt(ex * ex + ey * ey)
-            if distance < best:
-                best = distance
-                side = 1.0 if dx * ry - dy * rx >= 0.0 else -1.0
-                offset[n], reached[n] = side * distance, along[here] + t
-            skip = max(1, int((distance - best) / longest)) if k >= 0 else 1
-            # the last piece goes on for ever, so it is never passed over
-            k = pieces - 1 if k < pieces - 1 and k + skip > pieces - 1 else k + skip
+        px, py = points[n, 0], points[n, 1]
+        least = _away2(x, y, dx, dy, first, last, px, py, away2)
+        k = 0
+        while k < pieces - 1 and away2[k] > least:
+            k += 1
+        rx, ry = px - x[k], py - y[k]
+        side = 1.0 if dx[k] * ry - dy[k] * rx >= 0.0 else -1.0
+        offset[n] = side * np.sqrt(least)
+        reached[n] = along[k] + min(max(rx * dx[k] + ry * dy[k], first[k]), last[k])
     return offset, reached
+
+
+# No branch and nothing that can raise: then the compiler vectorises it, and looking at every piece is faster than
+# choosing which ones to look at.
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"nnan", "nsz", "contract", "reassoc"})
+def _away2(x, y, dx, dy, first, last, px, py, out):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Into ``out`` the squared distance of a point from each piece of the line; the least of them."""
+    least = np.inf
+    for k in range(len(x)):
+        rx, ry = px - x[k], py - y[k]
+        t = min(max(rx * dx[k] + ry * dy[k], first[k]), last[k])
+        ex, ey = rx - t * dx[k], ry - t * dy[k]
+        out[k] = ex * ex + ey * ey
+        least = min(least, out[k])
+    return least

@@ -8,14 +8,14 @@ middle is outside but which leaves no room is in the path too.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import copysign, erf, sqrt
+from math import copysign, erf, nan, sqrt
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
-from pipeline.geometry import F64
 from pipeline.params import CipvParams
-from pipeline.path.corridor import nearest_on_path
+from pipeline.path.corridor import nearest
 from pipeline.path.estimates import STEP_M
 from pipeline.path.yaw_rate import usable_rate
 from pipeline.types import EgoState, FusedObject, Path, Point2
@@ -108,40 +108,24 @@ def place(
     known = [item for item in objects if item.bev is not None]
     if not known:
         return [None] * len(objects)
-    points = _outlines(known)
-    offsets, reached = (row.reshape(-1, 5) for row in nearest_on_path(path, points.reshape(-1, 2)))
-    ahead = reached[:, 0]
-    k = np.clip((ahead / STEP_M).astype(np.intp), 0, len(path.center) - 2)
-    way = path.center[k + 1] - path.center[k]
-    heading = np.arctan2(way[:, 1], way[:, 0])
-    # columns 1 and 2 are the nearest face; the far corners count for what stands across the path
-    offsets[:, 3:] = np.where(_stands_across(known, heading)[:, None], offsets[:, 3:], offsets[:, 1:3])
-    low, high = offsets[:, 1:].min(axis=1), offsets[:, 1:].max(axis=1)
-    half_left, half_right = _half_widths(path, k)
-    spare = 0.5 * (high - low) - np.minimum(params.min_overlap_m, 0.5 * (high - low))
-    sigma = np.hypot(path.profile_m[k] if len(path.profile_m) else 0.0, _sigmas_m(known, points[:, 0], heading))
-    speeds = _sideways_mps(known, points[:, 0], heading, ego)
-    columns = (
-        offsets[:, 0],
-        ahead,
-        low,
-        high,
-        0.5 * (low + high),
-        half_left + spare,
-        half_right + spare,
-        sigma,
-        speeds,
-    )
+    has_edges = len(path.left) == len(path.right) == len(path.center) and path.left is not path.center
+    rows = _against(
+        np.array([_numbers(item) for item in known]),
+        path.center,
+        path.left if has_edges else path.center,
+        path.right if has_edges else path.center,
+        0.0 if has_edges else path.half_width_m,
+        path.profile_m if len(path.profile_m) else np.zeros(len(path.center)),
+        STEP_M,
+        params.min_overlap_m,
+        ego is not None,
+        ego.speed_mps if ego is not None else 0.0,
+        usable_rate(ego) or 0.0,
+    ).tolist()
     placed = []
-    for item, (offset, along, lowest, highest, middle, left, right, both, moves), edges in zip(
-        known,
-        zip(*(column.tolist() for column in columns), strict=True),
-        zip(half_left.tolist(), half_right.tolist(), strict=True),
-        strict=True,
-    ):
-        sideways_mps = moves if item.velocity_mps is not None else None
-        there = Place(offset, along, lowest, highest, middle, left, right, both, sideways_mps)
-        placed.append((there, there.crossing_s(believed_mps(there.sideways_mps, item), *edges)))
+    for item, (half_left, half_right, sideways, *numbers) in zip(known, rows, strict=True):
+        there = Place._make((*numbers, sideways if item.velocity_mps is not None else None))
+        placed.append((there, there.crossing_s(believed_mps(there.sideways_mps, item), half_left, half_right)))
     following = iter(placed)
     return [next(following) if item.bev is not None else None for item in objects]
 
@@ -152,51 +136,74 @@ def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
     return (ax + bx) / 2, (ay + by) / 2
 
 
-def _outlines(items: Sequence[FusedObject]) -> F64:
-    """(N, 5, 2): the middle of the nearest face, and the four corners, nearest first."""
-    corners = np.array([item.bev for item in items])
-    order = np.argsort((corners**2).sum(axis=2), axis=1, kind="stable")
-    corners = np.take_along_axis(corners, order[:, :, None], axis=1)
-    return np.concatenate([corners[:, :2].mean(axis=1, keepdims=True), corners], axis=1)
+def _numbers(item: FusedObject) -> tuple[float, ...]:
+    """One row for ``_against``: the four corners x y, yaw, velocity x y, sigma of the distance, whether only the camera
+    has it, whether it is carried. NaN where unknown."""
+    a, b, c, d = item.bev  # type: ignore[misc]
+    yaw_rad = item.cuboid.yaw_rad if item.cuboid is not None else nan
+    velocity = item.velocity_mps if item.velocity_mps is not None else (nan, nan)
+    return (*a, *b, *c, *d, yaw_rad, *velocity, item.distance_sigma_m or 0.0, item.source == "V", not item.seen_by)
 
 
-def _stands_across(items: Sequence[FusedObject], heading: F64) -> np.ndarray:
-    """(N,) whether an object the LiDAR measured stands slantwise to the path, as one that turns across it does. Of what
-    drives along, the nearest face says better where it is: how long it is and how it is turned are known poorly."""
-    yaw = np.array([item.cuboid.yaw_rad if item.cuboid is not None else np.nan for item in items])
-    with np.errstate(invalid="ignore"):
-        return np.abs(np.sin(2.0 * (yaw - heading))) > _SLANTED
+@numba.njit(cache=True, nogil=True)
+def _against(rows, center, left, right, half_width, profile, step, overlap, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(N, 11) of (N, 14) rows as ``_numbers`` gives them: distances from the centre to the left and to the right edge
+    there, sideways speed, then the numbers of ``Place`` as far as ``sigma_m``. half_width: of a path that has no edges
+    of its own, else 0."""
+    outlines = _outlines(rows)
+    aside, reached = nearest(center, outlines)
+    out = np.empty((len(rows), 11))
+    for n in range(len(rows)):
+        offsets, ahead = aside[5 * n : 5 * n + 5], reached[5 * n]
+        near_x, near_y = outlines[5 * n, 0], outlines[5 * n, 1]
+        k = min(max(int(ahead / step), 0), len(center) - 2)
+        heading = np.arctan2(center[k + 1, 1] - center[k, 1], center[k + 1, 0] - center[k, 0])
+        cos, sin = np.cos(heading), np.sin(heading)
+        # Of what drives along, the nearest face says where it is: how long it is and how it is turned are known poorly.
+        # What stands slantwise to the path, as one that turns across it does, reaches as far as its far corners.
+        ends = offsets[1:] if abs(np.sin(2.0 * (rows[n, 8] - heading))) > _SLANTED else offsets[1:3]
+        low, high = ends.min(), ends.max()
+        half_left = half_width + np.hypot(left[k, 0] - center[k, 0], left[k, 1] - center[k, 1])
+        half_right = half_width + np.hypot(right[k, 0] - center[k, 0], right[k, 1] - center[k, 1])
+        spare = 0.5 * (high - low) - min(overlap, 0.5 * (high - low))
+        out[n, 0], out[n, 1] = half_left, half_right
+        vx, vy = rows[n, 9], rows[n, 10]
+        # the path lies still on the ground: over ground one that follows its bend does not move sideways; where the own
+        # speed is not known, relative to ego and its x axis
+        along, across = vx + speed - yaw_rate * near_y, vy + yaw_rate * near_x
+        out[n, 2] = across * cos - along * sin if ego_known else vy
+        out[n, 3], out[n, 4], out[n, 5], out[n, 6] = offsets[0], ahead, low, high
+        out[n, 7] = 0.5 * (low + high)
+        out[n, 8], out[n, 9] = half_left + spare, half_right + spare
+        out[n, 10] = np.hypot(profile[k], _sigma_m(near_x, near_y, cos, sin, rows[n, 11], rows[n, 12], rows[n, 13]))
+    return out
 
 
-def _half_widths(path: Path, k: np.ndarray) -> tuple[F64, F64]:
-    """Distances from the centre to either edge at points k."""
-    if len(path.left) != len(path.center) or len(path.right) != len(path.center) or path.left is path.center:
-        usual = np.full(len(k), path.half_width_m)
-        return usual, usual
-    return np.hypot(*(path.left[k] - path.center[k]).T), np.hypot(*(path.right[k] - path.center[k]).T)
+@numba.njit(cache=True, nogil=True)
+def _outlines(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(5·N, 2): of each row the middle of the nearest face, and the four corners, nearest first."""
+    outlines = np.empty((5 * len(rows), 2))
+    for n in range(len(rows)):
+        corners = outlines[5 * n + 1 : 5 * n + 5]
+        for c in range(4):  # sorted in; equals keep their order
+            x, y, k = rows[n, 2 * c], rows[n, 2 * c + 1], c
+            while k > 0 and x * x + y * y < corners[k - 1, 0] ** 2 + corners[k - 1, 1] ** 2:
+                corners[k, 0], corners[k, 1] = corners[k - 1, 0], corners[k - 1, 1]
+                k -= 1
+            corners[k, 0], corners[k, 1] = x, y
+        outlines[5 * n, 0] = 0.5 * (corners[0, 0] + corners[1, 0])
+        outlines[5 * n, 1] = 0.5 * (corners[0, 1] + corners[1, 1])
+    return outlines
 
 
-def _sigmas_m(items: Sequence[FusedObject], near: F64, heading: F64) -> F64:
-    """(N,) of the objects' places across the path. A wrong distance moves one along the line of sight, which in a bend
-    is not the way the path goes there. near: (N, 2) middles of their nearest faces."""
-    by_camera = np.array([item.source == "V" for item in items])
-    carried = np.array([item.carried for item in items])
-    along = np.array([item.distance_sigma_m or 0.0 for item in items])
-    distance = np.maximum(np.hypot(*near.T), 0.1)
-    slant = np.abs(near[:, 1] * np.cos(heading) - near[:, 0] * np.sin(heading)) / distance
-    boxed = BEARING_SIGMA_RAD * distance * np.where(carried, 2.0, 1.0)
-    # while a cluster is carried its sigma grows, to either side as much as ahead
-    clustered = np.hypot(LIDAR_SIDEWAYS_SIGMA_M, np.where(carried, along, 0.0))
-    return np.hypot(along * slant, np.where(by_camera, boxed, clustered))
-
-
-def _sideways_mps(items: Sequence[FusedObject], near: F64, heading: F64, ego: EgoState | None) -> F64:
-    """(N,) speeds to the left of the path, which lies still on the ground: over ground, so that a car that follows the
-    bend has none; NaN where a velocity is not known. Without ego speed, relative to ego and its x axis."""
-    velocity = np.array([item.velocity_mps or (np.nan, np.nan) for item in items])
-    if ego is None:
-        return velocity[:, 1]
-    turning = usable_rate(ego) or 0.0
-    vx = velocity[:, 0] + ego.speed_mps - turning * near[:, 1]
-    vy = velocity[:, 1] + turning * near[:, 0]
-    return np.asarray(vy * np.cos(heading) - vx * np.sin(heading))
+@numba.njit(cache=True, nogil=True)
+def _sigma_m(near_x, near_y, cos, sin, distance_sigma, by_camera, carried):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Of an object's place across the path. A wrong distance moves it along the line of sight, which in a bend is not
+    the way the path goes there."""
+    distance = max(np.hypot(near_x, near_y), 0.1)
+    slant = abs(near_y * cos - near_x * sin) / distance
+    if by_camera:
+        aside = BEARING_SIGMA_RAD * distance * (2.0 if carried else 1.0)
+    else:  # while a cluster is carried its sigma grows, to either side as much as ahead
+        aside = np.hypot(LIDAR_SIDEWAYS_SIGMA_M, distance_sigma if carried else 0.0)
+    return np.hypot(distance_sigma * slant, aside)
