@@ -27,7 +27,7 @@ from app.showing import Showing
 from app.snapshot import Notice, Snapshot
 from pipeline.params import Params
 from pipeline.run import Detectors, Sensors
-from pipeline.sources.base import AnySource, Source, SourceError, is_live_source, is_simulated
+from pipeline.sources.base import AnySource, Source, SourceError, is_live_source
 from pipeline.step import warm_up
 
 logger = logging.getLogger("cipv.engine")
@@ -65,7 +65,7 @@ class Engine:
         self._open_source = open_source
         self._sensors: Sensors = sensors
         self._detections = DetectionCache()
-        self.drives = Drives(_recordings_of(open_source), self._detections)
+        self.drives = Drives(self._detections)
         self.desk = desk or RecordingDesk()
         self._whole_drives = whole_drives
         self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every)
@@ -174,10 +174,7 @@ class Engine:
             return LivePlayer(LiveLine(source, detectors, self._sensors), self.control, self.drives, self.desk)
         recording = cast("Source", source)
         line = Line(recording, detectors, self._detections, self._sensors, self.drives.state_before)
-        recipe = None
-        if self._whole_drives:
-            simulated = is_simulated(recording)
-            recipe = Recipe(recording.uri, len(recording), line.timeline_s, detectors, self._sensors, simulated)
+        recipe = Recipe(recording, line.timeline_s, detectors, self._sensors) if self._whole_drives else None
         return RecordedPlayer(line, self.control, self.drives, recipe, self.desk)
 
     def _close(self) -> None:
@@ -230,11 +227,6 @@ class Engine:
                 notices=tuple(n for n in shown.notices if n.level != "error"),
             )
         self._showing.publish(shown)
-
-
-def _recordings_of(open_source: OpenSource) -> Callable[[str], Source]:
-    """Opens again what was opened as a recording before."""
-    return lambda uri: cast("Source", open_source(uri))
 
 
 def _first_line(error: BaseException) -> str:

@@ -19,6 +19,7 @@ from app.server import DEFAULT_PORT, serve
 from pipeline.run import detector_for, lanes_for
 from pipeline.sources import open_any
 from pipeline.sources.along_route import along_route
+from pipeline.sources.base import AnySource
 
 if TYPE_CHECKING:
     from app.rerun_feed import RerunFeed
@@ -86,11 +87,21 @@ class Serve:
     """The road to be driven, on which GNSS places the car: CSV, GPX, an NMEA log or an earlier session"""
 
     def __call__(self) -> int:
+        return self.server.serve(self.engine())
+
+    def engine(self) -> Engine:
+        """The engine on the source, not started. BadInput when it cannot be opened."""
         params = self.line.parameters()
         route = planned(self.route)
-        open_any(self.source, rings=self.rings)  # a typing mistake is said here, not on the page
-        engine = Engine(
-            lambda uri: along_route(open_any(uri, rings=self.rings), route),
+        # opened here, so that a typing mistake is not said on the page; a large recording is not opened twice
+        opened = {self.source: open_any(self.source, rings=self.rings)}
+
+        def open_again(uri: str) -> AnySource:
+            source = opened.pop(uri, None)
+            return along_route(source if source is not None else open_any(uri, rings=self.rings), route)
+
+        return Engine(
+            open_again,
             lambda source: detector_for(source, self.line.detector),
             params,
             preset=self.line.preset,
@@ -101,7 +112,6 @@ class Serve:
             open_lanes=lambda source: lanes_for(source, self.line.lanes),
             lanes_every=self.line.every(),
         )
-        return self.server.serve(engine)
 
 
 @dataclass(frozen=True)

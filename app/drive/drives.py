@@ -15,7 +15,6 @@ from app.drive.turn import Turn
 from app.line import DetectionCache
 from pipeline.errors import BadInput
 from pipeline.params import Params
-from pipeline.sources.base import Source
 from pipeline.step import State, warm_up
 from pipeline.types import Frame
 
@@ -48,10 +47,9 @@ class Drives:
     """``open`` a recording, ``want`` parameters; read ``recording``. on_change is called on any thread when ``state``
     changed, at most every 0.25 s while a run goes on."""
 
-    def __init__(self, open_source: Callable[[str], Source], detections: DetectionCache) -> None:
+    def __init__(self, detections: DetectionCache) -> None:
         self.turn = Turn()
         self.on_change: Callable[[], object] = lambda: None
-        self._open_source = open_source
         self._detections = detections
         self._condition = threading.Condition(threading.RLock())
         self._recording: Recording | None = None
@@ -103,9 +101,7 @@ class Drives:
         """Another recording, or none."""
         with self._condition:
             number = self._recording.book.next_number if self._recording else 1
-            self._recording = (
-                Recording(recipe, self._open_source, self._detections, number) if recipe is not None else None
-            )
+            self._recording = Recording(recipe, self._detections, number) if recipe is not None else None
             self.changed()
 
     def want(self, params: Params, preset: str) -> None:

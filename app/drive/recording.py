@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +14,7 @@ from pipeline.params import Params
 from pipeline.recording.rewrite import Progress
 from pipeline.recording.save import save
 from pipeline.run import Detectors, Sensors, detect, only
-from pipeline.sources.base import Source, TruthObject
+from pipeline.sources.base import Source, TruthObject, is_simulated
 from pipeline.step import State, step
 from pipeline.types import F64, Frame
 
@@ -26,31 +24,37 @@ Truth = tuple[TruthObject, ...] | None
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """What every run of a recording is made from. timeline_s: (total,) each frame's place on the playback timeline.
-    simulated: its truth is the simulator's."""
+    """What every run of a recording is made from. source: the one that is shown too, which any thread may read.
+    timeline_s: (total,) each frame's place on the playback timeline."""
 
-    uri: str
-    total: int
+    source: Source
     timeline_s: F64
     detectors: Detectors
     sensors: Sensors
-    simulated: bool = False
+
+    @property
+    def uri(self) -> str:
+        return self.source.uri
+
+    @property
+    def total(self) -> int:
+        return len(self.timeline_s)
+
+    @property
+    def simulated(self) -> bool:
+        """Whether its truth is the simulator's."""
+        return is_simulated(self.source)
 
 
 class Recording:
-    """It opens the source a second time: the one that is shown may be reading at the same moment."""
+    """Frames are read from the source that is shown, also at the same moment."""
 
-    def __init__(
-        self, recipe: Recipe, open_source: Callable[[str], Source], detections: DetectionCache, next_number: int
-    ) -> None:
+    def __init__(self, recipe: Recipe, detections: DetectionCache, next_number: int) -> None:
         self.recipe = recipe
         self.book = RunBook(lambda number, params, preset: DriveRun(number, params, preset, recipe.total), next_number)
         self.inputs = InputStore()
-        self._open_source = open_source
-        self._source: Source | None = None
         self._ask = detections.asker(recipe.uri)
         self._truths: dict[int, Truth] = {}
-        self._reading = threading.Lock()
 
     def advance(self, run: DriveRun) -> None:
         """The next frame of a run. Whatever a source or a network raises."""
@@ -84,18 +88,25 @@ class Recording:
 
     def as_read(self, index: int) -> Frame:
         """A frame as its source gives it: no detector has looked at it."""
-        with self._reading:
-            return self._opened().frame(index)
+        return self.recipe.source.frame(index)
+
+    def names(self) -> tuple[str, ...]:
+        """What the recording calls its frames; those that nobody saw yet are read."""
+        return tuple(self.inputs.name(index) or self.as_read(index).name for index in range(self.recipe.total))
+
+    @property
+    def t_ns(self) -> tuple[int, ...]:
+        """The ticks of all frames."""
+        return tuple(self.recipe.source.t_ns(index) for index in range(self.recipe.total))
 
     def save(self, path: Path, first: int, last: int, progress: Progress) -> None:
         """Frames as a session file, with all that the source has."""
-        save(self._open_source(self.recipe.uri), path, first, last, progress)
+        save(self.recipe.source, path, first, last, progress)
 
     def truth(self, index: int) -> Truth:
         """The labelled objects of a frame; null when it is not labelled."""
         if index not in self._truths:
-            with self._reading:
-                self._truths[index] = self._opened().truth(index)
+            self._truths[index] = self.recipe.source.truth(index)
         return self._truths[index]
 
     def digest(self, params: Params) -> str:
@@ -109,8 +120,3 @@ class Recording:
         for between in range(kept.at, index):
             state, _ = step(state, self.input(between), params)
         return state
-
-    def _opened(self) -> Source:
-        if self._source is None:
-            self._source = self._open_source(self.recipe.uri)
-        return self._source

@@ -23,7 +23,8 @@ from pipeline.recording.directory import RECORD_HEAD, ChunkEntry, Unreadable, re
 from pipeline.recording.messages import Damaged
 
 _LARGEST_CHUNK_BYTES = 1 << 30
-_CHUNKS_HELD = 4
+_CHUNKS_HELD = 8
+"""For two places that are read by turns, what is shown and what is computed beside it; a frame may lie in three."""
 
 
 class NotMcap(BadInput):

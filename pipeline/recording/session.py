@@ -199,16 +199,18 @@ class SessionSource:
         """One picture may serve several ticks, and is the same object then."""
         if ref is None:
             return None
-        if self._picture is None or self._picture[0] != ref:
-            self._picture = ref, picture_from(self.file.message(topics.IMAGE, ref.at_ns).data, ref.t_ns)
-        return self._picture[1]
+        held = self._picture
+        if held is None or held[0] != ref:
+            held = self._picture = ref, picture_from(self.file.message(topics.IMAGE, ref.at_ns).data, ref.t_ns)
+        return held[1]
 
     def _read_route(self, at_ns: int | None) -> Route | None:
         if at_ns is None:
             return None
-        if self._route is None or self._route[0] != at_ns:
-            self._route = at_ns, route_from(self.file.message(topics.ROUTE, at_ns).data)
-        return self._route[1]
+        held = self._route
+        if held is None or held[0] != at_ns:
+            held = self._route = at_ns, route_from(self.file.message(topics.ROUTE, at_ns).data)
+        return held[1]
 
 
 def _params_from(data: bytes) -> Params:

@@ -30,7 +30,8 @@ class TruthObject:
 
 class Source(Protocol):
     """A recording that can be read anywhere. Reading a frame never raises for what is wrong with that frame's data:
-    the missing branch is null and ``Frame.notes`` says why.
+    the missing branch is null and ``Frame.notes`` says why. Any thread, and several at once: what is shown and what is
+    computed beside it are read from one.
 
     uri: what was opened, as a person typed it. title: short, for a heading. rate_hz: nominal frames per second.
     notes: what a person should know about the whole (for example how many rings remain).

@@ -1,4 +1,4 @@
-"""A video file whose pictures can be had by their time, anywhere, without keeping more than one."""
+"""A video file whose pictures can be had by their time, anywhere, without keeping any."""
 
 from __future__ import annotations
 
@@ -18,40 +18,68 @@ SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".mjpeg", ".ts")
 _NS = 1_000_000_000
 _DECODE_ON_NS = 2 * _NS
 """A picture this little later is reached sooner by decoding on than by seeking."""
+_PLACES = 2
+"""What is shown, and what is computed beside it."""
 
 
 class VideoFile:
     """times_ns: (N,) int64, ascending, of every picture since the first. Times come from the container; where it has
-    none, the pictures are evenly spaced at its rate."""
+    none, the pictures are evenly spaced at its rate. Any thread: two that read on at different places do not make each
+    other seek."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._lock = Lock()
-        self._frames: Iterator[av.VideoFrame] | None = None
-        self._container: av.container.InputContainer | None = None
-        self._at_ns = 0
         try:
             with av.open(str(path)) as container:
-                stamps, self._tick_ns = _stamps(container)
+                stamps, tick_ns = _stamps(container)
         except (av.FFmpegError, OSError, ValueError) as error:
             raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
         if not len(stamps):
             raise SourceError(f"{path.name}: no pictures in it")
-        self._first_stamp = int(stamps[0])
-        self.times_ns: Times = np.rint((stamps - stamps[0]) * self._tick_ns).astype(np.int64)
+        first = int(stamps[0])
+        self.times_ns: Times = np.rint((stamps - first) * tick_ns).astype(np.int64)
+        self._lock = Lock()
+        self._places = [_Place(path, first, tick_ns) for _ in range(_PLACES)]  # the one used last stands last
 
     def picture(self, index: int) -> U8:
         """(H, W, 3) uint8 blue green red of one of ``times_ns``. SourceError when it cannot be decoded."""
         wanted_ns = int(self.times_ns[index])
         with self._lock:
+            place = next((each for each in self._places if each.is_near(wanted_ns)), self._places[0])
+            self._places.remove(place)
+            self._places.append(place)
+        try:
+            return place.picture(wanted_ns)
+        except (av.FFmpegError, OSError, ValueError, StopIteration) as error:
+            raise SourceError(f"{self.path.name}: picture {index} cannot be decoded: {reason_of(error)}") from None
+
+
+class _Place:
+    """Where one reader is in the file. seeks: how often it had to go somewhere else."""
+
+    def __init__(self, path: Path, first_stamp: int, tick_ns: float) -> None:
+        self.seeks = 0
+        self._path, self._first_stamp, self._tick_ns = path, first_stamp, tick_ns
+        self._lock = Lock()
+        self._frames: Iterator[av.VideoFrame] | None = None
+        self._container: av.container.InputContainer | None = None
+        self._at_ns = 0
+
+    def is_near(self, wanted_ns: int) -> bool:
+        """Whether decoding on leads there soon."""
+        return self._frames is not None and self._at_ns < wanted_ns <= self._at_ns + _DECODE_ON_NS
+
+    def picture(self, wanted_ns: int) -> U8:
+        """The picture of a time. Whatever the library raises; the next one is then read from the file anew."""
+        with self._lock:
             try:
                 return self._decode(wanted_ns)
-            except (av.FFmpegError, OSError, ValueError, StopIteration) as error:
+            except BaseException:
                 self._close()
-                raise SourceError(f"{self.path.name}: picture {index} cannot be decoded: {reason_of(error)}") from None
+                raise
 
     def _decode(self, wanted_ns: int) -> U8:
-        if self._frames is None or not self._at_ns < wanted_ns <= self._at_ns + _DECODE_ON_NS:
+        if not self.is_near(wanted_ns):
             self._seek(wanted_ns)
         assert self._frames is not None
         half_tick_ns = self._tick_ns / 2
@@ -64,8 +92,9 @@ class VideoFile:
         raise ValueError("the video ends before it")
 
     def _seek(self, wanted_ns: int) -> None:
+        self.seeks += 1
         if self._container is None:
-            self._container = av.open(str(self.path))
+            self._container = av.open(str(self._path))
         stream = self._container.streams.video[0]
         self._container.seek(self._first_stamp + int(wanted_ns / self._tick_ns), stream=stream)
         self._frames = self._container.decode(stream)

@@ -3,7 +3,7 @@ messages: then ROS's own serve, and those of Velodyne packets."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from pathlib import Path
 from typing import Any, NamedTuple
 from weakref import finalize
@@ -43,7 +43,7 @@ class Bag:
 
     def messages(
         self, topics: list[str], at_ns: int | None = None, onward: bool = False
-    ) -> Iterator[tuple[str, int, Any]]:
+    ) -> Generator[tuple[str, int, Any], None, None]:
         """(topic, when it was recorded, message) of all messages, or of those recorded at that very moment (onward: or
         later), in order.
 

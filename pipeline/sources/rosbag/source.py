@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+from itertools import islice
 from threading import Lock
 from typing import Any
 
@@ -60,9 +62,8 @@ class RosbagSource:
 
     def frame(self, index: int) -> Frame:
         t_ns, notes = self.t_ns(index), list[str]()
-        with self._lock:  # a bag is read at one place at a time
-            sweep = self._sweep(index, t_ns, notes)
-            picture = self._picture(t_ns, notes)
+        sweep = self._sweep(index, t_ns, notes)
+        picture = self._picture(t_ns, notes)
         return Frame(
             index,
             f"{index:06d}",
@@ -135,9 +136,9 @@ class RosbagSource:
         try:
             if self._index.is_packets:
                 return self._packets_sweep(recorded_ns, t_ns, notes)
-            for _, at_ns, message in self._bag.messages([lidar.topic], recorded_ns):
-                if messages.stamp_ns(message, at_ns)[0] == t_ns:
-                    return messages.cloud(message, t_ns, notes).sweep(t_ns, self._T_ego_lidar)
+            message = self._message(lidar, recorded_ns, t_ns)
+            if message is not None:
+                return messages.cloud(message, t_ns, notes).sweep(t_ns, self._T_ego_lidar)
             notes.append("LiDAR: its message is not there any more")
         except (BagError, messages.BadMessage) as error:
             notes.append(f"LiDAR: {error}")
@@ -148,12 +149,12 @@ class RosbagSource:
         lidar = self._index.lidar
         assert lidar is not None
         decoder, found = Vlp16Decoder(self._T_ego_lidar, keeps_partial=True), list[Sweep]()
-        for count, (_, at_ns, message) in enumerate(self._bag.messages([lidar.topic], recorded_ns, onward=True)):
+        with self._lock, closing(self._bag.messages([lidar.topic], recorded_ns, onward=True)) as read:
+            scans = list(islice(read, _MESSAGES_A_SWEEP))
+        for _, at_ns, message in scans:
             for data, received_ns in messages.packets(message):
                 sweep = decoder.push(data, received_ns or at_ns)
                 found += [sweep] if sweep is not None else []
-            if count + 1 >= _MESSAGES_A_SWEEP:
-                break
         last = decoder.flush()
         found += [last] if last is not None else []
         sweep = min(found, key=lambda sweep: abs(sweep.t_ns - t_ns), default=None)
@@ -172,12 +173,22 @@ class RosbagSource:
             return None
         wanted_ns = int(camera.times_ns[index])
         try:
-            for _, at_ns, message in self._bag.messages([camera.topic], int(camera.recorded_ns[index])):
-                if messages.stamp_ns(message, at_ns)[0] == wanted_ns:
-                    return messages.picture(message, wanted_ns)
+            message = self._message(camera, int(camera.recorded_ns[index]), wanted_ns)
+            if message is not None:
+                return messages.picture(message, wanted_ns)
             notes.append("camera: its message is not there any more")
         except (BagError, messages.BadMessage) as error:
             notes.append(f"camera: {error}")
+        return None
+
+    def _message(self, stream: Stream, recorded_ns: int, t_ns: int) -> Any:
+        """The message that was written then and is of that time; null when there is none. BagError when the bag is
+        damaged there."""
+        # a bag is read at one place at a time
+        with self._lock, closing(self._bag.messages([stream.topic], recorded_ns)) as found:
+            for _, at_ns, message in found:
+                if messages.stamp_ns(message, at_ns)[0] == t_ns:
+                    return message
         return None
 
 

@@ -47,8 +47,8 @@ def clip() -> Clip:
     """Eight frames out of the middle; no run of the whole drive has been made yet."""
     source = Recording()
     times = timeline_s([source.t_ns(i) for i in range(len(source))], source.rate_hz)
-    recipe = Recipe(source.uri, len(source), times, Detectors(CountingDetector()), "both")
-    recording = DriveRecording(recipe, lambda _: Recording(), DetectionCache(), 1)
+    recipe = Recipe(source, times, Detectors(CountingDetector()), "both")
+    recording = DriveRecording(recipe, DetectionCache(), 1)
     return Clip(recording, Params(), FIRST, LAST, Turn(), source.title, source.rate_hz)
 
 
@@ -129,7 +129,7 @@ def test_what_is_no_clip_is_refused(clip: Clip, first: int, last: int):
 
 
 def test_a_clip_that_is_too_long_is_refused(clip: Clip):
-    clip.recording.recipe.__dict__["total"] = MOST_FRAMES + 1
+    clip.recording.recipe.__dict__["timeline_s"] = np.arange(MOST_FRAMES + 1) / 10.0
     with pytest.raises(BadInput, match="at most"):
         submit(Jobs(), Clip(**{**vars(clip), "first": 0, "last": MOST_FRAMES}), "csv")
 
@@ -173,8 +173,8 @@ def test_a_real_clip_looks_as_it_should(data_dir: Path):
     source = open_source(f"astyx:{data_dir / 'astyx'}")
     detector = detector_for(source, str(data_dir / "models" / "yolox_nano.onnx"))
     times = timeline_s([source.t_ns(i) for i in range(len(source))], source.rate_hz)
-    recipe = Recipe(source.uri, len(source), times, Detectors(detector), "both")
-    recording = DriveRecording(recipe, lambda _: source, DetectionCache(), 1)
+    recipe = Recipe(source, times, Detectors(detector), "both")
+    recording = DriveRecording(recipe, DetectionCache(), 1)
     frame = recording.frame(17)
     _, result = step(State(), frame, Params())
     drawn = draw_frame(frame, result, Params())

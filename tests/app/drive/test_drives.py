@@ -30,16 +30,16 @@ def with_hits(hits: int) -> Params:
 
 def recipe(recording: Recording, detector: CountingDetector | None = None) -> Recipe:
     times = timeline_s([recording.t_ns(i) for i in range(len(recording))], recording.rate_hz)
-    return Recipe(recording.uri, len(recording), times, Detectors(detector or CountingDetector()), "both")
+    return Recipe(recording, times, Detectors(detector or CountingDetector()), "both")
 
 
 def opened(recording: Recording, detector: CountingDetector | None = None) -> DriveRecording:
-    return DriveRecording(recipe(recording, detector), lambda _: recording, DetectionCache(), 1)
+    return DriveRecording(recipe(recording, detector), DetectionCache(), 1)
 
 
 @pytest.fixture
 def drives() -> Iterator[Drives]:
-    drives = Drives(lambda _: Recording(), DetectionCache())
+    drives = Drives(DetectionCache())
     yield drives
     drives.stop()
 
@@ -131,18 +131,14 @@ def test_going_back_to_parameters_of_before_computes_nothing_again(drives: Drive
 
 
 def test_a_frame_that_cannot_be_read_fails_the_run_and_says_which(drives: Drives, caplog: pytest.LogCaptureFixture):
-    broken = Drives(lambda _: Recording(broken=frozenset({7})), DetectionCache())
-    broken.start()
-    try:
-        broken.open(recipe(Recording()))
-        broken.want(Params(), "default")
-        failed = wait_done(broken)
-        assert (failed.done, broken.state.phase) == (7, "failed")
-        assert "frame 7 is not there" in broken.state.note
-        assert broken.state_before(5, Params()) is not None, "what it has come to stays"
-        assert broken.state_before(9, Params()) is None
-    finally:
-        broken.stop()
+    drives.start()
+    drives.open(recipe(Recording(broken=frozenset({7}))))
+    drives.want(Params(), "default")
+    failed = wait_done(drives)
+    assert (failed.done, drives.state.phase) == (7, "failed")
+    assert "frame 7 is not there" in drives.state.note
+    assert drives.state_before(5, Params()) is not None, "what it has come to stays"
+    assert drives.state_before(9, Params()) is None
 
 
 def test_without_a_recording_there_is_nothing_to_say(drives: Drives):

@@ -40,3 +40,12 @@ def test_a_video_that_goes_away(tmp_path: Path) -> None:
     (tmp_path / "a.avi").unlink()
     with pytest.raises(SourceError, match=r"a\.avi: picture 1 cannot be decoded"):
         video.picture(1)
+
+
+def test_two_who_read_by_turns_do_not_make_each_other_seek(tmp_path: Path) -> None:
+    write_video(tmp_path / "a.mkv", 100, rate=25, codec="mpeg4", step=2)
+    video = VideoFile(tmp_path / "a.mkv")
+    for index in range(20):
+        for at in (index, index + 80):
+            assert np.median(video.picture(at)) == pytest.approx(2 * at, abs=8)
+    assert sum(place.seeks for place in video._places) == 2
