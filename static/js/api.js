@@ -3,8 +3,18 @@
 /** Every page of the server has the same root, wherever it lies itself. */
 const ROOT = new URL("../", import.meta.url);
 
+/** What the server refused, in its own sentence. */
+export class Refused extends Error {
+  /** @param {number} status @param {any} answer */
+  constructor(status, answer) {
+    super(answer?.detail ?? `the server answered ${status}`);
+    this.status = status;
+    this.answer = answer;
+  }
+}
+
 /**
- * The server's answer; rejects with the server's own sentence.
+ * The server's answer; rejects with `Refused`, or a TypeError when it could not be reached.
  * @param {string} path @param {string} [method] @param {unknown} [body] @returns {Promise<any>}
  */
 export async function request(path, method = "GET", body = undefined) {
@@ -16,7 +26,7 @@ export async function request(path, method = "GET", body = undefined) {
   }
   const response = await fetch(new URL(path, ROOT), options);
   const answer = await response.json().catch(() => null);
-  if (!response.ok) throw new Error(answer?.detail ?? `the server answered ${response.status}`);
+  if (!response.ok) throw new Refused(response.status, answer);
   return answer;
 }
 

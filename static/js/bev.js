@@ -17,6 +17,8 @@ import { Viewport } from "./viewport.js";
 
 /** @typedef {import("./types.js").Frame} Frame */
 /** @typedef {import("./types.js").FusedObject} FusedObject */
+/** @typedef {import("./viewport.js").Place} Place */
+/** @typedef {import("./viewport.js").Drag} Drag */
 
 const RINGS_M = [10, 20, 30, 40, 50, 60, 70, 80, 100, 120];
 const PICK_PX = 8;
@@ -27,24 +29,39 @@ const raster = new DotRaster();
 let surface;
 /** @type {Viewport} */
 let view;
+/** A mode that lays its own drawing over the plan, and whose hand goes first.
+ * @typedef {{isOn: () => boolean, draw: (ctx: CanvasRenderingContext2D, view: Viewport, labels: Labels) => void,
+ *   takes: (from: Place, scale: number) => Drag|null, clicked: (place: Place) => void, cursorAt: (place: Place, scale: number) => string}} PlanMode */
+/** @type {PlanMode|null} */
+let mode = null;
+
+/** @param {PlanMode} added */
+export function addMode(added) {
+  mode = added;
+}
+
+/** The mode, while it is on. */
+const modeNow = () => (mode?.isOn() ? mode : null);
 
 export function setUp() {
-  const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "tape"], draw);
+  const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "tape", "labeling", "labels", "labelFrames", "track", "draft"], draw);
   surface = new Surface(canvas, invalidate);
   view = new Viewport(canvas, {
     changed: () => {
       reflect();
       invalidate();
     },
-    clicked: (place) => (get("taping") ? set("tape", null) : select(objectAt(place))),
-    measures: (event) => get("taping") === true || event.shiftKey,
-    measured: (from, to) => measure({ ...from, z: null, u: null, v: null }, { ...to, z: null, u: null, v: null }),
+    clicked: (place) => (get("taping") ? set("tape", null) : modeNow() ? modeNow()?.clicked(place) : select(objectAt(place))),
+    takes: (from, event) => (get("taping") || event.shiftKey ? measuring(from) : modeNow()?.takes(from, view.scale) ?? null),
   });
-  followHover(canvas, (u, v) => objectAt(view.place(u, v)));
+  followHover(canvas, (u, v) => (modeNow() ? null : objectAt(view.place(u, v))), (u, v) => modeNow()?.cursorAt(view.place(u, v), view.scale) ?? "");
   const views = /** @type {const} */ ([["ahead", "Ahead", "The road ahead (double click)"], ["around", "Around", "50 m on every side"]]);
   for (const [name, label, title] of views) addTool("plan", el("button", { type: "button", textContent: label, title, data: { view: name }, onclick: () => view.show(name) }));
   reflect();
 }
+
+/** @param {Place} from @returns {Drag} */
+const measuring = (from) => ({ moved: (to) => measure({ ...from, z: null, u: null, v: null }, { ...to, z: null, u: null, v: null }) });
 
 function reflect() {
   for (const button of document.querySelectorAll(".view-tools [data-view]")) press(button, /** @type {HTMLElement} */ (button).dataset.view === view.view);
@@ -60,7 +77,8 @@ function draw() {
     if (layers.planPath) drawPath(ctx, view, frame.result.path);
     if (layers.planPoints) drawPoints(ctx, frame);
     if (layers.planPath && frame.display.plan_lanes) drawLanes(ctx, frame.display.plan_lanes);
-    drawObjects(ctx, frame, layers, labels);
+    if (!modeNow() || get("labeling")?.hasObjects) drawObjects(ctx, frame, layers, labels);
+    modeNow()?.draw(ctx, view, labels);
   }
   drawEgo(ctx);
   const tape = get("tape");

@@ -27,12 +27,12 @@ const raster = new DotRaster();
 let surface;
 /** Where the picture lies in the pane. @type {Place} */
 let laid = { x: 0, y: 0, scale: 1 };
-/** @type {Layer[]} */
-const extra = [];
+/** Under the points and boxes, and over them. @type {{under: Layer[], over: Layer[]}} */
+const extra = { under: [], over: [] };
 
-/** Have something drawn over the picture and under points and boxes. @param {Layer} draw */
-export function addLayer(draw) {
-  extra.push(draw);
+/** Have something drawn over the picture. @param {Layer} draw @param {keyof typeof extra} [where] of points and boxes */
+export function addLayer(draw, where = "under") {
+  extra[where].push(draw);
 }
 
 /** Where the picture lies: canvas pixel = x + u·scale, for a pixel u of the sent picture. @returns {Place} */
@@ -42,11 +42,11 @@ const X = (/** @type {number} */ u) => laid.x + u * laid.scale;
 const Y = (/** @type {number} */ v) => laid.y + v * laid.scale;
 
 export function setUp() {
-  const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "align", "tape"], draw);
+  const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "align", "tape", "labeling", "track", "draft", "projected"], draw);
   surface = new Surface(canvas, invalidate);
   showPictureAt(canvas.clientWidth * devicePixelRatio); // it is no wider than its pane
-  canvas.addEventListener("click", (event) => !get("align")?.on && !get("taping") && select(objectAt(event.offsetX, event.offsetY)));
-  followHover(canvas, (u, v) => (get("align")?.on ? null : objectAt(u, v)));
+  canvas.addEventListener("click", (event) => !get("align")?.on && !get("labeling")?.on && !get("taping") && select(objectAt(event.offsetX, event.offsetY)));
+  followHover(canvas, (u, v) => (get("align")?.on || get("labeling")?.on ? null : objectAt(u, v)), () => (get("labeling")?.tool ? "crosshair" : ""));
   followTape();
   on(["taping"], () => (canvas.style.cursor = get("taping") ? "crosshair" : ""));
 }
@@ -68,13 +68,14 @@ function draw() {
   if (frame.bitmap) ctx.drawImage(frame.bitmap, laid.x, laid.y, width * laid.scale, height * laid.scale);
   else message(ctx, "The picture of this frame could not be decoded");
   ctx.globalAlpha = 1;
-  for (const layer of extra) layer(ctx, frame, laid);
+  for (const layer of extra.under) layer(ctx, frame, laid);
   if (blend === null) drawBelief(ctx, frame);
   else {
     ctx.globalAlpha = Math.min(1, 2 * blend);
     drawPoints(ctx, frame);
     ctx.globalAlpha = 1;
   }
+  for (const layer of extra.over) layer(ctx, frame, laid);
   ctx.restore();
 }
 
@@ -85,13 +86,14 @@ function drawBelief(ctx, frame) {
   if (layers.points) drawPoints(ctx, frame);
   if (layers.lanes && display.lanes) for (const lane of [display.lanes.left, display.lanes.right]) drawLane(ctx, lane);
   const labels = new Labels(ctx, surface.width, laid.y, laid.y + (frame.picture?.height ?? 0) * laid.scale);
-  const chosen = result.objects.find(({ id }) => id === get("selection"));
+  const hasObjects = !get("labeling")?.on || get("labeling")?.hasObjects;
+  const chosen = hasObjects ? result.objects.find(({ id }) => id === get("selection")) : undefined;
   if (chosen) {
     for (const [boxes, role] of /** @type {const} */ ([[display.lidar_boxes, "lidar"], [display.vision_boxes, "vision"]])) {
       if (boxes[chosen.id]) drawBox(ctx, boxes[chosen.id], onPicture(role), 1.5, X, Y);
     }
   }
-  drawObjects(ctx, frame, layers, labels, X, Y);
+  if (hasObjects) drawObjects(ctx, frame, layers, labels, X, Y);
   if (chosen) drawInPicture(ctx, frame, chosen, labels, X, Y);
   const tape = get("tape");
   if (tape?.from.u != null && tape.from.v != null && tape.to.u != null && tape.to.v != null) {
@@ -179,7 +181,7 @@ function followTape() {
   /** @type {import("./tape.js").Spot|null} */
   let from = null;
   canvas.addEventListener("pointerdown", (event) => {
-    if (get("align")?.on || !(get("taping") || event.shiftKey)) return;
+    if (get("align")?.on || !(get("taping") || (event.shiftKey && !get("labeling")?.on))) return;
     from = spotAt(event);
     if (from) canvas.setPointerCapture(event.pointerId);
     else set("tape", null);

@@ -23,7 +23,7 @@ export function show() {
 /** @param {import("./keymap.js").Group} group */
 function group({ title, bindings }) {
   return el("div", {}, el("h2", { textContent: title }),
-    ...bindings.map(({ shown, words }) => el("div", { class: "pair" }, el("kbd", { textContent: shown }), el("span", { textContent: words }))));
+    ...bindings.filter(({ words }) => words).map(({ shown, words }) => el("div", { class: "pair" }, el("kbd", { textContent: shown }), el("span", { textContent: words }))));
 }
 
 /** @param {string[]} colour */

@@ -3,8 +3,11 @@ import { kmh, num, signed } from "./format.js";
 import { get } from "./store.js";
 import { hideTip, tipAt } from "./tooltip.js";
 
-/** @param {HTMLCanvasElement} canvas @param {(u: number, v: number) => number|null} objectAt its id, by a pixel of the canvas */
-export function followHover(canvas, objectAt) {
+/**
+ * @param {HTMLCanvasElement} canvas @param {(u: number, v: number) => number|null} objectAt its id, by a pixel of the canvas
+ * @param {(u: number, v: number) => string} [cursorAt] the pointer's look where there is no object
+ */
+export function followHover(canvas, objectAt, cursorAt = () => "") {
   let asked = false;
   canvas.addEventListener("pointermove", (event) => {
     if (event.pointerType === "touch" || event.buttons || asked) return;
@@ -14,7 +17,7 @@ export function followHover(canvas, objectAt) {
       asked = false;
       const id = get("taping") ? null : objectAt(offsetX, offsetY);
       const item = get("frame")?.result.objects.find((object) => object.id === id);
-      canvas.style.cursor = get("taping") ? "crosshair" : item ? "pointer" : "";
+      canvas.style.cursor = get("taping") ? "crosshair" : item ? "pointer" : cursorAt(offsetX, offsetY);
       if (item) tipAt(clientX, clientY, wordsOf(item));
       else hideTip();
     });

@@ -2,13 +2,13 @@
 import { keymap } from "./keymap.js";
 
 export function setUp() {
-  const actions = new Map(keymap().flatMap(({ bindings }) => bindings.flatMap(({ keys, act }) => keys.map((key) => [key, act]))));
+  const bindings = keymap().flatMap((group) => group.bindings);
   document.addEventListener("keydown", (event) => {
     if (event.altKey || event.defaultPrevented || isTaken(event)) return;
-    const act = actions.get(nameOf(event));
-    if (!act) return;
+    const name = nameOf(event), binding = bindings.find(({ keys, isOn }) => keys.includes(name) && (isOn?.() ?? true));
+    if (!binding) return;
     event.preventDefault();
-    act();
+    binding.act();
   });
 }
 

@@ -5,6 +5,8 @@ import { toDifference, toEvent } from "./drive/jumps.js";
 import { seekTo } from "./drive/seek.js";
 import * as shuttle from "./drive/shuttle.js";
 import * as help from "./help.js";
+import { labelKeys } from "./labeling/keys.js";
+import * as labeling from "./labeling/mode.js";
 import * as sources from "./sources.js";
 import { get, set } from "./store.js";
 import { toggleTape } from "./tape.js";
@@ -17,7 +19,8 @@ import { grow, nextTab, toggle, toggleInspector, toggleTab } from "./workspace/p
 import { share } from "./workspace/share.js";
 import { toggleTheme } from "./workspace/theme.js";
 
-/** @typedef {{keys: string[], shown: string, words: string, act: () => void}} Binding  keys: as `nameOf` in keyboard.js gives them */
+/** keys: as `nameOf` in keyboard.js gives them; isOn: when it counts, of several of one key the first that does. A binding without words is said by another one.
+ * @typedef {{keys: string[], shown: string, words: string, act: () => unknown, isOn?: () => boolean}} Binding */
 /** @typedef {{title: string, bindings: Binding[]}} Group */
 
 /** @param {string} keys one or more, apart by spaces @param {string} shown @param {string} words @param {() => void} act @returns {Binding} */
@@ -26,6 +29,7 @@ const last = () => Math.max(0, (get("state")?.count ?? 1) - 1);
 
 /** @returns {Group[]} */
 export const keymap = () => [
+  ...labelKeys(),
   { title: "Playing", bindings: [
     key("Space", "Space", "play or pause", togglePlay),
     key("ArrowLeft", "←", "one frame back", () => playback({ step: -1 })),
@@ -68,9 +72,10 @@ export const keymap = () => [
     key("p", "P", "why and parameters", toggleInspector),
     key("g", "G", "measuring tape (also: drag with Shift)", toggleTape),
     key("a", "A", "align LiDAR and camera", toggleAlign),
+    key("Shift+L", "Shift L", "label: who leads, and where everybody is", labeling.toggle),
   ] },
   { title: "Everything else", bindings: [
-    key("Ctrl+z", "Ctrl Z", "undo a change of parameters", undo),
+    key("Ctrl+z", "Ctrl Z", "undo your last change, of labels or parameters", undo),
     key("Ctrl+Shift+Z Ctrl+y", "Ctrl Shift Z", "redo", redo),
     key("c", "C", "copy a link to what is shown", share),
     key("f", "F", "open a recording", sources.open),

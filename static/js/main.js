@@ -13,6 +13,7 @@ import * as shuttle from "./drive/shuttle.js";
 import { toEvent } from "./drive/jumps.js";
 import * as help from "./help.js";
 import * as keyboard from "./keyboard.js";
+import * as labeling from "./labeling/start.js";
 import * as layers from "./layers.js";
 import * as notices from "./notices.js";
 import * as objects from "./objects.js";
@@ -35,7 +36,7 @@ import * as theme from "./workspace/theme.js";
 
 for (const part of [theme, panes, gutters, layers, trails, three, seek, shuttle, drive, live, object]) part.setUp();
 for (const part of [banner, camera, bev, objects, why, timeline, exporting, transport, notices, vitals]) part.setUp();
-for (const part of [params, history, runs, align, sources, layouts, share, keyboard]) part.setUp();
+for (const part of [params, history, runs, align, labeling, sources, layouts, share, keyboard]) part.setUp();
 $("#help-button").addEventListener("click", help.show);
 $("#event-back").addEventListener("click", () => toEvent(-1));
 $("#event-next").addEventListener("click", () => toEvent(1));

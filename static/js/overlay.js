@@ -87,7 +87,7 @@ function drawHalo(ctx, [x1, y1, x2, y2], X, Y) {
 }
 
 /** @param {CanvasRenderingContext2D} ctx @param {Pixels} corners @param {string} tint @param {number} width @param {Axis} X @param {Axis} Y */
-function drawCuboid(ctx, corners, tint, width, X, Y) {
+export function drawCuboid(ctx, corners, tint, width, X, Y) {
   ctx.strokeStyle = tint;
   ctx.lineWidth = width;
   ctx.beginPath();

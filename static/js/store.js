@@ -19,7 +19,17 @@
  * @property {{first: number, last: number}} clip  what is marked for export
  * @property {import("./workspace/panes.js").Layout} layout
  * @property {{on: boolean, blend: number, edges: boolean}} align  alignment mode
+ * @property {Labeling} labeling  the mode in which people label
+ * @property {import("./labeling/held.js").Labels} labels
+ * @property {number} labelFrames  grows when what is labelled in some frames has come
+ * @property {number} track  id of the selected label
+ * @property {import("./labeling/draft.js").Draft} draft  a label under a hand, or on its way to the server
+ * @property {import("./labeling/span.js").Marked} marked  the frames that a lead is painted over
+ * @property {import("./labeling/acts.js").Saving} saving
+ * @property {string} said  what the labeling mode has to say
+ * @property {import("./labeling/projection.js").Projected} projected
  */
+/** @typedef {{on: boolean, tool: null|"new"|"shape"|"merge", hasObjects: boolean}} Labeling  tool: what the next drag or click does; hasObjects: whether the pipeline's objects are drawn */
 /** @typedef {keyof Values} Key */
 
 /** @type {Partial<Values>} */

@@ -11,8 +11,13 @@ const DRAG_FROM_PX = 4;
  * @typedef {object} Hand  what a hand on the plan may do
  * @property {() => void} changed  the view has moved
  * @property {(place: Place) => void} clicked
- * @property {(event: PointerEvent) => boolean} measures  whether this drag measures, rather than moves
- * @property {(from: Place, to: Place) => void} measured
+ * @property {(from: Place, event: PointerEvent) => Drag|null} takes  what a drag from here does; null when it moves the plan
+ */
+/**
+ * @typedef {object} Drag
+ * @property {(to: Place) => void} moved
+ * @property {() => void} [ended]  the hand let go after a move
+ * @property {() => void} [cancelled]  it never moved, or was taken away
  */
 
 export class Viewport {
@@ -97,11 +102,11 @@ export class Viewport {
   }
 
   #followPointer() {
-    /** @type {{u: number, v: number, x: number, y: number, place: Place, isMeasure: boolean, moved: boolean}|null} */
+    /** @type {{u: number, v: number, x: number, y: number, place: Place, drag: Drag|null, moved: boolean}|null} */
     let start = null;
     this.#canvas.addEventListener("pointerdown", (event) => {
-      const { offsetX: u, offsetY: v } = event;
-      start = { u, v, x: this.x, y: this.y, place: this.place(u, v), isMeasure: this.#hand.measures(event), moved: false };
+      const { offsetX: u, offsetY: v } = event, place = this.place(u, v);
+      start = { u, v, x: this.x, y: this.y, place, drag: this.#hand.takes(place, event), moved: false };
       this.#canvas.setPointerCapture(event.pointerId);
     });
     this.#canvas.addEventListener("pointermove", (event) => {
@@ -109,16 +114,23 @@ export class Viewport {
       const du = event.offsetX - start.u, dv = event.offsetY - start.v;
       start.moved ||= Math.hypot(du, dv) >= DRAG_FROM_PX;
       if (!start.moved) return;
-      if (start.isMeasure) return this.#hand.measured(start.place, this.place(event.offsetX, event.offsetY));
+      if (start.drag) return start.drag.moved(this.place(event.offsetX, event.offsetY));
       this.view = null;
       this.x = start.x + dv / this.scale;
       this.y = start.y + du / this.scale;
       this.#hand.changed();
     });
     this.#canvas.addEventListener("pointerup", (event) => {
-      if (start && !start.moved) this.#hand.clicked(this.place(event.offsetX, event.offsetY));
+      const held = start;
+      start = null;
+      if (!held) return;
+      if (held.moved) return held.drag?.ended?.();
+      held.drag?.cancelled?.();
+      this.#hand.clicked(this.place(event.offsetX, event.offsetY));
+    });
+    this.#canvas.addEventListener("pointercancel", () => {
+      start?.drag?.cancelled?.();
       start = null;
     });
-    this.#canvas.addEventListener("pointercancel", () => (start = null));
   }
 }

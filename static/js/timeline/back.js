@@ -1,6 +1,7 @@
 /** What of the timeline stays while the cursor moves: axis, flags, ribbons, differences, curves. Drawn when data change. */
 import { color, ui } from "../colors.js";
 import { clock } from "../format.js";
+import { drawLabelRows } from "../labeling/ribbon.js";
 import { get } from "../store.js";
 import { scaleOf, traceLine, yOf } from "./curves.js";
 import { drawFlags } from "./flags.js";
@@ -33,6 +34,7 @@ export function drawBack(ctx, size, span, rows, isLight) {
   ctx.clip();
   colorLeads([drive.base, drive.now]);
   const look = { isLight, empty: ui("raised"), chosen: get("selection"), ring: ui("text") };
+  if (rows.labels) drawLabelRows(ctx, span, rows.labels, isLight);
   drawRibbon(ctx, drive.now, span, rows.ribbon, look);
   if (drive.base && rows.base) {
     ctx.globalAlpha = 0.75;

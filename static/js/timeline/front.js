@@ -2,6 +2,8 @@
 import { color, ui } from "../colors.js";
 import { here } from "../drive/seek.js";
 import { DASH, num } from "../format.js";
+import { leadAt, leadName } from "../labeling/held.js";
+import { drawMarked } from "../labeling/ribbon.js";
 import { get } from "../store.js";
 import { colorOf } from "./ribbon.js";
 
@@ -17,6 +19,7 @@ const VALUE = '600 10.5px system-ui, "DejaVu Sans", sans-serif';
  */
 export function drawFront(ctx, size, span, rows, { isLight, hover }) {
   drawClip(ctx, size, span, rows);
+  if (rows.labels) drawMarked(ctx, span, rows.labels.leads);
   const index = here();
   if (hover !== null && hover !== index) drawLine(ctx, span, hover, ui("dim"), rows.axis.height, size.height);
   drawLine(ctx, span, index, ui("accent"), 0, size.height);
@@ -48,8 +51,10 @@ function drawHandle(ctx, span, index) {
 function drawLabels(ctx, rows, index, isLight, edge) {
   const drive = get("drive"), columns = drive?.now?.columns;
   ctx.textBaseline = "middle";
+  const lead = rows.labels ? leadAt(index)?.lead ?? null : null;
+  if (rows.labels) label(ctx, "labels", lead === null ? DASH : leadName(lead), rows.labels.leads, edge, typeof lead === "number" ? colorOf(lead, isLight) : ui("dim"));
   const id = columns?.cipv_id[index] ?? null;
-  label(ctx, "CIPV", id === null ? DASH : `#${id}`, rows.ribbon, edge, id === null ? ui("dim") : colorOf(id, isLight));
+  label(ctx, rows.labels ? "pipeline" : "CIPV", id === null ? DASH : `#${id}`, rows.ribbon, edge, id === null ? ui("dim") : colorOf(id, isLight));
   if (rows.base) {
     const was = drive?.base?.columns.cipv_id[index] ?? null;
     label(ctx, "before", was === null ? DASH : `#${was}`, rows.base, edge, was === null ? ui("dim") : colorOf(was, isLight));

@@ -30,9 +30,9 @@ const still = new Surface(back, redraw), moving = new Surface(front, redrawFront
 
 export function setUp() {
   $("#timeline-curves").append(...CURVES.map(chip));
-  on(["drive", "curve", "selection", "theme"], redraw);
+  on(["drive", "curve", "selection", "theme", "labeling", "labels", "track"], redraw);
   on(["state"], () => frames() !== span.count && redraw());
-  on(["state", "scrub", "clip"], redrawFront);
+  on(["state", "scrub", "clip", "marked"], redrawFront);
   paint(["state", "drive"], describe);
   followPointer(front, { span, rows, zoomed: redraw, hovered });
   $("#timeline-fit").addEventListener("click", fit);
@@ -69,7 +69,7 @@ function chip({ key, label, title, role }) {
 }
 
 /** As last drawn: the front asks ten times a second, and asking the page for sizes and styles makes it lay itself out. */
-let shared = shareOut(0, false, curves);
+let shared = shareOut(0, false, curves, false);
 let isLight = false;
 const rows = () => shared;
 
@@ -79,7 +79,7 @@ function draw() {
   span.setCount(frames());
   span.left = LABELS_PX;
   span.width = Math.max(1, width - LABELS_PX - EDGE_PX);
-  shared = shareOut(height, Boolean(get("drive")?.base), curves);
+  shared = shareOut(height, Boolean(get("drive")?.base), curves, get("labeling")?.on === true);
   isLight = getComputedStyle(document.documentElement).colorScheme === "light";
   drawBack(ctx, { width, height }, span, shared, isLight);
   $("#timeline-fit").hidden = span.isWhole;

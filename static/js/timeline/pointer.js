@@ -1,5 +1,7 @@
 /** The hand on the timeline: press or drag to go to a frame, wheel to zoom, shift or two fingers to move along. */
 import { seekTo } from "../drive/seek.js";
+import { leadAt } from "../labeling/held.js";
+import * as marking from "../labeling/span.js";
 import { get, set } from "../store.js";
 import { flagAt } from "./flags.js";
 
@@ -10,6 +12,7 @@ const CLICK_PX = 4;
 const ZOOM_PER_PX = 0.0018;
 const GRAB_PX = 8;
 
+/** What a drag does on the way, and when the hand lets go after it. @typedef {((x: number, dx: number) => void) & {ended?: () => void}} Act */
 /**
  * @typedef {object} Hand
  * @property {Span} span
@@ -22,7 +25,7 @@ const GRAB_PX = 8;
 export function followPointer(canvas, hand) {
   /** @type {Map<number, {x: number, y: number}>} */
   const down = new Map();
-  /** @type {{x: number, y: number, moved: boolean, act: (x: number, dx: number) => void}|null} */
+  /** @type {{x: number, y: number, moved: boolean, act: Act}|null} */
   let drag = null;
 
   canvas.addEventListener("pointerdown", (event) => {
@@ -45,6 +48,7 @@ export function followPointer(canvas, hand) {
   const lift = (/** @type {PointerEvent} */ event) => {
     down.delete(event.pointerId);
     if (drag && !drag.moved && event.type === "pointerup") click(hand, drag.x, drag.y);
+    else if (event.type === "pointerup") drag?.act.ended?.();
     if (!down.size) drag = null;
   };
   for (const name of /** @type {const} */ (["pointerup", "pointercancel"])) canvas.addEventListener(name, lift);
@@ -56,7 +60,7 @@ export function followPointer(canvas, hand) {
   canvas.addEventListener("wheel", (event) => onWheel(hand, event), { passive: false });
 }
 
-/** What a drag that begins here does. @param {Hand} hand @param {PointerEvent} event @returns {(x: number, dx: number) => void} */
+/** What a drag that begins here does. @param {Hand} hand @param {PointerEvent} event @returns {Act} */
 function actionAt({ span, rows, zoomed }, event) {
   const { axis, bar } = rows(), clip = get("clip");
   if (event.offsetY >= bar.top && !span.isWhole) {
@@ -75,16 +79,33 @@ function actionAt({ span, rows, zoomed }, event) {
     if (Math.abs(event.offsetX - span.x(clip.first)) < GRAB_PX) return (x) => set("clip", { first: Math.min(span.index(x), clip.last), last: clip.last });
     if (Math.abs(event.offsetX - span.x(clip.last + 1)) < GRAB_PX) return (x) => set("clip", { first: clip.first, last: Math.max(span.index(x), clip.first) });
   }
+  if (isIn(rows().labels?.leads ?? null, event.offsetY)) return marks(span, span.index(event.offsetX));
   return (x) => seekTo(span.index(x));
 }
 
+/** A drag along the labels' ribbon marks frames; the selected track leads there when the hand lets go. @param {Span} span @param {number} from @returns {Act} */
+function marks(span, from) {
+  let hasMoved = false;
+  const along = (/** @type {number} */ x) => {
+    const to = span.index(x);
+    hasMoved ||= to !== from;
+    if (hasMoved) marking.markAll(from, to);
+    seekTo(to);
+  };
+  return Object.assign(along, { ended: () => { if (hasMoved && get("track") !== null) marking.paint(/** @type {number} */ (get("track"))); } });
+}
+
+/** @param {{top: number, height: number}|null} row @param {number} y */
+const isIn = (row, y) => row !== null && y >= row.top && y < row.top + row.height;
+
 /** A click on a flag goes to its event; on a ribbon, it selects who was the CIPV there. @param {Hand} hand @param {number} x @param {number} y */
 function click({ span, rows }, x, y) {
-  const drive = get("drive"), { flags, ribbon, base } = rows();
-  const isIn = (/** @type {{top: number, height: number}|null} */ row) => row !== null && y >= row.top && y < row.top + row.height;
-  const event = isIn(flags) ? flagAt(drive?.events ?? [], span, x) : null;
+  const drive = get("drive"), { flags, labels, ribbon, base } = rows();
+  const lead = isIn(labels?.leads ?? null, y) ? leadAt(span.index(x))?.lead : null;
+  if (typeof lead === "number") set("track", lead);
+  const event = isIn(flags, y) ? flagAt(drive?.events ?? [], span, x) : null;
   if (event) seekTo(event.index);
-  const series = isIn(ribbon) ? drive?.now : isIn(base) ? drive?.base : null;
+  const series = isIn(ribbon, y) ? drive?.now : isIn(base, y) ? drive?.base : null;
   const id = series?.columns.cipv_id[span.index(x)];
   if (id !== undefined && id !== null) set("selection", id);
 }

@@ -1,19 +1,19 @@
-/** How the timeline's height is shared out, from the top: time axis, flags, ribbon, the compared ribbon, curves. */
+/** How the timeline's height is shared out, from the top: time axis, flags, labels while labeling, ribbon, the compared ribbon, curves. */
 import { CURVES } from "./curves.js";
 
 /** @typedef {{top: number, height: number}} Row */
-/** @typedef {{axis: Row, flags: Row, ribbon: Row, base: Row|null, lanes: {curve: import("./curves.js").Curve, row: Row}[], bar: Row}} Rows */
+/** @typedef {{axis: Row, flags: Row, labels: {leads: Row, track: Row}|null, ribbon: Row, base: Row|null, lanes: {curve: import("./curves.js").Curve, row: Row}[], bar: Row}} Rows */
 
-const AXIS_PX = 15, FLAGS_PX = 13, RIBBON_PX = 16, BASE_PX = 12, BAR_PX = 7, LANE_PX = 20;
+const AXIS_PX = 15, FLAGS_PX = 13, RIBBON_PX = 16, LABELS_PX = 18, TRACK_PX = 9, BASE_PX = 12, BAR_PX = 7, LANE_PX = 20;
 /** Room between the two ribbons, where their differences are marked. */
 export const MARKS_PX = 5;
 
-/** @param {number} height @param {boolean} isComparing @param {Set<string>} wanted keys of the curves @returns {Rows} */
-export function shareOut(height, isComparing, wanted) {
+/** @param {number} height @param {boolean} isComparing @param {Set<string>} wanted keys of the curves @param {boolean} isLabeling @returns {Rows} */
+export function shareOut(height, isComparing, wanted, isLabeling) {
   let top = 0;
   /** @param {number} size @returns {Row} */
   const take = (size) => ({ top: (top += size) - size, height: size });
-  const axis = take(AXIS_PX), flags = take(FLAGS_PX), ribbon = take(RIBBON_PX);
+  const axis = take(AXIS_PX), flags = take(FLAGS_PX), labels = isLabeling ? { leads: take(LABELS_PX), track: take(TRACK_PX) } : null, ribbon = take(RIBBON_PX);
   if (isComparing) take(MARKS_PX);
   const base = isComparing ? take(BASE_PX) : null;
   const rest = height - top - BAR_PX - 4;
@@ -21,5 +21,5 @@ export function shareOut(height, isComparing, wanted) {
   top += 4;
   const size = curves.length ? rest / curves.length : 0;
   const lanes = curves.map((curve) => ({ curve, row: take(size) }));
-  return { axis, flags, ribbon, base, lanes, bar: { top: height - BAR_PX, height: BAR_PX } };
+  return { axis, flags, labels, ribbon, base, lanes, bar: { top: height - BAR_PX, height: BAR_PX } };
 }

@@ -1,6 +1,7 @@
-/** Undo and redo of parameter changes. The history is the server's, so that all who watch share it. */
+/** Undo and redo: one history of labels, parameters and calibration. It is the server's; a person takes back their own. */
 import { request } from "../api.js";
 import { $ } from "../dom.js";
+import { move as moveLabels } from "../labeling/acts.js";
 import { on, get, set } from "../store.js";
 
 export function setUp() {
@@ -12,14 +13,17 @@ export function setUp() {
 export const undo = () => move("undo");
 export const redo = () => move("redo");
 
+/** What can be taken back or done again: of labels and parameters together, where the recording can be labelled. */
+const can = () => get("state")?.labels ?? get("state");
+
 /** @param {"undo"|"redo"} direction */
 function move(direction) {
-  const state = get("state");
-  if (direction === "undo" ? state?.can_undo : state?.can_redo) request(`api/params/${direction}`, "POST").then((answer) => set("params", answer), () => {});
+  if (!(direction === "undo" ? can()?.can_undo : can()?.can_redo)) return;
+  if (get("state")?.labels) moveLabels(direction);
+  else request(`api/params/${direction}`, "POST").then((answer) => set("params", answer), () => {});
 }
 
 function reflect() {
-  const state = get("state");
-  $("#undo-button", HTMLButtonElement).disabled = !state?.can_undo;
-  $("#redo-button", HTMLButtonElement).disabled = !state?.can_redo;
+  $("#undo-button", HTMLButtonElement).disabled = !can()?.can_undo;
+  $("#redo-button", HTMLButtonElement).disabled = !can()?.can_redo;
 }

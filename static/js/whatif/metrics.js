@@ -4,7 +4,7 @@ import { DASH, num, signed } from "../format.js";
 
 /** @typedef {import("../types.js").Metric} Metric */
 
-/** @param {import("../types.js").Comparison} comparison @returns {HTMLElement} */
+/** @param {Pick<import("../types.js").Comparison, "metrics"|"truth"|"judged">} comparison @returns {HTMLElement} */
 export function metricsTable({ metrics, truth, judged }) {
   const judge = truth ? `Judged in ${judged} frames against ${truth === "labels" ? "labels" : "the simulator's truth"}` : "Without labels: what needs none";
   const head = ["", "before", "after", "change"].map((words) => el("th", { scope: "col", textContent: words }));

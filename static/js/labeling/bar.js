@@ -1,0 +1,82 @@
+/** The labeling mode's bar: who leads here, where to go next, and what is saved. Below the timeline: its keys. */
+import { $, el, keyed, press, text } from "../dom.js";
+import { get, on, paint } from "../store.js";
+import { redo, undo } from "../whatif/history.js";
+import { send } from "./acts.js";
+import * as commands from "./commands.js";
+import { present } from "./draft.js";
+import { leadAt, leadName, shown, trackOf } from "./held.js";
+import { labelKeys } from "./keys.js";
+import { setTool } from "./mode.js";
+import { askName, knownName } from "./person.js";
+import * as span from "./span.js";
+
+/** @typedef {import("./types.js").Lead} Lead */
+
+/** As many labels of the frame can be chosen as its lead in the bar; the rest by number. */
+const MOST_LEADS = 7;
+
+const where = el("span", { class: "facts where" }), leads = el("span", { class: "joined leads", aria: { role: "group", label: "Who leads" } });
+const saved = el("span", { class: "saved", aria: { role: "status" } }), again = el("button", { type: "button", textContent: "Retry", hidden: true, onclick: send });
+const said = el("span", { class: "facts said", aria: { role: "status" } });
+const task = el("span", { class: "task", hidden: true }, el("progress", { max: 1, aria: { label: "Progress" } }), el("span", { class: "facts" }));
+const name = el("button", { type: "button", class: "quiet", title: "Who labels" });
+const back = el("button", { type: "button", class: "icon-button", textContent: "↶", aria: { label: "Undo your last change" }, title: "Undo (Ctrl Z)", onclick: undo });
+const forth = el("button", { type: "button", class: "icon-button", textContent: "↷", aria: { label: "Redo" }, title: "Redo (Ctrl Shift Z)", onclick: redo });
+const fresh = el("button", { type: "button", class: "toggle fresh", textContent: "New", title: "New label: drag in the plan, drag or click in the picture (G)", onclick: () => setTool("new") });
+
+export function setUp() {
+  name.addEventListener("click", async () => {
+    await askName();
+    reflect();
+  });
+  const next = (/** @type {string} */ words, /** @type {string} */ title, /** @type {commands.Wanted} */ what) =>
+    el("button", { type: "button", class: what === "sent_back" ? "rarely" : "", textContent: words, title, onclick: () => commands.goTo(what, 1) });
+  $("#label-bar").append(
+    el("b", { textContent: "Lead" }), leads, where,
+    el("b", { textContent: "Next" }), el("span", { class: "joined", aria: { role: "group", label: "Go to the next" } }, next("Unlabelled", "Next frame in which something is unlabelled (N)", "unlabelled"),
+      next("Disagreement", "Next disagreement of labels and pipeline (V)", "disagreement"), next("Proposed", "Next proposal (B)", "proposed"), next("Sent back", "Next label that was sent back (Y)", "sent_back")),
+    fresh, said, task, saved, again, back, forth, name);
+  $("#label-keys").append(...labelKeys().flatMap(({ bindings }) => bindings).filter(({ brief }) => brief).map(({ shown: keys, brief }) =>
+    el("span", {}, el("kbd", { textContent: keys }), ` ${brief}`)));
+  paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);
+  on(["saving", "said", "link"], reflectSaving);
+  on(["state"], reflectTask);
+  on(["frame"], () => get("said") && text(said, ""));
+}
+
+function reflect() {
+  if (!get("labeling")?.on) return;
+  const range = leadAt(shown()), marked = get("marked");
+  const here = present().map(({ track }) => trackOf(track)).filter((track) => track !== null && track.state !== "rejected");
+  const numbers = here.map((track) => /** @type {import("./types.js").LabelTrack} */ (track).id).sort((a, b) => a - b);
+  const shownLeads = /** @type {Lead[]} */ ([...(typeof range?.lead === "number" && !numbers.includes(range.lead) ? [range.lead] : []), ...numbers]).slice(0, MOST_LEADS);
+  keyed(leads, /** @type {Lead[]} */ ([...shownLeads, "none", "unknown"]), String, (lead) => el("button", { type: "button", textContent: leadName(lead), onclick: () => span.paint(lead) }), (button, lead) => {
+    press(button, range?.lead === lead);
+    button.classList.toggle("is-proposed", range?.lead === lead && range.state === "proposed");
+    button.title = lead === "none" ? "Nobody leads (0)" : lead === "unknown" ? "One can't tell who leads (U)" : `#${lead} leads (type its number)`;
+  });
+  const { first, last } = span.span();
+  text(where, marked ? `frames ${first + 1}–${last + 1}${marked.typed ? ` · #${marked.typed}…` : ""}` : range ? `${range.state} ${range.first + 1}–${range.last + 1}` : "nobody has said");
+  press(fresh, get("labeling")?.tool === "new");
+  text(name, knownName() || "your name");
+}
+
+function reflectSaving() {
+  const saving = get("saving"), at = saving?.at_ms ? new Date(saving.at_ms).toLocaleTimeString("en-GB") : "";
+  saved.dataset.state = saving?.state ?? "";
+  text(saved, !saving ? "" : saving.state === "saving" ? "saving…" : saving.state === "failed" ? `not saved: ${saving.problem}` : at ? `saved ${at}` : "");
+  again.hidden = saving?.state !== "failed";
+  text(said, get("said") ?? "");
+  said.title = get("said") ?? "";
+}
+
+function reflectTask() {
+  const state = get("state"), running = state?.labels?.task ?? null;
+  back.disabled = !state?.labels?.can_undo;
+  forth.disabled = !state?.labels?.can_redo;
+  task.hidden = !running;
+  if (!running) return;
+  $("progress", HTMLProgressElement, task).value = running.total ? running.done / running.total : 0;
+  text($(".facts", HTMLElement, task), running.error ?? `${running.what} ${running.done}/${running.total} ${running.note}`.trim());
+}

@@ -1,0 +1,129 @@
+/** What keys and buttons of the labeling mode do: each is one act about the selected track or the shown frame. */
+import { request } from "../api.js";
+import { seekTo } from "../drive/seek.js";
+import { get, set } from "../store.js";
+import { act } from "./acts.js";
+import { CLASSES, moved, turned } from "./cuboid.js";
+import { ask } from "./dialogs.js";
+import * as draft from "./draft.js";
+import { chosen, leadAt, nameOf, shown } from "./held.js";
+import { setTool } from "./mode.js";
+import * as span from "./span.js";
+import { el } from "../dom.js";
+
+/** @typedef {import("./types.js").LabelTrack} LabelTrack */
+/** @typedef {import("./types.js").ItemRef} ItemRef */
+/** @typedef {"unlabelled"|"disagreement"|"proposed"|"sent_back"} Wanted */
+
+/** A sentence for the person, where something could not be done. @param {string} words */
+export const say = (words) => set("said", words);
+
+/** Do something with the selected track, or say that none is selected. @param {(track: LabelTrack) => unknown} what */
+function withTrack(what) {
+  const track = chosen();
+  if (track) what(track);
+  else say("Select a label first");
+}
+
+/** @param {LabelTrack} track @returns {ItemRef} */
+const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
+
+export const propose = () => act({ kind: "propose", first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1), from: "run" });
+
+/** Accept or reject the selected track whole; without one, who leads here. @param {"accept"|"reject"} kind */
+export function judge(kind) {
+  const track = chosen();
+  if (track) act({ kind, items: [refOf(track)] });
+  else if (!span.judge(kind)) say("Nothing is selected, and nobody leads here");
+}
+
+/** Everything of the shown frame that nobody has looked at: its tracks and its lead. */
+export function acceptHere() {
+  const lead = leadAt(shown());
+  const tracks = draft.present().map(({ track }) => get("labels")?.tracks.get(track)).filter((track) => track?.state === "proposed");
+  const items = tracks.map((track) => refOf(/** @type {LabelTrack} */ (track)));
+  if (lead?.state === "proposed") items.push({ kind: "lead", id: lead.id, revision: lead.revision });
+  if (items.length) act({ kind: "accept", items });
+  else say("Nothing here is proposed");
+}
+
+/** The next or the previous label of the shown frame. @param {1|-1} direction */
+export function selectNext(direction) {
+  const ids = draft.present().map(({ track }) => track).filter((id) => get("labels")?.tracks.get(id)?.state !== "rejected").sort((a, b) => a - b);
+  const at = ids.indexOf(get("track") ?? -1);
+  const next = at < 0 ? (direction > 0 ? 0 : ids.length - 1) : (at + direction + ids.length) % ids.length;
+  set("track", ids[next] ?? null);
+}
+
+/** @param {number} dx @param {number} dy metres, ego frame */
+export const nudge = (dx, dy) => change((cuboid) => moved(cuboid, dx, dy));
+/** @param {number} deg to the left */
+export const turn = (deg) => change((cuboid) => turned(cuboid, (deg * Math.PI) / 180));
+
+/** @param {(cuboid: import("./types.js").Cuboid) => import("./types.js").Cuboid} how */
+function change(how) {
+  const track = chosen(), cuboid = draft.presentOf(track?.id ?? null)?.cuboid;
+  if (!track || !cuboid) return say("Select a label that has a cuboid in this frame");
+  draft.hold(track.id, { cuboid: how(cuboid) });
+  draft.release();
+}
+
+export const snap = () => withTrack(({ id, revision }) => act({ kind: "refit", track: id, revision, frame: shown() }));
+export const splitHere = () => withTrack(({ id, revision }) => act({ kind: "split", track: id, revision, frame: shown() }));
+export const dropKeyframe = () => withTrack(({ id, revision }) => act({ kind: "drop_keyframe", track: id, revision, frame: shown() }));
+export const removeTrack = () => withTrack((track) => act({ kind: "remove", items: [refOf(track)] }).then((answer) => answer && set("track", null)));
+
+/** Hold the label where it is in this frame. */
+export const keyframe = () => withTrack(({ id }) => {
+  if (!draft.isHere(id)) return say(`#${id} is not in this frame`);
+  draft.hold(id, {});
+  draft.release();
+});
+
+export const sizeAlong = () => withTrack(({ id, revision }) => {
+  const size = draft.presentOf(id)?.cuboid?.size;
+  if (size) act({ kind: "size_along", track: id, revision, size });
+  else say(`#${id} has no cuboid in this frame`);
+});
+
+/** The vehicle is not there, in the marked frames or in this one. */
+export const notHere = () => withTrack(({ id, revision }) => act({ kind: "drop_sightings", track: id, revision, ...span.span() }).then((answer) => answer && span.forget()));
+
+/** @param {1|-1} direction */
+export const nextClass = (direction) => withTrack(({ label }) => {
+  relabel(CLASSES[(CLASSES.indexOf(label) + direction + CLASSES.length) % CLASSES.length]);
+});
+
+/** @param {string} label */
+export const relabel = (label) => withTrack(({ id, revision }) => act({ kind: "relabel", track: id, revision, label }));
+
+/** The selected track is this one too. @param {number} other */
+export function mergeWith(other) {
+  setTool(null);
+  const tracks = get("labels")?.tracks, a = chosen(), b = tracks?.get(other);
+  if (a && b && a !== b) act({ kind: "merge", tracks: [a, b].map(({ id, revision }) => ({ id, revision })) });
+}
+
+export const sendBack = () => withTrack(async (track) => {
+  const comment = await ask("Send back", el("p", { textContent: `${nameOf(track)} goes back to who labelled it.` }), "Comment", track.comment);
+  if (comment) act({ kind: "send_back", items: [refOf(track)], comment });
+});
+
+export const reviewOk = () => withTrack((track) => act({ kind: "review_ok", items: [refOf(track)] }));
+
+/** @param {string} tag @param {boolean} on */
+export const tagFrame = (tag, on) => act({ kind: "tag", frame: shown(), tag, on });
+
+/** An event of this frame, about the selected track. @param {string} event */
+export const addEvent = (event) => act({ kind: "add_event", frame: shown(), event, tracks: chosen() ? [chosen()?.id] : [] });
+
+/** Go where there is something to do. @param {Wanted} what @param {1|-1} direction */
+export async function goTo(what, direction) {
+  const query = `what=${what}&frame=${get("scrub") ?? shown()}&direction=${direction}`;
+  /** @type {import("./types.js").Place|Error} */
+  const found = await request(`api/labels/next?${query}`).catch((error) => error);
+  if (found instanceof Error) return say(found.message);
+  if (found.frame === null) return say(`No ${what.replace("_", " ")} ${direction > 0 ? "after" : "before"} this frame`);
+  seekTo(found.frame);
+  say(found.why);
+}

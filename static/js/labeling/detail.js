@@ -1,0 +1,75 @@
+/** The selected track: what can be done with it, its place in this frame, and its history. */
+import { newestOnly, request } from "../api.js";
+import { el, text } from "../dom.js";
+import { DASH, num } from "../format.js";
+import { get, on, paint } from "../store.js";
+import * as commands from "./commands.js";
+import { CLASSES } from "./cuboid.js";
+import { presentOf } from "./draft.js";
+import { chosen, nameOf } from "./held.js";
+import { setTool } from "./mode.js";
+
+const MOST_PAST = 6;
+
+const head = el("div", { class: "detail-head" }), title = el("b", {}), state = el("span", { class: "tag" });
+const classes = el("select", { aria: { label: "Class" }, title: "Class (T)" }, ...CLASSES.map((label) => el("option", { value: label, textContent: label })));
+const facts = el("p", { class: "facts" }), comment = el("p", { class: "comment" }), past = el("ol", { class: "past facts" });
+const panel = el("div", { class: "track-detail", hidden: true });
+
+const lookBack = newestOnly(async (/** @type {number} */ id) => {
+  /** @type {import("./types.js").PastAct[]} */
+  const acts = await request(`api/labels/history?kind=track&id=${id}`).catch(() => []);
+  if (chosen()?.id !== id) return;
+  past.replaceChildren(...acts.slice(0, MOST_PAST).map(({ what, person, t_unix_ms, undone }) =>
+    el("li", { class: undone ? "is-undone" : "" }, `${new Date(t_unix_ms).toLocaleTimeString("en-GB")} ${person}: ${what}${undone ? " (undone)" : ""}`)));
+});
+
+/** @param {HTMLElement} parent */
+export function setUp(parent) {
+  const button = (/** @type {string} */ words, /** @type {string} */ key, /** @type {string} */ help, /** @type {() => unknown} */ onclick) =>
+    el("button", { type: "button", title: `${help} (${key})`, onclick }, words);
+  classes.addEventListener("change", () => {
+    commands.relabel(classes.value);
+    classes.blur();
+  });
+  head.append(title, state, el("span", { class: "spacer" }), classes);
+  panel.append(head, facts, comment,
+    el("div", { class: "detail-buttons" },
+      button("Accept", "A", "Accept the whole track", () => commands.judge("accept")), button("Reject", "R", "Reject the whole track", () => commands.judge("reject")),
+      button("Send back", "H", "Send it back with a comment", commands.sendBack), button("Reviewed", "Shift H", "A second person finds it right", commands.reviewOk),
+      button("Snap", "S", "Fit the cuboid to the points", commands.snap), button("Size along", "W", "This size along the whole track", commands.sizeAlong),
+      button("Keyframe", "K", "It is right in this frame", commands.keyframe), button("Draw", "Shift G", "Draw its shape in this frame", () => setTool("shape")),
+      button("Not here", "Del", "It is not there in this frame, or in the marked ones", commands.notHere), button("Split", "X", "From this frame on it is another", commands.splitHere),
+      button("Merge", "M", "Merge it with the label that is pressed next", () => setTool("merge")), button("Remove", "Shift Del", "Remove the track", commands.removeTrack)),
+    past);
+  parent.append(panel);
+  paint(["track", "labels", "labelFrames", "frame", "draft"], show);
+  let seen = "";
+  on(["track", "labels"], () => {
+    const track = chosen(), key = track ? `${track.id} ${track.revision}` : "";
+    if (key === seen) return;
+    seen = key;
+    if (track) lookBack(track.id);
+  });
+}
+
+function show() {
+  const track = chosen();
+  panel.hidden = !track;
+  if (!track) return;
+  text(title, nameOf(track));
+  text(state, track.state);
+  state.dataset.state = track.state;
+  if (document.activeElement !== classes) classes.value = track.label;
+  text(comment, track.comment ? `Sent back: ${track.comment}` : "");
+  text(facts, placeWords(presentOf(track.id)));
+}
+
+/** @param {import("./types.js").LabelSighting|null} sighting */
+function placeWords(sighting) {
+  if (!sighting) return "not in this frame";
+  const kind = sighting.keyframe ? "keyframe" : "interpolated";
+  if (!sighting.cuboid) return `${kind} · box in the picture only`;
+  const { center: [x, y], size, yaw_rad } = sighting.cuboid;
+  return `${kind} · ${num(x, 2)} m ahead, ${num(Math.abs(y), 2)} ${y >= 0 ? "left" : "right"} · ${size.map((each) => num(each, 1)).join(" × ")} m · ${num((yaw_rad * 180) / Math.PI, 0)}°${sighting.bbox ? "" : ` · box ${DASH}`}`;
+}

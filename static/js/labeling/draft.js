@@ -1,0 +1,64 @@
+/** A label under a hand: drawn at once in every view, sent when the hand lets go, dropped when the server's own has come. */
+import { get, on, set } from "../store.js";
+import { act } from "./acts.js";
+import { knownUpTo, sightingOf, sightingsAt } from "./frames.js";
+import { shown, trackOf } from "./held.js";
+
+/** @typedef {import("./types.js").Cuboid} Cuboid */
+/** @typedef {import("./types.js").Box} Box */
+/** @typedef {import("./types.js").LabelSighting} LabelSighting */
+/**
+ * @typedef {object} Draft
+ * @property {number|null} track  null of a new one
+ * @property {number} frame
+ * @property {number} revision  of the track when it was taken hold of
+ * @property {Cuboid|null} cuboid
+ * @property {Box|null} bbox
+ * @property {number|null} settled  the act that it became
+ */
+
+export function setUp() {
+  on(["labelFrames"], () => {
+    const draft = get("draft");
+    if (draft?.settled != null && knownUpTo(draft.frame) >= draft.settled) set("draft", null);
+  });
+}
+
+/** Everything that is labelled in the shown frame, as it looks now. @returns {LabelSighting[]} */
+export function present() {
+  const frame = shown(), draft = get("draft"), known = sightingsAt(frame);
+  if (!draft || draft.frame !== frame || draft.track === null) return known;
+  const held = { track: draft.track, cuboid: draft.cuboid, bbox: draft.bbox, keyframe: true };
+  return [...known.filter(({ track }) => track !== held.track), held];
+}
+
+/** @param {number|null} track @returns {LabelSighting|null} */
+export const presentOf = (track) => (track === null ? null : present().find((each) => each.track === track) ?? null);
+
+/** Draw a track's label otherwise than it is held. @param {number} track @param {{cuboid?: Cuboid|null, bbox?: Box|null}} shape */
+export function hold(track, shape) {
+  const frame = shown(), draft = get("draft"), before = presentOf(track);
+  const isSame = draft?.track === track && draft.frame === frame;
+  const revision = isSame ? draft.revision : trackOf(track)?.revision ?? 0;
+  set("draft", { track, frame, revision, cuboid: before?.cuboid ?? null, bbox: before?.bbox ?? null, ...shape, settled: null });
+}
+
+/** Send what is held. */
+export async function release() {
+  const draft = get("draft");
+  if (!draft || draft.track === null || draft.settled !== null) return;
+  const { track, frame, revision, cuboid, bbox } = draft;
+  const answer = await act({ kind: "set_sighting", track, revision, frame, cuboid, bbox, interpolate: true });
+  const now = get("draft");
+  if (now?.track !== track || now.frame !== frame) return;
+  if (answer) set("draft", { ...now, settled: answer.revision, revision: trackOf(track)?.revision ?? now.revision });
+  else if (now === draft) set("draft", null);
+}
+
+/** Let go of it without a trace. */
+export function drop() {
+  set("draft", null);
+}
+
+/** @param {number} track @returns {boolean} whether a track is labelled in the shown frame, also only in the making */
+export const isHere = (track) => presentOf(track) !== null || sightingOf(shown(), track) !== null;

@@ -1,0 +1,84 @@
+/** Keys of the labeling mode. They go before the page's own while it is on. */
+import { playback } from "../api.js";
+import { get } from "../store.js";
+import * as commands from "./commands.js";
+import { cancel, isOn, setTool, toggleObjects } from "./mode.js";
+import * as span from "./span.js";
+
+/** @typedef {import("../keymap.js").Binding} Binding */
+/** `brief`: the words of the strip below the timeline; what has none is only in the help. @typedef {Binding & {brief?: string}} LabelBinding */
+
+const STEP_M = 0.1, FAR_M = 1, TURN_DEG = 1, FAR_DEG = 10;
+
+/** @param {string} keys @param {string} shown @param {string} words @param {() => unknown} act @param {string} [brief] @returns {LabelBinding} */
+const key = (keys, shown, words, act, brief) => ({ keys: keys.split(" "), shown, words, act, brief, isOn });
+
+/** Arrows move the selected cuboid; with none they go through the frames, as without the mode. @param {LabelBinding} binding @returns {LabelBinding} */
+const selected = (binding) => ({ ...binding, isOn: () => isOn() && get("track") !== null });
+
+/** A pair of keys, the second with Shift for the other direction. @param {string} letter @param {string} words @param {(direction: 1|-1) => unknown} act @param {string} [brief] @returns {LabelBinding[]} */
+const pair = (letter, words, act, brief) => [
+  key(letter.toLowerCase(), letter, words, () => act(1), brief),
+  key(`Shift+${letter}`, `Shift ${letter}`, `${words}, backwards`, () => act(-1)),
+];
+
+/** @returns {{title: string, bindings: LabelBinding[]}[]} */
+export const labelKeys = () => [
+  { title: "Labeling: proposals and review", bindings: [
+    key("p", "P", "take the pipeline's output as proposals", commands.propose, "propose"),
+    key("a", "A", "accept the selected track, or who leads here", () => commands.judge("accept"), "accept"),
+    key("Shift+A", "Shift A", "accept everything in this frame", commands.acceptHere),
+    key("r", "R", "reject it", () => commands.judge("reject"), "reject"),
+    key("h", "H", "send it back with a comment", commands.sendBack, "send back"),
+    key("Shift+H", "Shift H", "reviewed: it is right", commands.reviewOk),
+    ...pair("N", "next frame in which something is unlabelled", (d) => commands.goTo("unlabelled", d), "next unlabelled"),
+    ...pair("V", "next disagreement of labels and pipeline", (d) => commands.goTo("disagreement", d), "next disagreement"),
+    ...pair("B", "next proposal", (d) => commands.goTo("proposed", d), "next proposal"),
+    ...pair("Y", "next label that was sent back", (d) => commands.goTo("sent_back", d)),
+  ] },
+  { title: "Labeling: who leads", bindings: [
+    key("i", "I", "the lead begins here", span.begin, "lead from"),
+    key("o", "O", "the lead ends here", span.end, "to"),
+    key("c", "C", "the selected track leads", () => (get("track") === null ? commands.say("Select a label first") : span.paint(/** @type {number} */ (get("track")))), "is the lead"),
+    ...[..."123456789"].map((digit) => key(digit, digit, digit === "1" ? "the track of that number leads" : "", () => span.type(digit))),
+    key("0", "0", "nobody leads", () => span.type("0"), "none"),
+    key("u", "U", "one can't tell who leads", () => span.paint("unknown"), "can't tell"),
+    key("Shift+U", "Shift U", "take back who leads", span.clear),
+  ] },
+  { title: "Labeling: shapes", bindings: [
+    key(".", ".", "next label in this frame", () => commands.selectNext(1), "next label"),
+    key(",", ",", "label before", () => commands.selectNext(-1)),
+    key("g", "G", "new label: drag in the plan, drag or click in the picture", () => setTool("new"), "new"),
+    key("Shift+G", "Shift G", "draw the selected track's shape here", () => setTool("shape")),
+    selected(key("ArrowUp", "↑", "move it 0.1 m; Shift: 1 m", () => commands.nudge(STEP_M, 0))),
+    selected(key("ArrowDown", "↓", "back", () => commands.nudge(-STEP_M, 0))),
+    selected(key("ArrowLeft", "←", "to the left", () => commands.nudge(0, STEP_M))),
+    selected(key("ArrowRight", "→", "to the right", () => commands.nudge(0, -STEP_M))),
+    selected(key("Shift+ArrowUp", "Shift ↑", "", () => commands.nudge(FAR_M, 0))),
+    selected(key("Shift+ArrowDown", "Shift ↓", "", () => commands.nudge(-FAR_M, 0))),
+    selected(key("Shift+ArrowLeft", "Shift ←", "", () => commands.nudge(0, FAR_M))),
+    selected(key("Shift+ArrowRight", "Shift →", "", () => commands.nudge(0, -FAR_M))),
+    key("q", "Q", "turn it 1° to the left; Shift: 10°", () => commands.turn(TURN_DEG)),
+    key("e", "E", "turn it 1° to the right; Shift: 10°", () => commands.turn(-TURN_DEG)),
+    key("Shift+Q", "Shift Q", "", () => commands.turn(FAR_DEG)),
+    key("Shift+E", "Shift E", "", () => commands.turn(-FAR_DEG)),
+    key("s", "S", "snap it to its points", commands.snap, "snap"),
+    key("w", "W", "this size along the whole track", commands.sizeAlong, "size along"),
+    key("k", "K", "keyframe: it is right here", commands.keyframe, "keyframe"),
+    key("Shift+K", "Shift K", "no keyframe here", commands.dropKeyframe),
+    key("Delete Backspace", "Del", "it is not there (in this frame, or in the marked ones)", commands.notHere, "not here"),
+    key("Shift+Delete Shift+Backspace", "Shift Del", "remove the track", commands.removeTrack),
+    ...pair("T", "next class", commands.nextClass, "class"),
+    key("x", "X", "split: from this frame on it is another", commands.splitHere, "split"),
+    key("m", "M", "merge with the label that is pressed next", () => setTool("merge"), "merge"),
+  ] },
+  { title: "Labeling: frames", bindings: [
+    key("f", "F", "one frame on; Shift: ten", () => playback({ step: 1 }), "frame on"),
+    key("d", "D", "one frame back; Shift: ten", () => playback({ step: -1 }), "back"),
+    key("Shift+F", "Shift F", "", () => playback({ step: 10 })),
+    key("Shift+D", "Shift D", "", () => playback({ step: -10 })),
+    key("z", "Z", "the pipeline's objects too", toggleObjects, "pipeline"),
+    { ...key("Enter", "Enter", "take the number that is typed", () => span.enter()), isOn: () => isOn() && Boolean(get("marked")?.typed) },
+    { ...key("Escape", "Esc", "let go: tool, marked frames, selection", () => cancel()), isOn: () => isOn() && (get("labeling")?.tool !== null || get("marked") !== null || get("track") !== null) },
+  ] },
+];

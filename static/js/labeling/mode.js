@@ -1,0 +1,61 @@
+/** The labeling mode: the pipeline's output becomes proposals, a person makes them true. */
+import { $, press } from "../dom.js";
+import { get, on, set } from "../store.js";
+import { toggle as togglePane } from "../workspace/panes.js";
+import { personName } from "./person.js";
+
+const OFF = { on: false, tool: null, hasObjects: false };
+
+const button = $("#label-button", HTMLButtonElement);
+
+export function setUp() {
+  set("labeling", OFF);
+  button.addEventListener("click", toggle);
+  on(["labeling", "state"], reflect);
+}
+
+export const isOn = () => get("labeling")?.on === true;
+
+const canLabel = () => get("state")?.labels != null;
+
+export function toggle() {
+  if (!isOn() && !canLabel()) return;
+  change({ on: !isOn(), tool: null });
+  set("draft", null);
+  set("marked", null);
+  if (!isOn()) return;
+  togglePane("params", true); // the labels' panel stands in the inspector's column
+  personName();
+}
+
+/** What the next drag or click does. @param {import("../store.js").Labeling["tool"]} tool */
+export function setTool(tool) {
+  change({ tool: get("labeling")?.tool === tool ? null : tool });
+}
+
+export function toggleObjects() {
+  change({ hasObjects: !get("labeling")?.hasObjects });
+}
+
+/** Let go of one thing, the newest first. @returns {boolean} whether there was one */
+export function cancel() {
+  if (get("labeling")?.tool) setTool(null);
+  else if (get("marked")) set("marked", null);
+  else if (get("track") !== null) set("track", null);
+  else return false;
+  return true;
+}
+
+/** @param {Partial<import("../store.js").Labeling>} changes */
+function change(changes) {
+  set("labeling", { ...(get("labeling") ?? OFF), ...changes });
+}
+
+function reflect() {
+  if (isOn() && get("state") && !canLabel()) return change({ on: false, tool: null });
+  press(button, isOn());
+  button.disabled = !canLabel();
+  document.body.classList.toggle("is-labeling", isOn());
+  document.body.dataset.tool = get("labeling")?.tool ?? "";
+  $("#label-bar").hidden = $("#label-keys").hidden = $("#label-pane").hidden = !isOn();
+}

@@ -1,0 +1,79 @@
+/** The hand on the plan while labeling: it selects, moves, turns and resizes cuboids, and draws new ones. */
+import { get, set } from "../store.js";
+import { act } from "./acts.js";
+import { mergeWith } from "./commands.js";
+import { contains, dragged, drawn, gripAt, groundAt } from "./cuboid.js";
+import { drop, hold, present, presentOf, release } from "./draft.js";
+import { chosen, shown, trackOf } from "./held.js";
+import { lookOf } from "./looks.js";
+import { isOn, setTool } from "./mode.js";
+import { newLabel } from "./newlabel.js";
+import { KNOB_PX } from "./plan.js";
+
+/** @typedef {import("../viewport.js").Place} Place */
+/** @typedef {import("../viewport.js").Drag} Drag */
+
+const REACH_PX = 6;
+
+/** What a drag from here does; null when it is the plan that moves. @param {Place} from @param {number} scale pixels per metre @returns {Drag|null} */
+export function takes(from, scale) {
+  if (!isOn()) return null;
+  const tool = get("labeling")?.tool;
+  if (tool === "new" || tool === "shape") return drawing(from, tool === "shape" ? chosen()?.id ?? null : null);
+  const track = get("track"), cuboid = presentOf(track)?.cuboid;
+  const grip = cuboid ? gripAt(cuboid, from, REACH_PX / scale, KNOB_PX / scale) : null;
+  if (track === null || !cuboid || !grip) return null;
+  return { moved: (to) => hold(track, { cuboid: dragged(cuboid, grip, from, to) }), ended: release, cancelled: drop };
+}
+
+/** What the hand would hold, for the pointer's look. @param {Place} place @param {number} scale @returns {string} a CSS cursor, "" for none */
+export function cursorAt(place, scale) {
+  if (get("labeling")?.tool) return "crosshair";
+  const cuboid = presentOf(get("track"))?.cuboid;
+  const grip = cuboid ? gripAt(cuboid, place, REACH_PX / scale, KNOB_PX / scale) : null;
+  if (grip) return { move: "move", turn: "grab", front: "ns-resize", rear: "ns-resize", left: "ew-resize", right: "ew-resize" }[grip];
+  return labelAt(place) === null ? "" : "pointer";
+}
+
+/** @param {Place} from @param {number|null} track whose shape it is; null of a new one @returns {Drag} */
+function drawing(from, track) {
+  const ground_m = groundAt(get("frame")?.display.ground ?? null, from), label = trackOf(track)?.label ?? newLabel();
+  const shape = (/** @type {Place} */ to) => drawn(from, to, label, ground_m);
+  const show = (/** @type {Place} */ to) => {
+    if (track !== null) hold(track, { cuboid: shape(to) });
+    else set("draft", { track: null, frame: shown(), revision: 0, cuboid: shape(to), bbox: null, settled: null });
+  };
+  show(from);
+  return {
+    moved: show, cancelled: drop,
+    ended: () => {
+      setTool(null);
+      if (track !== null) release();
+      else add(label);
+    },
+  };
+}
+
+/** Make the drawn cuboid a new track. @param {string} label */
+async function add(label) {
+  const draft = get("draft");
+  if (!draft?.cuboid) return;
+  const answer = await act({ kind: "add_track", label, frame: draft.frame, cuboid: draft.cuboid, bbox: null });
+  const made = answer?.changed?.tracks[0]?.id ?? null;
+  if (get("draft") === draft) set("draft", answer && made !== null ? { ...draft, track: made, settled: answer.revision } : null);
+  if (made !== null) set("track", made);
+}
+
+/** A press selects what is there, or is what the tool asks for. @param {Place} place */
+export function clicked(place) {
+  const id = labelAt(place);
+  if (get("labeling")?.tool === "merge" && id !== null) mergeWith(id);
+  else set("track", id);
+}
+
+/** The smallest label at a place. @param {Place} place @returns {number|null} */
+function labelAt(place) {
+  const hits = present().filter(({ cuboid, track }) => cuboid && contains(cuboid, place) && lookOf(track, false));
+  const area = (/** @type {import("./types.js").LabelSighting} */ { cuboid }) => (cuboid ? cuboid.size[0] * cuboid.size[1] : 0);
+  return hits.sort((a, b) => area(a) - area(b))[0]?.track ?? null;
+}

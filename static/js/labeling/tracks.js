@@ -1,0 +1,84 @@
+/** The list of labelled tracks: state, class, frames, and who made them. */
+import { el, keyed, memory, press, text, within } from "../dom.js";
+import { seekTo } from "../drive/seek.js";
+import { get, paint, set } from "../store.js";
+import { mergeWith } from "./commands.js";
+import { present } from "./draft.js";
+import { shown, trackOf } from "./held.js";
+
+/** @typedef {import("./types.js").LabelTrack} LabelTrack */
+/** @typedef {"here"|"open"|"all"} Which */
+
+/** A list longer than this is for the search of the frames, not for reading. */
+const MOST = 200;
+const WHICH = /** @type {[Which, string, string][]} */ ([["here", "Here", "Labels of this frame"], ["open", "To do", "Proposed, or sent back"], ["all", "All", "Every track of the drive"]]);
+
+const body = el("div", { class: "track-list", tabIndex: -1, aria: { role: "listbox", label: "Tracks" } });
+const count = el("span", { class: "facts" });
+/** @type {Which} */
+let which = memory.read("labelTracks", "here");
+
+/** @param {HTMLElement} parent */
+export function setUp(parent) {
+  const buttons = WHICH.map(([key, words, title]) => el("button", { type: "button", textContent: words, title, data: { which: key }, onclick: () => choose(key) }));
+  parent.append(el("div", { class: "list-bar" }, el("div", { class: "joined", aria: { role: "group", label: "Which tracks" } }, ...buttons), el("span", { class: "spacer" }), count), body);
+  body.addEventListener("click", (event) => pick(within(event, ".track-row")));
+  const reflect = paint(["labels", "labelFrames", "frame", "track", "labeling", "draft"], show);
+  /** @param {Which} key */
+  function choose(key) {
+    which = key;
+    memory.write("labelTracks", key);
+    reflect();
+  }
+  /** What is shown now. */
+  function show() {
+    if (!get("labeling")?.on) return;
+    for (const button of buttons) press(button, button.dataset.which === which);
+    const found = fitting();
+    text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
+    keyed(body, found.slice(0, MOST), ({ id }) => String(id), create, update);
+    if (!found.length) body.replaceChildren(el("p", { class: "facts pad", textContent: emptyWords() }));
+  }
+}
+
+/** @returns {LabelTrack[]} */
+function fitting() {
+  const tracks = [...(get("labels")?.tracks.values() ?? [])], here = new Set(present().map(({ track }) => track));
+  if (which === "here") return tracks.filter(({ id }) => here.has(id)).sort((a, b) => a.id - b.id);
+  if (which === "open") return tracks.filter(({ state, comment }) => state === "proposed" || (comment && state !== "rejected")).sort((a, b) => a.id - b.id);
+  return tracks.sort((a, b) => a.id - b.id);
+}
+
+function emptyWords() {
+  if (!get("labels")?.tracks.size) return "Nothing is labelled yet. Press P: the pipeline's output becomes proposals.";
+  return which === "open" ? "Nothing is left to do." : "Nothing is labelled in this frame.";
+}
+
+/** @param {LabelTrack} track */
+function create({ id }) {
+  const part = (/** @type {string} */ name) => el("span", { class: name });
+  return el("button", { type: "button", class: "track-row", data: { id }, aria: { role: "option" } }, part("mark"), el("b", { textContent: `#${id}` }), part("what"), part("frames"), part("who"));
+}
+
+/** @param {HTMLElement} row @param {LabelTrack} track */
+function update(row, { id, label, state, first, last, keyframes, origin, comment }) {
+  row.setAttribute("aria-selected", String(id === get("track")));
+  row.dataset.state = comment && state === "proposed" ? "sent-back" : state;
+  const [mark, , what, frames, who] = [...row.children];
+  text(mark, { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state]);
+  mark.setAttribute("aria-label", state);
+  text(what, label);
+  text(frames, first === null || last === null ? "nowhere" : `${first + 1}–${last + 1} · ${keyframes.length} key`);
+  text(who, origin.maker === "person" ? origin.name : origin.maker);
+  row.title = `${state}${comment ? `, sent back: ${comment}` : ""}; made by ${origin.name || origin.maker}`;
+}
+
+/** Select it, and where it is not in this frame, go where it is. @param {HTMLElement|null} row */
+function pick(row) {
+  const track = trackOf(Number(row?.dataset.id ?? -1));
+  if (!track) return;
+  if (get("labeling")?.tool === "merge") return mergeWith(track.id);
+  set("track", track.id);
+  const here = shown();
+  if (track.first !== null && track.last !== null && (here < track.first || here > track.last)) seekTo(here < track.first ? track.first : track.last);
+}
