@@ -233,6 +233,7 @@ def _hit_row(
         hits=hit.hits,
         lidar_points=hit.obstacle.points,
         lidar_track=hit.id,
+        lidar_hits=hit.hits,
         gates=gates,
     )
     if seen is None:

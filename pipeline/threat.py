@@ -10,6 +10,9 @@ from pipeline.path.placing import believed_mps
 from pipeline.types import FusedObject, Path
 
 ABREAST_M = 1.0
+_VELOCITY_HITS = 3
+"""From two sightings the LiDAR knows no more than the difference of two noisy places, which may point across the road,
+and the camera's having followed the object for long does not make it better."""
 _MUST_PASS = frozenset({"distance_known", "hits", "seen", "size"})
 
 
@@ -17,7 +20,8 @@ def is_dependable(item: FusedObject) -> bool:
     """Seen now, by the LiDAR, and every test for a lead passed but class and place. A box height alone says too little
     about speed to brake for what is not even the lead."""
     tests = [gate for gate in item.gates if gate.name in _MUST_PASS]
-    return item.source != "V" and not item.carried and bool(tests) and all(gate.passed for gate in tests)
+    by_lidar = item.source == "L" or (item.source == "VL" and item.lidar_hits >= _VELOCITY_HITS)
+    return by_lidar and not item.carried and bool(tests) and all(gate.passed for gate in tests)
 
 
 def enters_corridor(item: FusedObject, path: Path) -> bool:

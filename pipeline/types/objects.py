@@ -125,7 +125,7 @@ class FusedObject:
     source: which sensors' tracks it is made of. seen_by: which of them saw it in this frame; none: it is carried.
     measured: its distance was measured in this frame; else it is a prediction.
     lateral_mps: how fast it moves to the left of the path, over ground. crossing_s: until it is over the edge of it, or
-    out of it where it is in; null when its sideways speed leads nowhere."""
+    out of it where it is in; null when its sideways speed leads nowhere. lidar_hits: sightings of its LiDAR track."""
 
     id: int
     source: SourceKind
@@ -153,6 +153,7 @@ class FusedObject:
     measured: bool = True
     lateral_mps: float | None = None
     crossing_s: float | None = None
+    lidar_hits: int = 0
 
     @property
     def carried(self) -> bool:

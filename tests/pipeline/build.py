@@ -63,4 +63,5 @@ def fused(
         lidar_points=0 if source == "V" else 40,
         lidar_track=None,
         vision_track=None,
+        lidar_hits=0 if source == "V" else hits,
     )

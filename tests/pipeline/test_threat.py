@@ -32,6 +32,11 @@ def judged(item: FusedObject, ego_mps: float | None = 20.0) -> FusedObject:
         pytest.param(fused(1, 15.0, 3.0, label="person"), True, id="a person is hit no less"),
         pytest.param(fused(1, 15.0, 3.0, source="V"), False, id="camera alone: its speed comes from a box height"),
         pytest.param(fused(1, 15.0, 3.0, source="L", hits=2), False, id="a blob seen twice"),
+        pytest.param(
+            dataclasses.replace(fused(1, 15.0, 3.0, hits=40), lidar_hits=2),
+            False,
+            id="followed by the camera for long, by the LiDAR only since the sweep before",
+        ),
         pytest.param(fused(1, 15.0, 3.0, source="L", height=0.1), False, id="a kerb"),
         pytest.param(dataclasses.replace(fused(1, 15.0, 3.0), seen_by=""), False, id="not seen now"),
     ],
