@@ -22,6 +22,7 @@ from pipeline.params import Params, with_changes
 from pipeline.path.corridor import nearest_on_path
 from pipeline.path.placing import near_face_middle
 from pipeline.records import evolve
+from pipeline.run import only
 from pipeline.simulation import truth_boxes, world
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import Sensors
@@ -31,6 +32,7 @@ from pipeline.simulation.world import World
 from pipeline.step import State, step, warm_up
 from pipeline.types import CameraCalibration, Frame, Path, Result
 
+LIDAR_ALONE = "LiDAR alone"
 SOURCES: Mapping[str, Mapping[str, bool]] = {
     "lane lines": {"path.use_gnss": False, "path.use_yaw_rate": False},
     "GNSS route": {"path.use_lanes": False, "path.use_yaw_rate": False},
@@ -38,7 +40,9 @@ SOURCES: Mapping[str, Mapping[str, bool]] = {
     "lane lines and yaw rate": {"path.use_gnss": False},
     "straight guess": {"path.use_lanes": False, "path.use_gnss": False, "path.use_yaw_rate": False},
     "fused": {},
+    LIDAR_ALONE: {},
 }
+"""Which parameters leave each source of the path; the last has all of them but no camera, so no boxes and no lines."""
 BOXES = BoxNoise(reach_m=105.0)
 """As measured of the embedded detector (``truth_boxes``), its reach included."""
 LINES = LineNoise()
@@ -101,7 +105,8 @@ def _drive(scene: Scenario, names: Sequence[str]) -> dict[str, list[tuple[World,
     rows: dict[str, list[tuple[World, Frame, Result]]] = {name: [] for name in names}
     for now, frame in seen(scene):
         for name, params in settings.items():
-            states[name], result = step(states[name], frame, params)
+            given = only(frame, "lidar") if name == LIDAR_ALONE else frame
+            states[name], result = step(states[name], given, params)
             rows[name].append((now, frame, result))
     return rows
 
@@ -296,9 +301,11 @@ def _verdict(layout: str, by_source: dict[str, list[Frames]]) -> str:
     wanted_near = near >= 0.99
     wanted_far = far >= kind.wanted
     held = "as wanted" if wanted_near and wanted_far and wrong_s <= LONGEST_WRONG_S + 1e-9 else "less than wanted"
+    alone = share_right(by_source[LIDAR_ALONE])[0]
+    better = "better than" if far > alone + 0.005 else "no better than"
     return (
         f"{kind.title}: right in {100 * near:.1f} % to 60 m and {100 * far:.1f} % to {kind.reach_m:.0f} m, "
-        f"{wrong_s:.1f} s on a decoy at most: {held}."
+        f"{wrong_s:.1f} s on a decoy at most: {held}; {better} the LiDAR alone ({100 * alone:.1f} %)."
     )
 
 

@@ -2,8 +2,9 @@
 
 CCRs: 10–80 km/h towards a standing car. CCRm: 30–80 km/h towards one that drives 20 km/h. Both in steps of 5 km/h, at
 five overlaps. CCRb: both at 50 km/h, 12 or 40 m apart, the lead brakes at 2 or 6 m/s². Impact speeds are relative, in
-the protocol's colours (Euro NCAP Assessment Protocol, Safety Assist, AEB car-to-car). As in a test, a robot holds the
-speed until AEB acts; a run whose approach left the protocol's tolerance is void.
+the colours of Euro NCAP's protocol of 2026 (Crash Avoidance, Frontal Collisions, section 5.2, as the rating calculator
+that Euro NCAP publishes, euroncap-rating-2026 5.4.9, has them). As in a test, a robot holds the speed until AEB acts; a
+run whose approach left the protocol's tolerance is void.
 """
 
 from __future__ import annotations
@@ -31,8 +32,14 @@ BRAKED_KMH = 50.0
 START_TTC_S = 4.0
 _RUN_UP_S = 1.5
 SPEED_TOLERANCE_MPS = 1.0 * KMH
-BANDS: tuple[tuple[float, Tone], ...] = ((5.0, "green"), (15.0, "yellow"), (25.0, "orange"), (35.0, "brown"))
-"""Relative impact speeds, km/h, below which a cell has the colour; red from there on."""
+BANDS: tuple[tuple[float, tuple[tuple[float, Tone], ...]], ...] = (
+    (50.0, ((10.0, "yellow"), (20.0, "orange"), (30.0, "brown"))),
+    (40.0, ((10.0, "orange"), (20.0, "brown"))),
+    (30.0, ((10.0, "brown"),)),
+    (0.0, ()),
+)
+"""From which speed of the ego car, km/h, which relative impact speeds, km/h, have a colour: each those below. Green is
+an impact avoided, red all others. The protocol tests every 10 km/h; in between, the bands of the speed below hold."""
 R152_LIMITS: tuple[tuple[float, float], ...] = ((42.0, 0.0), (45.0, 15.0), (50.0, 25.0), (55.0, 30.0), (60.0, 35.0))
 """UN R152, 5.2.1.4, category M1 unladen: up to this relative speed, km/h, the impact may be no faster than that."""
 Kind = tuple[Sensors, str, Boxes]
@@ -180,10 +187,14 @@ def _void(case: Case, drive: Drive) -> str:
     return ""
 
 
-def tone(result: Result) -> Tone:
+def tone(speed_kmh: float, result: Result) -> Tone:
+    """A cell's colour at this speed of the ego car."""
     if result.void:
         return "grey"
-    return next((colour for limit, colour in BANDS if result.impact_kmh < limit), "red")
+    if result.impact_kmh <= 0.0:
+        return "green"
+    bands = next(bands for from_kmh, bands in BANDS if speed_kmh >= from_kmh)
+    return next((colour for limit, colour in bands if result.impact_kmh < limit), "red")
 
 
 def report(cases: Sequence[Case], results: Sequence[Result]) -> Section:
@@ -202,7 +213,8 @@ def report(cases: Sequence[Case], results: Sequence[Result]) -> Section:
             "are projected truth with a detector's errors, and in a sample of the cells (network) the embedded "
             "network's on drawn pictures. AEB: a robot holds the speed and only AEB brakes. ACC: the "
             "paper's speed law alone, set to the test speed. Cells are relative impact speeds in km/h; 0 is avoided. "
-            "Grey: the approach was not as the protocol wants it.",
+            "Colours are those of Euro NCAP's protocol of 2026, whose bands depend on the test speed: green avoided, "
+            "then yellow, orange, brown, red. Grey: the approach was not as the protocol wants it.",
             _verdict(done),
         ),
         tuple(tables),
@@ -248,7 +260,7 @@ def _cell(found: tuple[Case, Result] | None) -> Cell | Coloured:
     if found is None:
         return None
     case, result = found
-    return Coloured(result.void or result.impact_kmh, tone(result), case.name)
+    return Coloured(result.void or result.impact_kmh, tone(case.speed_kmh, result), case.name)
 
 
 def _r152(done: dict[Case, Result]) -> Table:

@@ -32,12 +32,24 @@ def test_a_braking_lead_brakes_twice_as_hard_from_two_gaps() -> None:
 
 
 @pytest.mark.parametrize(
-    ("impact_kmh", "colour"),
-    [(0.0, "green"), (4.9, "green"), (5.0, "yellow"), (15.0, "orange"), (25.0, "brown"), (35.0, "red"), (80.0, "red")],
+    ("speed_kmh", "impact_kmh", "colour"),
+    [
+        (20.0, 0.0, "green"),
+        (20.0, 0.1, "red"),
+        (30.0, 9.9, "brown"),
+        (35.0, 10.0, "red"),
+        (40.0, 9.9, "orange"),
+        (40.0, 19.9, "brown"),
+        (45.0, 20.0, "red"),
+        (50.0, 9.9, "yellow"),
+        (80.0, 10.0, "orange"),
+        (80.0, 29.9, "brown"),
+        (80.0, 30.0, "red"),
+    ],
 )
-def test_colours(impact_kmh: float, colour: str) -> None:
-    assert tone(Result(impact_kmh, "")) == colour
-    assert tone(Result(impact_kmh, "speed off by 2.0 km/h")) == "grey"
+def test_colours(speed_kmh: float, impact_kmh: float, colour: str) -> None:
+    assert tone(speed_kmh, Result(impact_kmh, "")) == colour
+    assert tone(speed_kmh, Result(impact_kmh, "speed off by 2.0 km/h")) == "grey"
 
 
 @pytest.mark.parametrize(("relative", "limit"), [(10, 0), (42, 0), (45, 15), (50, 25), (60, 35), (65, None)])
@@ -84,9 +96,9 @@ def test_the_report_has_a_coloured_cell_for_each_run() -> None:
         (
             "30 km/h",
             Coloured(0.0, "green", "ccrs_30kmh_overlap-50_fused_aeb_truth"),
-            Coloured(8.0, "yellow", "ccrs_30kmh_overlap100_fused_aeb_truth"),
+            Coloured(8.0, "brown", "ccrs_30kmh_overlap100_fused_aeb_truth"),
         ),
     )
     ((_, *lidar),) = grids["CCRs: LiDAR, AEB"]
-    assert [(cell.value, cell.tone) for cell in lidar] == [(30.0, "brown"), ("speed off", "grey")]
+    assert [(cell.value, cell.tone) for cell in lidar] == [(30.0, "red"), ("speed off", "grey")]
     assert "of 1 runs fused ends slower than the LiDAR alone in 1" in section.text[1], "a void run does not count"
