@@ -5,10 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
-from app.undo import History, Setting
-from pipeline.params import Params, with_changes
+from pipeline.params import Params, changes_of, with_changes
 
 
 @dataclass(frozen=True)
@@ -30,12 +29,27 @@ class Wish:
     stop: bool = False
 
 
+class Settling(Protocol):
+    """Hears of parameters that are meant to stay."""
+
+    def __call__(self, changes: Mapping[str, tuple[Any, Any]], person: str, *, merges: bool) -> object:
+        """changes: by dotted name (and ``preset``), before and after. merges: one step with the change before it."""
+        ...
+
+
+PRESET = "preset"
+"""Among changes of parameters, the name of what they started from."""
+
+
 class Control:
-    """The hand-over between any number of callers and the one worker."""
+    """The hand-over between any number of callers and the one worker. on_settle: called on the thread of who changed
+    parameters, before that returns, one change after the other."""
 
     def __init__(self, first: Wish) -> None:
+        self.on_settle: Settling = lambda changes, person, *, merges: None
         self._wish = first
-        self._history = History(Setting(first.params, first.preset))
+        self._settled = (first.params, first.preset)
+        self._settling = threading.RLock()
         self._condition = threading.Condition(threading.RLock())
         self._changed = first.uri is not None
 
@@ -54,43 +68,53 @@ class Control:
             self._replace(replace(self._wish, playing=False, steps=self._wish.steps + count))
 
     def set_params(
-        self, params: Params, preset: str | None = None, *, final: bool = True, merges: frozenset[str] = frozenset()
+        self,
+        params: Params,
+        preset: str | None = None,
+        *,
+        final: bool = True,
+        merges: bool = False,
+        person: str = "",
     ) -> int:
         """Use these parameters from now on. Returns their revision.
 
-        final: a step that can be undone; otherwise they are only tried, as while a slider is dragged. merges: names
-        whose changes one after the other are one step."""
-        with self._condition:
-            setting = Setting(params, preset or self._wish.preset)
-            if final:
-                self._history = self._history.settle(setting, merges)
-            return self._use(setting, final)
+        final: a step that can be undone; otherwise they are only tried, as while a slider is dragged. merges: one step
+        with the change before it, when that was of the same parameters. person: whose step it is."""
+        with self._settling:
+            revision, changes = self._take(params, preset, final)
+            if changes:
+                self.on_settle(changes, person, merges=merges)
+            return revision
 
-    def change_params(self, changes: Mapping[str, Any], *, final: bool = True, merge: bool = False) -> int:
+    def change_params(
+        self, changes: Mapping[str, Any], *, final: bool = True, merge: bool = False, person: str = ""
+    ) -> int:
         """Change some parameters, by their dotted names, as they stand at this moment: of two callers at once neither
         undoes the other. ParamsError for a bad one. Returns the revision."""
-        with self._condition:
-            merges = frozenset(changes) if merge else frozenset()
-            return self.set_params(with_changes(self._wish.params, changes), final=final, merges=merges)
+        with self._settling:
+            changed = with_changes(self.peek().params, changes)
+            return self.set_params(changed, final=final, merges=merge, person=person)
 
-    def undo(self) -> bool:
-        """Back to what was settled on before; what is only tried at this moment goes first. False: nothing to undo."""
-        with self._condition:
-            tried = self._wish.params != self._history.now.params
-            return self._move(self._history if tried else self._history.back())
+    def restore(self, changes: Mapping[str, Any]) -> None:
+        """Parameters as an undone or redone step has them, by dotted name (and ``preset``): no step of its own. What is
+        only tried at this moment goes. ParamsError when they are no parameters any more."""
+        with self._settling, self._condition:
+            self._settled = self.check(changes)
+            self._use(*self._settled, settled=True)
 
-    def redo(self) -> bool:
-        """What was undone last, again. False: nothing to redo."""
-        with self._condition:
-            return self._move(self._history.forth())
+    def check(self, changes: Mapping[str, Any]) -> tuple[Params, str]:
+        """Parameters and preset as ``restore`` would have them."""
+        params, preset = self._settled
+        values = {name: value for name, value in changes.items() if name != PRESET}
+        return with_changes(params, values), changes.get(PRESET, preset)
 
-    @property
-    def can_undo(self) -> bool:
-        return bool(self._history.past)
-
-    @property
-    def can_redo(self) -> bool:
-        return bool(self._history.future)
+    def forget_tried(self) -> bool:
+        """Back to what was settled on; false when nothing else is being tried."""
+        with self._settling, self._condition:
+            if self._wish.params == self._settled[0]:
+                return False
+            self._use(*self._settled, settled=True)
+            return True
 
     def peek(self) -> Wish:
         """The wish as it stands, served or not."""
@@ -115,16 +139,21 @@ class Control:
             self._wish = replace(taken, uri=None, target=None, steps=0)
             return taken
 
-    def _move(self, history: History | None) -> bool:
-        if history is None:
-            return False
-        self._history = history
-        self._use(history.now, settled=True)
-        return True
+    def _take(self, params: Params, preset: str | None, final: bool) -> tuple[int, dict[str, tuple[Any, Any]]]:
+        """The revision, and what is settled that was not before."""
+        with self._condition:
+            preset = preset or self._wish.preset
+            revision = self._use(params, preset, final)
+            if not final:
+                return revision, {}
+            (old, old_preset), self._settled = self._settled, (params, preset)
+            changes = changes_of(old, params)
+            if preset != old_preset:
+                changes[PRESET] = (old_preset, preset)
+            return revision, changes
 
-    def _use(self, setting: Setting, settled: bool) -> int:
+    def _use(self, params: Params, preset: str, settled: bool) -> int:
         revision = self._wish.params_revision + 1
-        params, preset = setting
         self._replace(replace(self._wish, params=params, preset=preset, params_revision=revision, settled=settled))
         return revision
 

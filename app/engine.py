@@ -17,6 +17,7 @@ from app.control import Control, Wish
 from app.detector_pool import DetectorPool, OpenDetector, OpenLanes
 from app.drive.drives import Drives
 from app.drive.recording import Recipe
+from app.labels.desk import LabelDesk
 from app.line import DetectionCache, Line, Tick
 from app.playing.live import LivePlayer
 from app.playing.live_line import LiveLine
@@ -42,7 +43,8 @@ class Engine:
     one for a source's pictures; null runs without a camera's detector and says nothing about it; ``open_lanes`` gives
     the lane detector, which looks at every ``lanes_every``-th frame. ``whole_drives``: a recording's whole drive is
     computed in the background (``drives``), so that any frame is shown as it is in it. ``desk``: where what is shown
-    can be recorded; by default into the folder of this machine's sessions."""
+    can be recorded; by default into the folder of this machine's sessions. ``labels``: what people say of it, and the
+    steps they can take back; by default gone at the end."""
 
     def __init__(
         self,
@@ -58,6 +60,7 @@ class Engine:
         open_lanes: OpenLanes | None = None,
         lanes_every: int | None = None,
         desk: RecordingDesk | None = None,
+        labels: LabelDesk | None = None,
     ) -> None:
         self.control = Control(Wish(params, preset, uri=uri, playing=playing))
         self._showing = Showing(Snapshot(params, preset))
@@ -67,6 +70,7 @@ class Engine:
         self._detections = DetectionCache()
         self.drives = Drives(self._detections)
         self.desk = desk or RecordingDesk()
+        self.labels = labels or LabelDesk()
         self._whole_drives = whole_drives
         self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every)
         self._player: Player | None = None
@@ -75,6 +79,7 @@ class Engine:
     def start(self) -> None:
         self.drives.on_change = self.control.change
         self.drives.start()
+        self.labels.start(self.control)
         self._thread.start()
 
     def stop(self) -> None:
@@ -84,6 +89,7 @@ class Engine:
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
         self.desk.stop()
+        self.labels.stop()
 
     @property
     def source(self) -> AnySource | None:
@@ -149,6 +155,7 @@ class Engine:
         player = self._player_of(source, detectors)
         player.open()
         self._player = player
+        self.labels.open(uri, self.drives.recording)
         self._showing.publish(
             replace(
                 self.snapshot,
@@ -204,8 +211,7 @@ class Engine:
             shown,
             drive=self.drives.state,
             recording=self.desk.state,
-            can_undo=self.control.can_undo,
-            can_redo=self.control.can_redo,
+            labels=self.labels.state,
             params=wish.params,
             preset=wish.preset,
             params_revision=wish.params_revision,

@@ -29,6 +29,8 @@ from app.routes.alignment import alignment_router
 from app.routes.clips import clips_router
 from app.routes.drive import drive_router
 from app.routes.health import health_router
+from app.routes.label_acts import label_acts_router
+from app.routes.labels import labels_router
 from app.routes.params import params_router
 from app.routes.playback import playback_router
 from app.routes.project import project_router
@@ -87,6 +89,8 @@ def create_app(
     app.include_router(recording_router(engine))
     app.include_router(drive_router(engine, engine.drives, marks or Marks()))
     app.include_router(runs_router(engine, engine.drives))
+    app.include_router(labels_router(engine.labels))
+    app.include_router(label_acts_router(engine.labels))
     app.include_router(clips_router(engine, jobs))
     app.include_router(alignment_router(engine))
     app.include_router(project_router(engine))

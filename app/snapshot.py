@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from app.drive.drives import DriveState
+from app.labels.desk import LabelState
 from app.line import Tick
 from pipeline.params import Params
 from pipeline.recording.recorder import RecordingState
@@ -52,8 +53,7 @@ class Snapshot:
     made_unix_s: float = 0.0
     tick: Tick | None = None
     drive: DriveState = DriveState()
-    can_undo: bool = False
-    can_redo: bool = False
+    labels: LabelState = LabelState()
     live: bool = False
     streams: tuple[StreamHealth, ...] = ()
     recording: RecordingState | None = None
@@ -81,8 +81,9 @@ class Snapshot:
             "skipped": self.skipped,
             "provisional": self.tick is not None and not self.tick.exact,
             "drive": self.drive.to_json(),
-            "can_undo": self.can_undo,
-            "can_redo": self.can_redo,
+            "can_undo": self.labels.can_undo,
+            "can_redo": self.labels.can_redo,
+            "labels": self.labels.to_json(),
             "live": self.live,
             "streams": streams_json(self.streams),
             "recording": self.recording.to_json() if self.recording is not None else None,

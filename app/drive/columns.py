@@ -1,6 +1,6 @@
 """One frame of a drive as a row of plain values, and one object in it as a record: what timelines and events need.
 
-A row is some 200 bytes and an object 40, so that a whole drive fits where its results would not. Null in a row, NaN and
+A row is some 200 bytes and an object 85, so that a whole drive fits where its results would not. Null in a row, NaN and
 0 in a record (``source``) stand for what is not known.
 """
 
@@ -15,11 +15,19 @@ import numpy.typing as npt
 
 from pipeline.evaluation.lead import Judged
 from pipeline.fusion import LIDAR_RANGE_SIGMA_M
+from pipeline.geometry import Cuboid
+from pipeline.labels.propose import Seen
 from pipeline.motion import closing_speed_mps
 from pipeline.types import VEHICLES, Frame, FusedObject, Result, VisionTrack
+from pipeline.vision.labels import COCO_80
 
 SOURCES = ("", "V", "L", "VL")
+LABELS = ("", *COCO_80)
+"""A class that is none of these is kept as nameless."""
 _DECIMALS = 4
+_PLACE = {name: place for place, name in enumerate(LABELS)}
+_NOWHERE = (math.nan,) * 7
+_UNBOXED = (math.nan,) * 4
 
 OBJECT = np.dtype(
     [
@@ -34,10 +42,14 @@ OBJECT = np.dtype(
         ("path_offset_m", "f4"),
         ("vl_gap_m", "f4"),
         ("vl_gap_sigmas", "f4"),
+        ("label", "i1"),
+        ("cuboid", "f4", 7),
+        ("bbox", "f4", 4),
     ]
 )
 """``source`` is a place in ``SOURCES``; ``vehicle``: of a vehicle's class, or nameless; ``vl_gap``: camera's minus
-LiDAR's distance of a VL object, also in standard deviations of both."""
+LiDAR's distance of a VL object, also in standard deviations of both. ``label`` is a place in ``LABELS``. ``cuboid``:
+center x y z, length, width, height, yaw."""
 Objects = npt.NDArray[np.void]
 
 
@@ -116,8 +128,16 @@ def objects_of(result: Result) -> Objects:
             _float(item.path_offset_m),
             gap,
             sigmas,
+            _PLACE.get(item.label or "", 0),
+            (*item.cuboid.center, *item.cuboid.size, item.cuboid.yaw_rad) if item.cuboid is not None else _NOWHERE,
+            item.bbox if item.bbox is not None else _UNBOXED,
         )
     return records
+
+
+def seen_of(records: Objects) -> list[Seen]:
+    """The objects of one frame as labels are proposed from."""
+    return [_seen(record) for record in records]
 
 
 def columns_json(rows: Sequence[Row]) -> dict[str, list[Any]]:
@@ -158,6 +178,19 @@ def _vl_gap(item: FusedObject, tracks: dict[int, VisionTrack]) -> tuple[float, f
         return None
     gap = track.distance_m - item.distance_m
     return gap, abs(gap) / math.hypot(track.sigma_m, item.distance_sigma_m or LIDAR_RANGE_SIGMA_M)
+
+
+def _seen(record: Any) -> Seen:
+    x, y, z, length, width, height, yaw = (round(float(value), _DECIMALS) for value in record["cuboid"])
+    x1, y1, x2, y2 = (round(float(value), _DECIMALS) for value in record["bbox"])
+    return Seen(
+        int(record["id"]),
+        LABELS[record["label"]] or None,
+        Cuboid((x, y, z), (length, width, height), yaw) if math.isfinite(x) else None,
+        (x1, y1, x2, y2) if math.isfinite(x1) else None,
+        bool(record["in_path"]),
+        bool(record["carried"]),
+    )
 
 
 def _float(value: float | None) -> float:

@@ -38,6 +38,7 @@ class InputStore:
         self._lock = threading.Lock()
         self._bytes = 0
         self._frames: dict[int, Frame] = {}
+        self._names: dict[int, str] = {}
 
     def __len__(self) -> int:
         return len(self._frames)
@@ -46,8 +47,13 @@ class InputStore:
         """The frame without pixels; null when it is not held."""
         return self._frames.get(index)
 
+    def name(self, index: int) -> str | None:
+        """What the recording calls a frame; null when it was not seen yet. Of all frames, also of those not held."""
+        return self._names.get(index)
+
     def offer(self, frame: Frame) -> None:
         """Hold a frame that the detectors have looked at, if there is room and it is not held yet."""
+        self._names[frame.index] = frame.name
         if frame.index in self._frames:
             return
         light = without_pixels(frame)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -114,6 +116,13 @@ class Recording:
         detectors = self.recipe.detectors
         names = [each.name for each in (detectors.boxes, detectors.lanes) if each is not None]
         return digest(self.recipe.uri, names, self.recipe.sensors, params)
+
+    def calibration_digest(self, params: Params) -> str:
+        """With which calibration pictures and points are laid on each other, as twelve characters."""
+        camera = self.as_read(0).camera
+        numbers = [] if camera is None else [camera.K, camera.distortion, camera.T_camera_ego]
+        made_from = [[each.tolist() for each in numbers], params.alignment.model_dump(mode="json")]
+        return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:12]
 
     def _onwards(self, kept: Kept, index: int, params: Params) -> State:
         state = kept.state

@@ -104,8 +104,9 @@ class Draft:
 
     def add(self, kind: ItemKind, value: Value) -> int:
         """Make an item; its number, which no other had before."""
-        number = value.id if isinstance(value, LabelTrack) else self.next_number(kind)
-        self._given[kind] = max(self._given.get(kind, 0), number)
+        following = self.next_number(kind)
+        number = value.id if isinstance(value, LabelTrack) else following
+        self._given[kind] = max(following - 1, number)
         self.put(kind, number, value)
         return number
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
@@ -16,7 +16,7 @@ from app.labels.items import SIGHTINGS, read_changed, read_extents, read_item, r
 from app.labels.log import Log
 from app.labels.refusals import ActRefused, NoSuchLabel
 from app.labels.tables import DriveRow, SightingRow, VersionRow
-from app.labels.values import KINDS, Item, ItemKind, pack, sighting_of, unpack
+from app.labels.values import KINDS, Item, ItemKind, sighting_of
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
 
@@ -25,13 +25,14 @@ WORKING = "working"
 
 @dataclass(frozen=True)
 class DriveInfo:
-    """A recording that labels belong to. key: of its content. frames: their names; t_ns: their ticks."""
+    """A recording that labels belong to. key: of its content. t_ns: the ticks of its frames. names: gives their names,
+    which may mean to read them all."""
 
     key: str
     uri: str
     title: str
-    frames: tuple[str, ...]
     t_ns: tuple[int, ...]
+    names: Callable[[], tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -167,7 +168,7 @@ class DriveLabels:
         leads = sorted(cast("list[LeadRange]", items["lead"]), key=lambda lead: (lead.first, lead.last))
         return LabelSet(
             self.info.uri,
-            self.info.frames,
+            self.info.names(),
             self.info.t_ns,
             tuple(replace(track, sightings=tuple(by_track.get(track.id, ()))) for track in tracks),
             tuple(leads),
@@ -188,20 +189,13 @@ def known_drives(database: Database) -> list[dict[str, Any]]:
     return [dict(row._mapping) for row in found]
 
 
-def frames_of(packed: bytes) -> tuple[Sequence[str], Sequence[int]]:
-    """Names and ticks as a drive's row holds them."""
-    body = unpack(packed)
-    return body["names"], body["t_ns"]
-
-
 def _drive_row(database: Database, info: DriveInfo) -> int:
     """Its id; made when there is none. Two at once make one."""
     values = {
         "key": info.key,
         "uri": info.uri,
         "title": info.title,
-        "count": len(info.frames),
-        "frames": pack({"names": info.frames, "t_ns": info.t_ns}),
+        "count": len(info.t_ns),
         "revision": 0,
     }
     wanted = select(DriveRow.id).where(DriveRow.key == info.key)

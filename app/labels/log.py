@@ -97,9 +97,9 @@ class Log:
 
     # ------------------------------------------------------------ going back and forth
 
-    def move(self, way: Way, person: str) -> Acted:
+    def move(self, way: Way, person: str, check: Callable[[Mapping[str, Any]], object] = lambda _: None) -> Acted:
         """Take back the person's newest act, or do again the one taken back last. ActRefused when there is none, or
-        when somebody else changed the same label or parameter since."""
+        when somebody else changed the same label or parameter since. check: raises for parameters that cannot be."""
         with self._database.writing() as connection:
             draft = self._draft(connection, person)
             step = self._next(connection, way, person)
@@ -109,6 +109,7 @@ class Log:
             self._check_untouched(connection, [number for number, _ in acts], person, way)
             for number, _ in reversed(acts) if way == "undo" else acts:
                 self._put(connection, draft, number, way)
+            check(draft.params)
             draft.write()
             what = acts[-1][1]
             status = "undone" if way == "undo" else "done"

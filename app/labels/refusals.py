@@ -11,6 +11,10 @@ class ActRefused(BadInput):
     """It cannot be done to these labels as they stand; nothing was written."""
 
 
+class BadAct(BadInput):
+    """It makes no sense, whatever the labels are."""
+
+
 class NoSuchLabel(BadInput):
     """What it is about is not, or no longer, there."""
 

@@ -6,13 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from app.labels.refusals import BadAct
 from app.labels.tables import LONGEST_NAME
 from app.labels.values import ItemKind
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.labels.check import check_sighting
 from pipeline.labels.model import Sighting
-from pipeline.types import Box, Point2
+from pipeline.types import Point2
 
 _LARGEST_ID = 2**63 - 1
 _MOST_FRAMES = 2**31 - 1
@@ -65,12 +66,15 @@ class Placed(Strict):
     bbox: tuple[Finite, Finite, Finite, Finite] | None = None
 
     def sighting(self) -> Sighting:
-        """As a keyframe. BadInput for a box that is none, or when nothing is there."""
+        """As a keyframe. BadAct for a box that is none, or when nothing is there."""
         if self.cuboid is None and self.bbox is None:
-            raise BadInput("neither a cuboid nor a box")
+            raise BadAct("neither a cuboid nor a box")
         cuboid = Cuboid(self.cuboid.center, self.cuboid.size, self.cuboid.yaw_rad) if self.cuboid else None
-        bbox: Box | None = self.bbox
-        return check_sighting(Sighting(self.frame, cuboid, bbox), f"frame {self.frame}")
+        sighting = Sighting(self.frame, cuboid, self.bbox)
+        try:
+            return check_sighting(sighting, f"frame {self.frame}")
+        except BadInput as error:
+            raise BadAct(str(error)) from None
 
 
 class Ref(Strict):
@@ -228,9 +232,9 @@ class SetPath(Strict):
     right: Line | None
 
     def lines(self) -> tuple[tuple[Point2, ...] | None, tuple[Point2, ...] | None]:
-        """BadInput when there is neither."""
+        """BadAct when there is neither."""
         if self.left is None and self.right is None:
-            raise BadInput("neither a left nor a right line")
+            raise BadAct("neither a left nor a right line")
         return (
             tuple(self.left) if self.left is not None else None,
             tuple(self.right) if self.right is not None else None,

@@ -18,8 +18,8 @@ class Base(DeclarativeBase):
 
 
 class DriveRow(Base):
-    """A recording that was labelled, or driven with. key: its content's. frames: names and ticks, compressed. revision:
-    the number of its newest act."""
+    """A recording that was labelled, or driven with. key: its content's. count: of its frames, 0 for what has none, as
+    live sensors. revision: the number of its newest act."""
 
     __tablename__ = "drive"
     id: Mapped[int] = mapped_column(Integer, primary_key=True)
@@ -27,7 +27,6 @@ class DriveRow(Base):
     uri: Mapped[str] = mapped_column(Text)
     title: Mapped[str] = mapped_column(Text)
     count: Mapped[int] = mapped_column(Integer)
-    frames: Mapped[bytes] = mapped_column(LargeBinary)
     revision: Mapped[int] = mapped_column(BigInteger, default=0)
 
 

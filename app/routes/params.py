@@ -11,9 +11,11 @@ from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
 from app.engine import Engine
+from app.labels.tables import LONGEST_NAME
+from app.routes.refusals import refusing
 from app.routes.shapes import ParamsJson, file_of
 from pipeline.alignment import angular_from_calibration
-from pipeline.params import PRESETS, Params, ParamsError, preset, to_yaml, with_changes
+from pipeline.params import PRESETS, Params, ParamsError, flat, preset, to_yaml, with_changes
 from pipeline.types import REAL_VEHICLES, Frame
 
 _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": ParamsJson}}
@@ -24,6 +26,7 @@ class Changes(BaseModel):
 
     changes: dict[str, Any] = Field(min_length=1, examples=[{"cluster.z_weight": 0.4}])
     final: bool = Field(True, description="False while a slider is dragged: shown, but no step and no whole-drive run")
+    person: str = Field("", max_length=LONGEST_NAME, description="Whose step it is to undo; anyone's without a name")
 
 
 class Replacement(BaseModel):
@@ -52,7 +55,7 @@ def params_router(engine: Engine) -> APIRouter:
     def change(body: Changes) -> JSONResponse:
         """Change some parameters. The shown frame is run again at once. 422 with one sentence for a bad value."""
         try:
-            engine.control.change_params(body.changes, final=body.final)
+            engine.control.change_params(body.changes, final=body.final, person=body.person)
         except ParamsError as error:
             raise HTTPException(422, str(error)) from None
         return _params_json(engine)
@@ -68,16 +71,17 @@ def params_router(engine: Engine) -> APIRouter:
 
     @router.post("/params/undo", responses=_ANSWER)
     def undo() -> JSONResponse:
-        """Back to the parameters before the last change. 409 when there is none."""
-        if not engine.control.undo():
-            raise HTTPException(409, "there is nothing to undo")
+        """Back to the parameters before the last change that nobody put a name to. 409 when there is none. A page
+        undoes by POST /api/labels/undo, which goes across labels and parameters."""
+        with refusing():
+            engine.labels.move("undo", "")
         return _params_json(engine)
 
     @router.post("/params/redo", responses=_ANSWER)
     def redo() -> JSONResponse:
         """The change that was undone last, again. 409 when there is none."""
-        if not engine.control.redo():
-            raise HTTPException(409, "there is nothing to redo")
+        with refusing():
+            engine.labels.move("redo", "")
         return _params_json(engine)
 
     @router.post("/params/preset", responses=_ANSWER)
@@ -138,21 +142,14 @@ def _params_json(engine: Engine) -> JSONResponse:
         "preset": wish.preset,
         "presets": list(PRESETS),
         "revision": wish.params_revision,
-        "can_undo": engine.control.can_undo,
-        "can_redo": engine.control.can_redo,
+        "can_undo": engine.labels.state.can_undo,
+        "can_redo": engine.labels.state.can_redo,
         "sections": describe(),
         "values": flat(wish.params),
         "base": flat(preset(wish.preset)),
         "effective": effective(tick.frame if tick else None, wish.params),
     }
     return JSONResponse(answer)
-
-
-def flat(params: Params) -> dict[str, Any]:
-    """``{"cluster.z_weight": 0.4, …}`` in the order in which they are declared."""
-    return {
-        f"{section}.{key}": value for section, values in params.model_dump().items() for key, value in values.items()
-    }
 
 
 def _section_fields(field: FieldInfo) -> dict[str, FieldInfo]:

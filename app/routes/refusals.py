@@ -10,16 +10,25 @@ from fastapi import HTTPException
 from app.drive.book import NoSuchRun
 from app.drive.drives import Drives
 from app.drive.recording import Recording
+from app.labels.database import DatabaseError
+from app.labels.refusals import BadAct, NoSuchLabel, Stale
 from pipeline.errors import BadInput
 
 
 @contextmanager
 def refusing() -> Iterator[None]:
-    """404 for a run that is not there, 409 for what is refused."""
+    """404 for what is not there, 409 for what is refused, 422 for what makes no sense, 503 for a database that fails.
+    Stale goes through: who asks is to get both versions."""
     try:
         yield
-    except NoSuchRun as error:
+    except Stale:
+        raise
+    except (NoSuchRun, NoSuchLabel) as error:
         raise HTTPException(404, str(error)) from None
+    except BadAct as error:
+        raise HTTPException(422, str(error)) from None
+    except DatabaseError as error:
+        raise HTTPException(503, str(error)) from None
     except BadInput as error:
         raise HTTPException(409, str(error)) from None
 

@@ -14,10 +14,9 @@ from app.drive.recording import Recording
 from app.drive.run import DriveRun
 from app.engine import Engine
 from app.routes.drive import Columns, columns_of, current
-from app.routes.params import flat
 from app.routes.refusals import open_recording, refusing
 from app.routes.shapes import file_of
-from pipeline.params import Params, to_yaml
+from pipeline.params import changes_of, to_yaml
 
 _MOST_SENTENCES = 100
 _NAMED_CHANGES = 3
@@ -161,12 +160,6 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
         )
 
     return router
-
-
-def changes_of(base: Params, params: Params) -> dict[str, tuple[Any, Any]]:
-    """``{"cluster.z_weight": (0.4, 0.3)}``: what differs, before and after."""
-    before, after = flat(base), flat(params)
-    return {name: (before[name], value) for name, value in after.items() if value != before[name]}
 
 
 def label_of(changes: dict[str, tuple[Any, Any]], preset: str) -> str:

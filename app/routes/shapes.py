@@ -177,6 +177,26 @@ class RecordingJson(_Exact):
     error: str | None
 
 
+class LabelTaskJson(_Exact):
+    """Something on labels that takes a while. It stays, with its note or error, until the next one begins."""
+
+    what: Literal["propose", "import", "refit"]
+    done: int
+    total: int
+    note: str
+    error: str | None
+    running: bool
+
+
+class LabelStateJson(_Exact):
+    """revision: the number of acts; when it is another, GET /api/labels?since=. can_undo, can_redo: for anyone."""
+
+    revision: int
+    can_undo: bool
+    can_redo: bool
+    task: LabelTaskJson | None
+
+
 class StateJson(_Exact):
     """Source, position, playback. streams: how live sensors do, by sensor. sequence grows with every result."""
 
@@ -202,6 +222,7 @@ class StateJson(_Exact):
     drive: DriveStateJson
     can_undo: bool
     can_redo: bool
+    labels: LabelStateJson | None
     live: bool
     streams: dict[str, dict[str, Any]]
     recording: RecordingJson | None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pipeline.labels.link import linked
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
 from pipeline.sources.base import Source, TruthObject
 from pipeline.vision.labels import canonical
@@ -17,46 +18,47 @@ def truth_labels(
 ) -> tuple[LabelSet, tuple[str, ...]]:
     """(labels, what is to be said of them). frames: the names of the recording's frames.
 
-    Objects that have an id are a track each over all frames; one without is a track of its own in each frame.
+    Objects that have an id are a track each over all frames; those without are linked over frames by nearness.
     """
     known: dict[int, tuple[str, list[Sighting]]] = {}
-    alone: list[tuple[str, Sighting]] = []
+    alone: dict[int, tuple[TruthObject, ...]] = {}
     labelled = 0
+    stamps = tuple(source.t_ns(index) for index in range(len(frames)))
     for index in range(len(frames)):
         truth = source.truth(index)
         labelled += truth is not None
         for each in truth or ():
-            _add(each, index, known, alone)
+            if each.id is not None and each.id >= 0:
+                _add(each, each.id, index, known)
+        alone[index] = tuple(each for each in truth or () if each.id is None or each.id < 0)
         progress(index + 1, len(frames))
-    tracks = [(number, label, tuple(sightings)) for number, (label, sightings) in sorted(known.items())]
-    first = max(known, default=0) + 1
-    tracks += [(first + place, label, (sighting,)) for place, (label, sighting) in enumerate(alone)]
-    stamps = tuple(source.t_ns(index) for index in range(len(frames)))
+    links = linked({stamps[index]: objects for index, objects in alone.items() if objects})
+    first = max(known, default=0)
+    for index, objects in alone.items():
+        for each in links[stamps[index]] if objects else ():
+            _add(each, first + (each.id or 0), index, known)
     labels = LabelSet(
         source.uri,
         frames,
         stamps,
-        tuple(LabelTrack(number, label, sightings, "accepted", origin) for number, label, sightings in tracks),
+        tuple(
+            LabelTrack(number, label, tuple(sightings), "accepted", origin)
+            for number, (label, sightings) in sorted(known.items())
+        ),
     )
-    return labels, tuple(_notes(labelled, len(frames), len(alone)))
+    return labels, tuple(_notes(labelled, len(frames), any(alone.values())))
 
 
-def _add(
-    each: TruthObject, index: int, known: dict[int, tuple[str, list[Sighting]]], alone: list[tuple[str, Sighting]]
-) -> None:
-    sighting, label = Sighting(index, each.cuboid), canonical(each.label)
-    if each.id is None or each.id < 0:
-        alone.append((label, sighting))
-        return
-    sightings = known.setdefault(each.id, (label, []))[1]
+def _add(each: TruthObject, number: int, index: int, known: dict[int, tuple[str, list[Sighting]]]) -> None:
+    sightings = known.setdefault(number, (canonical(each.label), []))[1]
     if not sightings or sightings[-1].frame < index:
-        sightings.append(sighting)
+        sightings.append(Sighting(index, each.cuboid))
 
 
-def _notes(labelled: int, count: int, alone: int) -> list[str]:
+def _notes(labelled: int, count: int, is_linked: bool) -> list[str]:
     notes = []
     if labelled < count:
         notes.append(f"{count - labelled} of {count} frames are not labelled")
-    if alone:
-        notes.append("no identities over time: each object of each frame is a track of its own")
+    if is_linked:
+        notes.append("the labels follow no identities over time: vehicles are linked over frames by nearness")
     return notes

@@ -136,6 +136,19 @@ def with_changes(params: Params, changes: Mapping[str, Any]) -> Params:
     return _validated(data)
 
 
+def flat(params: Params) -> dict[str, Any]:
+    """``{"cluster.z_weight": 0.4, …}`` in the order in which they are declared."""
+    return {
+        f"{section}.{key}": value for section, values in params.model_dump().items() for key, value in values.items()
+    }
+
+
+def changes_of(base: Params, params: Params) -> dict[str, tuple[Any, Any]]:
+    """``{"cluster.z_weight": (0.4, 0.3)}``: what differs, before and after."""
+    before, after = flat(base), flat(params)
+    return {name: (before[name], value) for name, value in after.items() if value != before[name]}
+
+
 def from_yaml(path: Path, base: Params) -> Params:
     """``base`` with a preset file's values: a mapping of section to parameter to value."""
     try:

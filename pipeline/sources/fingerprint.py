@@ -1,12 +1,16 @@
-"""Whether a recording is still the one that was opened before under the same name."""
+"""Whether a recording is still the one that was opened before under the same name, and whether two are the same."""
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from urllib.parse import parse_qsl
+
+import numpy as np
+
+from pipeline.types import Frame
 
 
 def fingerprint(uri: str) -> str:
@@ -21,6 +25,20 @@ def fingerprint(uri: str) -> str:
         except (OSError, ValueError):
             continue
         digest.update(f"{file}\0{stat.st_size}\0{stat.st_mtime_ns}\0{stat.st_ino}\0".encode(errors="replace"))
+    return digest.hexdigest()[:16]
+
+
+def content_key(t_ns: Sequence[int], frame: Callable[[int], Frame]) -> str:
+    """Sixteen characters of what is in a recording, wherever it lies and whatever form it has: a session that was made
+    of it has the same. From the ticks of all frames, and the pictures (without one, the points) of the first, the
+    middle and the last one."""
+    digest = hashlib.sha256(np.array(t_ns, np.int64).tobytes())
+    for index in sorted({0, len(t_ns) // 2, len(t_ns) - 1}) if t_ns else ():
+        shown = frame(index)
+        if shown.picture is not None:
+            digest.update(shown.picture.encoded or np.ascontiguousarray(shown.picture.bgr).tobytes())
+        elif shown.sweep is not None:
+            digest.update(np.ascontiguousarray(shown.sweep.points).tobytes())
     return digest.hexdigest()[:16]
 
 

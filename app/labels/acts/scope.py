@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TypeVar, cast
 
 from app.labels.draft import Draft
+from app.labels.refusals import BadAct
 from app.labels.values import Item
-from pipeline.errors import BadInput
 from pipeline.labels.model import EventLabel, LabelTrack, LeadRange, Origin, PathLabel
 
 Stated = LabelTrack | LeadRange | PathLabel | EventLabel
@@ -21,11 +21,11 @@ class Scope:
     t_ns: tuple[int, ...]
 
     def check(self, first: int, last: int | None = None) -> None:
-        """BadInput for frames that the recording does not have."""
+        """BadAct for frames that the recording does not have."""
         count, last = len(self.t_ns), first if last is None else last
         if not 0 <= first <= last < count:
             frames = f"frame {first}" if first == last else f"frames {first} to {last}"
-            raise BadInput(f"{frames}: the recording has {count}, counted from 0")
+            raise BadAct(f"{frames}: the recording has {count}, counted from 0")
 
 
 def by_person(draft: Draft) -> Origin:
@@ -42,9 +42,9 @@ def corrected(draft: Draft, track: LabelTrack) -> None:
 
 
 def stated(item: Item) -> Stated:
-    """Its value, which has a state. BadInput for a tag."""
+    """Its value, which has a state. BadAct for a tag."""
     if item.kind == "tag":
-        raise BadInput("a tag is neither accepted nor rejected")
+        raise BadAct("a tag is neither accepted nor rejected")
     return cast("Stated", item.value)
 
 

@@ -14,8 +14,9 @@ from typing import Literal
 
 from pipeline.aeb import required_decel_mps2
 from pipeline.evaluation.lead import nearest_face_m
-from pipeline.evaluation.scores.truth import MAX_GAP_S, FrameTruth
+from pipeline.evaluation.scores.truth import FrameTruth
 from pipeline.geometry import closest_on_polygon
+from pipeline.labels.link import MAX_GAP_S
 from pipeline.motion import SMALLEST_CLOSING_MPS
 from pipeline.params import AebParams
 from pipeline.types import AccCommand, Result

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from pipeline.evaluation.lead import Judged, nearest_face_m, switches
-from pipeline.evaluation.scores.truth import MAX_GAP_S, FrameTruth
+from pipeline.evaluation.scores.truth import FrameTruth
+from pipeline.labels.link import MAX_GAP_S
 
 
 @dataclass(frozen=True)

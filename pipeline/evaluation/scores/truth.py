@@ -7,19 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-import numpy as np
-from scipy.optimize import linear_sum_assignment
-
 from pipeline.errors import BadInput
 from pipeline.evaluation.lead import LeadRule, true_lead
+from pipeline.labels.link import MAX_GAP_S, linked
 from pipeline.labels.model import LabelSet, LabelTrack
-from pipeline.params import TimeParams
 from pipeline.sources.base import Source, TruthObject
 from pipeline.types import Box, Point2
 
-MAX_GAP_S = TimeParams().reset_gap_s
-"""After a longer gap the line's trackers start anew, so nothing is compared across it."""
-_LINK_M, _LINK_MPS = 2.0, 10.0
 _NOT_FOLLOWED = (
     "The labels follow no identity over time: vehicles are linked from frame to frame by nearness. Figures of identity "
     "rest on that, and speed is judged of leads only."
@@ -137,37 +131,6 @@ def _objects_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Truth
             item = (TruthObject(track.label, seen.cuboid, track.id),) if seen.cuboid is not None else ()
             found[seen.frame] = (*found.get(seen.frame, ()), *item)
     return found
-
-
-def linked(labelled: Mapping[int, tuple[TruthObject, ...]]) -> dict[int, tuple[TruthObject, ...]]:
-    """Labels with an identity over time, by tick: each object is the one of its class nearest to where it was, one to
-    one, at most 2 m and what 10 m/s of relative speed add. After a gap all are new."""
-    given = 0
-    before: tuple[TruthObject, ...] = ()
-    last_ns: int | None = None
-    out = {}
-    for tick in sorted(labelled):
-        gap_s = (tick - last_ns) / 1e9 if last_ns is not None else np.inf
-        ids = _links(before, labelled[tick], _LINK_M + _LINK_MPS * gap_s) if gap_s <= MAX_GAP_S else {}
-        now = []
-        for n, item in enumerate(labelled[tick]):
-            if n not in ids:
-                given += 1
-            now.append(replace(item, id=ids.get(n, given)))
-        out[tick], before, last_ns = tuple(now), tuple(now), tick
-    return out
-
-
-def _links(before: tuple[TruthObject, ...], now: tuple[TruthObject, ...], gate_m: float) -> dict[int, int]:
-    """Places in ``now`` to the ids they go on with."""
-    if not before or not now:
-        return {}
-    places = [np.array([item.cuboid.center[:2] for item in items]) for items in (before, now)]
-    apart = np.hypot(*np.moveaxis(places[0][:, None] - places[1][None], 2, 0))
-    other = np.array([[a.label != b.label for b in now] for a in before])
-    cost = np.where(other | (apart > gate_m), 1e6, apart)
-    rows, columns = linear_sum_assignment(cost)
-    return {int(n): before[k].id for k, n in zip(rows, columns, strict=True) if cost[k, n] < 1e6}  # type: ignore[misc]
 
 
 def with_velocities(frames: Mapping[int, FrameTruth]) -> dict[int, FrameTruth]:

@@ -36,11 +36,10 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
 
     labels, notes = truth_labels(Partly(), ("a", "b", "c"), BY)  # type: ignore[arg-type]
     assert [(t.id, t.label, [s.frame for s in t.sightings]) for t in labels.tracks] == [
-        (1, "car", [0]),
-        (2, "car", [2]),
+        (1, "car", [0, 2]),
     ]
     assert notes[0] == "1 of 3 frames are not labelled"
-    assert "no identities over time" in notes[1]
+    assert "linked over frames by nearness" in notes[1]
 
 
 def test_the_simulator_knows_who_is_who() -> None:

@@ -29,7 +29,6 @@ def upgrade() -> None:
         sa.Column("uri", sa.Text, nullable=False),
         sa.Column("title", sa.Text, nullable=False),
         sa.Column("count", sa.Integer, nullable=False),
-        sa.Column("frames", sa.LargeBinary, nullable=False),
         sa.Column("revision", sa.BigInteger, nullable=False),
     )
     op.create_table(

@@ -13,11 +13,11 @@ from pipeline.evaluation.scores.truth import (
     DriveTruth,
     FrameTruth,
     NoTruth,
-    linked,
     of_labels,
     of_source,
     with_velocities,
 )
+from pipeline.labels.link import linked
 from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, Lead, LeadRange, Origin, Sighting, State
 from pipeline.sources import open_source
 from pipeline.sources.base import TruthObject

@@ -1,0 +1,226 @@
+"""The labels of what is open: acts on them, how far they are, and what others do to them meanwhile."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from app.control import Control, Wish
+from app.drive.recording import Recording
+from app.labels.acts import do
+from app.labels.acts.scope import Scope
+from app.labels.database import Database
+from app.labels.drive import DriveInfo, DriveLabels
+from app.labels.log import Acted, Way
+from app.labels.long import importing_truth, proposing
+from app.labels.refusals import ActRefused, NoSuchLabel
+from app.labels.requests import AddTrack, Import, Lift, Propose, Refit, SetSighting
+from app.labels.tasks import Tasks, TaskState
+from pipeline.errors import BadInput
+from pipeline.params import Params
+from pipeline.sources.fingerprint import content_key
+
+logger = logging.getLogger("cipv.labels")
+
+_LOOK_EVERY_S = 0.4
+"""Others see within a second what was done through another server."""
+_PATIENCE_S = 10.0
+
+
+@dataclass(frozen=True)
+class LabelState:
+    """revision: the number of the newest act. can_undo, can_redo: for anyone here. labelled: it is a recording; else
+    only parameters are changed."""
+
+    revision: int = 0
+    can_undo: bool = False
+    can_redo: bool = False
+    labelled: bool = False
+    task: TaskState | None = None
+
+    def to_json(self) -> dict[str, Any] | None:
+        """Null for what cannot be labelled."""
+        if not self.labelled:
+            return None
+        return {
+            "revision": self.revision,
+            "can_undo": self.can_undo,
+            "can_redo": self.can_redo,
+            "task": self.task.to_json() if self.task is not None else None,
+        }
+
+
+@dataclass(eq=False)
+class _Open:
+    """What is open. recording: null for what has no frames to label."""
+
+    uri: str
+    recording: Recording | None
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    labels: DriveLabels | None = None
+
+
+class LabelDesk:
+    """Any thread. database: where labels are kept; null: in one that is gone at the end, and made when first needed.
+    It hears of parameters that are settled from ``Control`` and gives them back when they are undone, and wakes it
+    whenever ``state`` is another."""
+
+    def __init__(self, database: Database | None = None) -> None:
+        self._control = Control(Wish(Params()))
+        self._database = database
+        self._lock = threading.Lock()
+        self._open = _Open("", None)
+        self._state = LabelState()
+        self._wake = threading.Event()
+        self._ended = False
+        self._thread = threading.Thread(target=self._look, name="cipv-labels", daemon=True)
+        self.tasks = Tasks(self._told)
+
+    # ------------------------------------------------------------ what is open
+
+    def start(self, control: Control) -> None:
+        """control: whose parameters are meant."""
+        self._control = control
+        control.on_settle = self.settle
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and the tasks, and close the database."""
+        self._ended = True
+        self._wake.set()
+        self.tasks.stop()
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join(_PATIENCE_S)
+        with self._lock:
+            if self._database is not None:
+                self._database.close()
+
+    def open(self, uri: str, recording: Recording | None) -> None:
+        """Something else was opened; null for what has no frames to label."""
+        self.tasks.cancel()
+        with self._lock:
+            self._open = _Open(uri, recording)
+            self._state = LabelState(labelled=recording is not None)
+        self._wake.set()
+
+    @property
+    def state(self) -> LabelState:
+        return self._state
+
+    @property
+    def recording(self) -> Recording:
+        """What can be labelled. NoSuchLabel when nothing can."""
+        recording = self._open.recording
+        if recording is None:
+            raise NoSuchLabel("no recording is open that could be labelled")
+        return recording
+
+    @property
+    def labels(self) -> DriveLabels:
+        """Of the open recording. NoSuchLabel when none is open."""
+        _ = self.recording
+        return self._labels_of(self._open)
+
+    # ------------------------------------------------------------ acts
+
+    def act(self, person: str, act: Any) -> Acted:
+        """Do it; on disk when this returns. Whatever refuses it."""
+        labels = self.labels
+        scope = Scope(labels.info.t_ns)
+        return self._done(labels.log.act(act.kind, person, lambda draft: do(draft, scope, act)))
+
+    def move(self, way: Way, person: str) -> Acted:
+        """Undo or redo, across labels and parameters; what is only being tried is undone first. ActRefused when there
+        is nothing to, or somebody else is in the way."""
+        labels = self._labels_of(self._open)
+        if way == "undo" and self._control.forget_tried():
+            return Acted(labels.revision, None, "what was being tried")
+        acted = labels.log.move(way, person, self._control.check)
+        if acted.params:
+            self._control.restore(acted.params)
+        return self._done(acted)
+
+    def begin(self, person: str, act: Propose | Import) -> None:
+        """Something that takes a while. ActRefused while another one goes on, or when it cannot be done."""
+        labels, recording = self.labels, self.recording
+        if isinstance(act, Propose):
+            self.tasks.begin("propose", proposing(labels, recording, person, act.first, act.last))
+        else:
+            self.tasks.begin("import", importing_truth(labels, recording, person))
+
+    def measured(self, act: Refit | Lift) -> tuple[SetSighting | AddTrack, str]:
+        """What is measured in the sensors' data for a person, as what it comes to, and how it was found."""
+        raise ActRefused("not yet")
+
+    def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
+        """Parameters were changed. A database that fails does not keep anybody from driving: it is said, and the change
+        cannot be undone."""
+        try:
+            self._labels_of(self._open).log.settle(changes, person, merges=merges)
+        except BadInput as error:
+            logger.warning("a change of parameters was not kept: %s", error)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Look at the database now."""
+        opened = self._open
+        try:
+            log, revision = self._labels_of(opened).log, self._labels_of(opened).revision
+            can_undo, can_redo = log.possible()
+        except BadInput as error:
+            logger.warning("%s", error)
+            return
+        with self._lock:
+            if opened is not self._open:
+                return
+            new = LabelState(revision, can_undo, can_redo, opened.recording is not None, self.tasks.state)
+            changed, self._state = new != self._state, new
+        if changed:
+            self._control.change()
+
+    # ------------------------------------------------------------ inside
+
+    def _done(self, acted: Acted) -> Acted:
+        self.refresh()
+        return acted
+
+    def _told(self) -> None:
+        """A task has come further."""
+        self.refresh()
+
+    def _labels_of(self, opened: _Open) -> DriveLabels:
+        """Found in the database when first asked for."""
+        with opened.lock:
+            if opened.labels is None:
+                opened.labels = DriveLabels(self._opened_database(), _info(opened.uri, opened.recording))
+            return opened.labels
+
+    def _opened_database(self) -> Database:
+        with self._lock:
+            if self._database is None:
+                self._database = Database.temporary()
+            return self._database
+
+    def _look(self) -> None:
+        """The thread: what others write to the same database is seen here too."""
+        while not self._ended:
+            self._wake.wait(_LOOK_EVERY_S)
+            self._wake.clear()
+            if self._database is None or self._ended:
+                continue
+            try:
+                opened = self._open
+                if opened.labels is None or opened.labels.revision != self._state.revision:
+                    self.refresh()
+            except Exception as error:  # whatever a database or a recording does, others still drive
+                logger.warning("labels: %s", error)
+
+
+def _info(uri: str, recording: Recording | None) -> DriveInfo:
+    if recording is None:
+        return DriveInfo(f"uri {uri}"[:120], uri, uri, (), tuple)
+    t_ns = recording.t_ns
+    return DriveInfo(content_key(t_ns, recording.as_read), uri, recording.recipe.source.title, t_ns, recording.names)

@@ -1,0 +1,157 @@
+"""Acts that go through a whole drive: proposals of the present run, and labels from elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import cast
+
+from app.drive.columns import seen_of
+from app.drive.recording import Recording
+from app.drive.run import DriveRun
+from app.labels.acts.leads import clear
+from app.labels.draft import Draft
+from app.labels.drive import DriveLabels
+from app.labels.refusals import ActRefused
+from app.labels.tasks import Progress, Work
+from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
+from pipeline.labels.propose import Proposals, known_as, propose
+from pipeline.labels.truth import truth_labels
+
+
+def proposing(labels: DriveLabels, recording: Recording, person: str, first: int, last: int) -> Work:
+    """The present run's objects in frames first … last as proposals. ActRefused while the run has not come that far."""
+    run = recording.book.current
+    last = min(last, recording.recipe.total - 1)
+    if run is None or run.done <= last:
+        done = run.done if run is not None else 0
+        raise ActRefused(f"{done} of {last + 1} frames are computed: wait, or propose these")
+    if first > last:
+        raise ActRefused(f"frames {first} to {last}: the recording has {recording.recipe.total}, counted from 0")
+
+    def work(progress: Progress) -> str:
+        progress(0, 2)
+        found = _proposals(recording, run, first, last)
+        progress(1, 2)
+        counts: list[int] = []
+
+        def apply(draft: Draft) -> str:
+            counts.append(_put_proposals(draft, found, first, last))
+            return f"proposed {counts[-1]} tracks in frames {first}–{last}"
+
+        acted = labels.log.act("propose", person, apply)
+        progress(2, 2)
+        known = len(found.tracks) - counts[-1]
+        return acted.what + (f"; {known} more are labelled already" if known else "")
+
+    return work
+
+
+def importing(labels: DriveLabels, found: LabelSet, person: str, notes: Sequence[str]) -> str:
+    """Labels of this drive from elsewhere, in one act, beside those that are there; a sentence of what came of it. A
+    track whose number is taken gets another. Who leads is taken over what was there."""
+
+    def apply(draft: Draft) -> str:
+        numbers = {}
+        for track in found.tracks:
+            taken = draft.find("track", track.id) is not None or track.id == 0
+            numbers[track.id] = draft.next_number("track") if taken else track.id
+            draft.add("track", replace(track, id=numbers[track.id], sightings=()))
+            draft.put_sightings(numbers[track.id], {each.frame: each for each in track.sightings})
+        for lead in found.leads:
+            clear(draft, lead.first, lead.last)
+            who = numbers.get(lead.lead, lead.lead) if isinstance(lead.lead, int) else lead.lead
+            draft.add("lead", replace(lead, lead=who))
+        for path in found.paths:
+            draft.add("path", path)
+        for event in found.events:
+            draft.add("event", replace(event, tracks=tuple(numbers.get(track, track) for track in event.tracks)))
+        for tag in found.tags:
+            draft.add("tag", tag)
+        return f"imported {len(found.tracks)} tracks and {len(found.leads)} ranges of the lead"
+
+    return "; ".join((labels.log.act("import", person, apply).what, *notes))
+
+
+def importing_truth(labels: DriveLabels, recording: Recording, person: str) -> Work:
+    """The truth that comes with the recording."""
+
+    def work(progress: Progress) -> str:
+        source = recording.recipe.source
+        origin = Origin("import", source.title, int(time.time() * 1000))
+        found, notes = truth_labels(source, recording.names(), origin, progress)
+        if not found.tracks:
+            raise ActRefused("no frame of this recording comes with truth")
+        return importing(labels, found, person, notes)
+
+    return work
+
+
+def _proposals(recording: Recording, run: DriveRun, first: int, last: int) -> Proposals:
+    rows = run.rows()[: last + 1]
+    frames = {index: seen_of(records) for index, records in run.objects() if first <= index <= last}
+    leads = {index: rows[index].cipv_id for index in range(first, last + 1)}
+    origin = Origin(
+        "pipeline",
+        run.name or f"run {run.number}",
+        int(time.time() * 1000),
+        recording.digest(run.params),
+        recording.calibration_digest(run.params),
+    )
+    return propose(frames, leads, origin)
+
+
+def _put_proposals(draft: Draft, found: Proposals, first: int, last: int) -> int:
+    """How many tracks were proposed. One that a person has looked at is not proposed again; one that nobody has is
+    replaced, and keeps its number. Who leads is proposed where nobody has said it."""
+    known = [
+        replace(cast("LabelTrack", item.value), sightings=tuple(draft.sightings(number, first, last).values()))
+        for number, item in draft.all("track").items()
+    ]
+    states = {track.id: track.state for track in known}
+    same = known_as(found.tracks, known)
+    numbers, count = dict(same), 0
+    for track in found.tracks:
+        if track.id in same and states[same[track.id]] != "proposed":
+            continue
+        count += 1
+        number = numbers.get(track.id)
+        if number is None:
+            taken = draft.find("track", track.id) is not None or track.id == 0
+            number = numbers[track.id] = draft.next_number("track") if taken else track.id
+            draft.add("track", replace(track, id=number, sightings=()))
+        else:
+            draft.put("track", number, replace(track, id=number, sightings=()))
+        there = draft.sightings(number, first, last)
+        fresh: dict[int, Sighting | None] = dict.fromkeys(there)
+        draft.put_sightings(number, fresh | {each.frame: each for each in track.sightings})
+    _put_leads(draft, found.leads, numbers, first, last)
+    return count
+
+
+def _put_leads(draft: Draft, leads: Sequence[LeadRange], numbers: dict[int, int], first: int, last: int) -> None:
+    said: set[int] = set()
+    for number, item in draft.all("lead").items():
+        old = cast("LeadRange", item.value)
+        if old.state == "proposed" and first <= old.first and old.last <= last:
+            draft.put("lead", number, None)
+        else:
+            said.update(range(old.first, old.last + 1))
+    for lead in leads:
+        who = numbers[lead.lead] if isinstance(lead.lead, int) else lead.lead
+        for start, end in _free(lead.first, lead.last, said):
+            draft.add("lead", replace(lead, first=start, last=end, lead=who))
+
+
+def _free(first: int, last: int, said: set[int]) -> list[tuple[int, int]]:
+    """The parts of a range of which nobody has said anything."""
+    parts: list[tuple[int, int]] = []
+    for frame in range(first, last + 1):
+        if frame in said:
+            continue
+        if parts and parts[-1][1] == frame - 1:
+            parts[-1] = (parts[-1][0], frame)
+        else:
+            parts.append((frame, frame))
+    return parts

@@ -1,0 +1,72 @@
+"""/api/labels/act: changing labels, and going back and forth. What is answered as done is on disk."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Response
+from fastapi.responses import JSONResponse
+
+from app.labels.answers import changes_json
+from app.labels.desk import LabelDesk
+from app.labels.log import Acted, Way
+from app.labels.refusals import Stale
+from app.labels.requests import Import, Lift, Propose, Refit
+from app.routes.label_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
+from app.routes.refusals import refusing
+
+_ANSWERS: dict[int | str, dict[str, Any]] = {
+    200: {"model": ActedJson},
+    202: {"model": TaskBegun, "description": "It goes on; state.labels.task tells how far it is"},
+    409: {"model": StaleJson, "description": "Somebody changed it since, or it cannot be done"},
+}
+
+
+def label_acts_router(desk: LabelDesk) -> APIRouter:
+    """Routes that change labels."""
+    router = APIRouter(prefix="/api/labels", tags=["labels"])
+
+    @router.post("/act", responses=_ANSWERS)
+    def act(body: ActBody) -> Response:
+        """One act: one transaction, one step that can be undone. It answers only when the act is on disk."""
+        try:
+            with refusing():
+                if isinstance(body.act, Propose | Import):
+                    desk.begin(body.person, body.act)
+                    return JSONResponse({"status": "begun", "what": body.act.kind}, 202)
+                note = ""
+                doing: Any = body.act
+                if isinstance(doing, Lift | Refit):
+                    doing, note = desk.measured(doing)
+                return _answer(desk, desk.act(body.person, doing), note)
+        except Stale as stale:
+            yours = body.act.model_dump(mode="json", by_alias=True)
+            return JSONResponse({"detail": str(stale), "theirs": stale.theirs, "yours": yours}, 409)
+
+    @router.post("/undo", responses={200: {"model": ActedJson}})
+    def undo(body: Who) -> Response:
+        """Take back the person's newest act, across labels, parameters and calibration. 409 when there is none, or when
+        somebody else changed the same thing since."""
+        return _move("undo", body)
+
+    @router.post("/redo", responses={200: {"model": ActedJson}})
+    def redo(body: Who) -> Response:
+        """Do again what the person took back last."""
+        return _move("redo", body)
+
+    def _move(way: Way, body: Who) -> Response:
+        with refusing():
+            return _answer(desk, desk.move(way, body.person))
+
+    return router
+
+
+def _answer(desk: LabelDesk, acted: Acted, note: str = "") -> Response:
+    changed = None
+    if desk.state.labelled:
+        labels = desk.labels
+        since = acted.revision if acted.act is None else acted.revision - 1
+        changed = changes_json(labels.info, labels.changes(since))
+    return JSONResponse(
+        {"revision": acted.revision, "act": acted.act, "what": acted.what, "changed": changed, "note": note}
+    )

@@ -1,0 +1,231 @@
+"""What /api/labels answers, as types."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
+
+from app.labels.requests import Act, Person, Strict
+from app.labels.tables import LONGEST_NAME
+from app.routes.shapes import CuboidJson, Point
+from pipeline.labels.model import State
+
+ItemName = Literal["track", "lead", "path", "event", "tag"]
+VERSION_NAME = r"^[A-Za-z0-9][A-Za-z0-9._ -]*$"
+"""A version's name is shown and asked for in addresses; it is never a path."""
+
+
+class OriginJson(BaseModel):
+    """Who made a label. params, calibration: digests of what the pipeline ran with."""
+
+    maker: Literal["pipeline", "person", "import"]
+    name: str
+    t_unix_ms: int
+    params: str | None
+    calibration: str | None
+
+
+class LabelItem(BaseModel):
+    """revision: the act that changed it last; an edit carries the one that it is based on."""
+
+    id: int
+    revision: int
+
+
+class TrackHead(LabelItem):
+    """A track without its sightings. first, last: frames; null while it has none. sightings: how many."""
+
+    label: str
+    state: State
+    origin: OriginJson
+    comment: str
+    first: int | None
+    last: int | None
+    keyframes: list[int]
+    sightings: int
+
+
+class LeadJson(LabelItem):
+    """Who leads from first to last."""
+
+    first: int
+    last: int
+    lead: int | Literal["none", "unknown"]
+    state: State
+    origin: OriginJson
+
+
+class PathLabelJson(LabelItem):
+    """The ego lane's lines in a frame, ego x, y."""
+
+    frame: int
+    left: list[Point] | None
+    right: list[Point] | None
+    state: State
+    origin: OriginJson
+
+
+class EventLabelJson(LabelItem):
+    """kind: ``cut_in``, ``cut_out``, or another word."""
+
+    frame: int
+    kind: str
+    tracks: list[int]
+    state: State
+    origin: OriginJson
+
+
+class TagJson(LabelItem):
+    """A word about a frame."""
+
+    frame: int
+    tag: str
+    origin: OriginJson
+
+
+class Removed(BaseModel):
+    """What is no longer there."""
+
+    kind: ItemName
+    id: int
+
+
+class LabelledDrive(BaseModel):
+    """id: of its content: the same wherever it lies."""
+
+    id: str
+    uri: str
+    count: int
+
+
+class LabelChanges(BaseModel):
+    """Everything that changed after ``since``."""
+
+    revision: int
+    drive: LabelledDrive
+    tracks: list[TrackHead]
+    leads: list[LeadJson]
+    paths: list[PathLabelJson]
+    events: list[EventLabelJson]
+    tags: list[TagJson]
+    removed: list[Removed]
+
+
+class PlacedJson(BaseModel):
+    """keyframe: a person or a file put it there; else it follows those that are."""
+
+    cuboid: CuboidJson | None
+    bbox: tuple[float, float, float, float] | None
+    keyframe: bool
+
+
+class PlacedTrack(PlacedJson):
+    """A track in a frame."""
+
+    track: int
+
+
+class PlacedFrame(PlacedJson):
+    """A frame of a track."""
+
+    frame: int
+
+
+class Window(BaseModel):
+    """By frame, whatever is in it."""
+
+    revision: int
+    sightings: dict[int, list[PlacedTrack]]
+
+
+class WholeTrack(LabelItem):
+    """With every sighting."""
+
+    label: str
+    state: State
+    origin: OriginJson
+    comment: str
+    sightings: list[PlacedFrame]
+
+
+class HistoryJson(BaseModel):
+    """One act in an item's life. before, after: the item, null where it was not there; of a track, with the sightings
+    that the act changed."""
+
+    act: int
+    what: str
+    person: str
+    t_unix_ms: int
+    before: dict[str, Any] | None
+    after: dict[str, Any] | None
+    undone: bool
+
+
+class NextJson(BaseModel):
+    """frame: null when there is none. why: one sentence."""
+
+    frame: int | None
+    why: str
+
+
+class ActBody(Strict):
+    """person: whose act it is."""
+
+    person: Person
+    act: Act
+
+
+class Who(Strict):
+    """person: whose newest act is meant."""
+
+    person: Annotated[str, Field(max_length=LONGEST_NAME)] = ""
+
+
+class ActedJson(BaseModel):
+    """It is on disk. act: its number, null when nothing changed. what: in a few words. changed: what others get as
+    changes. note: what there is to say about it."""
+
+    revision: int
+    act: int | None
+    what: str
+    changed: LabelChanges | None
+    note: str
+
+
+class TaskBegun(BaseModel):
+    """It goes on; ``state.labels.task`` tells how far it is."""
+
+    status: Literal["begun"]
+    what: Literal["propose", "import", "refit"]
+
+
+class StaleJson(BaseModel):
+    """Nothing was written. theirs: the item as it is now, null when it was removed; yours: what was sent."""
+
+    detail: str
+    theirs: dict[str, Any] | None = None
+    yours: dict[str, Any] | None = None
+
+
+class VersionJson(BaseModel):
+    """A frozen label set. frames: that have a label."""
+
+    name: str
+    person: str
+    t_unix_ms: int
+    tracks: int
+    frames: int
+
+
+class NewVersion(Strict):
+    """Freeze the labels as they are now."""
+
+    name: Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=VERSION_NAME)]
+    person: Person
+
+
+class LostJson(BaseModel):
+    """What a format has no place for, a sentence each."""
+
+    lost: list[str]
