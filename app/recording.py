@@ -23,7 +23,8 @@ class RecordingDesk:
     """At most one recording at a time, of one source, into ``folder``. Any thread; ``take`` on the engine's.
 
     A recording holds what was shown: playing a drive at double speed or seeking leaves out what was skipped. Of live
-    sensors it holds every tick that the line ran, also while the page is paused. A frame whose result is not exact yet
+    sensors it holds every tick that the line ran, also while the page is paused, and every picture, fix and own motion
+    that came in between. A frame whose result is not exact yet
     waits, with its marks, for the exact one, until the next frame comes or recording ends.
     """
 
@@ -61,6 +62,8 @@ class RecordingDesk:
             with self._feeding:
                 self._live = source if is_live_source(source) else None
                 self._last, self._recorder = None, recorder
+            if self._live is not None:
+                self._live.tap(recorder)
             return recorder.state
 
     def stop(self) -> RecordingState | None:
@@ -105,11 +108,13 @@ class RecordingDesk:
             recorder.mark(text)
 
     def _end(self) -> RecordingState | None:
+        if self._live is not None:
+            self._live.tap(None)
         with self._feeding:
             recorder, self._recorder = self._recorder, None
             if recorder is not None:
                 self._write_waiting(recorder)
-            self._last = None
+            self._last = self._live = None
         if recorder is None:
             return None
         state = recorder.stop()

@@ -76,6 +76,7 @@ class Record:
         """Sensors do not wait: what the disk is too slow for is dropped, and said."""
         detectors = self.line.open_detectors(source)
         recorder = self._recorder(source)
+        source.tap(recorder)
         _say_where(recorder.state.file)
         try:
             with frames_progress() as bar:
@@ -87,10 +88,11 @@ class Record:
                         break
                     bar.advance(task)
         finally:
+            source.tap(None)
             state = recorder.stop()
         _say(list(state.files), state.frames, state.bytes)
         if state.dropped:
-            print(f"cipv: {state.dropped} frames were dropped: the disk was too slow", file=sys.stderr)
+            print(f"cipv: {state.dropped} frames or samples were dropped: the disk was too slow", file=sys.stderr)
         if state.error is not None:
             print(f"cipv: {state.error}", file=sys.stderr)
         return 0 if state.error is None else 1
@@ -102,9 +104,7 @@ class Record:
             return Recorder(path, about(source), self._rotation)
         if mount is None:
             raise BadInput(f"--packets: {source.uri} has no LiDAR")
-        recorder = Recorder(path, about(source), self._rotation, raw_lidar=RawLidar(*mount))
-        source.tap_lidar(recorder.put_packet)
-        return recorder
+        return Recorder(path, about(source), self._rotation, raw_lidar=RawLidar(*mount))
 
     @property
     def _rotation(self) -> Rotation:

@@ -3,7 +3,7 @@ stays the camera's own bytes, any other picture becomes a PNG."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.geometry import inverse
 from pipeline.recording import topics
+from pipeline.sources.live.pictures import Shot
 from pipeline.types import U8, CameraCalibration, GnssFix, Picture, Sweep
 
 _XYZI = ("x", "y", "z", "intensity")
@@ -22,6 +23,7 @@ _NUMERIC_TYPE = {np.dtype("<f4"): 7, np.dtype("<u2"): 3}
 """``foxglove.PackedElementField.NumericType``: FLOAT32, UINT16."""
 
 _PNG_FAST = [cv2.IMWRITE_PNG_COMPRESSION, 1]
+_JPEG_GOOD = [cv2.IMWRITE_JPEG_QUALITY, 95]
 _DIAGONAL_KNOWN, _WARNING, _INFO = 2, 3, 2
 _IDENTITY = (0.0, 0.0, 0.0, 1.0)
 
@@ -72,13 +74,26 @@ def sweep_from(data: bytes, t_ns: int, channels: int) -> Sweep:
 def image_message(picture: Picture, t_ns: int) -> bytes:
     """``foxglove.CompressedImage``: the camera's JPEG as it came, else a PNG. t_ns: the tick, for a camera without
     stamps of its own."""
-    if picture.encoded is not None:
-        data, kind = picture.encoded, "jpeg"
-    else:
-        data, kind = cv2.imencode(".png", picture.bgr, _PNG_FAST)[1].tobytes(), "png"
     taken_ns = t_ns if picture.t_ns is None else picture.t_ns
+    if picture.encoded is not None:
+        return jpeg_message(picture.encoded, taken_ns)
+    return _compressed(cv2.imencode(".png", picture.bgr, _PNG_FAST)[1].tobytes(), "png", taken_ns)
+
+
+def jpeg_message(data: bytes, t_ns: int) -> bytes:
+    """``foxglove.CompressedImage`` of a JPEG that was taken at ``t_ns``."""
+    return _compressed(data, "jpeg", t_ns)
+
+
+def jpeg_of(shot: Shot) -> bytes | None:
+    """A picture that came as none; null when it is damaged."""
+    bgr = shot.bgr()
+    return None if bgr is None else cv2.imencode(".jpg", bgr, _JPEG_GOOD)[1].tobytes()
+
+
+def _compressed(data: bytes, kind: Literal["jpeg", "png"], t_ns: int) -> bytes:
     message = topics.message_class(topics.IMAGE)
-    return to_bytes(message(timestamp=stamp(taken_ns), frame_id=topics.CAMERA_FRAME, data=data, format=kind))
+    return to_bytes(message(timestamp=stamp(t_ns), frame_id=topics.CAMERA_FRAME, data=data, format=kind))
 
 
 def picture_from(data: bytes, t_ns: int | None) -> Picture:

@@ -1,8 +1,9 @@
 """Recording beside the line: a thread of its own writes, and nothing ever waits for the disk.
 
-What is put goes into a bounded queue. When the disk is too slow, what does not fit is dropped, counted, logged, and
-noted in the session itself. A chunk goes to the system when it is full and at least every ``FLUSH_S``, and is forced to
-the disk every ``SYNC_S``: death of the process costs a second at most, loss of power ``SYNC_S``.
+What is put, and what sensors send in between, goes into a bounded queue. When the disk is too slow, what does not fit
+is dropped, counted by kind, logged, and noted in the session itself. A chunk goes to the system when it is full and at
+least every ``FLUSH_S``, and is forced to the disk every ``SYNC_S``: death of the process costs a second at most, loss
+of power ``SYNC_S``.
 """
 
 from __future__ import annotations
@@ -11,24 +12,29 @@ import logging
 import queue
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 from pipeline.params import Params
 from pipeline.recording.packets import RawLidar
 from pipeline.recording.segments import NEVER, Rotation, Segments
 from pipeline.recording.writer import About
-from pipeline.types import Frame, Result
+from pipeline.sources.live.pictures import Shot
+from pipeline.types import EgoState, Frame, GnssFix, Result
 
 logger = logging.getLogger("cipv.recording")
 
 FLUSH_S, SYNC_S = 1.0, 5.0
 _QUEUED = 64
 """Six seconds of frames at 10 Hz; with pictures of 1280×720 that is 200 MB at worst."""
+_QUEUED_BYTES = 200_000_000
+"""Of what comes between frames; the JPEGs of ten seconds are 50 MB."""
+_UNPACKED_BYTES, _SMALL_BYTES = 3_000_000, 500
+"""A picture of a camera that sends video, and a sample of own motion or GNSS, as they wait."""
 
 _BATCH = 76
 """A VLP-16 sends about so many packets a rotation."""
@@ -36,13 +42,20 @@ _BATCH = 76
 _PATIENCE_S = 15.0
 """A disk that takes nothing for so long at the end is not waited for."""
 
-_Job = Callable[[Segments], None]
+_Do = Callable[[Segments], None]
+_Kind = Literal["frames", "packets", "pictures", "samples"]
+
+
+class _Job(NamedTuple):
+    do: _Do
+    kind: _Kind
+    bytes: int
 
 
 @dataclass(frozen=True)
 class RecordingState:
-    """How a recording does. file: the newest of ``files``. seconds, bytes: over all of them. dropped: frames and
-    batches of packets that did not fit. error: why it ended by itself, null while all is well."""
+    """How a recording does. file: the newest of ``files``. seconds, bytes: over all of them. dropped: frames, batches
+    of packets, pictures and samples that did not fit. error: why it ended by itself, null while all is well."""
 
     file: Path
     files: tuple[Path, ...]
@@ -65,9 +78,9 @@ class RecordingState:
 
 
 class Recorder:
-    """Starts at once. BadInput when there is such a file already, OSError when it cannot be made. ``stop`` it in the
-    end. ``queued``: how many frames may wait for the disk. ``raw_lidar``: ``put_packets`` instead of clouds. hangs:
-    whether ``stop`` has given up on the disk."""
+    """Starts at once; a ``Tap`` of live sensors too. BadInput when there is such a file already, OSError when it cannot
+    be made. ``stop`` it in the end. ``queued``: how many frames may wait for the disk. ``raw_lidar``: packets instead
+    of clouds. hangs: whether ``stop`` has given up on the disk."""
 
     def __init__(
         self,
@@ -79,14 +92,16 @@ class Recorder:
         raw_lidar: RawLidar | None = None,
     ) -> None:
         self._segments = Segments(path, about, rotation, "lz4", raw_lidar)
-        self._jobs: queue.Queue[_Job | None] = queue.Queue(queued)
+        self._jobs: queue.SimpleQueue[_Job | None] = queue.SimpleQueue()
+        self._queued, self._takes_packets = queued, raw_lidar is not None
+        self._waiting: Counter[_Kind] = Counter()
+        self._waiting_bytes = 0
         self._lock = threading.Lock()
         self._taken, self._done = 0, 0
         self._marks: deque[tuple[int, str]] = deque()
         self._batch: list[tuple[int, bytes]] = []
-        self._dropped = 0
+        self._dropped: Counter[_Kind] = Counter()
         self._error: str | None = None
-        self._ending = False
         self.hangs = False
         self._thread = threading.Thread(target=self._work, name="cipv-recorder", daemon=True)
         self._thread.start()
@@ -101,19 +116,36 @@ class Recorder:
     ) -> bool:
         """Record a frame, what was believed of it and with which parameters. Returns at once; false when it was
         dropped. received_ns: when a live frame was made, by its source's clock; null for one from a recording."""
-        return self._put(lambda segments: segments.write(frame, result, params, received_ns=received_ns))
+        return self._put(lambda segments: segments.write(frame, result, params, received_ns=received_ns), "frames")
 
     def put_packets(self, packets: list[tuple[int, bytes]]) -> bool:
         """Record raw LiDAR packets, (when received in ns, payload) each, oldest first; best a sweep's at a time.
         Returns at once; false when they were dropped."""
-        return self._put(lambda segments: segments.write_packets(packets))
+        return self._put(lambda segments: segments.write_packets(packets), "packets")
 
-    def put_packet(self, t_ns: int, payload: bytes) -> None:
-        """Record a raw LiDAR packet; they are written a sweep's at a time. For one thread. t_ns: when it arrived."""
-        self._batch.append((t_ns, payload))
+    # ------------------------------------------------------------ what sensors send, each on its own thread
+
+    def packet(self, payload: bytes, arrived_ns: int) -> None:
+        """Where packets are recorded they are written a sweep's at a time."""
+        if not self._takes_packets:
+            return
+        self._batch.append((arrived_ns, payload))
         if len(self._batch) >= _BATCH:
             batch, self._batch = self._batch, []
             self.put_packets(batch)
+
+    def picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
+        """Every picture, not only those of frames."""
+        size = len(shot.encoded) if shot.encoded is not None else _UNPACKED_BYTES
+        self._put(lambda segments: segments.write_picture(shot, t_ns, arrived_ns), "pictures", size)
+
+    def ego(self, ego: EgoState, arrived_ns: int) -> None:
+        self._put(lambda segments: segments.write_ego(ego, arrived_ns), "samples", _SMALL_BYTES)
+
+    def fix(self, fix: GnssFix, arrived_ns: int) -> None:
+        self._put(lambda segments: segments.write_fix(fix, arrived_ns), "samples", _SMALL_BYTES)
+
+    # ------------------------------------------------------------
 
     def mark(self, text: str) -> bool:
         """ "Something happened here", right after what was put last: never dropped. Returns at once; false when
@@ -134,7 +166,7 @@ class Recorder:
             segments.frames,
             segments.seconds,
             segments.bytes_written,
-            self._dropped,
+            self._dropped.total(),
             self._error,
         )
 
@@ -145,9 +177,7 @@ class Recorder:
             if self._batch:
                 batch, self._batch = self._batch, []
                 self.put_packets(batch)
-            self._ending = True
-            with suppress(queue.Full):  # then the writer looks when it has written what is queued
-                self._jobs.put_nowait(None)
+            self._jobs.put(None)
             self._thread.join(_PATIENCE_S)
             if self._thread.is_alive():
                 self.hangs = True
@@ -156,19 +186,23 @@ class Recorder:
                 logger.error("%s: %s", self._segments.files[-1], self._error)
         return self.state
 
-    def _put(self, job: _Job) -> bool:
+    def _put(self, do: _Do, kind: _Kind, size: int = 0) -> bool:
+        """Queue it, if there is room for one more of its kind, or for so many bytes of what comes between frames."""
         if self._error is not None:
             return False
-        try:
-            with self._lock:
-                self._jobs.put_nowait(job)
+        with self._lock:
+            has_room = self._waiting_bytes + size <= _QUEUED_BYTES if size else self._waiting[kind] < self._queued
+            if has_room:
+                self._jobs.put(_Job(do, kind, size))
+                self._waiting[kind] += 1
+                self._waiting_bytes += size
                 self._taken += 1
-        except queue.Full:
-            self._dropped += 1
-            if self._dropped == 1:
-                logger.warning("%s: the disk is too slow, frames are dropped", self._segments.files[-1])
-            return False
-        return True
+            else:
+                self._dropped[kind] += 1
+            is_first = not has_room and self._dropped.total() == 1
+        if is_first:
+            logger.warning("%s: the disk is too slow, %s are dropped", self._segments.files[-1], kind)
+        return has_room
 
     # ------------------------------------------------------------ the writer's thread
 
@@ -182,27 +216,43 @@ class Recorder:
             self._fail(error)
 
     def _write_all(self) -> None:
-        dropped = 0
+        noted: Counter[_Kind] = Counter()
         flushed_s = synced_s = time.monotonic()
         while True:
             try:
                 job = self._jobs.get(timeout=FLUSH_S)
-                if job is None:
-                    return self._write_marks()
-                job(self._segments)
-                self._done += 1
             except queue.Empty:
-                if self._ending:
-                    return self._write_marks()
+                pass
+            else:
+                if job is None:
+                    break
+                self._do(job)
             self._write_marks()
-            if self._dropped > dropped:
-                self._segments.write_note(f"{self._dropped - dropped} frames were dropped here: the disk was too slow")
-                dropped = self._dropped
+            noted = self._note_dropped(noted)
             now_s = time.monotonic()
             if now_s - flushed_s >= FLUSH_S:
                 is_due = now_s - synced_s >= SYNC_S
                 self._segments.flush(to_disk=is_due)
                 flushed_s, synced_s = now_s, now_s if is_due else synced_s
+        self._write_marks()
+        self._note_dropped(noted)
+
+    def _do(self, job: _Job) -> None:
+        with self._lock:
+            self._waiting[job.kind] -= 1
+            self._waiting_bytes -= job.bytes
+        job.do(self._segments)
+        self._done += 1
+
+    def _note_dropped(self, noted: Counter[_Kind]) -> Counter[_Kind]:
+        """Say in the session what was dropped since. Returns what has been said by now."""
+        with self._lock:
+            dropped = self._dropped.copy()
+        since = dropped - noted
+        if since:
+            what = ", ".join(f"{count} {kind}" for kind, count in sorted(since.items()))
+            self._segments.write_note(f"{what} were dropped here: the disk was too slow")
+        return dropped
 
     def _write_marks(self) -> None:
         """Those whose frame is written."""

@@ -12,7 +12,8 @@ from pipeline.recording.output import Compression
 from pipeline.recording.packets import RawLidar
 from pipeline.recording.writer import About, SessionWriter
 from pipeline.sources.base import TruthObject
-from pipeline.types import Frame, Result
+from pipeline.sources.live.pictures import Shot
+from pipeline.types import EgoState, Frame, GnssFix, Result
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,18 @@ class Segments:
         """See ``SessionWriter.write_packets``."""
         self._recent_packets.append(packets)
         self._writer.write_packets(packets)
+
+    def write_picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
+        """See ``SessionWriter.write_picture``."""
+        self._writer.write_picture(shot, t_ns, arrived_ns)
+
+    def write_ego(self, ego: EgoState, arrived_ns: int) -> None:
+        """See ``SessionWriter.write_ego``."""
+        self._writer.write_ego(ego, arrived_ns)
+
+    def write_fix(self, fix: GnssFix, arrived_ns: int) -> None:
+        """See ``SessionWriter.write_fix``."""
+        self._writer.write_fix(fix, arrived_ns)
 
     def write_mark(self, text: str) -> None:
         """See ``SessionWriter.write_mark``."""

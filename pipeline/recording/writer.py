@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import deque
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from pipeline.recording.clock import SessionClock
 from pipeline.recording.messages import (
     calibration_message,
     image_message,
+    jpeg_message,
+    jpeg_of,
     location_message,
     log_message,
     points_message,
@@ -36,9 +39,13 @@ from pipeline.recording.tick import (
 )
 from pipeline.results import to_json
 from pipeline.sources.base import TruthObject
+from pipeline.sources.live.pictures import Shot
 from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Result, Route, Sweep
 
 VERSION = 1
+
+_CAME = 256
+"""What came lately and a frame may refer to: a second of everything that a car's sensors send."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +104,7 @@ class SessionWriter:
         self._params: Params | None = None
         self._ego: EgoState | None = None
         self._gnss: GnssFix | None = None
+        self._came: deque[tuple[object, int]] = deque(maxlen=_CAME)
 
     @property
     def path(self) -> Path:
@@ -164,6 +172,26 @@ class SessionWriter:
         at_ns = self._clock.log_time(received_ns, received_ns)
         self._add(topics.PACKETS, at_ns, scan_message(packets), packets[0][0])
 
+    def write_picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
+        """A picture when it came, whether or not a tick shows it: the JPEG as it is; of a camera that gives none, one
+        of good quality. A frame with this very JPEG then refers to it."""
+        data = shot.encoded if shot.encoded is not None else jpeg_of(shot)
+        if data is None:
+            return
+        at_ns = self._clock.log_time(t_ns, arrived_ns)
+        self._add(topics.IMAGE, at_ns, jpeg_message(data, t_ns), t_ns)
+        self._came.append((data, at_ns))
+
+    def write_ego(self, ego: EgoState, arrived_ns: int) -> None:
+        """Own motion when it came."""
+        self._add(topics.EGO, self._clock.log_time(ego.t_ns, arrived_ns), ego_message(ego), ego.t_ns)
+        self._came.append((ego, 0))
+
+    def write_fix(self, fix: GnssFix, arrived_ns: int) -> None:
+        """A fix when it came."""
+        self._add(topics.GNSS, self._clock.log_time(fix.t_ns, arrived_ns), location_message(fix), fix.t_ns)
+        self._came.append((fix, 0))
+
     def write_mark(self, text: str) -> None:
         """ "Something happened here", by a person, right after the last frame."""
         self._add(topics.MARKS, self._clock.now(), log_message(topics.MARKS, text, self._header_ns))
@@ -211,8 +239,15 @@ class SessionWriter:
         if picture is self._picture and self._tick is not None and self._tick.picture is not None:
             return self._tick.picture
         self._picture = picture
+        came_at_ns = self._came_at_ns(picture.encoded)
+        if came_at_ns is not None:
+            return PictureRef(came_at_ns, picture.t_ns)
         self._add(topics.IMAGE, at_ns, image_message(picture, self._header_ns), picture.t_ns)
         return PictureRef(at_ns, picture.t_ns)
+
+    def _came_at_ns(self, value: object) -> int | None:
+        """The log time under which it was written when it came; null when it was not."""
+        return next((at_ns for came, at_ns in reversed(self._came) if came is value), None)
 
     def _put_camera(self, camera: CameraCalibration | None, at_ns: int) -> CameraRecord | None:
         before = self._tick.camera if self._tick is not None else None
@@ -253,9 +288,9 @@ class SessionWriter:
 
     def _put_small(self, frame: Frame, at_ns: int) -> None:
         """What a tick holds itself, once more for viewers, on topics of its own."""
-        if frame.ego is not None and frame.ego is not self._ego:
+        if frame.ego is not None and frame.ego is not self._ego and self._came_at_ns(frame.ego) is None:
             self._add(topics.EGO, at_ns, ego_message(frame.ego), frame.ego.t_ns)
-        if frame.gnss is not None and frame.gnss is not self._gnss:
+        if frame.gnss is not None and frame.gnss is not self._gnss and self._came_at_ns(frame.gnss) is None:
             self._add(topics.GNSS, at_ns, location_message(frame.gnss), frame.gnss.t_ns)
         if frame.streams:
             self._add(topics.HEALTH, at_ns, health_message(frame.streams))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeGuard, runtime_checkable
 
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.params import SyncParams
-from pipeline.types import F64, CameraCalibration, Frame, StreamHealth
+from pipeline.sources.live.pictures import Shot
+from pipeline.types import F64, CameraCalibration, EgoState, Frame, GnssFix, StreamHealth
 
 LIVE = "live:"
 """Scheme of what is read from devices."""
@@ -57,6 +57,19 @@ class Source(Protocol):
         ...
 
 
+class Tap(Protocol):
+    """Is told of everything that comes, whether or not a tick takes it, each on the thread of its reader: it must be
+    quick. t_ns: when it was measured; arrived_ns: when it came; both on the source's timeline."""
+
+    def packet(self, payload: bytes, arrived_ns: int) -> object:
+        """A data packet of the LiDAR."""
+        ...
+
+    def picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> object: ...
+    def ego(self, ego: EgoState, arrived_ns: int) -> object: ...
+    def fix(self, fix: GnssFix, arrived_ns: int) -> object: ...
+
+
 class LiveSource(Protocol):
     """Devices that are read as they deliver. There is no way back: what nobody took in time is dropped and counted.
 
@@ -85,8 +98,8 @@ class LiveSource(Protocol):
         """T_ego_lidar (4, 4) and what is added to the LiDAR's stamps in ns; null when there is none."""
         ...
 
-    def tap_lidar(self, on_packet: Callable[[int, bytes], object]) -> None:
-        """Have each of the LiDAR's data packets told, with when it arrived in ns, on another thread."""
+    def tap(self, tap: Tap | None) -> None:
+        """Have what comes told from now on; null ends that."""
         ...
 
     def now_ns(self) -> int:

@@ -19,7 +19,7 @@ from app.snapshot import Snapshot
 from pipeline.params import Params, SyncParams, with_changes
 from pipeline.recording.session import SessionSource
 from pipeline.run import Detectors
-from pipeline.sources.base import AnySource, SourceError
+from pipeline.sources.base import AnySource, SourceError, Tap
 from pipeline.types import U8, CameraCalibration, Frame, RawLanes, StreamHealth
 from tests.app.recording import CountingDetector, Recording
 from tests.app.waiting import wait_until
@@ -43,6 +43,7 @@ class Sensors:
         self._came = threading.Condition()
         self._newest: Frame | None = None
         self.given = 0
+        self.tapped: Tap | None = None
 
     def give(self, index: int) -> None:
         with self._came:
@@ -65,6 +66,9 @@ class Sensors:
 
     def now_ns(self) -> int:
         return 10**18 + self._recording.t_ns(self.given)
+
+    def tap(self, tap: Tap | None) -> None:
+        self.tapped = tap
 
     def health(self) -> tuple[StreamHealth, ...]:
         return (StreamHealth("lidar", self.state, 10.0, 60.0, 1.0, 0),)  # type: ignore[arg-type]

@@ -28,7 +28,7 @@ class LidarInput:
         self._clock, self._deliver = clock, deliver
         self.offset_ns = round(config.time_offset_ms * 1e6)
         self.T_ego_lidar = config.mount.T_ego_sensor()
-        self.on_packet: Callable[[int, bytes], object] | None = None
+        self.on_packet: Callable[[bytes, int], object] | None = None
         self._decoder = Vlp16Decoder(self.T_ego_lidar)
         listen = partial(read_datagrams, interface=config.interface, group=config.multicast_group)
         listeners = [("lidar", partial(listen, config.data_port, receive=self.receive))]
@@ -53,8 +53,9 @@ class LidarInput:
         """Take a data packet, received at ``wall_ns`` of the system's clock. The decoder's own clock maps to the host's
         timeline; it is not told of GPS, whose time is not the host's."""
         arrived_ns = self._clock.of_wall_ns(wall_ns)
-        if self.on_packet is not None:
-            self.on_packet(arrived_ns, packet)
+        on_packet = self.on_packet
+        if on_packet is not None:
+            on_packet(packet, arrived_ns)
         sweep = self._decoder.push(packet, arrived_ns)
         counts = self._decoder.counts
         self.stats.lost, self.stats.refused = counts.lost, sum(counts.refused.values())

@@ -8,24 +8,24 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
 from pipeline.params import SyncParams
+from pipeline.sources.base import Tap
 from pipeline.sources.live.camera import CameraInput
 from pipeline.sources.live.can import CanInput
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LiveConfig
 from pipeline.sources.live.gnss import GnssInput
 from pipeline.sources.live.health import StreamStats, not_delivering
-from pipeline.sources.live.inputs import Deliver, Input
+from pipeline.sources.live.inputs import Input
 from pipeline.sources.live.lidar import LidarInput
 from pipeline.sources.live.own_motion import MotionFromGnss
 from pipeline.sources.live.pictures import Shot
 from pipeline.sources.live.sync import Stream, Synchroniser, Together
 from pipeline.sources.rig import calibration_for
-from pipeline.types import F64, Frame, GnssFix, Picture, StreamHealth, Sweep
+from pipeline.types import F64, EgoState, Frame, GnssFix, Picture, StreamHealth, Sweep
 
 T = TypeVar("T")
 
@@ -47,6 +47,7 @@ class LiveSensors:
         self._sync: Synchroniser[Shot] = Synchroniser()
         self._came = threading.Condition()
         self._is_open = False
+        self._tap: Tap | None = None
         self._wire(config)
         self.notes = _about(config)
 
@@ -59,15 +60,15 @@ class LiveSensors:
         self.camera = calibration.calibration() if calibration is not None else None
         lidar = None
         if config.lidar is not None:
-            self.inputs["lidar"] = lidar = LidarInput(config.lidar, self._clock, self._into(self._sync.sweeps))
+            self.inputs["lidar"] = lidar = LidarInput(config.lidar, self._clock, self._take_sweep)
         if config.camera is not None:
-            self.inputs["camera"] = CameraInput(config.camera, self._clock, self._into(self._sync.pictures))
+            self.inputs["camera"] = CameraInput(config.camera, self._clock, self._take_shot)
         if config.gnss is not None:
             utc = {} if lidar is None else {"utc_to_host_ns": lidar.utc_to_host_ns}
             self.inputs["gnss"] = GnssInput(config.gnss, self._clock, self._take_fix, **utc)
         if config.ego is not None and config.ego.can is not None:
             offset_ms, can = config.ego.time_offset_ms, config.ego.can
-            self.inputs["ego"] = CanInput(can, offset_ms, self._clock, self._into(self._sync.egos))
+            self.inputs["ego"] = CanInput(can, offset_ms, self._clock, self._take_ego)
         elif config.ego is not None:
             self._ego_stats = StreamStats("ego")
             self._ego_offset_ns = round(config.ego.time_offset_ms * 1e6)
@@ -96,11 +97,12 @@ class LiveSensors:
         lidar = self.inputs.get("lidar")
         return (lidar.T_ego_lidar, lidar.offset_ns) if isinstance(lidar, LidarInput) else None
 
-    def tap_lidar(self, on_packet: Callable[[int, bytes], object]) -> None:
-        """Have each of the LiDAR's data packets told, with when it arrived in ns, on the reader's thread."""
+    def tap(self, tap: Tap | None) -> None:
+        """Have what comes told from now on; null ends that. What is told twice or at an impossible time is not."""
+        self._tap = tap
         lidar = self.inputs.get("lidar")
         if isinstance(lidar, LidarInput):
-            lidar.on_packet = on_packet
+            lidar.on_packet = tap.packet if tap is not None else None
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
         """The newest tick not given yet; null when none came in time."""
@@ -130,25 +132,35 @@ class LiveSensors:
                     return together
                 self._came.wait(min(left_s, _LOOK_AGAIN_S))
 
-    def _into(self, stream: Stream[T]) -> Deliver[T]:
-        """What an input delivers to: the stream, under the lock."""
+    def _add(self, stream: Stream[T], t_ns: int, value: T, arrived_ns: int) -> bool:
+        """What comes, into its stream; false when it was refused."""
+        with self._came:
+            was_taken = stream.add(t_ns, value, arrived_ns)
+            self._came.notify_all()
+            return was_taken
 
-        def deliver(t_ns: int, value: T, arrived_ns: int) -> None:
-            with self._came:
-                stream.add(t_ns, value, arrived_ns)
-                self._came.notify_all()
+    def _take_sweep(self, t_ns: int, sweep: Sweep, arrived_ns: int) -> None:
+        self._add(self._sync.sweeps, t_ns, sweep, arrived_ns)
 
-        return deliver
+    def _take_shot(self, t_ns: int, shot: Shot, arrived_ns: int) -> None:
+        tap = self._tap
+        if self._add(self._sync.pictures, t_ns, shot, arrived_ns) and tap is not None:
+            tap.picture(shot, t_ns, arrived_ns)
+
+    def _take_ego(self, t_ns: int, ego: EgoState, arrived_ns: int) -> None:
+        tap = self._tap
+        if self._add(self._sync.egos, t_ns, ego, arrived_ns) and tap is not None:
+            tap.ego(ego, arrived_ns)
 
     def _take_fix(self, t_ns: int, fix: GnssFix, arrived_ns: int) -> None:
-        with self._came:
-            self._sync.fixes.add(t_ns, fix, arrived_ns)
-            if self._ego_stats is not None:
-                ego = self._motion.push(fix)
-                ego = replace(ego, t_ns=ego.t_ns + self._ego_offset_ns)
-                self._ego_stats.arrived(arrived_ns, ego.t_ns)
-                self._sync.egos.add(ego.t_ns, ego, arrived_ns)
-            self._came.notify_all()
+        tap = self._tap
+        if self._add(self._sync.fixes, t_ns, fix, arrived_ns) and tap is not None:
+            tap.fix(fix, arrived_ns)
+        if self._ego_stats is not None:
+            ego = self._motion.push(fix)
+            ego = replace(ego, t_ns=ego.t_ns + self._ego_offset_ns)
+            self._ego_stats.arrived(arrived_ns, ego.t_ns)
+            self._take_ego(ego.t_ns, ego, arrived_ns)
 
     def _frame(self, together: Together[Shot]) -> Frame:
         taken_ns = self._clock.now_ns()

@@ -24,8 +24,9 @@ from pipeline.recording.recorder import Recorder, RecordingState
 from pipeline.recording.rewrite import recover
 from pipeline.recording.segments import Rotation, Segments
 from pipeline.recording.session import Mark, SessionSource
+from pipeline.sources.live.pictures import Shot
 from tests.conftest import ROOT
-from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, same, sweep
+from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, picture, same, sweep
 
 
 def test_what_is_put_can_be_opened_afterwards(tmp_path: Path) -> None:
@@ -91,6 +92,75 @@ def test_a_slow_disk_holds_nobody_up_and_what_is_dropped_is_counted_and_noted(
     notes = b"".join(stored.data for stored in session.file.messages(("/notes",)))
     assert f"{state.dropped} frames were dropped here".encode() in notes
     assert len(session.marks()) == 1
+
+
+def test_what_comes_between_frames_is_recorded_when_it_came(tmp_path: Path) -> None:
+    """Three pictures a frame, own motion twice, a fix; the frame refers to the picture it shows, moved by 4 ms."""
+    recorder = Recorder(tmp_path / "a.mcap", ABOUT)
+    began_ns, frames = 10**18, [full(index) for index in range(4)]
+    for index, frame in enumerate(frames):
+        shown, ego, fix = frame.picture, frame.ego, frame.gnss
+        assert shown is not None
+        assert ego is not None
+        assert fix is not None
+        t_ns, at_ns = frame.t_ns - 60_000_000, began_ns + index * PERIOD_NS
+        other = picture(100 + index).encoded
+        for step, shot in enumerate((Shot(encoded=other), Shot(encoded=shown.encoded), Shot(pixels=shown.bgr))):
+            recorder.picture(shot, t_ns + step * 33_000_000, at_ns + step)
+        recorder.ego(replace(ego, t_ns=ego.t_ns - 1), at_ns + 5)
+        recorder.ego(ego, at_ns + 6)
+        recorder.fix(fix, at_ns + 7)
+        moved = replace(shown, t_ns=t_ns + 37_000_000)
+        recorder.put(replace(frame, picture=moved), received_ns=at_ns + 10)
+    state = recorder.stop()
+    assert (state.frames, state.dropped, state.error) == (4, 0, None)
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    for index, frame in enumerate(frames):
+        assert frame.picture is not None
+        expected = replace(frame.picture, t_ns=frame.t_ns - 23_000_000)
+        assert same(session.frame(index), replace(frame, picture=expected))
+    stored = {topic: list(session.file.messages((topic,))) for topic in ("/camera/image", "/ego", "/gnss")}
+    assert [len(messages) for messages in stored.values()] == [12, 8, 4]
+    steps_ns = [each.publish_time_ns - frames[0].t_ns + 60_000_000 for each in stored["/camera/image"]]
+    assert steps_ns == [index * PERIOD_NS + step * 33_000_000 for index in range(4) for step in range(3)]
+    assert [each.log_time_ns - began_ns for each in stored["/ego"][:2]] == [5, 6]
+
+
+def test_what_a_slow_disk_leaves_no_room_for_is_counted_by_kind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shot = Shot(encoded=picture(0).encoded)
+    assert shot.encoded is not None
+    monkeypatch.setattr(recorder_module, "_QUEUED_BYTES", 3 * len(shot.encoded))
+    with slow_disk(monkeypatch) as may_write:
+        recorder = Recorder(tmp_path / "a.mcap", ABOUT, queued=2)
+        while recorder.put(full(0)):  # until there is no room for frames
+            pass
+        for index in range(5):
+            recorder.picture(shot, index, index)
+        assert recorder.state.dropped == 3
+        may_write.set()
+        state = recorder.stop()
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    notes = b"".join(stored.data for stored in session.file.messages(("/notes",)))
+    assert b"1 frames, 2 pictures were dropped here" in notes
+    assert len(list(session.file.messages(("/camera/image",)))) == state.frames + 3
+
+
+def test_a_new_file_holds_the_picture_of_its_first_frame(tmp_path: Path) -> None:
+    parts = Segments(tmp_path / "a.mcap", ABOUT, Rotation(max_s=0.2))
+    frames = [full(index) for index in range(8)]
+    for frame in frames:
+        assert frame.picture is not None
+        parts.write_picture(Shot(encoded=frame.picture.encoded), frame.t_ns - 7_000_001, frame.t_ns - 1)
+        parts.write(frame, received_ns=frame.t_ns)
+    parts.close()
+    assert len(parts.files) == 3
+    sessions = [SessionSource("a", str(path)) for path in parts.files]
+    read = [session.frame(index) for session in sessions for index in range(len(session))]
+    assert [same(replace(a, index=b.index), b) for a, b in zip(read, frames, strict=True)] == [True] * 8
+    pictures = [len(list(session.file.messages(("/camera/image",)))) for session in sessions]
+    assert pictures == [4, 4, 2], "the one that came before a file began is in both"
 
 
 def test_a_mark_stays_with_its_frame_however_many_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

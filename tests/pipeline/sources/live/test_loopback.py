@@ -285,7 +285,7 @@ def test_a_real_capture_sent_back_is_decoded_as_its_file_is(sensors: list[LiveSe
     packets: list[bytes] = []
     lidar = source.inputs["lidar"]
     assert isinstance(lidar, LidarInput)
-    lidar.on_packet = lambda arrived_ns, packet: packets.append(packet)
+    lidar.on_packet = lambda packet, arrived_ns: packets.append(packet)
     live: list[Frame] = []
     with Replaying(config, of_recording(recording)) as replaying:
         frames_until(source, lambda frame: len(live) >= min(8, len(direct) - 2), live)
