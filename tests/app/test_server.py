@@ -24,6 +24,7 @@ from app.server import PortTaken, Server, create_app, listen_socket
 from app.snapshot import Snapshot
 from pipeline.params import Params, from_yaml
 from pipeline.results import to_json
+from pipeline.types import REAL_VEHICLES
 from tests.app.recording import CountingDetector, Recording, opener
 
 WAIT_S = 60.0
@@ -136,6 +137,19 @@ def test_what_null_means_comes_from_the_calibration(client: httpx.Client):
     effective = client.get("/api/params").json()["effective"]
     assert effective["alignment.h_res_deg"] == pytest.approx(57.29578 / 250, abs=1e-4)
     assert effective["alignment.cx_px"] == 160.0
+
+
+def test_what_null_means_of_the_distance_law_is_the_detectors_own(client: httpx.Client):
+    answer = client.get("/api/params").json()
+    assert answer["values"]["distance.coefficient"] is None
+    assert answer["effective"]["distance.coefficient"] == REAL_VEHICLES.coefficient
+    assert answer["effective"]["distance.truck_ratio"] == REAL_VEHICLES.truck_ratio
+    try:
+        client.patch("/api/params", json={"changes": {"distance.reference_focal_px": 907.0 * 2}})
+        effective = client.get("/api/params").json()["effective"]
+        assert effective["distance.coefficient"] == pytest.approx(2 * REAL_VEHICLES.coefficient), "boxes twice as tall"
+    finally:
+        client.patch("/api/params", json={"changes": {"distance.reference_focal_px": 907.0}})
 
 
 def test_the_saved_file_is_taken_back_by_the_command_line(client: httpx.Client, tmp_path: Path):
