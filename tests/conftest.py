@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,10 @@ from pipeline.data import data_dir as recordings
 settings.register_profile("desk", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "desk")
+
+# Servers that tests start keep labels here, and never in the sessions of who runs the tests.
+_LABELS = tempfile.TemporaryDirectory(prefix="cipv-test-labels-", ignore_cleanup_errors=True)
+os.environ["CIPV_LABELS_URL"] = f"sqlite:///{_LABELS.name}/labels.db"
 
 ROOT = Path(__file__).resolve().parent.parent
 

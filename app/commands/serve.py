@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from app.engine import Engine
+from app.labels.database import open_database
+from app.labels.desk import LabelDesk
 from app.looks import Looks
 from app.options import LineOptions, planned
 from app.scene_feed import SceneFeed
@@ -39,6 +41,12 @@ class ServerOptions:
     """Open a browser once the dashboard answers"""
     rerun: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
     """Stream what is shown to a running rerun viewer too, e.g. rerun+http://127.0.0.1:9876/proxy"""
+    labels: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
+    """Keep labels in a team's database, e.g. postgresql://person@host/cipv (or $CIPV_LABELS_URL); else sessions/labels.db"""
+
+    def label_desk(self) -> LabelDesk:
+        """DatabaseError when the database cannot be opened."""
+        return LabelDesk(open_database(self.labels))
 
     def serve(self, engine: Engine) -> int:
         """Until Ctrl-C."""
@@ -111,6 +119,7 @@ class Serve:
             whole_drives=True,
             open_lanes=lambda source: lanes_for(source, self.line.lanes),
             lanes_every=self.line.every(),
+            labels=self.server.label_desk(),
         )
 
 

@@ -15,20 +15,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from alembic import command
-from alembic.config import Config
-from alembic.runtime.migration import MigrationContext
-from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, create_engine, event, text
+from sqlalchemy import Connection, create_engine, event, inspect, text
 from sqlalchemy.engine import URL, Engine, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
+from app.labels.migrations import HEAD
+from app.recording import SESSIONS
 from pipeline.errors import BadInput
 
 logger = logging.getLogger("cipv.labels")
 
 URL_VARIABLE = "CIPV_LABELS_URL"
-_MIGRATIONS = Path(__file__).resolve().parent / "migrations"
+FILE = SESSIONS / "labels.db"
 _BUSY_S = 30.0
 _CONNECT_S = 10
 _MIGRATION_LOCK = 0x63697076
@@ -105,22 +103,33 @@ class Database:
 
     def _migrate(self, connection: Connection) -> None:
         """To the newest schema, in the transaction."""
-        config = Config()
-        config.set_main_option("script_location", str(_MIGRATIONS).replace("%", "%%"))
-        config.attributes["connection"] = connection
-        known = ScriptDirectory.from_config(config)
-        at = MigrationContext.configure(connection).get_current_revision()
-        if at == known.get_current_head():
-            return
-        if at is not None and at not in {script.revision for script in known.walk_revisions()}:
-            raise DatabaseError(f"labels, {self.name}: written by a newer program; this one does not know its form")
-        command.upgrade(config, "head")
+        at = None
+        if inspect(connection).has_table("alembic_version"):
+            at = connection.scalar(text("SELECT version_num FROM alembic_version"))
+        if at != HEAD:
+            migrate(connection, at, self.name)
 
 
-def open_database(url: str | None, file: Path) -> Database:
-    """The one at ``url`` (or of the environment), else in a file of this machine."""
+def open_database(url: str | None = None) -> Database:
+    """The one at ``url`` (or of the environment), else the file of this machine. DatabaseError when it cannot be."""
     wanted = url or os.environ.get(URL_VARIABLE)
-    return Database(wanted) if wanted else Database.in_file(file)
+    return Database(wanted) if wanted else Database.in_file(FILE)
+
+
+def migrate(connection: Connection, at: str | None, name: str) -> None:
+    """From revision ``at``, null for an empty database. DatabaseError when nobody here knows that revision."""
+    from alembic import command  # half a second to import, which only the first start pays
+    from alembic.config import Config
+    from alembic.script import ScriptDirectory
+
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
+    config.attributes["connection"] = connection
+    if at is not None and at not in {
+        script.revision for script in ScriptDirectory.from_config(config).walk_revisions()
+    }:
+        raise DatabaseError(f"labels, {name}: written by a newer program; this one does not know its form")
+    command.upgrade(config, HEAD)
 
 
 def _engine(url: URL) -> Engine:
