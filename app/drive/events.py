@@ -13,6 +13,7 @@ import numpy as np
 
 from app.drive.columns import Objects, Row
 from pipeline.params import Params
+from pipeline.sources.base import Mark
 from pipeline.types import F64
 
 Kind = Literal[
@@ -48,7 +49,8 @@ TIME_GAP_PERIODS = 2.5
 
 @dataclass(frozen=True)
 class Event:
-    """ids: the objects it is about, the one that matters first. mark: a person's mark, by its number."""
+    """ids: the objects it is about, the one that matters first. mark: a person's mark, by its number; null for one that
+    is part of the recording, and cannot be taken away."""
 
     kind: Kind
     index: int
@@ -87,6 +89,12 @@ def find_events(rows: Sequence[Row], objects: Sequence[Objects], params: Params)
     drive = Drive(rows, objects[: len(rows)], params)
     found = [event for finder in _FINDERS for event in finder(drive)]
     return sorted(found, key=lambda event: (event.index, event.kind, event.ids))
+
+
+def recorded_marks(rows: Sequence[Row], marks: Sequence[Mark]) -> list[Event]:
+    """Marks made while it was recorded, at the frames they were made at; those of frames not run yet are left out."""
+    index_of = {row.t_ns: index for index, row in enumerate(rows)}
+    return [Event("mark", index_of[mark.t_ns], mark.text) for mark in marks if mark.t_ns in index_of]
 
 
 # ---------------------------------------------------------------- who leads

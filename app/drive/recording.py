@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from app.drive.book import RunBook
@@ -16,7 +17,7 @@ from pipeline.params import Params
 from pipeline.recording.rewrite import Progress
 from pipeline.recording.save import save
 from pipeline.run import Detectors, Sensors, detect, only
-from pipeline.sources.base import Source, TruthObject, is_simulated
+from pipeline.sources.base import Mark, Marked, Source, TruthObject, is_simulated
 from pipeline.step import State, step
 from pipeline.types import F64, Frame
 
@@ -100,6 +101,11 @@ class Recording:
     def t_ns(self) -> tuple[int, ...]:
         """The ticks of all frames."""
         return tuple(self.recipe.source.t_ns(index) for index in range(self.recipe.total))
+
+    @cached_property
+    def marks(self) -> tuple[Mark, ...]:
+        """What was marked while it was recorded."""
+        return self.recipe.source.marks() if isinstance(self.recipe.source, Marked) else ()
 
     def save(self, path: Path, first: int, last: int, progress: Progress) -> None:
         """Frames as a session file, with all that the source has."""

@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field
 
 from app.drive.columns import columns_json, object_json
 from app.drive.drives import Drives
-from app.drive.events import Event, Kind, Severity, find_events
+from app.drive.events import Event, Kind, Severity, find_events, recorded_marks
 from app.drive.marks import LONGEST_TEXT, MarkRefused, Marks
 from app.drive.recording import Recording
 from app.drive.run import DriveRun
@@ -109,6 +109,7 @@ def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
         marked = [
             Event("mark", mark.index, mark.text or "marked", mark=mark.id) for mark in marks.of(recording.recipe.uri)
         ]
+        marked += recorded_marks(run.rows(), recording.marks)
         times = recording.recipe.timeline_s
         found = sorted([*known.of(run), *marked], key=lambda event: event.index)
         return Events(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,18 +17,11 @@ from pipeline.recording.messages import Damaged, log_text, picture_from, sweep_f
 from pipeline.recording.packets import sweep_of_packets
 from pipeline.recording.tick import PictureRef, Tick, route_from, tick_from
 from pipeline.recording.writer import VERSION, About
-from pipeline.sources.base import SourceError, TruthObject
+from pipeline.sources.base import Mark, SourceError, TruthObject
 from pipeline.types import CameraCalibration, Frame, GnssFix, Picture, Route, Sweep
 
 _T = TypeVar("_T")
 I64 = npt.NDArray[np.int64]
-
-
-class Mark(NamedTuple):
-    """A moment that a person marked: its header time and their words."""
-
-    t_ns: int
-    text: str
 
 
 class SessionSource:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, TypeGuard, runtime_checkable
+from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
 
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
@@ -120,6 +120,20 @@ class Recorded(Protocol):
     """A source that was made from another one. origin: that one's URI."""
 
     origin: str
+
+
+class Mark(NamedTuple):
+    """A moment that a person marked while it was recorded: the tick of the frame, and their words."""
+
+    t_ns: int
+    text: str
+
+
+@runtime_checkable
+class Marked(Protocol):
+    """A source with marks of its own."""
+
+    def marks(self) -> tuple[Mark, ...]: ...
 
 
 @runtime_checkable

@@ -12,15 +12,18 @@ from app.engine import Engine
 from app.recording import RecordingDesk
 from app.server import Server, listen_socket
 from pipeline.params import Params
+from pipeline.sources.base import Source
 from tests.app.recording import CountingDetector, Recording, opener
 
 WAIT_S = 60.0
 
 
 @contextmanager
-def running(desk: RecordingDesk | None = None, *, whole_drives: bool = False) -> Iterator[Engine]:
-    """An engine on a made-up recording, which shows its first frame."""
-    recording = Recording()
+def running(
+    desk: RecordingDesk | None = None, *, whole_drives: bool = False, source: Source | None = None
+) -> Iterator[Engine]:
+    """An engine on a made-up recording, or another, which shows its first frame."""
+    recording = source if source is not None else Recording()
     engine = Engine(
         opener(recording),
         lambda _: CountingDetector(),

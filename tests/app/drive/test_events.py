@@ -11,10 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.drive.columns import Objects, Row, objects_of, row_of
-from app.drive.events import DISAGREEMENT_FRAMES, Event, find_events
+from app.drive.events import DISAGREEMENT_FRAMES, Event, find_events, recorded_marks
 from pipeline.params import Params
 from pipeline.run import Detectors, detector_for, run
 from pipeline.sources import open_source
+from pipeline.sources.base import Mark
 from tests.app.drive.rows import beside, drive, inside, objects, row
 
 NO_OBJECTS = objects()
@@ -108,6 +109,16 @@ def test_after_a_gap_in_the_recording_a_lead_is_acquired_not_switched():
 def test_the_shortest_ttc_of_each_approach(name: str, ttcs: list[float | None], expected: list[Any]):
     rows = [row(index, 7, ttc_s=ttc) for index, ttc in enumerate(ttcs)]
     assert [(event.index, event.severity) for event in found(rows, kind="ttc_minimum")] == expected
+
+
+def test_recorded_marks_are_at_their_frames():
+    rows = [row(index, 7) for index in range(4)]
+    marks = [Mark(rows[2].t_ns, "he braked"), Mark(rows[0].t_ns, "begin"), Mark(rows[3].t_ns + 10**12, "not run yet")]
+    events = recorded_marks(rows, marks)
+    assert [(event.kind, event.index, event.text, event.mark) for event in events] == [
+        ("mark", 2, "he braked", None),
+        ("mark", 0, "begin", None),
+    ]
 
 
 def test_each_lead_has_an_approach_of_its_own():

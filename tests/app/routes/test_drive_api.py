@@ -16,7 +16,9 @@ from app.drive.marks import Marks
 from app.engine import Engine
 from app.server import create_app
 from pipeline.params import Params, from_yaml, preset, with_changes
+from pipeline.recording.writer import About, SessionWriter
 from pipeline.run import Detectors, run
+from pipeline.sources import open_source
 from tests.app.recording import CountingDetector, Recording, opener
 from tests.app.serving import WAIT_S, running, serving
 
@@ -130,6 +132,24 @@ def test_marks_outlive_the_server(engine: Engine, tmp_path: Path):
         client.post("/api/marks", json={"index": 3, "text": "kept"})
     with client_of(engine, Marks(tmp_path)) as client:
         assert "kept" in [event["text"] for event in client.get("/api/drive/events").json()["events"]]
+
+
+def test_marks_made_while_a_session_was_recorded_are_events_of_it(tmp_path: Path):
+    writer = SessionWriter(tmp_path / "a.mcap", About("test:car", "a car", 10.0))
+    for index in range(4):
+        writer.write(Recording().frame(index))
+        if index == 2:
+            writer.write_mark("he braked")
+    writer.close()
+    session = open_source(str(tmp_path / "a.mcap"))
+    with running(whole_drives=True, source=session) as engine, client_of(engine) as client:
+        engine.wait_for(lambda s: s.drive.done == 4, WAIT_S)
+        client.post("/api/marks", json={"index": 1, "text": "seen later"})
+        events = [event for event in client.get("/api/drive/events").json()["events"] if event["kind"] == "mark"]
+        assert [(event["index"], event["text"], event["mark"]) for event in events] == [
+            (1, "seen later", 1),
+            (2, "he braked", None),
+        ]
 
 
 # ------------------------------------------------------------ what if
