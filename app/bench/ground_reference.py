@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.lidar import ground_kernels as shared
+from pipeline.lidar import ground_kernels, plane_kernels
 from pipeline.lidar.ground import Ground
 from pipeline.params import GroundParams
 from pipeline.types import F32, F64
@@ -33,11 +33,11 @@ def fit_ground_numpy(points: F32, keep: Mask, params: GroundParams) -> Ground:
 
 def _edges(x: F32, params: GroundParams) -> F64:
     """Bounds of equal counts along x, on multiples of the bin."""
-    bins = int(np.ceil(2.0 * params.fit_range_m / shared.X_BIN_M))
-    sample = ((x[:: shared.EDGE_SAMPLE] + params.fit_range_m) / shared.X_BIN_M).astype(int)
+    bins = int(np.ceil(2.0 * params.fit_range_m / ground_kernels.X_BIN_M))
+    sample = ((x[:: ground_kernels.EDGE_SAMPLE] + params.fit_range_m) / ground_kernels.X_BIN_M).astype(int)
     before = np.concatenate([[0], np.cumsum(np.bincount(sample, minlength=bins + 1))])[:-1]
     wanted = np.arange(1, params.segments) * len(sample)
-    inner = np.searchsorted(before * params.segments, wanted, side="left") * shared.X_BIN_M - params.fit_range_m
+    inner = np.searchsorted(before * params.segments, wanted, side="left") * ground_kernels.X_BIN_M - params.fit_range_m
     return np.concatenate([[-params.fit_range_m], inner, [params.fit_range_m]])
 
 
@@ -62,27 +62,27 @@ def _fit(parts: list[F32], edges: F64, params: GroundParams) -> tuple[F64, Mask]
 
 def _meets(plane: F64, neighbour: F64, x: float, params: GroundParams) -> bool:
     step = (plane[3] + plane[0] * x) / plane[2] - (neighbour[3] + neighbour[0] * x) / neighbour[2]
-    return bool(abs(step) <= params.distance_m and plane[:3] @ neighbour[:3] >= shared.MIN_COS_BEND)
+    return bool(abs(step) <= params.distance_m and plane[:3] @ neighbour[:3] >= ground_kernels.MIN_COS_BEND)
 
 
 def _refine(part: F32, prior: F64, params: GroundParams) -> tuple[F64, float]:
     """One segment's plane and its raggedness, infinite where it cannot be the road."""
-    wanted = max(1, min(params.lowest_points, len(part) // shared.LOWEST_SHARE))
-    raised = _heights(part, prior - [0.0, 0.0, 0.0, shared.HEIGHT_LOW_M]) * np.float32(shared.BINS_PER_M)
-    levels = np.clip(raised.astype(int), 0, shared.HEIGHT_BINS - 1)
+    wanted = max(1, min(params.lowest_points, len(part) // plane_kernels.LOWEST_SHARE))
+    raised = _heights(part, prior - [0.0, 0.0, 0.0, plane_kernels.HEIGHT_LOW_M]) * np.float32(plane_kernels.BINS_PER_M)
+    levels = np.clip(raised.astype(int), 0, plane_kernels.HEIGHT_BINS - 1)
     centimetres = np.partition(levels, wanted - 1)[:wanted] if len(part) else levels
-    mean_m = (centimetres.mean() + 0.5) / shared.BINS_PER_M + shared.HEIGHT_LOW_M if len(part) else 0.0
+    mean_m = (centimetres.mean() + 0.5) / plane_kernels.BINS_PER_M + plane_kernels.HEIGHT_LOW_M if len(part) else 0.0
     plane, ragged = prior, np.inf
     low, high = mean_m - params.seed_height_m, mean_m + params.seed_height_m
     for k in range(1, params.iterations + 1):
         height = _heights(part, plane)
         seeds = part[(height >= np.float32(low)) & (height <= np.float32(high))].astype(np.float64)
-        if len(seeds) < max(shared.MIN_SEEDS, shared.MIN_SHARE * len(part)):
+        if len(seeds) < max(plane_kernels.MIN_SEEDS, plane_kernels.MIN_SHARE * len(part)):
             return plane, np.inf
         center = seeds.mean(axis=0)
         vectors, values, _ = np.linalg.svd(np.cov((seeds - center).T, bias=True))
         normal = vectors[:, 2] * (1.0 if vectors[2, 2] > 0.0 else -1.0)
-        if values[1] < shared.MIN_SPREAD_M**2 or normal[2] < np.cos(np.radians(params.max_slope_deg)):
+        if values[1] < plane_kernels.MIN_SPREAD_M**2 or normal[2] < np.cos(np.radians(params.max_slope_deg)):
             return plane, np.inf
         plane = np.append(normal, -normal @ center)
         ragged = float(np.sqrt(values[2])) * len(part) / len(seeds)

@@ -31,7 +31,7 @@ Mask = npt.NDArray[np.bool_]
 
 def no_higher_than(ground: Ground, points: F32, of: Mask, height_m: float) -> Mask:
     """(N,) bool: those points of the mask ``of`` that are at most this high above the ground, or have none."""
-    return np.asarray(kernels.no_higher_than(*kernels.axes(points), of, ground.planes, ground.edges, height_m))
+    return np.asarray(kernels.no_higher_than(points, of, ground.planes, ground.edges, height_m))
 
 
 def fit_ground(points: F32, keep: Mask, params: GroundParams) -> Ground:
@@ -41,19 +41,18 @@ def fit_ground(points: F32, keep: Mask, params: GroundParams) -> Ground:
     A point is ground when it is no higher than ``distance_m`` over its segment's plane: what lies below the road
     (a ditch, a reflection in a puddle) is no obstacle either.
     """
-    x, y, z = kernels.axes(points)
-    planes, edges, fitted = kernels.fit(
-        x,
-        y,
-        z,
-        kernels.area(x, y, keep, params.fit_range_m, params.fit_half_width_m, params.min_range_m),
-        params.segments,
-        params.iterations,
-        params.lowest_points,
-        params.seed_height_m,
-        params.distance_m,
-        np.cos(np.radians(params.max_slope_deg)),
-        params.fit_range_m,
+    return Ground(
+        *kernels.ground(
+            points,
+            keep,
+            params.segments,
+            params.iterations,
+            params.lowest_points,
+            params.seed_height_m,
+            params.distance_m,
+            np.cos(np.radians(params.max_slope_deg)),
+            params.fit_range_m,
+            params.fit_half_width_m,
+            params.min_range_m,
+        )
     )
-    mask = kernels.no_higher_than(x, y, z, keep & fitted.any(), planes, edges, params.distance_m)
-    return Ground(mask, planes, edges, fitted)

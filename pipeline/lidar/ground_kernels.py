@@ -6,29 +6,53 @@ import numba
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.lidar.plane_kernels import refine
 from pipeline.types import F32, F64
 
 Mask = npt.NDArray[np.bool_]
 U32 = npt.NDArray[np.uint32]
 
-MIN_SEEDS = 20
-"""Fewer points than this carry no plane."""
-MIN_SPREAD_M = 0.7
-"""Standard deviation that the seeds need along both directions of their plane; below it they are a line."""
-MIN_SHARE = 0.05
-"""Nor is it the road where it holds less than this share of its segment's points."""
 MIN_COS_BEND = float(np.cos(np.radians(3.0)))
 """Neighbouring planes turn by 3° at most: roads change their slope by less over the length of a segment."""
-LOWEST_SHARE = 5
-"""The lowest points are at most one in five of a segment's: sparse segments would else count cars among them."""
 X_BIN_M = 0.1
 EDGE_SAMPLE = 8
 """Segments are cut by every eighth point: their sizes need not be exact."""
-HEIGHT_BINS, HEIGHT_LOW_M, BINS_PER_M = 2000, -10.0, 100
+_BLOCK = 1024
+"""Points whose three axes and heights fit the first-level cache together."""
 
 
 @numba.njit(cache=True, nogil=True)
-def axes(points: F32) -> tuple[F32, F32, F32]:
+def ground(
+    points: F32,
+    keep: Mask,
+    segments: int,
+    iterations: int,
+    lowest: int,
+    seed_m: float,
+    distance_m: float,
+    min_nz: float,
+    reach_m: float,
+    half_width_m: float,
+    min_range_m: float,
+) -> tuple[Mask, F64, F64, Mask]:
+    """mask (N,), planes (S, 4), edges (S + 1,), fitted (S,) as ``Ground`` has them."""
+    x, y, z = _axes(points)
+    inside = _area(x, y, keep, reach_m, half_width_m, min_range_m)
+    planes, edges, fitted = _fit(x, y, z, inside, segments, iterations, lowest, seed_m, distance_m, min_nz, reach_m)
+    none = np.zeros(len(points), dtype=np.bool_)
+    mask = _no_higher_than(x, y, z, keep, planes, edges, distance_m) if fitted.any() else none
+    return mask, planes, edges, fitted
+
+
+@numba.njit(cache=True, nogil=True)
+def no_higher_than(points: F32, of: Mask, planes: F64, edges: F64, height_m: float) -> Mask:
+    """(N,) bool: those of the mask ``of`` no higher than this over the plane of their segment, or without a plane."""
+    x, y, z = _axes(points)
+    return _no_higher_than(x, y, z, of, planes, edges, height_m)
+
+
+@numba.njit(cache=True, nogil=True)
+def _axes(points: F32) -> tuple[F32, F32, F32]:
     """x, y, z (N,) float32 each: separate arrays are what vector instructions can read."""
     count = len(points)
     x, y, z = np.empty(count, np.float32), np.empty(count, np.float32), np.empty(count, np.float32)
@@ -38,7 +62,7 @@ def axes(points: F32) -> tuple[F32, F32, F32]:
 
 
 @numba.njit(cache=True, nogil=True)
-def area(x: F32, y: F32, keep: Mask, reach_m: float, half_width_m: float, min_range_m: float) -> U32:
+def _area(x: F32, y: F32, keep: Mask, reach_m: float, half_width_m: float, min_range_m: float) -> U32:
     """Indices of the kept points that planes are fitted to."""
     reach, half_width = np.float32(reach_m), np.float32(half_width_m)
     near2 = np.float32(min_range_m * min_range_m)
@@ -54,7 +78,7 @@ def area(x: F32, y: F32, keep: Mask, reach_m: float, half_width_m: float, min_ra
 
 
 @numba.njit(cache=True, nogil=True)
-def fit(
+def _fit(
     all_x: F32,
     all_y: F32,
     all_z: F32,
@@ -75,7 +99,7 @@ def fit(
     flat = np.array([0.0, 0.0, 1.0, 0.0])
     for s in range(segments):
         a, b = starts[s], starts[s + 1]
-        planes[s], raggedness[s] = _refine(x[a:b], y[a:b], z[a:b], flat, iterations, lowest, seed_m, distance_m, min_nz)
+        planes[s], raggedness[s] = refine(x[a:b], y[a:b], z[a:b], flat, iterations, lowest, seed_m, distance_m, min_nz)
     fitted = np.isfinite(raggedness)
     if not fitted.any():
         planes[:] = np.nan
@@ -88,7 +112,7 @@ def fit(
         if fitted[s] and _meets(planes[s], neighbour, shared, distance_m):
             continue
         a, b = starts[s], starts[s + 1]
-        plane, ragged = _refine(x[a:b], y[a:b], z[a:b], neighbour, iterations, lowest, seed_m, distance_m, min_nz)
+        plane, ragged = refine(x[a:b], y[a:b], z[a:b], neighbour, iterations, lowest, seed_m, distance_m, min_nz)
         fitted[s] = np.isfinite(ragged) and _meets(plane, neighbour, shared, distance_m)
         planes[s] = plane if fitted[s] else neighbour
     return planes, edges, fitted
@@ -145,145 +169,29 @@ def _by_segment(
             size += segment[k] == s
         starts[s + 1] = starts[s] + np.uint64(size)
     place = starts.copy()
+    here, at = np.uint8(0), place[0]
     for k in range(count):
-        at, i = place[segment[k]], area[k]
-        place[segment[k]] = at + np.uint64(1)
+        if segment[k] != here:  # seldom: a ring stays in one segment for long, so the place stays in a register
+            place[here] = at
+            here, at = segment[k], place[segment[k]]
+        i = area[k]
         x[at], y[at], z[at] = all_x[i], all_y[i], all_z[i]
+        at += np.uint64(1)
     return x, y, z, starts.astype(np.int64)
 
 
 @numba.njit(cache=True, nogil=True)
-def _refine(
-    x: F32,
-    y: F32,
-    z: F32,
-    prior: F64,
-    iterations: int,
-    lowest: int,
-    seed_m: float,
-    distance_m: float,
-    min_nz: float,
-) -> tuple[F64, float]:
-    """One segment: its plane (4,), and how ragged that is: the standard deviation of its points across it over their
-    share of the segment's points, m; infinite where it cannot be the road. ``prior`` (4,) says which way is low.
-
-    The band around the plane narrows evenly from ``seed_m`` to ``distance_m``: taken at once, a narrow band keeps to
-    the strip of a tilted road that the lowest points came from."""
-    plane, raggedness = prior.copy(), np.inf
-    low, high = _seed_heights(x, y, z, prior, lowest, seed_m)
-    for k in range(1, iterations + 1):
-        count, mean, cov = _moments(x, y, z, plane, low, high)
-        if count < max(MIN_SEEDS, MIN_SHARE * len(x)):
-            return plane, np.inf
-        normal, across, along = _flattest(cov)
-        if along < MIN_SPREAD_M * MIN_SPREAD_M or normal[2] < min_nz:
-            return plane, np.inf
-        plane[:3] = normal
-        plane[3] = -(normal[0] * mean[0] + normal[1] * mean[1] + normal[2] * mean[2])
-        raggedness = np.sqrt(max(across, 0.0)) * len(x) / count
-        high = distance_m + max(seed_m - distance_m, 0.0) * max(iterations - 1 - k, 0) / max(iterations - 1, 1)
-        low = -high
-    return plane, raggedness
+def _no_higher_than(x: F32, y: F32, z: F32, of: Mask, planes: F64, edges: F64, height_m: float) -> Mask:
+    """As ``no_higher_than``, of separate axes. A block of points stays in the nearest cache over its passes."""
+    lower = np.empty(len(x), dtype=np.bool_)
+    for first in range(0, len(x), _BLOCK):
+        block = slice(first, first + _BLOCK)
+        _block_no_higher(x[block], y[block], z[block], of[block], planes, edges, height_m, lower[block])
+    return lower
 
 
 @numba.njit(cache=True, nogil=True)
-def _seed_heights(x: F32, y: F32, z: F32, prior: F64, lowest: int, seed_m: float) -> tuple[float, float]:
-    """Bounds of the seeds' height over ``prior``: the mean of the lowest points ± ``seed_m``.
-
-    Heights are counted in whole centimetres, so that the lowest are found without sorting.
-    """
-    a, b, c = np.float32(prior[0]), np.float32(prior[1]), np.float32(prior[2])
-    d, scale = np.float32(prior[3] - HEIGHT_LOW_M), np.float32(BINS_PER_M)
-    bottom, top = np.float32(0.0), np.float32(HEIGHT_BINS - 1)
-    levels = np.empty(len(x), dtype=np.uint16)
-    for i in range(len(x)):  # apart from the counting, which cannot use vector instructions
-        levels[i] = np.uint16(min(max((a * x[i] + b * y[i] + c * z[i] + d) * scale, bottom), top))
-    histogram = np.zeros(HEIGHT_BINS, dtype=np.int32)
-    for i in range(len(x)):
-        histogram[levels[i]] += 1
-    wanted = max(1, min(lowest, len(x) // LOWEST_SHARE))
-    taken, total = 0, 0
-    for level in range(HEIGHT_BINS):
-        n = min(histogram[level], wanted - taken)
-        taken += n
-        total += n * level
-        if taken == wanted:
-            break
-    mean = (total / float(max(taken, 1)) + 0.5) / BINS_PER_M + HEIGHT_LOW_M
-    return mean - seed_m, mean + seed_m
-
-
-@numba.njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"})
-def _moments(x: F32, y: F32, z: F32, plane: F64, low_m: float, high_m: float) -> tuple[float, F64, F64]:
-    """Count, mean (3,) and covariance (3, 3) of the points whose height over ``plane`` lies in low_m … high_m.
-
-    One branch-free pass in single precision, which the compiler turns into vector instructions. Sums are taken around
-    the first point, so that what cancels is small.
-    """
-    one, none = np.float32(1.0), np.float32(0.0)
-    a, b, c, d = np.float32(plane[0]), np.float32(plane[1]), np.float32(plane[2]), np.float32(plane[3])
-    low, high = np.float32(low_m), np.float32(high_m)
-    ox, oy, oz = (x[0], y[0], z[0]) if len(x) else (none, none, none)
-    n = sx = sy = sz = sxx = syy = szz = sxy = sxz = syz = none
-    for i in range(len(x)):
-        h = a * x[i] + b * y[i] + c * z[i] + d
-        w = one if (h >= low) & (h <= high) else none
-        px, py, pz = x[i] - ox, y[i] - oy, z[i] - oz
-        wx, wy, wz = w * px, w * py, w * pz
-        n += w
-        sx += wx
-        sy += wy
-        sz += wz
-        sxx += wx * px
-        syy += wy * py
-        szz += wz * pz
-        sxy += wx * py
-        sxz += wx * pz
-        syz += wy * pz
-    k = 1.0 / max(float(n), 1.0)
-    mx, my, mz = sx * k, sy * k, sz * k  # double precision from here on
-    cov = np.empty((3, 3))
-    cov[0, 0], cov[1, 1], cov[2, 2] = sxx * k - mx * mx, syy * k - my * my, szz * k - mz * mz
-    cov[0, 1] = cov[1, 0] = sxy * k - mx * my
-    cov[0, 2] = cov[2, 0] = sxz * k - mx * mz
-    cov[1, 2] = cov[2, 1] = syz * k - my * mz
-    return float(n), np.array([mx + ox, my + oy, mz + oz]), cov
-
-
-@numba.njit(cache=True, nogil=True)
-def _flattest(cov: F64) -> tuple[F64, float, float]:
-    """Of a symmetric (3, 3) covariance: the eigenvector of the smallest eigenvalue, pointing up, that eigenvalue, and
-    the middle one. Cyclic Jacobi rotations (Golub, Van Loan, *Matrix Computations*, section 8.5)."""
-    m, v = cov.copy(), np.eye(3)
-    negligible = 1e-30 * (m[0, 0] + m[1, 1] + m[2, 2]) ** 2
-    for _ in range(8):
-        if m[0, 1] ** 2 + m[0, 2] ** 2 + m[1, 2] ** 2 <= negligible:
-            break
-        for p, q in ((0, 1), (0, 2), (1, 2)):
-            if m[p, q] == 0.0:
-                continue
-            theta = (m[q, q] - m[p, p]) / (2.0 * m[p, q])
-            t = (1.0 if theta >= 0.0 else -1.0) / (abs(theta) + np.sqrt(theta * theta + 1.0))
-            c = 1.0 / np.sqrt(t * t + 1.0)
-            s = t * c
-            for k in range(3):
-                m[k, p], m[k, q] = c * m[k, p] - s * m[k, q], s * m[k, p] + c * m[k, q]
-            for k in range(3):
-                m[p, k], m[q, k] = c * m[p, k] - s * m[q, k], s * m[p, k] + c * m[q, k]
-            for k in range(3):
-                v[k, p], v[k, q] = c * v[k, p] - s * v[k, q], s * v[k, p] + c * v[k, q]
-    least = 0
-    for k in range(1, 3):
-        if m[k, k] < m[least, least]:
-            least = k
-    middle = min(m[(least + 1) % 3, (least + 1) % 3], m[(least + 2) % 3, (least + 2) % 3])
-    upwards = 1.0 if v[2, least] > 0.0 else -1.0
-    return v[:, least] * upwards, m[least, least], middle
-
-
-@numba.njit(cache=True, nogil=True)
-def no_higher_than(x: F32, y: F32, z: F32, of: Mask, planes: F64, edges: F64, height_m: float) -> Mask:
-    """(N,) bool: those of the mask ``of`` no higher than this over the plane of their segment, or without a plane."""
+def _block_no_higher(x: F32, y: F32, z: F32, of: Mask, planes: F64, edges: F64, height_m: float, lower: Mask) -> None:
     excess = np.empty(len(x), dtype=np.float32)
     for s in range(len(planes)):
         a, b, c = np.float32(planes[s, 0]), np.float32(planes[s, 1]), np.float32(planes[s, 2])
@@ -292,4 +200,5 @@ def no_higher_than(x: F32, y: F32, z: F32, of: Mask, planes: F64, edges: F64, he
         for i in range(len(x)):
             here = a * x[i] + b * y[i] + c * z[i] + d
             excess[i] = here if x[i] >= start else excess[i]
-    return of & ~(excess > np.float32(0.0))
+    for i in range(len(x)):
+        lower[i] = of[i] & ~(excess[i] > np.float32(0.0))
