@@ -9,6 +9,7 @@ from app.bench import detector as detector_bench
 from app.bench import lidar as lidar_bench
 from app.bench import line as line_bench
 from app.bench import packets as packets_bench
+from app.bench import simulation as simulation_bench
 from app.catalog import recordings
 from pipeline.params import Params
 from pipeline.run import detector_for
@@ -18,7 +19,7 @@ from pipeline.types import Sweep
 from pipeline.vision.detector import Detector
 from pipeline.vision.runtime import DetectorMissing
 
-BUDGET_S = {"decode": 1.5, "lidar": 8.0, "lidar@kitti": 6.5, "line": 8.0, "detector": 3.0}
+BUDGET_S = {"decode": 1.5, "lidar": 8.0, "lidar@kitti": 6.5, "line": 8.0, "detector": 3.0, "simulation": 3.0}
 """Wall time of each part; together with loading and compiling they stay below 45 s."""
 FRAMES = 40
 
@@ -37,6 +38,7 @@ def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, An
     figures |= line_bench.stages(frames, params, network, BUDGET_S["line"])
     if network is not None:
         figures |= detector_bench.stages(pictures, network, BUDGET_S["detector"])
+    figures |= simulation_bench.stages(BUDGET_S["simulation"])
     return figures
 
 

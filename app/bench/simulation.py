@@ -1,0 +1,50 @@
+"""The simulator in the closed loop against the time it simulates: LiDAR and true boxes, and camera and network."""
+
+from __future__ import annotations
+
+from itertools import cycle
+from time import perf_counter, process_time
+from typing import Any
+
+import numpy as np
+
+from pipeline.evaluation.experiments.network import embedded
+from pipeline.simulation import scenario
+from pipeline.simulation.loop import Eyes, NetworkEyes, Setup, TruthEyes, drive
+
+_SCENARIO = "straight"
+
+
+def stages(budget_s: float) -> dict[str, dict[str, Any]]:
+    """Figures of one tick for ``simulate_lidar`` and ``simulate_camera``: sensors, line and vehicle. Their peer is real
+    time: by the clock, and by the processor's time, which other work on the machine hardly changes. budget_s: wall time
+    for both, seconds."""
+    return {
+        "simulate_lidar": _stage(TruthEyes(), budget_s / 2),
+        "simulate_camera": _stage(NetworkEyes(embedded()), budget_s / 2),
+    }
+
+
+def _stage(eyes: Eyes, budget_s: float) -> dict[str, Any]:
+    scene = scenario.load(_SCENARIO)
+    ticks = (tick for each in cycle([scene]) for tick in drive(each, Setup(eyes=eyes)))
+    next(ticks)  # roads, meshes and kernels are made once
+    wall_s: list[float] = []
+    cpu_s: list[float] = []
+    end = perf_counter() + budget_s
+    while not wall_s or perf_counter() < end:
+        start, start_cpu = perf_counter(), process_time()
+        next(ticks)
+        wall_s.append(perf_counter() - start)
+        cpu_s.append(process_time() - start_cpu)
+    tick_ms, median_ms = 1e3 / scene.rate_hz, float(np.median(wall_s)) * 1e3
+    cpu_ms = float(np.mean(cpu_s)) * 1e3  # a mean: a processor's clock may tick more slowly than the loop
+    return {
+        "median_ms": round(median_ms, 4),
+        "p99_ms": round(float(np.percentile(wall_s, 99)) * 1e3, 4),
+        "cpu_ms": round(cpu_ms, 4),
+        "peers": {
+            "real time": {"median_ms": tick_ms, "ratio": round(tick_ms / median_ms, 2)},
+            "real time, by processor time": {"median_ms": tick_ms, "ratio": round(tick_ms / cpu_ms, 2)},
+        },
+    }
