@@ -16,6 +16,3 @@ def test_both_loops_are_measured_against_real_time() -> None:
         assert clock["median_ms"] == processor["median_ms"] == 100.0, "ten ticks a second"
         assert clock["ratio"] == pytest.approx(100.0 / row["median_ms"], rel=0.01)
         assert processor["ratio"] == pytest.approx(100.0 / row["cpu_ms"], rel=0.01)
-    assert figures["simulate_camera"]["cpu_ms"] > figures["simulate_lidar"]["cpu_ms"], (
-        "pictures and a network cost more"
-    )
