@@ -16,8 +16,10 @@ from app.labels.database import open_database
 from app.labels.desk import LabelDesk
 from app.looks import Looks
 from app.options import LineOptions, planned
+from app.progress import opened
 from app.scene_feed import SceneFeed
 from app.server import DEFAULT_PORT, serve
+from pipeline.progress import Progress
 from pipeline.run import detector_for, lanes_for
 from pipeline.sources import open_any
 from pipeline.sources.along_route import along_route
@@ -42,7 +44,7 @@ class ServerOptions:
     rerun: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
     """Stream what is shown to a running rerun viewer too, e.g. rerun+http://127.0.0.1:9876/proxy"""
     labels: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
-    """Keep labels in a team's database, e.g. postgresql://person@host/cipv (or $CIPV_LABELS_URL); else sessions/labels.db"""
+    """Keep labels in a team's database, as postgresql://person@host/cipv; else $CIPV_LABELS_URL, sessions/labels.db"""
 
     def label_desk(self) -> LabelDesk:
         """DatabaseError when the database cannot be opened."""
@@ -102,14 +104,16 @@ class Serve:
         params = self.line.parameters()
         route = planned(self.route)
         # opened here, so that a typing mistake is not said on the page; a large recording is not opened twice
-        opened = {self.source: open_any(self.source, rings=self.rings)}
+        first = {self.source: opened(self.source, self.rings)}
 
-        def open_again(uri: str) -> AnySource:
-            source = opened.pop(uri, None)
-            return along_route(source if source is not None else open_any(uri, rings=self.rings), route)
+        def open_source(uri: str, /, *, progress: Progress) -> AnySource:
+            source = first.pop(uri, None)
+            if source is None:
+                source = open_any(uri, rings=self.rings, progress=progress)
+            return along_route(source, route)
 
         return Engine(
-            open_again,
+            open_source,
             lambda source: detector_for(source, self.line.detector),
             params,
             preset=self.line.preset,

@@ -125,9 +125,8 @@ def migrate(connection: Connection, at: str | None, name: str) -> None:
     config = Config()
     config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
     config.attributes["connection"] = connection
-    if at is not None and at not in {
-        script.revision for script in ScriptDirectory.from_config(config).walk_revisions()
-    }:
+    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
+    if at is not None and at not in known:
         raise DatabaseError(f"labels, {name}: written by a newer program; this one does not know its form")
     command.upgrade(config, HEAD)
 

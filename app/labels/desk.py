@@ -16,7 +16,8 @@ from app.labels.database import Database
 from app.labels.drive import DriveInfo, DriveLabels
 from app.labels.log import Acted, Way
 from app.labels.long import importing_truth, proposing
-from app.labels.refusals import ActRefused, NoSuchLabel
+from app.labels.measured import lifted, refitted
+from app.labels.refusals import NoSuchLabel
 from app.labels.requests import AddTrack, Import, Lift, Propose, Refit, SetSighting
 from app.labels.tasks import Tasks, TaskState
 from pipeline.errors import BadInput
@@ -152,8 +153,14 @@ class LabelDesk:
             self.tasks.begin("import", importing_truth(labels, recording, person))
 
     def measured(self, act: Refit | Lift) -> tuple[SetSighting | AddTrack, str]:
-        """What is measured in the sensors' data for a person, as what it comes to, and how it was found."""
-        raise ActRefused("not yet")
+        """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found.
+        BadInput where there is nothing to measure."""
+        recording, labels = self.recording, self.labels
+        Scope(labels.info.t_ns).check(act.frame)
+        frame = recording.input(act.frame)
+        if isinstance(act, Refit):
+            return refitted(labels, frame, act)
+        return lifted(frame, self._control.peek().params, act)
 
     def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
         """Parameters were changed. A database that fails does not keep anybody from driving: it is said, and the change

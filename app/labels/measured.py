@@ -1,0 +1,59 @@
+"""Acts whose numbers come from the sensors' data instead of from a hand."""
+
+from __future__ import annotations
+
+from app.labels.drive import DriveLabels
+from app.labels.refusals import ActRefused, BadAct
+from app.labels.requests import AddTrack, CuboidIn, Lift, Refit, SetSighting
+from pipeline.geometry import Cuboid
+from pipeline.labels.lift import lift
+from pipeline.labels.model import LabelTrack
+from pipeline.labels.refit import refit
+from pipeline.params import Params
+from pipeline.types import Frame
+from pipeline.vision.labels import canonical
+
+_DECIMALS = 4
+
+
+def refitted(labels: DriveLabels, frame: Frame, act: Refit) -> tuple[SetSighting, str]:
+    """The track's cuboid in a frame laid on the points in and near it. ActRefused where it has none, BadInput where
+    there are too few points."""
+    track = labels.track(act.track).value
+    assert isinstance(track, LabelTrack)
+    sighting = track.at(act.frame)
+    if sighting is None or sighting.cuboid is None:
+        raise ActRefused(f"#{act.track} has no cuboid in frame {act.frame}")
+    if frame.sweep is None:
+        raise ActRefused(f"frame {act.frame} has no points")
+    found = refit(frame.sweep.points, sighting.cuboid)
+    note = f"laid on {found.points} points" + ("" if found.turned else "; they do not say how it is turned")
+    return (
+        SetSighting(
+            kind="set_sighting",
+            track=act.track,
+            revision=act.revision,
+            frame=act.frame,
+            cuboid=_cuboid_in(found.cuboid),
+            bbox=sighting.bbox,
+        ),
+        note,
+    )
+
+
+def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddTrack, str]:
+    """A new track from where something is in the picture, with the parameters that are in use. BadInput where neither
+    points nor picture tell where it is."""
+    if (act.bbox is None) == (act.pixel is None):
+        raise BadAct("either a box or a pixel")
+    if act.bbox is not None and not (act.bbox[0] < act.bbox[2] and act.bbox[1] < act.bbox[3]):
+        raise BadAct("the box is none")
+    found = lift(frame, params, canonical(act.label), act.bbox, act.pixel)
+    cuboid = _cuboid_in(found.cuboid)
+    return AddTrack(kind="add_track", label=act.label, frame=frame.index, cuboid=cuboid, bbox=found.bbox), found.how
+
+
+def _cuboid_in(cuboid: Cuboid) -> CuboidIn:
+    x, y, z = (round(value, _DECIMALS) for value in cuboid.center)
+    length, width, height = (round(value, _DECIMALS) for value in cuboid.size)
+    return CuboidIn(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
