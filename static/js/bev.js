@@ -52,6 +52,7 @@ export function setUp() {
       invalidate();
     },
     clicked: (place) => (get("taping") ? set("tape", null) : modeNow() ? modeNow()?.clicked(place) : select(objectAt(place))),
+    hasKeys: () => !modeNow(),
     takes: (from, event) => (get("taping") || event.shiftKey ? measuring(from) : modeNow()?.takes(from, view.scale) ?? null),
   });
   followHover(canvas, (u, v) => (modeNow() ? null : objectAt(view.place(u, v))), (u, v) => modeNow()?.cursorAt(view.place(u, v), view.scale) ?? "");

@@ -2,6 +2,7 @@
 import { newestOnly, request } from "./api.js";
 import { $, el, memory } from "./dom.js";
 import { control } from "./control.js";
+import { knownName } from "./labeling/person.js";
 import { get, on, set } from "./store.js";
 import { toggle } from "./workspace/panes.js";
 
@@ -31,7 +32,7 @@ let knownRevision = -1;
 let knownUri = null;
 
 const submit = newestOnly(
-  (/** @type {Changes} */ body) => request("api/params", "PATCH", body).then(accept, refuse),
+  (/** @type {Changes} */ body) => request("api/params", "PATCH", { ...body, person: knownName() }).then(accept, refuse),
   (waiting, newer) => ({ changes: { ...waiting.changes, ...newer.changes }, final: waiting.final || newer.final }),
 );
 

@@ -113,6 +113,7 @@
  * @property {DriveState} drive
  * @property {boolean} can_undo
  * @property {boolean} can_redo
+ * @property {import("./labeling/types.js").LabelsState|null} labels  null where nothing can be labelled
  *
  * @typedef {object} RecordingState
  * @property {string} file

@@ -11,6 +11,7 @@ const DRAG_FROM_PX = 4;
  * @typedef {object} Hand  what a hand on the plan may do
  * @property {() => void} changed  the view has moved
  * @property {(place: Place) => void} clicked
+ * @property {() => boolean} hasKeys  whether keys zoom now; a mode may mean them otherwise
  * @property {(from: Place, event: PointerEvent) => Drag|null} takes  what a drag from here does; null when it moves the plan
  */
 /**
@@ -93,6 +94,7 @@ export class Viewport {
 
   /** @param {KeyboardEvent} event */
   #onKey(event) {
+    if (!this.#hand.hasKeys()) return;
     /** @type {Record<string, number>} */
     const factors = { "+": 1.25, "=": 1.25, "-": 0.8 };
     if (factors[event.key]) this.zoom(factors[event.key]);

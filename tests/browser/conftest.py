@@ -134,15 +134,25 @@ OpenPage = Callable[..., Page]
 
 @pytest.fixture
 def open_page(browser: Browser, site: Site) -> Iterator[OpenPage]:
-    """Opens the dashboard in a fresh profile; at the end no page may have complained or called elsewhere."""
+    """Opens the dashboard in a fresh profile; at the end no page may have complained or called elsewhere. ``expects``:
+    words of complaints that the test provokes: a browser says of every refused request that it was refused."""
     complaints: list[str] = []
     pages: list[Page] = []
 
-    def begin(width: int = 1440, height: int = 900, address: str | None = None, **context: Any) -> Page:
+    def begin(
+        width: int = 1440, height: int = 900, address: str | None = None, expects: tuple[str, ...] = (), **context: Any
+    ) -> Page:
         page = browser.new_page(**{"viewport": {"width": width, "height": height}, "color_scheme": "dark"} | context)
         pages.append(page)
         page.set_default_timeout(WAIT_MS)
-        page.on("console", lambda m: complaints.append(m.text) if m.type in ("error", "warning") else None)
+        page.on(
+            "console",
+            lambda m: (
+                complaints.append(m.text)
+                if m.type in ("error", "warning") and not any(words in m.text for words in expects)
+                else None
+            ),
+        )
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.on(
             "request",

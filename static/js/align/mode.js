@@ -6,7 +6,7 @@
 import { newestOnly, request } from "../api.js";
 import { $, el, press, text } from "../dom.js";
 import { get, on, set } from "../store.js";
-import { reveal } from "../params.js";
+import { change, reveal } from "../params.js";
 import { followHand } from "./hand.js";
 import { drawEdges } from "./edges.js";
 import { addLayer } from "../camera.js";
@@ -55,7 +55,7 @@ function reflect() {
 
 /** @param {string} name */
 function model(name) {
-  const choose = () => request("api/params", "PATCH", { changes: { "alignment.model": name }, final: true }).then((answer) => set("params", answer), () => {});
+  const choose = () => change({ "alignment.model": name }, true);
   return el("button", { type: "button", textContent: name, data: { model: name }, onclick: choose });
 }
 

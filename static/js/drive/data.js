@@ -26,7 +26,7 @@ export function setUp() {
 function follow() {
   const state = get("state");
   if (!state || state.live || state.drive.run === null) return;
-  const { revision, run, base } = state.drive, key = `${state.uri} ${revision} ${run} ${base}`;
+  const { revision, run, base } = state.drive, key = `${state.uri} ${revision} ${run} ${base} ${base === null ? "" : state.labels?.revision}`;
   if (key === known) return;
   known = key;
   refresh(key);

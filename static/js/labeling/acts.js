@@ -97,11 +97,12 @@ async function one(waiting) {
 /** @param {Saving["state"]} state */
 const tell = (state, problem = "") => set("saving", { state, at_ms: savedAt_ms, problem });
 
-/** @param {Act} act @param {ActAnswer} answer */
+/** What has only begun (proposals, imports) and what changed nothing is not said to be saved. @param {Act} act @param {ActAnswer} answer */
 function settle(act, answer) {
-  savedAt_ms = Date.now();
+  if (answer.act != null) savedAt_ms = Date.now();
   tell("saved");
-  set("said", [answer.what, answer.note].filter(Boolean).join(": "));
+  const how = { undo: "undone: ", redo: "done again: " }[act.kind] ?? "";
+  set("said", how + [answer.what, answer.note].filter(Boolean).join(": "));
   if (!answer.changed) return;
   for (const later of queue.slice(1)) later.act = rebased(later.act, refsOf(act), answer.changed);
   data.accept(answer.changed);

@@ -1,6 +1,6 @@
 /** The labeling mode's bar: who leads here, where to go next, and what is saved. Below the timeline: its keys. */
 import { $, el, keyed, press, text } from "../dom.js";
-import { get, on, paint } from "../store.js";
+import { get, on, paint, set } from "../store.js";
 import { redo, undo } from "../whatif/history.js";
 import { send } from "./acts.js";
 import * as commands from "./commands.js";
@@ -15,6 +15,8 @@ import * as span from "./span.js";
 
 /** As many labels of the frame can be chosen as its lead in the bar; the rest by number. */
 const MOST_LEADS = 7;
+/** Whether a task was under way when last looked at. */
+let hasRun = false;
 
 const where = el("span", { class: "facts where" }), leads = el("span", { class: "joined leads", aria: { role: "group", label: "Who leads" } });
 const saved = el("span", { class: "saved", aria: { role: "status" } }), again = el("button", { type: "button", textContent: "Retry", hidden: true, onclick: send });
@@ -72,11 +74,17 @@ function reflectSaving() {
 }
 
 function reflectTask() {
-  const state = get("state"), running = state?.labels?.task ?? null;
+  const state = get("state"), current = state?.labels?.task ?? null;
   back.disabled = !state?.labels?.can_undo;
   forth.disabled = !state?.labels?.can_redo;
-  task.hidden = !running;
-  if (!running) return;
-  $("progress", HTMLProgressElement, task).value = running.total ? running.done / running.total : 0;
-  text($(".facts", HTMLElement, task), running.error ?? `${running.what} ${running.done}/${running.total} ${running.note}`.trim());
+  const isFailed = Boolean(current?.error);
+  task.hidden = !current?.running && !isFailed;
+  task.dataset.failed = String(isFailed);
+  if (hasRun && current && !current.running && !isFailed) set("said", current.note);
+  hasRun = current?.running === true;
+  if (!current) return;
+  const bar = $("progress", HTMLProgressElement, task);
+  bar.hidden = !current.running;
+  bar.value = current.total ? current.done / current.total : 0;
+  text($(".facts", HTMLElement, task), isFailed ? `${current.what} failed: ${current.error}` : `${current.what} ${current.done}/${current.total}`);
 }

@@ -28,7 +28,11 @@ function withTrack(what) {
 /** @param {LabelTrack} track @returns {ItemRef} */
 const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
 
-export const propose = () => act({ kind: "propose", first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1), from: "run" });
+/** The pipeline's output becomes proposals, in the marked frames or in all. */
+export function propose() {
+  const { first, last } = get("marked") ? span.span() : { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
+  return act({ kind: "propose", first, last, from: "run" }).then((answer) => answer && span.forget());
+}
 
 /** Accept or reject the selected track whole; without one, who leads here. @param {"accept"|"reject"} kind */
 export function judge(kind) {
@@ -73,12 +77,20 @@ export const splitHere = () => withTrack(({ id, revision }) => act({ kind: "spli
 export const dropKeyframe = () => withTrack(({ id, revision }) => act({ kind: "drop_keyframe", track: id, revision, frame: shown() }));
 export const removeTrack = () => withTrack((track) => act({ kind: "remove", items: [refOf(track)] }).then((answer) => answer && set("track", null)));
 
-/** Hold the label where it is in this frame. */
-export const keyframe = () => withTrack(({ id }) => {
-  if (!draft.isHere(id)) return say(`#${id} is not in this frame`);
-  draft.hold(id, {});
+/** Hold the label where it is in this frame; where it is not yet, it begins with the shape of its nearest frame. */
+export const keyframe = () => withTrack(async ({ id }) => {
+  const frame = shown(), shape = draft.presentOf(id) ?? (await nearestShape(id, frame));
+  if (!shape || shown() !== frame) return say(`#${id} is nowhere yet: draw it`);
+  draft.hold(id, { cuboid: shape.cuboid, bbox: shape.bbox });
   draft.release();
 });
+
+/** @param {number} id @param {number} frame @returns {Promise<Pick<import("./types.js").LabelSighting, "cuboid"|"bbox">|null>} */
+async function nearestShape(id, frame) {
+  /** @type {{sightings: (import("./types.js").LabelSighting & {frame: number})[]}} */
+  const { sightings } = await request(`api/labels/tracks/${id}`).catch(() => ({ sightings: [] }));
+  return sightings.sort((a, b) => Math.abs(a.frame - frame) - Math.abs(b.frame - frame))[0] ?? null;
+}
 
 export const sizeAlong = () => withTrack(({ id, revision }) => {
   const size = draft.presentOf(id)?.cuboid?.size;

@@ -1,7 +1,7 @@
 /** A label under a hand: drawn at once in every view, sent when the hand lets go, dropped when the server's own has come. */
 import { get, on, set } from "../store.js";
 import { act } from "./acts.js";
-import { knownUpTo, sightingOf, sightingsAt } from "./frames.js";
+import { knownUpTo, sightingsAt } from "./frames.js";
 import { shown, trackOf } from "./held.js";
 
 /** @typedef {import("./types.js").Cuboid} Cuboid */
@@ -59,6 +59,3 @@ export async function release() {
 export function drop() {
   set("draft", null);
 }
-
-/** @param {number} track @returns {boolean} whether a track is labelled in the shown frame, also only in the making */
-export const isHere = (track) => presentOf(track) !== null || sightingOf(shown(), track) !== null;

@@ -55,8 +55,5 @@ function keep(number, chunk) {
 /** What is labelled in a frame, as far as it is known here; while a change is being fetched, what was. @param {number} frame @returns {LabelSighting[]} */
 export const sightingsAt = (frame) => chunks.get(Math.floor(frame / CHUNK))?.byFrame[frame] ?? [];
 
-/** @param {number} frame @param {number} track */
-export const sightingOf = (frame, track) => sightingsAt(frame).find((each) => each.track === track) ?? null;
-
 /** Up to which act the labels of a frame are known. @param {number} frame */
 export const knownUpTo = (frame) => chunks.get(Math.floor(frame / CHUNK))?.revision ?? -1;

@@ -30,10 +30,9 @@ export function forget() {
   if (get("marked")) set("marked", null);
 }
 
-/** What would be painted: what is marked, up to the shown frame where its other end is not; else the shown frame alone. @returns {{first: number, last: number}} */
+/** What would be painted: what is marked, to the shown frame where its other end is not; else the shown frame alone. @returns {{first: number, last: number}} */
 export function span() {
-  const { first, last } = marked(), here = shown();
-  const ends = [first ?? (last === null ? here : Math.min(here, last)), last ?? (first === null ? here : Math.max(here, first))];
+  const { first, last } = marked(), ends = [first ?? shown(), last ?? shown()];
   return { first: Math.min(...ends), last: Math.max(...ends) };
 }
 

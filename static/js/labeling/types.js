@@ -76,7 +76,8 @@
  * @property {number} done
  * @property {number} total
  * @property {string} note
- * @property {string|null} error
+ * @property {string|null} error  why it failed
+ * @property {boolean} running  false: it stays until the next one begins
  *
  * @typedef {object} LabelsState  in the stream's state
  * @property {number} revision  how many acts the drive has seen

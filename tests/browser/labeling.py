@@ -1,0 +1,149 @@
+"""A person in the labeling mode: hands that are counted, and what the server knows of it."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import WAIT_MS
+from tests.browser.looks import box_of
+
+FROM_M, TO_M, HALF_M = -5.0, 74.0, 13.0
+"""What the plan shows until a person moves it (static/js/viewport.js)."""
+CUTTER_S = {"key": 0.28, "press": 0.20, "point": 1.10, "decide": 1.35}
+"""Seconds of the keystroke-level model (Card, Moran and Newell 1980): a key, a mouse button down and up, pointing at
+something, and making up one's mind before an act. For a person's time, which no test can measure."""
+
+Spot = tuple[float, float]
+
+
+@dataclass
+class Hand:
+    """Keys, presses and drags on a page, counted."""
+
+    page: Page
+    counts: dict[str, int] = field(default_factory=lambda: {"keys": 0, "presses": 0, "drags": 0, "acts": 0})
+
+    def keys(self, *names: str) -> None:
+        """One act: one or more keys."""
+        self.counts["acts"] += 1
+        for name in names:
+            self.counts["keys"] += 1
+            self.page.keyboard.press(name)
+
+    def press(self, spot: Spot) -> None:
+        self.counts["acts"] += 1
+        self.counts["presses"] += 1
+        self.page.mouse.click(*spot)
+
+    def drag(self, start: Spot, end: Spot, steps: int = 4) -> None:
+        self.counts["acts"] += 1
+        self.counts["drags"] += 1
+        self.page.mouse.move(*start)
+        self.page.mouse.down()
+        self.page.mouse.move(*end, steps=steps)
+        self.page.mouse.up()
+
+    @property
+    def modelled_s(self) -> float:
+        """What the keystroke-level model gives for these hands."""
+        of, n = CUTTER_S, self.counts
+        return (
+            n["acts"] * of["decide"]
+            + n["keys"] * of["key"]
+            + n["presses"] * (of["point"] + of["press"])
+            + n["drags"] * (2 * of["point"] + of["press"])
+        )
+
+    def plan(self, x: float, y: float) -> Spot:
+        """The pixel of a place of the plan."""
+        box = box_of(self.page.locator("#bev"))
+        scale = min(box["height"] / (TO_M - FROM_M), box["width"] / (2 * HALF_M))
+        middle = FROM_M + box["height"] / (2 * scale)
+        return box["x"] + box["width"] / 2 - y * scale, box["y"] + box["height"] / 2 - (x - middle) * scale
+
+    def picture(self, u: float, v: float, width: int, height: int) -> Spot:
+        """The pixel of the page where a pixel of the camera's picture of that size is."""
+        box = box_of(self.page.locator("#camera"))
+        scale = min(box["width"] / width, box["height"] / height)
+        left, top = (box["width"] - width * scale) / 2, (box["height"] - height * scale) / 2
+        return box["x"] + left + u * scale, box["y"] + top + v * scale
+
+
+class Labels:
+    """What the server at an address knows."""
+
+    def __init__(self, page: Page, address: str) -> None:
+        self._page, self._address = page, address
+
+    def get(self, path: str) -> Any:
+        answer = self._page.request.get(f"{self._address}/api/labels{path}")
+        assert answer.ok, (path, answer.text())
+        return answer.json()
+
+    def act(self, person: str, act: dict[str, Any]) -> Any:
+        answer = self._page.request.post(f"{self._address}/api/labels/act", data={"person": person, "act": act})
+        assert answer.ok, (act, answer.text())
+        return answer.json()
+
+    @property
+    def everything(self) -> Any:
+        return self.get("?since=0")
+
+    @property
+    def tracks(self) -> dict[int, Any]:
+        return {track["id"]: track for track in self.everything["tracks"]}
+
+    @property
+    def leads(self) -> list[tuple[int, int, int | str]]:
+        """(first, last, who), by frame."""
+        return sorted((each["first"], each["last"], each["lead"]) for each in self.everything["leads"])
+
+    def sighting(self, track: int, frame: int) -> Any:
+        """Where a track is in a frame; null where it is not."""
+        rows = self.get(f"/frames?first={frame}&last={frame}")["sightings"].get(str(frame), [])
+        return next((row for row in rows if row["track"] == track), None)
+
+    def cuboid(self, track: int, frame: int) -> Any:
+        found = self.sighting(track, frame)
+        return None if found is None else found["cuboid"]
+
+    def wait_for(self, holds: Callable[[Labels], bool]) -> None:
+        """Until the server knows it; the page's answers come on their own time."""
+        deadline = time.monotonic() + WAIT_MS / 1e3
+        while not holds(self):
+            assert time.monotonic() < deadline, json.dumps(self.everything)[:2000]
+            self._page.evaluate("() => new Promise((done) => setTimeout(done, 20))")
+
+    def clear(self, count: int) -> None:
+        """Nothing is labelled."""
+        held = self.everything
+        self._remove([("track", each) for each in held["tracks"]])
+        held = self.everything
+        self._remove([(kind, each) for kind in ("event", "path") for each in held[f"{kind}s"]])
+        if self.leads:
+            self.act("Nobody", {"kind": "clear_lead", "first": 0, "last": count - 1})
+
+    def _remove(self, items: Iterable[tuple[str, Any]]) -> None:
+        refs = [{"kind": kind, "id": each["id"], "revision": each["revision"]} for kind, each in items]
+        if refs:
+            self.act("Nobody", {"kind": "remove", "items": refs})
+
+
+def begin(page: Page, person: str = "Ada") -> Hand:
+    """The labeling mode, with who labels known."""
+    page.evaluate(f"localStorage.setItem('cipv.person', JSON.stringify('{person}'))")
+    expect(page.locator("#label-button")).to_be_enabled()
+    page.keyboard.press("Shift+L")
+    expect(page.locator("#label-pane")).to_be_visible()
+    return Hand(page)
+
+
+def is_saved(page: Page) -> None:
+    """Every act so far has been answered."""
+    expect(page.locator(".saved")).to_have_attribute("data-state", "saved")

@@ -1,0 +1,326 @@
+"""Labels made by hand: in the plan, in the picture, on the timeline, by one person and by two."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import START, OpenPage, Site
+from tests.browser.judges import LOW_CONTRAST
+from tests.browser.labeling import Hand, Labels, begin, is_saved
+from tests.browser.looks import COUNT, box_of, go_to, on_timeline, pixels, repainted, wait_for_frame, whole_drive
+
+SCREENS = Path(__file__).resolve().parents[2] / "build" / "screens"
+LEAD_X, LEAD_Y = 34.6, 0.0
+"""Where the simulated lead's middle is in the shown frame."""
+
+pytestmark = pytest.mark.usefixtures("paused_in_traffic")
+
+
+REFUSED = ("status of 409", "status of 503", "ERR_FAILED")
+"""What a browser's console says of requests that are refused."""
+
+
+@pytest.fixture
+def hand(open_page: OpenPage, site: Site) -> Hand:
+    page = open_page(expects=REFUSED)
+    Labels(page, site.address).clear(COUNT)
+    wait_for_frame(page, START)
+    return begin(page)
+
+
+@pytest.fixture
+def labels(hand: Hand, site: Site) -> Labels:
+    return Labels(hand.page, site.address)
+
+
+def draw(hand: Hand, labels: Labels) -> int:
+    """A cuboid on the simulated lead, drawn from its rear to its front; the new track's number."""
+    before = set(labels.tracks)
+    hand.keys("g")
+    hand.drag(hand.plan(LEAD_X - 2.2, LEAD_Y), hand.plan(LEAD_X + 2.2, LEAD_Y))
+    labels.wait_for(lambda now: len(now.tracks) == len(before) + 1)
+    (made,) = set(labels.tracks) - before
+    expect(hand.page.locator(".track-row[aria-selected=true]")).to_have_attribute("data-id", str(made))
+    return made
+
+
+def test_a_cuboid_is_drawn_moved_turned_and_resized_in_the_plan(hand: Hand, labels: Labels):
+    page = hand.page
+    empty = pixels(page, "#camera")
+    made = draw(hand, labels)
+    drawn = labels.cuboid(made, START)
+    assert drawn["center"][:2] == pytest.approx((LEAD_X, LEAD_Y), abs=0.2)
+    assert drawn["size"][0] == pytest.approx(4.4, abs=0.3)
+    assert repainted(page, "#camera", empty), "its edges are in the picture"
+
+    hand.drag(hand.plan(LEAD_X, LEAD_Y), hand.plan(LEAD_X + 2, LEAD_Y + 1))
+    labels.wait_for(lambda now: now.cuboid(made, START)["center"][0] > LEAD_X + 1)
+    moved = labels.cuboid(made, START)
+    assert moved["center"][:2] == pytest.approx((LEAD_X + 2, LEAD_Y + 1), abs=0.3)
+    assert (moved["size"], moved["yaw_rad"]) == (drawn["size"], drawn["yaw_rad"])
+
+    x, y = moved["center"][:2]
+    hand.drag(hand.plan(x + moved["size"][0] / 2, y), hand.plan(x + moved["size"][0] / 2 + 1.5, y))
+    labels.wait_for(lambda now: now.cuboid(made, START)["size"][0] > moved["size"][0] + 1)
+    longer = labels.cuboid(made, START)
+    rear = [each["center"][0] - each["size"][0] / 2 * math.cos(each["yaw_rad"]) for each in (moved, longer)]
+    assert rear[1] == pytest.approx(rear[0], abs=0.02), "the opposite face stays"
+
+    front = longer["center"][0] + longer["size"][0] / 2
+    knob_u, knob_v = hand.plan(front, y)
+    hand.drag((knob_u, knob_v - 16), hand.plan(longer["center"][0], y + 8))
+    labels.wait_for(lambda now: abs(now.cuboid(made, START)["yaw_rad"]) > 1.3)
+    assert labels.cuboid(made, START)["yaw_rad"] == pytest.approx(math.pi / 2, abs=0.1)
+    is_saved(page)
+
+
+def test_everything_is_done_by_keys_and_taken_back(hand: Hand, labels: Labels):
+    page = hand.page
+    made = draw(hand, labels)
+    start = labels.cuboid(made, START)
+    for keys, dx, dy, deg in (
+        (("ArrowUp", "ArrowUp", "ArrowLeft"), 0.2, 0.1, 0),
+        (("Shift+ArrowDown", "Shift+ArrowRight"), -0.8, -0.9, 0),
+        (("q", "Shift+Q", "e"), -0.8, -0.9, 10),
+    ):
+        hand.keys(*keys)
+        labels.wait_for(
+            lambda now, dx=dx, dy=dy, deg=deg: (
+                now.cuboid(made, START)["center"][:2]
+                == pytest.approx((start["center"][0] + dx, start["center"][1] + dy), abs=1e-6)
+                and now.cuboid(made, START)["yaw_rad"] == pytest.approx(start["yaw_rad"] + math.radians(deg), abs=1e-6)
+            )
+        )
+    hand.keys("t")
+    labels.wait_for(lambda now: now.tracks[made]["label"] == "truck")
+    hand.keys("f", "f", "f")
+    wait_for_frame(page, START + 3)
+    hand.keys("k")
+    labels.wait_for(lambda now: now.tracks[made]["keyframes"] == [START, START + 3])
+    assert labels.tracks[made]["sightings"] == 4, "the frames between follow"
+    expect(page.locator(".track-detail .facts").first).to_contain_text("keyframe")
+    hand.keys("x")
+    labels.wait_for(lambda now: len(now.tracks) == 2)
+    hand.keys("r")
+    labels.wait_for(lambda now: now.tracks[made]["state"] == "rejected")
+    is_saved(page)
+
+    page.reload()
+    wait_for_frame(page, START + 3)
+    begin(page)
+    expect(page.locator(".track-row")).not_to_have_count(0)
+    page.keyboard.press("Control+z")
+    labels.wait_for(lambda now: now.tracks[made]["state"] != "rejected")
+    page.keyboard.press("Control+z")
+    labels.wait_for(lambda now: len(now.tracks) == 1)
+    page.keyboard.press("Control+Shift+Z")
+    labels.wait_for(lambda now: len(now.tracks) == 2)
+
+
+def test_the_lead_is_painted_by_keys_by_number_and_by_a_drag(hand: Hand, labels: Labels):
+    page = hand.page
+    made = draw(hand, labels)
+    bare = pixels(page, "#timeline-back")
+    hand.keys("i", *["f"] * 4)
+    wait_for_frame(page, START + 4)
+    hand.keys("c")
+    labels.wait_for(lambda now: now.leads == [(START, START + 4, made)])
+    assert repainted(page, "#timeline-back", bare)
+    hand.keys("f")
+    wait_for_frame(page, START + 5)
+    hand.keys("u")
+    labels.wait_for(lambda now: now.leads == [(START, START + 4, made), (START + 5, START + 5, "unknown")])
+    expect(page.locator(".leads button[aria-pressed=true]")).to_have_text("can't tell")
+    hand.keys("0")
+    labels.wait_for(lambda now: now.leads[-1] == (START + 5, START + 5, "none"))
+
+    front = box_of(page.locator("#timeline-front"))
+    y = front["y"] + 37
+    hand.drag((front["x"] + on_timeline(page, 100), y), (front["x"] + on_timeline(page, 120), y), steps=8)
+    labels.wait_for(lambda now: (100, 120, made) in now.leads)
+    wait_for_frame(page, 120)
+    hand.keys("Escape", "i")
+    go_to(page, 130)
+    wait_for_frame(page, 130)
+    hand.keys(*str(made))
+    labels.wait_for(lambda now: (100, 130, made) in now.leads or (121, 130, made) in now.leads)
+    hand.keys("Shift+U")
+    labels.wait_for(lambda now: now.leads[-1][1] == 129)
+
+
+def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, site: Site):
+    page = hand.page
+    tick = site.engine.snapshot.tick
+    assert tick is not None
+    assert tick.frame.picture is not None
+    height, width = tick.frame.picture.bgr.shape[:2]
+    lead = next(each for each in tick.result.objects if each.id == tick.result.cipv.id)
+    assert lead.bbox is not None
+    u, v = (lead.bbox[0] + lead.bbox[2]) / 2, (lead.bbox[1] + lead.bbox[3]) / 2
+    hand.keys("g")
+    hand.press(hand.picture(u, v, width, height))
+    labels.wait_for(lambda now: len(now.tracks) == 1)
+    (made,) = labels.tracks
+    lifted = labels.cuboid(made, START)
+    assert lifted["center"][:2] == pytest.approx((LEAD_X, LEAD_Y), abs=2.5), "where the car is"
+    expect(page.locator(".said")).to_contain_text("points")
+
+    box = labels.sighting(made, START)["bbox"] or list(lead.bbox)
+    hand.keys("Shift+G")
+    corners = (
+        hand.picture(box[0] - 20, box[1] - 10, width, height),
+        hand.picture(box[2] + 10, box[3] + 10, width, height),
+    )
+    hand.drag(*corners)
+    wanted = [box[0] - 20, box[1] - 10, box[2] + 10, box[3] + 10]
+    labels.wait_for(lambda now: now.sighting(made, START)["bbox"] == pytest.approx(wanted, abs=6))
+    drawn = labels.sighting(made, START)["bbox"]
+    hand.drag(
+        hand.picture(drawn[0], (drawn[1] + drawn[3]) / 2, width, height),
+        hand.picture(drawn[0] + 15, (drawn[1] + drawn[3]) / 2, width, height),
+    )
+    labels.wait_for(lambda now: now.sighting(made, START)["bbox"][0] == pytest.approx(drawn[0] + 15, abs=6))
+    assert labels.sighting(made, START)["bbox"][1:] == pytest.approx(drawn[1:], abs=0.01), "one side moved"
+    assert labels.cuboid(made, START)["center"] == lifted["center"], "a box is no cuboid"
+
+
+def test_two_people_see_each_other_and_choose_when_they_disagree(hand: Hand, labels: Labels, open_page: OpenPage):
+    made = draw(hand, labels)
+    is_saved(hand.page)
+    other = open_page()
+    wait_for_frame(other, START)
+    second = begin(other, "Bob")
+    row = other.locator(f".track-row[data-id='{made}']")
+    expect(row).to_contain_text("car")
+    row.click()
+    second.keys("t")
+    expect(hand.page.locator(f".track-row[data-id='{made}']")).to_contain_text("truck")
+
+    # the other's change does not reach this page before its own act
+    hand.page.route("**/api/labels?since=*", lambda route: route.abort())
+    labels.act("Bob", {"kind": "relabel", "track": made, "revision": labels.tracks[made]["revision"], "label": "bus"})
+    hand.keys("Shift+T")
+    dialog = hand.page.get_by_role("dialog", name="Two people changed the same label")
+    expect(dialog).to_contain_text("Bob")
+    expect(dialog).to_contain_text("bus")
+    assert labels.tracks[made]["label"] == "bus", "nothing was written"
+    hand.page.unroute("**/api/labels?since=*")
+    dialog.get_by_role("button", name="Keep mine").click()
+    labels.wait_for(lambda now: now.tracks[made]["label"] == "car")
+    is_saved(hand.page)
+    assert [each["person"] for each in labels.get(f"/history?kind=track&id={made}")] == ["Ada", "Bob", "Bob", "Ada"]
+
+
+def test_what_is_called_saved_is_what_the_server_answered(hand: Hand, labels: Labels, site: Site):
+    page = hand.page
+    made = draw(hand, labels)
+    is_saved(page)
+    state = page.locator(".saved")
+    page.route("**/api/labels/act", lambda route: route.fulfill(status=503, json={"detail": "the disk is full"}))
+    before = labels.cuboid(made, START)
+    hand.keys("ArrowUp")
+    expect(state).to_have_text("not saved: the disk is full")
+    assert labels.cuboid(made, START) == before
+    page.unroute("**/api/labels/act")
+    page.get_by_role("button", name="Retry").click()
+    labels.wait_for(lambda now: now.cuboid(made, START)["center"][0] == pytest.approx(before["center"][0] + 0.1))
+    expect(state).to_contain_text("saved ")
+
+
+def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, site: Site):
+    page = hand.page
+    whole_drive(page, site)
+    hand.keys("p")
+    labels.wait_for(lambda now: len(now.leads) > 0)
+    expect(page.locator(".track-row")).not_to_have_count(0)
+    assert {each["state"] for each in labels.tracks.values()} == {"proposed"}
+    expect(page.locator(".leads button[aria-pressed=true]")).to_have_count(1)
+    hand.keys("Shift+A")
+    labels.wait_for(lambda now: any(each["state"] == "accepted" for each in now.everything["leads"]))
+    page.get_by_role("tab", name="Score").click()
+    expect(page.locator(".label-score .metrics tbody tr")).not_to_have_count(0)
+    page.get_by_role("tab", name="Tracks").click()
+    page.get_by_role("button", name="To do").click()
+    hand.keys("b")
+    expect(page.locator(".said")).not_to_be_empty()
+    with page.expect_download() as download:
+        page.locator("#label-pane").get_by_role("button", name="Export").click()
+        page.locator("#menu").get_by_text("CIPV Studio").click()
+    written = json.loads(download.value.path().read_text(encoding="utf-8"))
+    assert {each["id"] for each in written["labels"]["tracks"]} == set(labels.tracks)
+
+
+@pytest.mark.parametrize(("width", "height", "theme"), [(1440, 900, "light"), (1024, 600, "dark")])
+def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, height: int, theme: str):
+    page = open_page(width, height, color_scheme=theme)
+    labels = Labels(page, site.address)
+    labels.clear(COUNT)
+    wait_for_frame(page, START)
+    draw(begin(page), labels)
+    pixels(page, "#timeline-back")
+    SCREENS.mkdir(parents=True, exist_ok=True)
+    page.screenshot(path=SCREENS / f"labeling_{width}_{theme}.png")
+    assert page.evaluate(LOW_CONTRAST) == []
+    assert nameless(page) == []
+    for part in ("#label-bar", "#label-pane", "#label-keys", "#timeline-front", "#bev", "#camera"):
+        box = box_of(page.locator(part))
+        assert box["x"] >= 0, part
+        assert box["y"] >= 0, part
+        assert box["x"] + box["width"] <= width, part
+        assert box["y"] + box["height"] <= height, part
+
+
+def nameless(page: Page) -> list[str]:
+    """Controls of the mode that a screen reader has no name for."""
+    return page.evaluate(
+        """() => [...document.querySelectorAll("#label-bar button, #label-pane :is(button, select, input)")]
+          .filter((node) => node.checkVisibility() && !(node.textContent.trim() || node.getAttribute("aria-label")))
+          .map((node) => node.outerHTML)"""
+    )
+
+
+EDGES = [
+    ("front", (13.0, 0.0), (10.5, 0.0), (5.0, 2.0)),
+    ("rear", (7.0, 0.0), (9.5, 0.0), (5.0, 2.0)),
+    ("left", (10.0, 2.0), (10.0, 0.5), (4.0, 3.0)),
+    ("right", (10.0, 0.0), (10.0, 0.5), (4.0, 1.0)),
+]
+"""An edge, where it is dragged to, and the middle and the size that come of it."""
+
+
+def test_the_opposite_face_is_held_whatever_the_heading(open_page: OpenPage):
+    """A cuboid of 4 m by 2 m at (10, 0), each edge dragged; and the same turned by any angle about its middle."""
+    page = open_page()
+    found = page.evaluate(
+        """async (angles) => {
+          const { dragged, footprint } = await import("/js/labeling/cuboid.js");
+          const cuboid = (yaw_rad) => ({ center: [10, 0, 1], size: [4, 2, 2], yaw_rad });
+          const held = { front: [2, 3], rear: [0, 1], left: [1, 2], right: [0, 3] };
+          const away = [];
+          for (const yaw of angles) for (const [grip, corners] of Object.entries(held)) {
+            const before = cuboid(yaw), after = dragged(before, grip, { x: 0, y: 0 }, { x: 13.3, y: 2.7 });
+            const [a, b] = [footprint(before), footprint(after)];
+            away.push(Math.max(...corners.map((i) => Math.hypot(a[i][0] - b[i][0], a[i][1] - b[i][1]))));
+            away.push(Math.max(0, 0.2 - Math.min(...after.size)));
+          }
+          return away;
+        }""",
+        [0.0, 0.4, 1.7, 3.0, -2.2],
+    )
+    assert max(found) < 1e-9
+    sizes = page.evaluate(
+        """async (edges) => {
+          const { dragged } = await import("/js/labeling/cuboid.js");
+          const cuboid = { center: [10, 0, 1], size: [4, 2, 2], yaw_rad: 0 };
+          return edges.map(([grip, [x, y]]) => dragged(cuboid, grip, { x: 0, y: 0 }, { x, y }));
+        }""",
+        [[grip, to] for grip, to, _, _ in EDGES],
+    )
+    for (grip, to, center, size), got in zip(EDGES, sizes, strict=True):
+        assert got["center"][:2] == pytest.approx(center), (grip, to)
+        assert got["size"][:2] == pytest.approx(size), (grip, to)
