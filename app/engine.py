@@ -9,9 +9,8 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import replace
-from typing import cast
+from typing import Protocol, cast
 
 from app.control import Control, Wish
 from app.detector_pool import DetectorPool, OpenDetector, OpenLanes
@@ -27,6 +26,7 @@ from app.recording import RecordingDesk
 from app.showing import Showing
 from app.snapshot import Notice, Snapshot
 from pipeline.params import Params
+from pipeline.progress import Progress
 from pipeline.run import Detectors, Sensors
 from pipeline.sources.base import AnySource, Source, SourceError, is_live_source
 from pipeline.step import warm_up
@@ -34,8 +34,13 @@ from pipeline.step import warm_up
 logger = logging.getLogger("cipv.engine")
 
 _PATIENCE_S = 10.0
+_TELL_EVERY_S = 0.25
 
-OpenSource = Callable[[str], AnySource]
+
+class OpenSource(Protocol):
+    """As ``pipeline.sources.open_any``."""
+
+    def __call__(self, uri: str, /, *, progress: Progress) -> AnySource: ...
 
 
 class Engine:
@@ -139,14 +144,18 @@ class Engine:
     # ------------------------------------------------------------ opening
 
     def _open(self, uri: str) -> bool:
-        """Replace what is open; when it cannot be opened the old one stays, a notice says why, and this is false."""
+        """Replace what is open; when it cannot be opened the old one stays, a notice says why, and this is false. One
+        that takes long is given up for a newer wish."""
         self._showing.publish(replace(self.snapshot, busy=f"Opening {uri} …"))
         try:
-            source = self._open_source(uri)
+            source = self._open_source(uri, progress=self._opening(uri))
             if not is_live_source(source) and len(cast("Source", source)) == 0:
                 raise SourceError(f"{uri}: holds no frames")
         except SourceError as error:
             self._fail(str(error))
+            return False
+        except _Overtaken:
+            self._showing.publish(replace(self.snapshot, busy=None))
             return False
         notices = [Notice("info", text) for text in source.notes]
         detectors = self._detectors.both_for(source, notices)
@@ -175,6 +184,21 @@ class Engine:
             )
         )
         return True
+
+    def _opening(self, uri: str) -> Progress:
+        """Says how far it is, as often as people can read."""
+        told_s = 0.0
+
+        def progress(done: int, total: int) -> None:
+            nonlocal told_s
+            if self.control.superseded():
+                raise _Overtaken
+            now_s = time.monotonic()
+            if now_s - told_s >= _TELL_EVERY_S:
+                told_s = now_s
+                self._showing.publish(replace(self.snapshot, busy=f"Opening {uri} … {100 * done // max(1, total)} %"))
+
+        return progress
 
     def _player_of(self, source: AnySource, detectors: Detectors) -> Player:
         if is_live_source(source):
@@ -233,6 +257,10 @@ class Engine:
                 notices=tuple(n for n in shown.notices if n.level != "error"),
             )
         self._showing.publish(shown)
+
+
+class _Overtaken(Exception):
+    """Something else is wished for."""
 
 
 def _first_line(error: BaseException) -> str:

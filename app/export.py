@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from app.line import WARM_UP_FRAMES
 from pipeline.params import Params
-from pipeline.recording.rewrite import Progress
+from pipeline.progress import Progress, silent
 from pipeline.recording.save import save
 from pipeline.recording.session import SessionSource
 from pipeline.results import to_json
@@ -33,10 +33,6 @@ _COLUMNS = (
 _NO_DETECTORS = Detectors()
 
 
-def _silent(done: int, total: int) -> None:
-    """Nobody watches."""
-
-
 def export_clip(
     source: Source,
     first: int,
@@ -46,7 +42,7 @@ def export_clip(
     *,
     params: Params | None = None,
     detectors: Detectors = _NO_DETECTORS,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> None:
     """Frames ``first`` to ``last``, both included, to ``out``.
 

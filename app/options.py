@@ -10,11 +10,12 @@ from typing import Annotated, Literal, TypeVar
 import tyro
 import yaml
 
+from app.progress import opened_recording
 from pipeline.errors import BadInput
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
 from pipeline.path.lane_detector import usual_every
 from pipeline.run import Detectors, Sensors, detector_for, lanes_for
-from pipeline.sources import is_live, open_live, open_source
+from pipeline.sources import is_live, open_live
 from pipeline.sources.along_route import along_route
 from pipeline.sources.base import AnySource, LiveSource, Source
 from pipeline.sources.routes import load_route
@@ -44,7 +45,7 @@ class SourceOptions:
 
     def open(self) -> Source:
         """A recording. SourceError says in one sentence what is wrong, RouteError the same of the route."""
-        return self._with_notes(along_route(open_source(self.source, rings=self.rings), planned(self.route)))
+        return self._with_notes(along_route(opened_recording(self.source, self.rings), planned(self.route)))
 
     def open_live(self) -> LiveSource | None:
         """The sensors, if it names some; they are not started yet. SourceError as with ``open``."""

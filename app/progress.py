@@ -2,17 +2,68 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import PurePath
+
 from rich.console import Console
-from rich.progress import BarColumn, DownloadColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    DownloadColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
+
+from pipeline import progress
+from pipeline.sources import open_any, open_source
+from pipeline.sources.base import AnySource, Source
+
+_LONGEST_NAME = 40
 
 
 def frames_progress() -> Progress:
     """A bar that counts frames and vanishes when done."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    return Progress(*columns, console=Console(stderr=True), transient=True)
+    return _bar(MofNCompleteColumn())
 
 
 def bytes_progress() -> Progress:
     """A bar that counts bytes."""
-    columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TimeRemainingColumn())
+    return _bar(DownloadColumn())
+
+
+def opened(uri: str, rings: int = 16) -> AnySource:
+    """What a person named; a bar shows how far it is where a whole file has to be read first. SourceError as of
+    ``open_any``."""
+    with _reading(uri) as told:
+        return open_any(uri, rings=rings, progress=told)
+
+
+def opened_recording(uri: str, rings: int = 16) -> Source:
+    """The same of a recording alone."""
+    with _reading(uri) as told:
+        return open_source(uri, rings=rings, progress=told)
+
+
+@contextmanager
+def _reading(uri: str) -> Iterator[progress.Progress]:
+    """Whom to tell; the bar comes with the first word, so that there is none for what is opened at once."""
+    name = PurePath(uri.partition("?")[0]).name[-_LONGEST_NAME:]
+    with ExitStack() as stack:
+        bars: list[Progress] = []
+
+        def told(done: int, total: int) -> None:
+            if not bars:
+                bars.append(stack.enter_context(_bar(TaskProgressColumn())))
+                bars[0].add_task(f"reading {name}", total=total)
+            bars[0].update(bars[0].task_ids[0], completed=done, total=total)
+
+        yield told
+
+
+def _bar(count: ProgressColumn) -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), count, TimeRemainingColumn())
     return Progress(*columns, console=Console(stderr=True), transient=True)

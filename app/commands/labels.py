@@ -9,14 +9,13 @@ from typing import Annotated
 
 import tyro
 
-from app.progress import frames_progress
+from app.progress import frames_progress, opened_recording
 from pipeline.labels.formats.base import Drive, FormatName, drive_of
 from pipeline.labels.formats.native import from_json, onto
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.labels.formats.registry import export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.labels.truth import truth_labels
-from pipeline.sources import open_source
 from pipeline.sources.base import Source
 
 _NOBODY_KNOWS_WHEN = 0
@@ -40,7 +39,7 @@ class ExportLabels:
     """A file of our own with the labels; else the truth that comes with the recording"""
 
     def __call__(self) -> int:
-        source = open_source(self.source)
+        source = opened_recording(self.source)
         drive = _drive(source)
         labels, notes = _labels_of(source, drive, self.labels)
         lost = export_labels(labels, drive, self.format, self.out)
@@ -65,7 +64,7 @@ class ImportLabels:
     """The file to write; there may be none yet"""
 
     def __call__(self) -> int:
-        source = open_source(self.source)
+        source = opened_recording(self.source)
         drive = _drive(source)
         file = self.file.expanduser()
         origin = Origin("import", file.name, file.stat().st_mtime_ns // 1_000_000)

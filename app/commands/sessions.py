@@ -16,13 +16,12 @@ from rich.table import Table
 from app.export import Kind, export_clip
 from app.options import LineOptions, SourceOptions
 from app.playing.playback import timeline_s
-from app.progress import frames_progress
+from app.progress import frames_progress, opened_recording
 from pipeline.errors import BadInput
 from pipeline.recording.info import Info, Rhythm, info, info_of_source
 from pipeline.recording.rewrite import recover
 from pipeline.recording.save import save
 from pipeline.run import Detectors
-from pipeline.sources import open_source
 from pipeline.sources.base import Source
 
 _WIDE = 120
@@ -108,7 +107,7 @@ class ShowInfo:
             found = info(Path(self.source.removeprefix("mcap:")).expanduser())
             _print_json(asdict(found)) if self.json else _print_info(found)
             return 0
-        source = open_source(self.source)
+        source = opened_recording(self.source)
         frames = info_of_source(source)
         if self.json:
             _print_json({"uri": source.uri, "title": source.title, "frames": asdict(frames), "notes": source.notes})

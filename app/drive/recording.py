@@ -14,7 +14,7 @@ from app.drive.run import DriveRun, Kept, digest
 from app.line import DetectionCache
 from pipeline.evaluation.lead import LeadRule
 from pipeline.params import Params
-from pipeline.recording.rewrite import Progress
+from pipeline.progress import Progress
 from pipeline.recording.save import save
 from pipeline.run import Detectors, Sensors, detect, only
 from pipeline.sources.base import Mark, Marked, Source, TruthObject, is_simulated
@@ -106,6 +106,10 @@ class Recording:
     def marks(self) -> tuple[Mark, ...]:
         """What was marked while it was recorded."""
         return self.recipe.source.marks() if isinstance(self.recipe.source, Marked) else ()
+
+    def at_hand(self, index: int) -> Frame:
+        """A frame as the line takes it if it is held (its picture may be without pixels), else as its source gives it."""
+        return self.inputs.get(index) or self.as_read(index)
 
     def save(self, path: Path, first: int, last: int, progress: Progress) -> None:
         """Frames as a session file, with all that the source has."""

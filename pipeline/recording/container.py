@@ -18,6 +18,7 @@ from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
 from mcap.stream_reader import breakup_chunk
 
 from pipeline.errors import BadInput
+from pipeline.progress import Progress, silent
 from pipeline.recording import topics
 from pipeline.recording.directory import RECORD_HEAD, ChunkEntry, Unreadable, read_directory, record_at
 from pipeline.recording.messages import Damaged
@@ -77,11 +78,17 @@ class McapFile:
         self._file.close()
 
     def messages(
-        self, wanted: Collection[str] | None = None, first_ns: int = 0, last_ns: int = 2**64 - 1
+        self,
+        wanted: Collection[str] | None = None,
+        first_ns: int = 0,
+        last_ns: int = 2**64 - 1,
+        progress: Progress = silent,
     ) -> Iterator[Stored]:
         """Messages in the order of the file, of these topics, with log times from ``first_ns`` to ``last_ns``, both
-        included. A chunk that cannot be read is left out, and noted in ``damaged``."""
-        for place in self._chunks_between(first_ns, last_ns):
+        included. A chunk that cannot be read is left out, and noted in ``damaged``. progress: of chunks."""
+        places = self._chunks_between(first_ns, last_ns)
+        for done, place in enumerate(places):
+            progress(done, len(places))
             if wanted is not None and not self._may_hold(self.directory.chunks[place], wanted):
                 continue
             for stored in self.chunk(place):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from pipeline.progress import Progress, silent
 from pipeline.recording import topics
 from pipeline.recording.container import McapFile, Stored
 from pipeline.recording.messages import Damaged
@@ -15,9 +16,6 @@ from pipeline.recording.output import Output
 from pipeline.recording.packets import PACKETS_BEFORE_NS
 from pipeline.recording.session import SessionSource
 from pipeline.recording.tick import tick_from, tick_message
-
-Progress = Callable[[int, int], None]
-"""Told (done, total) as the work goes on."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,7 @@ class Recovered:
     is_cut: bool
 
 
-def recover(path: Path, out: Path, progress: Progress = lambda done, total: None) -> Recovered:
+def recover(path: Path, out: Path, progress: Progress = silent) -> Recovered:
     """Write every message of every complete chunk of ``path`` to a new, whole file ``out``.
 
     BadInput when ``path`` is no MCAP file or ``out`` exists.
@@ -67,7 +65,7 @@ def clip(
     last: int,
     out: Path,
     labels: bytes | None = None,
-    progress: Progress = lambda done, total: None,
+    progress: Progress = silent,
 ) -> int:
     """Frames ``first`` to ``last``, both included, as a session of their own, with results, marks and all else that
     was recorded meanwhile. What these frames refer to from before (calibration, parameters) is moved to right before

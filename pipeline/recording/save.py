@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.recording.rewrite import Progress, clip
+from pipeline.progress import Progress, silent
+from pipeline.recording.rewrite import clip
 from pipeline.recording.session import SessionSource
 from pipeline.recording.writer import About, SessionWriter
 from pipeline.sources.base import AnySource, Recorded, Source
@@ -15,7 +16,7 @@ def save(
     out: Path,
     first: int = 0,
     last: int | None = None,
-    progress: Progress = lambda done, total: None,
+    progress: Progress = silent,
     labels: bytes | None = None,
 ) -> None:
     """Write frames ``first`` to ``last`` (both included; null: to the end) to a new file, inputs and labels.

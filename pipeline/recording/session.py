@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.params import Params, ParamsError, with_changes
+from pipeline.progress import Progress, silent
 from pipeline.recording import topics
 from pipeline.recording.container import McapFile, NotMcap
 from pipeline.recording.messages import Damaged, log_text, picture_from, sweep_from
@@ -30,14 +31,14 @@ class SessionSource:
     origin: the URI of what was recorded.
     """
 
-    def __init__(self, uri: str, path: str) -> None:
+    def __init__(self, uri: str, path: str, progress: Progress = silent) -> None:
         try:
             self.file = McapFile(Path(path).expanduser())
         except (NotMcap, OSError, RuntimeError, ValueError) as error:
             raise SourceError(str(error)) from None
         try:
             about = self._about(path)
-            self._log_ns, self._t_ns = self._frames()
+            self._log_ns, self._t_ns = self._frames(progress)
             if not len(self._t_ns):
                 raise SourceError(f"{path}: the session holds no frames")
         except SourceError:
@@ -146,14 +147,14 @@ class SessionSource:
             raise SourceError(f"{path}: a session of version {about.version}; this program reads up to {VERSION}")
         return about
 
-    def _frames(self) -> tuple[I64, I64]:
+    def _frames(self, progress: Progress) -> tuple[I64, I64]:
         """Log time and header time of every frame: from the list at the file's end, else from the frames."""
         listed = self.file.attachment(topics.INDEX)
         if listed is not None and len(listed) % 16 == 0:
             pairs = np.frombuffer(listed, dtype="<i8").reshape(-1, 2)
             return pairs[:, 0].astype(np.int64), pairs[:, 1].astype(np.int64)
         stamps = []
-        for stored in self.file.messages((topics.FRAMES,)):
+        for stored in self.file.messages((topics.FRAMES,), progress=progress):
             try:
                 stamps.append((stored.log_time_ns, tick_from(stored.data).t_ns))
             except Damaged:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from pipeline.progress import Progress, silent
 from pipeline.sources.astyx import AstyxSource
 from pipeline.sources.base import LIVE, AnySource, LiveSource, Source, SourceError, TruthObject
 from pipeline.sources.kitti import KittiSource
@@ -25,40 +26,41 @@ __all__ = [
 _SESSION_SUFFIX = ".mcap"
 
 
-def _open_session(uri: str, path: str, rings: int) -> Source:
+def _open_session(uri: str, path: str, rings: int, progress: Progress) -> Source:
     from pipeline.recording.session import SessionSource  # half a second of imports: only who opens one pays
 
-    return SessionSource(uri, path)
+    return SessionSource(uri, path, progress)
 
 
-def _open_pcap(uri: str, rest: str, rings: int) -> Source:
+def _open_pcap(uri: str, rest: str, rings: int, progress: Progress) -> Source:
     from pipeline.sources.pcap import PcapSource  # decoder and video libraries: only who opens one pays
 
-    return PcapSource(uri, rest)
+    return PcapSource(uri, rest, progress)
 
 
-def _open_pcd(uri: str, rest: str, rings: int) -> Source:
+def _open_pcd(uri: str, rest: str, rings: int, progress: Progress) -> Source:
     from pipeline.sources.pcd import PcdSource
 
     return PcdSource(uri, rest)
 
 
-def _open_rosbag(uri: str, rest: str, rings: int) -> Source:
+def _open_rosbag(uri: str, rest: str, rings: int, progress: Progress) -> Source:
     from pipeline.sources.rosbag import RosbagSource
 
-    return RosbagSource(uri, rest)
+    return RosbagSource(uri, rest, progress)
 
 
-_OPENERS: dict[str, Callable[[str, str, int], Source]] = {
-    "astyx": lambda uri, rest, rings: AstyxSource(uri, rest),
-    "kitti": lambda uri, rest, rings: KittiSource(uri, rest, rings),
+_OPENERS: dict[str, Callable[[str, str, int, Progress], Source]] = {
+    "astyx": lambda uri, rest, rings, progress: AstyxSource(uri, rest),
+    "kitti": lambda uri, rest, rings, progress: KittiSource(uri, rest, rings),
     "mcap": _open_session,
     "pcap": _open_pcap,
     "pcd": _open_pcd,
     "rosbag": _open_rosbag,
-    "sim": lambda uri, rest, rings: SimulatedSource(uri, rest),
+    "sim": lambda uri, rest, rings, progress: SimulatedSource(uri, rest),
 }
-"""Scheme → what opens it, given the whole URI, the part after the colon and how many LiDAR rings to keep."""
+"""Scheme → what opens it, given the whole URI, the part after the colon, how many LiDAR rings to keep, and whom to tell
+how far it is."""
 
 _MARKS = {"lidar_vlp16": "astyx", "camera_front": "astyx", "velodyne": "kitti", "velodyne_points": "kitti"}
 """A folder with this one inside is such a recording."""
@@ -66,9 +68,9 @@ _SUFFIXES = {".pcap": "pcap", ".pcapng": "pcap", ".cap": "pcap", ".bag": "rosbag
 """A file whose name ends so is such a recording."""
 
 
-def open_source(uri: str, *, rings: int = 16) -> Source:
+def open_source(uri: str, *, rings: int = 16, progress: Progress = silent) -> Source:
     """Open ``scheme:rest``, or the path of a session. ``rings``: how many rings to keep of a LiDAR that has more
-    (KITTI's HDL-64).
+    (KITTI's HDL-64). ``progress``: told how much was read, where a whole file has to be.
 
     SourceError, in one sentence, when the scheme is unknown or the recording cannot be opened.
     """
@@ -76,13 +78,13 @@ def open_source(uri: str, *, rings: int = 16) -> Source:
     is_drive_letter = len(scheme) == 1
     if not colon or is_drive_letter or not scheme.isalnum():
         if uri.lower().endswith(_SESSION_SUFFIX):
-            return _open_session(uri, uri, rings)
+            return _open_session(uri, uri, rings, progress)
         raise SourceError(_about_bare_path(uri))
     if is_live(uri):
         raise SourceError(f"{uri}: live sensors have no frames to choose from; a recording is needed here")
     if scheme not in _OPENERS:
         raise SourceError(f"{uri}: no kind of source named {scheme!r}; there are {', '.join(_OPENERS)}")
-    return _OPENERS[scheme](uri, rest, rings)
+    return _OPENERS[scheme](uri, rest, rings, progress)
 
 
 def is_live(uri: str) -> bool:
@@ -98,9 +100,9 @@ def open_live(uri: str) -> LiveSource:
     return LiveSensors(uri, load(uri.removeprefix(LIVE)))
 
 
-def open_any(uri: str, *, rings: int = 16) -> AnySource:
+def open_any(uri: str, *, rings: int = 16, progress: Progress = silent) -> AnySource:
     """Devices or a recording, whichever it names. SourceError as of the two."""
-    return open_live(uri) if is_live(uri) else open_source(uri, rings=rings)
+    return open_live(uri) if is_live(uri) else open_source(uri, rings=rings, progress=progress)
 
 
 def _about_bare_path(path: str) -> str:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from pipeline.progress import Progress, silent
 from pipeline.records import evolve
 from pipeline.sources import rig as rig_files
 from pipeline.sources import video as video_files
@@ -28,7 +29,8 @@ class Beside:
     """Everything of a frame but its sweep. notes: what was found, and what had to be assumed.
 
     begin_ns: when the recording begins, which is when its video is taken to begin. fixes: what the recording itself
-    says of the place; used where no file of sentences lies beside it. SourceError for a named file that cannot be used.
+    says of the place; used where no file of sentences lies beside it. progress: told how much of a video was read.
+    SourceError for a named file that cannot be used.
     """
 
     def __init__(
@@ -38,10 +40,11 @@ class Beside:
         rig: rig_files.Rig,
         begin_ns: int,
         fixes: Iterable[GnssFix] = (),
+        progress: Progress = silent,
     ) -> None:
         self.notes: list[str] = []
         self._camera = rig.camera_calibration()
-        self._video = self._open_video(_named(recording, options, "video", video_files.SUFFIXES))
+        self._video = self._open_video(_named(recording, options, "video", video_files.SUFFIXES), progress)
         offset_s = number_option(options, "video_offset_s", 0.0) + rig.camera.time_offset_ms / 1e3
         self._video_begins_ns = begin_ns + round(offset_s * 1e9)
         if self._video is not None and not offset_s:
@@ -90,11 +93,11 @@ class Beside:
             return None
         return Picture(self._video_begins_ns + int(self._video.times_ns[index]), bgr)
 
-    def _open_video(self, path: Path | None) -> video_files.VideoFile | None:
+    def _open_video(self, path: Path | None, progress: Progress) -> video_files.VideoFile | None:
         if path is None:
             return None
         self.notes.append(f"pictures from {path.name}")
-        return video_files.VideoFile(path)
+        return video_files.VideoFile(path, progress)
 
 
 def rig_of(recording: Path, options: dict[str, str]) -> rig_files.Rig:

@@ -9,6 +9,7 @@ from threading import Lock
 import av
 import numpy as np
 
+from pipeline.progress import Progress, silent
 from pipeline.sources.base import SourceError
 from pipeline.sources.files import reason_of
 from pipeline.sources.timeline import Times
@@ -18,6 +19,8 @@ SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".mjpeg", ".ts")
 _NS = 1_000_000_000
 _DECODE_ON_NS = 2 * _NS
 """A picture this little later is reached sooner by decoding on than by seeking."""
+_TELL_EVERY = 256
+"""Pictures between two words of progress."""
 _PLACES = 2
 """What is shown, and what is computed beside it."""
 
@@ -27,11 +30,11 @@ class VideoFile:
     none, the pictures are evenly spaced at its rate. Any thread: two that read on at different places do not make each
     other seek."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, progress: Progress = silent) -> None:
         self.path = path
         try:
             with av.open(str(path)) as container:
-                stamps, tick_ns = _stamps(container)
+                stamps, tick_ns = _stamps(container, progress)
         except (av.FFmpegError, OSError, ValueError) as error:
             raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
         if not len(stamps):
@@ -105,12 +108,18 @@ class _Place:
         self._container = self._frames = None
 
 
-def _stamps(container: av.container.InputContainer) -> tuple[np.ndarray, float]:
-    """Presentation stamps of every picture, ascending, and nanoseconds a tick; nothing is decoded."""
+def _stamps(container: av.container.InputContainer, progress: Progress) -> tuple[np.ndarray, float]:
+    """Presentation stamps of every picture, ascending, and nanoseconds a tick; nothing is decoded. progress: of the
+    file's bytes."""
     if not container.streams.video:
         raise ValueError("no video in it")
     stream = container.streams.video[0]
     if stream.time_base is None:
         raise ValueError("its pictures have no times")
-    stamps = [packet.pts for packet in container.demux(stream) if packet.pts is not None]
+    stamps = []
+    for count, packet in enumerate(container.demux(stream)):
+        if packet.pts is not None:
+            stamps.append(packet.pts)
+        if count % _TELL_EVERY == 0 and packet.pos is not None:
+            progress(packet.pos, container.size)
     return np.unique(np.array(stamps, dtype=np.int64)), float(stream.time_base) * _NS

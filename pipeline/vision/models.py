@@ -13,20 +13,17 @@ import os
 import shutil
 import urllib.error
 import urllib.request
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from pipeline.data import data_dir, file_sha256
 from pipeline.errors import BadInput
+from pipeline.progress import Progress, silent
 from pipeline.types import DistanceLaw
 from pipeline.vision.laws import find_law, law_file
 
 Task = Literal["detector", "lanes"]
-Progress = Callable[[int, int], None]
-"""Called with bytes done and bytes in all."""
-
 EMBEDDED = "embedded"
 """Name of the detector that comes with the program."""
 _EMBEDDED_FILE = Path(__file__).parent / "embedded" / "simulated_vehicles.onnx"
@@ -185,7 +182,7 @@ def known_model(name: str) -> KnownModel:
     return known
 
 
-def pull(name: str, progress: Progress | None = None) -> Path:
+def pull(name: str, progress: Progress = silent) -> Path:
     """Fetch a known network into the folder; size and SHA-256 must be the official ones. A file that is already there
     and right is kept. ModelError says what went wrong; no part of a failed download stays."""
     known = known_model(name)
@@ -207,7 +204,7 @@ def pull(name: str, progress: Progress | None = None) -> Path:
     return target
 
 
-def _download(known: KnownModel, size: int, part: Path, progress: Progress | None) -> None:
+def _download(known: KnownModel, size: int, part: Path, progress: Progress) -> None:
     digest, done = hashlib.sha256(), 0
     try:
         with urllib.request.urlopen(known.url, timeout=_TIMEOUT_S) as response, part.open("wb") as file:
@@ -217,8 +214,7 @@ def _download(known: KnownModel, size: int, part: Path, progress: Progress | Non
                     break
                 file.write(chunk)
                 digest.update(chunk)
-                if progress is not None:
-                    progress(done, size)
+                progress(done, size)
     except urllib.error.HTTPError as error:
         error.close()
         raise ModelError(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from pipeline.progress import Progress, silent
 from pipeline.sources.base import SourceError, TruthObject
 from pipeline.types import F32, U8, CameraCalibration, EgoState, Frame, Picture, RawBoxes, Sweep
 
@@ -79,7 +80,7 @@ def opener(*recordings: Recording):
     """``open_source`` over these."""
     known = {recording.uri: recording for recording in recordings}
 
-    def open_source(uri: str) -> Recording:
+    def open_source(uri: str, *, progress: Progress = silent) -> Recording:
         if uri not in known:
             raise SourceError(f"{uri}: no such recording")
         return known[uri]

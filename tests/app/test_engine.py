@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
+import app.engine as engine_module
 from app.engine import Engine
 from app.line import WARM_UP_FRAMES, DetectionCache, Line
 from app.snapshot import Snapshot
 from pipeline.params import Params, with_changes
+from pipeline.progress import Progress
 from pipeline.results import to_json
 from pipeline.run import Detectors
 from pipeline.sources.base import Source
@@ -63,6 +66,59 @@ def played(recording: Recording, first: int, last: int, params: Params) -> Resul
         boxes = detector.detect(frame.picture.bgr)
         state, result = step(state, type(frame)(**{**vars(frame), "raw_boxes": boxes}), params)
     return result
+
+
+class Slowly:
+    """Opens "test:long" word by word, each when the test lets it; anything else at once."""
+
+    def __init__(self) -> None:
+        self.goes_on = threading.Semaphore(0)
+        self.given_up = threading.Event()
+
+    def __call__(self, uri: str, /, *, progress: Progress) -> Recording:
+        if uri == "test:long":
+            try:
+                for done in range(0, 101, 25):
+                    progress(done, 100)
+                    assert self.goes_on.acquire(timeout=WAIT_S)
+            except BaseException:
+                self.given_up.set()
+                raise
+        return Recording(uri)
+
+
+@pytest.fixture
+def slowly(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Engine, Slowly]]:
+    monkeypatch.setattr(engine_module, "_TELL_EVERY_S", 0.0)
+    opens = Slowly()
+    engine = Engine(opens, lambda _: CountingDetector(), Params(), uri="test:car")
+    engine.start()
+    engine.wait_for(lambda s: s.uri == "test:car", WAIT_S)
+    yield engine, opens
+    opens.goes_on.release(10)
+    engine.stop()
+
+
+def test_what_takes_long_to_open_says_how_far_it_is(slowly: tuple[Engine, Slowly]):
+    engine, opens = slowly
+    engine.control.change(uri="test:long")
+    for percent in (0, 25, 50):
+        shown = engine.wait_for(lambda s, percent=percent: s.busy == f"Opening test:long … {percent} %", WAIT_S)
+        assert shown.uri == "test:car", "what is open stays until then"
+        opens.goes_on.release()
+    opens.goes_on.release(2)
+    assert engine.wait_for(lambda s: s.uri == "test:long", WAIT_S).busy is None
+
+
+def test_what_takes_long_to_open_is_given_up_for_something_else(slowly: tuple[Engine, Slowly]):
+    engine, opens = slowly
+    engine.control.change(uri="test:long")
+    engine.wait_for(lambda s: s.busy == "Opening test:long … 0 %", WAIT_S)
+    engine.control.change(uri="test:other")
+    opens.goes_on.release()
+    assert opens.given_up.wait(WAIT_S)
+    shown = engine.wait_for(lambda s: s.uri == "test:other" and s.tick is not None, WAIT_S)
+    assert (shown.busy, [n for n in shown.notices if n.level == "error"]) == (None, [])
 
 
 def test_opens_paused_on_the_first_frame_and_finds_the_car(start: Start):

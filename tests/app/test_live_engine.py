@@ -17,6 +17,7 @@ from app.playing.live_line import LiveLine
 from app.recording import RecordingDesk
 from app.snapshot import Snapshot
 from pipeline.params import Params, SyncParams, with_changes
+from pipeline.progress import Progress
 from pipeline.recording.session import SessionSource
 from pipeline.run import Detectors
 from pipeline.sources.base import AnySource, SourceError, Tap
@@ -94,7 +95,7 @@ def start() -> Iterator[Start]:
     def begin(desk: RecordingDesk | None = None) -> tuple[Engine, Sensors, CountingDetector]:
         sensors, detector = Sensors(), CountingDetector()
 
-        def open_source(uri: str) -> AnySource:
+        def open_source(uri: str, *, progress: Progress) -> AnySource:
             if uri == sensors.uri:
                 return sensors
             if uri == "test:car":

@@ -7,6 +7,7 @@ and reads gigabytes for one packet, and because its times are floating-point num
 
 from __future__ import annotations
 
+import os
 import struct
 from bisect import bisect_right
 from collections.abc import Iterator
@@ -58,13 +59,14 @@ class _Section(NamedTuple):
 
 
 class Capture:
-    """One file. damage: why reading ended before the file did, null while it has not."""
+    """One file. size: in bytes. damage: why reading ended before the file did, null while it has not."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.damage: str | None = None
         with self._open() as file:
             head = file.read(12)
+            self.size = file.seek(0, os.SEEK_END)
         self._magic = head[:4]
         self._sections = [_Section(0, _BYTE_ORDER.get(head[8:], "<"), [])]
         self._described_to = 0

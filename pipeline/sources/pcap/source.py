@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.progress import Progress, silent
 from pipeline.records import evolve
 from pipeline.sources.base import SourceError, TruthObject
 from pipeline.sources.beside import OPTIONS, Beside, rig_of
@@ -34,13 +35,15 @@ from pipeline.types import F64, Frame, GnssFix, Sweep
 _DATA_PORT = 2368
 _LOOK_AT = 2000
 """Datagrams at the beginning that show to which port a LiDAR sends."""
+_TELL_EVERY = 4 << 20
+"""Bytes between two words of progress."""
 _NMEA = slice(0xCA, 0x14E)  # PPS state and sentence of a position packet
 
 
 class PcapSource:
     """``<file>?port=2368&video=…&video_offset_s=…&nmea=…&rig=…``, all optional."""
 
-    def __init__(self, uri: str, rest: str) -> None:
+    def __init__(self, uri: str, rest: str, progress: Progress = silent) -> None:
         path, options = split_options(rest, ("port", *OPTIONS))
         file = recording_file(path)
         self.uri, self.title = uri, file.stem
@@ -48,10 +51,10 @@ class PcapSource:
         rig = rig_of(file, options)
         self._T_ego_lidar = rig.lidar.mount.T_ego_sensor()
         self._port = int(number_option(options, "port", 0)) or _lidar_port(self._capture)
-        self._index = _Index(self._capture, self._port, self._T_ego_lidar)
+        self._index = _Index(self._capture, self._port, self._T_ego_lidar, progress)
         if not len(self._index):
             raise SourceError(f"{file.name}: {self._index.about_nothing(self._port)}")
-        self._beside = Beside(file, options, rig, self._index.begin_ns, self._index.fixes)
+        self._beside = Beside(file, options, rig, self._index.begin_ns, self._index.fixes, progress)
         self.rate_hz = self._index.rate_hz()
         self.notes = (*self._index.about(), *self._beside.notes)
 
@@ -104,7 +107,7 @@ class _Index:
     """Where every whole sweep lies. first, last: of each, where the records of its packets begin. fixes: what the
     position packets say."""
 
-    def __init__(self, capture: Capture, port: int, T_ego_lidar: F64) -> None:
+    def __init__(self, capture: Capture, port: int, T_ego_lidar: F64, progress: Progress) -> None:
         self.first, self.last, self.times_ns = array("q"), array("q"), array("q")
         self.fixes: list[GnssFix] = []
         self.begin_ns = 0
@@ -112,7 +115,11 @@ class _Index:
         self._cutter = RotationCutter(T_ego_lidar, self._clock)
         self._said = b""
         self._capture = capture
+        told = 0
         for datagram in capture.datagrams():
+            if datagram.origin >= told:
+                told = datagram.origin + _TELL_EVERY
+                progress(datagram.origin, capture.size)
             if datagram.port == port:
                 self.begin_ns = self.begin_ns or datagram.t_ns
                 self._add(self._cutter.push(datagram.payload, datagram.t_ns, datagram.origin))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.progress import Progress, silent
 from pipeline.sources.rosbag import messages
 from pipeline.sources.rosbag.bag import Bag, BagError
 from pipeline.sources.rosbag.rig import TF_STATIC, TransformTree
@@ -15,6 +16,9 @@ from pipeline.sources.rosbag.topics import TopicMap
 from pipeline.sources.timeline import Times
 from pipeline.sources.velodyne import DecoderCounts, Rotation, RotationCutter, SensorClock
 from pipeline.types import EgoState, GnssFix
+
+_TELL_EVERY = 64
+"""Messages between two words of progress."""
 
 
 class Stream:
@@ -48,7 +52,7 @@ class Stream:
 class BagIndex:
     """What the pass found. damage: why it ended before the bag did, null when it did not."""
 
-    def __init__(self, bag: Bag, topics: TopicMap) -> None:
+    def __init__(self, bag: Bag, topics: TopicMap, progress: Progress = silent) -> None:
         self.damage: str | None = None
         self.lidar = Stream(topics.lidar) if topics.lidar else None
         self.camera = Stream(topics.camera) if topics.camera else None
@@ -62,7 +66,10 @@ class BagIndex:
         self._cutter: RotationCutter | None = None
         wanted = [name for name in (topics.lidar, topics.camera, topics.gnss, topics.odometry) if name]
         try:
-            for topic, recorded_ns, message in bag.messages(wanted):
+            total = sum(bag.topics[name].held for name in wanted)
+            for done, (topic, recorded_ns, message) in enumerate(bag.messages(wanted)):
+                if done % _TELL_EVERY == 0:
+                    progress(done, total)
                 self._add(topic, recorded_ns, message)
         except BagError as error:
             self.damage = str(error)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.progress import Progress, silent
 from pipeline.records import evolve
 from pipeline.sources import rig as rig_files
 from pipeline.sources.base import SourceError, TruthObject
@@ -33,7 +34,7 @@ class RosbagSource:
     """``<bag>?lidar=/topic&camera=/topic&camera_info=/topic&gnss=/topic&odometry=/topic&rig=file.yaml``: all optional,
     ``none`` for a topic leaves it out."""
 
-    def __init__(self, uri: str, rest: str) -> None:
+    def __init__(self, uri: str, rest: str, progress: Progress = silent) -> None:
         path, options = split_options(rest, (*ROLES, "rig"))
         file = bag_path(path)
         self.uri, self.title = uri, file.resolve().stem
@@ -41,7 +42,7 @@ class RosbagSource:
         topics = map_topics(self._bag.topics, options)
         if topics.lidar is None and topics.camera is None:
             raise SourceError(f"{path}: neither LiDAR nor pictures in it; its topics are {_listed(self._bag)}")
-        self._index = BagIndex(self._bag, topics)
+        self._index = BagIndex(self._bag, topics, progress)
         self._ticks = self._ticking(path)
         notes = [topics.about(self._bag.topics), *self._about_times()]
         self._place(rig_of(file.resolve(), options), notes)

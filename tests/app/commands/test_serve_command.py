@@ -7,6 +7,7 @@ import pytest
 import app.commands.serve as command
 from app.commands.serve import Serve
 from pipeline.errors import BadInput
+from pipeline.progress import Progress
 from pipeline.sources.base import AnySource, SourceError
 from tests.app.recording import CountingDetector, Recording
 
@@ -19,13 +20,14 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Opened:
     """The URIs that are opened, one after the other; each is a recording of its own."""
     uris: Opened = []
 
-    def open_any(uri: str, *, rings: int) -> AnySource:
+    def open_any(uri: str, *, rings: int, progress: Progress) -> AnySource:
         uris.append(uri)
         if uri == "test:nothing":
             raise SourceError("test:nothing: no such file")
         return Recording(uri)
 
     monkeypatch.setattr(command, "open_any", open_any)
+    monkeypatch.setattr("app.progress.open_any", open_any)
     monkeypatch.setattr(command, "detector_for", lambda source, name: CountingDetector())
     monkeypatch.setattr(command, "lanes_for", lambda source, name: None)
     return uris

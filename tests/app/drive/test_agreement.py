@@ -57,7 +57,9 @@ def from_command_line(source: Source, detector: Detects[RawBoxes], params: Param
 @contextmanager
 def page(open_it: Callable[[], Source], detector: Detects[RawBoxes], params: Params | None = None) -> Iterator[Engine]:
     """An engine on a recording, paused at its first frame."""
-    engine = Engine(lambda _: open_it(), lambda _: detector, params or Params(), uri=open_it().uri, whole_drives=True)
+    engine = Engine(
+        lambda _, progress: open_it(), lambda _: detector, params or Params(), uri=open_it().uri, whole_drives=True
+    )
     engine.start()
     try:
         engine.wait_for(lambda s: s.tick is not None, WAIT_S)
@@ -128,7 +130,9 @@ def test_a_real_drive_agrees_with_other_parameters_too(data_dir: Path):
 
 def test_a_frame_shown_too_early_says_so_and_becomes_the_command_lines():
     expected = from_command_line(Recording(), CountingDetector(), Params())
-    engine = Engine(lambda _: Recording(), lambda _: CountingDetector(), Params(), uri="test:car", whole_drives=True)
+    engine = Engine(
+        lambda _, progress: Recording(), lambda _: CountingDetector(), Params(), uri="test:car", whole_drives=True
+    )
     try:
         with engine.drives.turn.foreground():  # while somebody is in front, no drive is computed
             engine.start()
@@ -167,7 +171,7 @@ def test_while_a_slider_is_dragged_the_frame_is_provisional_and_no_drive_is_comp
 def test_with_one_sensor_taken_away_they_agree(sensors):
     expected = [body(r) for _, r in run(Recording(), Params(), Detectors(CountingDetector()), sensors)]
     engine = Engine(
-        lambda _: Recording(),
+        lambda _, progress: Recording(),
         lambda _: CountingDetector(),
         Params(),
         uri="test:car",

@@ -60,7 +60,7 @@ class WhileWaiting(Sensors):
 def test_the_background_works_while_live_sensors_are_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(turn_module, "_LONGEST_FRONT_S", WAIT_S)
     sensors = WhileWaiting()
-    engine = Engine(lambda _: sensors, None, Params(), uri=sensors.uri)
+    engine = Engine(lambda _, progress: sensors, None, Params(), uri=sensors.uri)
     sensors.engine, sensors.let_through = engine, threading.Event()
     engine.start()
     try:

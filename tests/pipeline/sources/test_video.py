@@ -44,7 +44,10 @@ def test_a_video_that_goes_away(tmp_path: Path) -> None:
 
 def test_two_who_read_by_turns_do_not_make_each_other_seek(tmp_path: Path) -> None:
     write_video(tmp_path / "a.mkv", 100, rate=25, codec="mpeg4", step=2)
-    video = VideoFile(tmp_path / "a.mkv")
+    told: list[tuple[int, int]] = []
+    video = VideoFile(tmp_path / "a.mkv", lambda done, total: told.append((done, total)))
+    assert told
+    assert all(0 <= done < total == (tmp_path / "a.mkv").stat().st_size for done, total in told)
     for index in range(20):
         for at in (index, index + 80):
             assert np.median(video.picture(at)) == pytest.approx(2 * at, abs=8)

@@ -160,7 +160,7 @@ def test_a_file_that_goes_away_degrades(tmp_path: Path) -> None:
     assert "cannot be read" in frame.notes[0]
 
 
-def test_memory_does_not_grow_with_the_file(tmp_path: Path) -> None:
+def test_memory_does_not_grow_with_the_file_and_opening_says_how_far_it_is(tmp_path: Path) -> None:
     """75 packets of 1.2 kB a sweep lie in the file; a few dozen bytes a sweep stay in memory."""
     path = tmp_path / "drive.pcap"
     head, body = pcap([]), pcap(lidar(2))[24:]
@@ -168,13 +168,22 @@ def test_memory_does_not_grow_with_the_file(tmp_path: Path) -> None:
         file.write(head)
         for round_ in range(60):
             file.write(later(body, round_ * 200_000_000))
+    told: list[tuple[int, int]] = []
+    (tmp_path / "short.pcap").write_bytes(pcap(lidar(2)))
+    open_source(f"pcap:{tmp_path / 'short.pcap'}")  # imports and compiled code are here by now
     tracemalloc.start()
-    source = open_source(f"pcap:{path}")
+    source = open_source(f"pcap:{path}", progress=lambda done, total: told.append((done, total)))
     kept, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert len(source) == 120
     assert path.stat().st_size > 11e6
     assert kept < 0.8e6
+    size = path.stat().st_size
+    assert {total for _, total in told} == {size}
+    shares = [done / size for done, _ in told]
+    assert shares == sorted(shares)
+    assert len(shares) >= 3
+    assert shares[-1] > 0.6
     assert source.frame(100).sweep is not None
 
 

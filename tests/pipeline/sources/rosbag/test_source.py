@@ -36,7 +36,10 @@ def path_of(folder: Path, kind: Kind) -> Path:
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_sensor_of_a_bag(kind: Kind, tmp_path: Path) -> None:
     """Turned by the car's own axes: what the LiDAR, which sits turned to the left, sees at its right is ahead."""
-    source = open_source(f"rosbag:{write_bag(path_of(tmp_path, kind), kind)}")
+    told: list[tuple[int, int]] = []
+    uri = f"rosbag:{write_bag(path_of(tmp_path, kind), kind)}"
+    source = open_source(uri, progress=lambda done, total: told.append((done, total)))
+    assert told == [(0, 12)], "every 64 messages; there are three of each sensor's"
     assert (len(source), source.rate_hz, source.title) == (3, 10.0, "drive")
     assert source.notes[0].startswith(
         "topics: lidar /velodyne_points (PointCloud2), camera /front/image_raw/compressed (CompressedImage), "
