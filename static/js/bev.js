@@ -45,7 +45,7 @@ const modeNow = () => (mode?.isOn() ? mode : null);
 
 export function setUp() {
   const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "tape", "labeling", "labels", "labelFrames", "track", "draft"], draw);
-  surface = new Surface(canvas, invalidate);
+  surface = new Surface(canvas, invalidate, "panel");
   view = new Viewport(canvas, {
     changed: () => {
       reflect();

@@ -43,7 +43,7 @@ const Y = (/** @type {number} */ v) => laid.y + v * laid.scale;
 
 export function setUp() {
   const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "align", "tape", "labeling", "track", "draft", "projected"], draw);
-  surface = new Surface(canvas, invalidate);
+  surface = new Surface(canvas, invalidate, "panel");
   showPictureAt(canvas.clientWidth * devicePixelRatio); // it is no wider than its pane
   canvas.addEventListener("click", (event) => !get("align")?.on && !get("labeling")?.on && !get("taping") && select(objectAt(event.offsetX, event.offsetY)));
   followHover(canvas, (u, v) => (get("align")?.on || get("labeling")?.on ? null : objectAt(u, v)), () => (get("labeling")?.tool ? "crosshair" : ""));

@@ -35,7 +35,8 @@ import * as share from "./workspace/share.js";
 import * as theme from "./workspace/theme.js";
 
 for (const part of [theme, panes, gutters, layers, trails, three, seek, shuttle, drive, live, object]) part.setUp();
-for (const part of [banner, camera, bev, objects, why, timeline, exporting, transport, notices, vitals]) part.setUp();
+// words before canvases: a canvas that writes has the page laid out first, and again for every word that changes after it
+for (const part of [banner, objects, why, transport, notices, vitals, camera, bev, timeline, exporting]) part.setUp();
 for (const part of [params, history, runs, align, labeling, sources, layouts, share, keyboard]) part.setUp();
 $("#help-button").addEventListener("click", help.show);
 $("#event-back").addEventListener("click", () => toEvent(-1));

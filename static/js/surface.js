@@ -3,6 +3,7 @@
  * thousands of dots ten times a second are quick there, and where a page is composed without a graphics card they cost
  * half of what they do as textures. Its size comes from an observer: asking for it would have the page laid out anew.
  */
+import { ui } from "./colors.js";
 import { context } from "./dom.js";
 
 export class Surface {
@@ -12,11 +13,17 @@ export class Surface {
   ratio = 1;
   #canvas;
   #ctx;
+  #ground;
 
-  /** @param {HTMLCanvasElement} canvas @param {() => void} changed called when it has another size */
-  constructor(canvas, changed) {
+  /**
+   * @param {HTMLCanvasElement} canvas @param {() => void} changed called when it has another size
+   * @param {string|null} ground colour of the page that it is drawn on; nothing shines through then, and what lies behind needs
+   * no painting. Null is a sheet to see through
+   */
+  constructor(canvas, changed, ground = null) {
     this.#canvas = canvas;
-    this.#ctx = context(canvas, { willReadFrequently: true });
+    this.#ground = ground;
+    this.#ctx = context(canvas, { willReadFrequently: true, alpha: ground === null });
     new ResizeObserver(([{ contentRect }]) => {
       this.width = contentRect.width;
       this.height = contentRect.height;
@@ -36,8 +43,16 @@ export class Surface {
       this.#canvas.width = width;
       this.#canvas.height = height;
     }
+    this.#ctx.resetTransform();
+    this.#wipe(width, height);
     this.#ctx.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
-    this.#ctx.clearRect(0, 0, this.width, this.height);
     return this.#ctx;
+  }
+
+  /** Whole device pixels: part of a column would keep some of what was. @param {number} width @param {number} height */
+  #wipe(width, height) {
+    if (this.#ground === null) return this.#ctx.clearRect(0, 0, width, height);
+    this.#ctx.fillStyle = ui(this.#ground);
+    this.#ctx.fillRect(0, 0, width, height);
   }
 }

@@ -1,4 +1,5 @@
-/** The timeline: the whole recording at a glance. Its still part and its moving part lie on two canvases. */
+/** The timeline: the whole recording at a glance. What changes at different times is drawn apart: the recording, what a hand put
+ * onto it, and what moves with the frame. */
 import { ui } from "../colors.js";
 import { $, el, memory, press, text } from "../dom.js";
 import { here } from "../drive/seek.js";
@@ -14,6 +15,7 @@ import { drawFront } from "./front.js";
 import { followPointer } from "./pointer.js";
 import { shareOut } from "./rows.js";
 import { Span } from "./span.js";
+import { drawValues, moveCursor } from "./values.js";
 
 const LABELS_PX = 132;
 const EDGE_PX = 8;
@@ -24,15 +26,15 @@ const curves = new Set(memory.read("curves", CURVES.map(({ key }) => key)));
 /** @type {number|null} */
 let hover = null;
 
-const redraw = painter(draw);
-const redrawFront = painter(drawMoving);
-const still = new Surface(back, redraw), moving = new Surface(front, redrawFront);
+const redraw = painter(draw), redrawFront = painter(drawHand), redrawValues = painter(follow);
+const still = new Surface(back, redraw, "panel"), hand = new Surface(front, redrawFront), values = new Surface($("#timeline-values", HTMLCanvasElement), redrawValues);
 
 export function setUp() {
   $("#timeline-curves").append(...CURVES.map(chip));
   on(["drive", "curve", "selection", "theme", "labeling", "labels", "track"], redraw);
   on(["state"], () => frames() !== span.count && redraw());
-  on(["state", "scrub", "clip", "marked"], redrawFront);
+  on(["clip", "marked"], redrawFront);
+  on(["state", "scrub"], redrawValues);
   paint(["state", "drive"], describe);
   followPointer(front, { span, rows, zoomed: redraw, hovered });
   $("#timeline-fit").addEventListener("click", fit);
@@ -68,7 +70,7 @@ function chip({ key, label, title, role }) {
   return button;
 }
 
-/** As last drawn: the front asks ten times a second, and asking the page for sizes and styles makes it lay itself out. */
+/** As last drawn: the values ask ten times a second, and asking the page for sizes and styles makes it lay itself out. */
 let shared = shareOut(0, false, curves, false);
 let isLight = false;
 const rows = () => shared;
@@ -83,14 +85,21 @@ function draw() {
   isLight = getComputedStyle(document.documentElement).colorScheme === "light";
   drawBack(ctx, { width, height }, span, shared, isLight);
   $("#timeline-fit").hidden = span.isWhole;
-  drawMoving();
+  drawHand();
+  follow();
 }
 
-function drawMoving() {
+function drawHand() {
+  if (!hand.isHidden) drawFront(hand.begin(), hand, span, shared, hover);
+}
+
+/** The frame has moved. */
+function follow() {
   const state = get("state");
-  if (!state?.frame || moving.isHidden) return;
+  if (!state?.frame || values.isHidden) return;
   if (state.playing && span.reveal(here())) return redraw();
-  drawFront(moving.begin(), moving, span, shared, { isLight, hover });
+  moveCursor($("#timeline-cursor"), span, here());
+  drawValues(values.begin(), shared, hover ?? here(), isLight, LABELS_PX);
   front.setAttribute("aria-valuemax", String(frames() - 1));
   front.setAttribute("aria-valuenow", String(here()));
   front.setAttribute("aria-valuetext", `frame ${state.frame ?? ""}, ${clock(state.time_s)}`);
@@ -106,6 +115,7 @@ function hovered(index) {
   const why = differs ? drive?.comparison?.first[differs[0]] : undefined;
   front.title = [...here.map((event) => `${nameOf(event)}: ${event.text}`), why].filter(Boolean).join("\n");
   redrawFront();
+  redrawValues();
 }
 
 /** How far the computing has come, and how much the two runs differ. */

@@ -41,6 +41,11 @@ export class Span {
     return this.x(index + 0.5);
   }
 
+  /** Whether a pixel column is in the plot. @param {number} x */
+  holds(x) {
+    return x >= this.left && x <= this.left + this.width;
+  }
+
   /** The frame under a pixel column. @param {number} x */
   index(x) {
     return Math.min(this.count - 1, Math.max(0, Math.floor(this.first + (x - this.left) / this.perFrame)));
