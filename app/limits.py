@@ -1,6 +1,8 @@
-"""How much a request may carry. Nothing is uploaded here: the largest body is a set of parameters."""
+"""How much a request may carry: a set of parameters, and a file of labels where one is asked for."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
@@ -8,39 +10,46 @@ from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 LARGEST_BODY = 1 << 20
+LARGEST_FILE = 64 << 20
+"""A file of labels."""
 LARGEST_MESSAGE = 1 << 20
 """Bytes of one WebSocket message from a page; the page's own are some dozens."""
 
-_TOO_LARGE = f"a request may carry {LARGEST_BODY >> 20} MiB at most"
 _GOODBYE = {"connection": "close"}
 """The rest of the body is not read, so nothing can follow on this connection."""
 
 
 class BodyLimit:
-    """ASGI middleware: 413 as soon as a body is longer than ``largest`` bytes, said or sent. What is beyond that is
-    never held in memory."""
+    """ASGI middleware: 413 as soon as a body is longer than ``largest`` bytes, said or sent, or than what ``files``
+    allows for its path. What is beyond that is never held in memory."""
 
-    def __init__(self, app: ASGIApp, largest: int = LARGEST_BODY) -> None:
+    def __init__(self, app: ASGIApp, largest: int = LARGEST_BODY, files: Mapping[str, int] | None = None) -> None:
         self._app = app
         self._largest = largest
+        self._files = files or {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] != "http":
             return await self._app(scope, receive, send)
+        largest = self._files.get(scope["path"], self._largest)
         said = Headers(scope=scope).get("content-length", "0")
-        if not said.isdecimal() or int(said) > self._largest:
-            return await JSONResponse({"detail": _TOO_LARGE}, 413, _GOODBYE)(scope, receive, send)
-        await self._app(scope, self._counted(receive), send)
+        if not said.isdecimal() or int(said) > largest:
+            return await JSONResponse({"detail": _too_large(largest)}, 413, _GOODBYE)(scope, receive, send)
+        await self._app(scope, self._counted(receive, largest), send)
 
-    def _counted(self, receive: Receive) -> Receive:
+    def _counted(self, receive: Receive, largest: int) -> Receive:
         got = 0
 
         async def receiving() -> Message:
             nonlocal got
             message = await receive()
             got += len(message.get("body", b""))
-            if got > self._largest:
-                raise HTTPException(413, _TOO_LARGE, _GOODBYE)  # the framework hands it on as it is
+            if got > largest:
+                raise HTTPException(413, _too_large(largest), _GOODBYE)  # the framework hands it on as it is
             return message
 
         return receiving
+
+
+def _too_large(largest: int) -> str:
+    return f"a request may carry {largest >> 20} MiB at most"

@@ -21,7 +21,7 @@ from app.access import WILDCARDS, Access, Guard, is_loopback
 from app.clips.jobs import Jobs
 from app.drive.marks import Marks
 from app.engine import Engine
-from app.limits import LARGEST_MESSAGE, BodyLimit
+from app.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
 from app.looks import Looks
 from app.metrics import Metrics
 from app.recording import SESSIONS
@@ -30,6 +30,7 @@ from app.routes.clips import clips_router
 from app.routes.drive import drive_router
 from app.routes.health import health_router
 from app.routes.label_acts import label_acts_router
+from app.routes.label_files import IMPORT, label_files_router
 from app.routes.labels import labels_router
 from app.routes.params import params_router
 from app.routes.playback import playback_router
@@ -80,7 +81,7 @@ def create_app(
         viewer.close()
 
     app = FastAPI(title="CIPV Studio", version="1", docs_url=None, redoc_url=None, lifespan=listening)
-    app.add_middleware(BodyLimit)
+    app.add_middleware(BodyLimit, files={IMPORT: LARGEST_FILE})
     app.add_middleware(Guard, access=access, tokens=tokens)  # the last one added is the first to be asked
     app.add_exception_handler(RequestValidationError, _one_sentence)
     app.include_router(health_router(engine, metrics))
@@ -91,6 +92,7 @@ def create_app(
     app.include_router(runs_router(engine, engine.drives))
     app.include_router(labels_router(engine.labels))
     app.include_router(label_acts_router(engine.labels))
+    app.include_router(label_files_router(engine.labels))
     app.include_router(clips_router(engine, jobs))
     app.include_router(alignment_router(engine))
     app.include_router(project_router(engine))

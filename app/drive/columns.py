@@ -1,7 +1,7 @@
 """One frame of a drive as a row of plain values, and one object in it as a record: what timelines and events need.
 
-A row is some 200 bytes and an object 85, so that a whole drive fits where its results would not. Null in a row, NaN and
-0 in a record (``source``) stand for what is not known.
+A row is some 200 bytes and an object 130, so that a whole drive fits where its results would not. Null in a row, NaN
+and 0 in a record (``source``) stand for what is not known.
 """
 
 from __future__ import annotations
@@ -15,8 +15,6 @@ import numpy.typing as npt
 
 from pipeline.evaluation.lead import Judged
 from pipeline.fusion import LIDAR_RANGE_SIGMA_M
-from pipeline.geometry import Cuboid
-from pipeline.labels.propose import Seen
 from pipeline.motion import closing_speed_mps
 from pipeline.types import VEHICLES, Frame, FusedObject, Result, VisionTrack
 from pipeline.vision.labels import COCO_80
@@ -28,6 +26,8 @@ _DECIMALS = 4
 _PLACE = {name: place for place, name in enumerate(LABELS)}
 _NOWHERE = (math.nan,) * 7
 _UNBOXED = (math.nan,) * 4
+_FLAT = (math.nan,) * 8
+_STILL = (math.nan,) * 2
 
 OBJECT = np.dtype(
     [
@@ -45,11 +45,14 @@ OBJECT = np.dtype(
         ("label", "i1"),
         ("cuboid", "f4", 7),
         ("bbox", "f4", 4),
+        ("bev", "f4", 8),
+        ("velocity_mps", "f4", 2),
+        ("hits", "i4"),
     ]
 )
 """``source`` is a place in ``SOURCES``; ``vehicle``: of a vehicle's class, or nameless; ``vl_gap``: camera's minus
 LiDAR's distance of a VL object, also in standard deviations of both. ``label`` is a place in ``LABELS``. ``cuboid``:
-center x y z, length, width, height, yaw."""
+center x y z, length, width, height, yaw; ``bev``: x y of four corners."""
 Objects = npt.NDArray[np.void]
 
 
@@ -131,13 +134,11 @@ def objects_of(result: Result) -> Objects:
             _PLACE.get(item.label or "", 0),
             (*item.cuboid.center, *item.cuboid.size, item.cuboid.yaw_rad) if item.cuboid is not None else _NOWHERE,
             item.bbox if item.bbox is not None else _UNBOXED,
+            [value for corner in item.bev for value in corner] if item.bev is not None else _FLAT,
+            item.velocity_mps if item.velocity_mps is not None else _STILL,
+            item.hits,
         )
     return records
-
-
-def seen_of(records: Objects) -> list[Seen]:
-    """The objects of one frame as labels are proposed from."""
-    return [_seen(record) for record in records]
 
 
 def columns_json(rows: Sequence[Row]) -> dict[str, list[Any]]:
@@ -178,19 +179,6 @@ def _vl_gap(item: FusedObject, tracks: dict[int, VisionTrack]) -> tuple[float, f
         return None
     gap = track.distance_m - item.distance_m
     return gap, abs(gap) / math.hypot(track.sigma_m, item.distance_sigma_m or LIDAR_RANGE_SIGMA_M)
-
-
-def _seen(record: Any) -> Seen:
-    x, y, z, length, width, height, yaw = (round(float(value), _DECIMALS) for value in record["cuboid"])
-    x1, y1, x2, y2 = (round(float(value), _DECIMALS) for value in record["bbox"])
-    return Seen(
-        int(record["id"]),
-        LABELS[record["label"]] or None,
-        Cuboid((x, y, z), (length, width, height), yaw) if math.isfinite(x) else None,
-        (x1, y1, x2, y2) if math.isfinite(x1) else None,
-        bool(record["in_path"]),
-        bool(record["carried"]),
-    )
 
 
 def _float(value: float | None) -> float:

@@ -108,7 +108,7 @@ class Recording:
         return self.recipe.source.marks() if isinstance(self.recipe.source, Marked) else ()
 
     def at_hand(self, index: int) -> Frame:
-        """A frame as the line takes it if it is held (its picture may be without pixels), else as its source gives it."""
+        """A frame as the line takes it, its picture without pixels, if it is held; else as its source gives it."""
         return self.inputs.get(index) or self.as_read(index)
 
     def save(self, path: Path, first: int, last: int, progress: Progress) -> None:

@@ -6,6 +6,7 @@ import logging
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from app.control import Control, Wish
@@ -14,13 +15,16 @@ from app.labels.acts import do
 from app.labels.acts.scope import Scope
 from app.labels.database import Database
 from app.labels.drive import DriveInfo, DriveLabels
+from app.labels.files import importing_file
 from app.labels.log import Acted, Way
 from app.labels.long import importing_truth, proposing
 from app.labels.measured import lifted, refitted
 from app.labels.refusals import NoSuchLabel
 from app.labels.requests import AddTrack, Import, Lift, Propose, Refit, SetSighting
+from app.labels.scoring import LabelScores
 from app.labels.tasks import Tasks, TaskState
 from pipeline.errors import BadInput
+from pipeline.labels.formats.base import FormatName
 from pipeline.params import Params
 from pipeline.sources.fingerprint import content_key
 
@@ -79,6 +83,7 @@ class LabelDesk:
         self._ended = False
         self._thread = threading.Thread(target=self._look, name="cipv-labels", daemon=True)
         self.tasks = Tasks(self._told)
+        self.scores = LabelScores()
 
     # ------------------------------------------------------------ what is open
 
@@ -151,6 +156,11 @@ class LabelDesk:
             self.tasks.begin("propose", proposing(labels, recording, person, act.first, act.last))
         else:
             self.tasks.begin("import", importing_truth(labels, recording, person))
+
+    def begin_import(self, person: str, file: Path, name: FormatName) -> None:
+        """Labels of a file or folder that was handed in, as another tool made them; it is removed in the end."""
+        labels, recording = self.labels, self.recording
+        self.tasks.begin("import", importing_file(labels, recording, person, file, name))
 
     def measured(self, act: Refit | Lift) -> tuple[SetSighting | AddTrack, str]:
         """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found.

@@ -103,7 +103,13 @@ class DriveLabels:
 
     def label_set(self, version: str = WORKING) -> LabelSet:
         """All labels, as they are now or were frozen. NoSuchLabel for a version that is not there."""
-        return self._now() if version == WORKING else from_json(self.version_json(version), f"version {version}")
+        if version != WORKING:
+            return from_json(self.version_json(version), f"version {version}")
+        return self._now(self.info.names())
+
+    def unnamed_set(self) -> LabelSet:
+        """The same as they are now, frames called by their numbers: no frame is read for it."""
+        return self._now(tuple(map(str, range(len(self.info.t_ns)))))
 
     def has_labels(self) -> bool:
         """Whether anything was ever labelled here and is there still."""
@@ -125,7 +131,7 @@ class DriveLabels:
         """Keep all labels as they are now under a name. ActRefused when it is taken."""
         if name == WORKING or any(version.name == name for version in self.versions()):
             raise ActRefused(f"there is a version {name!r} already; versions are never overwritten")
-        labels = replace(self._now(), name=name)
+        labels = replace(self.label_set(), name=name)
         covered = {each.frame for track in labels.tracks for each in track.sightings}
         covered |= {frame for lead in labels.leads for frame in range(lead.first, lead.last + 1)}
         version = Version(name, person, int(time.time() * 1000), len(labels.tracks), len(covered))
@@ -155,7 +161,7 @@ class DriveLabels:
 
     # ------------------------------------------------------------ inside
 
-    def _now(self) -> LabelSet:
+    def _now(self, names: tuple[str, ...]) -> LabelSet:
         by_track: dict[int, list[Sighting]] = {}
         with self._database.reading() as connection:
             rows = connection.execute(
@@ -168,7 +174,7 @@ class DriveLabels:
         leads = sorted(cast("list[LeadRange]", items["lead"]), key=lambda lead: (lead.first, lead.last))
         return LabelSet(
             self.info.uri,
-            self.info.names(),
+            names,
             self.info.t_ns,
             tuple(replace(track, sightings=tuple(by_track.get(track.id, ()))) for track in tracks),
             tuple(leads),

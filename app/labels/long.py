@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast
 
-from app.drive.columns import seen_of
+from app.drive.kept import seen_of
 from app.drive.recording import Recording
 from app.drive.run import DriveRun
 from app.labels.acts.leads import clear

@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 
 from app.labels.requests import Act, Person, Strict
 from app.labels.tables import LONGEST_NAME
-from app.routes.shapes import CuboidJson, Point
+from app.routes.shapes import CuboidJson, MetricJson, Point
 from pipeline.labels.model import State
 
 ItemName = Literal["track", "lead", "path", "event", "tag"]
@@ -112,6 +112,13 @@ class LabelChanges(BaseModel):
     removed: list[Removed]
 
 
+class LabelsOfPerson(LabelChanges):
+    """can_undo, can_redo: of the person who asks."""
+
+    can_undo: bool
+    can_redo: bool
+
+
 class PlacedJson(BaseModel):
     """keyframe: a person or a file put it there; else it follows those that are."""
 
@@ -169,6 +176,16 @@ class NextJson(BaseModel):
     why: str
 
 
+class ScoreJson(BaseModel):
+    """revision: of the labels. judged: frames in which they say who leads. metrics: empty while nobody stands behind
+    any label."""
+
+    revision: int
+    run: int
+    judged: int
+    metrics: list[MetricJson]
+
+
 class ActBody(Strict):
     """person: whose act it is."""
 
@@ -223,6 +240,14 @@ class NewVersion(Strict):
 
     name: Annotated[str, Field(min_length=1, max_length=LONGEST_NAME, pattern=VERSION_NAME)]
     person: Person
+
+
+class NativeFile(BaseModel):
+    """Our own file: every field of a label set under its own name."""
+
+    format: Literal["cipv-labels"]
+    version: int
+    labels: dict[str, Any]
 
 
 class LostJson(BaseModel):

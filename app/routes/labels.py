@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, HTTPException, Query, Response
 from fastapi.responses import JSONResponse
 
 from app.labels.answers import changes_json, history_json, track_json, window_json
 from app.labels.desk import LabelDesk
+from app.labels.tables import LONGEST_NAME
 from app.labels.values import ItemKind
-from app.routes.label_shapes import HistoryJson, LabelChanges, WholeTrack, Window
+from app.labels.where_next import What, where_next
+from app.routes.drive import current
+from app.routes.label_shapes import HistoryJson, LabelsOfPerson, NextJson, ScoreJson, WholeTrack, Window
 from app.routes.refusals import refusing
+from app.routes.shapes import MetricJson
 
 MOST_FRAMES = 200
 _LARGEST = 2**62
@@ -21,13 +25,15 @@ def labels_router(desk: LabelDesk) -> APIRouter:
     """Routes that read labels."""
     router = APIRouter(prefix="/api/labels", tags=["labels"])
 
-    @router.get("", responses={200: {"model": LabelChanges}})
-    def changes(since: int = Query(0, ge=0, le=_LARGEST)) -> Response:
+    @router.get("", responses={200: {"model": LabelsOfPerson}})
+    def changes(since: int = Query(0, ge=0, le=_LARGEST), person: str = Query("", max_length=LONGEST_NAME)) -> Response:
         """What changed after act ``since``; 0 for everything. Ask again whenever ``state.labels.revision`` is
-        another."""
+        another. can_undo, can_redo: of the person."""
         with refusing():
             labels = desk.labels
-            return JSONResponse(changes_json(labels.info, labels.changes(since)))
+            body = changes_json(labels.info, labels.changes(since))
+            can_undo, can_redo = labels.log.possible(person)
+        return JSONResponse(body | {"can_undo": can_undo, "can_redo": can_redo})
 
     @router.get("/frames", responses={200: {"model": Window}})
     def frames(first: Annotated[int, Query(ge=0)], last: Annotated[int, Query(ge=0)]) -> Response:
@@ -42,6 +48,29 @@ def labels_router(desk: LabelDesk) -> APIRouter:
         """A whole track."""
         with refusing():
             return JSONResponse(track_json(desk.labels.track(number)))
+
+    @router.get("/next")
+    def following(what: What, frame: Annotated[int, Query(ge=-1)], direction: Literal[1, -1] = 1) -> NextJson:
+        """The nearest frame after ``frame`` (or before it) where there is something to do."""
+        with refusing():
+            run = desk.recording.book.current
+            found, why = where_next(desk.labels, desk.scores, run, what, frame, direction)
+        return NextJson(frame=found, why=why)
+
+    @router.get("/score")
+    def score() -> ScoreJson:
+        """The present run, and the one it is compared with, against the labels that people stand behind: the figures of
+        `cipv evaluate`, at once."""
+        with refusing():
+            book, labels = desk.recording.book, desk.labels
+            run = current(desk.recording)
+            judged, metrics = desk.scores.metrics(labels, book.base or run, run)
+            return ScoreJson(
+                revision=labels.revision,
+                run=run.number,
+                judged=judged,
+                metrics=[MetricJson(**vars(metric)) for metric in metrics],
+            )
 
     @router.get("/history", responses={200: {"model": list[HistoryJson]}})
     def history(kind: ItemKind, number: Annotated[int, Query(alias="id", ge=0, le=_LARGEST)]) -> Response:

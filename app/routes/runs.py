@@ -8,14 +8,16 @@ from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, Field
 
 from app.drive.book import LONGEST_NAME
+from app.drive.columns import Row
 from app.drive.compare import compare
 from app.drive.drives import Drives, Phase
 from app.drive.recording import Recording
 from app.drive.run import DriveRun
 from app.engine import Engine
+from app.labels.desk import LabelDesk
 from app.routes.drive import Columns, columns_of, current
 from app.routes.refusals import open_recording, refusing
-from app.routes.shapes import file_of
+from app.routes.shapes import MetricJson, file_of
 from pipeline.params import changes_of, to_yaml
 
 _MOST_SENTENCES = 100
@@ -51,16 +53,6 @@ class Name(BaseModel):
     """A person's name for a run."""
 
     name: str = Field("", max_length=LONGEST_NAME)
-
-
-class MetricJson(BaseModel):
-    """One figure of both runs; better: which way is, null where neither."""
-
-    name: str
-    unit: str
-    base: float | None
-    run: float | None
-    better: Literal["higher", "lower"] | None
 
 
 class ComparisonJson(BaseModel):
@@ -145,8 +137,10 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
         with refusing():
             new = recording.book.get(run) if run is not None else current(recording)
             old = recording.book.get(base) if base is not None else recording.book.base or new
-        found = compare(old.rows(), new.rows())
-        truth: Literal["labels", "simulator"] = "simulator" if recording.recipe.simulated else "labels"
+        judged = _judged_by_labels(engine.labels, old, new)
+        found = compare(*(judged or (old.rows(), new.rows())))
+        is_own = recording.recipe.simulated and judged is None
+        truth: Literal["labels", "simulator"] = "simulator" if is_own else "labels"
         return ComparisonJson(
             base=old.number,
             run=new.number,
@@ -160,6 +154,14 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
         )
 
     return router
+
+
+def _judged_by_labels(desk: LabelDesk, base: DriveRun, run: DriveRun) -> tuple[list[Row], list[Row]] | None:
+    """The rows of both, judged by what people labelled here; null where they stand behind nothing, and the truth that
+    comes with the recording judges."""
+    labels = desk.labels
+    first, second = desk.scores.judged_rows(labels, base), desk.scores.judged_rows(labels, run)
+    return (first, second) if first is not None and second is not None else None
 
 
 def label_of(changes: dict[str, tuple[Any, Any]], preset: str) -> str:

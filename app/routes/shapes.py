@@ -145,6 +145,16 @@ class ResultJson(_Exact):
     timing_ms: dict[str, float | None]
 
 
+class MetricJson(BaseModel):
+    """One figure of both runs; better: which way is, null where neither."""
+
+    name: str
+    unit: str
+    base: float | None
+    run: float | None
+    better: Literal["higher", "lower"] | None
+
+
 class NoticeJson(_Exact):
     """A sentence for the person at the page."""
 

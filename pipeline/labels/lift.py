@@ -130,8 +130,8 @@ def _points_of(
 
 def _cluster_of(labels: I32, inside: Mask, *, whole: bool) -> int | None:
     """The cluster with most points inside; those that lie mostly inside come first, unless a click asks for the whole
-    one it fell on. (Leaving out what is far from where the box's height says was tried: it leaves out more cars that are
-    half hidden than it does things before and behind them.)"""
+    one it fell on. (Leaving out what is far from where the box's height says was tried: it leaves out more cars that
+    are half hidden than it does things before and behind them.)"""
     if not inside.any():
         return None
     within = np.bincount(labels[inside])

@@ -62,7 +62,10 @@ def refit(sweep: F32, cuboid: Cuboid) -> Refitted:
     labels = cluster(sweep, near, _CLUSTERS)
     found = labels[_inside(sweep, cuboid, _INSIDE_M) & (labels >= 0)]
     if len(found) == 0:
-        raise TooFewPoints(f"{int(near.sum())} points in and near the cuboid: at least {FEWEST_POINTS} close together")
+        count = int(near.sum())
+        raise TooFewPoints(
+            f"{count} point{'' if count == 1 else 's'} in and near the cuboid: it needs {FEWEST_POINTS} close together"
+        )
     return onto_points(sweep[labels == np.bincount(found).argmax()], ground, cuboid)
 
 

@@ -16,9 +16,9 @@ from pipeline.results import VERSION
 from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth
 
 EMPTY = Layers(np.zeros((0, 4), np.float32), np.zeros(0, np.int32))
-_NO_HEALTH = SensorHealth(None, None, None, None, None)
+NO_HEALTH = SensorHealth(None, None, None, None, None)
 _NO_LINE = np.zeros((0, 2))
-_NO_PATH = Path("straight", _NO_LINE, _NO_LINE, _NO_LINE, 0.0, {}, {})
+NO_PATH = Path("straight", _NO_LINE, _NO_LINE, _NO_LINE, 0.0, {}, {})
 
 
 def read_results(path: FilePath) -> list[Result]:
@@ -47,10 +47,10 @@ def _result(line: str, where: str) -> Result:
         return Result(
             frame=str(row["frame"]),
             t_ns=int(row["t_ns"]),
-            sensors=_NO_HEALTH,
+            sensors=NO_HEALTH,
             ego=_ego(row["ego"], int(row["t_ns"])),
             objects=tuple(_object(each) for each in row["objects"]),
-            path=_NO_PATH,
+            path=NO_PATH,
             cipv=_cipv(row["cipv"]),
             rejected=(),
             acc=_acc(row["acc"]),

@@ -14,7 +14,7 @@ from pipeline.geometry import Cuboid, corners_of
 from pipeline.labels.formats.parts import Part
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.sources.base import Rectified, Source
-from pipeline.types import F32, F64, Box, CameraCalibration, EgoState
+from pipeline.types import F32, F64, Box, CameraCalibration, EgoState, Frame
 
 FormatName = Literal["native", "mcap", "openlabel", "kitti", "kitti-tracking", "nuscenes", "coco", "csv"]
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
@@ -68,11 +68,16 @@ class Drive:
         return LabelSet(self.uri, self.frames, self.t_ns)
 
 
-def drive_of(source: Source, progress: Callable[[int, int], None] = lambda done, total: None) -> Drive:
-    """Reads every frame of a recording once."""
+def drive_of(
+    source: Source,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    frame_of: Callable[[int], Frame] | None = None,
+) -> Drive:
+    """Reads every frame of a recording once. frame_of: who has them already; a picture's pixels are not asked for."""
+    read = frame_of or source.frame
     shots = []
     for index in range(len(source)):
-        frame = source.frame(index)
+        frame = read(index)
         camera, picture = frame.camera, frame.picture
         size = (camera.width, camera.height) if camera is not None else None
         if picture is not None:
@@ -84,7 +89,7 @@ def drive_of(source: Source, progress: Callable[[int, int], None] = lambda done,
         progress(index + 1, len(source))
 
     def points(index: int) -> F32 | None:
-        sweep = source.frame(index).sweep
+        sweep = read(index).sweep
         return sweep.points if sweep is not None else None
 
     return Drive(source.uri, tuple(shots), points)

@@ -1,0 +1,92 @@
+"""The runs of a drive against what people labelled in it: the figures of ``cipv evaluate``, at once."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+
+from app.drive.columns import Row
+from app.drive.compare import Metric
+from app.drive.kept import results_of
+from app.drive.recording import RULE
+from app.drive.run import DriveRun
+from app.labels.drive import DriveLabels
+from pipeline.errors import BadInput
+from pipeline.evaluation.lead import Judged
+from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
+from pipeline.evaluation.scores.figures import FIGURES
+from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels
+
+_MOST_HELD = 8
+
+
+class LabelScores:
+    """Any thread. What was judged is kept until labels or runs are others."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._of: tuple[DriveLabels, int] | None = None
+        self._truth: DriveTruth | None = None
+        self._scores: dict[tuple[int, int], DriveScore | None] = {}
+
+    def truth(self, labels: DriveLabels) -> tuple[int, DriveTruth | None]:
+        """(revision, what people stand behind; null while that is nothing)."""
+        with self._lock:
+            revision = labels.revision
+            if self._of is None or self._of[0] is not labels or self._of[1] != revision:
+                try:
+                    self._truth = of_labels(labels.unnamed_set(), RULE)
+                except NoTruth:
+                    self._truth = None
+                self._of, self._scores = (labels, revision), {}
+            return revision, self._truth
+
+    def score(self, labels: DriveLabels, run: DriveRun) -> DriveScore | None:
+        """One run's; null where no labelled frame has a result yet."""
+        revision, truth = self.truth(labels)
+        key = (run.number, run.done)
+        with self._lock:
+            if truth is None or self._of != (labels, revision):
+                return None
+            if key not in self._scores:
+                if len(self._scores) >= _MOST_HELD:
+                    self._scores.clear()
+                self._scores[key] = _scored(run, truth)
+            return self._scores[key]
+
+    def metrics(self, labels: DriveLabels, base: DriveRun, run: DriveRun) -> tuple[int, tuple[Metric, ...]]:
+        """(frames judged, every figure that either run has)."""
+        old, new = self.score(labels, base), self.score(labels, run)
+        if new is None:
+            return 0, ()
+        found = [
+            Metric(figure.title, figure.unit, figure.of([old]) if old else None, figure.of([new]), figure.better)
+            for figure in FIGURES
+        ]
+        judged = sum(frame.judged is not None for frame in new.frames)
+        return judged, tuple(each for each in found if each.base is not None or each.run is not None)
+
+    def judged_rows(self, labels: DriveLabels, run: DriveRun) -> list[Row] | None:
+        """A run's rows, judged by labels instead of what the recording came with; null where they judge nothing."""
+        score = self.score(labels, run)
+        if score is None:
+            return None
+        judged = judged_by_index(score)
+        return [row._replace(judged=judged.get(index)) for index, row in enumerate(run.rows())]
+
+
+def judged_by_index(score: DriveScore) -> dict[int, Judged]:
+    """The frames in which it is known who leads."""
+    return {frame.index: frame.judged for frame in score.frames if frame.judged is not None}
+
+
+def disagreements(score: DriveScore) -> Sequence[tuple[int, Judged]]:
+    """Frames in which the CIPV is not who leads, in order."""
+    return [(index, each) for index, each in judged_by_index(score).items() if each.verdict not in ("correct", "none")]
+
+
+def _scored(run: DriveRun, truth: DriveTruth) -> DriveScore | None:
+    try:
+        return score_drive(results_of(run), truth, Rules(RULE))
+    except BadInput:
+        return None

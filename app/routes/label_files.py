@@ -1,0 +1,89 @@
+"""/api/labels/export, import and versions: labels as files, and label sets that stay as they are."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import FileResponse, JSONResponse
+from starlette.background import BackgroundTask
+
+from app.labels.desk import LabelDesk
+from app.labels.files import exported
+from app.labels.requests import Person
+from app.labels.tables import LONGEST_NAME
+from app.routes.label_shapes import VERSION_NAME, LostJson, NativeFile, NewVersion, TaskBegun, VersionJson
+from app.routes.refusals import refusing
+from app.routes.shapes import file_of
+from pipeline.labels.formats.base import FormatName
+from pipeline.labels.formats.parts import reduce
+from pipeline.labels.formats.registry import FORMATS
+
+IMPORT = "/api/labels/import"
+_FILE = file_of("application/octet-stream")
+VersionName = Annotated[str, Query(max_length=LONGEST_NAME, pattern=VERSION_NAME)]
+
+
+def label_files_router(desk: LabelDesk) -> APIRouter:
+    """Routes over files of labels."""
+    router = APIRouter(prefix="/api/labels", tags=["labels"])
+
+    @router.post("/import", status_code=202, responses={202: {"model": TaskBegun}})
+    async def take(request: Request, person: Annotated[Person, Query()], format: FormatName = "native") -> Response:
+        """Labels that another tool made of this recording: the body is the file, of a format that is a folder a .zip of
+        it. They come beside those that are there, as one act. state.labels.task tells how far it is."""
+        with tempfile.NamedTemporaryFile(prefix="cipv-upload-", delete=False) as file:
+            async for piece in request.stream():
+                file.write(piece)
+        path = Path(file.name)
+        try:
+            with refusing():
+                desk.begin_import(person, path, format)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
+        return JSONResponse({"status": "begun", "what": "import"}, 202)
+
+    @router.get("/export", response_class=FileResponse, responses=_FILE)
+    def export(format: FormatName = "native", version: VersionName = "working") -> FileResponse:
+        """All labels as a file, of a format that is a folder as a .zip. The header X-Cipv-Lost says how many kinds of
+        things the format has no place for; /api/labels/export/notes says which."""
+        with refusing():
+            made = exported(desk.recording, desk.labels.label_set(version), format)
+        return FileResponse(
+            made.file,
+            filename=made.file.name,
+            media_type="application/octet-stream",
+            headers={"x-cipv-lost": str(len(made.lost))},
+            background=BackgroundTask(shutil.rmtree, made.folder, ignore_errors=True),
+        )
+
+    @router.get("/export/notes")
+    def notes(format: FormatName = "native", version: VersionName = "working") -> LostJson:
+        """What a format has no place for, a sentence each, before anything is written."""
+        with refusing():
+            _, lost = reduce(desk.labels.label_set(version), FORMATS[format].holds)
+        return LostJson(lost=list(lost))
+
+    @router.get("/versions", responses={200: {"model": list[VersionJson]}})
+    def versions() -> Response:
+        """Frozen label sets, the oldest first."""
+        with refusing():
+            return JSONResponse([vars(version) for version in desk.labels.versions()])
+
+    @router.post("/versions", status_code=201)
+    def freeze(body: NewVersion) -> VersionJson:
+        """Keep all labels as they are now under a name. 409 when it is taken."""
+        with refusing():
+            return VersionJson(**vars(desk.labels.freeze(body.name, body.person)))
+
+    @router.get("/versions/{name}", responses={200: {"model": NativeFile}})
+    def version(name: str) -> Response:
+        """A frozen label set as our own file."""
+        with refusing():
+            return Response(desk.labels.version_json(name), media_type="application/json")
+
+    return router
