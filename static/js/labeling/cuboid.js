@@ -44,21 +44,28 @@ export function contains(cuboid, place) {
 }
 
 /**
- * What of the cuboid is under a place; null for none.
+ * Which edge of one axis is held: the one ahead (1), behind (−1), none (0), or beyond both (null). Of what is thin, seen
+ * from afar, the middle stays to be held.
+ * @param {number} at from the middle @param {number} size @param {number} reach
+ */
+function edgeAt(at, size, reach) {
+  const away = Math.abs(at);
+  if (away <= Math.max(size / 2 - reach, reach / 2)) return 0;
+  return away <= size / 2 + reach ? Math.sign(at) : null;
+}
+
+/**
+ * What of the cuboid is under a place; null for nothing of it.
  * @param {Cuboid} cuboid @param {Place} place @param {number} reach how far an edge or the knob is felt, metres
  * @param {number} beyond where the knob is, metres before the front @returns {Grip|null}
  */
 export function gripAt(cuboid, place, reach, beyond) {
   const { along, across } = own(cuboid, place), [length, width] = cuboid.size;
   if (Math.hypot(along - length / 2 - beyond, across) <= reach * 1.3) return "turn";
-  const isBeside = Math.abs(along) > length / 2 + reach || Math.abs(across) > width / 2 + reach;
-  if (isBeside) return null;
-  // of a small one, seen from afar, the inside must stay to be held
-  const depthAlong = Math.min(reach, length / 4), depthAcross = Math.min(reach, width / 4);
-  if (along >= length / 2 - depthAlong) return "front";
-  if (along <= depthAlong - length / 2) return "rear";
-  if (across >= width / 2 - depthAcross) return "left";
-  if (across <= depthAcross - width / 2) return "right";
+  const end = edgeAt(along, length, reach), side = edgeAt(across, width, reach);
+  if (end === null || side === null) return null;
+  if (end) return end > 0 ? "front" : "rear";
+  if (side) return side > 0 ? "left" : "right";
   return "move";
 }
 

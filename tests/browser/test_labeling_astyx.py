@@ -1,0 +1,205 @@
+"""A whole real drive labelled through the browser: from proposals to what is accepted, exported and scored, and the
+same drive from nothing. What it took is kept in ``build/labeling.json``."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.engine import Engine
+from app.recording import RecordingDesk
+from pipeline.geometry import Cuboid
+from pipeline.params import Params
+from pipeline.run import detector_for
+from pipeline.sources import open_source
+from pipeline.sources.base import TruthObject
+from tests.browser.conftest import OpenPage, Site
+from tests.browser.labeling import CUTTER_S, Hand, Labels, begin, is_saved
+from tests.browser.looks import pixels
+
+FRAMES = range(414, 426)
+COUNT = len(FRAMES)
+BUILD = Path(__file__).resolve().parents[2] / "build"
+
+
+@pytest.fixture(scope="module")
+def clip(data_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The URI of these frames of Astyx alone, by links."""
+    folder = tmp_path_factory.mktemp("astyx")
+    for part in (each for each in (data_dir / "astyx").iterdir() if each.is_dir()):
+        (folder / part.name).mkdir()
+        for file in part.iterdir():
+            if int(file.stem) in FRAMES:
+                (folder / part.name / file.name).symlink_to(file)
+    return f"astyx:{folder}"
+
+
+@pytest.fixture(scope="module")
+def astyx(clip: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    engine = Engine(
+        open_source,
+        detector_for,
+        Params(),
+        uri=clip,
+        whole_drives=True,
+        desk=RecordingDesk(tmp_path_factory.mktemp("sessions")),
+    )
+    engine.start()
+    running = Site(engine, 0)
+    running.start()
+    engine.wait_for(lambda s: s.drive.done == s.drive.total == COUNT, 300)
+    engine.control.change(playing=False, target=0)
+    engine.wait_for(lambda s: s.index == 0 and not s.playing, 60)
+    yield running
+    running.stop()
+    engine.stop()
+
+
+@pytest.fixture(scope="module")
+def truth(clip: str) -> list[Cuboid]:
+    """Where the car ahead is, frame by frame, as Astyx says."""
+    source = open_source(clip)
+    return [ahead(source.truth(index) or ()).cuboid for index in range(COUNT)]
+
+
+def ahead(objects: tuple[TruthObject, ...]) -> TruthObject:
+    within = [each for each in objects if abs(each.cuboid.center[1]) < 1.5 and each.cuboid.center[0] > 0]
+    return min(within, key=lambda each: each.cuboid.center[0])
+
+
+def wait_for_frame(page: Page, index: int) -> None:
+    expect(page.locator("#transport .where .dim")).to_have_text(f"{index + 1}/{COUNT}")
+
+
+def errors_m(labels: Labels, track: int, truth: list[Cuboid]) -> dict[str, float]:
+    """How far the labelled car is from the true one, over its frames: of its middle, and of its rear face."""
+    held = [labels.cuboid(track, index) for index in range(COUNT)]
+    assert all(each is not None for each in held), "it is labelled in every frame"
+    middle = [
+        np.hypot(*np.subtract(each["center"][:2], true.center[:2])) for each, true in zip(held, truth, strict=True)
+    ]
+    rear = [
+        abs(each["center"][0] - each["size"][0] / 2 - true.center[0] + true.size[0] / 2)
+        for each, true in zip(held, truth, strict=True)
+    ]
+    length = [abs(each["size"][0] - true.size[0]) for each, true in zip(held, truth, strict=True)]
+    return {
+        "middle_mean": round(float(np.mean(middle)), 3),
+        "middle_max": round(float(np.max(middle)), 3),
+        "rear_mean": round(float(np.mean(rear)), 3),
+        "length_mean": round(float(np.mean(length)), 3),
+    }
+
+
+def work(hand: Hand, started: float, errors: dict[str, float]) -> dict[str, Any]:
+    return {
+        **hand.counts,
+        "hands_per_frame": round(sum(hand.counts[name] for name in ("keys", "presses", "drags")) / COUNT, 2),
+        "machine_s_per_frame": round((time.monotonic() - started) / COUNT, 3),
+        "modelled_person_s_per_frame": round(hand.modelled_s / COUNT, 2),
+        "error_m": errors,
+    }
+
+
+def from_proposals(hand: Hand, labels: Labels, truth: list[Cuboid]) -> int:
+    """The pipeline has found the car's rear in every frame, but a LiDAR behind it does not see how long it is: the front
+    is drawn out in one frame, and that size is taken along."""
+    page = hand.page
+    hand.keys("p")
+    labels.wait_for(lambda now: len(now.leads) > 0)
+    lead = labels.leads[0][2]
+    assert isinstance(lead, int)
+    proposed = labels.cuboid(lead, 0)
+    row = page.locator(f".track-row[data-id='{lead}']")
+    expect(row).to_be_visible()
+    x, y = proposed["center"][:2]
+    hand.press(hand.plan(x, y))
+    expect(row).to_have_attribute("aria-selected", "true")
+    front = x + proposed["size"][0] / 2
+    rear = x - proposed["size"][0] / 2
+    hand.drag(hand.plan(front + 0.8, y), hand.plan(rear + truth[0].size[0], y))
+    labels.wait_for(lambda now: now.cuboid(lead, 0)["size"][0] > 3)
+    hand.keys("w")
+    labels.wait_for(lambda now: now.cuboid(lead, COUNT - 1)["size"][0] > 3)
+    hand.keys("a", "Escape", "a")
+    labels.wait_for(lambda now: {each["state"] for each in now.everything["leads"]} == {"accepted"})
+    return lead
+
+
+def from_nothing(hand: Hand, labels: Labels, truth: list[Cuboid]) -> int:
+    """Drawn in the first frame, and put right in a few others; between them it follows."""
+    page = hand.page
+    first = truth[0]
+    hand.keys("g")
+    rear, front = (first.center[0] + sign * first.size[0] / 2 for sign in (-1, 1))
+    hand.drag(hand.plan(rear, first.center[1]), hand.plan(front, first.center[1]))
+    labels.wait_for(lambda now: len(now.tracks) == 1)
+    (made,) = labels.tracks
+    hand.keys("i")
+    at = 0
+    for frame in (4, 8, COUNT - 1):
+        hand.keys(*["f"] * (frame - at))
+        wait_for_frame(page, frame)
+        hand.keys("k")
+        labels.wait_for(lambda now, frame=frame: now.cuboid(made, frame) is not None)
+        held, true = labels.cuboid(made, frame), truth[frame]
+        hand.drag(hand.plan(*held["center"][:2]), hand.plan(*true.center[:2]))
+        labels.wait_for(
+            lambda now, frame=frame, true=true: abs(now.cuboid(made, frame)["center"][0] - true.center[0]) < 0.3
+        )
+        at = frame
+    hand.keys("c")
+    labels.wait_for(lambda now: now.leads == [(0, COUNT - 1, made)])
+    return made
+
+
+def test_the_drive_is_labelled_with_and_without_proposals(astyx: Site, truth: list[Cuboid], open_page: OpenPage):
+    page = open_page(address=astyx.address)
+    labels = Labels(page, astyx.address)
+    wait_for_frame(page, 0)
+
+    hand, started = begin(page), time.monotonic()
+    made = from_nothing(hand, labels, truth)
+    is_saved(page)
+    without = work(hand, started, errors_m(labels, made, truth))
+    labels.clear(COUNT)
+    page.keyboard.press("Escape")
+    page.keyboard.press("Home")
+    wait_for_frame(page, 0)
+    expect(page.locator(".track-row")).to_have_count(0)
+
+    hand, started = Hand(page), time.monotonic()
+    lead = from_proposals(hand, labels, truth)
+    is_saved(page)
+    proposed = work(hand, started, errors_m(labels, lead, truth))
+    assert labels.tracks[lead]["state"] == "corrected"
+    assert labels.leads == [(0, COUNT - 1, lead)], "the car ahead leads in every frame"
+    assert proposed["error_m"]["middle_max"] < 0.6
+    assert without["error_m"]["middle_max"] < 0.6
+    assert proposed["hands_per_frame"] < without["hands_per_frame"]
+
+    BUILD.mkdir(exist_ok=True)
+    report = {"frames": COUNT, "from_nothing": without, "from_proposals": proposed, "keystroke_level_model_s": CUTTER_S}
+    (BUILD / "labeling.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    (BUILD / "screens").mkdir(exist_ok=True)
+    pixels(page, "#timeline-back")
+    page.screenshot(path=BUILD / "screens" / "labeling_astyx.png")
+
+    page.get_by_role("tab", name="Score").click()
+    accuracy = page.locator(".label-score .metrics tbody tr").first
+    expect(accuracy).to_be_visible()
+    judged = labels.get("/score")
+    assert judged["judged"] == COUNT
+    with page.expect_download() as download:
+        page.locator("#label-pane").get_by_role("button", name="Export").click()
+        page.locator("#menu").get_by_text("CSV").click()
+    heading, *rows = download.value.path().read_text(encoding="utf-8").splitlines()
+    assert "lead" in heading
+    assert len(rows) == COUNT
