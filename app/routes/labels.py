@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from fastapi import APIRouter, HTTPException, Query, Response
 from fastapi.responses import JSONResponse
@@ -50,8 +50,10 @@ def labels_router(desk: LabelDesk) -> APIRouter:
             return JSONResponse(track_json(desk.labels.track(number)))
 
     @router.get("/next")
-    def following(what: What, frame: Annotated[int, Query(ge=-1)], direction: Literal[1, -1] = 1) -> NextJson:
-        """The nearest frame after ``frame`` (or before it) where there is something to do."""
+    def following(
+        what: What, frame: Annotated[int, Query(ge=-1)], direction: Annotated[int, Query(ge=-1, le=1)] = 1
+    ) -> NextJson:
+        """The nearest frame after ``frame``, or with a negative direction before it, where there is something to do."""
         with refusing():
             run = desk.recording.book.current
             found, why = where_next(desk.labels, desk.scores, run, what, frame, direction)

@@ -144,6 +144,11 @@ def begin(page: Page, person: str = "Ada") -> Hand:
     return Hand(page)
 
 
+def is_at(page: Page, index: int) -> None:
+    """The page has painted the frame: the next act is about it."""
+    expect(page.locator("#label-bar")).to_have_attribute("data-frame", str(index))
+
+
 def is_saved(page: Page) -> None:
     """Every act so far has been answered."""
     expect(page.locator(".saved")).to_have_attribute("data-state", "saved")

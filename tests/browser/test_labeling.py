@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.judges import LOW_CONTRAST
-from tests.browser.labeling import Hand, Labels, begin, is_saved
+from tests.browser.labeling import Hand, Labels, begin, is_at, is_saved
 from tests.browser.looks import COUNT, box_of, go_to, on_timeline, pixels, repainted, wait_for_frame, whole_drive
 
 SCREENS = Path(__file__).resolve().parents[2] / "build" / "screens"
@@ -99,7 +99,7 @@ def test_everything_is_done_by_keys_and_taken_back(hand: Hand, labels: Labels):
     hand.keys("t")
     labels.wait_for(lambda now: now.tracks[made]["label"] == "truck")
     hand.keys("f", "f", "f")
-    wait_for_frame(page, START + 3)
+    is_at(page, START + 3)
     hand.keys("k")
     labels.wait_for(lambda now: now.tracks[made]["keyframes"] == [START, START + 3])
     assert labels.tracks[made]["sightings"] == 4, "the frames between follow"
@@ -127,12 +127,12 @@ def test_the_lead_is_painted_by_keys_by_number_and_by_a_drag(hand: Hand, labels:
     made = draw(hand, labels)
     bare = pixels(page, "#timeline-back")
     hand.keys("i", *["f"] * 4)
-    wait_for_frame(page, START + 4)
+    is_at(page, START + 4)
     hand.keys("c")
     labels.wait_for(lambda now: now.leads == [(START, START + 4, made)])
     assert repainted(page, "#timeline-back", bare)
     hand.keys("f")
-    wait_for_frame(page, START + 5)
+    is_at(page, START + 5)
     hand.keys("u")
     labels.wait_for(lambda now: now.leads == [(START, START + 4, made), (START + 5, START + 5, "unknown")])
     expect(page.locator(".leads button[aria-pressed=true]")).to_have_text("can't tell")
@@ -143,10 +143,10 @@ def test_the_lead_is_painted_by_keys_by_number_and_by_a_drag(hand: Hand, labels:
     y = front["y"] + 37
     hand.drag((front["x"] + on_timeline(page, 100), y), (front["x"] + on_timeline(page, 120), y), steps=8)
     labels.wait_for(lambda now: (100, 120, made) in now.leads)
-    wait_for_frame(page, 120)
+    is_at(page, 120)
     hand.keys("Escape", "i")
     go_to(page, 130)
-    wait_for_frame(page, 130)
+    is_at(page, 130)
     hand.keys(*str(made))
     labels.wait_for(lambda now: (100, 130, made) in now.leads or (121, 130, made) in now.leads)
     hand.keys("Shift+U")

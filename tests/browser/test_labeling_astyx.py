@@ -21,7 +21,7 @@ from pipeline.run import detector_for
 from pipeline.sources import open_source
 from pipeline.sources.base import TruthObject
 from tests.browser.conftest import OpenPage, Site
-from tests.browser.labeling import CUTTER_S, Hand, Labels, begin, is_saved
+from tests.browser.labeling import CUTTER_S, Hand, Labels, begin, is_at, is_saved
 from tests.browser.looks import pixels
 
 FRAMES = range(414, 426)
@@ -109,8 +109,8 @@ def work(hand: Hand, started: float, errors: dict[str, float]) -> dict[str, Any]
 
 
 def from_proposals(hand: Hand, labels: Labels, truth: list[Cuboid]) -> int:
-    """The pipeline has found the car's rear in every frame, but a LiDAR behind it does not see how long it is: the front
-    is drawn out in one frame, and that size is taken along."""
+    """The pipeline has found the car's rear in every frame, but a LiDAR behind it does not see how long it is: its
+    front is drawn out in one frame, and that size is taken along."""
     page = hand.page
     hand.keys("p")
     labels.wait_for(lambda now: len(now.leads) > 0)
@@ -146,7 +146,7 @@ def from_nothing(hand: Hand, labels: Labels, truth: list[Cuboid]) -> int:
     at = 0
     for frame in (4, 8, COUNT - 1):
         hand.keys(*["f"] * (frame - at))
-        wait_for_frame(page, frame)
+        is_at(page, frame)
         hand.keys("k")
         labels.wait_for(lambda now, frame=frame: now.cuboid(made, frame) is not None)
         held, true = labels.cuboid(made, frame), truth[frame]
@@ -172,7 +172,7 @@ def test_the_drive_is_labelled_with_and_without_proposals(astyx: Site, truth: li
     labels.clear(COUNT)
     page.keyboard.press("Escape")
     page.keyboard.press("Home")
-    wait_for_frame(page, 0)
+    is_at(page, 0)
     expect(page.locator(".track-row")).to_have_count(0)
 
     hand, started = Hand(page), time.monotonic()

@@ -1,5 +1,5 @@
 /** The labeling mode's bar: who leads here, where to go next, and what is saved. Below the timeline: its keys. */
-import { $, el, keyed, press, text } from "../dom.js";
+import { $, el, keyed, mark, press, text } from "../dom.js";
 import { get, on, paint, set } from "../store.js";
 import { redo, undo } from "../whatif/history.js";
 import { send } from "./acts.js";
@@ -49,6 +49,7 @@ export function setUp() {
 
 function reflect() {
   if (!get("labeling")?.on) return;
+  mark($("#label-bar"), "frame", String(shown()));
   const range = leadAt(shown()), marked = get("marked");
   const here = present().map(({ track }) => trackOf(track)).filter((track) => track !== null && track.state !== "rejected");
   const numbers = here.map((track) => /** @type {import("./types.js").LabelTrack} */ (track).id).sort((a, b) => a - b);
