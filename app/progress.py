@@ -65,5 +65,7 @@ def _reading(uri: str) -> Iterator[progress.Progress]:
 
 
 def _bar(count: ProgressColumn) -> Progress:
+    """Vanishes when done; there is none where nobody looks, as in a log."""
     columns = (TextColumn("{task.description}"), BarColumn(), count, TimeRemainingColumn())
-    return Progress(*columns, console=Console(stderr=True), transient=True)
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)

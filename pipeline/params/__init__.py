@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
+from pipeline.complaint import did_you_mean
 from pipeline.errors import BadInput
 from pipeline.params.declare import Section
 from pipeline.params.driving import (
@@ -131,7 +132,8 @@ def with_changes(params: Params, changes: Mapping[str, Any]) -> Params:
     for name, value in changes.items():
         section, _, key = name.partition(".")
         if section not in data or key not in data[section]:
-            raise ParamsError(f"no parameter named {name!r}")
+            names = [f"{section}.{key}" for section, values in data.items() for key in values]
+            raise ParamsError(f"no parameter named {name!r}{did_you_mean(name, names)}")
         data[section][key] = value
     return _validated(data)
 

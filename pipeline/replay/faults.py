@@ -10,6 +10,7 @@ from typing import Literal
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
+from pipeline.complaint import first_complaint
 from pipeline.errors import BadInput
 from pipeline.replay.messages import Sensor
 from pipeline.replay.wire import WireEvent
@@ -45,8 +46,7 @@ def load(path: Path) -> tuple[Fault, ...]:
     except OSError as error:
         raise BadInput(f"{path}: {error.strerror}") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        raise BadInput(f"{path}: {'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+        raise BadInput(f"{path}: {first_complaint(error, Fault)}") from None
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
         raise BadInput(f"{path}: not YAML: {str(error).splitlines()[0]}") from None
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import yaml
 from pydantic import Field, ValidationError, model_validator
 
+from pipeline.complaint import first_complaint
 from pipeline.errors import BadInput
 from pipeline.simulation.actors import Actor, Motion, Script, motion
 from pipeline.simulation.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
@@ -145,6 +146,4 @@ def parse(text: str, file: str) -> Scenario:
     try:
         return Scenario.model_validate(loaded)
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "scenario"
-        raise ScenarioError(f"{file}: {where}: {first['msg']}") from None
+        raise ScenarioError(f"{file}: {first_complaint(error, Scenario)}") from None

@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 from pydantic import ValidationError
 
+from pipeline.complaint import first_complaint
 from pipeline.sources.base import SourceError
 from pipeline.sources.files import check_looks_ahead, reason_of
 from pipeline.sources.live.config import CalibrationConfig, Mount, OffsetMs, Strict
@@ -51,9 +52,7 @@ def load_rig(path: Path) -> Rig:
     except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
         raise SourceError(f"{path.name}: not YAML: {str(error).splitlines()[0]}") from None
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"])) or "the file"
-        raise SourceError(f"{path.name}: {where}: {first['msg']}") from None
+        raise SourceError(f"{path.name}: {first_complaint(error, Rig)}") from None
     camera = rig.camera_calibration()
     if camera is not None:
         check_looks_ahead(camera, path.name)

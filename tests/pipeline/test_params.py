@@ -45,7 +45,9 @@ def test_changes_touch_only_what_they_name() -> None:
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        pytest.param({"cluster.z_wait": 0.4}, "no parameter named 'cluster.z_wait'", id="misspelt"),
+        pytest.param(
+            {"cluster.z_wait": 0.4}, "no parameter named 'cluster.z_wait'; did you mean cluster.z_weight", id="misspelt"
+        ),
         pytest.param({"clusters.z_weight": 0.4}, "no parameter named", id="no such section"),
         pytest.param({"cluster": 0.4}, "no parameter named", id="a section is not a parameter"),
         pytest.param({"cluster.z_weight": 7.0}, "cluster.z_weight: ", id="out of bounds"),

@@ -9,6 +9,7 @@ import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from pipeline.complaint import first_complaint
 from pipeline.geometry import inverse, rotation
 from pipeline.sources.base import SourceError
 from pipeline.types import F64, CameraCalibration
@@ -178,8 +179,10 @@ def load(path: str) -> LiveConfig:
         raise SourceError(f"{path}: expected sensors with their settings below them")
     try:
         return _resolved(LiveConfig.model_validate(data), file.resolve().parent)
-    except (ValidationError, RecursionError) as error:
-        raise SourceError(f"{path}: {_first_complaint(error)}") from None
+    except ValidationError as error:
+        raise SourceError(f"{path}: {first_complaint(error, LiveConfig)}") from None
+    except RecursionError:
+        raise SourceError(f"{path}: nested too deeply") from None
 
 
 def _resolved(config: LiveConfig, folder: Path) -> LiveConfig:
@@ -199,12 +202,3 @@ def _exactly_one(config: BaseModel, *names: str) -> None:
         raise ValueError(
             f"give exactly one of {', '.join(names)}" + (f"; there are {', '.join(given)}" if given else "")
         )
-
-
-def _first_complaint(error: Exception) -> str:
-    if not isinstance(error, ValidationError):
-        return "nested too deeply"
-    first = error.errors()[0]
-    place = ".".join(str(part) for part in first["loc"])
-    text = first["msg"].removeprefix("Value error, ")
-    return f"{place}: {text}" if place else text

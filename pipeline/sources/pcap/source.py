@@ -154,10 +154,11 @@ class _Index:
         counts = self._cutter.counts
         if counts.models:
             return f"packets of another Velodyne, {counts.models.most_common(1)[0][0]}; only the VLP-16 is read"
-        damage = f"; the file is {self._capture.damage}" if self._capture.damage else ""
-        if counts.packets:
-            return f"no whole sweep in {counts.packets} packets to port {port}; {counts.about_refused()}{damage}"
-        return f"no packets of a VLP-16 in it{damage}"
+        says = [f"no whole sweep in {counts.packets} packets to port {port}"] if counts.packets else []
+        says = says or [f"no packets of a VLP-16 to port {port} in it"]
+        says += [counts.about_refused()] if counts.refused else []
+        says += [f"the file is {self._capture.damage}"] if self._capture.damage else []
+        return "; ".join(says)
 
     def _add(self, rotation: Rotation | None) -> None:
         if rotation is None:

@@ -89,5 +89,6 @@ def _topics(reader: AnyReader) -> dict[str, Topic]:
 
 
 def _in_words(error: Exception) -> str:
-    text = str(error).strip().splitlines()
-    return text[0][:200] if text else type(error).__name__
+    """What a library says; what its own code stumbled over, which it puts after a colon, helps nobody."""
+    text = (str(error).strip().splitlines() or [type(error).__name__])[0]
+    return (text.partition(": ")[0] if error.__context__ is not None else text)[:200].rstrip(".")

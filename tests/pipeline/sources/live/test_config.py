@@ -46,7 +46,9 @@ def test_defaults_of_the_written_file_are_the_programs() -> None:
 @pytest.mark.parametrize(
     ("case", "text", "complaint"),
     [
-        ("unknown key", "lidar: {prot: 1}", "lidar.prot: Extra inputs are not permitted"),
+        ("unknown key", "lidar: {colour: 1}", "lidar.colour: no such setting"),
+        ("misspelt", "lidar: {data_prot: 1}", "lidar.data_prot: no such setting; did you mean data_port?"),
+        ("misspelt below", "lidar: {mount: {yaw_dg: 1}}", "lidar.mount.yaw_dg: no such setting; did you mean yaw_deg?"),
         ("nothing to look with", "title: x", "neither lidar nor camera"),
         ("port out of range", "lidar: {data_port: 70000}", "lidar.data_port"),
         ("another model", "lidar: {model: HDL-32E}", "lidar.model"),

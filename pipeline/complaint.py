@@ -1,0 +1,46 @@
+"""What is wrong with a file that a person wrote, in one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+_IN_OUR_WORDS = {"extra_forbidden": "no such setting", "missing": "is missing"}
+
+
+def first_complaint(error: ValidationError, model: type[BaseModel]) -> str:
+    """The first thing that is wrong with what should have been a ``model``, after where it stands; for a name that does
+    not exist the one that was meant, if any is near."""
+    first = error.errors()[0]
+    place = first["loc"]
+    text = _IN_OUR_WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
+    if first["type"] == "extra_forbidden":
+        text += did_you_mean(str(place[-1]), _names_at(model, place[:-1]))
+    where = ".".join(str(part) for part in place)
+    return f"{where}: {text}" if where else text
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """``; did you mean data_port?``, empty when no known name is near."""
+    near = get_close_matches(name, known, n=1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
+def _names_at(model: type[BaseModel], place: Iterable[int | str]) -> list[str]:
+    """The settings that there are below a place."""
+    below = [model]
+    for part in place:
+        fields = [above.model_fields[part] for above in below if part in above.model_fields]
+        if fields:  # else it is a number in a list, or which kind of thing it was taken for
+            below = [each for field in fields for each in _models_in(field.annotation)]
+    return [name for each in below for name in each.model_fields]
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    """Those that a field may hold, alone or in a list."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [found for each in get_args(annotation) for found in _models_in(each)]
