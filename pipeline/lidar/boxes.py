@@ -71,29 +71,26 @@ def turns(params: BoxParams) -> F64:
 def _boxes(points: F32, labels: I32, count: int, turns: F64) -> tuple[F64, I32]:
     """turns: (K,) as ``turns`` gives them. boxes (count, 13) float64: center x, y, length, width, yaw, lowest z,
     highest z, closest point x, y, z, spread x, y, z. sizes (count,) int32."""
-    size = np.zeros(count, dtype=np.int32)
-    for i in range(len(labels)):
-        if labels[i] >= 0:
-            size[labels[i]] += 1
     start = np.zeros(count + 1, dtype=np.int32)
+    for i in range(len(labels)):
+        start[labels[i] + 1] += 1  # what has no cluster, −1, counts at 0 and is taken away again
+    start[0] = 0
+    size = start[1:].copy()
     for c in range(count):
-        start[c + 1] = start[c] + size[c]
+        start[c + 1] += start[c]
     place = start[:-1].copy()
-    xyz = np.empty((3, start[count]), dtype=np.float64)
+    x, y, z = np.empty(start[count]), np.empty(start[count]), np.empty(start[count])
     for i in range(len(labels)):
         if labels[i] >= 0:
-            for a in range(3):
-                xyz[a, place[labels[i]]] = points[i, a]
-            place[labels[i]] += 1
+            at = place[labels[i]]
+            x[at], y[at], z[at] = points[i, 0], points[i, 1], points[i, 2]
+            place[labels[i]] = at + 1
     boxes = np.empty((count, 13))
     cos, sin = np.cos(turns).astype(np.float32), np.sin(turns).astype(np.float32)
     for c in range(count):
-        x, y, z = xyz[0, start[c] : start[c + 1]], xyz[1, start[c] : start[c + 1]], xyz[2, start[c] : start[c + 1]]
-        _rectangle(x, y, turns[_best_turn(x, y, cos, sin)], boxes[c])
-        nearest = np.argmin(x * x + y * y)
-        boxes[c, 5], boxes[c, 6] = z.min(), z.max()
-        boxes[c, 7], boxes[c, 8], boxes[c, 9] = x[nearest], y[nearest], z[nearest]
-        boxes[c, 10], boxes[c, 11], boxes[c, 12] = x.std(), y.std(), z.std()
+        a, b = start[c], start[c + 1]
+        turn = turns[_best_turn(x[a:b], y[a:b], cos, sin)]
+        _describe(x[a:b], y[a:b], z[a:b], turn, boxes[c])
     return boxes, size
 
 
@@ -104,47 +101,82 @@ def _best_turn(x: F64, y: F64, cos: F32, sin: F32) -> int:
         return 0
     stride = (len(x) + SEARCH_POINTS - 1) // SEARCH_POINTS
     near_x, near_y = (x[::stride] - x[0]).astype(np.float32), (y[::stride] - y[0]).astype(np.float32)
-    best, best_score = 0, -1.0
+    u_side, v_side, closeness = np.empty_like(cos), np.empty_like(cos), np.empty_like(cos)
+    _sides(near_x, near_y, cos, sin, u_side, v_side)
+    _closeness(near_x, near_y, cos, sin, u_side, v_side, closeness)
+    return int(np.argmax(closeness))
+
+
+# Nothing in the two loops over points below can raise or is stored: then the compiler makes the most of them.
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "nnan"})
+def _sides(x: F32, y: F32, cos: F32, sin: F32, u_side: F32, v_side: F32) -> None:
+    """For each turn the end of x·cos + y·sin, and of y·cos − x·sin, that the points gather at."""
+    sum_x = sum_y = np.float32(0.0)
+    for i in range(len(x)):
+        sum_x += x[i]
+        sum_y += y[i]
     for k in range(len(cos)):
-        score = _closeness(near_x, near_y, cos[k], sin[k])
-        if score > best_score:
-            best, best_score = k, score
-    return best
-
-
-# Neither loop below stores into an array or can raise: then the compiler vectorises them.
+        u_low = u_high = x[0] * cos[k] + y[0] * sin[k]
+        v_low = v_high = y[0] * cos[k] - x[0] * sin[k]
+        for i in range(len(x)):
+            u, v = x[i] * cos[k] + y[i] * sin[k], y[i] * cos[k] - x[i] * sin[k]
+            u_low, u_high = min(u_low, u), max(u_high, u)
+            v_low, v_high = min(v_low, v), max(v_high, v)
+        u_sum, v_sum = sum_x * cos[k] + sum_y * sin[k], sum_y * cos[k] - sum_x * sin[k]
+        u_side[k] = u_high if 2 * u_sum > len(x) * (u_low + u_high) else u_low
+        v_side[k] = v_high if 2 * v_sum > len(x) * (v_low + v_high) else v_low
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "nnan"})
-def _closeness(x: F32, y: F32, cos: float, sin: float) -> float:
-    """Σ 1/max(d, d0), d the distance of a point to the nearer of two sides of the box with this turn: of each pair of
+def _closeness(x: F32, y: F32, cos: F32, sin: F32, u_side: F32, v_side: F32, closeness: F32) -> None:
+    """For each turn Σ 1/max(d, d0), d the distance of a point to the nearer of two sides of the box: of each pair of
     parallel sides the one that the points gather at (Zhang 2017, Algorithm 4)."""
-    u_side, v_side = _side(x, y, cos, sin), _side(y, x, cos, -sin)
-    score, nearest = np.float32(0.0), np.float32(NEAREST_M)
-    for i in range(len(x)):
-        u, v = x[i] * cos + y[i] * sin - u_side, y[i] * cos - x[i] * sin - v_side
-        score += np.float32(1.0) / max(min(abs(u), abs(v)), nearest)
-    return float(score)
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz", "nnan"})
-def _side(x: F32, y: F32, cos: float, sin: float) -> float:
-    """The end of x·cos + y·sin that the points gather at."""
-    low = high = x[0] * cos + y[0] * sin
-    total = np.float32(0.0)
-    for i in range(len(x)):
-        u = x[i] * cos + y[i] * sin
-        low, high = min(low, u), max(high, u)
-        total += u
-    return high if 2 * total > len(x) * (low + high) else low
+    nearest = np.float32(NEAREST_M)
+    for k in range(len(cos)):
+        score = np.float32(0.0)
+        for i in range(len(x)):
+            u, v = x[i] * cos[k] + y[i] * sin[k] - u_side[k], y[i] * cos[k] - x[i] * sin[k] - v_side[k]
+            score += np.float32(1.0) / max(min(abs(u), abs(v)), nearest)
+        closeness[k] = score
 
 
 @numba.njit(cache=True, nogil=True)
-def _rectangle(x: F64, y: F64, turn: float, out: F64) -> None:
-    """center x, y, length, width, yaw of the rectangle with this turn around the points, into ``out``."""
+def _describe(x: F64, y: F64, z: F64, turn: float, out: F64) -> None:
+    """One row of ``_boxes``, of the rectangle with this turn around the points. Two passes over all that is asked."""
     cos, sin = np.cos(turn), np.sin(turn)
-    u, v = x * cos + y * sin, y * cos - x * sin
-    u_low, u_high, v_low, v_high = u.min(), u.max(), v.min(), v.max()
+    u_low = v_low = z_low = least = np.inf
+    u_high = v_high = z_high = -np.inf
+    sum_x = sum_y = sum_z = 0.0
+    nearest = 0
+    for i in range(len(x)):
+        u, v = x[i] * cos + y[i] * sin, y[i] * cos - x[i] * sin
+        u_low, u_high = min(u_low, u), max(u_high, u)
+        v_low, v_high = min(v_low, v), max(v_high, v)
+        z_low, z_high = min(z_low, z[i]), max(z_high, z[i])
+        range2 = x[i] * x[i] + y[i] * y[i]
+        if range2 < least:
+            least, nearest = range2, i
+        sum_x += x[i]
+        sum_y += y[i]
+        sum_z += z[i]
+    _rectangle(u_low, u_high, v_low, v_high, turn, out)
+    out[5], out[6] = z_low, z_high
+    out[7], out[8], out[9] = x[nearest], y[nearest], z[nearest]
+    mean_x, mean_y, mean_z = sum_x / len(x), sum_y / len(x), sum_z / len(x)
+    var_x = var_y = var_z = 0.0
+    for i in range(len(x)):
+        var_x += (x[i] - mean_x) ** 2
+        var_y += (y[i] - mean_y) ** 2
+        var_z += (z[i] - mean_z) ** 2
+    out[10], out[11], out[12] = np.sqrt(var_x / len(x)), np.sqrt(var_y / len(x)), np.sqrt(var_z / len(x))
+
+
+@numba.njit(cache=True, nogil=True)
+def _rectangle(u_low: float, u_high: float, v_low: float, v_high: float, turn: float, out: F64) -> None:
+    """center x, y, length, width, yaw of a rectangle with this turn, into ``out``."""
+    cos, sin = np.cos(turn), np.sin(turn)
     u_mid, v_mid = (u_low + u_high) / 2, (v_low + v_high) / 2
     out[0], out[1] = u_mid * cos - v_mid * sin, u_mid * sin + v_mid * cos
     along_u, along_v = u_high - u_low, v_high - v_low

@@ -63,14 +63,13 @@ def kinds(labels, keep, ground):  # type: ignore[no-untyped-def]  # pragma: no c
 
 @numba.njit(cache=True, nogil=True)
 def _within(points: F32, candidates: Mask, max_range_m: float, front_only: bool) -> I32:
-    """Indices of the candidates in range."""
-    chosen = np.empty(len(points), dtype=np.int32)
+    """Indices of the candidates in range. Without a branch, since neighbours in a sweep differ in what they are."""
+    chosen = np.empty(len(points) + 1, dtype=np.int32)
     count, limit2 = 0, max_range_m * max_range_m
     for i in range(len(points)):
         x, y = float(points[i, 0]), float(points[i, 1])
-        if candidates[i] and x * x + y * y <= limit2 and (x > 0.0 or not front_only):
-            chosen[count] = i
-            count += 1
+        chosen[count] = i
+        count += candidates[i] & (x * x + y * y <= limit2) & ((x > 0.0) | (not front_only))
     return chosen[:count]
 
 
@@ -90,15 +89,16 @@ def _cells(
                 value *= z_weight
             xyz[k, a] = value
             low[a], high[a] = min(low[a], value), max(high[a], value)
-    nx = int((high[0] - low[0]) / cell_m) + 5
-    ny = int((high[1] - low[1]) / cell_m) + 5
+    per_m = 1.0 / cell_m
+    nx = int((high[0] - low[0]) * per_m) + 5
+    ny = int((high[1] - low[1]) * per_m) + 5
     column = np.empty(len(chosen), dtype=np.int64)
     level = np.empty(len(chosen), dtype=np.int32)
     for k in range(len(chosen)):
-        ix = int((xyz[k, 0] - low[0]) / cell_m) + 2
-        iy = int((xyz[k, 1] - low[1]) / cell_m) + 2
+        ix = int((xyz[k, 0] - low[0]) * per_m) + 2
+        iy = int((xyz[k, 1] - low[1]) * per_m) + 2
         column[k] = ix * ny + iy
-        level[k] = int((xyz[k, 2] - low[2]) / cell_m)
+        level[k] = int((xyz[k, 2] - low[2]) * per_m)
     return xyz, column, level, (nx, ny)
 
 
@@ -114,8 +114,12 @@ def _components(
     cell_column = np.empty(count, dtype=np.int64)
     cell_level = np.empty(count, dtype=np.int32)
     size = np.zeros(count + 1, dtype=np.int32)
-    cells = 0
+    cells, c = 0, -1
     for k in range(count):
+        if k > 0 and column[k] == column[k - 1] and level[k] == level[k - 1]:  # a beam's next point, mostly
+            cell_of[k] = c
+            size[c] += 1
+            continue
         c = first_cell[column[k]] - 1
         while c >= 0 and cell_level[c] != level[k]:
             c = below[c]
@@ -138,6 +142,7 @@ def _components(
     for j in range(count):
         packed[j, 0], packed[j, 1], packed[j, 2] = xyz[by_cell[j], 0], xyz[by_cell[j], 1], xyz[by_cell[j], 2]
 
+    bounds = _bounds(packed, start)
     parent = np.arange(cells).astype(np.int32)
     limit2 = tolerance_m * tolerance_m
     for c in range(cells):
@@ -148,9 +153,7 @@ def _components(
                 while other >= 0:
                     if abs(cell_level[other] - cell_level[c]) <= 2:
                         theirs = _root(parent, other)
-                        if mine != theirs and _touch(
-                            packed, start[c], start[c + 1], start[other], start[other + 1], limit2
-                        ):
+                        if mine != theirs and _touch(packed, start, bounds, c, other, limit2):
                             mine, theirs = min(mine, theirs), max(mine, theirs)
                             parent[theirs] = mine
                     other = below[other]
@@ -171,11 +174,36 @@ def _root(parent: I32, c: int) -> int:
 
 
 @numba.njit(cache=True, nogil=True)
-def _touch(packed: F64, a0: int, a1: int, b0: int, b1: int, limit2: float) -> bool:
-    """Whether any point of one cell lies within the tolerance of any point of the other."""
-    for a in range(a0, a1):
-        for b in range(b0, b1):
-            dx, dy, dz = packed[a, 0] - packed[b, 0], packed[a, 1] - packed[b, 1], packed[a, 2] - packed[b, 2]
+def _bounds(packed: F64, start: I32) -> F64:
+    """(C, 6) lowest and highest x, y, z of each cell's points."""
+    bounds = np.empty((len(start) - 1, 6))
+    for c in range(len(bounds)):
+        for axis in range(3):
+            low = high = packed[start[c], axis]
+            for j in range(start[c] + 1, start[c + 1]):
+                low, high = min(low, packed[j, axis]), max(high, packed[j, axis])
+            bounds[c, axis], bounds[c, axis + 3] = low, high
+    return bounds
+
+
+@numba.njit(cache=True, nogil=True)
+def _touch(packed: F64, start: I32, bounds: F64, c: int, other: int, limit2: float) -> bool:
+    """Whether any point of one cell lies within the tolerance of any point of the other. What is farther than that from
+    a cell's bounds is farther from each of its points: most pairs are told apart by that."""
+    dx = max(bounds[other, 0] - bounds[c, 3], bounds[c, 0] - bounds[other, 3], 0.0)
+    dy = max(bounds[other, 1] - bounds[c, 4], bounds[c, 1] - bounds[other, 4], 0.0)
+    dz = max(bounds[other, 2] - bounds[c, 5], bounds[c, 2] - bounds[other, 5], 0.0)
+    if dx * dx + dy * dy + dz * dz > limit2:
+        return False
+    for a in range(start[c], start[c + 1]):
+        x, y, z = packed[a, 0], packed[a, 1], packed[a, 2]
+        dx = max(bounds[other, 0] - x, x - bounds[other, 3], 0.0)
+        dy = max(bounds[other, 1] - y, y - bounds[other, 4], 0.0)
+        dz = max(bounds[other, 2] - z, z - bounds[other, 5], 0.0)
+        if dx * dx + dy * dy + dz * dz > limit2:
+            continue
+        for b in range(start[other], start[other + 1]):
+            dx, dy, dz = x - packed[b, 0], y - packed[b, 1], z - packed[b, 2]
             if dx * dx + dy * dy + dz * dz <= limit2:
                 return True
     return False

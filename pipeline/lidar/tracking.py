@@ -21,6 +21,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from pipeline import kalman
+from pipeline.geometry import Cuboid
 from pipeline.params import LidarTrackingParams
 from pipeline.types import F64, I64, LidarTrack, Obstacle, Point3
 
@@ -89,10 +90,13 @@ def track(
         else:
             continue
         rows.append(i)
-    fresh = np.setdiff1d(np.arange(len(sweep)), partner)
-    tracks += [LidarTrack(state.next_id + k, sweep[j], None, 1, 0, False) for k, j in enumerate(fresh)]
+    matched = partner >= 0
+    is_fresh = np.ones(len(sweep), dtype=np.bool_)
+    is_fresh[partner[matched]] = False
+    fresh = np.flatnonzero(is_fresh)
+    tracks += [LidarTrack(state.next_id + k, sweep[j], None, 1, 0, False) for k, j in enumerate(fresh.tolist())]
     shape = state.shape.copy()
-    shape[partner >= 0] = seen.shape[partner[partner >= 0]]
+    shape[matched] = seen.shape[partner[matched]]
     begun = kalman.start(seen.place[fresh], _noise(params), params.start_speed_mps)
     next_state = LidarTrackerState(
         tracks=tuple(tracks),
@@ -111,16 +115,23 @@ def looks(obstacles: tuple[Obstacle, ...]) -> Looks:
     """Place and shape of each. The reference point is the middle of the footprint's rear: of its two axes the one
     closer to ego x, at the end of smaller x."""
     rows = [(*o.cuboid.center, *o.cuboid.size, o.cuboid.yaw_rad, o.points, o.density, *o.spread) for o in obstacles]
-    table = np.array(rows, dtype=np.float64).reshape(-1, 12)
-    x, y, _, length, width, _, yaw, points, density = table.T[:9]
-    across = np.abs(np.cos(yaw)) < np.sqrt(0.5)
-    heading = np.where(across, yaw + np.pi / 2, yaw)
-    reach = np.where(across, width, length) / 2 * np.where(np.cos(heading) >= 0.0, 1.0, -1.0)
-    place = np.column_stack([x - reach * np.cos(heading), y - reach * np.sin(heading)])
-    shape = table[:, 7:].copy()
-    shape[:, 0] = np.maximum(points, MIN_GATE_POINTS)
-    shape[:, 1] = density * np.maximum(1.0, MIN_GATE_POINTS / np.maximum(points, 1.0))
-    return Looks(place, shape)
+    return Looks(*_looks(np.array(rows, dtype=np.float64).reshape(-1, 12)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _looks(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """place (M, 2) and shape (M, 5) of (M, 12) center x y z, length, width, height, yaw, points, density, spread."""
+    place, shape = np.empty((len(rows), 2)), np.empty((len(rows), 5))
+    for i in range(len(rows)):
+        yaw, points = rows[i, 6], rows[i, 7]
+        across = abs(np.cos(yaw)) < np.sqrt(0.5)
+        heading = yaw + np.pi / 2 if across else yaw
+        reach = (rows[i, 4] if across else rows[i, 3]) / 2 * (1.0 if np.cos(heading) >= 0.0 else -1.0)
+        place[i, 0], place[i, 1] = rows[i, 0] - reach * np.cos(heading), rows[i, 1] - reach * np.sin(heading)
+        shape[i] = rows[i, 7:]
+        shape[i, 0] = max(points, MIN_GATE_POINTS)
+        shape[i, 1] *= max(1.0, MIN_GATE_POINTS / max(points, 1.0))
+    return place, shape
 
 
 def associate(
@@ -243,12 +254,9 @@ def _lives_on(last: LidarTrack, unseen_s: float, has_sweep: bool, params: LidarT
 def _carried(last: LidarTrack, dt_s: float) -> LidarTrack:
     """Not seen: the obstacle as it was, moved on by its velocity. It belongs to no cluster of this sweep (−1)."""
     vx, vy = last.velocity_mps or (0.0, 0.0)
-    seen = last.obstacle
-    moved = seen._replace(
-        cluster=-1,
-        cuboid=seen.cuboid._replace(center=_moved(seen.cuboid.center, vx * dt_s, vy * dt_s)),
-        closest_point=_moved(seen.closest_point, vx * dt_s, vy * dt_s),
-    )
+    _, cuboid, closest, points, density, spread = last.obstacle
+    there = Cuboid(_moved(cuboid.center, vx * dt_s, vy * dt_s), cuboid.size, cuboid.yaw_rad)
+    moved = Obstacle(-1, there, _moved(closest, vx * dt_s, vy * dt_s), points, density, spread)
     return LidarTrack(last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True, last.unseen_s + dt_s)
 
 
