@@ -2,7 +2,8 @@
 
 The server listens on loopback, but every web page that a person visits can send requests there too. So the Host header
 must name this machine (a rebound DNS name does not), and what changes anything, and every WebSocket, must come from a
-page of the same origin. Programs send no Origin and are let through.
+page of the same origin. Nor may another page have us work: browsers say for whom they ask (Sec-Fetch-Site), and the API
+answers them only for our own pages and for a person who typed the address. Programs send neither and are let through.
 
 Where other machines can reach the server, all that does not help: there everybody, from loopback too, needs a token.
 """
@@ -27,6 +28,9 @@ LOOPBACK_HOSTS = ("localhost", "127.0.0.1", "::1")
 WILDCARDS = ("0.0.0.0", "::")
 """Every interface of this machine."""
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
+_OWN_SITES = (None, "same-origin", "none")
+"""Whom a browser may ask the API for: Sec-Fetch-Site of W3C Fetch Metadata. ``same-site`` is another port of ours."""
+_API = "/api/"
 _OPEN_TO_ALL = "/healthz"
 """Says that the server lives and nothing else, to whoever watches over it."""
 _DISPLAY_MAY = frozenset({("POST", "/api/marks"), ("POST", "/api/recording")})
@@ -65,14 +69,16 @@ class Access:
             names |= {own, f"{own}.local"}
         self._hosts = frozenset((*LOOPBACK_HOSTS, *names)) - frozenset(WILDCARDS)
 
-    def refusal(self, headers: Headers, *, changes: bool) -> str | None:
-        """Why the request is refused, in one sentence; null when it is welcome."""
+    def refusal(self, headers: Headers, *, changes: bool, path: str = _API) -> str | None:
+        """Why the request for a path is refused, in one sentence; null when it is welcome."""
         host = headers.get("host", "")
         if not self._knows(_host_name(host)):
             return f"this server does not answer to the name {host!r}; allow it with --allow-host"
         origin = headers.get("origin")
         if changes and origin is not None and urlsplit(origin).netloc.lower() != host.lower():
             return f"a page of {origin} may not do this"
+        if path.startswith(_API) and headers.get("sec-fetch-site") not in _OWN_SITES:
+            return "a page of another origin may not ask for this"
         return None
 
     def allowed(self, connection: HTTPConnection) -> bool:
@@ -105,7 +111,7 @@ class Guard:
 
     def _refused(self, connection: HTTPConnection, changes: bool) -> Response | None:
         """What is answered instead; null for who is welcome."""
-        refusal = self._access.refusal(connection.headers, changes=changes)
+        refusal = self._access.refusal(connection.headers, changes=changes, path=connection.scope["path"])
         if refusal is not None:
             return JSONResponse({"detail": refusal}, 403)
         if self._tokens is None or (connection.scope["path"] == _OPEN_TO_ALL and not changes):

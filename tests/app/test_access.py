@@ -24,6 +24,24 @@ CASES = {
 }
 
 
+FETCHES = {
+    "our own page": ("/api/export", "same-origin", True),
+    "an address that a person typed": ("/api/export", "none", True),
+    "a program": ("/api/export", None, True),
+    "a foreign page": ("/api/export", "cross-site", False),
+    "a page of another port": ("/api/export", "same-site", False),
+    "a foreign page's link to the dashboard": ("/", "cross-site", True),
+    "a foreign page's link to the display": ("/drive/", "cross-site", True),
+}
+
+
+@pytest.mark.parametrize("name", FETCHES)
+def test_the_api_works_for_no_other_page(name: str):
+    path, site, welcome = FETCHES[name]
+    headers = Headers({"host": "127.0.0.1:8420"} | ({"sec-fetch-site": site} if site is not None else {}))
+    assert (Access().refusal(headers, changes=False, path=path) is None) == welcome
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_access(name: str):
     host, origin, changes, welcome = CASES[name]

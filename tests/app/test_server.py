@@ -238,6 +238,12 @@ def test_a_foreign_page_changes_nothing(client: httpx.Client, path: str):
     assert answer.status_code == 403
 
 
+def test_a_foreign_page_has_nothing_computed(client: httpx.Client):
+    for path in ("/api/result", "/api/drive/events"):
+        assert client.get(path, headers={"sec-fetch-site": "cross-site"}).status_code == 403
+        assert client.get(path, headers={"sec-fetch-site": "same-origin"}).status_code == 200
+
+
 def test_a_rebound_name_reads_nothing(client: httpx.Client):
     assert client.get("/api/state", headers={"host": "evil.example"}).status_code == 403
     assert client.get("/", headers={"host": "evil.example"}).status_code == 403
