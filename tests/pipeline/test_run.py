@@ -46,6 +46,15 @@ def test_a_recording_is_seen_by_the_default_one(tmp_path: Path) -> None:
     assert detector_for(source).name.startswith("mine")
 
 
+def test_nothing_looks_for_lanes_in_a_recording_without_pictures() -> None:
+    source = open_source("sim:straight")
+    first = source.frame(0)
+    assert lanes_for(source) is not None
+    source.frame = lambda index: replace(first, picture=None, camera=None)  # type: ignore[method-assign]
+    assert lanes_for(source) is None
+    assert lanes_for(source, "classical") is not None, "whoever names one gets it"
+
+
 class _Seen:
     """A detector that says which pictures it was asked about."""
 
