@@ -6,9 +6,10 @@ import json
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
-from urllib.parse import quote
+from urllib.parse import quote, urlsplit
 
 import tyro
 
@@ -30,7 +31,8 @@ from pipeline.sources.base import Source
 from pipeline.step import State, step, warm_up
 from pipeline.types import Frame, Result
 
-DASHBOARD = "http://127.0.0.1:8420/"
+DASHBOARD = "http://127.0.0.1:8420"
+"""Where `cipv serve` listens unless told otherwise."""
 _PRESETS = ("default", "paper")
 
 
@@ -58,6 +60,8 @@ class Evaluate:
     """Leads that are farther are not asked for"""
     report: Path | None = None
     """Write an HTML file with tables, charts and links to the worst frames"""
+    dashboard: Annotated[str, tyro.conf.arg(metavar="URL")] = DASHBOARD
+    """Where the report's links lead: the address that `cipv serve` shows when it starts"""
     json: bool = False
     """Print the figures as JSON"""
 
@@ -86,6 +90,8 @@ class Evaluate:
             raise BadInput(f"--results: {len(self.results)} files for {count} recordings; name one for each")
         if self.against and self._base_preset() is None and len(self.against) != count:
             raise BadInput(f"--against: {len(self.against)} files for {count} recordings; name one for each")
+        if urlsplit(self.dashboard).scheme not in ("http", "https") or not urlsplit(self.dashboard).netloc:
+            raise BadInput(f"--dashboard {self.dashboard}: no address such as {DASHBOARD}")
         if not 0.0 < self.max_range_m < 1000.0:
             raise BadInput(f"--max-range-m {self.max_range_m:g}: metres, more than 0 and less than 1000")
 
@@ -138,7 +144,7 @@ class Evaluate:
             print(json.dumps(as_json(run, base), indent=1, ensure_ascii=False))
         if self.json and self.report is None:
             return
-        told = sections(run, dashboard_link, base)
+        told = sections(run, partial(dashboard_link, self.dashboard), base)
         if self.report is not None:
             title = "Scores: " + ", ".join(drive.uri for drive in run)
             self.report.write_text(html(told, title), encoding="utf-8")
@@ -167,6 +173,6 @@ def _seen(frame: Frame, detectors: Detectors, sensors: Sensors) -> Frame:
     return only(frame if sensors == "lidar" else detect(frame, detectors), sensors)
 
 
-def dashboard_link(uri: str, index: int) -> str:
-    """The address that opens the dashboard of this machine at a frame."""
-    return f"{DASHBOARD}#uri={quote(uri, safe='')}&frame={index}"
+def dashboard_link(dashboard: str, uri: str, index: int) -> str:
+    """The address that opens a dashboard at a frame."""
+    return f"{dashboard.rstrip('/')}/#uri={quote(uri, safe='')}&frame={index}"

@@ -83,12 +83,12 @@ def test_a_report_that_compares_two_runs(
     other.write_text("".join(json.dumps({**row, "cipv": None}) + "\n" for row in rows), encoding="utf-8")
     page = tmp_path / "out" / "scores.html"
     files = ("--results", str(other), "--against", str(results), "--truth", str(truth))
-    assert evaluate(SOURCE, *files, "--report", str(page)) == 0
+    assert evaluate(SOURCE, *files, "--report", str(page), "--dashboard", "http://car.local:9000") == 0
     text = page.read_text(encoding="utf-8")
     assert "Against the base" in text
     assert "Worst frames" in text
     assert "CIPV correct" in capsys.readouterr().out
-    links = re.findall(r'href="http://127\.0\.0\.1:8420/#([^"]+)"', text)
+    links = re.findall(r'href="http://car\.local:9000/#([^"]+)"', text)
     opened = [parse_qs(link.replace("&amp;", "&")) for link in links]
     assert {query["uri"][0] for query in opened} == {SOURCE}
     assert {int(query["frame"][0]) for query in opened} <= set(range(FRAMES))
@@ -156,6 +156,6 @@ def test_labels_of_another_recording(truth: Path, capsys: pytest.CaptureFixture[
 
 
 def test_an_address_is_quoted_whole() -> None:
-    assert dashboard_link("astyx:/my drives/a&b", 7) == (
-        "http://127.0.0.1:8420/#uri=astyx%3A%2Fmy%20drives%2Fa%26b&frame=7"
+    assert dashboard_link("http://car.local:9000/", "astyx:/my drives/a&b", 7) == (
+        "http://car.local:9000/#uri=astyx%3A%2Fmy%20drives%2Fa%26b&frame=7"
     )
