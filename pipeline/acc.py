@@ -31,11 +31,12 @@ class AccState:
 
 @dataclass(frozen=True)
 class Demand:
-    """One wish for a speed, and what asks for it."""
+    """One wish for a speed, what asks for it, and the object it slows down for."""
 
     speed_mps: float
     state: State
     reason: str
+    object_id: int | None = None
 
 
 def control(
@@ -62,6 +63,7 @@ def control(
         accelerator=max(accel, 0.0) / params.max_accel_mps2,
         brake=max(-accel, 0.0) / params.max_decel_mps2,
         reason=demand.reason,
+        object_id=demand.object_id,
     )
 
 
@@ -85,9 +87,9 @@ def follow(ego: EgoState, cipv: Cipv | None, params: AccParams) -> Demand:
     if cipv.distance_m > wanted:
         return Demand(set_speed, "cruise", f"lead #{cipv.id} beyond the desired gap of {wanted:.1f} m")
     if cipv.distance_m <= params.min_gap_m:
-        return Demand(0.0, "stop", f"lead #{cipv.id} inside the smallest gap of {params.min_gap_m:.1f} m")
+        return Demand(0.0, "stop", f"lead #{cipv.id} inside the smallest gap of {params.min_gap_m:.1f} m", cipv.id)
     speed = ego.speed_mps * (cipv.distance_m - params.min_gap_m) / (wanted - params.min_gap_m)
-    return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} inside the desired gap of {wanted:.1f} m")
+    return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} inside the desired gap of {wanted:.1f} m", cipv.id)
 
 
 def avoid(
@@ -101,6 +103,7 @@ def avoid(
             ego.speed_mps * item.ttc_s / params.ttc_limit_s,
             "warn",
             f"#{item.id} would be hit in {item.ttc_s:.1f} s",
+            item.id,
         )
         for item in objects
         if (cipv is None or item.id != cipv.id)

@@ -29,12 +29,14 @@ _SMALLEST_GAP_M = 0.1
 @dataclass(frozen=True)
 class AebState:
     """level: the stage that acts, 0 none to 3 full. streak: for how many frames in a row each stage has been asked for.
-    calm_s: for how long nothing has asked while a braking stage acted. cause: what it acts for."""
+    calm_s: for how long nothing has asked while a braking stage acted. cause: what it acts for, in words, and the id of
+    that object."""
 
     level: int = _NONE
     streak: tuple[int, int, int] = (0, 0, 0)
     calm_s: float = 0.0
     cause: str = ""
+    object_id: int | None = None
 
 
 class Threat(NamedTuple):
@@ -114,8 +116,11 @@ def _next(state: AebState, worst: Threat | None, ego: EgoState, dt_s: float, par
     over = calm_s >= (params.release_s if moving else params.standstill_s)
     held = state.level if state.level >= _PARTIAL and not over else _NONE
     level = max(confirmed, held)
-    cause = _cause(worst) if worst is not None and confirmed >= held else state.cause
-    return AebState(level, streak, calm_s, cause if level else "")  # type: ignore[arg-type]
+    if not level:
+        return AebState(level, streak, calm_s)  # type: ignore[arg-type]
+    if worst is not None and confirmed >= held:
+        return AebState(level, streak, calm_s, _cause(worst), worst.id)  # type: ignore[arg-type]
+    return AebState(level, streak, calm_s, state.cause, state.object_id)  # type: ignore[arg-type]
 
 
 def _cause(threat: Threat) -> str:
@@ -129,7 +134,7 @@ def _stronger(command: AccCommand, state: AebState, params: AebParams, pedals: A
         return command
     stage = STAGES[state.level - 1]
     if stage == "warn":
-        return evolve(command, state=stage, reason=f"warning: {state.cause}")
+        return evolve(command, state=stage, reason=f"warning: {state.cause}", object_id=state.object_id)
     decel = params.full_decel_mps2 if stage == "full_brake" else params.partial_decel_mps2
     if -command.accel_mps2 > decel:
         return command
@@ -141,4 +146,5 @@ def _stronger(command: AccCommand, state: AebState, params: AebParams, pedals: A
         accelerator=0.0,
         brake=min(decel / pedals.max_decel_mps2, 1.0),
         reason=f"emergency braking: {state.cause}",
+        object_id=state.object_id,
     )

@@ -110,7 +110,7 @@ class RejectedJson(_Exact):
 
 
 class AccJson(_Exact):
-    """accelerator and brake are 0–1."""
+    """accelerator and brake are 0–1. object_id: the object that it slows down for."""
 
     state: Literal["cruise", "follow", "stop", "warn", "partial_brake", "full_brake"]
     desired_speed_mps: float
@@ -118,6 +118,7 @@ class AccJson(_Exact):
     accelerator: float
     brake: float
     reason: str
+    object_id: int | None
 
 
 class EgoJson(_Exact):

@@ -60,7 +60,8 @@ class Rejection:
 
 @dataclass(frozen=True)
 class AccCommand:
-    """What the longitudinal controller asks for. accelerator and brake are 0–1."""
+    """What the longitudinal controller asks for. accelerator and brake are 0–1. object_id: what it slows down for, null
+    for nothing."""
 
     state: Literal["cruise", "follow", "stop", "warn", "partial_brake", "full_brake"]
     desired_speed_mps: float
@@ -68,6 +69,7 @@ class AccCommand:
     accelerator: float
     brake: float
     reason: str
+    object_id: int | None = None
 
 
 @dataclass(frozen=True)

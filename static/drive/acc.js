@@ -39,13 +39,8 @@ function update() {
   text(desired, acc ? num(kmh(acc.desired_speed_mps), 0) : DASH);
 }
 
-/** Id of the object that ACC reacts to by its own reason, which names it; null when it reacts to none.
- * @param {import("../js/types.js").Result} result */
-export function reactsTo({ acc, objects }) {
-  const named = /#(\d+)/.exec(acc?.reason ?? "");
-  const id = named ? Number(named[1]) : null;
-  return objects.some((item) => item.id === id) ? id : null;
-}
+/** Id of the object that ACC slows down for, null for none. @param {import("../js/types.js").Result} result */
+export const reactsTo = ({ acc }) => acc?.object_id ?? null;
 
 /** Whether it acts on that object rather than just follow it. @param {import("../js/types.js").Result} result */
 export const isAlarmed = ({ acc }) => ["warn", "partial_brake", "full_brake"].includes(acc?.state ?? "");

@@ -66,6 +66,7 @@
  * @property {number} accelerator
  * @property {number} brake
  * @property {string} reason
+ * @property {number|null} object_id  what it slows down for
  *
  * @typedef {object} Result
  * @property {number} version

@@ -50,7 +50,7 @@ def _decisions(full: dict[str, Any]) -> dict[str, Any]:
     return {
         "frame": full["frame"],
         "cipv": {key: lead[key] for key in lead if key != "id"},
-        "acc": {key: command[key] for key in command if key != "reason"},
+        "acc": {key: command[key] for key in command if key not in ("reason", "object_id")},
         "in_path_m": [item["distance_m"] for item in full["objects"] if item["in_path"]],
     }
 

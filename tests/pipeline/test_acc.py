@@ -83,6 +83,12 @@ def test_the_smallest_demand_wins_whatever_the_order() -> None:
     forward, backward = command(20.0, 34.0, mild, hard), command(20.0, 34.0, hard, mild)
     assert forward == backward
     assert "#2" in forward.reason
+    assert forward.object_id == 2
+
+
+@pytest.mark.parametrize(("distance_m", "object_id"), [(60.0, None), (20.0, 99), (2.0, 99), (None, None)])
+def test_it_names_the_lead_that_it_slows_down_for(distance_m: float | None, object_id: int | None) -> None:
+    assert command(20.0, distance_m).object_id == object_id
 
 
 def test_no_ego_speed_no_command() -> None:

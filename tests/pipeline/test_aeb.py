@@ -62,6 +62,7 @@ def test_each_stage_brakes_as_its_parameter_says_and_names_its_cause() -> None:
     _, full = decide(fused(7, 30.0, velocity=(-20.0, 0.0)))
     assert (full.accel_mps2, full.accelerator, full.brake) == (-8.0, 0.0, 1.0)
     assert "#7" in full.reason
+    assert full.object_id == 7
     _, partial = decide(fused(7, 54.0, velocity=(-20.0, 0.0)))
     assert (partial.accel_mps2, partial.brake) == (-4.0, 0.5)
     _, warn = decide(fused(7, 30.0, velocity=(-14.0, 0.0)), speed_mps=14.0)
@@ -106,7 +107,8 @@ def test_braking_stays_until_the_danger_is_over() -> None:
 
 def test_a_threat_that_vanishes_is_braked_for_a_little_longer() -> None:
     state, _ = decide(fused(1, 30.0, velocity=(-20.0, 0.0)))
-    assert decide(state=state, frames=2)[1].state == "full_brake"
+    held = decide(state=state, frames=2)[1]
+    assert (held.state, held.object_id) == ("full_brake", 1)
     assert decide(state=state, frames=3)[1] == CRUISE
 
 

@@ -43,7 +43,7 @@ FIELDS = {
     "path": "source center left right sigma_m weights carried_by reach_m usable confidence",
     "cipv": "id distance_m closing_speed_mps ttc_s reason",
     "rejected.0": "id reason",
-    "acc": "state desired_speed_mps accel_mps2 accelerator brake reason",
+    "acc": "state desired_speed_mps accel_mps2 accelerator brake reason object_id",
 }
 SHAPES = {"bbox": (4,), "bev": (4, 2), "closest_point": (3,), "velocity_mps": (2,)}
 

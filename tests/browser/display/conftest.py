@@ -1,0 +1,76 @@
+"""The display in the car, opened by touch, and a dashboard that a test has for itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+from app.engine import Engine
+from app.recording import RecordingDesk
+from pipeline.params import Params
+from tests.app.recording import CountingDetector, Recording, opener
+from tests.browser.conftest import WAIT_MS, Site
+
+WAIT_S = WAIT_MS / 1e3
+SCREENS = Path(__file__).resolve().parents[3] / "build" / "screens"
+
+OpenDisplay = Callable[..., Page]
+
+
+@pytest.fixture
+def open_display(browser: Browser) -> Iterator[OpenDisplay]:
+    """Opens the display in a fresh profile, by touch; at the end no page may have complained or called elsewhere."""
+    complaints: list[str] = []
+    pages: list[Page] = []
+
+    def begin(address: str, width: int = 1024, height: int = 600, *, quiet: bool = True, **context: Any) -> Page:
+        page = browser.new_page(viewport={"width": width, "height": height}, has_touch=True, **context)
+        pages.append(page)
+        page.set_default_timeout(WAIT_MS)
+        if quiet:
+            page.on("console", lambda m: complaints.append(m.text) if m.type in ("error", "warning") else None)
+            page.on("pageerror", lambda error: complaints.append(str(error)))
+        host = address.partition("//")[2].partition("/")[0]
+        page.on("request", lambda r: complaints.append(r.url) if "://" in r.url and host not in r.url else None)
+        page.goto(address if "/drive" in address else f"{address}/drive/")
+        return page
+
+    yield begin
+    for page in pages:
+        page.context.close()
+    assert [text for text in complaints if not text.startswith(("blob:", "data:"))] == []
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Iterator[tuple[Site, Recording]]:
+    """A dashboard of this test alone, which plays."""
+    recording = Recording()
+    engine = Engine(
+        opener(recording),
+        lambda _: CountingDetector(),
+        Params(),
+        uri=recording.uri,
+        playing=True,
+        desk=RecordingDesk(tmp_path),
+    )
+    engine.start()
+    site = Site(engine, 0)
+    site.start()
+    yield site, recording
+    recording.gate.set()
+    site.stop()
+    engine.stop()
+
+
+def keep(page: Page, name: str) -> None:
+    SCREENS.mkdir(parents=True, exist_ok=True)
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    page.screenshot(path=SCREENS / f"{name}.png")
+
+
+def is_now(page: Page, kind: str) -> None:
+    expect(page.locator("html")).to_have_attribute("data-freshness", kind)

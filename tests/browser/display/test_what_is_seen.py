@@ -1,0 +1,171 @@
+"""What matters is seen: sensors, figures, whatever ACC reacts to, by day and by night."""
+
+from __future__ import annotations
+
+import cv2
+import httpx
+import numpy as np
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import OpenPage, Site
+from tests.browser.display.conftest import WAIT_S, OpenDisplay, is_now, keep
+from tests.browser.judges import LOW_CONTRAST
+
+SIZES = [(1024, 600), (1280, 800), (800, 480)]
+FINGER_PX = 48
+
+STREAMS = """async () => {
+  const { get, set } = await import("/js/store.js");
+  const stream = (state, rate_hz) => ({ state, rate_hz, age_ms: 10, jitter_ms: 1, lost: 0, note: "" });
+  const streams = { lidar: stream("ok", 10), camera: stream("stale", 5), gnss: stream("silent", null) };
+  set("state", { ...get("state"), streams });
+  return [...document.querySelectorAll("#sensors li")].map((one) =>
+    [one.textContent, getComputedStyle(one).color, one.querySelector("path").getAttribute("d")]);
+}"""
+"""How sensors look in one that is well, one that is late and one that is silent."""
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_a_sensor_that_fails_is_seen_by_colour_word_and_shape(open_display: OpenDisplay, site: Site):
+    page = open_display(site.address)
+    expect(page.locator("#sensors li")).to_have_count(3)
+    works, late, own_speed, gone = page.evaluate(STREAMS)
+    assert [works[0], late[0], own_speed[0], gone[0]] == ["LiDAR10 Hz", "Camerastale", "Own speed", "GNSSsilent"]
+    for column in (1, 2):
+        assert len({works[column], late[column], gone[column]}) == 3
+
+
+CUT_OFF = """() => {
+  const { right } = document.querySelector(".lead").getBoundingClientRect();
+  return [...document.querySelectorAll(".figure small")].filter((node) => node.getBoundingClientRect().right > right)
+    .map((node) => node.textContent);
+}"""
+"""Units that large figures have pushed out of sight."""
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_it_fits_a_finger_finds_it_and_it_can_be_read(open_display: OpenDisplay, site: Site):
+    page = open_display(site.address)
+    for width, height in SIZES:
+        page.set_viewport_size({"width": width, "height": height})
+        for scheme in ("light", "dark"):
+            page.emulate_media(color_scheme=scheme)
+            is_now(page, "paused")
+            expect(page.locator("#sensors li")).to_have_count(3)
+            keep(page, f"drive_{width}x{height}_{scheme}")
+            assert page.evaluate(LOW_CONTRAST) == []
+        assert page.evaluate("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [
+            width,
+            height,
+        ]
+        targets = page.eval_on_selector_all("button", "all => all.map((node) => node.getBoundingClientRect().toJSON())")
+        assert len(targets) == 3
+        for box in targets:
+            assert min(box["width"], box["height"]) >= FINGER_PX
+            assert box["right"] <= width
+            assert box["bottom"] <= height
+        for worst in ("0.0", "188", "88.8"):
+            page.locator("#distance").evaluate("(node, words) => (node.textContent = words)", worst)
+            assert page.evaluate(CUT_OFF) == []
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_the_dashboards_help_leads_there(open_page: OpenPage, site: Site):
+    page = open_page()
+    page.keyboard.press("?")
+    page.get_by_role("link", name="Display").click()
+    expect(page).to_have_url(f"{site.address}/drive/")
+    is_now(page, "paused")
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_the_figures_are_those_of_the_result(open_display: OpenDisplay, site: Site):
+    page = open_display(site.address)
+    result = httpx.get(f"{site.address}/api/result", timeout=WAIT_S).json()
+    lead = result["cipv"]
+    assert lead is not None
+    digits = 1 if lead["distance_m"] < 20 else 0
+    expect(page.locator("#distance")).to_have_text(f"{lead['distance_m']:.{digits}f}")
+    expect(page.locator("#closing")).to_have_text(f"{abs(lead['closing_speed_mps'] * 3.6):.0f}")
+    expect(page.locator("#own-speed")).to_have_text(f"{result['ego']['speed_mps'] * 3.6:.0f}")
+    expect(page.locator("#acc")).to_have_attribute("data-state", result["acc"]["state"])
+
+
+SHOW = """async (change) => {
+  const { get, set } = await import("/js/store.js");
+  const frame = get("frame"), result = { ...frame.result, acc: { ...frame.result.acc, ...change } };
+  set("frame", { ...frame, result });
+  await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+}"""
+"""The shown frame with another command."""
+
+ALARM_PIXELS = """(selector) => {
+  const canvas = document.querySelector(selector), ctx = canvas.getContext("2d");
+  const { data } = ctx.getImageData(0, 0, canvas.width, canvas.height);
+  let found = 0;
+  for (let i = 0; i < data.length; i += 4) {
+    const [r, g, b, a] = data.subarray(i, i + 4);
+    found += r > 230 && g < 110 && b < 110 && a > 200;
+  }
+  return found;
+}"""
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_whatever_acc_reacts_to_is_drawn_also_when_it_is_not_the_lead(open_display: OpenDisplay, site: Site):
+    page = open_display(site.address, color_scheme="light")
+    is_now(page, "paused")
+    result = httpx.get(f"{site.address}/api/result", timeout=WAIT_S).json()
+    other = next(o for o in result["objects"] if o["bev"] and o["id"] != result["cipv"]["id"] and o["distance_m"] < 60)
+    assert page.evaluate(ALARM_PIXELS, "#plan") == 0
+    page.evaluate(SHOW, {"state": "warn", "reason": f"#{other['id']} would be hit in 1.9 s", "object_id": other["id"]})
+    assert page.evaluate(ALARM_PIXELS, "#plan") > 20
+    expect(page.locator("#acc-reason")).to_contain_text(f"#{other['id']} would be hit")
+    page.evaluate(SHOW, {"state": "warn", "reason": "it is not here any more", "object_id": 987654})
+    assert page.evaluate(ALARM_PIXELS, "#plan") == 0
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_warning_and_braking_differ_in_colour_word_and_shape(open_display: OpenDisplay, site: Site):
+    page = open_display(site.address)
+    is_now(page, "paused")
+    looks = set()
+    for state in ("follow", "warn", "full_brake"):
+        page.evaluate(SHOW, {"state": state, "reason": "for a test"})
+        looks.add(
+            page.evaluate(
+                "() => [getComputedStyle(document.querySelector('#acc')).backgroundColor, "
+                "document.querySelector('#acc-word').textContent, "
+                "document.querySelector('#acc-shape path').getAttribute('d')].join('|')"
+            )
+        )
+        keep(page, f"drive_{state}")
+    colours, words, shapes = (set(column) for column in zip(*(look.split("|") for look in looks), strict=True))
+    assert (len(colours), len(words), len(shapes)) == (3, 3, 3)
+
+
+def brightness(page: Page) -> np.ndarray:
+    picture = cv2.imdecode(np.frombuffer(page.screenshot(), np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert picture is not None
+    return picture
+
+
+@pytest.mark.usefixtures("paused_in_traffic")
+def test_night_is_dim_follows_the_system_and_remembers_the_hand(open_display: OpenDisplay, site: Site):
+    page = open_display(site.address, color_scheme="dark")
+    is_now(page, "paused")
+    night = page.locator("#night")
+    expect(night).to_have_attribute("aria-pressed", "true")
+    dark = brightness(page)
+    assert dark.mean() < 60
+    assert (dark > 210).mean() < 0.01, "no large white"
+    page.emulate_media(color_scheme="light")
+    expect(night).to_have_attribute("aria-pressed", "false")
+    assert brightness(page).mean() > 120
+    night.tap()
+    expect(night).to_have_attribute("aria-pressed", "true")
+    page.reload()
+    is_now(page, "paused")
+    expect(night).to_have_attribute("aria-pressed", "true")
+    assert brightness(page).mean() < 60
