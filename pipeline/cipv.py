@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from math import exp, hypot
+from math import copysign, exp, hypot, sqrt
 from typing import NamedTuple
 
 from pipeline.motion import closing_speed_mps
@@ -21,6 +21,11 @@ from pipeline.records import evolve
 from pipeline.types import VEHICLES, Cipv, EgoState, FusedObject, Gate, Path, Rejection
 
 AGREEMENT_SIGMAS = 3.0
+_BLUR_M = 0.2
+"""What moves sideways is weighed over no longer than it takes to move this far: older sightings were elsewhere."""
+_HOVERS_MPS = 1.0
+_KNOWN_M = 0.5
+"""A tracked distance that is as sure as this is as good as a measured one."""
 _HALF_WAY = 0.7
 """A running mean has turned half way after 0.7 of its time: what moves sideways is judged where it will be by then."""
 ON_A_VAGUE_PATH = 0.25
@@ -39,15 +44,27 @@ class CipvState:
 
 class Candidate(NamedTuple):
     """An object with what its tests need to know: its place against the path, the running log-odds of being in it,
-    whether these put it in, whether it led in the frame before, and the path."""
+    whether these put it in, whether it led in the frame before, by how much the path is wider for it, and the path."""
 
     item: FusedObject
     place: Place | None
     odds: float
     inside: bool
     leads: bool
+    widening_m: float
     path: Path
     params: CipvParams
+
+    @property
+    def aside_m(self) -> float:
+        """How far beside the middle of the path it is, as ``path_offset`` is asked: as measured now, unless its
+        sightings so far say otherwise; then what they stand for."""
+        assert self.place is not None
+        margin_m = self.place.margin_m(self.widening_m)
+        if (margin_m >= 0.0) == (self.odds > 0.0):
+            return abs(self.place.middle_m)
+        so_far_m = copysign(self.place.sigma_m * sqrt(2.0 * abs(self.odds)), self.odds)
+        return self.place.limit_m + self.widening_m - so_far_m
 
 
 class Test(NamedTuple):
@@ -78,17 +95,18 @@ def choose(
 ) -> tuple[CipvState, Choice]:
     """The CIPV of this frame, the next one, and a reason for each other object."""
     judged, able, failures, odds = [], [], {}, {}
-    fresh = 1.0 - exp(-dt_s / params.decide_s) if dt_s and params.decide_s > 0.0 else 1.0
     for item, placed in zip(objects, place(objects, path, ego, params), strict=True):
         where, crossing_s = placed if placed is not None else (None, None)
-        leads = item.id == state.lead_id
+        leads, widening_m = item.id == state.lead_id, 0.0
         if where is not None:
-            moves_m = believed_mps(where.sideways_mps, item) * params.decide_s * _HALF_WAY
-            now = where.log_odds(_widening_m(leads, params), moves_m)
+            moving_mps = believed_mps(where.sideways_mps, item)
+            decide_s = min(params.decide_s, _BLUR_M / max(abs(moving_mps), 1e-3))
+            widening_m = _widening_m(leads, moving_mps, params)
+            now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY)
             before = state.odds.get(item.id, now)
-            odds[item.id] = before + fresh * (now - before)
+            odds[item.id] = before + _fresh(dt_s, decide_s) * (now - before)
         now_in = where is not None and where.ahead_m > 0.0 and odds[item.id] > 0.0
-        candidate = Candidate(item, where, odds.get(item.id, 0.0), now_in, leads, path, params)
+        candidate = Candidate(item, where, odds.get(item.id, 0.0), now_in, leads, widening_m, path, params)
         if where is not None and where.margin_m() >= 0.0 and where.ahead_m > 0.0 and not now_in:
             crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
         gates = [ask(candidate) for ask in _QUESTIONS]
@@ -115,6 +133,11 @@ def choose(
     named = _named(lead, _why(lead, len(able))) if lead is not None else None
     choice = Choice(tuple(judged), named, _next_lead(judged, able, lead, params), rejected)
     return CipvState(lead.id if lead is not None else None, odds), choice
+
+
+def _fresh(dt_s: float | None, decide_s: float) -> float:
+    """The share that a new sighting has in the running mean."""
+    return 1.0 - exp(-dt_s / decide_s) if dt_s and decide_s > 0.0 else 1.0
 
 
 def _surer(nearest: FusedObject, able: list[FusedObject]) -> FusedObject:
@@ -196,8 +219,11 @@ def _hits(who: Candidate) -> Gate:
 
 def _seen(who: Candidate) -> Gate:
     """An object whose distance was not measured in this frame may stay the lead, so that the lead does not flicker; it
-    may not become it, because where it is now is only a guess."""
-    known = bool(who.item.seen_by) and who.item.measured
+    may not become it, because where it is now is only a guess. One that the camera sees and the LiDAR has just lost is
+    still known."""
+    item = who.item
+    followed = item.seen_by == "V" and item.source == "VL" and (item.distance_sigma_m or 0.0) < _KNOWN_M
+    known = bool(item.seen_by) and (item.measured or followed)
     passed = known or who.leads or who.params.carried_may_become_lead
     return Gate("seen", float(known), 0.0 if who.leads else 1.0, passed)
 
@@ -231,12 +257,10 @@ def _wrong_size(who: Candidate) -> str:
 
 
 def _path_offset(who: Candidate) -> Gate:
-    """As of now, in metres. A moment outside does not stop what its sightings so far say is inside."""
-    place = who.place
-    if place is None:
+    """In metres, what the odds say: see ``aside_m``."""
+    if who.place is None:
         return Gate("path_offset", None, who.path.half_width_m, False)
-    aside, limit = abs(place.middle_m), place.limit_m + _widening_m(who.leads, who.params)
-    return Gate("path_offset", aside, limit, place.ahead_m > 0.0 and (aside <= limit or who.odds > 0.0))
+    return Gate("path_offset", who.aside_m, who.place.limit_m + who.widening_m, who.inside)
 
 
 def _out_of_path(who: Candidate) -> str:
@@ -244,13 +268,14 @@ def _out_of_path(who: Candidate) -> str:
         return "place not known"
     if who.place.ahead_m <= 0.0:
         return "beside or behind the bumper"
-    aside = abs(who.place.middle_m) - who.place.limit_m - _widening_m(who.leads, who.params)
-    return f"out of path by {aside:.1f} m"
+    outside_m = -who.place.margin_m(who.widening_m)
+    return f"out of path by {outside_m:.1f} m" if outside_m > 0.0 else "in path for a moment only"
 
 
-def _widening_m(leads: bool, params: CipvParams) -> float:
-    """The last lead leaves the path only this far outside it, so that a lead at the edge does not flicker."""
-    return params.hysteresis_m if leads else 0.0
+def _widening_m(leads: bool, moving_mps: float, params: CipvParams) -> float:
+    """The last lead leaves the path only this far outside it, so that a lead at the edge does not flicker. One that
+    moves sideways is on its way."""
+    return params.hysteresis_m * max(0.0, 1.0 - abs(moving_mps) / _HOVERS_MPS) if leads else 0.0
 
 
 def _path_odds(who: Candidate) -> Gate:
@@ -278,7 +303,7 @@ _ELIGIBILITY = (
     Test(_seen, _not_seen),
     Test(_size, _wrong_size),
     Test(_path_offset, _out_of_path),
-    Test(_path_odds, lambda _: "in path for a moment only"),
+    Test(_path_odds, _out_of_path),
     Test(_path_sigma, _uncertain),
 )
 _QUESTIONS = tuple(test.ask for test in _ELIGIBILITY)

@@ -82,6 +82,9 @@ def fuse(
     keys = [(vision[i].id if i is not None else None, lidar[j].id if j is not None else None) for i, j in pairs]
     state, ids = _identities(state, keys)
     footprints = corners[:, :4, :2].tolist()
+    sides = _box_sides(
+        vision, [ranges_m[partner[i]] if i in partner else v.distance_m for i, v in enumerate(vision)], alignment
+    )
     objects, lidar_boxes, vision_boxes = [], {}, {}
     for object_id, (i, j) in zip(ids, pairs, strict=True):
         # of an object that one sensor has alone: the tests of the partner it overlaps most, which say why it is alone
@@ -90,9 +93,10 @@ def fuse(
         seen = vision[i] if i is not None else None
         if j is not None:
             quad = _quad(footprints[j])
-            objects.append(_hit_row(object_id, seen, lidar[j], projected[j], quad, ranges_m[j], sigmas_m[j], tested))
+            row = _hit_row(object_id, seen, lidar[j], projected[j], quad, ranges_m[j], sigmas_m[j], tested)
         elif seen is not None:
-            objects.append(_box_row(object_id, seen, tested))
+            row = _box_row(object_id, seen, tested)
+        objects.append(evolve(row, box_sides=sides[i]) if i is not None and i in sides else row)
         box = projected[j] if j is not None else None
         if box is not None:
             lidar_boxes[object_id] = box
@@ -100,6 +104,23 @@ def fuse(
             vision_boxes[object_id] = seen.bbox
     objects.sort(key=lambda o: (o.distance_m is None, o.distance_m or 0.0, o.id))
     return state, Fusion(tuple(objects), lidar_boxes, vision_boxes)
+
+
+def _box_sides(
+    vision: tuple[VisionTrack, ...], ranges_m: list[float | None], alignment: Alignment | None
+) -> dict[int, tuple[Point2, Point2]]:
+    """Vision index → where its box's left and right edge are at its distance, of what the camera sees now. ranges_m: of
+    each, the LiDAR's where it has it."""
+    seen = [i for i, each in enumerate(vision) if not each.carried and ranges_m[i] is not None]
+    if alignment is None or not seen:
+        return {}
+    boxes = np.array([vision[i].bbox for i in seen])
+    middle = (boxes[:, 1] + boxes[:, 3]) / 2
+    pixels = np.stack([boxes[:, 0], middle, boxes[:, 2], middle], axis=1).reshape(-1, 2)
+    places = (
+        alignment.unproject(pixels, np.repeat([ranges_m[i] or 0.0 for i in seen], 2))[:, :2].reshape(-1, 4).tolist()
+    )
+    return {i: ((ax, ay), (bx, by)) for i, (ax, ay, bx, by) in zip(seen, places, strict=True)}
 
 
 def _to_the_gaps(corners: F64, ranges_m: list[float], params: FusionParams) -> F64:

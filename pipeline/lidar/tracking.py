@@ -29,6 +29,9 @@ NEVER = 1e6
 """Cost of a pair that a gate forbids: more than all allowed ones together."""
 MIN_GATE_POINTS = 10
 """Counts and densities below this many points are noise: one ring more or less doubles them."""
+THINNEST_M = 0.5
+"""A rear alone is as thin as the LiDAR's noise; with a bit of flank it has twenty times the area, and is the same car.
+"""
 
 
 class Looks(NamedTuple):
@@ -123,14 +126,15 @@ def _looks(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
     """place (M, 2) and shape (M, 5) of (M, 12) center x y z, length, width, height, yaw, points, density, spread."""
     place, shape = np.empty((len(rows), 2)), np.empty((len(rows), 5))
     for i in range(len(rows)):
-        yaw, points = rows[i, 6], rows[i, 7]
+        length, width, yaw, points = rows[i, 3], rows[i, 4], rows[i, 6], rows[i, 7]
         across = abs(np.cos(yaw)) < np.sqrt(0.5)
         heading = yaw + np.pi / 2 if across else yaw
-        reach = (rows[i, 4] if across else rows[i, 3]) / 2 * (1.0 if np.cos(heading) >= 0.0 else -1.0)
+        reach = (width if across else length) / 2 * (1.0 if np.cos(heading) >= 0.0 else -1.0)
         place[i, 0], place[i, 1] = rows[i, 0] - reach * np.cos(heading), rows[i, 1] - reach * np.sin(heading)
         shape[i] = rows[i, 7:]
         shape[i, 0] = max(points, MIN_GATE_POINTS)
-        shape[i, 1] *= max(1.0, MIN_GATE_POINTS / max(points, 1.0))
+        spread_over = length * width / (max(length, THINNEST_M) * max(width, THINNEST_M))
+        shape[i, 1] *= spread_over * max(1.0, MIN_GATE_POINTS / max(points, 1.0))
     return place, shape
 
 

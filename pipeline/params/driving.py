@@ -24,7 +24,7 @@ class PathParams(Section):
         0.007, 0.0005, 0.05, 0.0005, "rad/s", "Noise of one yaw rate, the driver's small corrections included"
     )
     lateral_jerk_mps3: float = slider(
-        0.5, 0.05, 3.0, 0.05, "m/s³", "How fast a road's lateral acceleration changes: sets how far an arc is good for"
+        0.8, 0.05, 3.0, 0.05, "m/s³", "How fast a road's lateral acceleration changes: sets how far an arc is good for"
     )
     lateral_accel_mps2: float = slider(
         1.5, 0.1, 6.0, 0.1, "m/s²", "Lateral acceleration that a straight guess leaves open"

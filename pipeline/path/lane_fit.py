@@ -21,7 +21,7 @@ from pipeline.path.lane_types import F64
 
 Picked = npt.NDArray[np.bool_] | npt.NDArray[np.int64] | slice
 
-_NEAREST_M, _VOTE_REACH_M = 2.5, 32.0
+_NEAREST_M, _VOTE_REACH_M, _FARTHEST_M = 2.5, 32.0, 90.0
 _BIN_M, _BINS = 0.2, 90
 """Lateral histogram at x = 0: ±9 m."""
 _PEAK_GAP_M = 1.2
@@ -127,7 +127,7 @@ _PRIOR_INFO = 1.0 / np.array([1.0, 0.03, 1.5e-3, 1e-5]) ** 2
 
 
 def _grid(middle: float, reach: float, step: float) -> F64:
-    count = int(np.ceil(reach / step))
+    count = round(reach / step)
     return np.asarray(middle + step * np.arange(-count, count + 1), np.float64)
 
 
@@ -137,15 +137,17 @@ def _vote(slope, inverse, weight, height, headings, bends, pitches):  # type: ig
     best_score = -1.0
     best, best_histogram = np.zeros(3), np.zeros(_BINS)
     x, y, w = np.empty(len(slope)), np.empty(len(slope)), np.empty(len(slope))
+    voters, count = np.empty(len(slope), np.int64), 0
+    for i in range(len(slope)):  # the same ones for every pitch: one that lets more of them in would seem sharper
+        shifted = inverse[i] + pitches[len(pitches) // 2] / height
+        if shifted > 1.0 / _VOTE_REACH_M and shifted < 1.0 / _NEAREST_M:
+            w[count] = weight[i] * min(1.0 / shifted, 20.0)  # rows lie dense near the car: metres count, not rows
+            voters[count] = i
+            count += 1
     for pitch in pitches:
-        count = 0
-        for i in range(len(slope)):
-            shifted = inverse[i] + pitch / height
-            if shifted > 1.0 / _VOTE_REACH_M and shifted < 1.0 / _NEAREST_M:
-                x[count] = 1.0 / shifted
-                y[count] = slope[i] * x[count]
-                w[count] = weight[i] * min(x[count], 20.0)  # rows lie dense near the car: metres count, not rows
-                count += 1
+        for k in range(count):
+            x[k] = 1.0 / max(inverse[voters[k]] + pitch / height, 1.0 / _FARTHEST_M)
+            y[k] = slope[voters[k]] * x[k]
         for heading in headings:
             for bend in bends:
                 histogram = np.zeros(_BINS)
@@ -184,7 +186,7 @@ def _fit(x, y, slope, weight, prior, prior_info, height, bearing_sigma, rounds):
         near = inside = score = 0.0
         count = 0
         for i in range(len(x)):
-            if not (x[i] > _NEAREST_M and x[i] < 90.0):
+            if not (x[i] > _NEAREST_M and x[i] < _FARTHEST_M):
                 continue
             expected = mean[0] + x[i] * (mean[1] + x[i] * (mean[2] + x[i] * mean[3]))
             residual = y[i] - expected

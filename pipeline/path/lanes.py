@@ -35,6 +35,9 @@ _PLANE_GAIN = 0.1
 """Share by which one sweep moves the road's plane: one fit errs by centimetres, the car's stance changes slowly."""
 _UNPARALLEL = 0.004
 """Real lines of one road differ this much in heading, radians."""
+_HEADING_AT_M = 15.0
+_HEADING = np.array([0.0, 1.0, 2.0 * _HEADING_AT_M, 3.0 * _HEADING_AT_M**2])
+"""A line's slope dy/dx there, of its coefficients."""
 _FLATNESS_RAD = 0.003
 """A road that bends up or down ahead looks like this much pitch."""
 _STRAY_M = 9.0
@@ -120,7 +123,7 @@ def measure(
     seen, line = _on_road(raw, rays, plane, height_m, params.max_range_m)
     if len(line) < _MIN_POINTS:
         return nothing
-    reach = float(np.clip(2.5 * pitch.sigma_rad, 0.004, 0.045))
+    reach = float(min(2.5 * pitch.sigma_rad, 0.045))
     around = replace(expected or Shape(), pitch_rad=pitch.rad, pitch_reach_rad=reach)
     shape, histogram = lane_fit.shared_shape(seen, around)
     sigma = float(np.radians(params.bearing_sigma_deg))
@@ -236,12 +239,18 @@ def _parallel(lines: list[FittedLine], height_m: float, tried_rad: float, before
     """The pitch under which the lines are parallel, joined with what was believed before.
 
     Under a pitch error p a line at lateral place c0 seems turned by c0·p/h, so p/h is the slope of heading over place.
+    The heading is taken where it is known best, in the middle of what is seen. Parallels of curvature κ are concentric:
+    at x they differ in heading by κ²·x for each metre between them.
     """
     if len(lines) < 2:
         return before
-    place, heading = (np.array([line.coefficients[k] for line in lines]) for k in (0, 1))
-    trust = np.array([line.quality / (line.covariance[1, 1] + _UNPARALLEL**2) for line in lines])
+    place = np.array([line.coefficients[0] for line in lines])
+    heading = np.array([_HEADING @ line.coefficients for line in lines])
+    variance_of = np.array([_HEADING @ line.covariance @ _HEADING for line in lines])
+    trust = np.array([line.quality for line in lines]) / (variance_of + _UNPARALLEL**2)
+    bend = float(trust @ [2.0 * line.coefficients[2] for line in lines]) / float(trust.sum())
     place = place - float(trust @ place) / float(trust.sum())
+    heading = heading - bend * bend * _HEADING_AT_M * place
     spread = float(trust @ place**2)
     if spread <= 0.0:
         return before

@@ -30,6 +30,10 @@ CAMERA_SIDEWAYS_PER_S = 0.02
 """The same of a box, a metre of distance: it is placed by its bearing, and swings with its estimated distance."""
 _SLANTED = 0.64
 """Turned by more than 20° from along or across the path, as |sin 2φ|."""
+_WIDEST_M, _LONGEST_M = 3.2, 12.0
+"""A vehicle that drives along is no wider across the path, but for as much of its flank as can be seen."""
+_CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
+_NO_SIDES = ((nan, nan), (nan, nan))
 SURE = 4.0
 """Log-odds beyond which nothing gets surer: the sigmas themselves are not known that well."""
 
@@ -131,27 +135,44 @@ def place(
 
 
 def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
-    """The middle of the side that faces the ego origin: between the two nearest corners."""
-    (ax, ay), (bx, by) = sorted(bev, key=lambda corner: corner[0] ** 2 + corner[1] ** 2)[:2]
-    return (ax + bx) / 2, (ay + by) / 2
+    """The middle of the side that faces the ego origin: of the two sides at the nearest corner the one that is seen
+    under the larger angle. (Between the two nearest corners lies a short side of what is only a thin slice of a rear.)
+    """
+    (ax, ay), (bx, by), (cx, cy), (dx, dy) = bev
+    x, y = _outlines(np.array([[ax, ay, bx, by, cx, cy, dx, dy]]))[0].tolist()
+    return x, y
 
 
 def _numbers(item: FusedObject) -> tuple[float, ...]:
     """One row for ``_against``: the four corners x y, yaw, velocity x y, sigma of the distance, whether only the camera
-    has it, whether it is carried. NaN where unknown."""
+    has it, whether it is carried, ``box_sides``. NaN where unknown."""
     a, b, c, d = item.bev  # type: ignore[misc]
+    e, f = item.box_sides if item.box_sides is not None else _NO_SIDES
     yaw_rad = item.cuboid.yaw_rad if item.cuboid is not None else nan
     velocity = item.velocity_mps if item.velocity_mps is not None else (nan, nan)
-    return (*a, *b, *c, *d, yaw_rad, *velocity, item.distance_sigma_m or 0.0, item.source == "V", not item.seen_by)
+    return (
+        *a,
+        *b,
+        *c,
+        *d,
+        yaw_rad,
+        *velocity,
+        item.distance_sigma_m or 0.0,
+        item.source == "V",
+        not item.seen_by,
+        *e,
+        *f,
+    )
 
 
 @numba.njit(cache=True, nogil=True)
 def _against(rows, center, left, right, half_width, profile, step, overlap, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(N, 11) of (N, 14) rows as ``_numbers`` gives them: distances from the centre to the left and to the right edge
+    """(N, 11) of (N, 18) rows as ``_numbers`` gives them: distances from the centre to the left and to the right edge
     there, sideways speed, then the numbers of ``Place`` as far as ``sigma_m``. half_width: of a path that has no edges
     of its own, else 0."""
     outlines = _outlines(rows)
     aside, reached = nearest(center, outlines)
+    beside, _ = nearest(center, np.ascontiguousarray(rows[:, 14:18]).reshape(-1, 2))
     out = np.empty((len(rows), 11))
     for n in range(len(rows)):
         offsets, ahead = aside[5 * n : 5 * n + 5], reached[5 * n]
@@ -160,18 +181,30 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
         heading = np.arctan2(center[k + 1, 1] - center[k, 1], center[k + 1, 0] - center[k, 0])
         cos, sin = np.cos(heading), np.sin(heading)
         # Of what drives along, the nearest face says where it is: how long it is and how it is turned are known poorly.
-        # What stands slantwise to the path, as one that turns across it does, reaches as far as its far corners.
-        ends = offsets[1:] if abs(np.sin(2.0 * (rows[n, 8] - heading))) > _SLANTED else offsets[1:3]
-        low, high = ends.min(), ends.max()
-        half_left = half_width + np.hypot(left[k, 0] - center[k, 0], left[k, 1] - center[k, 1])
-        half_right = half_width + np.hypot(right[k, 0] - center[k, 0], right[k, 1] - center[k, 1])
-        spare = 0.5 * (high - low) - min(overlap, 0.5 * (high - low))
-        out[n, 0], out[n, 1] = half_left, half_right
+        # What stands slantwise to the path, as one that turns across it does, reaches as far as its far corners, and as
+        # its box does: of a dark flank at 30 m a few points come back.
+        low, high = min(offsets[1], offsets[2]), max(offsets[1], offsets[2])
+        flank = _LONGEST_M * abs(near_y * cos - near_x * sin) / max(np.hypot(near_x, near_y), 0.1)
+        too_wide = abs(beside[2 * n + 1] - beside[2 * n]) > _WIDEST_M + flank
+        if too_wide or abs(np.sin(2.0 * (rows[n, 8] - heading))) > _SLANTED:
+            low, high = min(low, offsets[3], offsets[4]), max(high, offsets[3], offsets[4])
+            if rows[n, 14] == rows[n, 14]:
+                low = min(low, beside[2 * n], beside[2 * n + 1])
+                high = max(high, beside[2 * n], beside[2 * n + 1])
         vx, vy = rows[n, 9], rows[n, 10]
         # the path lies still on the ground: over ground one that follows its bend does not move sideways; where the own
         # speed is not known, relative to ego and its x axis
         along, across = vx + speed - yaw_rate * near_y, vy + yaw_rate * near_x
-        out[n, 2] = across * cos - along * sin if ego_known else vy
+        sideways = across * cos - along * sin if ego_known else vy
+        forward = along * cos + across * sin
+        if ego_known and forward > _SLOWEST_MPS:  # the nose of one that moves over is farther that way than its rear
+            doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * ahead if rows[n, 12] else 0.0)
+            nose = _CAR_LENGTH_M * min(max(abs(sideways) - doubt, 0.0) / forward, _MOST_TURNED)
+            low, high = (low, high + nose) if sideways > 0.0 else (low - nose, high)
+        half_left = half_width + np.hypot(left[k, 0] - center[k, 0], left[k, 1] - center[k, 1])
+        half_right = half_width + np.hypot(right[k, 0] - center[k, 0], right[k, 1] - center[k, 1])
+        spare = 0.5 * (high - low) - min(overlap, 0.5 * (high - low))
+        out[n, 0], out[n, 1], out[n, 2] = half_left, half_right, sideways
         out[n, 3], out[n, 4], out[n, 5], out[n, 6] = offsets[0], ahead, low, high
         out[n, 7] = 0.5 * (low + high)
         out[n, 8], out[n, 9] = half_left + spare, half_right + spare
@@ -181,19 +214,29 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
 
 @numba.njit(cache=True, nogil=True)
 def _outlines(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(5·N, 2): of each row the middle of the nearest face, and the four corners, nearest first."""
+    """(5·N, 2): of each row the middle of the side that faces the ego origin, and the corners in their order around it,
+    those of that side first: the one that is seen under the larger angle, of the two at the nearest corner."""
     outlines = np.empty((5 * len(rows), 2))
     for n in range(len(rows)):
-        corners = outlines[5 * n + 1 : 5 * n + 5]
-        for c in range(4):  # sorted in; equals keep their order
-            x, y, k = rows[n, 2 * c], rows[n, 2 * c + 1], c
-            while k > 0 and x * x + y * y < corners[k - 1, 0] ** 2 + corners[k - 1, 1] ** 2:
-                corners[k, 0], corners[k, 1] = corners[k - 1, 0], corners[k - 1, 1]
-                k -= 1
-            corners[k, 0], corners[k, 1] = x, y
-        outlines[5 * n, 0] = 0.5 * (corners[0, 0] + corners[1, 0])
-        outlines[5 * n, 1] = 0.5 * (corners[0, 1] + corners[1, 1])
+        near = 0
+        for c in range(1, 4):
+            x, y = rows[n, 2 * c], rows[n, 2 * c + 1]
+            if x * x + y * y < rows[n, 2 * near] ** 2 + rows[n, 2 * near + 1] ** 2:
+                near = c
+        way = 1 if _angle(rows[n], near, (near + 1) % 4) >= _angle(rows[n], near, (near + 3) % 4) else 3
+        for c in range(4):
+            k = (near + way * c) % 4
+            outlines[5 * n + 1 + c, 0], outlines[5 * n + 1 + c, 1] = rows[n, 2 * k], rows[n, 2 * k + 1]
+        outlines[5 * n, 0] = 0.5 * (outlines[5 * n + 1, 0] + outlines[5 * n + 2, 0])
+        outlines[5 * n, 1] = 0.5 * (outlines[5 * n + 1, 1] + outlines[5 * n + 2, 1])
     return outlines
+
+
+@numba.njit(cache=True, nogil=True)
+def _angle(row, a, b):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Under which corners a and b are seen from the ego origin."""
+    ax, ay, bx, by = row[2 * a], row[2 * a + 1], row[2 * b], row[2 * b + 1]
+    return abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
 
 
 @numba.njit(cache=True, nogil=True)

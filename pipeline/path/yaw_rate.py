@@ -7,7 +7,8 @@ time, s/v: an arc is good for about two seconds at any speed, which is the look-
 
 Measured on 60 s of a real drive (comma2k19, 8–20 m/s, nearly straight): yaw rate as sampled 0.0046 rad/s around zero
 (of which 0.0024 white, 0.0005 bias), lateral jerk 0.1 m/s³. Curves are entered at 0.3–0.9 m/s³ (AASHTO, *A Policy on
-Geometric Design*, length of spirals): the default lies in between, since the same code must hold on both.
+Geometric Design*, length of spirals): the default is near the upper end, since an arc that is too sure of itself where
+a bend ends pulls the path off the lane lines that show the end.
 
 A yaw rate no larger than its noise is not a road that bends but a driver who corrects, and is gone in a second: the arc
 takes ω / (1 + (σ/ω)⁴) of it, all of a bend and nothing of the noise. The noise that predicts the driven path of that

@@ -3,21 +3,21 @@
 Straight road, left turn, and two turns across the path, each with the LiDAR alone, the camera alone and both. The ego
 vehicle follows its script, and GNSS knows the road that it means to drive, as the paper's did. Truth is the way that it
 will really drive: the nearest vehicle of which 0.9 m (half of what is narrower) reach into a corridor along it. Within
-0.3 m of that edge either answer is right, and where a nearer vehicle hides the lead nobody can say: such frames do not
-count.
+0.3 m of that edge either answer is right, where a nearer vehicle hides the lead nobody can say, and a lead that has
+just come into sight must be seen as often as confirmation asks (``cipv.confirm_hits``): such frames do not count.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
 from pipeline.evaluation.experiments.sections import Cell, Chart, Experiment, Section, Series, Table
 from pipeline.evaluation.lead import switches
-from pipeline.params import Params, PathParams
+from pipeline.params import CipvParams, Params, PathParams
 from pipeline.path.corridor import nearest_on_path
 from pipeline.path.placing import near_face_middle
 from pipeline.run import Sensors
@@ -42,8 +42,10 @@ VISIBLE_SHARE = 0.35
 _EDGE_M, _MARGIN_M = 0.3, 12.0
 _AHEAD_M, _STEP_S, _LONGEST_S, _SMALLEST_MOVE_M = 90.0, 0.25, 15.0, 0.2
 _SAME_PLACE_M, _SAME_SHARE = 2.5, 0.2
-Verdict = Literal["correct", "none", "missed", "false", "wrong", "edge", "hidden"]
-UNDECIDABLE = ("edge", "hidden")
+Verdict = Literal["correct", "none", "missed", "false", "wrong", "edge", "hidden", "new"]
+UNDECIDABLE = ("edge", "hidden", "new")
+"""edge: either answer is right · hidden: a nearer vehicle covers the lead · new: it was covered, or the drive had not
+begun, so short a time ago that it cannot be confirmed yet."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +76,14 @@ def run(case: Case) -> list[Frame]:
     scene = scenario.load(case.scene)
     scene = scene.model_copy(update={"seed": scene.seed + 100 * case.seed})
     setup = Setup(Params(), case.sensors, closed=False)
-    way = Way.of(scene)
-    return [judge(way, tick) for tick in drive(scene, setup)]
+    way, in_sight, frames = Way.of(scene), InSight(), []
+    for tick in drive(scene, setup):
+        assert tick.frame.camera is not None
+        in_sight = in_sight.then(tick.world, tick.frame.camera)
+        frame = judge(way, tick)
+        is_new = frame.verdict == "missed" and frame.lead is not None and not in_sight.is_confirmable(frame.lead)
+        frames.append(replace(frame, verdict="new") if is_new else frame)
+    return frames
 
 
 def judge(way: Way, tick: Tick) -> Frame:
@@ -153,6 +161,22 @@ def true_lead(now: World, path: Path | None, max_m: float = MAX_M) -> tuple[Acto
             found.append((nearest, state))
     nearest_m, lead = min(found, key=lambda pair: pair[0], default=(np.inf, None))
     return lead, bool(doubtful_m < nearest_m)
+
+
+@dataclass(frozen=True)
+class InSight:
+    """For how many frames in a row each vehicle has been in sight, by number."""
+
+    frames: Mapping[int, int] = field(default_factory=dict)
+
+    def then(self, now: World, camera: CameraCalibration) -> InSight:
+        """One frame later."""
+        ids = [state.actor.id for state in now.actors if not is_hidden(state, now, camera)]
+        return InSight({each: self.frames.get(each, 0) + 1 for each in ids})
+
+    def is_confirmable(self, actor: int) -> bool:
+        """Whether it could have been seen as often as an object must be that one sensor sees."""
+        return self.frames.get(actor, 0) >= CipvParams().confirm_hits
 
 
 def is_hidden(state: ActorState, now: World, camera: CameraCalibration) -> bool:

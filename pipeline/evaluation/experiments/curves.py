@@ -4,7 +4,8 @@ Bends at 3 m/s² lateral acceleration, S-curves and straights; a lead in the lan
 lanes beside it at 20–100 m. Detections are given: true boxes with the errors measured of the embedded detector, a
 simulated LiDAR. Every frame goes through the line with each source of the path alone, with none, without a route, and
 with all fused. Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge
-and no nearer vehicle hides it; the first second, in which the trackers start, is left out.
+and no nearer vehicle hides it. Missing one that has just come into sight is not counted before confirmation can be
+through (``choosing.InSight``).
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.evaluation.experiments import bends
-from pipeline.evaluation.experiments.choosing import Way, is_hidden, same_place, true_lead
+from pipeline.evaluation.experiments.choosing import InSight, Way, is_hidden, same_place, true_lead
 from pipeline.evaluation.experiments.sections import Cell, Experiment, Section, Table
 from pipeline.params import Params, with_changes
 from pipeline.path.corridor import nearest_on_path
@@ -47,7 +48,6 @@ BOXES = BoxNoise(reach_m=105.0)
 """As measured of the embedded detector (``truth_boxes``), its reach included."""
 LINES = LineNoise()
 LOOK_AHEAD_M = (10, 30, 60, 100)
-WARM_UP_S = 1.0
 LONGEST_WRONG_S = 0.3
 _TRUE_WAY_M = 130.0
 
@@ -126,13 +126,17 @@ def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[Wor
 def _judged(
     scene: Scenario, reach_m: float, rows: Sequence[tuple[World, Frame, Result]], over_line_s: float | None
 ) -> Frames:
-    way = Way.of(scene)
+    way, in_sight = Way.of(scene), InSight()
     verdicts, lead_m, errors, sigmas, told = [], [], [], [], []
     for now, frame, result in rows:
         true_path = way.ahead(now, _TRUE_WAY_M)
         assert frame.camera is not None
+        in_sight = in_sight.then(now, frame.camera)
         verdict, metres = judge(now, frame.camera, result, true_path, reach_m)
-        verdicts.append(verdict if now.t_s >= WARM_UP_S else "undecided")
+        if verdict == "missed":
+            lead, _ = true_lead(now, true_path, reach_m)
+            verdict = verdict if lead is not None and in_sight.is_confirmable(lead.actor.id) else "undecided"
+        verdicts.append(verdict)
         lead_m.append(metres)
         told.append(_is_told(now, result, 2) if over_line_s is not None else False)
         errors.append(_errors_m(result.path, true_path))

@@ -65,8 +65,9 @@ def test_a_pitch_that_is_not_looked_for_bends_the_lane_and_says_so() -> None:
     sure = measure(raw, aligned(), FLAT, SURE, PARAMS)
     assert sure.pitch.rad == pytest.approx(0.0, abs=2e-3)
     unsure = measure(raw, aligned(), FLAT, UNSURE, PARAMS)
+    assert unsure.pitch.sigma_rad > 1.5 * sure.pitch.sigma_rad
     sigma = [np.sqrt(found.lines[0].covariance[1, 1]) for found in (sure, unsure)]
-    assert sigma[1] > 1.2 * sigma[0]
+    assert sigma[1] > sigma[0]
 
 
 @given(
@@ -119,8 +120,11 @@ WRONG = {
 
 @pytest.mark.parametrize("wrong", WRONG)
 def test_a_wrong_calibration_gives_no_lane_rather_than_a_wrong_one(wrong: str) -> None:
+    """What the pitch search can mend may end on the paint."""
     lane = seen(paint(), through=WRONG[wrong]())
-    assert lane.left is None or lane.right is None
+    if lane.left is not None and lane.right is not None:
+        assert lane.left.y_m([5.0, 15.0]) == pytest.approx(1.75, abs=0.2)
+        assert lane.right.y_m([5.0, 15.0]) == pytest.approx(-1.75, abs=0.2)
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.9])

@@ -100,8 +100,10 @@ def test_a_path_known_less_makes_a_probability_that_says_less() -> None:
 @pytest.mark.parametrize(
     ("item", "seconds"),
     [
-        pytest.param(fused(1, 30.0, 4.4, velocity=(-5.0, -1.5)), 2.0, id="2 m from the line at 1 m/s believed"),
-        pytest.param(fused(1, 30.0, -4.4, velocity=(-5.0, 1.5)), 2.0, id="from the right"),
+        pytest.param(
+            fused(1, 30.0, 4.4, velocity=(-5.0, -1.5)), 1.7, id="its nose 1.7 m from the line at 1 m/s believed"
+        ),
+        pytest.param(fused(1, 30.0, -4.4, velocity=(-5.0, 1.5)), 1.7, id="from the right"),
         pytest.param(fused(1, 30.0, 2.0, velocity=(-5.0, -1.5)), 0.0, id="its side is over the line"),
         pytest.param(fused(1, 30.0, 4.4, velocity=(-5.0, -0.4)), None, id="noise"),
         pytest.param(fused(1, 30.0, 4.4, velocity=(-5.0, 1.5)), None, id="moves away"),
