@@ -184,6 +184,8 @@ class LabelDesk:
     def refresh(self) -> None:
         """Look at the database now."""
         opened = self._open
+        if not opened.uri:
+            return
         try:
             log, revision = self._labels_of(opened).log, self._labels_of(opened).revision
             can_undo, can_redo = log.possible()
@@ -228,9 +230,9 @@ class LabelDesk:
             self._wake.clear()
             if self._database is None or self._ended:
                 continue
+            opened = self._open
             try:
-                opened = self._open
-                if opened.labels is None or opened.labels.revision != self._state.revision:
+                if opened.uri and (opened.labels is None or opened.labels.revision != self._state.revision):
                     self.refresh()
             except Exception as error:  # whatever a database or a recording does, others still drive
                 logger.warning("labels: %s", error)

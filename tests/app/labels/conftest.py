@@ -1,0 +1,71 @@
+"""Labels are tested on both databases: each test has a drive of its own, without labels."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from app.labels.database import Database
+from app.labels.drive import DriveInfo, DriveLabels
+from tests.app.labels import postgres
+
+COUNT = 100
+_numbers = itertools.count()
+
+
+def fresh() -> DriveInfo:
+    """A recording that no other test has."""
+    return info(f"drive {next(_numbers)}")
+
+
+def info(key: str, count: int = COUNT) -> DriveInfo:
+    """A made-up recording at 10 Hz."""
+    names = tuple(f"{index:06d}" for index in range(count))
+    return DriveInfo(key, f"test:{key}", "a drive", tuple(index * 100_000_000 for index in range(count)), lambda: names)
+
+
+@pytest.fixture(scope="session")
+def postgres_url() -> Iterator[str]:
+    """Of a server that runs for these tests alone; skipped without PostgreSQL's programs, but never in CI."""
+    found = postgres.binaries()
+    if found is None:
+        assert os.environ.get("CIPV_BROWSER_TESTS") != "1", "PostgreSQL is not installed, and these tests may not skip"
+        pytest.skip("no PostgreSQL here (apt-get install postgresql)")
+    with postgres.running(found) as url:
+        yield url
+
+
+@pytest.fixture(scope="session")
+def sqlite_database(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Database]:
+    database = Database.in_file(tmp_path_factory.mktemp("labels") / "labels.db")
+    yield database
+    database.close()
+
+
+@pytest.fixture(scope="session")
+def postgres_database(postgres_url: str) -> Iterator[Database]:
+    database = Database(postgres_url)
+    yield database
+    database.close()
+
+
+@pytest.fixture(params=["sqlite", "postgres"])
+def database(request: pytest.FixtureRequest) -> Database:
+    """Both, one after the other."""
+    found: Database = request.getfixturevalue(f"{request.param}_database")
+    return found
+
+
+@pytest.fixture
+def labels(database: Database) -> DriveLabels:
+    """A drive that nobody has labelled."""
+    return DriveLabels(database, fresh(), station="here")
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "labels.db"

@@ -1,0 +1,57 @@
+"""A real server in a process of its own, which can be killed at any moment. All that it imports is imported once, by
+the process that the servers are forked from."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerContext
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+from app.engine import Engine
+from app.labels.database import Database
+from app.labels.desk import LabelDesk
+from app.server import Server, create_app, listen_socket
+from pipeline.params import Params
+from tests.app.recording import Recording, opener
+from tests.app.serving import WAIT_S
+
+
+def _serve(file: Path, tell: Connection) -> None:
+    recording = Recording()
+    engine = Engine(
+        opener(recording),
+        None,
+        Params(),
+        uri=recording.uri,
+        whole_drives=True,
+        labels=LabelDesk(Database.in_file(file)),
+    )
+    engine.start()
+    engine.wait_for(lambda shown: shown.labels.labelled, WAIT_S)
+    bound = listen_socket("127.0.0.1", 0)
+    address = f"http://127.0.0.1:{bound.getsockname()[1]}"
+    Server(create_app(engine), address, tell.send).run(sockets=[bound])
+
+
+@contextmanager
+def forking() -> Iterator[ForkServerContext]:
+    """Where servers come from."""
+    context = multiprocessing.get_context("forkserver")
+    context.set_forkserver_preload(["tests.app.labels.server_process"])
+    yield context
+
+
+def started(context: ForkServerContext, file: Path) -> tuple[BaseProcess, str]:
+    """The process and its address, as soon as it answers."""
+    hear, tell = context.Pipe(duplex=False)
+    process = context.Process(target=_serve, args=(file, tell), daemon=True)
+    process.start()
+    assert hear.poll(WAIT_S), "the server does not start"
+    address: str = hear.recv()
+    hear.close()
+    tell.close()
+    return process, address

@@ -1,0 +1,106 @@
+"""The database itself: its schema, how it is opened, and what is said when it cannot be."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import text
+
+from app.labels import migrations
+from app.labels.database import Database, DatabaseError, open_database
+from app.labels.drive import DriveLabels
+from app.labels.tables import Base
+from tests.app.labels.conftest import info
+
+
+def test_the_migrations_make_the_tables_as_they_are_declared(database: Database) -> None:
+    with database.reading() as connection:
+        assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []
+
+
+def test_the_newest_migration_is_the_one_that_is_worked_with() -> None:
+    config = Config()
+    config.set_main_option("script_location", str(Path(migrations.__file__).parent))
+    assert ScriptDirectory.from_config(config).get_heads() == [migrations.HEAD]
+
+
+def test_what_is_committed_is_on_disk(sqlite_database: Database) -> None:
+    """A log that is written through to the disk before a commit ends."""
+    with sqlite_database.reading() as connection:
+        assert connection.scalar(text("PRAGMA journal_mode")) == "wal"
+        assert connection.scalar(text("PRAGMA synchronous")) == 2
+
+
+def test_two_that_open_a_new_database_at_once_both_can(file: Path) -> None:
+    opened: list[Database] = []
+
+    def one() -> None:
+        opened.append(Database.in_file(file))
+
+    threads = [threading.Thread(target=one) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {DriveLabels(each, info("drive")).revision for each in opened} == {0}
+    assert len(opened) == 4
+    for each in opened:
+        each.close()
+
+
+def test_a_database_of_a_newer_program_is_left_alone(file: Path) -> None:
+    first = Database.in_file(file)
+    with first.writing() as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    first.close()
+    with pytest.raises(DatabaseError, match="written by a newer program"):
+        Database.in_file(file)
+
+
+@pytest.mark.parametrize(
+    ("url", "says"),
+    [
+        ("nonsense", "no database address"),
+        ("mysql://somewhere/labels", "no database address"),
+        ("sqlite:////nowhere/at/all/labels.db", "unable to open"),
+        ("postgresql://me:secret@127.0.0.1:1/labels", "127.0.0.1:1"),
+    ],
+)
+def test_an_address_that_cannot_be_opened_is_said_without_its_password(url: str, says: str) -> None:
+    with pytest.raises(DatabaseError) as error:
+        Database(url)
+    assert says in str(error.value)
+    assert "secret" not in str(error.value)
+
+
+def test_a_file_that_is_no_database_is_said(file: Path) -> None:
+    file.write_bytes(b"these are no labels" * 100)
+    with pytest.raises(DatabaseError, match="not a database"):
+        Database.in_file(file)
+    (file.parent / "a file").write_text("")
+    with pytest.raises(DatabaseError, match="labels cannot be kept there"):
+        Database.in_file(file.parent / "a file" / "labels.db")
+
+
+def test_the_environment_names_the_database_of_a_team(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CIPV_LABELS_URL", f"sqlite:///{file}")
+    database = open_database()
+    assert (database.name, file.is_file()) == (str(file), True)
+    database.close()
+
+
+def test_a_database_at_the_newest_schema_is_opened_as_it_is(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What changes schemas takes half a second to import: only who needs it pays."""
+    Database.in_file(file).close()
+
+    def migrate(*_: object) -> None:
+        raise AssertionError("there is nothing to change")
+
+    monkeypatch.setattr("app.labels.database.migrate", migrate)
+    Database.in_file(file).close()

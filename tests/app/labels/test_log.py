@@ -1,0 +1,340 @@
+"""Acts, and going back and forth through them: across labels and parameters, by person, and after a restart."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from app.labels.acts import do
+from app.labels.acts.scope import Scope
+from app.labels.database import Database
+from app.labels.draft import Draft
+from app.labels.drive import DriveLabels
+from app.labels.log import Acted
+from app.labels.refusals import ActRefused, Stale
+from app.labels.requests import AddTrack, CuboidIn, Relabel, SetLead, SetSighting
+from pipeline.labels.model import LabelSet, LeadRange
+from tests.app.labels.conftest import fresh, info
+
+
+def cuboid(x: float = 20.0) -> CuboidIn:
+    return CuboidIn(center=(x, 0.0, 0.7), size=(4.0, 1.8, 1.5), yaw_rad=0.0)
+
+
+def act(labels: DriveLabels, person: str, doing: object) -> Acted:
+    kind: str = doing.kind  # type: ignore[attr-defined]
+    return labels.log.act(kind, person, lambda draft: do(draft, Scope(labels.info.t_ns), doing))
+
+
+def add(labels: DriveLabels, person: str = "Ada", x: float = 20.0) -> int:
+    """Its number."""
+    before = set(labels.items("track"))
+    act(labels, person, AddTrack(kind="add_track", label="car", frame=10, cuboid=cuboid(x)))
+    (number,) = set(labels.items("track")) - before
+    return number
+
+
+def relabel(labels: DriveLabels, track: int, label: str, person: str = "Ada") -> Acted:
+    revision = labels.track(track).revision
+    return act(labels, person, Relabel(kind="relabel", track=track, revision=revision, label=label))
+
+
+def shown(labels: DriveLabels) -> LabelSet:
+    return labels.label_set()
+
+
+def label_of(labels: DriveLabels, track: int) -> str:
+    return labels.track(track).value.label  # type: ignore[union-attr]
+
+
+# ------------------------------------------------------------ one act
+
+
+def test_an_act_is_one_row_and_what_it_changed(labels: DriveLabels) -> None:
+    number = add(labels)
+    assert (labels.revision, number) == (1, 1)
+    (entry,) = labels.log.history("track", number)
+    assert (entry.act, entry.person, entry.what, entry.before, entry.undone) == (
+        1,
+        "Ada",
+        "added #1, a car, in frame 10",
+        None,
+        False,
+    )
+    assert entry.after is not None
+    assert [each["frame"] for each in entry.after["sightings"]] == [10]
+
+
+def test_an_act_that_is_refused_leaves_no_trace(labels: DriveLabels) -> None:
+    number = add(labels)
+    before = shown(labels)
+
+    def half_done(draft: Draft) -> str:
+        draft.put("track", number, None)
+        raise ActRefused("no")
+
+    with pytest.raises(ActRefused):
+        labels.log.act("remove", "Ada", half_done)
+    assert (shown(labels), labels.revision) == (before, 1)
+    assert len(labels.log.history("track", number)) == 1
+
+
+def test_what_changes_nothing_is_no_act(labels: DriveLabels) -> None:
+    number = add(labels)
+    relabel(labels, number, "truck")
+    again = labels.log.act("x", "Ada", lambda draft: draft.put("track", number, draft.get("track", number).value) or "")
+    assert (again.act, again.what, labels.revision) == (None, "nothing changed", 2)
+
+
+def test_a_number_is_never_given_twice(labels: DriveLabels) -> None:
+    first = add(labels)
+    labels.log.act("remove", "Ada", lambda draft: draft.put("track", first, None) or "removed")
+    assert add(labels) == first + 1
+
+
+def test_only_what_changed_since_is_told(labels: DriveLabels) -> None:
+    first, second = add(labels), add(labels)
+    third = act(labels, "Ada", SetLead(kind="set_lead", first=0, last=5, lead=first)).revision
+    labels.log.act("remove", "Ada", lambda draft: draft.put("track", second, None) or "removed")
+    changes = labels.changes(since=2)
+    assert [(item.kind, item.id, item.revision) for item in changes.items] == [("lead", 1, third)]
+    assert (changes.removed, changes.revision) == ([("track", second)], 4)
+    assert labels.changes(0).extents == {first: (10, 10, 1, [10])}
+
+
+# ------------------------------------------------------------ back and forth
+
+
+def test_undo_and_redo_go_through_every_act(labels: DriveLabels) -> None:
+    states = [shown(labels)]
+    number = add(labels)
+    states.append(shown(labels))
+    for label in ("truck", "bus", "car"):
+        relabel(labels, number, label)
+        states.append(shown(labels))
+    act(labels, "Ada", SetLead(kind="set_lead", first=3, last=30, lead=number))
+    states.append(shown(labels))
+    for state in reversed(states[:-1]):
+        labels.log.move("undo", "Ada")
+        assert shown(labels) == state
+    with pytest.raises(ActRefused, match="nothing to undo"):
+        labels.log.move("undo", "Ada")
+    for state in states[1:]:
+        labels.log.move("redo", "Ada")
+        assert shown(labels) == state
+    with pytest.raises(ActRefused, match="nothing to redo"):
+        labels.log.move("redo", "Ada")
+
+
+def test_something_else_ends_what_could_be_redone(labels: DriveLabels) -> None:
+    number = add(labels)
+    relabel(labels, number, "bus")
+    labels.log.move("undo", "Ada")
+    assert labels.log.possible("Ada") == (True, True)
+    relabel(labels, number, "truck")
+    assert labels.log.possible("Ada") == (True, False)
+    labels.log.move("undo", "Ada")
+    assert label_of(labels, number) == "car"
+    labels.log.move("redo", "Ada")
+    assert label_of(labels, number) == "truck"
+
+
+def test_each_takes_back_only_their_own(labels: DriveLabels) -> None:
+    ada, bob = add(labels, "Ada"), add(labels, "Bob")
+    assert labels.log.move("undo", "Ada").what == f"added #{ada}, a car, in frame 10"
+    assert set(labels.items("track")) == {bob}
+    with pytest.raises(ActRefused, match="nothing to undo"):
+        labels.log.move("undo", "Ada")
+
+
+def test_what_somebody_else_changed_since_is_not_taken_back(labels: DriveLabels) -> None:
+    number = add(labels, "Ada")
+    relabel(labels, number, "bus", "Bob")
+    with pytest.raises(ActRefused, match="Bob changed #1 since; undo would take that back too"):
+        labels.log.move("undo", "Ada")
+    assert label_of(labels, number) == "bus"
+    labels.log.move("undo", "Bob")
+    labels.log.move("undo", "Ada")
+    assert not labels.items("track")
+
+
+def test_labels_and_parameters_are_one_stack(labels: DriveLabels) -> None:
+    number = add(labels)
+    labels.log.settle({"cluster.z_weight": (0.4, 0.3)})
+    relabel(labels, number, "bus")
+    assert labels.log.move("undo", "Ada").params == {}
+    assert labels.log.move("undo", "Ada").params == {"cluster.z_weight": 0.4}
+    labels.log.move("undo", "Ada")
+    assert not labels.items("track")
+    labels.log.move("redo", "Ada")
+    assert labels.log.move("redo", "Ada").params == {"cluster.z_weight": 0.3}
+
+
+def test_nudges_of_one_slider_are_one_step(labels: DriveLabels) -> None:
+    labels.log.settle({"a.b": (1, 2)}, merges=True)
+    labels.log.settle({"a.b": (2, 3)}, merges=True)
+    labels.log.settle({"a.c": (0, 1)}, merges=True)
+    assert labels.log.move("undo", "").params == {"a.c": 0}
+    assert labels.log.move("undo", "").params == {"a.b": 1}
+    assert labels.log.move("redo", "").params == {"a.b": 3}
+    assert labels.log.possible("") == (True, True)
+
+
+def test_parameters_belong_to_the_machine_they_were_changed_on(labels: DriveLabels, database: Database) -> None:
+    there = DriveLabels(database, labels.info, station="there")
+    labels.log.settle({"a.b": (1, 2)})
+    assert (labels.log.possible("Ada"), there.log.possible("Ada")) == ((True, False), (False, False))
+
+
+def test_parameters_that_cannot_be_any_more_are_not_taken_back(labels: DriveLabels) -> None:
+    labels.log.settle({"gone.name": (1, 2)})
+
+    def check(_: object) -> None:
+        raise ActRefused("no parameter named 'gone.name'")
+
+    with pytest.raises(ActRefused, match="gone"):
+        labels.log.move("undo", "", check)
+    assert labels.log.possible("") == (True, False)
+
+
+def test_going_back_is_possible_after_a_restart(file: Path) -> None:
+    first = Database.in_file(file)
+    labels = DriveLabels(first, info("drive"), station="here")
+    number = add(labels)
+    relabel(labels, number, "bus")
+    labels.log.settle({"a.b": (1, 2)})
+    labels.log.move("undo", "Ada")
+    first.close()
+    second = Database.in_file(file)
+    labels = DriveLabels(second, info("drive"), station="here")
+    assert labels.log.possible("Ada") == (True, True)
+    assert labels.log.move("redo", "Ada").params == {"a.b": 2}
+    for _ in range(3):
+        labels.log.move("undo", "Ada")
+    assert shown(labels).tracks == ()
+    assert [entry.undone for entry in labels.log.history("track", number)] == [False, False, True, True]
+    second.close()
+
+
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    moves=st.lists(st.tuples(st.sampled_from(["Ada", "Bob"]), st.sampled_from(["act", "undo", "redo"])), max_size=15)
+)
+def test_a_persons_steps_are_a_list_with_a_cursor(sqlite_database: Database, moves: list[tuple[str, str]]) -> None:
+    """Two people on labels of their own, in any order: neither moves the other's cursor."""
+    labels = DriveLabels(sqlite_database, fresh(), "here")
+    stacks: dict[str, list[int]] = {"Ada": [], "Bob": []}
+    cursor = {"Ada": 0, "Bob": 0}
+    for person, move in moves:
+        if move == "act":
+            number = add(labels, person)
+            stacks[person] = [*stacks[person][: cursor[person]], number]
+            cursor[person] += 1
+        else:
+            wanted = cursor[person] + (1 if move == "redo" else -1)
+            if 0 <= wanted <= len(stacks[person]):
+                labels.log.move(move, person)  # type: ignore[arg-type]
+                cursor[person] = wanted
+            else:
+                with pytest.raises(ActRefused):
+                    labels.log.move(move, person)  # type: ignore[arg-type]
+        assert set(labels.items("track")) == {n for who in stacks for n in stacks[who][: cursor[who]]}
+
+
+# ------------------------------------------------------------ two at once
+
+
+def test_a_stale_edit_says_whose_it_is_and_writes_nothing(labels: DriveLabels) -> None:
+    number = add(labels)
+    seen = labels.track(number).revision
+    relabel(labels, number, "bus", "Bob")
+    late = SetSighting(kind="set_sighting", track=number, revision=seen, frame=10, cuboid=cuboid(30.0))
+    with pytest.raises(Stale, match="Bob changed #1 since") as stale:
+        act(labels, "Ada", late)
+    assert stale.value.theirs is not None
+    assert (stale.value.theirs["label"], stale.value.theirs["revision"]) == ("bus", 2)
+    labels.log.act("remove", "Bob", lambda draft: draft.put("track", number, None) or "removed")
+    with pytest.raises(Stale, match="Bob removed #1 since") as gone:
+        act(labels, "Ada", late)
+    assert gone.value.theirs is None
+
+
+def test_of_two_edits_of_one_label_at_once_one_wins_and_one_is_told(labels: DriveLabels) -> None:
+    number = add(labels)
+    seen = labels.track(number).revision
+    outcomes: list[object] = []
+    barrier = threading.Barrier(2)
+
+    def edit(person: str, label: str) -> None:
+        barrier.wait()
+        try:
+            outcomes.append(act(labels, person, Relabel(kind="relabel", track=number, revision=seen, label=label)))
+        except Stale as stale:
+            outcomes.append(stale)
+
+    together(lambda: edit("Ada", "bus"), lambda: edit("Bob", "truck"))
+    assert sorted(type(outcome).__name__ for outcome in outcomes) == ["Acted", "Stale"]
+    assert labels.revision == 2
+
+
+def test_many_acts_at_once_are_all_there(labels: DriveLabels, database: Database) -> None:
+    """On two servers: each has a number of its own, and none is lost."""
+    other = DriveLabels(database, labels.info, station="there")
+    together(
+        *(lambda on=on, who=who: [add_only(on, who) for _ in range(5)] for on, who in ((labels, "A"), (other, "B")))
+    )
+    assert labels.revision == other.revision == 10
+    assert set(labels.items("track")) == set(range(1, 11))
+
+
+def add_only(labels: DriveLabels, person: str) -> None:
+    act(labels, person, AddTrack(kind="add_track", label="car", frame=10, cuboid=cuboid()))
+
+
+def together(*work: Callable[[], object]) -> None:
+    threads = [threading.Thread(target=each) for each in work]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+
+
+# ------------------------------------------------------------ as a whole
+
+
+def test_all_labels_come_back_as_they_were_put(labels: DriveLabels) -> None:
+    number = add(labels)
+    act(labels, "Ada", SetLead(kind="set_lead", first=0, last=5, lead=number))
+    act(labels, "Ada", SetLead(kind="set_lead", first=2, last=3, lead="unknown"))
+    found = shown(labels)
+    assert [(each.first, each.last, each.lead) for each in found.leads] == [(0, 1, 1), (2, 3, "unknown"), (4, 5, 1)]
+    assert all(isinstance(each, LeadRange) and each.origin.name == "Ada" for each in found.leads)
+    (track,) = found.tracks
+    assert track.sightings[0].cuboid is not None
+    assert track.sightings[0].cuboid.center == (20.0, 0.0, 0.7)
+
+
+def test_a_frozen_version_stays_as_it_was(labels: DriveLabels) -> None:
+    number = add(labels)
+    before = shown(labels)
+    version = labels.freeze("first", "Ada")
+    assert (version.tracks, version.frames) == (1, 1)
+    relabel(labels, number, "bus")
+    assert replace(labels.label_set("first"), name="working") == before
+    assert [each.name for each in labels.versions()] == ["first"]
+    for taken in ("first", "working"):
+        with pytest.raises(ActRefused, match="never overwritten"):
+            labels.freeze(taken, "Bob")
+
+
+def test_labels_of_one_drive_are_not_anothers(labels: DriveLabels, database: Database) -> None:
+    add(labels)
+    other = DriveLabels(database, info(labels.info.key + " of another"))
+    assert not other.has_labels()
+    assert DriveLabels(database, replace(labels.info, uri="moved:elsewhere")).has_labels()
