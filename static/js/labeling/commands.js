@@ -30,8 +30,8 @@ const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
 
 /** The pipeline's output becomes proposals, in the marked frames or in all. */
 export function propose() {
-  const { first, last } = get("marked") ? span.span() : { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
-  return act({ kind: "propose", first, last, from: "run" }).then((answer) => answer && span.forget());
+  const isMarked = get("marked") !== null, whole = { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
+  return span.over((frames) => act({ kind: "propose", ...(isMarked ? frames : whole), from: "run" }));
 }
 
 /** Accept or reject the selected track whole; without one, who leads here. @param {"accept"|"reject"} kind */
@@ -99,7 +99,7 @@ export const sizeAlong = () => withTrack(({ id, revision }) => {
 });
 
 /** The vehicle is not there, in the marked frames or in this one. */
-export const notHere = () => withTrack(({ id, revision }) => act({ kind: "drop_sightings", track: id, revision, ...span.span() }).then((answer) => answer && span.forget()));
+export const notHere = () => withTrack(({ id, revision }) => span.over((frames) => act({ kind: "drop_sightings", track: id, revision, ...frames })));
 
 /** @param {1|-1} direction */
 export const nextClass = (direction) => withTrack(({ label }) => {

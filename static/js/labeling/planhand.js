@@ -59,9 +59,9 @@ async function add(label) {
   const draft = get("draft");
   if (!draft?.cuboid) return;
   const answer = await act({ kind: "add_track", label, frame: draft.frame, cuboid: draft.cuboid, bbox: null });
-  const made = answer?.changed?.tracks[0]?.id ?? null;
-  if (get("draft") === draft) set("draft", answer && made !== null ? { ...draft, track: made, settled: answer.revision } : null);
-  if (made !== null) set("track", made);
+  const made = answer?.changed?.tracks[0] ?? null;
+  if (get("draft") === draft) set("draft", answer && made ? { ...draft, track: made.id, revision: made.revision, settled: answer.revision } : null);
+  if (made) set("track", made.id);
 }
 
 /** A press selects what is there, or is what the tool asks for. @param {Place} place */

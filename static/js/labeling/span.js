@@ -37,16 +37,19 @@ export function span() {
 }
 
 /** Say who leads in the marked frames. @param {Lead} lead */
-export async function paint(lead) {
-  const { first, last } = span();
-  const answer = await act({ kind: "set_lead", first, last, lead });
-  if (answer) forget();
-}
+export const paint = (lead) => over((frames) => act({ kind: "set_lead", ...frames, lead }));
 
 /** Say that nobody has said who leads there. */
-export async function clear() {
-  const { first, last } = span();
-  if (await act({ kind: "clear_lead", first, last })) forget();
+export const clear = () => over((frames) => act({ kind: "clear_lead", ...frames }));
+
+/** Do something to the marked frames. The mark goes at once, so that the next act is not about it; what was refused brings it back.
+ * @param {(frames: {first: number, last: number}) => Promise<unknown>} what */
+export async function over(what) {
+  const held = get("marked"), frames = span();
+  forget();
+  const answer = await what(frames);
+  if (!answer && held && !get("marked")) set("marked", held);
+  return answer;
 }
 
 /**
