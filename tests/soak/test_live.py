@@ -28,6 +28,7 @@ from app.recording import RecordingDesk
 from app.snapshot import Snapshot
 from pipeline.params import Params
 from pipeline.recording.session import SessionSource
+from pipeline.recording.topics import IMAGE
 from pipeline.replay.faults import Fault
 from pipeline.run import lanes_for
 from pipeline.sources import open_any
@@ -201,6 +202,7 @@ def _report(
     grown, resident = memory.grown()
     session = [SessionSource(str(file), str(file)) for file in state.files]
     recorded = sum(len(each) for each in session)
+    pictures = sum(len(times) for each in session for of, times in each.file.log_times().items() if of.topic == IMAGE)
     for each in session:
         each.file.close()
     stages = {
@@ -225,7 +227,13 @@ def _report(
         "resident_MB": round(resident / 1e6, 1),
         "grown_MB": round(grown / 1e6, 2),
         "cores": round(cpu_s / seconds, 2),
-        "recording": {"frames": state.frames, "dropped": state.dropped, "read_back": recorded, "error": state.error},
+        "recording": {
+            "frames": state.frames,
+            "pictures": pictures,
+            "dropped": state.dropped,
+            "read_back": recorded,
+            "error": state.error,
+        },
         "shown_MB": round(watcher.encoded_bytes / 1e6, 1),
         "right_leads": _right_leads([each.lead_m for each in watcher.shown if each.at_s > seconds - QUIET_S + 2.0]),
         "errors": sorted(watcher.errors),
@@ -265,6 +273,7 @@ def judge(report: dict[str, Any]) -> None:
     recording = report["recording"]
     assert (recording["dropped"], recording["error"]) == (0, None)
     assert recording["read_back"] == recording["frames"] > 0
+    assert recording["pictures"] > 1.5 * recording["frames"], "thirty a second came, ten a second are shown"
     assert report["right_leads"] > 0.5, "a busy machine misses sweeps, and a lead needs three in a row"
 
 
