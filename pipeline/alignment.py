@@ -99,9 +99,8 @@ class Pinhole:
             flat = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.K, self.distortion).reshape(-1, 2)
         else:
             flat = (pixels - self.K[:2, 2]) / [self.K[0, 0], self.K[1, 1]]
-        T_ego_camera = inverse(self.T_camera_ego)
-        directions = np.column_stack([flat, np.ones(len(flat))]) @ T_ego_camera[:3, :3].T
-        return T_ego_camera[:3, 3], directions
+        rotation, offset = self.T_camera_ego[:3, :3], self.T_camera_ego[:3, 3]
+        return -offset @ rotation, flat @ rotation[:2] + rotation[2]
 
 
 def angular_from_calibration(camera: CameraCalibration) -> Angular:

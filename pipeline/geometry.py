@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numba
 import numpy as np
 import numpy.typing as npt
 
@@ -71,13 +72,22 @@ def rotation(roll_rad: float, pitch_rad: float, yaw_rad: float) -> F64:
 def iou_matrix(a: npt.NDArray[np.floating], b: npt.NDArray[np.floating]) -> F64:
     """(n, m) intersection over union of (n, 4) and (m, 4) boxes ``x1 y1 x2 y2``. Boxes of no area overlap nothing."""
     a, b = np.asarray(a, dtype=np.float64).reshape(-1, 4), np.asarray(b, dtype=np.float64).reshape(-1, 4)
-    low = np.maximum(a[:, None, :2], b[None, :, :2])
-    high = np.minimum(a[:, None, 2:], b[None, :, 2:])
-    inter = np.prod(np.clip(high - low, 0.0, None), axis=2)
-    area_a = np.prod(np.clip(a[:, 2:] - a[:, :2], 0.0, None), axis=1)
-    area_b = np.prod(np.clip(b[:, 2:] - b[:, :2], 0.0, None), axis=1)
-    union = area_a[:, None] + area_b[None, :] - inter
-    return np.divide(inter, union, out=np.zeros_like(inter), where=union > 0)
+    return _iou(a, b)
+
+
+@numba.njit(cache=True, nogil=True)
+def _iou(a, b):  # type: ignore[no-untyped-def]  # pragma: no cover
+    out = np.zeros((len(a), len(b)))
+    for i in range(len(a)):
+        area_a = max(a[i, 2] - a[i, 0], 0.0) * max(a[i, 3] - a[i, 1], 0.0)
+        for j in range(len(b)):
+            width = min(a[i, 2], b[j, 2]) - max(a[i, 0], b[j, 0])
+            height = min(a[i, 3], b[j, 3]) - max(a[i, 1], b[j, 1])
+            if width > 0.0 and height > 0.0:
+                inter = width * height
+                area_b = max(b[j, 2] - b[j, 0], 0.0) * max(b[j, 3] - b[j, 1], 0.0)
+                out[i, j] = inter / (area_a + area_b - inter)
+    return out
 
 
 def closest_on_polygon(corners: npt.NDArray[np.floating]) -> tuple[float, float]:

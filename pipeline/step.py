@@ -16,11 +16,12 @@ from time import perf_counter_ns
 import numpy as np
 
 from pipeline import acc, aeb, alignment, cipv, fusion, kalman, motion
+from pipeline.geometry import iou_matrix
 from pipeline.lidar import boxes, cluster, deskew, downsample, ground
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.lidar import warm_up as warm_up_lidar
 from pipeline.params import Params
-from pipeline.path import corridor, lanes, yaw_rate
+from pipeline.path import corridor, lanes, placing, yaw_rate
 from pipeline.types import (
     VEHICLES,
     CameraCalibration,
@@ -132,8 +133,10 @@ def warm_up() -> None:
     warm_up_lidar()
     one = np.eye(2)
     kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)
+    iou_matrix(np.zeros((1, 4)), np.zeros((1, 4)))
     lanes.warm_up()
     corridor.warm_up()
+    placing.warm_up()
 
 
 @dataclass(frozen=True)

@@ -146,7 +146,8 @@ def associate(
     partner = np.full(len(state.tracks), -1)
     if not state.tracks or not len(seen.place):
         return partner
-    expected = filters.mean[:, :2] if params.filter == "kalman" else _extrapolated(state, dt_s)
+    # a copy, since to numba a part of an array is another type than the whole of one
+    expected = filters.mean[:, :2].copy() if params.filter == "kalman" else _extrapolated(state, dt_s)
     new = np.array([t.hits < 2 for t in state.tracks])
     gate = params.gate_m + new * params.start_speed_mps * dt_s
     cost = _gated(

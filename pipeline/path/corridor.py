@@ -88,7 +88,7 @@ def warm_up() -> None:
     route, params, state = Route("warm-up", place, place, 0.01), PathParams(), PathState()
     for k in range(2):
         t_ns = k * 100_000_000
-        fix = GnssFix(t_ns, 0.0, k * 1e-5, 0.0, pi / 4, 10.0, "rtk_fixed", 0.01)
+        fix = GnssFix(t_ns, k * 6.4e-6, k * 6.4e-6, 0.0, pi / 4, 10.0, "rtk_fixed", 0.01)
         state, path = predict(state, EgoState(t_ns, 10.0, 0.0), None, fix, route, t_ns, 0.1 if k else None, params)
     nearest_on_path(path, np.zeros((1, 2)))
 

@@ -134,6 +134,12 @@ def place(
     return [next(following) if item.bev is not None else None for item in objects]
 
 
+def warm_up() -> None:
+    """Compile the kernel before the first frame."""
+    center = np.column_stack([np.arange(3.0), np.zeros(3)])
+    _against(np.zeros((1, 14)), center, center, center, 1.5, np.zeros(3), STEP_M, 0.9, True, 0.0, 0.0)
+
+
 def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
     """The middle of the side that faces the ego origin: of the two sides at the nearest corner the one that is seen
     under the larger angle. (Between the two nearest corners lies a short side of what is only a thin slice of a rear.)

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.alignment import Alignment, Angular
-from pipeline.geometry import F64, transform
+from pipeline.geometry import F64
 from pipeline.params import DistanceParams
 from pipeline.types import REAL_VEHICLES, Box, CameraCalibration, Detection, DistanceLaw, VisionMeasurement
 
@@ -27,7 +27,6 @@ _BORDER_PX, _BORDER_SHARE = 1.0, 0.02
 """A box ends at the picture's edge when it is nearer than a pixel or this share of its own height: so exact are the
 sides that a network draws."""
 _NEAREST_M = 0.5
-_STEPS = 2
 _HUBER = 1.345
 """Residuals beyond this many standard deviations weigh less: 95 % efficiency on clean data (Huber 1981, section 4)."""
 _ROUNDS = 30
@@ -112,14 +111,14 @@ def measure(
     place = np.full((len(boxes), 2), np.nan)
     if alignment is not None:
         place = alignment.unproject(_centres(boxes), range_m)[:, :2]
+    known = np.isfinite(range_m)
+    placed = known & np.isfinite(place).all(axis=1)
+    rows = zip(detections, *(column.tolist() for column in (range_m, sigma_m, place, known, placed)), strict=True)
     return tuple(
         VisionMeasurement(
-            detection,
-            float(range_m[row]) if known else None,
-            float(sigma_m[row]) if known else None,
-            (float(place[row, 0]), float(place[row, 1])) if known and np.isfinite(place[row]).all() else None,
+            detection, at_m if is_known else None, sigma if is_known else None, (x, y) if is_placed else None
         )
-        for row, (detection, known) in enumerate(zip(detections, np.isfinite(range_m), strict=True))
+        for detection, at_m, sigma, (x, y), is_known, is_placed in rows
     )
 
 
@@ -161,19 +160,15 @@ def range_at_depth(pixels: F64, depth_m: F64, alignment: Alignment, camera: Came
     """(N,) horizontal ranges from the ego origin of the points on (N, 2) pixels' rays that lie ``depth_m`` (N,) along
     the optical axis (along ego x for a camera without calibration). NaN where that point is not ahead.
 
-    Depth is linear in range but for the few decimetres between the mounts, so Newton's method is there in two steps.
+    Depth is linear along a ray.
     """
-
-    def depth_at(ranges_m: F64) -> F64:
-        points = alignment.unproject(pixels, ranges_m)
-        return transform(camera.T_camera_ego, points)[:, 2] if camera is not None else points[:, 0]
-
-    range_m = np.where(depth_m > _NEAREST_M, depth_m, np.nan)
-    for _ in range(_STEPS):
-        here = depth_at(range_m)
-        slope = depth_at(range_m + 1.0) - here
-        range_m = np.where(slope > 0.0, range_m + (depth_m - here) / np.where(slope > 0.0, slope, 1.0), np.nan)
-    return np.where(range_m > _NEAREST_M, range_m, np.nan)
+    start, rays = alignment.rays(pixels)
+    axis = camera.T_camera_ego[2] if camera is not None else np.array([1.0, 0.0, 0.0, 0.0])
+    slope = rays @ axis[:3]
+    along = (depth_m - start @ axis[:3] - axis[3]) / np.where(slope > 0.0, slope, np.nan)
+    point = start[:2] + along[:, None] * rays[:, :2]
+    range_m = np.hypot(point[:, 0], point[:, 1])
+    return np.where((depth_m > _NEAREST_M) & (along > 0.0) & (range_m > _NEAREST_M), range_m, np.nan)
 
 
 def _depths(

@@ -6,7 +6,6 @@ Kept apart from the network, so that moving a slider never runs it again.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.geometry import iou_matrix
 from pipeline.params import DetectionParams
@@ -21,30 +20,28 @@ def select(raw: RawBoxes, params: DetectionParams) -> tuple[Detection, ...]:
     """
     candidates = np.flatnonzero(raw.scores >= params.min_score)
     order = candidates[np.argsort(-raw.scores[candidates], kind="stable")]
-    kinds = np.array(["vehicle" if raw.labels[index] in VEHICLES else raw.labels[index] for index in order])
-    same = (iou_matrix(raw.boxes[order], raw.boxes[order]) > params.nms_iou) & (kinds[:, None] == kinds[None, :])
-    alive = np.ones(len(order), dtype=bool)
+    boxes, scores = raw.boxes[order], raw.scores[order].tolist()
+    labels = [raw.labels[index] for index in order.tolist()]
+    kinds = ["vehicle" if label in VEHICLES else label for label in labels]
+    number = {kind: k for k, kind in enumerate(dict.fromkeys(kinds))}
+    kind = np.array([number[each] for each in kinds], dtype=np.int64)
+    same = (iou_matrix(boxes, boxes) > params.nms_iou) & (kind[:, None] == kind)
+    alive = np.ones(len(order), dtype=np.bool_)
     found = []
-    for best in range(len(order)):
+    for best, (x1, y1, x2, y2) in enumerate(boxes.tolist()):
         if alive[best]:
             suppressed = alive & same[best]
             suppressed[best] = True
             alive &= ~suppressed
-            found.append(_detection(raw, order[suppressed], params.car_prior))
+            members = [(labels[k], scores[k]) for k in np.flatnonzero(suppressed).tolist()]
+            found.append(Detection((x1, y1, x2, y2), _name(members, params.car_prior), scores[best]))
     return tuple(found)
 
 
-def _detection(raw: RawBoxes, members: npt.NDArray[np.intp], car_prior: float) -> Detection:
-    """One object from its candidates, best first."""
-    best = int(members[0])
-    x1, y1, x2, y2 = (float(value) for value in raw.boxes[best])
-    return Detection((x1, y1, x2, y2), _name(raw, members, car_prior), float(raw.scores[best]))
-
-
-def _name(raw: RawBoxes, members: npt.NDArray[np.intp], car_prior: float) -> str:
-    """The best candidate's class, except that a vehicle is a car unless the other class scores ``car_prior`` times the
-    car candidate: on a road cars are commoner than in COCO, on which the network learned how common they are, and
-    a car taken for a bus is placed twice as far away as it is."""
-    label, score = raw.labels[members[0]], float(raw.scores[members[0]])
-    as_car = max((float(raw.scores[index]) for index in members if raw.labels[index] == "car"), default=0.0)
+def _name(members: list[tuple[str, float]], car_prior: float) -> str:
+    """Of one object's candidates, best first: the best one's class, except that a vehicle is a car unless the other
+    class scores ``car_prior`` times the car candidate: on a road cars are commoner than in COCO, on which the network
+    learned how common they are, and a car taken for a bus is placed twice as far away as it is."""
+    label, score = members[0]
+    as_car = max((each for name, each in members if name == "car"), default=0.0)
     return "car" if label in VEHICLES and as_car * car_prior > score else label
