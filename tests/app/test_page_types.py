@@ -1,4 +1,4 @@
-"""What the page's types.js says of a message is what the server sends: no key more, no key less."""
+"""What types.js and labeling/types.js of the page say of a message is what is sent: no key more, no key less."""
 
 from __future__ import annotations
 
@@ -120,18 +120,68 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Comparison": comparison,
         "Job": job,
         "AlignmentScore": get("/api/alignment/score"),
+        **labelled(engine, client),
+    }
+
+
+def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
+    """Whatever is sent of labels."""
+
+    def act(**what: Any) -> Any:
+        answer = client.post("/api/labels/act", json={"person": "Ada", "act": what})
+        assert answer.status_code < 300, (what, answer.text)
+        return answer.json()
+
+    def get(path: str) -> Any:
+        answer = client.get(f"/api/labels{path}")
+        assert answer.status_code == 200, (path, answer.text)
+        return answer.json()
+
+    cuboid = {"center": [20.0, 0.0, 0.8], "size": [4.0, 1.8, 1.5], "yaw_rad": 0.0}
+    added = act(kind="add_track", label="car", frame=3, cuboid=cuboid, bbox=None)
+    (track,) = added["changed"]["tracks"]
+    act(kind="set_lead", first=3, last=5, lead=track["id"])
+    act(kind="set_path", frame=3, left=[[0, 1], [5, 1]], right=None)
+    act(kind="add_event", frame=3, event="cut_in", tracks=[track["id"]])
+    act(kind="tag", frame=3, tag="rain")
+    act(kind="propose", first=0, last=5, **{"from": "run"})
+    shown = engine.wait_for(lambda s: s.labels.task is not None and not s.labels.task.running, WAIT_S)
+    assert client.post("/api/labels/versions", json={"name": "first", "person": "Ada"}).status_code == 201
+    everything, window = get("?since=0"), get("/frames?first=3&last=3")
+    state = shown.state_json()["labels"]
+    return {
+        "LabelsState": state,
+        "LabelTask": state["task"],
+        "ActAnswer": added,
+        "LabelsAnswer": added["changed"],
+        "LabelTrack": track,
+        "LabelOrigin": track["origin"],
+        "LeadRange": everything["leads"][0],
+        "PathLabel": everything["paths"][0],
+        "EventLabel": everything["events"][0],
+        "FrameTag": everything["tags"][0],
+        "SightingsAnswer": window,
+        "LabelSighting": window["sightings"]["3"][0],
+        "Cuboid": window["sightings"]["3"][0]["cuboid"],
+        "PastAct": get(f"/history?kind=track&id={track['id']}")[0],
+        "Version": get("/versions")[0],
+        "Score": get("/score"),
+        "Found": get("/next?what=unlabelled&frame=0"),
     }
 
 
 MADE_BY_THE_PAGE = {"Frame", "Series", "Drive"}
 """Put together in the page from messages."""
 
-KNOWN = typedefs(TYPES.read_text(encoding="utf-8"))
+LABEL_TYPES = TYPES.parent / "labeling" / "types.js"
+KNOWN = {
+    name: keys for file in (TYPES, LABEL_TYPES) for name, keys in typedefs(file.read_text(encoding="utf-8")).items()
+}
 
 
 @pytest.mark.parametrize("name", sorted(KNOWN.keys() - MADE_BY_THE_PAGE))
 def test_the_page_knows_every_key_and_no_other(sent: dict[str, Any], name: str):
-    assert KNOWN[name] == set(sent[name]), "say it in static/js/types.js"
+    assert KNOWN[name] == set(sent[name]), "say it in static/js/types.js or labeling/types.js"
 
 
 def test_every_kind_of_message_is_looked_at(sent: dict[str, Any]):

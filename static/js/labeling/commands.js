@@ -132,7 +132,7 @@ export const addEvent = (event) => act({ kind: "add_event", frame: shown(), even
 /** Go where there is something to do. @param {Wanted} what @param {1|-1} direction */
 export async function goTo(what, direction) {
   const query = `what=${what}&frame=${get("scrub") ?? shown()}&direction=${direction}`;
-  /** @type {import("./types.js").Place|Error} */
+  /** @type {import("./types.js").Found|Error} */
   const found = await request(`api/labels/next?${query}`).catch((error) => error);
   if (found instanceof Error) return say(found.message);
   if (found.frame === null) return say(`No ${what.replace("_", " ")} ${direction > 0 ? "after" : "before"} this frame`);

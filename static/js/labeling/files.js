@@ -81,7 +81,7 @@ async function upload(event) {
   const given = file.files?.[0], person = await personName();
   if (!given || person === null) return;
   await attempt(async () => {
-    const address = new URL(`api/labels/import?format=${which.value}&person=${encodeURIComponent(person)}&name=${encodeURIComponent(given.name)}`, document.baseURI);
+    const address = new URL(`api/labels/import?format=${which.value}&person=${encodeURIComponent(person)}`, document.baseURI);
     const response = await fetch(address, { method: "POST", body: given, headers: { "content-type": "application/octet-stream" } });
     if (!response.ok) throw new Refused(response.status, await response.json().catch(() => null));
     say(`Importing ${given.name}`);

@@ -106,7 +106,7 @@
  * @property {LabelsAnswer|null} changed
  * @property {string} note
  *
- * @typedef {object} Place  somewhere to look at
+ * @typedef {object} Found  where there is something to do
  * @property {number|null} frame
  * @property {string} why
  *
