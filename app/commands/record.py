@@ -16,6 +16,7 @@ import tyro
 from app.options import LineOptions, SourceOptions
 from app.progress import frames_progress
 from app.recording import SESSIONS, new_session
+from app.waiting import Waiting
 from pipeline.errors import BadInput
 from pipeline.params import Params
 from pipeline.recording.packets import RawLidar
@@ -74,14 +75,19 @@ class Record:
 
     def _live(self, source: LiveSource, params: Params, asked: Event) -> int:
         """Sensors do not wait: what the disk is too slow for is dropped, and said."""
-        detectors = self.line.open_detectors(source)
+        detectors, waiting = self.line.open_detectors(source), Waiting(source)
         recorder = self._recorder(source)
+
+        def on_silence() -> None:
+            _end_if(asked)
+            waiting()
+
         source.tap(recorder)
         _say_where(recorder.state.file)
         try:
             with frames_progress() as bar:
                 task = bar.add_task(source.title, total=None)
-                ran = run_live(source, params, detectors, on_silence=lambda: _end_if(asked))
+                ran = run_live(source, params, detectors, on_silence=on_silence)
                 for frame, result in self._until_enough(ran, asked):
                     recorder.put(frame, result, params, received_ns=source.now_ns())
                     if recorder.state.error is not None:
@@ -90,6 +96,10 @@ class Record:
         finally:
             source.tap(None)
             state = recorder.stop()
+        if state.frames == 0 and state.error is None:
+            state.file.unlink(missing_ok=True)
+            print("cipv: no sensor ticked; there is nothing to keep", file=sys.stderr)
+            return 1
         _say(list(state.files), state.frames, state.bytes)
         if state.dropped:
             print(f"cipv: {state.dropped} frames or samples were dropped: the disk was too slow", file=sys.stderr)

@@ -15,11 +15,11 @@ import tyro
 
 from app.options import LineOptions, SourceOptions
 from app.progress import frames_progress
+from app.waiting import Waiting
 from pipeline.params import Params
 from pipeline.results import write_line
 from pipeline.run import Detectors, run, run_live
-from pipeline.sources.base import AnySource, LiveSource, Source, is_live_source
-from pipeline.sources.live.health import not_delivering
+from pipeline.sources.base import AnySource, Source, is_live_source
 from pipeline.types import Frame, Result
 
 Ran = tuple[Frame, Result]
@@ -77,7 +77,7 @@ class Run:
     def _results(self, source: AnySource, params: Params, detectors: Detectors) -> Iterator[Ran]:
         """Frames with their results, as many as are wanted."""
         if is_live_source(source):
-            every = run_live(source, params, detectors, self.sensors, _Waiting(source))
+            every = run_live(source, params, detectors, self.sensors, Waiting(source))
         else:
             every = run(cast("Source", source), params, detectors, self.sensors)
         return islice(every, self.frames)
@@ -90,20 +90,6 @@ def _until_interrupted(results: Iterator[Ran], is_live: bool) -> Iterator[Ran]:
     except KeyboardInterrupt:
         if not is_live:
             raise
-
-
-class _Waiting:
-    """Says what live sensors are waited for, whenever that has changed."""
-
-    def __init__(self, live: LiveSource) -> None:
-        self._live = live
-        self._said = ""
-
-    def __call__(self) -> None:
-        text = f"cipv: waiting for sensors: {not_delivering(self._live.health())}"
-        if text != self._said:
-            print(text, file=sys.stderr)
-        self._said = text
 
 
 def _sentence(result: Result) -> str:

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from pipeline.complaint import first_complaint
 from pipeline.geometry import inverse, rotation
 from pipeline.sources.base import SourceError
+from pipeline.sources.files import check_looks_ahead
 from pipeline.types import F64, CameraCalibration
 
 Port = Annotated[int, Field(ge=1, le=65535)]
@@ -178,11 +179,14 @@ def load(path: str) -> LiveConfig:
     if not isinstance(data, dict):
         raise SourceError(f"{path}: expected sensors with their settings below them")
     try:
-        return _resolved(LiveConfig.model_validate(data), file.resolve().parent)
+        config = _resolved(LiveConfig.model_validate(data), file.resolve().parent)
     except ValidationError as error:
         raise SourceError(f"{path}: {first_complaint(error, LiveConfig)}") from None
     except RecursionError:
         raise SourceError(f"{path}: nested too deeply") from None
+    if config.camera is not None and config.camera.calibration is not None:
+        check_looks_ahead(config.camera.calibration.calibration(), path)
+    return config
 
 
 def _resolved(config: LiveConfig, folder: Path) -> LiveConfig:

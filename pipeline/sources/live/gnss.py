@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import socket
 from collections.abc import Callable
 from dataclasses import replace
@@ -112,4 +113,5 @@ def _read_serial(device: str, baud: int, receive: Callable[[bytes], None], stop:
             while not stop:
                 receive(line.read(max(1, line.in_waiting)))
     except (serial.SerialException, OSError, ValueError) as error:
-        raise DeviceLost(f"{device}: {getattr(error, 'strerror', None) or error}") from None
+        number = getattr(error, "errno", None)
+        raise DeviceLost(f"{device}: {os.strerror(number) if number else error}") from None

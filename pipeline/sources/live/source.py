@@ -71,6 +71,7 @@ class LiveSensors:
             self.inputs["ego"] = CanInput(can, offset_ms, self._clock, self._take_ego)
         elif config.ego is not None:
             self._ego_stats = StreamStats("ego")
+            self._ego_stats.note = "its speed comes from gnss, which gives none yet"
             self._ego_offset_ns = round(config.ego.time_offset_ms * 1e6)
 
     def start(self) -> None:
@@ -159,6 +160,7 @@ class LiveSensors:
         if self._ego_stats is not None:
             ego = self._motion.push(fix)
             ego = replace(ego, t_ns=ego.t_ns + self._ego_offset_ns)
+            self._ego_stats.note = ""
             self._ego_stats.arrived(arrived_ns, ego.t_ns)
             self._take_ego(ego.t_ns, ego, arrived_ns)
 

@@ -55,6 +55,7 @@ def play_file(path: Path, receive: Receive, stop: Stop) -> None:
 
 def read_device(number: int, receive: Receive, stop: Stop) -> None:
     """A camera plugged in. DeviceLost when there is none or it was pulled out."""
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # what is wrong is said once, and by us
     capture = cv2.VideoCapture(number)
     try:
         if not capture.isOpened():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
@@ -49,6 +51,33 @@ def test_what_was_recorded_until_an_error_is_a_whole_session(tmp_path: Path, mon
     assert (len(session), session.file.directory.is_cut) == (2, False)
     received_ns = [session.log_time_ns(index) for index in range(2)]
     assert received_ns == [10**18 + session.t_ns(index) for index in range(2)]
+
+
+class Silent(Sensors):
+    """Sensors that give nothing; at the second look somebody presses Ctrl-C."""
+
+    lidar_mount = None
+    looks = 0
+
+    def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
+        self.looks += 1
+        if self.looks == 2:
+            os.kill(os.getpid(), signal.SIGINT)
+        return None
+
+
+def test_sensors_that_give_nothing_are_said_and_leave_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sensors = Silent()
+    sensors.state = "absent"
+    monkeypatch.setattr(SourceOptions, "open_live", lambda self: sensors)
+    assert Record(SourceOptions("live:test"), tmp_path, LineOptions(lanes="off"))() == 1
+    said = capsys.readouterr().err
+    assert said.count("cipv: waiting for sensors: lidar absent") == 1
+    assert "nothing to keep" in said
+    assert list(tmp_path.iterdir()) == []
+    assert sensors.tapped is None
 
 
 @pytest.mark.parametrize("arguments", [(), ("--packets",)], ids=["clouds", "packets"])

@@ -59,6 +59,8 @@ def test_defaults_of_the_written_file_are_the_programs() -> None:
         ("CAN without its file", "lidar: {}\nego: {source: can}", "`can:` with its DBC file"),
         ("distortion of three", "camera: {device: 0, calibration: {fx_px: 900, fy_px: 900, cx_px: 640, cy_px: 360,"
          " width_px: 1280, height_px: 720, distortion: [1, 2, 3]}}", "0, 4, 5 or 8 numbers"),
+        ("a camera that looks back", "camera: {device: 0, calibration: {fx_px: 900, fy_px: 900, cx_px: 640, cy_px: 360,"
+         " width_px: 1280, height_px: 720, mount: {yaw_deg: 180}}}", "the camera does not look ahead"),
         ("a list", "- 1", "expected sensors"),
         ("not YAML", "lidar: {", "not YAML"),
         ("not a number", "lidar: {time_offset_ms: .nan}", "lidar.time_offset_ms"),
