@@ -11,7 +11,7 @@ piecewise constant white acceleration: an acceleration of standard deviation ``a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -20,8 +20,7 @@ import numpy.typing as npt
 F64 = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class CvState:
+class CvState(NamedTuple):
     """mean: (…, 4) float64 ``x y vx vy`` in m and m/s. cov: (…, 4, 4) float64, symmetric, positive semi-definite."""
 
     mean: F64

@@ -15,20 +15,17 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from pipeline import kalman
 from pipeline.geometry import F64, iou_matrix
 from pipeline.kalman import CvState
 from pipeline.params import VisionTrackingParams
 from pipeline.records import evolve
-from pipeline.types import VEHICLES, Box, VisionMeasurement, VisionTrack
+from pipeline.types import Box, VisionMeasurement, VisionTrack
+from pipeline.vision.association import match, same_kind
 
 SPEED_SIGMA_MPS = 8.0
 """How fast a new object may be closing in or away, before a second sighting tells."""
-_NOMINAL_DT_S = 0.1
-_MAX_GROWTH = 3.0
-"""The pixel gate is meant for pictures 0.1 s apart; it widens with the time since the last sighting, thrice at most."""
 _OUTLIER = 9.21
 """99 % point of χ² with 2 degrees of freedom: a place farther off weighs less."""
 _CAR_WIDTH_M = 1.8
@@ -81,7 +78,7 @@ def track(
     if measurements is None:
         kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
         return evolve(state, followed=kept), tuple(followed.track for followed in kept)
-    partner = _match(expected, measurements, params)
+    partner = match([followed.track for followed in expected], [f.unseen_s for f in expected], measurements, params)
     kept_list = [
         _seen(followed, measurements[partner[row]], guess, params) if row in partner else _missed(followed)
         for row, followed in enumerate(expected)
@@ -106,82 +103,38 @@ def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -
     carried = [followed.track for followed in alive if followed.track.carried]
     overlap = iou_matrix(np.array([track.bbox for track in carried]), np.array([track.bbox for track in seen]))
     pairs = np.argwhere(overlap > params.ghost_iou)
-    ghosts = {carried[i].id for i, j in pairs if _same_kind(carried[i].label, seen[j].label)}
+    ghosts = {carried[i].id for i, j in pairs if same_kind(carried[i].label, seen[j].label)}
     return tuple(followed for followed in alive if followed.track.id not in ghosts) if ghosts else alive
-
-
-def _same_kind(a: str, b: str) -> bool:
-    """Whether two names may be one object's: a detector mixes up vehicles, not a person and a car."""
-    return a == b or VEHICLES.issuperset((a, b))
 
 
 def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
     """Where the object should be now; carried until a box says that it is there."""
-    aged = evolve(
-        followed,
-        track=evolve(followed.track, carried=True, measured=False),
-        unseen_s=followed.unseen_s + dt_s,
-        unplaced_s=followed.unplaced_s + dt_s,
-    )
+    aged = evolve(followed, unseen_s=followed.unseen_s + dt_s, unplaced_s=followed.unplaced_s + dt_s)
     if params.filter == "queue":
-        return aged
-    return _show(_predict_place(_predict_box(aged, dt_s, params), dt_s, params))
+        return evolve(aged, track=evolve(followed.track, carried=True, measured=False))
+    box = followed.track.bbox
+    moved = kalman.predict(followed.box_filter, dt_s, params.accel_sigma_mps2 * _width(box) / _CAR_WIDTH_M)
+    place, scale = _predict_place(aged, dt_s, params)
+    track = evolve(followed.track, carried=True, measured=False, bbox=_around(moved.mean, box, scale))
+    if place is not None:
+        track = _shown(track, place, followed.placed)
+    elif followed.place_filter is not None:
+        track = evolve(track, distance_m=None, sigma_m=None, position=None, velocity_mps=None)
+    placed = followed.placed if place is not None or followed.place_filter is None else 0
+    return evolve(aged, box_filter=moved, place_filter=place, placed=placed, track=track)
 
 
-def _predict_box(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
-    px_per_m = _width(followed.track.bbox) / _CAR_WIDTH_M
-    moved = kalman.predict(followed.box_filter, dt_s, params.accel_sigma_mps2 * px_per_m)
-    box = _around(moved.mean[:2], followed.track.bbox)
-    return evolve(followed, box_filter=moved, track=evolve(followed.track, bbox=box))
-
-
-def _predict_place(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
-    """The place a moment later, and the box grown or shrunk as the range changed. A place not measured for
+def _predict_place(followed: Followed, dt_s: float, params: VisionTrackingParams) -> tuple[CvState | None, float]:
+    """The place a moment later, and how much the box has grown as the range changed. A place not measured for
     ``max_missed_s`` is forgotten, though its box be seen (it may be too near to be measured)."""
     if followed.place_filter is None:
-        return followed
+        return None, 1.0
     moved = kalman.predict(followed.place_filter, dt_s, params.accel_sigma_mps2)
-    before_m, now_m = (math.hypot(*filtered.mean[:2]) for filtered in (followed.place_filter, moved))
-    if followed.unplaced_s > params.max_missed_s or now_m <= 0.0 or moved.mean[0] <= 0.0:
-        lost = evolve(followed.track, distance_m=None, sigma_m=None, position=None, velocity_mps=None)
-        return evolve(followed, place_filter=None, placed=0, track=lost)
-    box = _around(followed.box_filter.mean[:2], followed.track.bbox, before_m / now_m)
-    return evolve(followed, place_filter=moved, track=evolve(followed.track, bbox=box))
-
-
-def _match(
-    expected: list[Followed], measurements: tuple[VisionMeasurement, ...], params: VisionTrackingParams
-) -> dict[int, int]:
-    """Index of followed object → index of measurement: the one-to-one choice of least total cost, where leaving a pair
-    apart costs as much as a pair at its gate. (Making as many pairs as possible would shift a whole row of cars by one
-    when the first leaves the picture.)"""
-    if not expected or not measurements:
-        return {}
-    cost = _costs(expected, measurements, params)
-    rows, columns = linear_sum_assignment(np.minimum(cost, 1.0))
-    return {int(row): int(column) for row, column in zip(rows, columns, strict=True) if cost[row, column] < 1.0}
-
-
-def _costs(expected: list[Followed], measurements: tuple[VisionMeasurement, ...], params: VisionTrackingParams) -> F64:
-    """(n, m) how unlike each box is to each expected one: 0 the same, 1 at the gate, infinite for another kind.
-
-    queue: distance of the centres (print: of the half widths). kalman: also how much the width changed."""
-    old = np.array([followed.track.bbox for followed in expected])
-    new = np.array([seen.detection.bbox for seen in measurements])
-    apart = (old[:, None, :2] + old[:, None, 2:] - new[:, :2] - new[:, 2:]) / 2
-    moved_px = np.hypot(apart[..., 0], apart[..., 1])
-    if params.filter == "queue":
-        cost = moved_px / params.gate_px
-    else:
-        old_width, new_width = old[:, 2] - old[:, 0], new[:, 2] - new[:, 0]
-        unseen_s = np.array([followed.unseen_s for followed in expected])
-        growth = np.clip(unseen_s / _NOMINAL_DT_S, 1.0, _MAX_GROWTH)
-        moved = moved_px / (np.maximum(params.gate_px, params.gate_sizes * old_width) * growth)[:, None]
-        ratio = np.maximum(new_width, 1.0) / np.maximum(old_width, 1.0)[:, None]
-        cost = np.hypot(moved, np.abs(np.log(ratio)) / math.log(params.max_size_ratio))
-    kinds = [followed.track.label for followed in expected]
-    named = [seen.detection.label for seen in measurements]
-    return np.where([[_same_kind(a, b) for b in named] for a in kinds], cost, np.inf)
+    (before_x, before_y), (x, y) = followed.place_filter.mean[:2].tolist(), moved.mean[:2].tolist()
+    before_m, now_m = math.hypot(before_x, before_y), math.hypot(x, y)
+    if followed.unplaced_s > params.max_missed_s or now_m <= 0.0 or x <= 0.0:
+        return None, 1.0
+    return moved, before_m / now_m
 
 
 def _first_guess(ego_speed_mps: float | None) -> SpeedGuess:
@@ -217,26 +170,26 @@ def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: Visi
 def _seen(followed: Followed, seen: VisionMeasurement, guess: SpeedGuess, params: VisionTrackingParams) -> Followed:
     """The object with this picture's box and distance taken in."""
     detection = seen.detection
-    shown = evolve(
+    label, votes, box_filter = detection.label, followed.votes, followed.box_filter
+    if params.filter == "kalman":
+        tally = dict(votes)
+        tally[label] = tally.get(label, 0.0) + detection.score
+        label, votes = max(tally, key=lambda name: tally[name]), tuple(tally.items())
+        box_filter = kalman.update(box_filter, _centre(detection.bbox), _box_noise(detection.bbox))
+    track = evolve(
         followed.track,
         bbox=detection.bbox,
-        label=detection.label,
+        label=label,
         score=detection.score,
         hits=followed.track.hits + 1,
         missed=0,
         carried=False,
         measured=seen.distance_m is not None,
     )
-    current = evolve(followed, track=shown, unseen_s=0.0)
     if params.filter == "queue":
-        measured = evolve(shown, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position)
-        return evolve(current, track=measured)
-    votes = dict(followed.votes)
-    votes[detection.label] = votes.get(detection.label, 0.0) + detection.score
-    label = max(votes, key=lambda name: votes[name])
-    box_filter = kalman.update(followed.box_filter, _centre(detection.bbox), _box_noise(detection.bbox))
-    current = evolve(current, track=evolve(shown, label=label), votes=tuple(votes.items()), box_filter=box_filter)
-    return _place(current, seen, guess, params)
+        track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position)
+    current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter)
+    return _place(current, seen, guess, params) if params.filter == "kalman" else current
 
 
 def _missed(followed: Followed) -> Followed:
@@ -246,8 +199,9 @@ def _missed(followed: Followed) -> Followed:
 def _place(followed: Followed, seen: VisionMeasurement, guess: SpeedGuess, params: VisionTrackingParams) -> Followed:
     """The measured place taken in; one far from the expected weighs less, by as much as it is too far."""
     if seen.position is None or seen.sigma_m is None or seen.distance_m is None:
-        bare = evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m)
-        return evolve(followed, track=bare) if followed.place_filter is None else _show(followed)
+        if followed.place_filter is not None:
+            return evolve(followed, track=_shown(followed.track, followed.place_filter, followed.placed))
+        return evolve(followed, track=evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m))
     noise = place_noise(seen.position, seen.sigma_m, params.bearing_sigma_deg)
     if followed.place_filter is None:
         filtered = kalman.start(seen.position, noise, guess.sigma_mps)
@@ -255,33 +209,30 @@ def _place(followed: Followed, seen: VisionMeasurement, guess: SpeedGuess, param
     else:
         surprise = kalman.mahalanobis2(followed.place_filter, seen.position, noise)
         filtered = kalman.update(followed.place_filter, seen.position, noise * max(1.0, surprise / _OUTLIER))
-    share = seen.sigma_m / seen.distance_m
-    return _show(evolve(followed, place_filter=filtered, placed=followed.placed + 1, unplaced_s=0.0), share)
+    placed = followed.placed + 1
+    track = _shown(followed.track, filtered, placed, seen.sigma_m / seen.distance_m)
+    return evolve(followed, track=track, place_filter=filtered, placed=placed, unplaced_s=0.0)
 
 
-def _show(followed: Followed, share: float | None = None) -> Followed:
-    """The track's public numbers, from its filter. ``share``: sigma over distance of the measurement taken in.
+def _shown(track: VisionTrack, place: CvState, placed: int, share: float | None = None) -> VisionTrack:
+    """The track with its public numbers, from its filter. ``share``: sigma over distance of the measurement taken in.
 
     The sigma shown never falls below that of one sighting: most of it is the object's own unknown height, an error
     that no number of sightings averages out.
     """
-    if followed.place_filter is None:
-        return followed
-    x, y, vx, vy = followed.place_filter.mean.tolist()
-    (xx, xy), (_, yy) = followed.place_filter.cov[:2, :2].tolist()
+    x, y, vx, vy = place.mean.tolist()
+    (xx, xy), (_, yy) = place.cov[:2, :2].tolist()
     range_m = math.hypot(x, y)
     filter_sigma = math.sqrt(x * x * xx + 2 * x * y * xy + y * y * yy) / range_m  # along the ray
     if share is None:
-        before = followed.track
-        share = before.sigma_m / before.distance_m if before.sigma_m and before.distance_m else 0.0
-    shown = evolve(
-        followed.track,
+        share = track.sigma_m / track.distance_m if track.sigma_m and track.distance_m else 0.0
+    return evolve(
+        track,
         distance_m=range_m,
         sigma_m=max(filter_sigma, share * range_m),
         position=(x, y),
-        velocity_mps=(vx, vy) if followed.placed >= 2 else None,
+        velocity_mps=(vx, vy) if placed >= 2 else None,
     )
-    return evolve(followed, track=shown)
 
 
 def place_noise(position: tuple[float, float], range_sigma_m: float, bearing_sigma_deg: float) -> F64:
@@ -295,14 +246,15 @@ def place_noise(position: tuple[float, float], range_sigma_m: float, bearing_sig
 
 
 def _box_noise(box: Box) -> F64:
-    return np.eye(2) * max(_CENTRE_NOISE * _width(box), 1.0) ** 2
+    variance = max(_CENTRE_NOISE * _width(box), 1.0) ** 2
+    return np.array([[variance, 0.0], [0.0, variance]])
 
 
 def _box_speed_sigma(box: Box) -> float:
     return SPEED_SIGMA_MPS * _width(box) / _CAR_WIDTH_M
 
 
-def _around(centre: F64, box: Box, scale: float = 1.0) -> Box:
+def _around(centre: F64, box: Box, scale: float) -> Box:
     half_w, half_h = _width(box) / 2 * scale, (box[3] - box[1]) / 2 * scale
     u, v = float(centre[0]), float(centre[1])
     return u - half_w, v - half_h, u + half_w, v + half_h
