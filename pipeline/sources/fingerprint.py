@@ -45,6 +45,8 @@ def content_key(t_ns: Sequence[int], frame: Callable[[int], Frame]) -> str:
 def _files(rest: str) -> Iterator[Path]:
     """What the part after the scheme names, in a fixed order."""
     path, _, query = rest.partition("?")
+    if not path:
+        return
     try:
         main = Path(path).expanduser()
         if main.is_dir():

@@ -166,7 +166,7 @@ def test_memory_does_not_grow_with_the_file_and_opening_says_how_far_it_is(tmp_p
     head, body = pcap([]), pcap(lidar(2))[24:]
     with path.open("wb") as file:
         file.write(head)
-        for round_ in range(60):
+        for round_ in range(30):
             file.write(later(body, round_ * 200_000_000))
     told: list[tuple[int, int]] = []
     (tmp_path / "short.pcap").write_bytes(pcap(lidar(2)))
@@ -175,16 +175,16 @@ def test_memory_does_not_grow_with_the_file_and_opening_says_how_far_it_is(tmp_p
     source = open_source(f"pcap:{path}", progress=lambda done, total: told.append((done, total)))
     kept, _ = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert len(source) == 120
-    assert path.stat().st_size > 11e6
-    assert kept < 0.8e6
+    assert len(source) == 60
+    assert path.stat().st_size > 5.5e6
+    assert kept < 0.4e6
     size = path.stat().st_size
     assert {total for _, total in told} == {size}
     shares = [done / size for done, _ in told]
     assert shares == sorted(shares)
-    assert len(shares) >= 3
+    assert len(shares) >= 2
     assert shares[-1] > 0.6
-    assert source.frame(100).sweep is not None
+    assert source.frame(50).sweep is not None
 
 
 def later(body: bytes, by_ns: int) -> bytes:
