@@ -44,7 +44,7 @@ export function addMode(added) {
 const modeNow = () => (mode?.isOn() ? mode : null);
 
 export function setUp() {
-  const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "tape", "labeling", "labels", "labelFrames", "track", "draft"], draw);
+  const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "tape", "labeling", "labels", "labelFrames", "track", "draft", "drawnPath"], draw);
   surface = new Surface(canvas, invalidate, "panel");
   view = new Viewport(canvas, {
     changed: () => {

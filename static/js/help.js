@@ -10,7 +10,7 @@ const dialog = $("#help-dialog", HTMLDialogElement);
 
 export function show() {
   dialog.replaceChildren(
-    el("div", { class: "columns" }, ...keymap().map(group), el("div", {}, el("h2", { textContent: "Colours" }), ...COLORS.map(shade),
+    el("div", { class: "columns" }, ...groups().map(group), el("div", {}, el("h2", { textContent: "Colours" }), ...COLORS.map(shade),
       el("p", { class: "facts", textContent: "Dashed: carried, not seen in this frame." }),
       el("p", { class: "facts", textContent: "Ribbon: plain VL, hatched upwards V, downwards L, faint carried." })),
     el("div", {}, el("h2", { textContent: "Hand" }), el("p", { textContent: "Plan: wheel zooms, dragging moves, double click fits." }),
@@ -19,6 +19,12 @@ export function show() {
     el("form", { method: "dialog" }, el("button", { textContent: "Close" })));
   dialog.showModal();
 }
+
+/** What can be done now comes first. @returns {import("./keymap.js").Group[]} */
+const groups = () => [...keymap()].sort((a, b) => Number(isIdle(a)) - Number(isIdle(b)));
+
+/** Whether it belongs to a mode that is off. @param {import("./keymap.js").Group} group */
+const isIdle = ({ bindings }) => bindings.every(({ isOn }) => isOn && !isOn());
 
 /** @param {import("./keymap.js").Group} group */
 function group({ title, bindings }) {

@@ -28,8 +28,9 @@
  * @property {import("./labeling/acts.js").Saving} saving
  * @property {string} said  what the labeling mode has to say
  * @property {import("./labeling/projection.js").Projected} projected
+ * @property {{left: import("./types.js").Point2[], right: import("./types.js").Point2[]}} drawnPath  a path under a hand
  */
-/** @typedef {{on: boolean, tool: null|"new"|"shape"|"merge", hasObjects: boolean}} Labeling  tool: what the next drag or click does; hasObjects: whether the pipeline's objects are drawn */
+/** @typedef {{on: boolean, tool: null|"new"|"shape"|"merge"|"path", hasObjects: boolean}} Labeling  tool: what the next drag or click does; hasObjects: whether the pipeline's objects are drawn */
 /** @typedef {keyof Values} Key */
 
 /** @type {Partial<Values>} */

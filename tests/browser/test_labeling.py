@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
+from pipeline.params import Params
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.judges import LOW_CONTRAST
 from tests.browser.labeling import Hand, Labels, begin, is_at, is_saved
@@ -324,3 +325,48 @@ def test_the_opposite_face_is_held_whatever_the_heading(open_page: OpenPage):
     for (grip, to, center, size), got in zip(EDGES, sizes, strict=True):
         assert got["center"][:2] == pytest.approx(center), (grip, to)
         assert got["size"][:2] == pytest.approx(size), (grip, to)
+
+
+def test_a_drive_is_reviewed_frozen_and_taken_back_in(hand: Hand, labels: Labels, tmp_path: Path):
+    page = hand.page
+    made = draw(hand, labels)
+    hand.keys("h")
+    dialog = page.get_by_role("dialog", name="Send back")
+    dialog.get_by_label("Comment").fill("a metre too long")
+    dialog.get_by_role("button", name="OK").click()
+    expect(page.locator(".track-detail .comment")).to_have_text("Sent back: a metre too long")
+    assert labels.tracks[made]["state"] == "proposed"
+    hand.keys("a")
+    labels.wait_for(lambda now: now.tracks[made]["state"] == "accepted")
+
+    page.get_by_role("tab", name="Frame").click()
+    page.get_by_role("button", name="Cut-in").click()
+    page.get_by_label("Tag of this frame").fill("rain")
+    page.get_by_role("button", name="Add", exact=True).click()
+    page.get_by_role("button", name="Draw the path").click()
+    bare = pixels(page, "#bev")
+    hand.drag(hand.plan(1, 0), hand.plan(30, 1), steps=6)
+    labels.wait_for(lambda now: len(now.everything["paths"]) == 1)
+    assert repainted(page, "#bev", bare)
+    expect(page.locator(".moment-row")).to_have_count(2)
+    held = labels.everything
+    assert [(each["kind"], each["tracks"]) for each in held["events"]] == [("cut_in", [made])]
+    assert [each["tag"] for each in held["tags"]] == ["rain"]
+    (path,) = held["paths"]
+    assert path["left"][0][1] - path["right"][0][1] == pytest.approx(2 * Params().path.half_width_m, abs=0.05)
+
+    page.get_by_role("tab", name="Files").click()
+    page.get_by_label("Name of the version").fill("reviewed")
+    page.get_by_role("button", name="Freeze").click()
+    version = page.locator(".label-files a", has_text="reviewed")
+    with page.expect_download() as download:
+        version.click()
+    download.value.save_as(tmp_path / "reviewed.json")
+    page.get_by_role("tab", name="Tracks").click()
+    hand.keys("Shift+Delete")
+    labels.wait_for(lambda now: not now.tracks)
+    page.get_by_role("tab", name="Files").click()
+    page.get_by_label("File with labels").set_input_files(tmp_path / "reviewed.json")
+    page.get_by_role("button", name="Import the file").click()
+    labels.wait_for(lambda now: len(now.tracks) == 1)
+    expect(page.locator(".said")).to_contain_text("1 track")

@@ -4,10 +4,12 @@ import { get, on, paint, set } from "../store.js";
 import { redo, undo } from "../whatif/history.js";
 import { send } from "./acts.js";
 import * as commands from "./commands.js";
+import { CLASSES } from "./cuboid.js";
 import { present } from "./draft.js";
 import { leadAt, leadName, shown, trackOf } from "./held.js";
 import { labelKeys } from "./keys.js";
 import { setTool } from "./mode.js";
+import { newLabel, setNewLabel } from "./newlabel.js";
 import { askName, knownName } from "./person.js";
 import * as span from "./span.js";
 
@@ -27,7 +29,14 @@ const back = el("button", { type: "button", class: "icon-button", textContent: "
 const forth = el("button", { type: "button", class: "icon-button", textContent: "↷", aria: { label: "Redo" }, title: "Redo (Ctrl Shift Z)", onclick: redo });
 const fresh = el("button", { type: "button", class: "toggle fresh", textContent: "New", title: "New label: drag in the plan, drag or click in the picture (G)", onclick: () => setTool("new") });
 
+const kind = el("select", { class: "kind", aria: { label: "Class of new labels" }, title: "Class of new labels" }, ...CLASSES.map((label) => el("option", { value: label, textContent: label })));
+
 export function setUp() {
+  kind.value = newLabel();
+  kind.addEventListener("change", () => {
+    setNewLabel(kind.value);
+    kind.blur();
+  });
   name.addEventListener("click", async () => {
     await askName();
     reflect();
@@ -38,7 +47,7 @@ export function setUp() {
     el("b", { textContent: "Lead" }), leads, where,
     el("b", { textContent: "Next" }), el("span", { class: "joined", aria: { role: "group", label: "Go to the next" } }, next("Unlabelled", "Next frame in which something is unlabelled (N)", "unlabelled"),
       next("Disagreement", "Next disagreement of labels and pipeline (V)", "disagreement"), next("Proposed", "Next proposal (B)", "proposed"), next("Sent back", "Next label that was sent back (Y)", "sent_back")),
-    fresh, said, task, saved, again, back, forth, name);
+    fresh, kind, said, task, saved, again, back, forth, name);
   $("#label-keys").append(...labelKeys().flatMap(({ bindings }) => bindings).filter(({ brief }) => brief).map(({ shown: keys, brief }) =>
     el("span", {}, el("kbd", { textContent: keys }), ` ${brief}`)));
   paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);

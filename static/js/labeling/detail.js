@@ -2,7 +2,7 @@
 import { newestOnly, request } from "../api.js";
 import { el, text } from "../dom.js";
 import { DASH, num } from "../format.js";
-import { get, on, paint } from "../store.js";
+import { on, paint } from "../store.js";
 import * as commands from "./commands.js";
 import { CLASSES } from "./cuboid.js";
 import { presentOf } from "./draft.js";

@@ -69,6 +69,7 @@ export const labelKeys = () => [
     key("Delete Backspace", "Del", "it is not there (in this frame, or in the marked ones)", commands.notHere, "not here"),
     key("Shift+Delete Shift+Backspace", "Shift Del", "remove the track", commands.removeTrack),
     ...pair("T", "next class", commands.nextClass, "class"),
+    key("Shift+P", "Shift P", "draw our path: drag along its middle in the plan", () => setTool("path")),
     key("x", "X", "split: from this frame on it is another", commands.splitHere, "split"),
     key("m", "M", "merge with the label that is pressed next", () => setTool("merge"), "merge"),
   ] },

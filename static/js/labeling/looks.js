@@ -14,6 +14,3 @@ export function lookOf(id, isOnPicture) {
   const tint = track.state === "rejected" ? ui("danger") : isLead ? shade("cipv") : track.state === "proposed" ? shade("path") : shade("fused");
   return { tint, dash: track.state === "proposed" ? [5, 4] : track.state === "rejected" ? [2, 4] : [], width: isChosen ? 2.5 : 1.5, isLead, isChosen, name: `${isLead ? "lead " : ""}#${id} ${track.label}` };
 }
-
-/** The colour of a state in words and ribbons. @param {import("./types.js").LabelState} state */
-export const stateTint = (state) => ({ proposed: ui("warn"), accepted: ui("ok"), corrected: ui("ok"), rejected: ui("danger") })[state];

@@ -2,12 +2,13 @@
 import { $, el } from "../dom.js";
 import * as detail from "./detail.js";
 import * as files from "./files.js";
+import * as moment from "./moment.js";
 import * as score from "./score.js";
 import * as tracks from "./tracks.js";
 
-const TABS = /** @type {const} */ ([["tracks", "Tracks"], ["score", "Score"], ["files", "Files"]]);
+const TABS = /** @type {const} */ ([["tracks", "Tracks"], ["moment", "Frame"], ["score", "Score"], ["files", "Files"]]);
 
-const bodies = { tracks: el("div", { class: "label-tracks" }), score: el("div", { class: "label-score" }), files: el("div", { class: "label-files" }) };
+const bodies = { tracks: el("div", { class: "label-tracks" }), moment: el("div", { class: "label-files" }), score: el("div", { class: "label-score" }), files: el("div", { class: "label-files" }) };
 
 export function setUp() {
   const buttons = TABS.map(([key, words]) => el("button", { type: "button", id: `tab-label-${key}`, textContent: words, data: { tab: key }, aria: { role: "tab", controls: `label-${key}` }, onclick: () => show(key) }));
@@ -17,6 +18,7 @@ export function setUp() {
     ...TABS.map(([key]) => bodies[key]));
   tracks.setUp(bodies.tracks);
   detail.setUp(bodies.tracks);
+  moment.setUp(bodies.moment);
   score.setUp(bodies.score);
   files.setUp(bodies.files);
   show("tracks");

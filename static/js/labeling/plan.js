@@ -6,6 +6,7 @@ import { footprint, knob, nose } from "./cuboid.js";
 import { present } from "./draft.js";
 import { lookOf } from "./looks.js";
 import { isOn } from "./mode.js";
+import { drawPathLabel } from "./path.js";
 
 /** @typedef {import("./types.js").Cuboid} Cuboid */
 /** @typedef {import("../viewport.js").Viewport} Viewport */
@@ -18,6 +19,7 @@ const HANDLE_PX = 3.5;
 /** @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {Tags} tags */
 export function drawInPlan(ctx, view, tags) {
   if (!isOn()) return;
+  drawPathLabel(ctx, view);
   const labels = present().flatMap(({ track, cuboid, keyframe }) => {
     const look = cuboid && lookOf(track, false);
     return cuboid && look ? [{ cuboid, keyframe, look, tint: lookOf(track, true)?.tint ?? look.tint }] : [];

@@ -8,6 +8,7 @@ import { chosen, shown, trackOf } from "./held.js";
 import { lookOf } from "./looks.js";
 import { isOn, setTool } from "./mode.js";
 import { newLabel } from "./newlabel.js";
+import * as path from "./path.js";
 import { KNOB_PX } from "./plan.js";
 
 /** @typedef {import("../viewport.js").Place} Place */
@@ -20,6 +21,7 @@ export function takes(from, scale) {
   if (!isOn()) return null;
   const tool = get("labeling")?.tool;
   if (tool === "new" || tool === "shape") return drawing(from, tool === "shape" ? chosen()?.id ?? null : null);
+  if (tool === "path") return path.drawing(from);
   const track = get("track"), cuboid = presentOf(track)?.cuboid;
   const grip = cuboid ? gripAt(cuboid, from, REACH_PX / scale, KNOB_PX / scale) : null;
   if (track === null || !cuboid || !grip) return null;
