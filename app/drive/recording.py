@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from app.drive.book import RunBook
 from app.drive.inputs import InputStore
-from app.drive.run import DriveRun, Kept, digest
+from app.drive.run import DriveRun, Kept, calibration_digest, digest
 from app.line import DetectionCache
 from pipeline.evaluation.lead import LeadRule
 from pipeline.params import Params
@@ -97,11 +95,6 @@ class Recording:
         """What the recording calls its frames; those that nobody saw yet are read."""
         return tuple(self.inputs.name(index) or self.as_read(index).name for index in range(self.recipe.total))
 
-    @property
-    def t_ns(self) -> tuple[int, ...]:
-        """The ticks of all frames."""
-        return tuple(self.recipe.source.t_ns(index) for index in range(self.recipe.total))
-
     @cached_property
     def marks(self) -> tuple[Mark, ...]:
         """What was marked while it was recorded."""
@@ -129,10 +122,7 @@ class Recording:
 
     def calibration_digest(self, params: Params) -> str:
         """With which calibration pictures and points are laid on each other, as twelve characters."""
-        camera = self.as_read(0).camera
-        numbers = [] if camera is None else [camera.K, camera.distortion, camera.T_camera_ego]
-        made_from = [[each.tolist() for each in numbers], params.alignment.model_dump(mode="json")]
-        return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:12]
+        return calibration_digest(self.at_hand(0).camera, params)
 
     def _onwards(self, kept: Kept, index: int, params: Params) -> State:
         state = kept.state

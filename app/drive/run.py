@@ -16,7 +16,7 @@ from pipeline.evaluation.lead import LeadRule, judge
 from pipeline.params import Params
 from pipeline.sources.base import TruthObject
 from pipeline.step import State, step
-from pipeline.types import Frame
+from pipeline.types import CameraCalibration, Frame
 
 _MOST_STATES = 4000
 """A state of a real drive takes about 25 KB beside its neighbours: 100 MB at most."""
@@ -90,4 +90,11 @@ class DriveRun:
 def digest(uri: str, detectors: Sequence[str], sensors: str, params: Params) -> str:
     """Twelve characters that are the same when, and only when, a run is made from the same."""
     made_from = [uri, list(detectors), sensors, params.model_dump(mode="json")]
+    return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:12]
+
+
+def calibration_digest(camera: CameraCalibration | None, params: Params) -> str:
+    """Twelve characters that are the same when, and only when, pictures and points are laid on each other the same."""
+    numbers = [] if camera is None else [camera.K, camera.distortion, camera.T_camera_ego]
+    made_from = [[each.tolist() for each in numbers], params.alignment.model_dump(mode="json")]
     return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()[:12]

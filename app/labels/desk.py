@@ -14,7 +14,7 @@ from app.drive.recording import Recording
 from app.labels.acts import do
 from app.labels.acts.scope import Scope
 from app.labels.database import Database
-from app.labels.drive import DriveInfo, DriveLabels
+from app.labels.drive import DriveInfo, DriveLabels, info_of
 from app.labels.files import importing_file
 from app.labels.log import Acted, Way
 from app.labels.long import importing_truth, proposing
@@ -26,7 +26,6 @@ from app.labels.tasks import Tasks, TaskState
 from pipeline.errors import BadInput
 from pipeline.labels.formats.base import FormatName
 from pipeline.params import Params
-from pipeline.sources.fingerprint import content_key
 
 logger = logging.getLogger("cipv.labels")
 
@@ -241,5 +240,4 @@ class LabelDesk:
 def _info(uri: str, recording: Recording | None) -> DriveInfo:
     if recording is None:
         return DriveInfo(f"uri {uri}"[:120], uri, uri, (), tuple)
-    t_ns = recording.t_ns
-    return DriveInfo(content_key(t_ns, recording.as_read), uri, recording.recipe.source.title, t_ns, recording.names)
+    return info_of(recording.recipe.source, recording.names)

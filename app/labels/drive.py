@@ -8,17 +8,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from sqlalchemy import insert, select
+from sqlalchemy import and_, func, insert, select
 from sqlalchemy.dialects import postgresql, sqlite
 
 from app.labels.database import Database
 from app.labels.items import SIGHTINGS, read_changed, read_extents, read_item, read_items, read_track, read_window
 from app.labels.log import Log
 from app.labels.refusals import ActRefused, NoSuchLabel
-from app.labels.tables import DriveRow, SightingRow, VersionRow
+from app.labels.tables import DriveRow, ItemRow, SightingRow, VersionRow
 from app.labels.values import KINDS, Item, ItemKind, sighting_of
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
+from pipeline.sources.base import Source
+from pipeline.sources.fingerprint import content_key
 
 WORKING = "working"
 
@@ -33,6 +35,12 @@ class DriveInfo:
     title: str
     t_ns: tuple[int, ...]
     names: Callable[[], tuple[str, ...]]
+
+
+def info_of(source: Source, names: Callable[[], tuple[str, ...]]) -> DriveInfo:
+    """What a recording is, wherever it lies: three of its frames are read."""
+    t_ns = tuple(source.t_ns(index) for index in range(len(source)))
+    return DriveInfo(content_key(t_ns, source.frame), source.uri, source.title, t_ns, names)
 
 
 @dataclass(frozen=True)
@@ -185,11 +193,14 @@ class DriveLabels:
 
 
 def known_drives(database: Database) -> list[dict[str, Any]]:
-    """Every recording that has acts: its uri, title, frames and newest act."""
+    """Every recording that has labels: its uri, title, count of frames and of tracks, and newest act."""
+    tracks = func.count(ItemRow.id).filter(ItemRow.kind == "track")
     with database.reading() as connection:
         found = connection.execute(
-            select(DriveRow.uri, DriveRow.title, DriveRow.count, DriveRow.revision)
-            .where(DriveRow.revision > 0, DriveRow.count > 0)
+            select(DriveRow.uri, DriveRow.title, DriveRow.count, tracks.label("tracks"), DriveRow.revision)
+            .join(ItemRow, and_(ItemRow.drive_id == DriveRow.id, ItemRow.removed.is_(False)))
+            .where(DriveRow.count > 0)
+            .group_by(DriveRow.id)
             .order_by(DriveRow.title, DriveRow.id)
         ).all()
     return [dict(row._mapping) for row in found]

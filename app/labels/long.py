@@ -34,18 +34,24 @@ def proposing(labels: DriveLabels, recording: Recording, person: str, first: int
         progress(0, 2)
         found = _proposals(recording, run, first, last)
         progress(1, 2)
-        counts: list[int] = []
-
-        def apply(draft: Draft) -> str:
-            counts.append(_put_proposals(draft, found, first, last))
-            return f"proposed {counts[-1]} tracks in frames {first}–{last}"
-
-        acted = labels.log.act("propose", person, apply)
+        said = put_proposals(labels, found, person, first, last)
         progress(2, 2)
-        known = len(found.tracks) - counts[-1]
-        return acted.what + (f"; {known} more are labelled already" if known else "")
+        return said
 
     return work
+
+
+def put_proposals(labels: DriveLabels, found: Proposals, person: str, first: int, last: int) -> str:
+    """Into the labels of a drive, in one act; a sentence of what came of it."""
+    counts: list[int] = []
+
+    def apply(draft: Draft) -> str:
+        counts.append(_put_proposals(draft, found, first, last))
+        return f"proposed {counts[-1]} tracks in frames {first}–{last}"
+
+    acted = labels.log.act("propose", person, apply)
+    known = len(found.tracks) - counts[-1]
+    return acted.what + (f"; {known} more are labelled already" if known else "")
 
 
 def importing(labels: DriveLabels, found: LabelSet, person: str, notes: Sequence[str]) -> str:

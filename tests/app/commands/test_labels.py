@@ -17,6 +17,12 @@ def cipv(*arguments: str | Path) -> int:
     return int(ended.value.code or 0)
 
 
+@pytest.fixture(autouse=True)
+def database(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without labels, and nobody else's."""
+    monkeypatch.setenv("CIPV_LABELS_URL", f"sqlite:///{tmp_path}/labels.db")
+
+
 @pytest.fixture
 def drive(tmp_path: Path) -> Path:
     return write(tmp_path / "drive.mcap", [full(index) for index in range(3)])
@@ -40,12 +46,48 @@ def test_the_same_recording_gives_the_same_file(drive: Path, tmp_path: Path) -> 
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
+def test_the_database_comes_before_the_truth_and_a_file_before_both(
+    drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cipv("labels", "list") == 0
+    assert "no labels yet" in capsys.readouterr().err
+    assert cipv("labels", "export", drive, "--format", "native", "--out", tmp_path / "truth.json") == 0
+    labels = json.loads((tmp_path / "truth.json").read_text())
+    labels["labels"]["tracks"][0]["label"] = "bus"
+    (tmp_path / "other.json").write_text(json.dumps(labels))
+    assert cipv("labels", "import", drive, tmp_path / "other.json", "--format", "native", "--person", "Ada") == 0
+    assert "imported 1 tracks" in capsys.readouterr().err
+    for name, options, label in (("a", (), "bus"), ("b", ("--labels", tmp_path / "truth.json"), "car")):
+        assert cipv("labels", "export", drive, "--format", "native", "--out", tmp_path / name, *options) == 0
+        found = json.loads((tmp_path / name).read_text())
+        assert [track["label"] for track in found["labels"]["tracks"]] == [label]
+    capsys.readouterr()
+    assert cipv("labels", "list", "--json") == 0
+    (listed,) = json.loads(capsys.readouterr().out)
+    assert (listed["count"], listed["tracks"], listed["revision"]) == (3, 1, 1)
+    moved = drive.rename(tmp_path / "moved.mcap")
+    assert cipv("labels", "export", moved, "--format", "native", "--out", tmp_path / "c") == 0
+    assert json.loads((tmp_path / "c").read_text())["labels"]["tracks"][0]["label"] == "bus"
+
+
+def test_what_the_pipeline_saw_is_proposed(drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cipv("labels", "propose", drive, "--lanes", "off") == 0
+    assert "tracks in frames 0–2" in capsys.readouterr().err
+    assert cipv("labels", "export", drive, "--format", "native", "--out", tmp_path / "a") == 0
+    labels = json.loads((tmp_path / "a").read_text())["labels"]
+    assert {each["state"] for each in (*labels["tracks"], *labels["leads"])} == {"proposed"}
+    assert {each["origin"]["maker"] for each in labels["leads"]} == {"pipeline"}
+    assert [(each["first"], each["last"]) for each in labels["leads"]] == [(0, 2)]
+
+
 BAD = {
     "no such format": ("labels", "export", "{drive}", "--format", "word", "--out", "{tmp}/x"),
     "no such file": ("labels", "import", "{drive}", "{tmp}/none", "--format", "csv", "--out", "{tmp}/x"),
     "no such recording": ("labels", "export", "{tmp}/none.mcap", "--format", "csv", "--out", "{tmp}/x"),
     "the other way": ("labels", "import", "{drive}", "{drive}", "--format", "coco", "--out", "{tmp}/x"),
     "a file that is there": ("labels", "export", "{drive}", "--format", "csv", "--out", "{drive}"),
+    "no such version": ("labels", "export", "{drive}", "--version", "v9", "--format", "csv", "--out", "{tmp}/x"),
+    "no database": ("labels", "list", "--database", "mysql://nowhere"),
     "a session without labels": ("labels", "import", "{drive}", "{drive}", "--format", "mcap", "--out", "{tmp}/x"),
 }
 

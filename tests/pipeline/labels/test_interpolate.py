@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
@@ -58,7 +59,7 @@ def test_through_several_keyframes_the_way_is_smooth_and_never_swings_beyond_the
     assert places == sorted(places)
     assert (places[0], places[3], places[6], places[9]) == (0.0, 3.0, 12.0, 12.0)
     assert max(places) == 12.0
-    steps = [b - a for a, b in zip(places, places[1:], strict=False)]
+    steps = [b - a for a, b in itertools.pairwise(places)]
     assert steps[3] < steps[4] > steps[5]  # it speeds up and slows down instead of turning at a corner
 
 
