@@ -30,6 +30,8 @@ FEWEST_POINTS = 5
 _MARGIN_M = 0.6
 """How far beside the vehicle a hand may have put it."""
 _INSIDE_M = 0.15
+_LONGEST_M = 2.0
+"""A cluster that goes on farther beside the cuboid is the vehicle and what stands by it: only what is near counts."""
 _MOST_TURN_RAD = math.radians(25.0)
 """Points that say more than this against a hand say it of something else."""
 _TWO_SIDES_M = 0.6
@@ -59,17 +61,19 @@ def refit(sweep: F32, cuboid: Cuboid) -> Refitted:
     sweep: (N, 4) float32 ``x y z intensity``, ego frame. TooFewPoints, with how many there are, for fewer than five.
     """
     ground = fit_ground(sweep, np.ones(len(sweep), dtype=bool), GroundParams())
-    near = candidates(sweep, ground, _inside(sweep, cuboid, _MARGIN_M), _CLUSTERS)
-    labels = cluster(sweep, near, _CLUSTERS)
+    labels = cluster(sweep, candidates(sweep, ground, np.ones(len(sweep), dtype=bool), _CLUSTERS), _CLUSTERS)
+    near = _inside(sweep, cuboid, _MARGIN_M)
     found = labels[_inside(sweep, cuboid, _INSIDE_M) & (labels >= 0)]
     if len(found) == 0:
-        found = labels[labels >= 0]
+        found = labels[near & (labels >= 0)]
     if len(found) == 0:
-        count = int(near.sum())
+        count = int((near & ~ground.mask).sum())
         raise TooFewPoints(
             f"{count} point{'' if count == 1 else 's'} in and near the cuboid: it needs {FEWEST_POINTS} close together"
         )
-    return onto_points(sweep[labels == np.bincount(found).argmax()], ground, cuboid)
+    whole = labels == np.bincount(found).argmax()
+    grown_together = bool((whole & ~_inside(sweep, cuboid, _LONGEST_M)).any())
+    return onto_points(sweep[whole & near] if grown_together else sweep[whole], ground, cuboid)
 
 
 def onto_points(points: F32, ground: Ground, cuboid: Cuboid) -> Refitted:

@@ -1,0 +1,127 @@
+"""What a run saw, as proposals, and which of them are labelled already."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pipeline.geometry import Cuboid
+from pipeline.labels.check import check
+from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
+from pipeline.labels.propose import Seen, known_as, propose
+
+BY = Origin("pipeline", "run 1", 5, "params", "camera")
+
+
+def seen(number: int, x: float = 20.0, y: float = 0.0, **values: object) -> Seen:
+    plain = Seen(number, "car", Cuboid((x, y, 0.7), (4.0, 1.8, 1.5), 0.0), None, False, False)
+    return replace(plain, **values)  # type: ignore[arg-type]
+
+
+def frames_of(track: LabelTrack) -> list[int]:
+    return [each.frame for each in track.sightings]
+
+
+@pytest.mark.parametrize(
+    ("life", "is_proposed"),
+    [
+        ([seen(7), seen(7)], True),
+        ([seen(7)], False),
+        ([seen(7, label=None), seen(7, label=None)], False),
+        ([seen(7, label=None, in_path=True), seen(7, label=None)], True),
+        ([seen(7, label="traffic light"), seen(7, label="traffic light")], False),
+        ([seen(7, label="person"), seen(7, label=None)], True),
+        ([seen(7, carried=True), seen(7, carried=True)], False),
+        ([seen(7, cuboid=None), seen(7, cuboid=None)], False),
+        ([seen(7, cuboid=None, bbox=(1.0, 2.0, 3.0, 4.0)), seen(7, cuboid=None, bbox=(1.0, 2.0, 3.0, 4.0))], True),
+    ],
+    ids=[
+        "a car",
+        "once",
+        "a return beside the road",
+        "in the path",
+        "no road user",
+        "person",
+        "carried",
+        "nowhere",
+        "box",
+    ],
+)
+def test_what_is_worth_a_look_is_proposed(life: list[Seen], is_proposed: bool) -> None:
+    found = propose({index: [each] for index, each in enumerate(life)}, {}, BY)
+    assert [track.id for track in found.tracks] == ([7] if is_proposed else [])
+
+
+def test_the_lead_is_proposed_whatever_it_is() -> None:
+    found = propose({0: [seen(7, label=None)], 1: []}, {0: 7, 1: None}, BY)
+    assert [(track.id, track.label, track.state, track.origin) for track in found.tracks] == [
+        (7, "car", "proposed", BY)
+    ]
+    assert [(each.first, each.last, each.lead) for each in found.leads] == [(0, 0, 7), (1, 1, "none")]
+
+
+def test_a_track_has_the_name_it_was_called_most_and_ends_where_it_was_last_seen() -> None:
+    life = [seen(7, label="car"), seen(7, label=None, carried=True), seen(7, label="truck"), seen(7, label="truck")]
+    life += [seen(7, label="truck", carried=True)]
+    (track,) = propose({index: [each] for index, each in enumerate(life)}, {}, BY).tracks
+    assert (track.label, frames_of(track)) == ("truck", [0, 1, 2, 3])
+    assert not any(each.keyframe for each in track.sightings)
+
+
+def test_who_leads_is_one_range_as_long_as_it_stays_the_same() -> None:
+    frames = {index: [seen(7), seen(8)] for index in range(6)}
+    found = propose(frames, {0: 7, 1: 7, 2: None, 3: 8, 4: 8, 5: 7}, BY)
+    assert [(each.first, each.last, each.lead) for each in found.leads] == [
+        (0, 1, 7), (2, 2, "none"), (3, 4, 8), (5, 5, 7),
+    ]  # fmt: skip
+    names = tuple(map(str, range(6)))
+    check(LabelSet("test", names, tuple(range(6)), found.tracks, found.leads), "proposals")
+
+
+# ------------------------------------------------------------ known already
+
+
+def track(number: int, places: dict[int, float], *, y: float = 0.0, size: float = 4.0) -> LabelTrack:
+    sightings = tuple(Sighting(f, Cuboid((x, y, 0.7), (size, 1.8, 1.5), 0.0)) for f, x in places.items())
+    return LabelTrack(number, "car", sightings, "accepted", BY)
+
+
+def boxed(number: int, x1: float) -> LabelTrack:
+    return LabelTrack(number, "car", (Sighting(0, None, (x1, 0.0, x1 + 10.0, 10.0)),), "accepted", BY)
+
+
+@pytest.mark.parametrize(
+    ("mine", "theirs", "same"),
+    [
+        (track(7, {0: 20.0, 1: 21.0}), track(3, {0: 20.5, 1: 21.5, 2: 90.0}), {7: 3}),
+        (track(7, {0: 20.0}), track(3, {0: 25.0}), {}),
+        (track(7, {0: 20.0}, y=3.5), track(3, {0: 20.0}), {}),
+        (track(7, {0: 20.0, 1: 21.0, 2: 22.0}), track(3, {0: 20.0, 1: 31.0, 2: 32.0}), {}),
+        (track(7, {0: 20.0}), track(3, {1: 20.0}), {}),
+        (track(7, {0: 18.2}, size=0.4), track(3, {0: 20.0}), {7: 3}),
+        (boxed(7, 0.0), boxed(3, 2.0), {7: 3}),
+        (boxed(7, 0.0), boxed(3, 8.0), {}),
+        (boxed(7, 0.0), track(3, {0: 20.0}), {}),
+    ],
+    ids=[
+        "near",
+        "far",
+        "the next lane",
+        "once in three",
+        "never together",
+        "only its rear",
+        "boxes",
+        "other",
+        "unlike",
+    ],
+)
+def test_two_are_the_same_when_they_mostly_are_in_one_place(
+    mine: LabelTrack, theirs: LabelTrack, same: dict[int, int]
+) -> None:
+    assert known_as([mine], [theirs]) == same
+
+
+def test_one_labelled_vehicle_is_one_proposal() -> None:
+    proposals = [track(7, {0: 20.0}), track(8, {0: 20.5, 1: 20.5})]
+    assert known_as(proposals, [track(3, {0: 20.0, 1: 20.5})]) == {8: 3}
