@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from pipeline.sources.fingerprint import fingerprint
+from pipeline.recording.save import save
+from pipeline.sources import open_source
+from pipeline.sources.fingerprint import content_key, fingerprint
+from pipeline.types import Frame, Picture
+from tests.app.recording import Recording
 
 
 def _edit(path: Path) -> None:
@@ -61,3 +66,40 @@ def test_an_edited_or_replaced_recording_is_another(
 def test_what_names_no_file_has_one_too(uri: str) -> None:
     assert fingerprint(uri) == fingerprint(uri)
     assert fingerprint(uri) != fingerprint(uri + "x")
+
+
+def key(source: Recording) -> str:
+    return content_key([source.t_ns(index) for index in range(len(source))], source.frame)
+
+
+def test_a_recording_has_the_same_key_wherever_it_lies_and_whatever_form_it_has(tmp_path: Path) -> None:
+    recording = Recording(count=5)
+    save(recording, tmp_path / "drive.mcap")
+    session = open_source(str(tmp_path / "drive.mcap"))
+    assert key(session) == key(recording) == key(Recording("test:elsewhere", count=5))  # type: ignore[arg-type]
+
+
+def test_another_recording_has_another_key() -> None:
+    class Darker(Recording):
+        """Another first picture."""
+
+        def frame(self, index: int) -> Frame:
+            frame = super().frame(index)
+            assert frame.picture is not None
+            return frame if index else replace(frame, picture=Picture(frame.t_ns, frame.picture.bgr // 2))
+
+    class Later(Recording):
+        """The same at another time."""
+
+        def t_ns(self, index: int) -> int:
+            return super().t_ns(index) + 1
+
+    assert len({key(each) for each in (Recording(count=5), Recording(count=6), Darker(count=5), Later(count=5))}) == 4
+
+
+def test_without_pictures_the_points_tell_recordings_apart() -> None:
+    def blind(index: int) -> Frame:
+        return replace(Recording().frame(index), picture=None)
+
+    assert content_key([1, 2], blind) != content_key([1, 2], lambda index: blind(index + 3))
+    assert content_key([], blind) == content_key([], blind)
