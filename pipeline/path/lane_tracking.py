@@ -8,7 +8,7 @@ lane, so that in a lane change the lines pass through and the ego lane is simply
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from pipeline.geometry import F64
 from pipeline.params import LaneParams
 from pipeline.path.lane_fit import FittedLine, Shape
 from pipeline.path.lane_types import EgoLane, LaneLine, Side, powers
+from pipeline.records import evolve
 from pipeline.types import EgoState
 
 _COMPARE_AT = powers([5.0, 15.0])
@@ -79,7 +80,7 @@ def predict(tracks: LaneTracks, ego: EgoState | None, dt_s: float | None, params
     move, offset = shifted(way), np.array([-0.5 * way * turn, -turn, 0.0, 0.0])
     noise = _noise(ego, dt_s)
     moved = [
-        replace(
+        evolve(
             line,
             coefficients=move @ line.coefficients + offset,
             covariance=move @ line.covariance @ move.T + noise,
@@ -181,7 +182,7 @@ def _joined(line: LineTrack, found: FittedLine) -> LineTrack:
 
 
 def _faded(line: LineTrack) -> LineTrack:
-    return replace(line, quality=line.quality * (1.0 - _SEEN_GAIN))
+    return evolve(line, quality=line.quality * (1.0 - _SEEN_GAIN))
 
 
 def _quality_now(line: LineTrack) -> float:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from pipeline.params import LaneParams
 from pipeline.path import lane_fit, lane_tracking
 from pipeline.path.lane_fit import FittedLine, Shape, Sightings
 from pipeline.path.lane_types import EgoLane, LaneLine, powers
+from pipeline.records import evolve
 from pipeline.types import I32, Box, EgoState, RawLanes
 
 Seed = tuple[float, Sightings]
@@ -124,12 +125,12 @@ def measure(
     if len(line) < _MIN_POINTS:
         return nothing
     reach = float(min(2.5 * pitch.sigma_rad, 0.045))
-    around = replace(expected or Shape(), pitch_rad=pitch.rad, pitch_reach_rad=reach)
+    around = evolve(expected or Shape(), pitch_rad=pitch.rad, pitch_reach_rad=reach)
     shape, histogram = lane_fit.shared_shape(seen, around)
     sigma = float(np.radians(params.bearing_sigma_deg))
     first = _fitted(_seeds(line, seen, shape, histogram), shape, sigma)
     pitch = _parallel([found for found, _ in first], height_m, shape.pitch_rad, pitch)
-    shape = replace(shape, pitch_rad=pitch.rad)
+    shape = evolve(shape, pitch_rad=pitch.rad)
     again = [(float(found.coefficients[0]), points) for found, points in first]
     lines = [found for found, _ in _fitted(again, shape, sigma)]
     to_ego = lane_tracking.shifted(-float(eye[0]))
