@@ -107,14 +107,15 @@ def between_lines(lane: EgoLane | None, params: PathParams) -> PathEstimate | No
 def _leaving(x: F64, y: F64, left: F64, right: F64) -> tuple[F64, F64]:
     """How far a car that points out of its lane will be beside the lane's middle, and how open that is, at each x.
 
-    It either stays or goes on as it points, the likelier so the sooner its side crosses the line: mean and spread of
-    the two.
+    It either stays or goes on from where it is as it points, the likelier so the sooner its side crosses the line: mean
+    and spread of the two.
     """
     heading = float(y[_HEADING_AT] - y[0]) / _HEADING_AT
     to_line_m = float(left[0] + y[0] if heading < 0.0 else right[0] - y[0]) - _CAR_HALF_M
     crossing_m = max(to_line_m, 0.0) / max(abs(heading), 1e-6)
-    goes = float(np.exp(-crossing_m / _SOON_M))
-    return goes * heading * x, np.sqrt(goes * (1.0 - goes)) * abs(heading) * x
+    goes = float(np.exp(-((crossing_m / _SOON_M) ** 2)))
+    away_m = y[0] + heading * x
+    return goes * away_m, np.sqrt(goes * (1.0 - goes)) * np.abs(away_m)
 
 
 def _places(line: LaneLine | None, x: F64) -> tuple[F64, F64] | None:

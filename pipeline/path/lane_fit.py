@@ -127,7 +127,7 @@ _PRIOR_INFO = 1.0 / np.array([1.0, 0.03, 1.5e-3, 1e-5]) ** 2
 
 
 def _grid(middle: float, reach: float, step: float) -> F64:
-    count = round(reach / step)
+    count = int(reach / step + 1e-6)  # what is known to less than a step is left to the fit
     return np.asarray(middle + step * np.arange(-count, count + 1), np.float64)
 
 

@@ -208,12 +208,15 @@ class _Candidate:
 
 
 def _worth(left: _Candidate | None, right: _Candidate | None, params: LaneParams) -> float:
-    """How good a pair is: well supported and long known, as wide as a lane, the car near its middle."""
+    """How good a pair is: well supported and long known, as wide as a lane, the car near its middle. A line alone must
+    not lie under the car: so do shadows and tracks in snow, and to which side of it the lane is nobody can say."""
     both = [each for each in (left, right) if each is not None]
     worth = sum(each.quality * each.line.seen / (each.line.seen + 1.0) for each in both)
     places = sum(each.beside_m for each in both)
+    if not both:
+        return 0.0
     if left is None or right is None:
-        return worth if abs(places) < params.max_width_m - _CAR_HALF_M else -1.0
+        return worth if _CAR_HALF_M < abs(places) < params.max_width_m - _CAR_HALF_M else -1.0
     width, unparallel = _width_m(left, right), left.heading - right.heading
     if not params.min_width_m <= width <= params.max_width_m or abs(unparallel) > _MOST_UNPARALLEL:
         return -1.0

@@ -222,7 +222,7 @@ def _on_road(raw: RawLanes, rays: F64, plane: F64, height_m: float, max_range_m:
 def _seeds(line: I32, seen: Sightings, shape: Shape, histogram: F64) -> list[Seed]:
     """Where each line lies at x = 0, and which points it may be made of: those that the detector says are one line, or,
     where it does not say, any that are near a peak of the histogram."""
-    groups = np.unique(line[line >= 0]).tolist()
+    groups = sorted(set(line[line >= 0].tolist()))
     if not groups:
         return [(y0, seen) for y0 in lane_fit.peaks(histogram)]
     x = seen.x_m(shape.pitch_rad)

@@ -8,7 +8,7 @@ middle is outside but which leaves no room is in the path too.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import copysign, erf, nan, sqrt
+from math import atan2, copysign, erf, nan, sqrt
 from typing import NamedTuple
 
 import numba
@@ -30,7 +30,7 @@ CAMERA_SIDEWAYS_PER_S = 0.02
 """The same of a box, a metre of distance: it is placed by its bearing, and swings with its estimated distance."""
 _SLANTED = 0.64
 """Turned by more than 20° from along or across the path, as |sin 2φ|."""
-_WIDEST_M, _LONGEST_M = 3.2, 12.0
+_WIDEST_M, _LONGEST_M = 3.2, 6.0
 """A vehicle that drives along is no wider across the path, but for as much of its flank as can be seen."""
 _CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
 _NO_SIDES = ((nan, nan), (nan, nan))
@@ -137,15 +137,15 @@ def place(
 def warm_up() -> None:
     """Compile the kernel before the first frame."""
     center = np.column_stack([np.arange(3.0), np.zeros(3)])
-    _against(np.zeros((1, 14)), center, center, center, 1.5, np.zeros(3), STEP_M, 0.9, True, 0.0, 0.0)
+    _against(np.zeros((1, 18)), center, center, center, 1.5, np.zeros(3), STEP_M, 0.9, True, 0.0, 0.0)
 
 
 def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
-    """The middle of the side that faces the ego origin: of the two sides at the nearest corner the one that is seen
-    under the larger angle. (Between the two nearest corners lies a short side of what is only a thin slice of a rear.)
-    """
+    """The middle of the side that faces the ego origin: of the two at the nearest corner the one more square to the
+    line of sight. (Between the two nearest corners lies a short side of what is only a thin slice of a rear.)"""
     (ax, ay), (bx, by), (cx, cy), (dx, dy) = bev
-    x, y = _outlines(np.array([[ax, ay, bx, by, cx, cy, dx, dy]]))[0].tolist()
+    sight = np.array([atan2(ay + by + cy + dy, ax + bx + cx + dx)])
+    x, y = _outlines(np.array([[ax, ay, bx, by, cx, cy, dx, dy]]), sight)[0].tolist()
     return x, y
 
 
@@ -176,15 +176,19 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
     """(N, 11) of (N, 18) rows as ``_numbers`` gives them: distances from the centre to the left and to the right edge
     there, sideways speed, then the numbers of ``Place`` as far as ``sigma_m``. half_width: of a path that has no edges
     of its own, else 0."""
-    outlines = _outlines(rows)
+    middles = np.empty((len(rows), 2))
+    middles[:, 0] = 0.25 * (rows[:, 0] + rows[:, 2] + rows[:, 4] + rows[:, 6])
+    middles[:, 1] = 0.25 * (rows[:, 1] + rows[:, 3] + rows[:, 5] + rows[:, 7])
+    outlines = _outlines(rows, _headings(center, nearest(center, middles)[1], step))
     aside, reached = nearest(center, outlines)
+    headings = _headings(center, reached[::5], step)
     beside, _ = nearest(center, np.ascontiguousarray(rows[:, 14:18]).reshape(-1, 2))
     out = np.empty((len(rows), 11))
     for n in range(len(rows)):
         offsets, ahead = aside[5 * n : 5 * n + 5], reached[5 * n]
         near_x, near_y = outlines[5 * n, 0], outlines[5 * n, 1]
         k = min(max(int(ahead / step), 0), len(center) - 2)
-        heading = np.arctan2(center[k + 1, 1] - center[k, 1], center[k + 1, 0] - center[k, 0])
+        heading = headings[n]
         cos, sin = np.cos(heading), np.sin(heading)
         # Of what drives along, the nearest face says where it is: how long it is and how it is turned are known poorly.
         # What stands slantwise to the path, as one that turns across it does, reaches as far as its far corners, and as
@@ -219,9 +223,19 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
 
 
 @numba.njit(cache=True, nogil=True)
-def _outlines(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _headings(center, along, step):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(N,) directions of a line at path lengths (N,)."""
+    out = np.empty(len(along))
+    for n in range(len(along)):
+        k = min(max(int(along[n] / step), 0), len(center) - 2)
+        out[n] = np.arctan2(center[k + 1, 1] - center[k, 1], center[k + 1, 0] - center[k, 0])
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _outlines(rows, along):  # type: ignore[no-untyped-def]  # pragma: no cover
     """(5·N, 2): of each row the middle of the side that faces the ego origin, and the corners in their order around it,
-    those of that side first: the one that is seen under the larger angle, of the two at the nearest corner."""
+    those of that side first: of the two at the nearest corner the one more square to the direction ``along`` (N,)."""
     outlines = np.empty((5 * len(rows), 2))
     for n in range(len(rows)):
         near = 0
@@ -229,7 +243,11 @@ def _outlines(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
             x, y = rows[n, 2 * c], rows[n, 2 * c + 1]
             if x * x + y * y < rows[n, 2 * near] ** 2 + rows[n, 2 * near + 1] ** 2:
                 near = c
-        way = 1 if _angle(rows[n], near, (near + 1) % 4) >= _angle(rows[n], near, (near + 3) % 4) else 3
+        after, before = (
+            _square(rows[n], near, (near + 1) % 4, along[n]),
+            _square(rows[n], near, (near + 3) % 4, along[n]),
+        )
+        way = 1 if after >= before else 3
         for c in range(4):
             k = (near + way * c) % 4
             outlines[5 * n + 1 + c, 0], outlines[5 * n + 1 + c, 1] = rows[n, 2 * k], rows[n, 2 * k + 1]
@@ -239,10 +257,10 @@ def _outlines(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
 
 
 @numba.njit(cache=True, nogil=True)
-def _angle(row, a, b):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """Under which corners a and b are seen from the ego origin."""
-    ax, ay, bx, by = row[2 * a], row[2 * a + 1], row[2 * b], row[2 * b + 1]
-    return abs(np.arctan2(ax * by - ay * bx, ax * bx + ay * by))
+def _square(row, a, b, along):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """How square the side between corners a and b is to a direction: |sin| of the angle between them."""
+    dx, dy = row[2 * b] - row[2 * a], row[2 * b + 1] - row[2 * a + 1]
+    return abs(dy * np.cos(along) - dx * np.sin(along)) / max(np.hypot(dx, dy), 1e-9)
 
 
 @numba.njit(cache=True, nogil=True)

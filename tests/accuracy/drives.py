@@ -46,9 +46,10 @@ def drive(
     sensors: Sensors = "both",
     changes: tuple[tuple[str, float], ...] = (),
     lanes: str = "off",
+    lanes_every: int | None = None,
 ) -> Drive:
     """Run a recording of the data folder with YOLOX-nano. ``changes``: dotted parameters on top of the preset. lanes:
-    the lane detector, as on the command line."""
+    the lane detector, as on the command line; it looks at every ``lanes_every``-th picture, null: as often as usual."""
     name = {"astyx": "astyx", "kitti": "kitti_0052"}[kind]
     source = open_source(f"{kind}:{folder / name}")
     params = with_changes(preset(preset_name), dict(changes))
@@ -58,7 +59,7 @@ def drive(
     detector = open_detector(str(folder / "models" / "yolox_nano.onnx"), size)
     results, judged = {}, {}
     found = lanes_for(source, lanes)
-    for frame, result in run(source, params, Detectors(detector, found, usual_every(found)), sensors):
+    for frame, result in run(source, params, Detectors(detector, found, lanes_every or usual_every(found)), sensors):
         results[frame.name] = result
         truth = source.truth(frame.index)
         if truth is not None:

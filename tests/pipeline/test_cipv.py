@@ -225,3 +225,44 @@ def test_where_the_path_is_not_known_nobody_new_leads() -> None:
 
 def ids(choice: Choice) -> set[int]:
     return {lead.id for lead in (choice.lead, choice.next_lead) if lead is not None}
+
+
+def sightings(*places: FusedObject) -> list[Choice]:
+    """What is chosen while one object is seen here and there, every 0.1 s, from a car at 20 m/s."""
+    state, ego, found = CipvState(), EgoState(0, 20.0, 0.0), []
+    for item in places:
+        seen = describe([item], ego, MotionParams())
+        state, choice = choose(state, tuple(seen), PATH, ego, 0.1, PARAMS)
+        found.append(choice)
+    return found
+
+
+@given(st.lists(st.floats(-4.0, 4.0), min_size=1, max_size=8))
+def test_the_gates_value_and_limit_say_what_it_decides(asides: list[float]) -> None:
+    """Wherever it was seen before: over the limit is out, and the odds say the same."""
+    for choice in sightings(*[fused(1, 20.0, y) for y in asides]):
+        gates = {gate.name: gate for gate in choice.objects[0].gates}
+        offset, odds = gates["path_offset"], gates["path_odds"]
+        assert offset.value is not None
+        assert odds.value is not None
+        assert offset.passed == odds.passed == choice.objects[0].in_path == (odds.value > 0.0)
+        assert offset.value <= offset.limit + 1e-9 if offset.passed else offset.value >= offset.limit - 1e-9
+
+
+def test_what_crosses_fast_is_judged_where_it_is_now() -> None:
+    """A car crosses from the right at 6 m/s: it leads from the first frame on in which 0.9 m of it, its nose included,
+    are inside, and not in the first in which they are not. One that is there at a bound is believed after a while."""
+    crossing = [fused(1, 20.0, -4.1 + 0.6 * k, velocity=(-10.0, 6.0)) for k in range(14)]
+    inside = [choice.lead is not None for choice in sightings(*crossing)]
+    assert inside == [-2.4 < -4.1 + 0.6 * k < 1.5 for k in range(14)]
+    swaying = [fused(1, 20.0, -3.0), fused(1, 20.0, -3.0), fused(1, 20.0, 0.0)]
+    assert sightings(*swaying)[-1].lead is None
+
+
+def test_the_lidar_has_just_lost_what_the_camera_sees() -> None:
+    """It may become the lead while its tracked distance is known well, and not when it has drifted."""
+    lost = dataclasses.replace(fused(1, 20.0), seen_by="V", measured=False)
+    assert decide(dataclasses.replace(lost, distance_sigma_m=0.2))[0] is not None
+    lead, why_not = decide(dataclasses.replace(lost, distance_sigma_m=0.8))
+    assert lead is None
+    assert why_not == {1: "its distance was not measured in this frame"}

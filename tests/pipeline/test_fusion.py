@@ -56,6 +56,21 @@ def test_every_track_lands_in_exactly_one_row(
     assert len({item.id for item in result.objects}) == len(result.objects)
 
 
+def test_where_the_sight_lines_past_a_box_end() -> None:
+    """At the LiDAR's distance where it has one, at the camera's else; nowhere for what the camera does not see now."""
+    near, far = lidar_track(1, 20.0), vision_track(2, (300.0, 330.0, 400.0, 390.0), 40.0)
+    lost = evolve(vision_track(3, (900.0, 330.0, 950.0, 390.0), 30.0), carried=True)
+    u1, v1, u2, v2 = box_of(near)
+    _, result = joined([near], [vision_track(1, (u1, v1, u2, v2), 26.0), far, lost])
+    both, alone, carried = (next(o for o in result.objects if o.vision_track == k) for k in (1, 2, 3))
+    for item, box, range_m in ((both, (u1, u2), 20.0), (alone, (300.0, 400.0), 40.0)):
+        assert item.box_sides is not None
+        for place, u in zip(item.box_sides, box, strict=True):
+            assert np.hypot(*place) == pytest.approx(range_m)
+            assert np.arctan2(-place[1], place[0]) == pytest.approx(np.radians(0.06) * (u - 640.0))
+    assert carried.box_sides is None
+
+
 def test_one_car_seen_by_both_is_one_row_with_the_lidars_place_and_the_cameras_name() -> None:
     track = lidar_track(1, 20.0, 1.0, velocity=(-2.0, 0.0))
     _, result = joined([track], [vision_track(1, box_of(track), 21.0)])

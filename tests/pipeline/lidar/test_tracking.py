@@ -189,3 +189,14 @@ def test_every_obstacle_is_in_exactly_one_track(
         assert sorted(map(id, seen)) == sorted(map(id, given_now or ()))
         assert [t.id for t in tracks] == sorted({t.id for t in tracks})
         assert all(t.missed == 0 for t in tracks if not t.carried)
+
+
+@pytest.mark.parametrize("filter_name", FILTERS)
+def test_a_rear_with_and_without_a_bit_of_flank_is_one_car(filter_name: str) -> None:
+    """The flank makes the footprint, and with it the density, twenty times as large or small."""
+    params = LidarTrackingParams(filter=filter_name)  # type: ignore[arg-type]
+    thin, thick = (
+        _car(20.0, length_m=length)._replace(density=24 / (1.8 * length), points=24) for length in (0.1, 1.5)
+    )
+    seen = _drive([(thin,), (thick,), (thin,), (thick,)], params)
+    assert [t.id for tracks in seen for t in tracks] == [1] * 4

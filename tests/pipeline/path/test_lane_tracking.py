@@ -176,3 +176,12 @@ def test_covariances_stay_symmetric_and_positive() -> None:
         for line in tracks.lines:
             assert np.allclose(line.covariance, line.covariance.T, rtol=0, atol=1e-12)
             assert np.all(np.diag(line.covariance) > 0.0)
+
+
+@pytest.mark.parametrize("y_m", [-0.6, -0.1, 0.4])
+def test_a_line_alone_under_the_car_says_nothing(y_m: float) -> None:
+    """On which side of it would the lane be? A shadow or a track in snow lies there as well."""
+    assert places(tracked(found(y_m))) == (None, None)
+    assert places(tracked(found(y_m), found(y_m - np.copysign(3.5, y_m)))) != (None, None), (
+        "with another one a lane away it is a lane"
+    )

@@ -132,3 +132,49 @@ def test_a_car_that_follows_the_bend_does_not_move_sideways() -> None:
 def test_what_has_no_place_has_none() -> None:
     assert place((fused(1, None, source="V"),), STRAIGHT, EGO, CipvParams()) == [None]
     assert place((), STRAIGHT, EGO, CipvParams()) == []
+
+
+@pytest.mark.parametrize("y", [-6.0, -2.4, -1.0, 0.0, 1.7, 3.5])
+def test_a_thin_slice_of_a_rear_is_placed_by_its_long_side(y: float) -> None:
+    """A LiDAR that sees a rear alone gives a box of 0.1 m by 1.7 m, whose two nearest corners are those of a short
+    side."""
+    there, _ = placed(fused(1, 19.0, y, length=0.1, width=1.7))
+    assert (there.offset_m, there.middle_m) == (pytest.approx(y, abs=0.02), pytest.approx(y, abs=0.02))
+    assert there.high_m - there.low_m == pytest.approx(1.7, abs=0.01)
+
+
+@pytest.mark.parametrize("x", [4.0, 8.0, 30.0])
+@pytest.mark.parametrize("y", [-3.5, 0.0, 3.5])
+def test_a_whole_car_is_placed_by_its_rear(x: float, y: float) -> None:
+    there, _ = placed(fused(1, x, y, length=4.5))
+    assert there.middle_m == pytest.approx(y, abs=0.02)
+
+
+def crossing_car(x: float, from_m: float, to_m: float) -> FusedObject:
+    """One that stands square across, of whose flank the LiDAR sees only the first metre and a half."""
+    item = fused(1, x, from_m + 0.75, length=0.1, width=1.5)
+    return dataclasses.replace(item, box_sides=((x, to_m), (x, from_m)))
+
+
+def test_of_one_that_stands_across_the_box_says_how_far_it_reaches() -> None:
+    alone, _ = placed(dataclasses.replace(crossing_car(30.0, -4.4, 0.1), box_sides=None))
+    both, _ = placed(crossing_car(30.0, -4.4, 0.1))
+    assert alone.margin_m() < 0.0 < both.margin_m()
+    assert (both.low_m, both.high_m) == (pytest.approx(-4.4, abs=0.02), pytest.approx(0.1, abs=0.02))
+
+
+def test_the_flank_of_a_car_in_the_next_lane_does_not_widen_it() -> None:
+    """Its box covers rear and flank: from 4.4 m aside at its rear to 2.6 m at its front, which is farther away."""
+    item = fused(1, 15.0, 3.5, length=4.5)
+    beside = dataclasses.replace(item, box_sides=((15.0, 4.4), (15.0, 2.0)))
+    assert placed(beside)[0].middle_m == pytest.approx(3.5, abs=0.02)
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_the_nose_of_one_that_moves_over_is_farther_that_way(way: float) -> None:
+    """2 m/s sideways at 15 m/s, of which 1.5 are believed: 0.45 m over a car's length."""
+    steady, _ = placed(fused(1, 20.0, 3.0, velocity=(-5.0, 0.0)))
+    moving, _ = placed(fused(1, 20.0, 3.0, velocity=(-5.0, 2.0 * way)))
+    gained = moving.high_m - steady.high_m if way > 0.0 else steady.low_m - moving.low_m
+    assert gained == pytest.approx(0.45, abs=0.02)
+    assert moving.high_m - moving.low_m == pytest.approx(steady.high_m - steady.low_m + 0.45, abs=0.02)

@@ -5,9 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.evaluation.experiments.choosing import Case, Frame, Way, acquired_m, report, run, true_lead
+from pipeline.evaluation.experiments.choosing import (
+    Case,
+    Frame,
+    InSight,
+    Way,
+    acquired_m,
+    is_hidden,
+    report,
+    run,
+    true_lead,
+)
 from pipeline.evaluation.lead import switches
 from pipeline.simulation import scenario, world
+from pipeline.simulation.camera import calibration
 from tests.pipeline.simulation.worlds import with_actors
 
 
@@ -54,6 +65,24 @@ def test_one_at_the_edge_is_doubtful() -> None:
     scene = with_actors("{id: 1, kind: car, lane: -2, offset_m: 1.5, ahead_m: 30, speed_mps: {0: 20}}")
     now = world.at(scene, 0.0)
     assert true_lead(now, Way.of(scene).ahead(now))[1]
+
+
+def test_what_has_just_come_into_sight_cannot_be_confirmed_yet() -> None:
+    """A car behind another one is hidden, and in sight from when that one has moved over."""
+    scene = with_actors(
+        "{id: 1, kind: car, lane: -2, ahead_m: 50, speed_mps: {0: 20}},"
+        "{id: 2, kind: truck, lane: -2, ahead_m: 15, speed_mps: {0: 20}, "
+        "lane_changes: [{start_s: 0.5, duration_s: 2, lane: -1}]}"
+    )
+    camera, in_sight, hidden, confirmable = calibration(), InSight(), [], []
+    for k in range(40):
+        now = world.at(scene, k / 10)
+        in_sight = in_sight.then(now, camera)
+        hidden.append(any(is_hidden(each, now, camera) for each in now.actors if each.actor.id == 1))
+        confirmable.append(in_sight.is_confirmable(1))
+    first = hidden.index(False)
+    assert 5 < first < 35
+    assert confirmable == [False] * (first + 2) + [True] * (38 - first)
 
 
 def frame(verdict: str, lead: int | None, chosen: int | None, lead_m: float = 30.0) -> Frame:

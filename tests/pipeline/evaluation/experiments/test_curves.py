@@ -65,6 +65,7 @@ def test_in_a_bend_of_125_m_the_lead_is_the_cipv(outcomes: dict[Case, Outcome]) 
     assert frames > 90
     assert share >= 0.99
     assert longest_wrong_s(outcome["fused"]) <= 0.3
+    assert share_right([outcome["lane lines and yaw rate"]], 60.0)[0] >= 0.99, "without a route too"
     assert share_right([outcome["straight guess"]])[0] < 0.5
     assert share_right([outcome["yaw rate"]])[0] > share_right([outcome["straight guess"]])[0] + 0.3
 
