@@ -104,7 +104,7 @@ def test_live_sensors_are_recorded(arguments: tuple[str, ...], tmp_path: Path) -
     assert ("/lidar/packets" in stored, "/lidar/points" in stored) == (bool(arguments), not arguments)
     pictures = list(session.file.messages(("/camera/image",)))
     shown = {frame.picture.t_ns for frame in frames if frame.picture is not None}
-    assert len(pictures) > 1.5 * len(shown), "30 a second came, ten a second are shown"
+    assert len(pictures) > len(shown), "those that came between ticks, too"
     assert shown <= {each.publish_time_ns for each in pictures}
     assert len({each.publish_time_ns for each in pictures}) == len(pictures)
     for index, result in enumerate(results):
