@@ -224,8 +224,10 @@ def report(cases: Sequence[Case], runs: Sequence[list[Frame]]) -> Section:
         "Choosing the CIPV: straight, left turn, turns across",
         (
             "Correct: the right vehicle, or rightly none. Missed: there is one, none is chosen. False: there is none, "
-            "one is chosen. Wrong: another one is chosen. The path is the route's, as the paper's was a map's, placed "
-            "by simulated RTK GNSS, fused with the yaw rate.",
+            "one is chosen. Wrong: another one is chosen. New: the lead came into sight fewer frames ago than "
+            f"confirmation asks ({CipvParams().confirm_hits}), and is not chosen yet. Such frames are not among those "
+            "counted, nor are those in which it is hidden or at the edge of the path. The path is the route's, as the "
+            "paper's was a map's, placed by simulated RTK GNSS, fused with the yaw rate.",
             *(_verdict(scene, groups) for scene in scenes),
         ),
         (Table("Frames", _COLUMNS, tuple(_row(*key, group) for key, group in groups.items()), decimals=1),),
@@ -244,6 +246,7 @@ _COLUMNS = (
     "with a lead",
     "first acquired at m",
     "switches a run",
+    "new",
 )
 
 
@@ -260,6 +263,7 @@ def _row(scene: str, sensors: Sensors, runs: list[list[Frame]]) -> tuple[Cell, .
         sum(frame.lead is not None for frame in frames),
         sum(first) / len(first) if first else None,
         sum(switches((frame.lead, frame.chosen) for frame in run) for run in runs) / len(runs) if runs else None,
+        sum(frame.verdict == "new" for run in runs for frame in run),
     )
 
 

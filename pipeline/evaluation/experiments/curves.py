@@ -19,7 +19,7 @@ import numpy as np
 from pipeline.evaluation.experiments import bends
 from pipeline.evaluation.experiments.choosing import InSight, Way, is_hidden, same_place, true_lead
 from pipeline.evaluation.experiments.sections import Cell, Experiment, Section, Table
-from pipeline.params import Params, with_changes
+from pipeline.params import CipvParams, Params, with_changes
 from pipeline.path.corridor import nearest_on_path
 from pipeline.path.placing import near_face_middle
 from pipeline.records import evolve
@@ -229,7 +229,8 @@ def report(cases: Sequence[Case], outcomes: Sequence[Outcome]) -> Section:
             "Given detections: true boxes that err as the embedded detector was measured to (3 % of the height that "
             "stays with a vehicle, 3 % and 0.7 px new in each frame, half missed at 105 m), a simulated VLP-16, lane "
             "lines with 1.5 px of noise to 55 m, RTK GNSS on a surveyed route with 0.3° of course noise, yaw rate with "
-            "0.0024 rad/s of noise and 0.0005 rad/s of bias.",
+            "0.0024 rad/s of noise and 0.0005 rad/s of bias. A lead that came into sight fewer frames ago than "
+            f"confirmation asks ({CipvParams().confirm_hits}) and is not chosen yet is not counted.",
             *(_verdict(name, drives) for name, drives in follows.items()),
         ),
         (
