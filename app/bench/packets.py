@@ -93,7 +93,7 @@ def _behind(block: bytes) -> bytes:
 def _rotations(packets: list[bytes]) -> Rotations:
     cutter = RotationCutter(np.eye(4), SensorClock())
     rotations = [*(cutter.push(packet, None) for packet in packets), cutter.flush()]
-    return [[placed.packet.data for placed in rotation.packets] for rotation in rotations if rotation is not None]
+    return [[placed.data for placed in rotation.packets] for rotation in rotations if rotation is not None]
 
 
 def _ours(rotations: Rotations) -> Callable[[], object]:

@@ -49,12 +49,14 @@ class DecoderCounts:
 
 
 class Placed(NamedTuple):
-    """A packet on the clock that counts on over the hours, and on the circle that begins behind the car. origin:
-    whatever its giver knows it by."""
+    """A packet on the clock that counts on over the hours, and on the circle that begins behind the car; the rest as in
+    ``Packet``. origin: whatever its giver knows it by."""
 
     time_us: int
     phase_cdeg: float
-    packet: Packet
+    rate_cdeg_us: float
+    span_us: float
+    data: bytes
     t_host_ns: int | None
     origin: int
 
@@ -99,8 +101,7 @@ class RotationCutter:
         """Take one data packet; the rotation that it completes, if it is the first of the next. Never raises."""
         self.counts.packets += 1
         try:
-            packet = read_packet(data)
-            placed = self._placed(packet, t_host_ns, origin)
+            placed = self._placed(read_packet(data), t_host_ns, origin)
             place = self._accept(placed)
         except BadPacket as bad:
             self.counts.refused[bad.reason] += 1
@@ -111,7 +112,7 @@ class RotationCutter:
         if place is _ANEW:
             self.clock.restart()
         if t_host_ns is not None:
-            self.clock.observe(round(placed.time_us + packet.span_us), t_host_ns)
+            self.clock.observe(round(placed.time_us + placed.span_us), t_host_ns)
         packets = self._packets
         if not packets or placed.time_us > packets[-1].time_us:
             packets.append(placed)  # in order, as nearly all
@@ -127,14 +128,14 @@ class RotationCutter:
 
     def _placed(self, packet: Packet, t_host_ns: int | None, origin: int) -> Placed:
         """The packet in the hour that is nearest to when it must have been sent."""
-        time_us = packet.time_us
+        time_us, azimuth_cdeg, rate_cdeg_us, span_us, _, data = packet
         if self._last is not None:
             passed_us = (_host_gap_us(self._last, t_host_ns) or 0) + self._last.time_us
             hours = (passed_us - time_us) / HOUR_US
             if not -0.5 < hours < 0.5:
                 time_us += round(hours) * HOUR_US
-        phase_cdeg = (packet.azimuth_cdeg - self._behind_cdeg) % ROTATION_CDEG
-        return Placed(time_us, phase_cdeg, packet, t_host_ns, origin)
+        phase_cdeg = (azimuth_cdeg - self._behind_cdeg) % ROTATION_CDEG
+        return Placed(time_us, phase_cdeg, rate_cdeg_us, span_us, data, t_host_ns, origin)
 
     def _accept(self, placed: Placed) -> _Place:
         """Where the packet belongs. BadPacket when it does not fit to those before it.
@@ -171,7 +172,7 @@ class RotationCutter:
 
     def _is_doubled(self, placed: Placed) -> bool:
         """Whether a packet of this time is there already; only some µs off, one of the two is spoiled."""
-        apart_us = _APART_SHARE * placed.packet.span_us
+        apart_us = _APART_SHARE * placed.span_us
         if not self._packets or placed.time_us - self._packets[-1].time_us >= apart_us:
             return False  # in order, as nearly all
         at = bisect(self._packets, placed.time_us, key=_time_us)
@@ -198,14 +199,14 @@ class RotationCutter:
             if not self._keeps_partial:
                 return None
         ahead = min(packets, key=lambda placed: abs(placed.phase_cdeg - ROTATION_CDEG / 2))
-        ahead_us = ahead.time_us + (ROTATION_CDEG / 2 - ahead.phase_cdeg) / ahead.packet.rate_cdeg_us
+        ahead_us = ahead.time_us + (ROTATION_CDEG / 2 - ahead.phase_cdeg) / ahead.rate_cdeg_us
         return Rotation(packets, ahead_us, self.clock.to_ns(ahead_us))
 
 
 def _turns(earlier: Placed, later: Placed) -> int | None:
     """How often the head passed behind the car between two packets; null when their azimuths disagree with their
     times."""
-    advance = (later.time_us - earlier.time_us) * later.packet.rate_cdeg_us
+    advance = (later.time_us - earlier.time_us) * later.rate_cdeg_us
     expected = earlier.phase_cdeg + advance
     turns = round((expected - later.phase_cdeg) / ROTATION_CDEG)
     off = abs(expected - later.phase_cdeg - turns * ROTATION_CDEG)
@@ -230,6 +231,6 @@ def _time_us(placed: Placed) -> int:
 
 def _missing(packets: list[Placed]) -> int:
     """Packets that must have been sent between those at hand."""
-    span_us = packets[0].packet.span_us
+    span_us = packets[0].span_us
     gaps = np.diff([placed.time_us for placed in packets]) / span_us
     return int(np.maximum(np.rint(gaps) - 1, 0).sum())

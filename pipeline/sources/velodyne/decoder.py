@@ -53,7 +53,7 @@ class Vlp16Decoder:
         """The sweep of a rotation; null when it holds no return."""
         packets = rotation.packets
         base_us = packets[0].time_us // HOUR_US * HOUR_US
-        vector = PacketVector([VelodynePacket((it.time_us - base_us) * 1e-6, list(it.packet.data)) for it in packets])
+        vector = PacketVector([VelodynePacket((it.time_us - base_us) * 1e-6, list(it.data)) for it in packets])
         _, cloud = self._library.decode(vector)
         points, ring, time_s = _columns(cloud, np.float32((packets[-1].time_us - rotation.ahead_us) * 1e-6))
         if not len(points):
