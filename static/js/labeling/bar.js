@@ -6,6 +6,7 @@ import { send } from "./acts.js";
 import * as commands from "./commands.js";
 import { CLASSES } from "./cuboid.js";
 import { present } from "./draft.js";
+import { isKnown } from "./frames.js";
 import { leadAt, leadName, shown, trackOf } from "./held.js";
 import { labelKeys } from "./keys.js";
 import { setTool } from "./mode.js";
@@ -59,6 +60,7 @@ export function setUp() {
 function reflect() {
   if (!get("labeling")?.on) return;
   mark($("#label-bar"), "frame", String(shown()));
+  if (!isKnown(shown())) return;
   const range = leadAt(shown()), marked = get("marked");
   const here = present().map(({ track }) => trackOf(track)).filter((track) => track !== null && track.state !== "rejected");
   const numbers = here.map((track) => /** @type {import("./types.js").LabelTrack} */ (track).id).sort((a, b) => a - b);

@@ -6,8 +6,9 @@ import { shown } from "./held.js";
 /** @typedef {import("./types.js").LabelSighting} LabelSighting */
 /** @typedef {{revision: number, byFrame: Record<string, LabelSighting[]>}} Chunk */
 
-/** Frames in one request, and how many such stretches are kept. */
-const CHUNK = 20, KEPT = 12;
+/** Frames in one request; fewer where many are labelled in each, so that an answer stays small. How many stretches are kept. */
+const CHUNKS = [20, 10, 5, 2, 1], MOST_SIGHTINGS = 1500, KEPT = 24;
+let size = CHUNKS[0];
 
 /** By their number, the one used last at the end. @type {Map<number, Chunk>} */
 const chunks = new Map();
@@ -15,10 +16,10 @@ const chunks = new Map();
 const fetchChunk = newestOnly(async (/** @type {number} */ number) => {
   const labels = get("labels");
   if (!labels || isFresh(number)) return;
-  const last = Math.min((get("state")?.count ?? 1) - 1, (number + 1) * CHUNK - 1);
+  const asked = size, last = Math.min((get("state")?.count ?? 1) - 1, (number + 1) * size - 1);
   /** @type {import("./types.js").SightingsAnswer|null} */
-  const answer = await request(`api/labels/frames?first=${number * CHUNK}&last=${last}`).catch(() => null);
-  if (!answer || get("labels")?.uri !== labels.uri) return;
+  const answer = await request(`api/labels/frames?first=${number * size}&last=${last}`).catch(() => null);
+  if (!answer || get("labels")?.uri !== labels.uri || asked !== size) return;
   keep(number, { revision: answer.revision, byFrame: answer.sightings });
   set("labelFrames", (get("labelFrames") ?? 0) + 1);
 });
@@ -27,19 +28,33 @@ export function setUp() {
   let uri = "";
   on(["labels", "frame", "labeling"], () => {
     const labels = get("labels");
-    if (labels?.uri !== uri) {
+    const fitting = labels ? sizeFor(labels) : size;
+    if (labels?.uri !== uri || fitting !== size) {
       uri = labels?.uri ?? "";
+      size = fitting;
       chunks.clear();
     }
     if (labels && get("labeling")?.on) look(shown());
   });
 }
 
+let weighed = { labels: /** @type {import("./held.js").Labels|null} */ (null), size };
+
+/** How many frames a request is for. @param {import("./held.js").Labels} labels */
+function sizeFor(labels) {
+  if (weighed.labels === labels) return weighed.size;
+  let sightings = 0;
+  for (const track of labels.tracks.values()) sightings += track.sightings;
+  const each = sightings / Math.max(1, get("state")?.count ?? 1);
+  weighed = { labels, size: CHUNKS.find((frames) => frames * each <= MOST_SIGHTINGS) ?? 1 };
+  return weighed.size;
+}
+
 /** @param {number} frame */
 function look(frame) {
-  const number = Math.floor(frame / CHUNK), isNearEnd = frame % CHUNK >= CHUNK - CHUNK / 4;
+  const number = Math.floor(frame / size), isNearEnd = frame % size >= size - Math.max(1, size / 4);
   if (!isFresh(number)) fetchChunk(number);
-  else if (isNearEnd && (number + 1) * CHUNK < (get("state")?.count ?? 0) && !isFresh(number + 1)) fetchChunk(number + 1);
+  else if (isNearEnd && get("state")?.playing && (number + 1) * size < (get("state")?.count ?? 0) && !isFresh(number + 1)) fetchChunk(number + 1);
 }
 
 /** @param {number} number */
@@ -53,7 +68,10 @@ function keep(number, chunk) {
 }
 
 /** What is labelled in a frame, as far as it is known here; while a change is being fetched, what was. @param {number} frame @returns {LabelSighting[]} */
-export const sightingsAt = (frame) => chunks.get(Math.floor(frame / CHUNK))?.byFrame[frame] ?? [];
+export const sightingsAt = (frame) => chunks.get(Math.floor(frame / size))?.byFrame[frame] ?? [];
+
+/** Whether anything is known of a frame yet; until then what is listed of the frame before stays. @param {number} frame */
+export const isKnown = (frame) => chunks.has(Math.floor(frame / size));
 
 /** Up to which act the labels of a frame are known. @param {number} frame */
-export const knownUpTo = (frame) => chunks.get(Math.floor(frame / CHUNK))?.revision ?? -1;
+export const knownUpTo = (frame) => chunks.get(Math.floor(frame / size))?.revision ?? -1;

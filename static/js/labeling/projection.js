@@ -17,12 +17,22 @@ const project = newestOnly(async (/** @type {{frame: number, cuboids: Map<number
   set("projected", { frame, pixels: new Map([...cuboids.keys()].flatMap((id, place) => (places[place] ? [[id, places[place]]] : []))) });
 });
 
+/** More cuboids than this nobody can tell apart in a picture: the nearest ones, and the selected one. */
+const MOST = 150;
+
+/** @param {[number, Cuboid][]} cuboids @returns {[number, Cuboid][]} */
+function nearest(cuboids) {
+  if (cuboids.length <= MOST) return cuboids;
+  const away = (/** @type {[number, Cuboid]} */ [id, { center: [x, y] }]) => (id === get("track") ? -1 : x < 0 ? Infinity : Math.hypot(x, y));
+  return cuboids.sort((a, b) => away(a) - away(b)).slice(0, MOST);
+}
+
 export function setUp() {
   on(["frame", "labels", "labelFrames", "draft", "labeling"], () => {
     if (!isOn() || !get("labels")) return;
     const draft = get("draft"), frame = shown();
     /** @type {[number, Cuboid][]} */
-    const cuboids = present().flatMap(({ track, cuboid }) => (cuboid ? [[track, cuboid]] : []));
+    const cuboids = nearest(present().flatMap(({ track, cuboid }) => (cuboid ? [[track, cuboid]] : [])));
     if (draft?.track === null && draft.cuboid && draft.frame === frame) cuboids.push([NEW, draft.cuboid]);
     project({ frame, cuboids: new Map(cuboids) });
   });

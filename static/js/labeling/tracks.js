@@ -4,13 +4,14 @@ import { seekTo } from "../drive/seek.js";
 import { get, paint, set } from "../store.js";
 import { mergeWith } from "./commands.js";
 import { present } from "./draft.js";
+import { isKnown } from "./frames.js";
 import { shown, trackOf } from "./held.js";
 
 /** @typedef {import("./types.js").LabelTrack} LabelTrack */
 /** @typedef {"here"|"open"|"all"} Which */
 
 /** A list longer than this is for the search of the frames, not for reading. */
-const MOST = 200;
+const MOST = 100;
 const WHICH = /** @type {[Which, string, string][]} */ ([["here", "Here", "Labels of this frame"], ["open", "To do", "Proposed, or sent back"], ["all", "All", "Every track of the drive"]]);
 
 const body = el("div", { class: "track-list", tabIndex: -1, aria: { role: "listbox", label: "Tracks" } });
@@ -34,6 +35,7 @@ export function setUp(parent) {
   function show() {
     if (!get("labeling")?.on) return;
     for (const button of buttons) press(button, button.dataset.which === which);
+    if (which === "here" && !isKnown(shown())) return;
     const found = fitting();
     text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
     keyed(body, found.slice(0, MOST), ({ id }) => String(id), create, update);
