@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from sqlalchemy import Connection, delete, func, insert, select, tuple_
+from sqlalchemy import Connection, bindparam, delete, func, insert, select, tuple_
 
 from app.labels.items import read_item, read_items, read_track
 from app.labels.refusals import ActRefused, NoSuchLabel, Stale
@@ -149,9 +149,7 @@ class Draft:
         items = {key: self._content(key) for key in {*self._after, *(("track", n) for n in self._frames_after)}}
         changed = {key: pair for key, pair in items.items() if pair[0] != pair[1]}
         self._write_items(changed)
-        for (kind, track), (_, after) in changed.items():
-            if kind == "track":
-                self._write_sightings(track, after.frames)
+        self._write_sightings(changed)
         rows: list[tuple[Any, ...]] = [
             (self._drive_id, self.number, kind, str(number), pack_content(kind, before), pack_content(kind, after))
             for (kind, number), (before, after) in changed.items()
@@ -212,18 +210,19 @@ class Draft:
         names = ("drive_id", "kind", "id", "revision", "removed", "value")
         self._connection.execute(insert(ItemRow), [dict(zip(names, row, strict=True)) for row in rows])
 
-    def _write_sightings(self, track: int, frames: Frames) -> None:
-        if not frames:
-            return
-        old = sorted(frame for frame in frames if self._frames_before[track][frame] is not None)
-        for start in range(0, len(old), 500):
-            self._connection.execute(
-                delete(SightingRow).where(
-                    SightingRow.drive_id == self._drive_id,
-                    SightingRow.track == track,
-                    SightingRow.frame.in_(old[start : start + 500]),
-                )
+    def _write_sightings(self, changed: Mapping[_Key, tuple[Content, Content]]) -> None:
+        """Of all tracks at once: a statement for each would be what an import spends its time on."""
+        gone, rows = [], []
+        for (kind, track), (before, after) in changed.items():
+            if kind == "track":
+                gone += [(frame, track) for frame, each in before.frames.items() if each is not None]
+                rows += [row_of(self._drive_id, track, each) for each in after.frames.values() if each is not None]
+        if gone:
+            one = delete(SightingRow).where(
+                SightingRow.drive_id == self._drive_id,
+                SightingRow.frame == bindparam("at_frame"),
+                SightingRow.track == bindparam("of_track"),
             )
-        rows = [row_of(self._drive_id, track, each) for each in frames.values() if each is not None]
+            self._connection.execute(one, [{"at_frame": frame, "of_track": track} for frame, track in gone])
         if rows:
             self._connection.execute(insert(SightingRow), [dict(zip(_COLUMNS, row, strict=True)) for row in rows])
