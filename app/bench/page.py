@@ -10,58 +10,29 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 from urllib.request import Request, urlopen
 
 import numpy as np
 from websockets.sync.client import connect
 
+from app.bench.browser import FLAGS, browser, first_views_ms, paused, playing
 from pipeline.errors import BadInput
 
-CHROMIUM = Path("/usr/bin/chromium")
-FLAGS = (
-    "--no-sandbox",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
-"""As a browser starts by itself where there is no graphics card: the page is composed by the processor, and WebGL
-is there for the 3D views."""
-SIZE_PX = (1440, 900)
-_SETTLE_S = 4.0
+_ALL_SEEN_WITHIN_S, _ASK_EVERY_S = 120.0, 0.5
 _PARAMETER_EVERY_S = 0.23
 _PARAMETER_VALUES = (0.65, 0.75)
 _REVISION = re.compile(rb'"params_revision":([0-9]+)')
 
-_WATCH = """async () => {
-  const { get, on } = await import("/js/store.js");
-  window.paintedMs = [];
-  const after = new MessageChannel();
-  let made = null;
-  // the message comes after the frame's style, layout and drawing: the painters' callbacks stand before this one
-  after.port1.onmessage = () => {
-    if (made !== null) window.paintedMs.push(performance.timeOrigin + performance.now() - made);
-    made = null;
-  };
-  on(["frame"], () => {
-    const { madeUnixMs } = get("frame");
-    requestAnimationFrame(() => {
-      made = madeUnixMs;
-      after.port2.postMessage(0);
-    });
-  });
-}"""
-
 
 def figures(source: str, for_s: float) -> dict[str, Any]:
-    """Milliseconds. ``page``: latency from result made to painted, and processor time a frame by kind of process;
-    ``parameter``: from the request to the first message with its result. BadInput without a browser."""
-    with _dashboard(source) as address:
-        return {"source": source, "page": _page(address, for_s), "parameter": _parameter(address, for_s)}
+    """Milliseconds. ``page``: latency from result made to painted, and processor time a frame by kind of process; when
+    paused, from a seek and from a slider's move to painted; and from opening the address to the first frame painted.
+    ``parameter``: while it plays, from the request to the first message with its result. BadInput without a browser."""
+    with browser() as running, _dashboard(source) as address:
+        live = _playing(running, address, for_s)
+        parameter = _parameter(address, for_s)
+        return {"source": source, "page": {**live, **_still(running, address)}, "parameter": parameter}
 
 
 @contextmanager
@@ -93,41 +64,36 @@ def _stream(address: str) -> str:
     return address.replace("http", "ws") + "/api/stream"
 
 
-def _page(address: str, for_s: float) -> dict[str, Any]:
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        raise BadInput("the page's bench needs the Python package playwright") from None
-    if not CHROMIUM.exists():
-        raise BadInput(f"the page's bench needs a browser at {CHROMIUM}")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        page = browser.new_page(viewport={"width": SIZE_PX[0], "height": SIZE_PX[1]})
-        page.goto(address)
-        page.wait_for_timeout(_SETTLE_S * 1e3)
-        page.evaluate(_WATCH)
-        processes = browser.new_browser_cdp_session()
-        before, start = _cpu_s(processes), time.monotonic()
-        page.wait_for_timeout(for_s * 1e3)
-        painted_ms = page.evaluate("window.paintedMs")
-        spent_s, after = time.monotonic() - start, _cpu_s(processes)
-        browser.close()
-    frames = max(1, len(painted_ms))
-    cpu = {kind: round(1e3 * (after[kind] - before.get(kind, 0.0)) / frames, 1) for kind in after}
+def _playing(running: Any, address: str, for_s: float) -> dict[str, Any]:
+    painted_ms, rate_hz, cpu = playing(running, address, for_s)
     return {
         **_spread(painted_ms),
         "frames": len(painted_ms),
-        "rate_hz": round(len(painted_ms) / spent_s, 1),
+        "rate_hz": round(rate_hz, 1),
         "cpu_ms_per_frame": {"all": round(sum(cpu.values()), 1), **{k: v for k, v in cpu.items() if v >= 1.0}},
+        "browser_flags": " ".join(FLAGS),
     }
 
 
-def _cpu_s(processes: Any) -> dict[str, float]:
-    """Processor time of the browser so far, by kind of process."""
-    spent: dict[str, float] = {}
-    for process in processes.send("SystemInfo.getProcessInfo")["processInfo"]:
-        spent[process["type"]] = spent.get(process["type"], 0.0) + process["cpuTime"]
-    return spent
+def _still(running: Any, address: str) -> dict[str, Any]:
+    count = _paused_with_all_seen(address)
+    seeks_ms, slides_ms = paused(running, address, count)
+    first_ms = first_views_ms(running, address)
+    return {"seek": _spread(seeks_ms), "slider": _spread(slides_ms), "first_view": _spread(first_ms)}
+
+
+def _paused_with_all_seen(address: str) -> int:
+    """Pause once the networks have looked at every frame, as they have when a person has waited for the timeline; how
+    many frames there are."""
+    deadline = time.monotonic() + _ALL_SEEN_WITHIN_S
+    while time.monotonic() < deadline:
+        with urlopen(f"{address}/api/state") as answer:
+            state = json.load(answer)
+        if not state["drive"]["running"]:
+            break
+        time.sleep(_ASK_EVERY_S)
+    _post(address, "POST", "/api/playback", {"playing": False})
+    return int(state["count"])
 
 
 def _parameter(address: str, for_s: float) -> dict[str, Any]:
@@ -149,10 +115,13 @@ def _parameter(address: str, for_s: float) -> dict[str, Any]:
 
 
 def _change(address: str, changes: dict[str, float]) -> int:
-    body = json.dumps({"changes": changes, "final": False}).encode()
-    request = Request(f"{address}/api/params", body, {"content-type": "application/json"}, method="PATCH")
+    return int(_post(address, "PATCH", "/api/params", {"changes": changes, "final": False})["revision"])
+
+
+def _post(address: str, method: str, path: str, body: dict[str, Any]) -> Any:
+    request = Request(address + path, json.dumps(body).encode(), {"content-type": "application/json"}, method=method)
     with urlopen(request) as answer:
-        return int(json.load(answer)["revision"])
+        return json.load(answer)
 
 
 def _revision_of(message: bytes) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from app.bench.page import CHROMIUM, FLAGS
+from app.bench.browser import CHROMIUM, FLAGS
 from app.engine import Engine
 from app.recording import RecordingDesk
 from app.server import Server, create_app, listen_socket

@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from app.bench import page
-from app.bench.page import _page, _revision_of, _spread
+from app.bench import browser
+from app.bench.page import _revision_of, _spread, figures
 from pipeline.errors import BadInput
 
 
 def test_without_a_browser_it_says_what_it_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    monkeypatch.setattr(page, "CHROMIUM", tmp_path / "no-browser")
+    monkeypatch.setattr(browser, "CHROMIUM", tmp_path / "no-browser")
     with pytest.raises(BadInput, match="needs a browser at"):
-        _page("http://127.0.0.1:1", 0.1)
+        figures("sim:straight", 0.1)
 
 
 @pytest.mark.parametrize(
