@@ -148,18 +148,17 @@ class LabelDesk:
             self._control.restore(acted.params)
         return self._done(acted)
 
-    def begin(self, person: str, act: Propose | Import) -> None:
-        """Something that takes a while. ActRefused while another one goes on, or when it cannot be done."""
+    def begin(self, person: str, act: Propose | Import) -> int:
+        """Something that takes a while; its number. ActRefused while another one goes on, or when it cannot be done."""
         labels, recording = self.labels, self.recording
         if isinstance(act, Propose):
-            self.tasks.begin("propose", proposing(labels, recording, person, act.first, act.last))
-        else:
-            self.tasks.begin("import", importing_truth(labels, recording, person))
+            return self.tasks.begin("propose", proposing(labels, recording, person, act.first, act.last))
+        return self.tasks.begin("import", importing_truth(labels, recording, person))
 
-    def begin_import(self, person: str, file: Path, name: FormatName) -> None:
+    def begin_import(self, person: str, file: Path, name: FormatName) -> int:
         """Labels of a file or folder that was handed in, as another tool made them; it is removed in the end."""
         labels, recording = self.labels, self.recording
-        self.tasks.begin("import", importing_file(labels, recording, person, file, name))
+        return self.tasks.begin("import", importing_file(labels, recording, person, file, name))
 
     def measured(self, act: Refit | Lift) -> tuple[SetSighting | AddTrack, str]:
         """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found.

@@ -23,8 +23,10 @@ class Cancelled(Exception):
 
 @dataclass(frozen=True)
 class TaskState:
-    """How far it is. error: why it failed. It stays until the next one begins, or what it was about is closed."""
+    """How far it is. id: its number, which who began it was told. error: why it failed. It stays until the next one
+    begins, or what it was about is closed."""
 
+    id: int
     what: Kind
     done: int = 0
     total: int = 0
@@ -57,17 +59,18 @@ class Tasks:
         """Null while there was none."""
         return self._state
 
-    def begin(self, what: Kind, work: Work) -> None:
-        """ActRefused while another one runs."""
+    def begin(self, what: Kind, work: Work) -> int:
+        """Its number. ActRefused while another one runs."""
         with self._lock:
             if self._state is not None and self._state.running:
                 raise ActRefused(f"{self._state.what} is still going on")
             self._turn += 1
             turn = self._turn
-            self._state = TaskState(what)
+            self._state = TaskState(turn, what)
             self._thread = threading.Thread(target=self._run, args=(turn, work), name="cipv-label-task", daemon=True)
         self._thread.start()
         self._on_change()
+        return turn
 
     def cancel(self) -> None:
         """It is not waited for; what it has not written yet it never will."""

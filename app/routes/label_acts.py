@@ -32,8 +32,8 @@ def label_acts_router(desk: LabelDesk) -> APIRouter:
         try:
             with refusing():
                 if isinstance(body.act, Propose | Import):
-                    desk.begin(body.person, body.act)
-                    return JSONResponse({"status": "begun", "what": body.act.kind}, 202)
+                    number = desk.begin(body.person, body.act)
+                    return JSONResponse({"status": "begun", "what": body.act.kind, "task": number}, 202)
                 note = ""
                 doing: Any = body.act
                 if isinstance(doing, Lift | Refit):

@@ -41,11 +41,11 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         path = Path(file.name)
         try:
             with refusing():
-                desk.begin_import(person, path, format)
+                number = desk.begin_import(person, path, format)
         except BaseException:
             path.unlink(missing_ok=True)
             raise
-        return JSONResponse({"status": "begun", "what": "import"}, 202)
+        return JSONResponse({"status": "begun", "what": "import", "task": number}, 202)
 
     @router.get("/export", response_class=FileResponse, responses=_FILE)
     def export(format: FormatName = "native", version: VersionName = "working") -> FileResponse:

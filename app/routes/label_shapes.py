@@ -211,10 +211,11 @@ class ActedJson(BaseModel):
 
 
 class TaskBegun(BaseModel):
-    """It goes on; ``state.labels.task`` tells how far it is."""
+    """It goes on; ``state.labels.task`` tells how far it is. task: its id there."""
 
     status: Literal["begun"]
     what: Literal["propose", "import", "refit"]
+    task: int
 
 
 class StaleJson(BaseModel):

@@ -191,6 +191,7 @@ class RecordingJson(_Exact):
 class LabelTaskJson(_Exact):
     """Something on labels that takes a while. It stays, with its note or error, until the next one begins."""
 
+    id: int
     what: Literal["propose", "import", "refit"]
     done: int
     total: int

@@ -95,7 +95,8 @@ def task(engine: Engine, begun: httpx.Response) -> str:
     assert begun.status_code == 202, begun.text
 
     def ended(shown: Snapshot) -> bool:
-        return shown.labels.task is not None and not shown.labels.task.running
+        now = shown.labels.task
+        return now is not None and now.id == begun.json()["task"] and not now.running
 
     state = engine.wait_for(ended, WAIT_S).labels.task
     assert state is not None
