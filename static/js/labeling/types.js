@@ -72,6 +72,7 @@
  * @property {LabelOrigin} origin
  *
  * @typedef {object} LabelTask
+ * @property {number} id  the 202 of who began it has the same
  * @property {"propose"|"import"|"refit"} what
  * @property {number} done
  * @property {number} total
