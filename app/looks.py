@@ -1,4 +1,5 @@
-"""What people at the pages look at, for the views that the server draws: the selection, and who hides the 3D view."""
+"""What people at the pages look at, for the views that the server draws: the selection, and who hides the 3D view; and
+what they pick in those views, for the pages."""
 
 from __future__ import annotations
 
@@ -14,10 +15,20 @@ class Looks:
         self._selected: int | None = None
         self._hiding: set[object] = set()
         self._listener: Callable[[], None] = lambda: None
+        self._pages: Callable[[int | None], None] = lambda number: None
 
     def on_change(self, listener: Callable[[], None]) -> None:
         """Call ``listener`` after every change; there is one."""
         self._listener = listener
+
+    def on_pick(self, pages: Callable[[int | None], None]) -> None:
+        """Call ``pages`` with what was picked in a view of the server; there is one."""
+        self._pages = pages
+
+    def pick(self, number: int | None) -> None:
+        """Somebody has clicked on this object in the 3D view, or beside all: it is selected here and at the pages."""
+        self.select(number)
+        self._pages(number)
 
     @property
     def selected(self) -> int | None:

@@ -23,7 +23,7 @@ class SceneFeed:
     def __init__(self, engine: Engine, looks: Looks | None = None) -> None:
         self._engine = engine
         self._looks = looks or Looks()
-        self._view = ViserView(engine.snapshot.params, self._moved)
+        self._view = ViserView(engine.snapshot.params, self._moved, on_pick=self._looks.pick)
         self._newest = Newest[Snapshot]()
         self.drawn = 0
         self._thread = threading.Thread(target=self._work, name="cipv-scene", daemon=True)

@@ -9,7 +9,8 @@ Buffers of the system between here and a page hold many frames, which would be a
 for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no more than ``FRAMES_UNDER_WAY`` are sent
 ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the picture: the one that all get is
 as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
-``{"selected": 7}`` and ``{"hides_3d": true}`` are for the views that the server draws.
+``{"selected": 7}`` and ``{"hides_3d": true}`` are for the views that the server draws; what is picked there
+comes to the pages as ``{"type": "selected", "id": 7}``.
 """
 
 from __future__ import annotations
@@ -105,6 +106,7 @@ class Stream:
     def __init__(self, looks: Looks | None = None) -> None:
         self.traffic = Traffic()
         self._looks = looks or Looks()
+        self._looks.on_pick(self._picked)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._slots: list[Slot] = []
         self._encoder = Encoder()
@@ -196,6 +198,16 @@ class Stream:
             if self._frame[0] < snapshot.sequence and snapshot.tick is not None:
                 self._frame = (snapshot.sequence, self._encoder.message(snapshot, self._width_px))
             return self._frame
+
+    def _picked(self, number: int | None) -> None:
+        """Tell every page what was picked in the 3D view. Any thread."""
+        loop, message = self._loop, _dump({"type": "selected", "id": number})
+        if loop is not None and not loop.is_closed():
+            loop.call_soon_threadsafe(self._tell, "selected", message)
+
+    def _tell(self, kind: str, message: str) -> None:
+        for slot in self._slots:
+            slot.put(kind, message)
 
     def _distribute(self, state: str, frame: bytes | None, sequence: int) -> None:
         for slot in self._slots:

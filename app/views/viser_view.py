@@ -18,11 +18,13 @@ import viser
 
 from app.views import scene, viser_nodes
 from app.views.colors import Role, rgb
+from app.views.picking import object_on_ray
 from app.views.viser_gui import OnChange, ParamsGui
 from app.views.viser_nodes import Strokes
 from pipeline.params import Params
 from pipeline.types import Frame, FusedObject, Point3, Result
 
+OnPick = Callable[[int | None], None]
 HOST = "127.0.0.1"
 CAMERA_FOV_DEG = 48.0
 _LABELS = ("vehicles and in path", "all", "none")
@@ -58,10 +60,17 @@ class _Display:
 class ViserView:
     """Starts the server at once. ``port`` 0 takes a free one; a taken port silently becomes the next: read ``port``.
 
-    ``on_change(name, value)`` hears of every slider that a person moves, on a thread of viser's.
+    ``on_change(name, value)`` hears of every slider that a person moves, ``on_pick(id)`` of every click into the scene:
+    the object that was met, null for none. Both on a thread of viser's.
     """
 
-    def __init__(self, params: Params, on_change: OnChange = lambda name, value: None, port: int = 0) -> None:
+    def __init__(
+        self,
+        params: Params,
+        on_change: OnChange = lambda name, value: None,
+        port: int = 0,
+        on_pick: OnPick = lambda number: None,
+    ) -> None:
         self._lock = threading.Lock()
         self._shown: tuple[Frame, Result] | None = None
         self._display = _Display()
@@ -81,6 +90,7 @@ class ViserView:
         self._add_cameras()
         self._add_display_options()
         self._params = ParamsGui(self._server.gui, params, on_change)
+        self._scene.on_click()(lambda click: on_pick(self._met(click.ray_origin, click.ray_direction)))
 
     @property
     def watchers(self) -> int:
@@ -117,6 +127,14 @@ class ViserView:
         """Stop the server and disconnect everybody."""
         with _silent():
             self._server.stop()
+
+    def _met(self, origin: Point3, direction: Point3) -> int | None:
+        """The object that a click's ray meets."""
+        with self._lock:
+            shown = self._shown
+        if shown is None:
+            return None
+        return object_on_ray(shown[1].objects, origin, direction, scene.ground_height_m(shown[1]) or 0.0)
 
     # ------------------------------------------------------------ what never changes
 

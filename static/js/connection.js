@@ -91,12 +91,13 @@ export function connect() {
   };
 }
 
-/** @param {{type: string, state: import("./types.js").State, ping: number, server_unix_ms: number}} message @param {number} number */
+/** @param {{type: string, state: import("./types.js").State, id: number|null, ping: number, server_unix_ms: number}} message @param {number} number */
 function onText(message, number) {
   if (message.type === "state") {
     stateNumber = number;
     set("state", message.state);
   }
+  if (message.type === "selected") set("selection", message.id);
   if (message.type === "pong") clockOffset = message.server_unix_ms - (Date.now() + message.ping) / 2;
 }
 

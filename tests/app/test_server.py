@@ -20,6 +20,7 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from app.engine import Engine
+from app.looks import Looks
 from app.server import PortTaken, Server, create_app, listen_socket
 from app.snapshot import Snapshot
 from pipeline.params import Params, from_yaml
@@ -42,12 +43,17 @@ def engine() -> Iterator[Engine]:
 
 
 @pytest.fixture(scope="module")
-def address(engine: Engine) -> Iterator[str]:
+def looks() -> Looks:
+    return Looks()
+
+
+@pytest.fixture(scope="module")
+def address(engine: Engine, looks: Looks) -> Iterator[str]:
     """Where a real server answers."""
     bound = listen_socket("127.0.0.1", 0)
     address = f"http://127.0.0.1:{bound.getsockname()[1]}"
     is_ready = threading.Event()
-    server = Server(create_app(engine), address, lambda _: is_ready.set())
+    server = Server(create_app(engine, looks=looks), address, lambda _: is_ready.set())
     thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
     thread.start()
     assert is_ready.wait(WAIT_S)
@@ -227,6 +233,14 @@ def test_bad_input_is_refused_with_one_sentence(client: httpx.Client, name: str)
     assert about in answer.json()["detail"]
     assert "\n" not in answer.json()["detail"]
     assert client.get("/api/params").json()["values"] == before
+
+
+def test_what_is_picked_in_the_3d_view_comes_to_the_pages(looks: Looks, stream: Callable[..., ClientConnection]):
+    page = stream()
+    page.recv(timeout=WAIT_S)
+    looks.pick(7)
+    told = (json.loads(words) for words in page if isinstance(words, str))
+    assert next(word for word in told if word["type"] == "selected") == {"type": "selected", "id": 7}
 
 
 # ------------------------------------------------------------ strangers

@@ -32,6 +32,7 @@ from pipeline.types import (
     Obstacle,
     Path,
     Picture,
+    Point3,
     Rejection,
     Result,
     SensorHealth,
@@ -211,6 +212,11 @@ class SceneClient:
     def move(self, uuid: str, value: object) -> None:
         """What the browser sends when a person moves a slider."""
         self._send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
+
+    def click(self, origin: Point3, direction: Point3) -> None:
+        """What the browser sends when a person clicks into the scene: the ray through that pixel."""
+        place = {"screen_pos": ((0.5, 0.5),), "modifier": None}
+        self._send("ScenePointerMessage", event_type="click", ray_origin=origin, ray_direction=direction, **place)
 
     def _send(self, kind: str, **fields: Any) -> None:
         self.connection.send(msgspec.msgpack.encode({"type": kind, **fields}))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 from collections.abc import Iterator
 from typing import Any
 
@@ -56,6 +57,27 @@ def test_a_page_that_hides_its_3d_view_costs_nothing_until_it_shows_it_again(eng
         looks.hide(page, False)
         client.read_until(_is_cloud)
     assert feed.drawn == 2, "the first one and the last one"
+
+
+def test_what_is_clicked_in_the_3d_view_is_selected_everywhere(engine: Engine, open_scene: Any) -> None:
+    tick = engine.snapshot.tick
+    assert tick is not None
+    target = next(each for each in tick.result.objects if each.cuboid is not None)
+    assert target.cuboid is not None
+    x, y, _ = target.cuboid.center
+    picked: queue.Queue[int | None] = queue.Queue()
+    looks = Looks()
+    looks.on_pick(picked.put)
+    with SceneFeed(engine, looks) as feed:
+        client = open_scene(feed.port)
+        client.look()
+        client.read_until(_is_cloud)
+        client.click((x, y, 50.0), (0.0, 0.0, -1.0))
+        assert picked.get(timeout=WAIT_S) == target.id
+        client.read_until(lambda message: message.get("name") == "/selection")
+        client.click((x, y, 50.0), (0.0, 0.0, 1.0))
+        assert picked.get(timeout=WAIT_S) is None, "beside everything"
+    assert looks.selected is None
 
 
 def test_what_is_selected_at_a_page_is_marked_in_the_3d_view(engine: Engine, open_scene: Any) -> None:
