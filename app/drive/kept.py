@@ -34,11 +34,10 @@ def seen_of(records: Objects) -> list[Seen]:
     ]
 
 
-def results_of(run: DriveRun) -> Iterator[Result]:
-    """Every frame that is there, named by its index."""
-    objects = run.objects()
-    for (index, records), row in zip(objects, run.rows(), strict=False):
-        yield _result(index, row, records)
+def results_of(run: DriveRun, *, leads_only: bool = False) -> Iterator[Result]:
+    """Every frame that is there, named by its index. leads_only: of its objects only the CIPV, which is quicker."""
+    for (index, records), row in zip(run.objects(), run.rows(), strict=False):
+        yield _result(index, row, records[records["id"] == row.cipv_id] if leads_only else records)
 
 
 def _result(index: int, row: Row, records: Objects) -> Result:

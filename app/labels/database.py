@@ -28,7 +28,8 @@ logger = logging.getLogger("cipv.labels")
 URL_VARIABLE = "CIPV_LABELS_URL"
 FILE = SESSIONS / "labels.db"
 _BUSY_S = 30.0
-_CONNECT_S = 10
+_CONNECT_S = 3
+"""A server that is away must not keep anybody waiting: parameters are changed while driving."""
 _MIGRATION_LOCK = 0x63697076
 """Any number that only this program takes in PostgreSQL."""
 

@@ -80,6 +80,7 @@ class LabelDesk:
         self._state = LabelState()
         self._wake = threading.Event()
         self._ended = False
+        self._trouble = ""
         self._thread = threading.Thread(target=self._look, name="cipv-labels", daemon=True)
         self.tasks = Tasks(self._told)
         self.scores = LabelScores()
@@ -180,16 +181,19 @@ class LabelDesk:
         self.refresh()
 
     def refresh(self) -> None:
-        """Look at the database now."""
+        """Look at the database now. What goes wrong there is said once, until it goes right again."""
         opened = self._open
         if not opened.uri:
             return
         try:
-            log, revision = self._labels_of(opened).log, self._labels_of(opened).revision
-            can_undo, can_redo = log.possible()
-        except BadInput as error:
-            logger.warning("%s", error)
+            labels = self._labels_of(opened)
+            revision, (can_undo, can_redo) = labels.revision, labels.log.possible()
+        except Exception as error:  # whatever a database or a recording does, people go on driving
+            if str(error) != self._trouble:
+                logger.warning("labels: %s", error)
+            self._trouble = str(error)
             return
+        self._trouble = ""
         with self._lock:
             if opened is not self._open:
                 return
@@ -226,14 +230,8 @@ class LabelDesk:
         while not self._ended:
             self._wake.wait(_LOOK_EVERY_S)
             self._wake.clear()
-            if self._database is None or self._ended:
-                continue
-            opened = self._open
-            try:
-                if opened.uri and (opened.labels is None or opened.labels.revision != self._state.revision):
-                    self.refresh()
-            except Exception as error:  # whatever a database or a recording does, others still drive
-                logger.warning("labels: %s", error)
+            if self._database is not None and not self._ended:
+                self.refresh()
 
 
 def _info(uri: str, recording: Recording | None) -> DriveInfo:

@@ -13,7 +13,7 @@ from app.drive.run import DriveRun
 from app.labels.drive import DriveLabels
 from pipeline.errors import BadInput
 from pipeline.evaluation.lead import Judged
-from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
+from pipeline.evaluation.scores.drive import DriveScore, Rules, judged, score_drive
 from pipeline.evaluation.scores.figures import FIGURES
 from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels
 
@@ -63,16 +63,16 @@ class LabelScores:
             Metric(figure.title, figure.unit, figure.of([old]) if old else None, figure.of([new]), figure.better)
             for figure in FIGURES
         ]
-        judged = sum(frame.judged is not None for frame in new.frames)
-        return judged, tuple(each for each in found if each.base is not None or each.run is not None)
+        count = sum(frame.judged is not None for frame in new.frames)
+        return count, tuple(each for each in found if each.base is not None or each.run is not None)
 
     def judged_rows(self, labels: DriveLabels, run: DriveRun) -> list[Row] | None:
-        """A run's rows, judged by labels instead of what the recording came with; null where they judge nothing."""
-        score = self.score(labels, run)
-        if score is None:
-            return None
-        judged = judged_by_index(score)
-        return [row._replace(judged=judged.get(index)) for index, row in enumerate(run.rows())]
+        """A run's rows, judged by labels instead of what the recording came with; null where they judge nothing. Asked
+        for while a run goes on: only who leads is looked at."""
+        _, truth = self.truth(labels)
+        rows = run.rows()
+        found = _judged(run, truth) if truth is not None else {}
+        return [row._replace(judged=found.get(row.t_ns)) for row in rows] if found else None
 
 
 def judged_by_index(score: DriveScore) -> dict[int, Judged]:
@@ -83,6 +83,17 @@ def judged_by_index(score: DriveScore) -> dict[int, Judged]:
 def disagreements(score: DriveScore) -> Sequence[tuple[int, Judged]]:
     """Frames in which the CIPV is not who leads, in order."""
     return [(index, each) for index, each in judged_by_index(score).items() if each.verdict not in ("correct", "none")]
+
+
+def _judged(run: DriveRun, truth: DriveTruth) -> dict[int, Judged]:
+    """By tick."""
+    rules, found = Rules(RULE), {}
+    for result in results_of(run, leads_only=True):
+        known = truth.frames.get(result.t_ns)
+        verdict = judged(result, known, rules) if known is not None else None
+        if verdict is not None:
+            found[result.t_ns] = verdict
+    return found
 
 
 def _scored(run: DriveRun, truth: DriveTruth) -> DriveScore | None:

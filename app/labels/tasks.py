@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
@@ -15,6 +16,7 @@ logger = logging.getLogger("cipv.labels")
 
 Kind = Literal["propose", "import", "refit"]
 _PATIENCE_S = 10.0
+_TELL_EVERY_S = 0.1
 
 
 class Cancelled(Exception):
@@ -45,7 +47,7 @@ Work = Callable[[Progress], str]
 
 
 class Tasks:
-    """Any thread. on_change is called whenever ``state`` is another."""
+    """Any thread. on_change is called when ``state`` is another, while a task goes on ten times a second at most."""
 
     def __init__(self, on_change: Callable[[], object]) -> None:
         self._on_change = on_change
@@ -53,6 +55,7 @@ class Tasks:
         self._state: TaskState | None = None
         self._thread: threading.Thread | None = None
         self._turn = 0
+        self._told_s = 0.0
 
     @property
     def state(self) -> TaskState | None:
@@ -109,4 +112,8 @@ class Tasks:
             if turn != self._turn or self._state is None:
                 raise Cancelled
             self._state = replace(self._state, **values)
+            now = time.monotonic()
+            if self._state.running and now - self._told_s < _TELL_EVERY_S:
+                return
+            self._told_s = now
         self._on_change()

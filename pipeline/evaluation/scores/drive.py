@@ -73,10 +73,10 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
     index = {tick: n for n, tick in enumerate(truth.ticks)}
     frames, moments, guarded = [], [], []
     for result, known in pairs:
-        judged = _judged(result, known, rules)
-        frames.append(FrameScore(index[result.t_ns], result.t_ns, result.frame, judged, errors(result, known)))
-        if judged is not None:
-            moments.append(_moment(result, known, judged))
+        verdict = judged(result, known, rules)
+        frames.append(FrameScore(index[result.t_ns], result.t_ns, result.frame, verdict, errors(result, known)))
+        if verdict is not None:
+            moments.append(_moment(result, known, verdict))
             guarded += moments[-1:] if result.acc is not None and known.lead_box is None else []
     notes = truth.notes
     if len(pairs) < len(truth.frames):
@@ -95,7 +95,8 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
     )
 
 
-def _judged(result: Result, known: FrameTruth, rules: Rules) -> Judged | None:
+def judged(result: Result, known: FrameTruth, rules: Rules) -> Judged | None:
+    """One labelled frame's verdict; null where nobody knows who leads."""
     if known.lead_box is not None:
         return judge_lead_box(result, known.lead_box[1])
     return judge_lead(result, known.lead, rules.lead) if known.lead_known else None
