@@ -21,7 +21,8 @@ from pipeline.progress import Progress
 from pipeline.recording.session import SessionSource
 from pipeline.run import Detectors
 from pipeline.sources.base import AnySource, SourceError, Tap
-from pipeline.types import U8, CameraCalibration, Frame, RawLanes, StreamHealth
+from pipeline.sources.live.pictures import Shot
+from pipeline.types import U8, CameraCalibration, Frame, GnssFix, RawLanes, StreamHealth
 from tests.app.recording import CountingDetector, Recording
 from tests.app.waiting import wait_until
 
@@ -206,6 +207,27 @@ def test_a_session_of_them_is_on_their_own_steady_timeline(start: Start, tmp_pat
     times_ns = [Recording().t_ns(index) for index in range(3)]
     assert [session.log_time_ns(index) - 10**18 for index in range(3)] == times_ns
     assert [session.t_ns(index) for index in range(3)] == times_ns
+
+
+def test_what_comes_between_ticks_is_recorded_until_the_end(start: Start, tmp_path: Path) -> None:
+    """``now_ns`` of these sensors is their ticks' time and 10¹⁸."""
+    engine, sensors, _ = start(RecordingDesk(tmp_path))
+    engine.desk.start(engine.source)
+    tap = sensors.tapped
+    assert tap is not None
+    shown = Recording().frame(0)
+    assert shown.picture is not None
+    for step in range(3):
+        tap.picture(Shot(pixels=shown.picture.bgr), shown.t_ns + step, 10**18 + step)
+        tap.fix(GnssFix(shown.t_ns + step, 48.0, 9.0, 300.0, None, 0.0, "single", 4.0), 10**18 + step)
+    shown_after(engine, sensors, 1)
+    state = engine.desk.stop()
+    assert sensors.tapped is None
+    assert state is not None
+    assert (state.frames, state.dropped) == (1, 0)
+    session = SessionSource("a", str(state.file))
+    counts = {topic: len(list(session.file.messages((topic,)))) for topic in ("/camera/image", "/gnss")}
+    assert counts == {"/camera/image": 4, "/gnss": 3}
 
 
 def test_lanes_are_looked_for_as_often_as_the_line_runs_whatever_is_dropped() -> None:
