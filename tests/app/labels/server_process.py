@@ -1,5 +1,5 @@
-"""A real server in a process of its own, which can be killed at any moment. All that it imports is imported once, by
-the process that the servers are forked from."""
+"""A real server in a process of its own, which can be killed at any moment. What it imports and compiles is there
+already in the process that the servers are forked from."""
 
 from __future__ import annotations
 
@@ -16,8 +16,11 @@ from app.labels.database import Database
 from app.labels.desk import LabelDesk
 from app.server import Server, create_app, listen_socket
 from pipeline.params import Params
+from pipeline.step import warm_up
 from tests.app.recording import Recording, opener
 from tests.app.serving import WAIT_S
+
+warm_up()
 
 
 def _serve(file: Path, tell: Connection) -> None:
