@@ -42,10 +42,11 @@ suite: install
 	@$(BIN)/python -m pytest -q tests/accuracy -s
 	@$(BIN)/cipv scenarios run --suite all --report build/experiments.html --drives build/drives --json > build/experiments.json
 
-# Memory over a drive looped 100 times; live sensors for ten minutes with every fault. Writes build/soak*.json.
+# Memory over a drive looped 100 times; live sensors for ten minutes with every fault; a day of frames at the display in the
+# car (about an hour). Writes build/soak*.json.
 soak: install
 	@mkdir -p build
-	@$(BIN)/python -m pytest -q -m soak tests/soak -s
+	@$(BIN)/python -m pytest -q -m soak tests/soak tests/browser/display/test_all_day.py -s
 
 lock: install
 	@$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --extra dev --no-header --no-annotate --no-emit-index-url \

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from playwright.sync_api import Browser, CDPSession
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, CDPSession, Page
 
 from tests.app.recording import Recording
 from tests.browser.conftest import Site
 from tests.browser.display.conftest import WAIT_S, is_now
+
+HOURS, FRAMES_AN_HOUR, SLICE = 24, 36_000, 3_000
 
 KEEP_SOCKET = """
 const Real = WebSocket;
@@ -38,24 +43,43 @@ def used_bytes(devtools: CDPSession) -> tuple[float, dict[str, int]]:
     return devtools.send("Runtime.getHeapUsage")["usedSize"], counters
 
 
-def test_a_long_day_leaves_nothing_behind(browser: Browser, own: tuple[Site, Recording]):
+@pytest.fixture
+def fed(browser: Browser, own: tuple[Site, Recording]) -> Iterator[Page]:
+    """The display on a paused recording with a lead, ready to be fed."""
     site, _ = own
     site.engine.wait_for(lambda s: s.tick is not None and s.tick.result.cipv is not None, WAIT_S)
     context = browser.new_context(viewport={"width": 800, "height": 480})
     context.add_init_script(KEEP_SOCKET)
     page = context.new_page()
-    try:
-        page.goto(f"{site.address}/drive/")
-        is_now(page, "fresh")
-        site.engine.control.change(playing=False)
-        is_now(page, "paused")
-        devtools = context.new_cdp_session(page)
-        page.evaluate(FEED, 300)
-        heap, counters = used_bytes(devtools)
-        page.evaluate(FEED, 2000)
-        later, counted = used_bytes(devtools)
-    finally:
-        context.close()
+    page.goto(f"{site.address}/drive/")
+    is_now(page, "fresh")
+    site.engine.control.change(playing=False)
+    is_now(page, "paused")
+    yield page
+    context.close()
+
+
+def test_a_long_day_leaves_nothing_behind(fed: Page):
+    devtools = fed.context.new_cdp_session(fed)
+    fed.evaluate(FEED, 300)
+    heap, counters = used_bytes(devtools)
+    fed.evaluate(FEED, 2000)
+    later, counted = used_bytes(devtools)
     assert later - heap < 500_000, "250 bytes a frame would be 100 MB in half a day"
     assert counted["nodes"] <= counters["nodes"] + 20
     assert counted["jsEventListeners"] <= counters["jsEventListeners"] + 5
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(4 * 3600)
+def test_a_whole_day_of_frames_leaves_nothing_behind(fed: Page):
+    """As many as ten a second make in a day, each one drawn or skipped as a page in the car would."""
+    devtools, used = fed.context.new_cdp_session(fed), []
+    for _ in range(HOURS):
+        for _ in range(FRAMES_AN_HOUR // SLICE):
+            fed.evaluate(FEED, SLICE)
+        used.append(used_bytes(devtools))
+    (first, at_first), (last, at_last) = used[0], used[-1]
+    assert last - first < 2_000_000, [round(heap / 1e6, 1) for heap, _ in used]
+    assert at_last["nodes"] <= at_first["nodes"] + 20
+    assert at_last["jsEventListeners"] <= at_first["jsEventListeners"] + 5
