@@ -20,8 +20,14 @@ import { shown, trackOf } from "./held.js";
 export function setUp() {
   on(["labelFrames"], () => {
     const draft = get("draft");
-    if (draft?.settled != null && knownUpTo(draft.frame) >= draft.settled) set("draft", null);
+    if (draft?.settled != null) settle(draft, draft.settled);
   });
+}
+
+/** It has become an act: it is shown until the server's own has come, which may be before the act's answer. @param {Draft} draft @param {number} act */
+export function settle(draft, act) {
+  const isHeld = knownUpTo(draft.frame) >= act;
+  if (!isHeld || get("draft")) set("draft", isHeld ? null : { ...draft, settled: act });
 }
 
 /** Everything that is labelled in the shown frame, as it looks now. @returns {LabelSighting[]} */
@@ -43,7 +49,7 @@ export function hold(track, shape) {
   set("draft", { track, frame, revision, cuboid: before?.cuboid ?? null, bbox: before?.bbox ?? null, ...shape, settled: null });
 }
 
-/** Send what is held. */
+/** Send what is held. A hand that has taken hold of it again meanwhile goes on from what its own act left. */
 export async function release() {
   const draft = get("draft");
   if (!draft || draft.track === null || draft.settled !== null) return;
@@ -51,8 +57,10 @@ export async function release() {
   const answer = await act({ kind: "set_sighting", track, revision, frame, cuboid, bbox, interpolate: true });
   const now = get("draft");
   if (now?.track !== track || now.frame !== frame) return;
-  if (answer) set("draft", { ...now, settled: answer.revision, revision: trackOf(track)?.revision ?? now.revision });
-  else if (now === draft) set("draft", null);
+  const left = answer?.changed?.tracks.find(({ id }) => id === track)?.revision ?? revision;
+  if (now !== draft) set("draft", { ...now, revision: Math.max(now.revision, left) });
+  else if (answer) settle({ ...now, revision: left }, answer.revision);
+  else set("draft", null);
 }
 
 /** Let go of it without a trace. */

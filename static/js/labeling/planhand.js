@@ -3,7 +3,7 @@ import { get, set } from "../store.js";
 import { act } from "./acts.js";
 import { mergeWith } from "./commands.js";
 import { contains, dragged, drawn, gripAt, groundAt } from "./cuboid.js";
-import { drop, hold, present, presentOf, release } from "./draft.js";
+import { drop, hold, present, presentOf, release, settle } from "./draft.js";
 import { chosen, shown, trackOf } from "./held.js";
 import { lookOf } from "./looks.js";
 import { isOn, setTool } from "./mode.js";
@@ -62,7 +62,10 @@ async function add(label) {
   if (!draft?.cuboid) return;
   const answer = await act({ kind: "add_track", label, frame: draft.frame, cuboid: draft.cuboid, bbox: null });
   const made = answer?.changed?.tracks[0] ?? null;
-  if (get("draft") === draft) set("draft", answer && made ? { ...draft, track: made.id, revision: made.revision, settled: answer.revision } : null);
+  if (get("draft") === draft) {
+    if (answer && made) settle({ ...draft, track: made.id, revision: made.revision }, answer.revision);
+    else drop();
+  }
   if (made) set("track", made.id);
 }
 
