@@ -13,22 +13,13 @@ from pipeline.alignment import Alignment, project_cuboid, resolve
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.labels.refit import FEWEST_POINTS, onto_points
+from pipeline.labels.sizes import usual_size_m
 from pipeline.lidar.boxes import fit_obstacles
 from pipeline.lidar.cluster import candidates, cluster
 from pipeline.lidar.ground import Ground, fit_ground
 from pipeline.params import BoxParams, ClusterParams, GroundParams, Params
 from pipeline.types import F32, I32, REAL_VEHICLES, Box, Detection, Frame, Mask, VisionMeasurement
 from pipeline.vision.distance import measure
-
-USUAL_SIZE_M: dict[str, tuple[float, float, float]] = {
-    "car": (4.3, 1.8, 1.5),
-    "truck": (8.0, 2.5, 3.2),
-    "bus": (11.0, 2.55, 3.2),
-    "motorcycle": (2.1, 0.8, 1.5),
-    "bicycle": (1.8, 0.6, 1.7),
-    "person": (0.6, 0.6, 1.75),
-}
-"""Length, width, height of a class, for the sides that nobody sees; others count as cars."""
 
 _CLICK_SHARE = 0.015
 """How near to a click, in widths of the picture, a point must fall."""
@@ -69,7 +60,7 @@ def lift(
         seen = fit_obstacles(points, np.zeros(len(points), dtype=np.int32), ground, BoxParams(method="l_shape"))[
             0
         ].cuboid
-        usual = Cuboid(seen.center, USUAL_SIZE_M.get(label, USUAL_SIZE_M["car"]), seen.yaw_rad)
+        usual = Cuboid(seen.center, usual_size_m(label), seen.yaw_rad)
         found = onto_points(points, ground, usual)
         return Lifted(found.cuboid, bbox, found.points, f"laid on the {found.points} points that are seen there")
     if bbox is None:
@@ -149,7 +140,7 @@ def _by_height(frame: Frame, params: Params, alignment: Alignment, label: str, b
 def _at_height(alignment: Alignment, label: str, bbox: Box, found: VisionMeasurement, ground: Ground | None) -> Cuboid:
     """A cuboid of the class's usual size there. It drives our way."""
     assert found.distance_m is not None
-    (length, width, height) = USUAL_SIZE_M.get(label, USUAL_SIZE_M["car"])
+    (length, width, height) = usual_size_m(label)
     foot = np.array([[(bbox[0] + bbox[2]) / 2, bbox[3]]])
     x, y, z = (float(value) for value in alignment.unproject(foot, np.array([found.distance_m]))[0])
     road = float(ground.height(np.array([[x, y]]))[0]) if ground is not None else math.nan

@@ -13,7 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.geometry import Cuboid, iou_matrix
+from pipeline.labels.interpolate import resized
 from pipeline.labels.model import LabelTrack, Lead, LeadRange, Origin, Sighting
+from pipeline.labels.sizes import usual_size_m
 from pipeline.types import VEHICLES, Box
 
 ROAD_USERS = VEHICLES | {"person", "bicycle"}
@@ -22,6 +24,8 @@ NAMELESS = "car"
 _SAME_M = 2.0
 _SAME_IOU = 0.4
 _SAME_SHARE = 0.5
+_LARGE = 0.9
+"""Of a track's sightings are smaller: single ones take in what stands beside."""
 _FEWEST = 2
 """Seen once and never again is mostly noise."""
 
@@ -102,7 +106,20 @@ def _track(number: int, life: Mapping[int, Seen], leads: bool, origin: Origin) -
         if seen[0] <= index <= seen[-1] and (each.cuboid is not None or each.bbox is not None)
     )
     label = max(sorted(set(names)), key=names.count) if names else NAMELESS
-    return LabelTrack(number, label, sightings, "proposed", origin) if sightings else None
+    return LabelTrack(number, label, _whole(sightings, label), "proposed", origin) if sightings else None
+
+
+def _whole(sightings: tuple[Sighting, ...], label: str) -> tuple[Sighting, ...]:
+    """With cuboids of one size, which is at least the class's usual one: the line shows what was seen of a vehicle, and
+    that is often its rear alone. The side that was seen stays where it is."""
+    seen = np.array([each.cuboid.size for each in sightings if each.cuboid is not None]).reshape(-1, 3)
+    if not len(seen):
+        return sightings
+    length, width, height = np.maximum(np.quantile(seen, _LARGE, axis=0), usual_size_m(label)).round(2).tolist()
+    return tuple(
+        replace(each, cuboid=resized(each.cuboid, (length, width, height))) if each.cuboid is not None else each
+        for each in sightings
+    )
 
 
 def _ranges(leads: Mapping[int, int | None], kept: set[int], origin: Origin) -> list[LeadRange]:

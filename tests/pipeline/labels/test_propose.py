@@ -69,6 +69,17 @@ def test_a_track_has_the_name_it_was_called_most_and_ends_where_it_was_last_seen
     assert not any(each.keyframe for each in track.sightings)
 
 
+def test_a_vehicle_is_proposed_whole_and_of_one_size_and_what_was_seen_of_it_stays() -> None:
+    """Its rear was seen in two frames, its side in one."""
+    rear, side = Cuboid((20.0, 0.0, 0.5), (0.3, 1.6, 1.1), 0.0), Cuboid((20.0, 0.0, 0.6), (5.0, 1.7, 1.3), 0.0)
+    life = {0: [seen(7, cuboid=rear)], 1: [seen(7, cuboid=rear)], 2: [seen(7, cuboid=side)], 3: [seen(7, cuboid=side)]}
+    (track,) = propose(life, {}, BY).tracks
+    found = [each.cuboid for each in track.sightings if each.cuboid is not None]
+    assert {each.size for each in found} == {(5.0, 1.8, 1.5)}
+    assert [each.center[0] - each.size[0] / 2 for each in found] == pytest.approx([19.85, 19.85, 17.5, 17.5])
+    assert [each.center[2] - each.size[2] / 2 for each in found] == pytest.approx([-0.05, -0.05, -0.05, -0.05])
+
+
 def test_who_leads_is_one_range_as_long_as_it_stays_the_same() -> None:
     frames = {index: [seen(7), seen(8)] for index in range(6)}
     found = propose(frames, {0: 7, 1: 7, 2: None, 3: 8, 4: 8, 5: 7}, BY)
