@@ -35,6 +35,7 @@ BY = Origin("import", "made up", 1)
 REPORT = Path("build/soak_labels.json")
 
 
+@pytest.mark.timeout(3600)
 def test_what_was_answered_as_saved_survives_a_hundred_kills(tmp_path: Path) -> None:
     answered, lost = kill_again_and_again(tmp_path / "labels.db", KILLS, seed=int(time.time()))
     _report(kills=KILLS, acts_answered=answered, acts_lost=lost)
@@ -60,6 +61,7 @@ def many() -> LabelSet:
     return LabelSet("test:many", names, t_ns, tuple(tracks), leads)
 
 
+@pytest.mark.timeout(3600)
 @pytest.mark.parametrize("kind", ["sqlite", "postgres"])
 def test_a_hundred_thousand_labels_in_one_drive(kind: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
     database = (
