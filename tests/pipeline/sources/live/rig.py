@@ -65,6 +65,10 @@ class Replaying(AbstractContextManager["Replaying"]):
         except Exception as error:  # shown by the test that waited in vain
             self.error = error
 
+    def stop(self) -> None:
+        """Send nothing more."""
+        self._stop.set()
+
     def __enter__(self) -> Replaying:
         self._thread.start()
         return self
@@ -72,7 +76,7 @@ class Replaying(AbstractContextManager["Replaying"]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, where: TracebackType | None
     ) -> None:
-        self._stop.set()
+        self.stop()
         self._thread.join(PATIENCE_S)
         for sender in self._senders.values():
             sender.close()

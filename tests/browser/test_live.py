@@ -1,0 +1,81 @@
+"""Live sensors at the pages: a real source on loopback, to which a simulated car sends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.engine import Engine
+from pipeline.params import Params
+from pipeline.sources import open_any
+from pipeline.sources.live.config import load
+from tests.app.recording import CountingDetector
+from tests.browser.conftest import WAIT_MS, OpenPage, Site
+from tests.pipeline.sources.live.rig import Replaying
+from tests.soak import live_car
+from tests.soak.test_live import config_file
+
+SENDS_S, CLIP = 240.0, 6
+"""Longer than the test waits for anything; frames of the clip, played to and fro."""
+
+
+@pytest.fixture(scope="module")
+def car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, Replaying]]:
+    """A dashboard on live sensors, and the car that sends."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(live_car, "SPAN", CLIP)
+        clip = live_car.clip()
+    config = config_file(tmp_path_factory.mktemp("car"))
+    engine = Engine(open_any, lambda _: CountingDetector(), Params(), uri=f"live:{config}", playing=True)
+    engine.start()
+    engine.wait_for(lambda s: s.live, WAIT_MS / 1e3)
+    with Replaying(load(config), live_car.messages(*clip, SENDS_S)) as sending:
+        engine.wait_for(lambda s: s.tick is not None, WAIT_MS / 1e3)
+        site = Site(engine, 0)
+        site.start()
+        yield site, sending
+        site.stop()
+    engine.stop()
+
+
+def until(page: Page, holds: str) -> Any:
+    """Wait until something holds of the store: ``holds`` is an expression of ``get``."""
+    return page.evaluate(
+        f"""async () => {{
+          const {{ get, on }} = await import('/js/store.js');
+          const holds = () => {holds};
+          if (!holds()) await new Promise((done) => on(['frame', 'drive', 'state'], () => holds() && done()));
+          return get('frame').state.sequence;
+        }}"""
+    )
+
+
+def test_live_sensors_are_watched_held_and_let_go_on(open_page: OpenPage, car: tuple[Site, Replaying]):
+    site, _ = car
+    page = open_page(address=site.address)
+    expect(page.locator("#transport .live")).to_be_visible()
+    for name in ("Step back", "Step forward"):
+        expect(page.get_by_role("button", name=name)).to_be_disabled()
+    seen = until(page, "get('frame').bitmap && get('frame').count > 1000 && get('drive')?.count > 5")
+    assert until(page, f"get('frame').state.sequence > {seen} + 3") > seen + 3, "it goes on by itself"
+    page.keyboard.press("Space")
+    site.engine.wait_for(lambda s: not s.playing, WAIT_MS / 1e3)
+    until(page, "!get('state').playing")
+    expect(page.get_by_role("button", name="Play", exact=True)).to_be_visible()
+    held = site.engine.snapshot.sequence
+    page.keyboard.press("Space")
+    until(page, f"get('state').playing && get('frame').state.sequence > {held}")
+
+
+def test_a_lidar_that_falls_silent_is_said_at_the_display_and_covered(open_page: OpenPage, car: tuple[Site, Replaying]):
+    site, sending = car
+    page = open_page(address=site.address)
+    page.goto(f"{site.address}/drive/")
+    lidar = page.locator("#sensors li", has_text="LiDAR")
+    expect(lidar).to_contain_text("Hz")
+    sending.stop()
+    expect(lidar).not_to_contain_text("Hz")
+    expect(page.locator("html")).not_to_have_attribute("data-freshness", "fresh")
