@@ -1,10 +1,26 @@
-"""What people at the pages look at, for the views that the server draws: the selection, and who hides the 3D view; and
-what they pick in those views, for the pages."""
+"""What people at the pages look at, for the views that the server draws: the selection, who hides the 3D view, and the
+cuboid that one of them labels; and what they pick in those views, for the pages."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
+
+from pipeline.geometry import Cuboid
+
+
+@dataclass(frozen=True)
+class Held:
+    """A labelled cuboid of the shown frame that may be dragged in the 3D view. page: whose it is; track: its label."""
+
+    page: object
+    track: int
+    cuboid: Cuboid
+
+
+OnDrag = Callable[[Held, bool], None]
+"""What is held, as it is now, and whether the hand has let go."""
 
 
 class Looks:
@@ -14,8 +30,10 @@ class Looks:
         self._lock = threading.Lock()
         self._selected: int | None = None
         self._hiding: set[object] = set()
+        self._held: Held | None = None
         self._listener: Callable[[], None] = lambda: None
         self._pages: Callable[[int | None], None] = lambda number: None
+        self._on_drag: OnDrag = lambda held, ended: None
 
     def on_change(self, listener: Callable[[], None]) -> None:
         """Call ``listener`` after every change; there is one."""
@@ -52,3 +70,34 @@ class Looks:
         with self._lock:
             (self._hiding.add if hides else self._hiding.discard)(page)
         self._listener()
+
+    @property
+    def held(self) -> Held | None:
+        """The newest cuboid that a page lets a hand take in the 3D view."""
+        with self._lock:
+            return self._held
+
+    def hold(self, page: object, track: int, cuboid: Cuboid) -> None:
+        with self._lock:
+            self._held = Held(page, track, cuboid)
+        self._listener()
+
+    def let_go(self, page: object) -> None:
+        """This page holds nothing any more."""
+        with self._lock:
+            was = self._held is not None and self._held.page is page
+            self._held = None if was else self._held
+        if was:
+            self._listener()
+
+    def on_drag(self, listener: OnDrag) -> None:
+        """Call ``listener`` when what is held is dragged; there is one."""
+        self._on_drag = listener
+
+    def drag(self, cuboid: Cuboid, ended: bool) -> None:
+        """What is held is dragged there. Any thread."""
+        with self._lock:
+            if self._held is None:
+                return
+            self._held = held = Held(self._held.page, self._held.track, cuboid)
+        self._on_drag(held, ended)

@@ -23,7 +23,7 @@ class SceneFeed:
     def __init__(self, engine: Engine, looks: Looks | None = None) -> None:
         self._engine = engine
         self._looks = looks or Looks()
-        self._view = ViserView(engine.snapshot.params, self._moved, on_pick=self._looks.pick)
+        self._view = ViserView(engine.snapshot.params, self._moved, on_drag=self._looks.drag, on_pick=self._looks.pick)
         self._newest = Newest[Snapshot]()
         self.drawn = 0
         self._thread = threading.Thread(target=self._work, name="cipv-scene", daemon=True)
@@ -60,6 +60,8 @@ class SceneFeed:
             if self._view.watchers <= self._looks.hiding:
                 continue
             self._view.select(self._looks.selected)
+            held = self._looks.held
+            self._view.hold(held.cuboid if held is not None else None)
             if drawn is None or newest.params is not drawn.params:
                 self._view.set_params(newest.params)
             if newest.tick is not None and (drawn is None or newest.tick is not drawn.tick):

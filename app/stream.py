@@ -9,8 +9,10 @@ Buffers of the system between here and a page hold many frames, which would be a
 for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no more than ``FRAMES_UNDER_WAY`` are sent
 ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the picture: the one that all get is
 as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
-``{"selected": 7}`` and ``{"hides_3d": true}`` are for the views that the server draws; what is picked there
-comes to the pages as ``{"type": "selected", "id": 7}``.
+``{"selected": 7}`` and ``{"hides_3d": true}`` are for the views that the server draws. So is ``{"held": {"track": 7,
+"cuboid": …}}``, a label that may be dragged in 3D, or null; the page that holds it hears of the drag as
+``{"type": "held", "track": 7, "cuboid": …, "ended": true}``. What is picked in 3D comes to all as ``{"type": "selected",
+"id": 7}``.
 """
 
 from __future__ import annotations
@@ -19,14 +21,17 @@ import asyncio
 import json
 import threading
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
+from pydantic import BaseModel, Field, ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.access import is_display
 from app.encode import Encoder
-from app.looks import Looks
+from app.given import GivenCuboid
+from app.looks import Held, Looks
 from app.sent_picture import MAX_WIDTH_PX, width_for
 from app.snapshot import Snapshot
 
@@ -36,6 +41,13 @@ FRAMES_UNDER_WAY = 2
 _LARGEST_PING = 1e15
 """Milliseconds; a page sends its own clock."""
 _WIDEST_PX = 4096
+
+
+class _Held(BaseModel):
+    """A label that may be dragged in the 3D view."""
+
+    track: int = Field(ge=0, lt=2**53)
+    cuboid: GivenCuboid
 
 
 @dataclass
@@ -106,6 +118,7 @@ class Stream:
     def __init__(self, looks: Looks | None = None) -> None:
         self.traffic = Traffic()
         self._looks = looks or Looks()
+        self._looks.on_drag(self._tell_dragged)
         self._looks.on_pick(self._picked)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._slots: list[Slot] = []
@@ -155,6 +168,7 @@ class Stream:
         finally:
             self._slots.remove(slot)
             self._looks.hide(slot, False)
+            self._looks.let_go(slot)
             self._fit_width()
 
     async def _receive(self, socket: WebSocket, slot: Slot) -> None:
@@ -176,6 +190,24 @@ class Stream:
                 self._looks.select(said["selected"])
             if isinstance(said.get("hides_3d"), bool):
                 self._looks.hide(slot, said["hides_3d"])
+            if "held" in said and not is_display(socket):
+                self._hold(slot, said["held"])
+
+    def _hold(self, slot: Slot, said: Any) -> None:
+        """What is no label is none."""
+        try:
+            held = _Held.model_validate(said)
+        except ValidationError:
+            self._looks.let_go(slot)
+        else:
+            self._looks.hold(slot, held.track, held.cuboid.value())
+
+    def _tell_dragged(self, held: Held, ended: bool) -> None:
+        """Tell the page that holds it; on a thread of the 3D view's."""
+        message = _dump({"type": "held", "track": held.track, "cuboid": held.cuboid._asdict(), "ended": ended})
+        if self._loop is not None and isinstance(held.page, Slot):
+            with suppress(RuntimeError):  # the server closed its loop
+                self._loop.call_soon_threadsafe(held.page.put, "held", message)
 
     async def _put_newest(self, slot: Slot, snapshot: Snapshot) -> None:
         sequence, frame = await asyncio.to_thread(self._encoded, snapshot)

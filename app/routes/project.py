@@ -4,25 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 from fastapi import APIRouter
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.engine import Engine
+from app.given import GivenCuboid
 from pipeline.alignment import resolve
-from pipeline.geometry import Cuboid, corners_of
+from pipeline.geometry import corners_of
 
 MOST_CUBOIDS = 500
 
 Pixel = tuple[float, float]
-
-
-class GivenCuboid(BaseModel):
-    """Ego frame, metres: centre x y z, length width height, heading in radians."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    center: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-    size: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
-    yaw_rad: FiniteFloat
 
 
 class Given(BaseModel):
@@ -54,7 +45,7 @@ def project_router(engine: Engine) -> APIRouter:
             return Projected(pixels=None)
         if not body.cuboids:
             return Projected(pixels=[])
-        corners = corners_of([Cuboid(each.center, each.size, each.yaw_rad) for each in body.cuboids])
+        corners = corners_of([each.value() for each in body.cuboids])
         pixels = np.round(aligned.project(corners.reshape(-1, 3)), 2).tolist()
         seen = [(u, v) if np.isfinite((u, v)).all() else None for u, v in pixels]
         return Projected(pixels=[seen[start : start + 8] for start in range(0, len(seen), 8)])

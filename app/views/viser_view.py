@@ -19,8 +19,10 @@ import viser
 from app.views import scene, viser_nodes
 from app.views.colors import Role, rgb
 from app.views.picking import object_on_ray
+from app.views.viser_gizmo import CuboidGizmo, OnDrag
 from app.views.viser_gui import OnChange, ParamsGui
 from app.views.viser_nodes import Strokes
+from pipeline.geometry import Cuboid
 from pipeline.params import Params
 from pipeline.types import Frame, FusedObject, Point3, Result
 
@@ -60,8 +62,9 @@ class _Display:
 class ViserView:
     """Starts the server at once. ``port`` 0 takes a free one; a taken port silently becomes the next: read ``port``.
 
-    ``on_change(name, value)`` hears of every slider that a person moves, ``on_pick(id)`` of every click into the scene:
-    the object that was met, null for none. Both on a thread of viser's.
+    ``on_change(name, value)`` hears of every slider that a person moves, on a thread of viser's; ``on_drag(cuboid,
+    ended)`` of a held cuboid that is dragged; ``on_pick(id)`` of every click into the scene: the object that was met, null
+    for none.
     """
 
     def __init__(
@@ -69,6 +72,7 @@ class ViserView:
         params: Params,
         on_change: OnChange = lambda name, value: None,
         port: int = 0,
+        on_drag: OnDrag = lambda cuboid, ended: None,
         on_pick: OnPick = lambda number: None,
     ) -> None:
         self._lock = threading.Lock()
@@ -86,6 +90,7 @@ class ViserView:
         camera.position, camera.look_at, camera.up = POSES["Follow"]
         camera.fov = math.radians(CAMERA_FOV_DEG)
         self._scene = self._server.scene
+        self._gizmo = CuboidGizmo(self._scene, on_drag)
         self._add_static()
         self._add_cameras()
         self._add_display_options()
@@ -118,6 +123,10 @@ class ViserView:
             if number != self._selected:
                 self._selected = number
                 self._draw()
+
+    def hold(self, cuboid: Cuboid | None) -> None:
+        """Show a cuboid with handles to move, turn and resize it by; null for none."""
+        self._gizmo.hold(cuboid)
 
     def set_params(self, params: Params) -> None:
         """Put the sliders where the parameters are; ``on_change`` does not hear of it."""

@@ -24,7 +24,7 @@ let waiting = null;
 let decoding = false;
 /** @type {WebSocket|null} */
 let socket = null;
-/** What the server was told about this page. @type {Map<string, number|boolean|null>} */
+/** What the server was told about this page. @type {Map<string, Told>} */
 const told = new Map();
 
 /** The server's clock now, Unix milliseconds. */
@@ -41,10 +41,12 @@ export function showPictureAt(width) {
   if (steps > 0) tell("picture_px", steps * WIDTH_STEP_PX);
 }
 
+/** @typedef {number|boolean|null|{track: number, cuboid: import("./labeling/types.js").Cuboid}} Told */
+
 /** Let the server know something about this page, now and after every reconnection; once for each value.
- * @param {string} name @param {number|boolean|null} value */
+ * @param {string} name @param {Told} value */
 export function tell(name, value) {
-  if (told.get(name) === value) return;
+  if (JSON.stringify(told.get(name)) === JSON.stringify(value)) return;
   told.set(name, value);
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ [name]: value }));
 }
@@ -91,12 +93,14 @@ export function connect() {
   };
 }
 
-/** @param {{type: string, state: import("./types.js").State, id: number|null, ping: number, server_unix_ms: number}} message @param {number} number */
+/** @typedef {{type: string, state: import("./types.js").State, id: number|null, ping: number, server_unix_ms: number} & import("./labeling/three.js").Dragged} Message */
+/** @param {Message} message @param {number} number */
 function onText(message, number) {
   if (message.type === "state") {
     stateNumber = number;
     set("state", message.state);
   }
+  if (message.type === "held") set("dragged", message);
   if (message.type === "selected") set("selection", message.id);
   if (message.type === "pong") clockOffset = message.server_unix_ms - (Date.now() + message.ping) / 2;
 }

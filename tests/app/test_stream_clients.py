@@ -23,6 +23,7 @@ from app.sent_picture import MAX_WIDTH_PX
 from app.server import Server, listen_socket
 from app.snapshot import Snapshot
 from app.stream import FRAMES_UNDER_WAY, Stream
+from pipeline.geometry import Cuboid
 from pipeline.params import Params
 from pipeline.run import Detectors
 from pipeline.types import Picture
@@ -216,6 +217,35 @@ def test_what_a_page_looks_at_is_heard_until_it_leaves(site: Site):
             if looks.hiding == 0:
                 break
     assert looks.hiding == 0
+
+
+def test_a_label_that_is_held_in_3d_is_followed_by_its_page_alone(site: Site):
+    looks, cuboid = site.stream._looks, {"center": [20, 0, 1], "size": [4, 2, 1.5], "yaw_rad": 0.5}
+    with site.connected() as page, site.connected() as other:
+        page.send(json.dumps({"held": {"track": 7, "cuboid": cuboid}}))
+        _heard(page)
+        held = looks.held
+        assert held is not None
+        assert (held.track, held.cuboid) == (7, Cuboid((20.0, 0.0, 1.0), (4.0, 2.0, 1.5), 0.5))
+        looks.drag(held.cuboid._replace(yaw_rad=1.0), True)
+        said = {"type": "held", "track": 7, "cuboid": cuboid | {"yaw_rad": 1.0}, "ended": True}
+        assert next(message for message in _texts(page) if message["type"] == "held") == said
+        other.send(json.dumps({"held": None}))
+        _heard(other)
+        assert looks.held is not None, "another page holds nothing of this one's"
+        for nonsense in ({"track": "7", "cuboid": 3}, {"track": 7}, 5):
+            page.send(json.dumps({"held": nonsense}))
+            _heard(page)
+            assert looks.held is None
+            page.send(json.dumps({"held": {"track": 7, "cuboid": cuboid}}))
+        _heard(page)
+        assert looks.held is not None
+
+
+def _texts(client: ClientConnection) -> Iterator[dict[str, Any]]:
+    while True:
+        if isinstance(message := client.recv(WAIT_S), str):
+            yield json.loads(message)
 
 
 def _heard(client: ClientConnection) -> None:
