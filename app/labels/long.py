@@ -15,7 +15,7 @@ from app.labels.draft import Draft
 from app.labels.drive import DriveLabels
 from app.labels.refusals import ActRefused
 from app.labels.tasks import Progress, Work
-from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
+from pipeline.labels.model import FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.labels.propose import Proposals, known_as, propose
 from pipeline.labels.truth import truth_labels
 
@@ -56,28 +56,58 @@ def put_proposals(labels: DriveLabels, found: Proposals, person: str, first: int
 
 def importing(labels: DriveLabels, found: LabelSet, person: str, notes: Sequence[str]) -> str:
     """Labels of this drive from elsewhere, in one act, beside those that are there; a sentence of what came of it. A
-    track whose number is taken gets another. Who leads is taken over what was there."""
+    track whose number is taken gets another; one that is there already, place for place, is not there twice. Who leads,
+    and the path of a frame, are taken over what was there."""
+    known: list[int] = []
 
     def apply(draft: Draft) -> str:
-        numbers = {}
-        for track in found.tracks:
-            taken = draft.find("track", track.id) is not None or track.id == 0
-            numbers[track.id] = draft.next_number("track") if taken else track.id
-            draft.add("track", replace(track, id=numbers[track.id], sightings=()))
-            draft.put_sightings(numbers[track.id], {each.frame: each for each in track.sightings})
+        numbers = _put_tracks(draft, found.tracks, known)
         for lead in found.leads:
             clear(draft, lead.first, lead.last)
             who = numbers.get(lead.lead, lead.lead) if isinstance(lead.lead, int) else lead.lead
             draft.add("lead", replace(lead, lead=who))
+        drawn = {path.frame for path in found.paths}
+        for number, item in draft.all("path").items():
+            if cast("PathLabel", item.value).frame in drawn:
+                draft.put("path", number, None)
         for path in found.paths:
             draft.add("path", path)
         for event in found.events:
             draft.add("event", replace(event, tracks=tuple(numbers.get(track, track) for track in event.tracks)))
+        tags = {(tag.frame, tag.tag) for tag in (cast("FrameTag", item.value) for item in draft.all("tag").values())}
         for tag in found.tags:
-            draft.add("tag", tag)
-        return f"imported {len(found.tracks)} tracks and {len(found.leads)} ranges of the lead"
+            if (tag.frame, tag.tag) not in tags:
+                draft.add("tag", tag)
+        return f"imported {len(found.tracks) - len(known)} tracks and {len(found.leads)} ranges of the lead"
 
-    return "; ".join((labels.log.act("import", person, apply).what, *notes))
+    said = labels.log.act("import", person, apply).what
+    twice = (f"{len(known)} tracks are there already, place for place",) if known else ()
+    return "; ".join((said, *twice, *notes))
+
+
+def _put_tracks(draft: Draft, tracks: Sequence[LabelTrack], known: list[int]) -> dict[int, int]:
+    """The numbers that they have here, by their own; ``known`` gets those that are here already."""
+    numbers: dict[int, int] = {}
+    there = {(each.label, each.sightings): each.id for each in _as_they_are(draft)}
+    for track in tracks:
+        same = there.get((track.label, track.sightings))
+        if same is not None:
+            numbers[track.id] = same
+            known.append(same)
+            continue
+        taken = draft.find("track", track.id) is not None or track.id == 0
+        numbers[track.id] = draft.next_number("track") if taken else track.id
+        draft.add("track", replace(track, id=numbers[track.id], sightings=()))
+        draft.put_sightings(numbers[track.id], {each.frame: each for each in track.sightings})
+    return numbers
+
+
+def _as_they_are(draft: Draft) -> list[LabelTrack]:
+    """Every track, with its sightings."""
+    return [
+        replace(cast("LabelTrack", item.value), sightings=tuple(draft.sightings(number).values()))
+        for number, item in draft.all("track").items()
+    ]
 
 
 def importing_truth(labels: DriveLabels, recording: Recording, person: str) -> Work:

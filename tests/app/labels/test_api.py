@@ -251,6 +251,12 @@ def test_truth_is_imported_and_points_out_where_the_pipeline_says_otherwise(
     assert back == {"frame": 0, "why": f"#{track['id']}: too low"}
 
 
+def test_what_is_there_already_is_not_imported_twice(engine: Engine, client: httpx.Client) -> None:
+    for said in ("imported 1 tracks", "1 tracks are there already, place for place"):
+        assert said in task(engine, act(client, kind="import", what="truth"))
+    assert len(labels(client)["tracks"]) == 1
+
+
 # ------------------------------------------------------------ files
 
 
