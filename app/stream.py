@@ -11,8 +11,8 @@ ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the pictur
 as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
 ``{"selected": 7}`` and ``{"hides_3d": true}`` are for the views that the server draws. So is ``{"held": {"track": 7,
 "cuboid": …}}``, a label that may be dragged in 3D, or null; the page that holds it hears of the drag as
-``{"type": "held", "track": 7, "cuboid": …, "ended": true}``. What is picked in 3D comes to all as ``{"type": "selected",
-"id": 7}``.
+``{"type": "held", "track": 7, "cuboid": …, "ended": true}``. What is picked in 3D comes to all as
+``{"type": "selected", "id": 7}``.
 """
 
 from __future__ import annotations
