@@ -63,8 +63,8 @@ class ViserView:
     """Starts the server at once. ``port`` 0 takes a free one; a taken port silently becomes the next: read ``port``.
 
     ``on_change(name, value)`` hears of every slider that a person moves, on a thread of viser's; ``on_drag(cuboid,
-    ended)`` of a held cuboid that is dragged; ``on_pick(id)`` of every click into the scene: the object that was met, null for
-    none.
+    ended)`` of a held cuboid that is dragged; ``on_pick(id)`` of every click into the scene: the object that was met,
+    or null.
     """
 
     def __init__(
