@@ -80,13 +80,13 @@ def run(case: Case) -> list[Frame]:
     for tick in drive(scene, setup):
         assert tick.frame.camera is not None
         in_sight = in_sight.then(tick.world, tick.frame.camera)
-        frame = judge(way, tick)
+        frame = judge(way, tick, in_sight)
         is_new = frame.verdict == "missed" and frame.lead is not None and not in_sight.is_confirmable(frame.lead)
         frames.append(replace(frame, verdict="new") if is_new else frame)
     return frames
 
 
-def judge(way: Way, tick: Tick) -> Frame:
+def judge(way: Way, tick: Tick, in_sight: InSight) -> Frame:
     """The frame's CIPV against the vehicle that the car will really meet first."""
     lead, doubtful = true_lead(tick.world, way.ahead(tick.world))
     cipv = tick.result.cipv
@@ -97,7 +97,7 @@ def judge(way: Way, tick: Tick) -> Frame:
     verdict: Verdict
     if doubtful:
         verdict = "edge"
-    elif lead is not None and tick.frame.camera is not None and is_hidden(lead, tick.world, tick.frame.camera):
+    elif lead is not None and in_sight.is_hidden(lead.actor.id):
         verdict = "hidden"
     elif lead is None:
         # what drives only just too far ahead a camera may take for less
@@ -165,25 +165,27 @@ def true_lead(now: World, path: Path | None, max_m: float = MAX_M) -> tuple[Acto
 
 @dataclass(frozen=True)
 class InSight:
-    """For how many frames in a row each vehicle has been in sight, by number."""
+    """For how many frames in a row each vehicle has been in sight, by number. A hidden one is not among them."""
 
     frames: Mapping[int, int] = field(default_factory=dict)
 
     def then(self, now: World, camera: CameraCalibration) -> InSight:
         """One frame later."""
-        ids = [state.actor.id for state in now.actors if not is_hidden(state, now, camera)]
+        covered = _covered(now, camera)
+        ids = [state.actor.id for state in now.actors if state.actor.id not in covered]
         return InSight({each: self.frames.get(each, 0) + 1 for each in ids})
+
+    def is_hidden(self, actor: int) -> bool:
+        """Whether nearer vehicles cover so much of it that neither sensor can see it."""
+        return actor not in self.frames
 
     def is_confirmable(self, actor: int) -> bool:
         """Whether it could have been seen as often as an object must be that one sensor sees."""
         return self.frames.get(actor, 0) >= CipvParams().confirm_hits
 
 
-def is_hidden(state: ActorState, now: World, camera: CameraCalibration) -> bool:
-    """Whether nearer vehicles cover so much of it that neither sensor can see it."""
-    return any(
-        seen.actor.actor.id == state.actor.id and seen.visible < VISIBLE_SHARE for seen in in_picture(now, camera)
-    )
+def _covered(now: World, camera: CameraCalibration) -> frozenset[int]:
+    return frozenset(seen.actor.actor.id for seen in in_picture(now, camera) if seen.visible < VISIBLE_SHARE)
 
 
 def _near_face(state: ActorState) -> Point2:

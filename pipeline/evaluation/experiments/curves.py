@@ -10,48 +10,18 @@ through (``choosing.InSight``).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from pipeline.evaluation.experiments import bends
-from pipeline.evaluation.experiments.choosing import InSight, Way, is_hidden, same_place, true_lead
+from pipeline.evaluation.experiments.curve_drives import LIDAR_ALONE, Frames, driven
 from pipeline.evaluation.experiments.sections import Cell, Experiment, Section, Table
-from pipeline.params import CipvParams, Params, with_changes
-from pipeline.path.corridor import nearest_on_path
-from pipeline.path.placing import near_face_middle
-from pipeline.records import evolve
-from pipeline.run import only
-from pipeline.simulation import truth_boxes, world
-from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.sensors import Sensors
-from pipeline.simulation.truth_boxes import BoxNoise
-from pipeline.simulation.truth_lanes import LineNoise, lane_points
-from pipeline.simulation.world import World
-from pipeline.step import State, step, warm_up
-from pipeline.types import CameraCalibration, Frame, Path, Result
+from pipeline.params import CipvParams
 
-LIDAR_ALONE = "LiDAR alone"
-SOURCES: Mapping[str, Mapping[str, bool]] = {
-    "lane lines": {"path.use_gnss": False, "path.use_yaw_rate": False},
-    "GNSS route": {"path.use_lanes": False, "path.use_yaw_rate": False},
-    "yaw rate": {"path.use_lanes": False, "path.use_gnss": False},
-    "lane lines and yaw rate": {"path.use_gnss": False},
-    "straight guess": {"path.use_lanes": False, "path.use_gnss": False, "path.use_yaw_rate": False},
-    "fused": {},
-    LIDAR_ALONE: {},
-}
-"""Which parameters leave each source of the path; the last has all of them but no camera, so no boxes and no lines."""
-BOXES = BoxNoise(reach_m=105.0)
-"""As measured of the embedded detector (``truth_boxes``), its reach included."""
-LINES = LineNoise()
-LOOK_AHEAD_M = (10, 30, 60, 100)
 LONGEST_WRONG_S = 0.3
-_TRUE_WAY_M = 130.0
-
-Verdict = Literal["right", "missed", "decoy", "none", "false", "undecided"]
 
 
 @dataclass(frozen=True)
@@ -61,21 +31,6 @@ class Case:
     kind: Literal["follow", "cut_in"]
     layout: str
     seed: int
-
-
-@dataclass(frozen=True)
-class Frames:
-    """One drive with one set of sources, an entry a frame: verdicts, range of the true lead (null without), whether the
-    car that cuts in is known by then, and (N, 4) the path's errors at 10, 30, 60, 100 m (NaN where the true way ends)
-    with its sigmas there."""
-
-    t_s: tuple[float, ...]
-    verdicts: tuple[Verdict, ...]
-    lead_m: tuple[float | None, ...]
-    told: tuple[bool, ...]
-    errors_m: tuple[tuple[float, ...], ...]
-    sigmas_m: tuple[tuple[float, ...], ...]
-    over_line_s: float | None = None
 
 
 Outcome = dict[str, Frames]
@@ -92,97 +47,8 @@ def run(case: Case) -> Outcome:
     layout = bends.LAYOUTS[case.layout]
     if case.kind == "cut_in":
         scene, over_line_s = bends.cut_in(layout, case.seed)
-        return {"fused": _judged(scene, layout.reach_m, _drive(scene, ("fused",))["fused"], over_line_s)}
-    scene = bends.scenario(layout, case.seed)
-    return {name: _judged(scene, layout.reach_m, rows, None) for name, rows in _drive(scene, tuple(SOURCES)).items()}
-
-
-def _drive(scene: Scenario, names: Sequence[str]) -> dict[str, list[tuple[World, Frame, Result]]]:
-    """Every frame once through the sensors, and through the line once for each set of sources."""
-    warm_up()
-    settings = {name: with_changes(Params(), SOURCES[name]) for name in names}
-    states = dict.fromkeys(names, State())
-    rows: dict[str, list[tuple[World, Frame, Result]]] = {name: [] for name in names}
-    for now, frame in seen(scene):
-        for name, params in settings.items():
-            given = only(frame, "lidar") if name == LIDAR_ALONE else frame
-            states[name], result = step(states[name], given, params)
-            rows[name].append((now, frame, result))
-    return rows
-
-
-def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[World, Frame]]:
-    """Each moment of a drive along its script, with given detections. lines null: the road has none."""
-    sensors = Sensors(scene, scene.ego.start_m + scene.ego.travelled_m(scene.duration_s))
-    for index in range(scene.frame_count()):
-        now = world.at(scene, index / scene.rate_hz)
-        frame = sensors.frame(now, index, round(now.t_s * 1e9), picture=False)
-        assert frame.camera is not None
-        found = truth_boxes.boxes(now, frame.camera, BOXES, scene.seed, index)
-        lanes = None if lines is None else lane_points(now, scene.road, frame.camera, lines, scene.seed, index)
-        yield now, evolve(frame, raw_boxes=found, raw_lanes=lanes)
-
-
-def _judged(
-    scene: Scenario, reach_m: float, rows: Sequence[tuple[World, Frame, Result]], over_line_s: float | None
-) -> Frames:
-    way, in_sight = Way.of(scene), InSight()
-    verdicts, lead_m, errors, sigmas, told = [], [], [], [], []
-    for now, frame, result in rows:
-        true_path = way.ahead(now, _TRUE_WAY_M)
-        assert frame.camera is not None
-        in_sight = in_sight.then(now, frame.camera)
-        verdict, metres = judge(now, frame.camera, result, true_path, reach_m)
-        if verdict == "missed":
-            lead, _ = true_lead(now, true_path, reach_m)
-            verdict = verdict if lead is not None and in_sight.is_confirmable(lead.actor.id) else "undecided"
-        verdicts.append(verdict)
-        lead_m.append(metres)
-        told.append(_is_told(now, result, 2) if over_line_s is not None else False)
-        errors.append(_errors_m(result.path, true_path))
-        sigmas.append(tuple(float(result.path.profile_m[min(s, len(result.path.profile_m) - 1)]) for s in LOOK_AHEAD_M))
-    times = tuple(now.t_s for now, _, _ in rows)
-    return Frames(times, tuple(verdicts), tuple(lead_m), tuple(told), tuple(errors), tuple(sigmas), over_line_s)
-
-
-def judge(
-    now: World, camera: CameraCalibration, result: Result, true_path: Path | None, reach_m: float
-) -> tuple[Verdict, float | None]:
-    """The frame's CIPV against the vehicle that really is the first in the lane within ``reach_m``, and its range."""
-    lead, doubtful = true_lead(now, true_path, reach_m)
-    chosen = next((item for item in result.objects if result.cipv is not None and item.id == result.cipv.id), None)
-    if doubtful or (lead is not None and is_hidden(lead, now, camera)):
-        return "undecided", None
-    place = near_face_middle(chosen.bev) if chosen is not None and chosen.bev is not None else None
-    if lead is None:
-        anyone = true_lead(now, true_path, 1.3 * reach_m)[0]
-        beyond = place is not None and anyone is not None and same_place(place, anyone)
-        return ("none" if place is None else "undecided" if beyond else "false"), None
-    metres = float(np.hypot(*lead.cuboid.center[:2]) - lead.cuboid.size[0] / 2)
-    if place is None:
-        return "missed", metres
-    return ("right" if same_place(place, lead) else "decoy"), metres
-
-
-def _is_told(now: World, result: Result, actor: int) -> bool:
-    """Whether the car that cuts in is the CIPV or said to be the next."""
-    state = next(each for each in now.actors if each.actor.id == actor)
-    known = {lead.id for lead in (result.cipv, result.next_cipv) if lead is not None}
-    places = [near_face_middle(item.bev) for item in result.objects if item.id in known and item.bev is not None]
-    return any(same_place(place, state) for place in places)
-
-
-def _errors_m(path: Path, true_path: Path | None) -> tuple[float, ...]:
-    """Sideways distance of the path's points at 10, 30, 60, 100 m from the way really driven."""
-    if true_path is None:
-        return (np.nan,) * len(LOOK_AHEAD_M)
-    points = path.center[[min(s, len(path.center) - 1) for s in LOOK_AHEAD_M]]
-    off, along = nearest_on_path(true_path, points)
-    length = float(np.hypot(*np.diff(true_path.center, axis=0).T).sum())
-    return tuple(float(o) if a < length else np.nan for o, a in zip(off, along, strict=True))
-
-
-# ---------------------------------------------------------------- what it comes to
+        return driven(scene, layout.reach_m, ("fused",), over_line_s)
+    return driven(bends.scenario(layout, case.seed), layout.reach_m)
 
 
 def share_right(drives: Sequence[Frames], reach_m: float = np.inf) -> tuple[float, int]:

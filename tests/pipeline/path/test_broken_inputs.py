@@ -10,15 +10,15 @@ import dataclasses
 import math
 from collections.abc import Callable
 from functools import cache
+from itertools import takewhile
 
 import numpy as np
 import pytest
 
-from pipeline.evaluation.experiments import bends, curves
-from pipeline.evaluation.experiments.choosing import Way
+from pipeline.evaluation.experiments import bends
+from pipeline.evaluation.experiments.curve_drives import Moment, judge, moments, seen
 from pipeline.params import Params, with_changes
 from pipeline.records import evolve
-from pipeline.simulation.world import World
 from pipeline.step import State, step, warm_up
 from pipeline.types import CameraCalibration, Frame, Result
 
@@ -30,23 +30,27 @@ Break = Callable[[Frame], Frame]
 
 
 @cache
-def drive() -> list[tuple[World, Frame]]:
+def drive() -> list[Moment]:
     warm_up()
     scene = bends.scenario(LAYOUT, 0)
-    return [(now, frame) for now, frame in curves.seen(scene) if now.t_s < ENDS_S]
+    return list(takewhile(lambda moment: moment.now.t_s < ENDS_S, moments(scene, seen(scene), LAYOUT.reach_m)))
 
 
 def driven(broken: Break, from_start: bool = False) -> tuple[list[Result], set[str]]:
     """The results from the break on, and what was chosen: right, missed, decoy, …"""
-    way, state, results, verdicts = Way.of(bends.scenario(LAYOUT, 0)), State(), [], set()
-    for now, frame in drive():
-        after = now.t_s >= BREAKS_S
-        state, result = step(state, broken(frame) if after or from_start else frame, PARAMS)
+    state, results, verdicts = State(), [], set()
+    for moment in drive():
+        after = moment.now.t_s >= BREAKS_S
+        state, result = step(state, broken(moment.frame) if after or from_start else moment.frame, PARAMS)
         if after:
             results.append(result)
-            assert frame.camera is not None
-            verdicts.add(curves.judge(now, frame.camera, result, way.ahead(now, 130.0), LAYOUT.reach_m)[0])
+            verdicts.add(judge(moment, result))
     return results, verdicts
+
+
+@cache
+def unbroken() -> tuple[list[Result], set[str]]:
+    return driven(lambda frame: frame)
 
 
 def no_lines(frame: Frame) -> Frame:
@@ -82,7 +86,7 @@ def wrong_mount(frame: Frame) -> Frame:
 
 
 def test_nothing_broken() -> None:
-    results, verdicts = driven(lambda frame: frame)
+    results, verdicts = unbroken()
     assert verdicts == {"right"}
     assert all(result.path.usable and not result.path.notes for result in results)
 
@@ -99,7 +103,7 @@ def test_nothing_broken() -> None:
     ],
 )
 def test_less_is_known_and_nobody_else_leads(broken: Break, from_start: bool) -> None:
-    whole, _ = driven(lambda frame: frame)
+    whole, _ = unbroken()
     results, verdicts = driven(broken, from_start)
     assert verdicts <= {"right", "missed", "undecided"}, "never a decoy"
     sure = [result.path.sigma_m["60"] for result in whole]
@@ -109,14 +113,14 @@ def test_less_is_known_and_nobody_else_leads(broken: Break, from_start: bool) ->
 
 def test_a_wrong_mount_ends_in_less_confidence_and_no_wrong_lead() -> None:
     """The lines seen contradict the route and the yaw rate."""
-    whole, _ = driven(lambda frame: frame)
+    whole, _ = unbroken()
     results, verdicts = driven(wrong_mount, from_start=True)
     assert "decoy" not in verdicts
     assert np.mean([r.path.sigma_m["30"] for r in results]) > np.mean([r.path.sigma_m["30"] for r in whole])
 
 
 def test_a_jump_is_said_and_moves_nothing() -> None:
-    whole, _ = driven(lambda frame: frame)
+    whole, _ = unbroken()
     results, _ = driven(jumped)
     assert any("GNSS jumped by 5.0 m" in note for note in results[0].notes)
     first = results[: int(PARAMS.path.gnss_restart_s * 10) - 2]
@@ -134,14 +138,14 @@ def test_acc_hears_that_nobody_knows_the_way() -> None:
     """With a straight guess at 99 km/h the car gets no faster, though 130 km/h are set."""
     params = with_changes(PARAMS, {"acc.set_speed_kmh": 130.0})
     state = State()
-    for _, frame in drive()[:10]:
-        frame = yaw_rate(None, "raw_lanes", "route", "gnss", "raw_boxes", "sweep")(frame)
+    for moment in drive()[:10]:
+        frame = yaw_rate(None, "raw_lanes", "route", "gnss", "raw_boxes", "sweep")(moment.frame)
         state, result = step(state, frame, params)
     assert not result.path.usable
     assert result.acc is not None
     assert result.acc.accelerator == 0.0
     assert result.acc.reason == f"path known for {result.path.reach_m:.0f} m only: no faster than now"
-    alone = without("raw_boxes", "sweep")(drive()[0][1])
+    alone = without("raw_boxes", "sweep")(drive()[0].frame)
     _, result = step(State(), alone, params)
     assert result.path.usable
     assert result.acc is not None

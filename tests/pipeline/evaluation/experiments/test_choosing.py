@@ -11,7 +11,6 @@ from pipeline.evaluation.experiments.choosing import (
     InSight,
     Way,
     acquired_m,
-    is_hidden,
     report,
     run,
     true_lead,
@@ -78,7 +77,7 @@ def test_what_has_just_come_into_sight_cannot_be_confirmed_yet() -> None:
     for k in range(40):
         now = world.at(scene, k / 10)
         in_sight = in_sight.then(now, camera)
-        hidden.append(any(is_hidden(each, now, camera) for each in now.actors if each.actor.id == 1))
+        hidden.append(in_sight.is_hidden(1))
         confirmable.append(in_sight.is_confirmable(1))
     first = hidden.index(False)
     assert 5 < first < 35

@@ -5,14 +5,8 @@ from __future__ import annotations
 import pytest
 
 from pipeline.evaluation.experiments import bends, curves
-from pipeline.evaluation.experiments.curves import (
-    Case,
-    Frames,
-    Outcome,
-    longest_wrong_s,
-    share_right,
-    told_before_line_s,
-)
+from pipeline.evaluation.experiments.curve_drives import SOURCES, Frames
+from pipeline.evaluation.experiments.curves import Case, Outcome, longest_wrong_s, share_right, told_before_line_s
 from pipeline.simulation import world
 
 
@@ -81,7 +75,7 @@ def test_the_report_says_what_held(outcomes: dict[Case, Outcome]) -> None:
     section = curves.report(list(outcomes), list(outcomes.values()))
     assert any(text.startswith("R = 125 m, 70 km/h: right in ") for text in section.text)
     choice, path, cut_in = section.tables
-    assert [row[1] for row in choice.rows] == list(curves.SOURCES)
+    assert [row[1] for row in choice.rows] == list(SOURCES)
     errors = {row[1]: row[4] for row in path.rows}
     assert errors["fused"] < 0.3 < errors["straight guess"]  # type: ignore[operator]
     assert len(cut_in.rows) == 1
