@@ -21,7 +21,7 @@ from pipeline.run import detector_for
 from pipeline.sources import open_source
 from pipeline.sources.base import TruthObject
 from tests.browser.conftest import OpenPage, Site
-from tests.browser.labeling import CUTTER_S, Hand, Labels, begin, is_at, is_saved
+from tests.browser.labeling import KEYSTROKE_S, Hand, Labels, begin, is_at, is_saved
 from tests.browser.looks import pixels
 
 FRAMES = range(414, 426)
@@ -108,14 +108,15 @@ def work(hand: Hand, started: float, errors: dict[str, float]) -> dict[str, Any]
     }
 
 
-def from_proposals(hand: Hand, labels: Labels, truth: list[Cuboid]) -> int:
-    """The pipeline has found the car's rear in every frame, but a LiDAR behind it does not see how long it is: its
-    front is drawn out in one frame, and that size is taken along."""
+def from_proposals(hand: Hand, labels: Labels, truth: list[Cuboid]) -> tuple[int, dict[str, float]]:
+    """The pipeline has found the car's rear in every frame, but a LiDAR behind it cannot see how long it is: its front is
+    drawn in one frame, and that size is taken along. Returns the lead, and how far the untouched proposals are off."""
     page = hand.page
     hand.keys("p")
     labels.wait_for(lambda now: len(now.leads) > 0)
     lead = labels.leads[0][2]
     assert isinstance(lead, int)
+    as_proposed = errors_m(labels, lead, truth)
     proposed = labels.cuboid(lead, 0)
     row = page.locator(f".track-row[data-id='{lead}']")
     expect(row).to_be_visible()
@@ -125,12 +126,14 @@ def from_proposals(hand: Hand, labels: Labels, truth: list[Cuboid]) -> int:
     front = x + proposed["size"][0] / 2
     rear = x - proposed["size"][0] / 2
     hand.drag(hand.plan(front + 0.8, y), hand.plan(rear + truth[0].size[0], y))
-    labels.wait_for(lambda now: now.cuboid(lead, 0)["size"][0] > 3)
+    labels.wait_for(lambda now: now.tracks[lead]["keyframes"] == [0])
+    size = labels.cuboid(lead, 0)["size"]
+    assert size[0] == pytest.approx(truth[0].size[0], abs=0.3), "as long as it was drawn"
     hand.keys("w")
-    labels.wait_for(lambda now: now.cuboid(lead, COUNT - 1)["size"][0] > 3)
+    labels.wait_for(lambda now: all(now.cuboid(lead, at)["size"] == pytest.approx(size) for at in range(COUNT)))
     hand.keys("a", "Escape", "a")
     labels.wait_for(lambda now: {each["state"] for each in now.everything["leads"]} == {"accepted"})
-    return lead
+    return lead, as_proposed
 
 
 def from_nothing(hand: Hand, labels: Labels, truth: list[Cuboid]) -> int:
@@ -176,7 +179,7 @@ def test_the_drive_is_labelled_with_and_without_proposals(astyx: Site, truth: li
     expect(page.locator(".track-row")).to_have_count(0)
 
     hand, started = Hand(page), time.monotonic()
-    lead = from_proposals(hand, labels, truth)
+    lead, as_proposed = from_proposals(hand, labels, truth)
     is_saved(page)
     proposed = work(hand, started, errors_m(labels, lead, truth))
     assert labels.tracks[lead]["state"] == "corrected"
@@ -186,7 +189,12 @@ def test_the_drive_is_labelled_with_and_without_proposals(astyx: Site, truth: li
     assert proposed["hands_per_frame"] < without["hands_per_frame"]
 
     BUILD.mkdir(exist_ok=True)
-    report = {"frames": COUNT, "from_nothing": without, "from_proposals": proposed, "keystroke_level_model_s": CUTTER_S}
+    report = {
+        "frames": COUNT,
+        "from_nothing": without,
+        "from_proposals": proposed | {"error_m_as_proposed": as_proposed},
+        "keystroke_level_model_s": KEYSTROKE_S,
+    }
     (BUILD / "labeling.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
     (BUILD / "screens").mkdir(exist_ok=True)
     pixels(page, "#timeline-back")
