@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 from app.engine import Engine
-from app.labels.database import Database
+from app.labels.database import Database, DatabaseError
 from app.labels.desk import LabelDesk
 from app.limits import LARGEST_FILE
 from app.routes.label_shapes import LabelsOfPerson, ScoreJson, Window
@@ -407,6 +407,25 @@ def test_after_a_restart_everything_is_there_and_can_be_undone(tmp_path: Any) ->
         assert undone == ["cipv.confirm_hits 3 → 5", "tagged frame 3 night"]
         assert client.post("/api/labels/undo", json={"person": "Ada"}).status_code == 409
         assert labels(client)["tags"] == []
+
+
+def test_a_database_that_fails_keeps_nobody_from_driving(
+    engine: Engine, client: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def away(_: Database) -> None:
+        raise DatabaseError("labels: the server is away")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Database, "writing", away)
+        assert client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 6}}).status_code == 200
+        assert engine.control.peek().params.cipv.confirm_hits == 6
+        for refused in (
+            act(client, kind="tag", frame=1, tag="x"),
+            client.post("/api/labels/undo", json={"person": "A"}),
+        ):
+            assert (refused.status_code, refused.json()["detail"]) == (503, "labels: the server is away")
+    client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 3}})
+    assert act(client, kind="tag", frame=1, tag="x").status_code == 200
 
 
 def test_live_sensors_and_nothing_cannot_be_labelled() -> None:
