@@ -105,8 +105,8 @@ class LabelDesk:
                 self._database.close()
 
     def open(self, uri: str, recording: Recording | None) -> None:
-        """Something else was opened; null for what has no frames to label. Its labels are looked for a little later, when
-        its first frame is on its way."""
+        """Something else was opened; null for what has no frames to label. Its labels are looked for a little later,
+        when its first frame is on its way."""
         self.tasks.cancel()
         with self._lock:
             self._open = _Open(uri, recording)
