@@ -183,7 +183,7 @@ class ListLabels:
         for drive in drives:
             print(
                 f"{drive['title']}: frames {drive['count']:,}, tracks {drive['tracks']:,}, acts {drive['revision']:,}, "
-                f"last opened as {drive['uri']}"
+                f"first opened as {drive['uri']}"
             )
         if not drives:
             _say(f"{database.name}: no labels yet")
