@@ -24,11 +24,11 @@ export function show() {
 const groups = () => [...keymap()].sort((a, b) => Number(isIdle(a)) - Number(isIdle(b)));
 
 /** Whether it belongs to a mode that is off. @param {import("./keymap.js").Group} group */
-const isIdle = ({ bindings }) => bindings.every(({ isOn }) => isOn && !isOn());
+const isIdle = ({ mode, bindings }) => mode !== undefined && bindings.every(({ isOn }) => isOn && !isOn());
 
 /** @param {import("./keymap.js").Group} group */
-function group({ title, bindings }) {
-  return el("div", {}, el("h2", { textContent: title }),
+function group({ title, mode, bindings }) {
+  return el("div", { data: { mode: mode ?? "page" } }, el("h2", { textContent: title }),
     ...bindings.filter(({ words }) => words).map(({ shown, words }) => el("div", { class: "pair" }, el("kbd", { textContent: shown }), el("span", { textContent: words }))));
 }
 

@@ -109,8 +109,8 @@ def work(hand: Hand, started: float, errors: dict[str, float]) -> dict[str, Any]
 
 
 def from_proposals(hand: Hand, labels: Labels, truth: list[Cuboid]) -> tuple[int, dict[str, float]]:
-    """The pipeline has found the car's rear in every frame, but a LiDAR behind it cannot see how long it is: its front is
-    drawn in one frame, and that size is taken along. Returns the lead, and how far the untouched proposals are off."""
+    """The pipeline has found the car's rear in every frame, but a LiDAR behind it cannot see how long it is: its
+    front is drawn in one frame, and that size is taken along. Returns the lead, and how far off the proposals were."""
     page = hand.page
     hand.keys("p")
     labels.wait_for(lambda now: len(now.leads) > 0)

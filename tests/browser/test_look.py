@@ -146,10 +146,14 @@ def test_j_k_and_l_play_back_stop_and_on(open_page: OpenPage, site: Site):
 def test_the_help_tells_every_key(open_page: OpenPage):
     page = open_page()
     page.keyboard.press("?")
-    told = page.locator("#help-dialog kbd").all_inner_texts()
-    assert len(told) == len(set(told))
-    for key in ("Space", "J", "K", "L", "1", "7", "E", "I", "O", "Ctrl Z", "?"):
-        assert key in told
+    for mode, keys in (
+        ("page", ("Space", "J", "K", "L", "1", "7", "E", "I", "O", "Ctrl Z", "Shift L", "?")),
+        ("labeling", ("P", "A", "R", "C", "0", "G", "Shift G", "Del", "N", "Shift N")),
+    ):
+        told = page.locator(f"#help-dialog [data-mode={mode}] kbd").all_inner_texts()
+        assert len(told) == len(set(told))
+        for key in keys:
+            assert key in told
 
 
 def test_a_gate_leads_to_the_parameter_behind_its_limit(open_page: OpenPage, site: Site):

@@ -22,9 +22,9 @@ const pair = (letter, words, act, brief) => [
   key(`Shift+${letter}`, `Shift ${letter}`, `${words}, backwards`, () => act(-1)),
 ];
 
-/** @returns {{title: string, bindings: LabelBinding[]}[]} */
+/** @returns {{mode: string, title: string, bindings: LabelBinding[]}[]} */
 export const labelKeys = () => [
-  { title: "Labeling: proposals and review", bindings: [
+  { mode: "labeling", title: "Labeling: proposals and review", bindings: [
     key("p", "P", "take the pipeline's output as proposals", commands.propose, "propose"),
     key("a", "A", "accept the selected track, or who leads here", () => commands.judge("accept"), "accept"),
     key("Shift+A", "Shift A", "accept everything in this frame", commands.acceptHere),
@@ -36,7 +36,7 @@ export const labelKeys = () => [
     ...pair("B", "next proposal", (d) => commands.goTo("proposed", d), "next proposal"),
     ...pair("Y", "next label that was sent back", (d) => commands.goTo("sent_back", d)),
   ] },
-  { title: "Labeling: who leads", bindings: [
+  { mode: "labeling", title: "Labeling: who leads", bindings: [
     key("i", "I", "the lead begins here", span.begin, "lead from"),
     key("o", "O", "the lead ends here", span.end, "to"),
     key("c", "C", "the selected track leads", () => (get("track") === null ? commands.say("Select a label first") : span.paint(/** @type {number} */ (get("track")))), "is the lead"),
@@ -45,7 +45,7 @@ export const labelKeys = () => [
     key("u", "U", "one can't tell who leads", () => span.paint("unknown"), "can't tell"),
     key("Shift+U", "Shift U", "take back who leads", span.clear),
   ] },
-  { title: "Labeling: shapes", bindings: [
+  { mode: "labeling", title: "Labeling: shapes", bindings: [
     key(".", ".", "next label in this frame", () => commands.selectNext(1), "next label"),
     key(",", ",", "label before", () => commands.selectNext(-1)),
     key("g", "G", "new label: drag in the plan, drag or click in the picture", () => setTool("new"), "new"),
@@ -73,7 +73,7 @@ export const labelKeys = () => [
     key("x", "X", "split: from this frame on it is another", commands.splitHere, "split"),
     key("m", "M", "merge with the label that is pressed next", () => setTool("merge"), "merge"),
   ] },
-  { title: "Labeling: frames", bindings: [
+  { mode: "labeling", title: "Labeling: frames", bindings: [
     key("f", "F", "one frame on; Shift: ten", () => playback({ step: 1 }), "frame on"),
     key("d", "D", "one frame back; Shift: ten", () => playback({ step: -1 }), "back"),
     key("Shift+F", "Shift F", "", () => playback({ step: 10 })),
