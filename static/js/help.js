@@ -18,6 +18,7 @@ export function show() {
       el("h2", { textContent: "In the car" }), el("p", {}, el("a", { href: "drive/", textContent: "Display for a small screen, by touch" })))),
     el("form", { method: "dialog" }, el("button", { textContent: "Close" })));
   dialog.showModal();
+  dialog.scrollTop = 0; // what can be focused first is far below
 }
 
 /** What can be done now comes first. @returns {import("./keymap.js").Group[]} */
@@ -28,8 +29,9 @@ const isIdle = ({ mode, bindings }) => mode !== undefined && bindings.every(({ i
 
 /** @param {import("./keymap.js").Group} group */
 function group({ title, mode, bindings }) {
+  const taken = new Set(keymap().flatMap((each) => (each.mode ? each.bindings : [])).filter(({ isOn }) => isOn?.()).flatMap(({ keys }) => keys));
   return el("div", { data: { mode: mode ?? "page" } }, el("h2", { textContent: title }),
-    ...bindings.filter(({ words }) => words).map(({ shown, words }) => el("div", { class: "pair" }, el("kbd", { textContent: shown }), el("span", { textContent: words }))));
+    ...bindings.filter(({ words, keys }) => words && (mode || !keys.every((key) => taken.has(key)))).map(({ shown, words }) => el("div", { class: "pair" }, el("kbd", { textContent: shown }), el("span", { textContent: words }))));
 }
 
 /** @param {string[]} colour */

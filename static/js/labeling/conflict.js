@@ -1,4 +1,5 @@
 /** Two people changed the same label: both versions side by side, and the person chooses. */
+import { request } from "../api.js";
 import { el } from "../dom.js";
 import { open } from "./dialogs.js";
 import { based, refsOf } from "./refs.js";
@@ -9,23 +10,34 @@ import { based, refsOf } from "./refs.js";
  * The act to send instead, based on what the other person left; null to let theirs stand.
  * @param {Act} act @param {string} sentence what the server says @param {any} theirs the item as it is now @returns {Promise<Act|null>}
  */
-export function choose(act, sentence, theirs) {
+export async function choose(act, sentence, theirs) {
+  const place = typeof act.track === "number" && typeof act.frame === "number" ? await placeOf(act.track, act.frame) : null;
   const body = el("div", {}, el("p", { textContent: sentence }),
-    el("div", { class: "conflict" }, side("Yours", { ...act }), side("Theirs", theirs)));
+    el("div", { class: "conflict" }, side("Yours", act), side("Theirs", { ...theirs, cuboid: place?.cuboid, bbox: place?.bbox })));
   return open("Two people changed the same label", body, null, [
     ["Take theirs", null],
     ["Keep mine", () => based(act, (ref) => (isThat(act, ref, theirs) ? theirs.revision : ref.revision))],
   ]);
 }
 
+/** Where the server has a track now. @param {number} track @param {number} frame @returns {Promise<import("./types.js").LabelSighting|null>} */
+async function placeOf(track, frame) {
+  /** @type {import("./types.js").SightingsAnswer} */
+  const { sightings } = await request(`api/labels/frames?first=${frame}&last=${frame}`).catch(() => ({ sightings: {} }));
+  return sightings[frame]?.find((each) => each.track === track) ?? null;
+}
+
 /** Of an act about several items, `theirs` is the one that has moved on. @param {Act} act @param {import("./types.js").ItemRef} ref @param {any} theirs */
 const isThat = (act, ref, theirs) => ref.id === theirs.id || refsOf(act).length === 1;
 
+/** What a person does not choose by. */
+const HIDDEN = ["kind", "id", "track", "items", "tracks", "revision", "interpolate", "sightings", "origin", "keyframes"];
+
 /** @param {string} title @param {Record<string, any>} item */
 function side(title, item) {
-  const rows = Object.entries(item).filter(([key, value]) => !["sightings", "origin"].includes(key) && value !== null && value !== undefined && value !== "");
-  return el("div", {}, el("h3", { textContent: title }), el("dl", { class: "facts-list" }, ...rows.flatMap(([key, value]) => [
-    el("dt", { textContent: key.replaceAll("_", " ") }), el("dd", { textContent: words(value) })])));
+  const rows = Object.entries(item).filter(([key, value]) => !HIDDEN.includes(key) && value !== null && value !== undefined && value !== "");
+  return el("div", {}, el("h3", { textContent: item.kind ? `${title}: ${item.kind.replaceAll("_", " ")}` : title }), el("dl", { class: "facts-list" }, ...rows.flatMap(([key, value]) => [
+    el("dt", { textContent: ({ bbox: "box" })[key] ?? key.replaceAll("_", " ") }), el("dd", { textContent: words(key === "frame" ? value + 1 : value) })])));
 }
 
 /** @param {any} value @returns {string} */

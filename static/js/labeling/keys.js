@@ -40,7 +40,7 @@ export const labelKeys = () => [
     key("i", "I", "the lead begins here", span.begin, "lead from"),
     key("o", "O", "the lead ends here", span.end, "to"),
     key("c", "C", "the selected track leads", () => (get("track") === null ? commands.say("Select a label first") : span.paint(/** @type {number} */ (get("track")))), "is the lead"),
-    ...[..."123456789"].map((digit) => key(digit, digit, digit === "1" ? "the track of that number leads" : "", () => span.type(digit))),
+    ...[..."123456789"].map((digit) => key(digit, digit === "1" ? "1–9" : digit, digit === "1" ? "the track of that number leads" : "", () => span.type(digit))),
     key("0", "0", "nobody leads", () => span.type("0"), "none"),
     key("u", "U", "one can't tell who leads", () => span.paint("unknown"), "can't tell"),
     key("Shift+U", "Shift U", "take back who leads", span.clear),
