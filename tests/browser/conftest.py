@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -134,6 +135,12 @@ OpenPage = Callable[..., Page]
 
 @pytest.fixture
 def open_page(browser: Browser, site: Site) -> Iterator[OpenPage]:
+    with opening(browser, site) as begin:
+        yield begin
+
+
+@contextmanager
+def opening(browser: Browser, site: Site) -> Iterator[OpenPage]:
     """Opens the dashboard in a fresh profile; at the end no page may have complained or called elsewhere. ``expects``:
     words of complaints that the test provokes: a browser says of every refused request that it was refused."""
     complaints: list[str] = []

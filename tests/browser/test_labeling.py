@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, Route, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from pipeline.params import Params
-from tests.browser.conftest import START, OpenPage, Site
+from tests.browser.conftest import START, OpenPage, Site, opening
 from tests.browser.judges import LOW_CONTRAST
 from tests.browser.labeling import Hand, Labels, begin, is_at, is_saved
 from tests.browser.looks import COUNT, box_of, go_to, on_timeline, pixels, repainted, wait_for_frame, whole_drive
@@ -49,19 +50,36 @@ class Line:
             route.continue_()
 
 
-@pytest.fixture
-def line() -> Line:
-    return Line()
+@pytest.fixture(scope="module")
+def desk(browser: Browser, site: Site) -> Iterator[tuple[Page, Line]]:
+    """One page in the labeling mode, for all who label here."""
+    line = Line()
+    with opening(browser, site) as open_page:
+        page = open_page(expects=REFUSED)
+        page.route(re.compile(r"/api/labels/act$"), line.act)
+        page.route(re.compile(r"/api/labels\?since="), line.changes)
+        begin(page)
+        yield page, line
 
 
 @pytest.fixture
-def hand(open_page: OpenPage, site: Site, line: Line) -> Hand:
-    page = open_page(expects=REFUSED)
-    page.route(re.compile(r"/api/labels/act$"), line.act)
-    page.route(re.compile(r"/api/labels\?since="), line.changes)
+def line(desk: tuple[Page, Line]) -> Line:
+    return desk[1]
+
+
+@pytest.fixture
+def hand(desk: tuple[Page, Line], site: Site) -> Hand:
+    """Nothing is labelled, nothing is selected, and the page is at ``START``."""
+    page, line = desk
+    line.full = line.deaf = False
     Labels(page, site.address).clear(COUNT)
-    wait_for_frame(page, START)
-    return begin(page)
+    page.get_by_role("tab", name="Tracks").click()
+    for _ in range(3):
+        page.keyboard.press("Escape")
+    page.get_by_role("button", name="Here", exact=True).click()
+    is_at(page, START)
+    expect(page.locator(".track-row")).to_have_count(0)
+    return Hand(page)
 
 
 @pytest.fixture
@@ -182,6 +200,26 @@ def test_the_lead_is_painted_by_keys_by_number_and_by_a_drag(hand: Hand, labels:
     labels.wait_for(lambda now: (100, 130, made) in now.leads or (121, 130, made) in now.leads)
     hand.keys("Shift+U")
     labels.wait_for(lambda now: now.leads[-1][1] == 129)
+
+
+def test_a_hand_in_the_3d_view_moves_it_in_every_view(hand: Hand, labels: Labels):
+    """What the server says of a drag there, as ``app/stream.py`` sends it."""
+    page = hand.page
+    made = draw(hand, labels)
+    is_saved(page)
+    cuboid = labels.cuboid(made, START)
+    cuboid["center"][0] -= 6.0
+    dragged = """async ([track, cuboid, ended]) => {
+      const { set } = await import("/js/store.js");
+      set("dragged", { track, cuboid, ended });
+    }"""
+    plan, picture = pixels(page, "#bev"), pixels(page, "#camera")
+    page.evaluate(dragged, [made, cuboid, False])
+    assert repainted(page, "#bev", plan)
+    assert repainted(page, "#camera", picture)
+    assert labels.cuboid(made, START) != cuboid, "the hand still holds it"
+    page.evaluate(dragged, [made, cuboid, True])
+    labels.wait_for(lambda now: now.cuboid(made, START) == cuboid)
 
 
 def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, site: Site):
@@ -325,9 +363,9 @@ EDGES = [
 """An edge, where it is dragged to, and the middle and the size that come of it."""
 
 
-def test_the_opposite_face_is_held_whatever_the_heading(open_page: OpenPage):
+def test_the_opposite_face_is_held_whatever_the_heading(hand: Hand):
     """A cuboid of 4 m by 2 m at (10, 0), each edge dragged; and the same turned by any angle about its middle."""
-    page = open_page()
+    page = hand.page
     found = page.evaluate(
         """async (angles) => {
           const { dragged, footprint } = await import("/js/labeling/cuboid.js");
