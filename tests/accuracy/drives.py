@@ -10,10 +10,11 @@ from pathlib import Path
 from pipeline.evaluation.lead import Judged, LeadRule, judge
 from pipeline.params import preset, with_changes
 from pipeline.path.lane_detector import usual_every
-from pipeline.run import Detectors, Sensors, lanes_for, run
+from pipeline.run import Detectors, Sensors, run
 from pipeline.sources import open_source
 from pipeline.types import Result
-from pipeline.vision.detector import open_detector
+from tests import looking
+from tests.looking import yolox_nano
 
 SCORED_CLIPS = {
     "lead near 20 m": range(60, 69),
@@ -51,15 +52,16 @@ def drive(
     """Run a recording of the data folder with YOLOX-nano. ``changes``: dotted parameters on top of the preset. lanes:
     the lane detector, as on the command line; it looks at every ``lanes_every``-th picture, null: as often as usual."""
     name = {"astyx": "astyx", "kitti": "kitti_0052"}[kind]
-    source = open_source(f"{kind}:{folder / name}")
+    uri = f"{kind}:{folder / name}"
+    source = open_source(uri)
     params = with_changes(preset(preset_name), dict(changes))
     picture = source.frame(0).picture
     assert picture is not None
-    size = (picture.bgr.shape[1], picture.bgr.shape[0])
-    detector = open_detector(str(folder / "models" / "yolox_nano.onnx"), size)
+    detector = yolox_nano(folder, picture.bgr.shape[1], picture.bgr.shape[0])
     results, judged = {}, {}
-    found = lanes_for(source, lanes)
-    for frame, result in run(source, params, Detectors(detector, found, lanes_every or usual_every(found)), sensors):
+    found = looking.lanes(uri, lanes)
+    every = lanes_every or usual_every(found and found.detector)
+    for frame, result in run(source, params, Detectors(detector, found, every), sensors):
         results[frame.name] = result
         truth = source.truth(frame.index)
         if truth is not None:

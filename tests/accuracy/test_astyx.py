@@ -9,8 +9,8 @@ import pytest
 from pipeline.calibration.distance import Pair, collect_pairs, fit_laws
 from pipeline.evaluation.lead import Judged, score
 from pipeline.sources import open_source
-from pipeline.vision.detector import open_detector
 from tests.accuracy.drives import EMPTY_CLIP, SCORED_CLIPS, all_scored, drive
+from tests.looking import yolox_nano
 
 ALL_CLIPS = (range(47, 52), range(57, 69), range(183, 193), range(414, 426))
 
@@ -19,8 +19,7 @@ ALL_CLIPS = (range(47, 52), range(57, 69), range(183, 193), range(414, 426))
 def pairs(data_dir: Path) -> tuple[Pair, ...]:
     """Every detected vehicle of the recording with its labelled depth."""
     source = open_source(f"astyx:{data_dir / 'astyx'}")
-    detector = open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (2048, 618))
-    return collect_pairs(source, detector)
+    return collect_pairs(source, yolox_nano(data_dir, 2048, 618))
 
 
 def test_the_labelled_lead_is_the_cipv(data_dir: Path) -> None:

@@ -27,7 +27,21 @@ def test_a_short_experiment_as_json_and_as_a_page(tmp_path: Path, capsys: pytest
 def test_cells_of_the_report_lead_to_the_drives_behind_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     report, drives = tmp_path / "ncap.html", tmp_path / "drives"
     with pytest.raises(SystemExit) as ended:
-        main(["scenarios", "run", "--suite", "ncap", "--short", "--report", str(report), "--drives", str(drives)])
+        main(
+            [
+                "scenarios",
+                "run",
+                "--suite",
+                "ncap",
+                "--short",
+                "--jobs",
+                "1",
+                "--report",
+                str(report),
+                "--drives",
+                str(drives),
+            ]
+        )
     assert ended.value.code == 0
     links = re.findall(r'href="(drives/[^"#]+)\.html"', report.read_text(encoding="utf-8"))
     assert links

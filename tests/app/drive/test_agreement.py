@@ -19,6 +19,7 @@ from pipeline.sources import open_source
 from pipeline.sources.base import Source, TruthObject
 from pipeline.types import Frame, RawBoxes, Result
 from tests.app.recording import CountingDetector, Recording
+from tests.looking import yolox_nano
 
 WAIT_S = 60.0
 
@@ -118,7 +119,7 @@ def test_a_simulated_drive_agrees():
 def test_a_real_drive_agrees_with_other_parameters_too(data_dir: Path):
     """Runs with minutes between them: trackers start anew, numbers go on."""
     source = open_source(f"astyx:{data_dir / 'astyx'}")
-    detector = detector_for(source, str(data_dir / "models" / "yolox_nano.onnx"))
+    detector = yolox_nano(data_dir, 2048, 618)
     other = with_changes(Params(), {"cipv.confirm_hits": 5, "cluster.tolerance_m": 0.7})
     with page(lambda: source, detector) as engine:
         engine.wait_for(is_done(Params()), WAIT_S)

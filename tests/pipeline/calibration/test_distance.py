@@ -15,9 +15,9 @@ from pipeline.geometry import iou_matrix
 from pipeline.params import Params, with_changes
 from pipeline.sources import open_source
 from pipeline.sources.base import Source
-from pipeline.types import REAL_VEHICLES
+from pipeline.types import REAL_VEHICLES, RawBoxes
 from pipeline.vision import distance, select, tracking
-from pipeline.vision.detector import Detector, open_detector
+from tests.looking import LooksOnce, yolox_nano
 
 DRIVES = {"047": (47, 51), "057": (57, 68), "183": (183, 192), "414": (414, 425)}
 JUDGED = {"057": (60, 68), "183": (183, 192), "414": (414, 425)}
@@ -26,8 +26,9 @@ JUDGED = {"057": (60, 68), "183": (183, 192), "414": (414, 425)}
 @dataclass(frozen=True)
 class Recording:
     source: Source
-    detector: Detector
+    detector: LooksOnce[RawBoxes]
     pairs: tuple[Pair, ...]
+    names: tuple[str, ...]
 
 
 @pytest.fixture(scope="module")
@@ -41,8 +42,9 @@ def kitti(data_dir: Path) -> Recording:
 
 
 def _recording(uri: str, data_dir: Path, size: tuple[int, int]) -> Recording:
-    source, detector = open_source(uri), open_detector(str(data_dir / "models" / "yolox_nano.onnx"), size)
-    return Recording(source, detector, collect_pairs(source, detector))
+    source, detector = open_source(uri), yolox_nano(data_dir, *size)
+    names = tuple(source.frame(index).name for index in range(len(source)))
+    return Recording(source, detector, collect_pairs(source, detector), names)
 
 
 def _within(name: str, frames: tuple[int, int]) -> bool:
@@ -79,10 +81,8 @@ def test_the_camera_alone_with_a_law_that_never_saw_the_drive(astyx: Recording, 
 def _lead_errors(recording: Recording, frames: tuple[int, int], params: Params) -> list[float]:
     """Relative error of the track whose box lies best on the labelled lead, camera only, frame by frame."""
     state, before_ns, errors = tracking.VisionTrackerState(), None, []
-    for index in range(len(recording.source)):
+    for index in (k for k, name in enumerate(recording.names) if _within(name, frames)):
         frame = recording.source.frame(index)
-        if not _within(frame.name, frames):
-            continue
         alignment = resolve(params.alignment, frame.camera)
         assert frame.picture is not None
         assert frame.camera is not None

@@ -1,0 +1,47 @@
+"""Detectors that look at each picture once: tests that drive the same recording again and again see the same in it."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Generic
+
+from pipeline.run import Detects, Seen_co, lanes_for
+from pipeline.sources import open_source
+from pipeline.types import U8, RawBoxes, RawLanes
+from pipeline.vision.detector import open_detector
+
+
+class LooksOnce(Generic[Seen_co]):
+    """Answers as another detector did when it saw the same picture."""
+
+    def __init__(self, detector: Detects[Seen_co]) -> None:
+        self.detector = detector
+        self._answers: dict[tuple[tuple[int, ...], int], Seen_co] = {}
+
+    @property
+    def name(self) -> str:
+        return self.detector.name
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self.detector.notes
+
+    def detect(self, bgr: U8) -> Seen_co:
+        key = (bgr.shape, hash(bgr.tobytes()))
+        if key not in self._answers:
+            self._answers[key] = self.detector.detect(bgr)
+        return self._answers[key]
+
+
+@cache
+def yolox_nano(data_dir: Path, width: int, height: int) -> LooksOnce[RawBoxes]:
+    """The network of the data folder for pictures of a size, in px."""
+    return LooksOnce(open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (width, height)))
+
+
+@cache
+def lanes(uri: str, spec: str) -> LooksOnce[RawLanes] | None:
+    """The lane detector for a recording, as on the command line; null when it is off."""
+    detector = lanes_for(open_source(uri), spec)
+    return None if detector is None else LooksOnce(detector)
