@@ -10,9 +10,9 @@ from pathlib import Path
 from pipeline.evaluation.lead import Judged, LeadRule, judge
 from pipeline.params import preset, with_changes
 from pipeline.path.lane_detector import usual_every
-from pipeline.run import Detectors, Sensors, run
+from pipeline.run import Detectors, Sensors, through
 from pipeline.sources import open_source
-from pipeline.types import Result
+from pipeline.types import Frame, Result
 from tests import looking
 from tests.looking import yolox_nano
 
@@ -53,20 +53,27 @@ def drive(
     the lane detector, as on the command line; it looks at every ``lanes_every``-th picture, null: as often as usual."""
     name = {"astyx": "astyx", "kitti": "kitti_0052"}[kind]
     uri = f"{kind}:{folder / name}"
-    source = open_source(uri)
+    source, frames = open_source(uri), _frames(uri)
     params = with_changes(preset(preset_name), dict(changes))
-    picture = source.frame(0).picture
+    picture = frames[0].picture
     assert picture is not None
     detector = yolox_nano(folder, picture.bgr.shape[1], picture.bgr.shape[0])
     results, judged = {}, {}
     found = looking.lanes(uri, lanes)
     every = lanes_every or usual_every(found and found.detector)
-    for frame, result in run(source, params, Detectors(detector, found, every), sensors):
+    for frame, result in through(frames, params, Detectors(detector, found, every), sensors):
         results[frame.name] = result
         truth = source.truth(frame.index)
         if truth is not None:
             judged[frame.name] = judge(result, truth, RULE)
     return Drive(results, judged)
+
+
+@cache
+def _frames(uri: str) -> tuple[Frame, ...]:
+    """Read once: a picture takes longer to read than to go through the line."""
+    source = open_source(uri)
+    return tuple(source.frame(index) for index in range(len(source)))
 
 
 def all_scored(of: Drive) -> Iterator[Judged]:
