@@ -18,8 +18,8 @@ import * as span from "./span.js";
 
 /** As many labels of the frame can be chosen as its lead in the bar; the rest by number. */
 const MOST_LEADS = 7;
-/** Whether a task was under way when last looked at. */
-let hasRun = false;
+/** The task whose end has been said, or was over before this page came. @type {number|null} */
+let ended = null;
 
 const where = el("span", { class: "facts where" }), leads = el("span", { class: "joined leads", aria: { role: "group", label: "Who leads" } });
 const saved = el("span", { class: "saved", aria: { role: "status" } }), again = el("button", { type: "button", textContent: "Retry", hidden: true, onclick: send });
@@ -89,11 +89,14 @@ function reflectTask() {
   const state = get("state"), current = state?.labels?.task ?? null;
   back.disabled = !state?.labels?.can_undo;
   forth.disabled = !state?.labels?.can_redo;
-  const isFailed = Boolean(current?.error);
+  ended ??= current && !current.running ? current.id : -1;
+  const isFailed = Boolean(current?.error) && current?.id !== ended;
   task.hidden = !current?.running && !isFailed;
   task.dataset.failed = String(isFailed);
-  if (hasRun && current && !current.running && !isFailed) set("said", current.note);
-  hasRun = current?.running === true;
+  if (current && !current.running && !isFailed && current.id !== ended) {
+    ended = current.id;
+    set("said", current.note);
+  }
   if (!current) return;
   const bar = $("progress", HTMLProgressElement, task);
   bar.hidden = !current.running;

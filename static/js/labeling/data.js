@@ -23,10 +23,7 @@ export function setUp() {
 /** Labels are looked at when a person labels; until then nothing is fetched. */
 function follow() {
   const state = get("state"), labels = get("labels");
-  if (labels && labels.uri !== state?.uri) {
-    set("labels", null);
-    set("track", null);
-  }
+  if (labels && labels.uri !== state?.uri) for (const key of /** @type {const} */ (["labels", "track", "draft", "marked"])) set(key, null);
   if (!state?.labels || !get("labeling")?.on) return;
   if (!get("labels") || state.labels.revision > (get("labels")?.revision ?? 0)) refresh(undefined);
 }

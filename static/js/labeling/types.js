@@ -73,7 +73,7 @@
  *
  * @typedef {object} LabelTask
  * @property {number} id  the 202 of who began it has the same
- * @property {"propose"|"import"|"refit"} what
+ * @property {"propose"|"import"} what
  * @property {number} done
  * @property {number} total
  * @property {string} note
