@@ -69,10 +69,10 @@ class Draft:
             removed_by = self._last_change(kind, number)
             if removed_by is None:
                 raise NoSuchLabel(f"there is no {kind} {number}")
-            raise Stale(f"{self.who(removed_by)} removed {name_of(kind, number)} since", None)
+            raise Stale(f"{self.who(removed_by)} removed {name_of(kind, number)} since", kind, number, None)
         if found.revision != revision and (kind, number) not in self._after:
             theirs = {"id": number, **value_to_json(kind, found.value), "revision": found.revision}
-            raise Stale(f"{self.who(found.revision)} changed {name_of(kind, number)} since", theirs)
+            raise Stale(f"{self.who(found.revision)} changed {name_of(kind, number)} since", kind, number, theirs)
         return found
 
     def all(self, kind: ItemKind) -> dict[int, Item]:

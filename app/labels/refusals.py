@@ -20,8 +20,9 @@ class NoSuchLabel(BadInput):
 
 
 class Stale(ActRefused):
-    """Somebody changed the item since. theirs: the item as it stands; null where it was removed."""
+    """Somebody changed an item, of that kind and number, since. theirs: the item as it stands; null where it was
+    removed."""
 
-    def __init__(self, text: str, theirs: dict[str, Any] | None) -> None:
+    def __init__(self, text: str, kind: str, number: int, theirs: dict[str, Any] | None) -> None:
         super().__init__(text)
-        self.theirs = theirs
+        self.kind, self.number, self.theirs = kind, number, theirs

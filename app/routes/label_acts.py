@@ -41,7 +41,8 @@ def label_acts_router(desk: LabelDesk) -> APIRouter:
                 return _answer(desk, desk.act(body.person, doing), note)
         except Stale as stale:
             yours = body.act.model_dump(mode="json", by_alias=True)
-            return JSONResponse({"detail": str(stale), "theirs": stale.theirs, "yours": yours}, 409)
+            item = {"kind": stale.kind, "id": stale.number}
+            return JSONResponse({"detail": str(stale), "item": item, "theirs": stale.theirs, "yours": yours}, 409)
 
     @router.post("/undo", responses={200: {"model": ActedJson}})
     def undo(body: Who) -> Response:

@@ -84,11 +84,15 @@ class TagJson(LabelItem):
     origin: OriginJson
 
 
-class Removed(BaseModel):
-    """What is no longer there."""
+class ItemKey(BaseModel):
+    """Which item."""
 
     kind: ItemName
     id: int
+
+
+class Removed(ItemKey):
+    """What is no longer there."""
 
 
 class LabelledDrive(BaseModel):
@@ -219,9 +223,11 @@ class TaskBegun(BaseModel):
 
 
 class StaleJson(BaseModel):
-    """Nothing was written. theirs: the item as it is now, null when it was removed; yours: what was sent."""
+    """Nothing was written. item: what somebody changed; theirs: it as it is now, null when it was removed; yours: what
+    was sent."""
 
     detail: str
+    item: ItemKey | None = None
     theirs: dict[str, Any] | None = None
     yours: dict[str, Any] | None = None
 

@@ -375,6 +375,7 @@ def test_a_conflict_shows_both_and_loses_neither(engine: Engine, client: httpx.C
     assert refused.status_code == 409
     assert refused.json()["detail"] == f"Bob changed #{track['id']} since"
     assert refused.json()["theirs"]["label"] == "truck"
+    assert refused.json()["item"] == {"kind": "track", "id": mine["track"]}
     assert refused.json()["yours"] == mine
     assert act(client, **(mine | {"revision": theirs["revision"]})).status_code == 200
     history = client.get("/api/labels/history", params={"kind": "track", "id": track["id"]}).json()
