@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pydantic import ValidationError
+
 from app.labels.drive import DriveLabels
 from app.labels.refusals import ActRefused, BadAct
 from app.labels.requests import AddTrack, CuboidIn, Lift, Refit, SetSighting
@@ -54,6 +56,10 @@ def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddTrack, str]:
 
 
 def _cuboid_in(cuboid: Cuboid) -> CuboidIn:
+    """ActRefused for one that nobody could have drawn."""
     x, y, z = (round(value, _DECIMALS) for value in cuboid.center)
     length, width, height = (round(value, _DECIMALS) for value in cuboid.size)
-    return CuboidIn(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
+    try:
+        return CuboidIn(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
+    except ValidationError:
+        raise ActRefused(f"the points there are {length:.0f} × {width:.0f} × {height:.0f} m: no vehicle") from None

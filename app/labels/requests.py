@@ -16,7 +16,7 @@ from pipeline.labels.model import Sighting
 from pipeline.types import Point2
 
 _LARGEST_ID = 2**63 - 1
-_MOST_FRAMES = 2**31 - 1
+MOST_FRAMES = 2**31 - 1
 _MOST_ITEMS = 10_000
 _MOST_POINTS = 1000
 _FARTHEST = 1e6
@@ -35,10 +35,12 @@ def _named(text: str) -> str:
 
 
 Id = Annotated[int, Field(ge=0, le=_LARGEST_ID)]
-Index = Annotated[int, Field(ge=0, le=_MOST_FRAMES)]
+Index = Annotated[int, Field(ge=0, le=MOST_FRAMES)]
 Finite = Annotated[float, Field(ge=-_FARTHEST, le=_FARTHEST, allow_inf_nan=False)]
 Meters = Annotated[float, Field(gt=0.0, le=200.0, allow_inf_nan=False)]
 Person = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_named)]
+PersonOrNobody = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_clean)]
+"""Cleaned as ``Person`` is, so that both name the same one; empty for nobody in particular."""
 Word = Annotated[str, Field(max_length=40), AfterValidator(_named)]
 Comment = Annotated[str, Field(max_length=1000), AfterValidator(_clean)]
 Line = Annotated[list[tuple[Finite, Finite]], Field(min_length=2, max_length=_MOST_POINTS)]
@@ -271,7 +273,7 @@ class Propose(Strict):
 
     kind: Literal["propose"]
     first: Index = 0
-    last: Index = _MOST_FRAMES
+    last: Index = MOST_FRAMES
     source: Literal["run"] = Field("run", alias="from")
 
 

@@ -14,7 +14,7 @@ from pipeline.errors import BadInput
 
 logger = logging.getLogger("cipv.labels")
 
-Kind = Literal["propose", "import", "refit"]
+Kind = Literal["propose", "import"]
 _PATIENCE_S = 10.0
 _TELL_EVERY_S = 0.1
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
 import shutil
 import tempfile
 from pathlib import Path
@@ -35,13 +37,13 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
     async def take(request: Request, person: Annotated[Person, Query()], format: FormatName = "native") -> Response:
         """Labels that another tool made of this recording: the body is the file, of a format that is a folder a .zip of
         it. They come beside those that are there, as one act. state.labels.task tells how far it is."""
-        with tempfile.NamedTemporaryFile(prefix="cipv-upload-", delete=False) as file:
-            async for piece in request.stream():
-                file.write(piece)
-        path = Path(file.name)
+        path = _new_file()
         try:
+            with path.open("wb") as file:
+                async for piece in request.stream():
+                    await asyncio.to_thread(file.write, piece)
             with refusing():
-                number = desk.begin_import(person, path, format)
+                number = await asyncio.to_thread(desk.begin_import, person, path, format)
         except BaseException:
             path.unlink(missing_ok=True)
             raise
@@ -87,3 +89,10 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
             return Response(desk.labels.version_json(name), media_type="application/json")
 
     return router
+
+
+def _new_file() -> Path:
+    """An empty one that only this program can read; who asked for it removes it."""
+    handle, name = tempfile.mkstemp(prefix="cipv-upload-")
+    os.close(handle)
+    return Path(name)

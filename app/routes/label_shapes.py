@@ -6,12 +6,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from app.labels.requests import Act, Person, Strict
+from app.labels.requests import Act, Person, PersonOrNobody, Strict
 from app.labels.tables import LONGEST_NAME
+from app.labels.tasks import Kind
+from app.labels.values import ItemKind
 from app.routes.shapes import CuboidJson, MetricJson, Point
 from pipeline.labels.model import State
 
-ItemName = Literal["track", "lead", "path", "event", "tag"]
 VERSION_NAME = r"^[A-Za-z0-9][A-Za-z0-9._ -]*$"
 """A version's name is shown and asked for in addresses; it is never a path."""
 
@@ -87,7 +88,7 @@ class TagJson(LabelItem):
 class ItemKey(BaseModel):
     """Which item."""
 
-    kind: ItemName
+    kind: ItemKind
     id: int
 
 
@@ -200,7 +201,7 @@ class ActBody(Strict):
 class Who(Strict):
     """person: whose newest act is meant."""
 
-    person: Annotated[str, Field(max_length=LONGEST_NAME)] = ""
+    person: PersonOrNobody = ""
 
 
 class ActedJson(BaseModel):
@@ -218,7 +219,7 @@ class TaskBegun(BaseModel):
     """It goes on; ``state.labels.task`` tells how far it is. task: its id there."""
 
     status: Literal["begun"]
-    what: Literal["propose", "import", "refit"]
+    what: Kind
     task: int
 
 

@@ -9,7 +9,7 @@ from fastapi.responses import JSONResponse
 
 from app.labels.answers import changes_json, history_json, track_json, window_json
 from app.labels.desk import LabelDesk
-from app.labels.tables import LONGEST_NAME
+from app.labels.requests import MOST_FRAMES, Id, Index, PersonOrNobody
 from app.labels.values import ItemKind
 from app.labels.where_next import What, where_next
 from app.routes.drive import current
@@ -17,8 +17,7 @@ from app.routes.label_shapes import HistoryJson, LabelsOfPerson, NextJson, Score
 from app.routes.refusals import refusing
 from app.routes.shapes import MetricJson
 
-MOST_FRAMES = 200
-_LARGEST = 2**62
+LONGEST_WINDOW = 200
 
 
 def labels_router(desk: LabelDesk) -> APIRouter:
@@ -26,7 +25,7 @@ def labels_router(desk: LabelDesk) -> APIRouter:
     router = APIRouter(prefix="/api/labels", tags=["labels"])
 
     @router.get("", responses={200: {"model": LabelsOfPerson}})
-    def changes(since: int = Query(0, ge=0, le=_LARGEST), person: str = Query("", max_length=LONGEST_NAME)) -> Response:
+    def changes(since: Annotated[Id, Query()] = 0, person: Annotated[PersonOrNobody, Query()] = "") -> Response:
         """What changed after act ``since``; 0 for everything. Ask again whenever ``state.labels.revision`` is
         another. can_undo, can_redo: of the person."""
         with refusing():
@@ -36,22 +35,24 @@ def labels_router(desk: LabelDesk) -> APIRouter:
         return JSONResponse(body | {"can_undo": can_undo, "can_redo": can_redo})
 
     @router.get("/frames", responses={200: {"model": Window}})
-    def frames(first: Annotated[int, Query(ge=0)], last: Annotated[int, Query(ge=0)]) -> Response:
+    def frames(first: Annotated[Index, Query()], last: Annotated[Index, Query()]) -> Response:
         """Where tracks are, frame by frame; at most 200 frames."""
-        if not first <= last < first + MOST_FRAMES:
-            raise HTTPException(422, f"first to last: at least one frame, and {MOST_FRAMES} at most")
+        if not first <= last < first + LONGEST_WINDOW:
+            raise HTTPException(422, f"first to last: at least one frame, and {LONGEST_WINDOW} at most")
         with refusing():
             return JSONResponse(window_json(desk.labels, first, last))
 
     @router.get("/tracks/{number}", responses={200: {"model": WholeTrack}})
-    def track(number: int) -> Response:
+    def track(number: Id) -> Response:
         """A whole track."""
         with refusing():
             return JSONResponse(track_json(desk.labels.track(number)))
 
     @router.get("/next")
     def following(
-        what: What, frame: Annotated[int, Query(ge=-1)], direction: Annotated[int, Query(ge=-1, le=1)] = 1
+        what: What,
+        frame: Annotated[int, Query(ge=-1, le=MOST_FRAMES)],
+        direction: Annotated[int, Query(ge=-1, le=1)] = 1,
     ) -> NextJson:
         """The nearest frame after ``frame``, or with a negative direction before it, where there is something to do."""
         with refusing():
@@ -75,7 +76,7 @@ def labels_router(desk: LabelDesk) -> APIRouter:
             )
 
     @router.get("/history", responses={200: {"model": list[HistoryJson]}})
-    def history(kind: ItemKind, number: Annotated[int, Query(alias="id", ge=0, le=_LARGEST)]) -> Response:
+    def history(kind: ItemKind, number: Annotated[Id, Query(alias="id")]) -> Response:
         """The acts that changed a label, newest first, at most 200."""
         with refusing():
             return JSONResponse([history_json(entry) for entry in desk.labels.log.history(kind, number)])

@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
 from app.engine import Engine
-from app.labels.tables import LONGEST_NAME
+from app.labels.requests import PersonOrNobody
 from app.routes.refusals import refusing
 from app.routes.shapes import ParamsJson, file_of
 from pipeline.alignment import angular_from_calibration
@@ -26,7 +26,7 @@ class Changes(BaseModel):
 
     changes: dict[str, Any] = Field(min_length=1, examples=[{"cluster.z_weight": 0.4}])
     final: bool = Field(True, description="False while a slider is dragged: shown, but no step and no whole-drive run")
-    person: str = Field("", max_length=LONGEST_NAME, description="Whose step it is to undo; anyone's without a name")
+    person: PersonOrNobody = Field("", description="Whose step it is to undo; anyone's without a name")
 
 
 class Replacement(BaseModel):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from typing import Any, Literal
 
 from fastapi import APIRouter, Query, Response
@@ -14,11 +15,14 @@ from app.drive.drives import Drives, Phase
 from app.drive.recording import Recording
 from app.drive.run import DriveRun
 from app.engine import Engine
+from app.labels.database import DatabaseError
 from app.labels.desk import LabelDesk
 from app.routes.drive import Columns, columns_of, current
 from app.routes.refusals import open_recording, refusing
 from app.routes.shapes import MetricJson, file_of
 from pipeline.params import changes_of, to_yaml
+
+logger = logging.getLogger("cipv.runs")
 
 _MOST_SENTENCES = 100
 _NAMED_CHANGES = 3
@@ -158,9 +162,13 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
 
 def _judged_by_labels(desk: LabelDesk, base: DriveRun, run: DriveRun) -> tuple[list[Row], list[Row]] | None:
     """The rows of both, judged by what people labelled here; null where they stand behind nothing, and the truth that
-    comes with the recording judges."""
-    labels = desk.labels
-    first, second = desk.scores.judged_rows(labels, base), desk.scores.judged_rows(labels, run)
+    comes with the recording judges; also while their database is away."""
+    try:
+        labels = desk.labels
+        first, second = desk.scores.judged_rows(labels, base), desk.scores.judged_rows(labels, run)
+    except DatabaseError as error:  # two runs are compared without labels as well
+        logger.warning("compared without labels: %s", error)
+        return None
     return (first, second) if first is not None and second is not None else None
 
 

@@ -10,6 +10,8 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
+from app.labels.tasks import Kind
+
 Point = tuple[float, float]
 Sees = Literal["V", "L", "VL"]
 
@@ -192,7 +194,7 @@ class LabelTaskJson(_Exact):
     """Something on labels that takes a while. It stays, with its note or error, until the next one begins."""
 
     id: int
-    what: Literal["propose", "import", "refit"]
+    what: Kind
     done: int
     total: int
     note: str

@@ -14,10 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.labels.model import Sighting
 from pipeline.types import Box
@@ -32,7 +34,8 @@ def put_keyframe(
     """The track with a keyframe where a person put it. t_ns: of every frame of the recording.
 
     Frames without a sighting stay so, but for those between a frame that is new and what the track had before or after
-    it. interpolate: others follow; else the one frame changes.
+    it. interpolate: others follow; else the one frame changes. BadInput where others would follow over a step back of
+    the clock.
     """
     frame = sighting.frame
     put = {**track, frame: replace(sighting, keyframe=True)}
@@ -46,7 +49,8 @@ def put_keyframe(
 
 
 def drop_keyframe(track: Track, frame: int, t_ns: Sequence[int]) -> dict[int, Sighting]:
-    """The track with one keyframe less: there it follows the others, or stays as it is when none is beyond it."""
+    """The track with one keyframe less: there it follows the others, or stays as it is when none is beyond it.
+    BadInput where the clock steps back between these."""
     return _ordered(_between({**track, frame: replace(track[frame], keyframe=False)}, t_ns))
 
 
@@ -84,6 +88,7 @@ def _runs(track: Track) -> list[list[int]]:
 
 def _follow(keys: Sequence[tuple[int, Cuboid]], at_ns: Sequence[int]) -> list[Cuboid]:
     """Cuboids between given ones, at times within theirs."""
+    _require_forward([t for t, _ in keys])
     start = keys[0][0]
     times = np.array([t - start for t, _ in keys]) / 1e9
     wanted = np.array([t - start for t in at_ns]) / 1e9
@@ -160,7 +165,13 @@ def _boxes_after(track: dict[int, Sighting], old: Sighting, frame: int, t_ns: Se
 
 def _share(t_ns: Sequence[int], first: int, frame: int, last: int) -> float:
     """How far ``frame`` is in time from ``first`` (0) to ``last`` (1)."""
+    _require_forward((t_ns[first], t_ns[last]))
     return (t_ns[frame] - t_ns[first]) / (t_ns[last] - t_ns[first])
+
+
+def _require_forward(times_ns: Sequence[int]) -> None:
+    if any(after <= before for before, after in pairwise(times_ns)):
+        raise BadInput("the recording's clock steps back between these keyframes: what lies between them is not known")
 
 
 def _mixed(a: Box, b: Box, share: float) -> Box:
