@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 from collections.abc import Iterator
 from dataclasses import replace
@@ -23,6 +22,7 @@ from pipeline.recording.session import Mark, SessionSource
 from pipeline.results import to_json
 from pipeline.run import Detectors, run
 from tests.app.recording import CountingDetector, Recording, opener
+from tests.app.waiting import Runs, loop_apart
 from tests.pipeline.recording.frames import same
 
 WAIT_S = 30.0
@@ -42,8 +42,8 @@ def engine(tmp_path: Path) -> Iterator[Engine]:
 class Client:
     """Asks the application itself, without a network."""
 
-    def __init__(self, engine: Engine) -> None:
-        self._app = create_app(engine)
+    def __init__(self, engine: Engine, run: Runs) -> None:
+        self._app, self._run = create_app(engine), run
 
     def get(self, path: str) -> httpx.Response:
         return self._ask("GET", path)
@@ -57,12 +57,13 @@ class Client:
             async with httpx.AsyncClient(transport=transport, base_url="http://localhost") as client:
                 return await client.request(method, path, json=json)
 
-        return asyncio.run(ask())
+        return self._run(ask())
 
 
 @pytest.fixture
-def client(engine: Engine) -> Client:
-    return Client(engine)
+def client(engine: Engine) -> Iterator[Client]:
+    with loop_apart() as run:
+        yield Client(engine, run)
 
 
 def show(engine: Engine, index: int) -> dict[str, Any]:
@@ -185,7 +186,8 @@ def test_what_goes_wrong_is_one_sentence(
 
 def test_nothing_open_is_nothing_to_record(tmp_path: Path) -> None:
     engine = Engine(opener(), None, Params(), desk=RecordingDesk(tmp_path))
-    assert Client(engine).post("/api/recording", json={"on": True}).status_code == 409
+    with loop_apart() as run:
+        assert Client(engine, run).post("/api/recording", json={"on": True}).status_code == 409
     assert not list(tmp_path.iterdir())
 
 

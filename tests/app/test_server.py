@@ -27,6 +27,7 @@ from pipeline.params import Params, from_yaml
 from pipeline.results import to_json
 from pipeline.types import REAL_VEHICLES
 from tests.app.recording import CountingDetector, Recording, opener
+from tests.app.waiting import loop_apart
 
 WAIT_S = 60.0
 
@@ -384,7 +385,8 @@ def test_small_messages_are_not_held_back():
             await writer.wait_closed()
             return no_delay
 
-    assert asyncio.run(accepted_delay())
+    with loop_apart() as run:
+        assert run(accepted_delay())
 
 
 def test_a_taken_port_is_said_or_passed_over():

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from app.stream import FRAMES_UNDER_WAY, Slot
+from tests.app.waiting import loop_apart
 
 Taken = Callable[[Slot], list[str | bytes] | None]
 
@@ -25,8 +26,8 @@ async def _now(slot: Slot) -> list[str | bytes] | None:
 @pytest.fixture
 def taken() -> Iterator[Taken]:
     """What a slot gives now; null when it would wait."""
-    with asyncio.Runner() as runner:
-        yield lambda slot: runner.run(_now(slot))
+    with loop_apart() as run:
+        yield lambda slot: run(_now(slot))
 
 
 def test_a_slow_client_gets_only_the_newest_of_each_kind(taken: Taken):

@@ -1,11 +1,37 @@
-"""Waiting for what tells nobody when it comes."""
+"""Waiting for what tells nobody when it comes, and for coroutines."""
 
 from __future__ import annotations
 
+import asyncio
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import Any, Protocol, TypeVar
 
 WAIT_S = 60.0
+T = TypeVar("T")
+
+
+class Runs(Protocol):
+    """Runs a coroutine to its end."""
+
+    def __call__(self, what: Coroutine[Any, Any, T], /) -> T: ...
+
+
+@contextmanager
+def loop_apart() -> Iterator[Runs]:
+    """An event loop in a thread of its own: while a browser is open, the main thread is in Playwright's."""
+    with ThreadPoolExecutor(1) as apart:
+        runner = asyncio.Runner()
+
+        def run(what: Coroutine[Any, Any, T]) -> T:
+            return apart.submit(runner.run, what).result()
+
+        try:
+            yield run
+        finally:
+            apart.submit(runner.close).result()
 
 
 def wait_until(condition: Callable[[], bool], timeout_s: float = WAIT_S) -> bool:

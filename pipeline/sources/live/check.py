@@ -9,6 +9,9 @@ from pipeline.sources.live.lidar import LidarInput
 from pipeline.sources.live.source import LiveSensors
 from pipeline.types import StreamHealth
 
+_LATE_S, _LOOK_S = 2.0, 0.1
+"""How long a late sensor is waited for in the end, and how often it is looked at."""
+
 
 @dataclass(frozen=True)
 class SensorReport:
@@ -28,18 +31,24 @@ class SensorReport:
 
 
 def check(source: LiveSensors, seconds: float) -> list[SensorReport]:
-    """Open the sensors, take ticks for so long as they come, and report. The sensors are given back."""
+    """Open the sensors, take ticks for so long as they come, and report. One that is late just then is waited for, 2 s
+    at most. The sensors are given back."""
     source.start()
     skews_ms = []
     end_s = time.monotonic() + seconds
     try:
-        while (left_s := end_s - time.monotonic()) > 0.0:
-            frame = source.next(left_s)
+        while (left_s := end_s - time.monotonic()) > 0.0 or (left_s > -_LATE_S and _is_one_late(source)):
+            frame = source.next(max(left_s, _LOOK_S))
             if frame is not None and frame.sweep is not None and frame.picture is not None and frame.picture.t_ns:
                 skews_ms.append((frame.picture.t_ns - frame.sweep.t_ns) / 1e6)
         return [_report(source, health, skews_ms) for health in source.health()]
     finally:
         source.close()
+
+
+def _is_one_late(source: LiveSensors) -> bool:
+    """Whether a sensor that delivered has not done so lately, and is not silent yet."""
+    return any(health.state == "stale" for health in source.health())
 
 
 def _report(source: LiveSensors, health: StreamHealth, skews_ms: list[float]) -> SensorReport:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import asyncio
-
 import pytest
 
 from app.bench.broadcast import RATE_HZ
 from app.bench.clients import Client, Run, _lags, _measure, _per_frame_ms, _rate_hz, _server
+from tests.app.waiting import loop_apart
 
 
 def run_of(*lags_s: list[float], cpu_s: float = 1.0, spent_s: float = 10.0) -> Run:
@@ -33,9 +32,10 @@ def test_a_lag_that_grows_at_one_client_shows_whatever_the_others_do():
     assert _rate_hz(run_of(steady, growing[:45])) == {"least": 4.5, "most": 9.0, "of": RATE_HZ}
 
 
-def test_real_clients_are_served_beside_one_that_does_not_read():
-    with _server(deflate=False) as server:
-        run = asyncio.run(_measure(server, 3, 1.0, None))
+def test_real_clients_are_served_beside_one_that_does_not_read(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("app.bench.clients._SETTLE_S", 0.5)
+    with _server(deflate=False) as server, loop_apart() as run_to_end:
+        run = run_to_end(_measure(server, 3, 1.0, None))
     assert len(run.clients) == 3
     assert all(client.lags_s for client in run.clients)
     assert all(lag > 0 for client in run.clients for lag in client.lags_s)

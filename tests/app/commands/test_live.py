@@ -51,7 +51,7 @@ def test_check_of_sensors_that_are_not_there_ends_with_1_and_says_why(
 
 def test_check_of_sensors_that_deliver_ends_with_0(car: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with Replaying(load(str(car)), endless()):
-        assert ended("live", "check", str(car), "--seconds", "3") == 0
+        assert ended("live", "check", str(car), "--seconds", "1.5") == 0
     assert capsys.readouterr().out.count(" Hz") == 4
 
 

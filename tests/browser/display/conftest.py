@@ -22,8 +22,10 @@ OpenDisplay = Callable[..., Page]
 
 
 @pytest.fixture
-def open_display(browser: Browser) -> Iterator[OpenDisplay]:
+def open_display(browser: Browser, request: pytest.FixtureRequest) -> Iterator[OpenDisplay]:
     """Opens the display in a fresh profile, by touch; at the end no page may have complained or called elsewhere."""
+    if "own" in request.fixturenames:
+        request.getfixturevalue("own")  # what comes first goes last: a page must not see its server go
     complaints: list[str] = []
     pages: list[Page] = []
 
