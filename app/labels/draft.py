@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from typing import Any
 
 from sqlalchemy import Connection, bindparam, delete, func, insert, select, tuple_
@@ -92,6 +92,19 @@ class Draft:
             if (first is None or frame >= first) and (last is None or frame <= last):
                 found[frame] = sighting
         return {frame: sighting for frame in sorted(found) if (sighting := found[frame]) is not None}
+
+    def stands(self, kind: ItemKind, number: int, content: Content) -> bool:
+        """Whether an item is exactly so: its value, and of a track where it is in those frames."""
+        item, frames = self.find(kind, number), content.frames
+        if (item.value if item is not None else None) != content.value:
+            return False
+        there = self.sightings(number, min(frames), max(frames)) if frames else {}
+        return all(there.get(frame) == each for frame, each in frames.items())
+
+    @property
+    def touched(self) -> Set[tuple[ItemKind, int]]:
+        """Kind and number of every item that was put or removed."""
+        return self._after.keys()
 
     # ------------------------------------------------------------ changing
 

@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from sqlalchemy import ColumnElement, Connection, and_, func, insert, or_, select, update
-from sqlalchemy.orm import aliased
 
 from app.labels.database import Database
 from app.labels.draft import Draft, name_of
 from app.labels.refusals import ActRefused
 from app.labels.tables import ActRow, ChangeRow, DriveRow
-from app.labels.values import ItemKind, unpack, unpack_content
+from app.labels.values import ItemKind, unpack, unpack_pair
+from app.labels.whole import check_whole
 
 Way = Literal["undo", "redo"]
 _OF_PARAMS = ("params", "nudge")
@@ -70,6 +70,7 @@ class Log:
         with self._database.writing() as connection:
             draft = self._draft(connection, person)
             what = apply(draft)
+            check_whole(draft)
             if not draft.write():
                 connection.get_transaction().rollback()  # type: ignore[union-attr]
                 return Acted(draft.number - 1, None, "nothing changed")
@@ -106,10 +107,10 @@ class Log:
             if step is None:
                 raise ActRefused(f"there is nothing to {way}")
             acts = self._acts_of(connection, step)
-            self._check_untouched(connection, [number for number, _ in acts], person, way)
             for number, _ in reversed(acts) if way == "undo" else acts:
                 self._put(connection, draft, number, way)
             check(draft.params)
+            check_whole(draft)
             draft.write()
             what = acts[-1][1]
             status = "undone" if way == "undo" else "done"
@@ -193,51 +194,52 @@ class Log:
         )
 
     def _put(self, connection: Connection, draft: Draft, act: int, way: Way) -> None:
-        """What an act found (undo) or left (redo), again."""
+        """What an act found (undo) or left (redo), again. ActRefused when anything does not stand as the act left it
+        (undo) or found it (redo): that would take back what somebody else did since."""
         rows = connection.execute(
             select(ChangeRow).where(ChangeRow.drive_id == self._drive_id, ChangeRow.act == act)
         ).all()
         for row in rows:
             here, there = (row.after, row.before) if way == "undo" else (row.before, row.after)
             if row.kind == "param":
+                if (other := self._changed_since(connection, row, draft.person)) is not None:
+                    raise ActRefused(f"{other} changed {row.item} since; {way} would take that back too")
                 draft.put_param(row.item, unpack(here), unpack(there))
                 continue
             kind: ItemKind = row.kind
-            was = unpack_content(kind, here)
-            to = unpack_content(kind, there, was.frames)
-            draft.put(kind, int(row.item), to.value)
+            number = int(row.item)
+            was, to = unpack_pair(kind, here, there)
+            if not draft.stands(kind, number, was):
+                other = self._changed_since(connection, row, draft.person) or "somebody"
+                raise ActRefused(f"{other} changed {name_of(kind, number)} since; {way} would take that back too")
+            draft.put(kind, number, to.value)
             if kind == "track":
-                draft.put_sightings(int(row.item), to.frames)
+                draft.put_sightings(number, to.frames)
 
-    def _check_untouched(self, connection: Connection, acts: Iterable[int], person: str, way: Way) -> None:
-        """ActRefused when an act in force, of somebody else, changed the same thing later."""
-        mine, other = aliased(ChangeRow), aliased(ChangeRow)
-        found = connection.execute(
-            select(other.kind, other.item, ActRow.person)
-            .join(
-                mine,
-                and_(
-                    mine.drive_id == other.drive_id,
-                    mine.kind == other.kind,
-                    mine.item == other.item,
-                    mine.act < other.act,
-                ),
-            )
-            .join(ActRow, and_(ActRow.drive_id == other.drive_id, ActRow.number == other.act))
-            .where(
-                mine.drive_id == self._drive_id,
-                mine.act.in_(list(acts)),
-                ActRow.person != person,
+    def _changed_since(self, connection: Connection, change: Any, person: str) -> str | None:
+        """Who else changed the same thing after ``change``, the last one; null when nobody did. A parameter is changed
+        by acts in force on this station alone, and by who has a name."""
+        wanted = [
+            ChangeRow.drive_id == self._drive_id,
+            ChangeRow.kind == change.kind,
+            ChangeRow.item == change.item,
+            ChangeRow.act > change.act,
+            ActRow.person != person,
+        ]
+        if change.kind == "param":
+            wanted += [
                 ActRow.status == "done",
                 ActRow.kind.not_in(_WAYS),
-                or_(other.kind != "param", and_(ActRow.station == self._station, ActRow.person != "")),
-            )
-            .order_by(other.act)
+                ActRow.station == self._station,
+                ActRow.person != "",
+            ]
+        return connection.scalars(
+            select(ActRow.person)
+            .join(ChangeRow, and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act))
+            .where(*wanted)
+            .order_by(ActRow.number.desc())
             .limit(1)
         ).first()
-        if found is not None:
-            named = found.item if found.kind == "param" else name_of(found.kind, int(found.item))
-            raise ActRefused(f"{found.person} changed {named} since; {way} would take that back too")
 
     # ------------------------------------------------------------ whose acts
 

@@ -113,6 +113,13 @@ def unpack_content(kind: ItemKind, data: bytes | None, frames: Iterable[int] = (
     return Content(value, found)
 
 
+def unpack_pair(kind: ItemKind, here: bytes | None, there: bytes | None) -> tuple[Content, Content]:
+    """Both sides of a change, each with every frame that it touched."""
+    found = unpack_content(kind, here)
+    other = unpack_content(kind, there, found.frames)
+    return (Content(None, dict.fromkeys(other.frames)) if here is None else found), other
+
+
 def pack(body: Any) -> bytes:
     return zlib.compress(json.dumps(body, separators=(",", ":"), ensure_ascii=False).encode(), _QUICK)
 

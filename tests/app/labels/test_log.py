@@ -6,10 +6,12 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pydantic import TypeAdapter
 
 from app.labels.acts import do
 from app.labels.acts.scope import Scope
@@ -18,9 +20,11 @@ from app.labels.draft import Draft
 from app.labels.drive import DriveLabels
 from app.labels.log import Acted
 from app.labels.refusals import ActRefused, Stale
-from app.labels.requests import AddTrack, CuboidIn, Relabel, SetLead, SetSighting
+from app.labels.requests import Act, AddTrack, CuboidIn, Relabel, SetLead, SetSighting
 from pipeline.labels.model import LabelSet, LeadRange
 from tests.app.labels.conftest import fresh, info
+
+ACT: TypeAdapter[Any] = TypeAdapter(Act)
 
 
 def cuboid(x: float = 20.0) -> CuboidIn:
@@ -159,6 +163,57 @@ def test_what_somebody_else_changed_since_is_not_taken_back(labels: DriveLabels)
     with pytest.raises(ActRefused, match="Bob changed #1 since; undo would take that back too"):
         labels.log.move("undo", "Ada")
     assert label_of(labels, number) == "bus"
+    labels.log.move("undo", "Bob")
+    labels.log.move("undo", "Ada")
+    assert not labels.items("track")
+
+
+LEAD = {"kind": "set_lead", "first": 0, "last": 10, "lead": "none"}
+LINE = {"kind": "set_path", "frame": 3, "left": [(0.0, 1.5), (20.0, 1.5)], "right": None}
+TAG = {"kind": "tag", "frame": 3, "tag": "night"}
+EVENT = {"kind": "add_event", "frame": 10, "event": "cut_in", "tracks": [1]}
+CAR = {"kind": "add_track", "label": "car", "frame": 10, "cuboid": cuboid().model_dump()}
+PLACED = {"kind": "set_sighting", "track": 1, "revision": 1, "frame": 9, "cuboid": cuboid(22.0).model_dump()}
+CLEARED = {"kind": "clear_lead", "first": 0, "last": 10}
+
+
+@pytest.mark.parametrize(
+    ("steps", "says"),
+    [
+        ([("Ada", LEAD), ("Ada", CLEARED), ("Bob", LEAD | {"first": 5, "last": 15}), ("Ada", "undo")],
+         "frames 5–10 would have two leads: Bob made lead 2 there"),
+        ([("Ada", LINE), ("Ada", "undo"), ("Bob", LINE), ("Ada", "redo")],
+         "frame 3 would have two paths: Bob made path 2 there"),
+        ([("Ada", TAG), ("Ada", "undo"), ("Bob", TAG), ("Ada", "redo")],
+         "frame 3 would have two tags: Bob made tag 2 there"),
+        ([("Ada", CAR), ("Bob", LEAD | {"lead": 1}), ("Ada", "undo")], "lead 1 names #1, which would not be there"),
+        ([("Ada", CAR), ("Bob", EVENT), ("Ada", "undo")], "event 1 names #1, which would not be there"),
+        ([("Ada", CAR), ("Bob", LEAD | {"lead": 1}), ("Bob", "undo"), ("Ada", "undo"), ("Bob", "redo")],
+         "lead 1 names #1, which would not be there"),
+        ([("Bob", CAR), ("Ada", PLACED), ("Ada", "undo"), ("Bob", "undo"), ("Ada", "redo")],
+         "Bob changed #1 since; redo would take that back too"),
+    ],
+)  # fmt: skip
+def test_going_back_never_breaks_what_another_did_beside_it(
+    sqlite_database: Database, steps: list[tuple[str, Any]], says: str
+) -> None:
+    labels = DriveLabels(sqlite_database, fresh(), "here")
+    *first, (person, way) = steps
+    for who, step in first:
+        if isinstance(step, str):
+            labels.log.move(step, who)  # type: ignore[arg-type]
+        else:
+            act(labels, who, ACT.validate_python(step))
+    before = shown(labels)
+    with pytest.raises(ActRefused) as refused:
+        labels.log.move(way, person)
+    assert str(refused.value) == says
+    assert shown(labels) == before
+
+
+def test_what_another_changed_and_took_back_is_in_nobodys_way(labels: DriveLabels) -> None:
+    number = add(labels, "Ada")
+    relabel(labels, number, "bus", "Bob")
     labels.log.move("undo", "Bob")
     labels.log.move("undo", "Ada")
     assert not labels.items("track")
