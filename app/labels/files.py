@@ -17,7 +17,7 @@ from app.drive.recording import Recording
 from app.labels.drive import DriveLabels
 from app.labels.long import importing
 from app.labels.refusals import ActRefused, BadAct
-from app.labels.tasks import Progress, Work
+from app.labels.tasks import Progress, Work, to_nobody
 from pipeline.errors import BadInput
 from pipeline.labels.formats.base import Drive, FormatName, drive_of
 from pipeline.labels.formats.registry import export_labels, import_labels
@@ -66,12 +66,12 @@ def importing_file(labels: DriveLabels, recording: Recording, person: str, file:
                 found = import_labels(path, drive, name, origin)
             except BadInput as error:  # where it lies here is nobody's business
                 raise ActRefused(str(error).replace(str(path), "the file")) from None
-            return importing(labels, found.labels, person, found.notes)
+            return importing(labels, found.labels, person, found.notes, progress)
 
     return work
 
 
-def drive_for(recording: Recording, progress: Progress = lambda done, total: None) -> Drive:
+def drive_for(recording: Recording, progress: Progress = to_nobody) -> Drive:
     """What formats must know of the drive: read from its source only where no run has."""
     return drive_of(recording.recipe.source, progress, recording.at_hand)
 

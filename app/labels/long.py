@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import cast
 
@@ -14,8 +14,8 @@ from app.labels.acts.leads import clear
 from app.labels.draft import Draft
 from app.labels.drive import DriveLabels
 from app.labels.refusals import ActRefused
-from app.labels.tasks import Progress, Work
-from pipeline.labels.model import FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
+from app.labels.tasks import Progress, Work, to_nobody
+from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.labels.propose import Proposals, known_as, propose
 from pipeline.labels.truth import truth_labels
 
@@ -34,19 +34,23 @@ def proposing(labels: DriveLabels, recording: Recording, person: str, first: int
         progress(0, 2)
         found = _proposals(recording, run, first, last)
         progress(1, 2)
-        said = put_proposals(labels, found, person, first, last)
+        said = put_proposals(labels, found, person, first, last, progress)
         progress(2, 2)
         return said
 
     return work
 
 
-def put_proposals(labels: DriveLabels, found: Proposals, person: str, first: int, last: int) -> str:
-    """Into the labels of a drive, in one act; a sentence of what came of it."""
+def put_proposals(
+    labels: DriveLabels, found: Proposals, person: str, first: int, last: int, progress: Progress = to_nobody
+) -> str:
+    """Into the labels of a drive, in one act; a sentence of what came of it. Nothing is written when ``progress``
+    raises."""
     counts: list[int] = []
 
     def apply(draft: Draft) -> str:
         counts.append(_put_proposals(draft, found, first, last))
+        progress(1, 2)
         return f"proposed {counts[-1]} tracks in frames {first}–{last}"
 
     acted = labels.log.act("propose", person, apply)
@@ -54,17 +58,21 @@ def put_proposals(labels: DriveLabels, found: Proposals, person: str, first: int
     return acted.what + (f"; {known} more are labelled already" if known else "")
 
 
-def importing(labels: DriveLabels, found: LabelSet, person: str, notes: Sequence[str]) -> str:
+def importing(
+    labels: DriveLabels, found: LabelSet, person: str, notes: Sequence[str], progress: Progress = to_nobody
+) -> str:
     """Labels of this drive from elsewhere, in one act, beside those that are there; a sentence of what came of it. A
-    track whose number is taken gets another; one that is there already, place for place, is not there twice. Who leads,
-    and the path of a frame, are taken over what was there."""
+    track whose number is taken gets another; one that is there already, place for place, is not there twice, and is
+    what the file says where nobody here has said anything of it. Who leads, and the path of a frame, are taken over
+    what was there. ActRefused for a lead or an event of a track that is not there. Nothing is written when
+    ``progress`` raises."""
     known: list[int] = []
 
     def apply(draft: Draft) -> str:
-        numbers = _put_tracks(draft, found.tracks, known)
+        numbers = _put_tracks(draft, found.tracks, known) or {each: each for each in draft.all("track")}
         for lead in found.leads:
             clear(draft, lead.first, lead.last)
-            who = numbers.get(lead.lead, lead.lead) if isinstance(lead.lead, int) else lead.lead
+            who = _numbered(numbers, lead.lead, "the lead") if isinstance(lead.lead, int) else lead.lead
             draft.add("lead", replace(lead, lead=who))
         drawn = {path.frame for path in found.paths}
         for number, item in draft.all("path").items():
@@ -72,12 +80,16 @@ def importing(labels: DriveLabels, found: LabelSet, person: str, notes: Sequence
                 draft.put("path", number, None)
         for path in found.paths:
             draft.add("path", path)
+        events = {_happening(cast("EventLabel", item.value)) for item in draft.all("event").values()}
         for event in found.events:
-            draft.add("event", replace(event, tracks=tuple(numbers.get(track, track) for track in event.tracks)))
+            renamed = replace(event, tracks=tuple(_numbered(numbers, each, event.kind) for each in event.tracks))
+            if _happening(renamed) not in events:
+                draft.add("event", renamed)
         tags = {(tag.frame, tag.tag) for tag in (cast("FrameTag", item.value) for item in draft.all("tag").values())}
         for tag in found.tags:
             if (tag.frame, tag.tag) not in tags:
                 draft.add("tag", tag)
+        progress(1, 1)
         return f"imported {len(found.tracks) - len(known)} tracks and {len(found.leads)} ranges of the lead"
 
     said = labels.log.act("import", person, apply).what
@@ -88,18 +100,38 @@ def importing(labels: DriveLabels, found: LabelSet, person: str, notes: Sequence
 def _put_tracks(draft: Draft, tracks: Sequence[LabelTrack], known: list[int]) -> dict[int, int]:
     """The numbers that they have here, by their own; ``known`` gets those that are here already."""
     numbers: dict[int, int] = {}
-    there = {(each.label, each.sightings): each.id for each in _as_they_are(draft)}
+    there = {(each.label, each.sightings): each for each in _as_they_are(draft)}
     for track in tracks:
         same = there.get((track.label, track.sightings))
         if same is not None:
-            numbers[track.id] = same
-            known.append(same)
+            numbers[track.id] = same.id
+            known.append(same.id)
+            if _is_untouched(same):
+                draft.put("track", same.id, replace(track, id=same.id, sightings=()))
             continue
         taken = draft.find("track", track.id) is not None or track.id == 0
         numbers[track.id] = draft.next_number("track") if taken else track.id
         draft.add("track", replace(track, id=numbers[track.id], sightings=()))
         draft.put_sightings(numbers[track.id], {each.frame: each for each in track.sightings})
     return numbers
+
+
+def _numbered(numbers: Mapping[int, int], track: int, what: str) -> int:
+    """The number that a track of the file has here."""
+    if track not in numbers:
+        raise ActRefused(f"{what} is #{track}, and no such track comes with it or is here")
+    return numbers[track]
+
+
+def _happening(event: EventLabel) -> tuple[int, str, tuple[int, ...]]:
+    """What tells events apart."""
+    return event.frame, event.kind, event.tracks
+
+
+def _is_untouched(label: LabelTrack | LeadRange) -> bool:
+    """A proposal of the pipeline that nobody has looked at, nor sent back."""
+    sent_back = isinstance(label, LabelTrack) and bool(label.comment)
+    return label.state == "proposed" and label.origin.maker == "pipeline" and not sent_back
 
 
 def _as_they_are(draft: Draft) -> list[LabelTrack]:
@@ -119,7 +151,7 @@ def importing_truth(labels: DriveLabels, recording: Recording, person: str) -> W
         found, notes = truth_labels(source, recording.names(), origin, progress)
         if not found.tracks:
             raise ActRefused("no frame of this recording comes with truth")
-        return importing(labels, found, person, notes)
+        return importing(labels, found, person, notes, progress)
 
     return work
 
@@ -145,11 +177,11 @@ def _put_proposals(draft: Draft, found: Proposals, first: int, last: int) -> int
         replace(cast("LabelTrack", item.value), sightings=tuple(draft.sightings(number, first, last).values()))
         for number, item in draft.all("track").items()
     ]
-    states = {track.id: track.state for track in known}
+    replaced = {track.id for track in known if _is_untouched(track)}
     same = known_as(found.tracks, known)
     numbers, count = dict(same), 0
     for track in found.tracks:
-        if track.id in same and states[same[track.id]] != "proposed":
+        if track.id in same and same[track.id] not in replaced:
             continue
         count += 1
         number = numbers.get(track.id)
@@ -170,7 +202,7 @@ def _put_leads(draft: Draft, leads: Sequence[LeadRange], numbers: dict[int, int]
     said: set[int] = set()
     for number, item in draft.all("lead").items():
         old = cast("LeadRange", item.value)
-        if old.state == "proposed" and first <= old.first and old.last <= last:
+        if _is_untouched(old) and first <= old.first and old.last <= last:
             draft.put("lead", number, None)
         else:
             said.update(range(old.first, old.last + 1))

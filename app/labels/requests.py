@@ -34,6 +34,13 @@ def _named(text: str) -> str:
     return cleaned
 
 
+def _commented(text: str) -> str:
+    cleaned = _clean(text)
+    if not cleaned:
+        raise ValueError("a comment says what is to be looked at")
+    return cleaned
+
+
 Id = Annotated[int, Field(ge=0, le=_LARGEST_ID)]
 Index = Annotated[int, Field(ge=0, le=MOST_FRAMES)]
 Finite = Annotated[float, Field(ge=-_FARTHEST, le=_FARTHEST, allow_inf_nan=False)]
@@ -42,7 +49,7 @@ Person = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_named)]
 PersonOrNobody = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_clean)]
 """Cleaned as ``Person`` is, so that both name the same one; empty for nobody in particular."""
 Word = Annotated[str, Field(max_length=40), AfterValidator(_named)]
-Comment = Annotated[str, Field(max_length=1000), AfterValidator(_clean)]
+Comment = Annotated[str, Field(max_length=1000), AfterValidator(_commented)]
 Line = Annotated[list[tuple[Finite, Finite]], Field(min_length=2, max_length=_MOST_POINTS)]
 
 
@@ -116,7 +123,7 @@ class Reject(_OfItems):
 
 
 class SendBack(_OfItems):
-    """Review: it is to be looked at again; tracks carry the comment."""
+    """Review: tracks are to be looked at again; they carry the comment."""
 
     kind: Literal["send_back"]
     comment: Comment

@@ -46,6 +46,10 @@ Work = Callable[[Progress], str]
 """Does it, and says in a sentence what came of it."""
 
 
+def to_nobody(done: int, total: int) -> None:
+    """Progress of what is waited for until its end."""
+
+
 class Tasks:
     """Any thread. on_change is called when ``state`` is another, while a task goes on ten times a second at most."""
 

@@ -165,7 +165,7 @@ def _boxes_after(track: dict[int, Sighting], old: Sighting, frame: int, t_ns: Se
 
 def _share(t_ns: Sequence[int], first: int, frame: int, last: int) -> float:
     """How far ``frame`` is in time from ``first`` (0) to ``last`` (1)."""
-    _require_forward((t_ns[first], t_ns[last]))
+    _require_forward([t_ns[f] for f in sorted((first, last))])
     return (t_ns[frame] - t_ns[first]) / (t_ns[last] - t_ns[first])
 
 

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast
 
-from app.labels.acts.scope import Scope, Stated, stated
+from app.labels.acts.scope import Scope, Stated, stated, track_of
 from app.labels.draft import Draft, name_of
-from app.labels.refusals import ActRefused
+from app.labels.refusals import ActRefused, BadAct
 from app.labels.requests import Accept, Ref, Reject, Remove, ReviewOk, SendBack
 from pipeline.labels.model import EventLabel, LabelTrack, LeadRange
 
@@ -40,11 +40,11 @@ def review_ok(draft: Draft, scope: Scope, act: ReviewOk) -> str:
 
 def send_back(draft: Draft, scope: Scope, act: SendBack) -> str:
     for ref in act.items:
-        value = replace(stated(draft.get(ref.kind, ref.id, ref.revision)), state="proposed")
-        if isinstance(value, LabelTrack):
-            value = replace(value, comment=act.comment)
-        draft.put(ref.kind, ref.id, value)
-    return f"sent back {_names(act.items)}" + (f": {act.comment}" if act.comment else "")
+        if ref.kind != "track":
+            raise BadAct("tracks are sent back; what else is wrong is put right, or rejected")
+        track = track_of(draft, ref.id, ref.revision)
+        draft.put("track", ref.id, replace(track, state="proposed", comment=act.comment))
+    return f"sent back {_names(act.items)}: {act.comment}"
 
 
 def remove(draft: Draft, scope: Scope, act: Remove) -> str:

@@ -246,6 +246,7 @@ def test_a_tag_is_there_once_or_not(labels: DriveLabels) -> None:
         {"kind": "set_lead", "first": 5, "last": COUNT, "lead": "none"},
         {"kind": "set_path", "frame": 3, "left": None, "right": None},
         {"kind": "accept", "items": [("tag", 1)]},
+        {"kind": "send_back", "items": [("lead", 1)], "comment": "it is another"},
     ],
 )
 def test_what_makes_no_sense_is_refused(labels: DriveLabels, body: dict[str, Any]) -> None:
@@ -278,6 +279,7 @@ def test_what_is_not_there_is_said(labels: DriveLabels, body: dict[str, Any]) ->
         {"kind": "set_sighting", "track": 1, "revision": 1, "frame": 1, "cuboid": BOX | {"size": [0, 1, 1]}},
         {"kind": "set_sighting", "track": 1, "revision": 1, "frame": 1, "cuboid": BOX | {"yaw_rad": float("nan")}},
         {"kind": "accept", "items": []},
+        {"kind": "send_back", "items": [{"kind": "track", "id": 1, "revision": 1}], "comment": " \n "},
         {"kind": "tag", "frame": 1, "tag": "x", "extra": 1},
     ],
 )

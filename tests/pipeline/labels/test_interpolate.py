@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.labels.interpolate import drop_keyframe, put_keyframe, resized
 from pipeline.labels.model import Sighting
@@ -42,6 +43,15 @@ SEEN = track(*(at(frame, 20.0 + frame, key=False) for frame in range(10)))
 
 
 # ------------------------------------------------------------ between
+
+
+def test_over_a_step_back_of_the_clock_nothing_is_put_between() -> None:
+    ticks = (*T_NS[:5], *T_NS[:5])
+    with pytest.raises(BadInput, match="clock steps back"):
+        put_keyframe(track(at(2, 9.0)), at(6, 9.0), ticks)
+    with pytest.raises(BadInput, match="clock steps back"):
+        drop_keyframe(track(at(2, 9.0), at(4, 9.0), at(6, 9.0)), 4, ticks)
+    assert xs(put_keyframe(track(at(2, 9.0)), at(6, 9.0), ticks, interpolate=False)) == {2: 9.0, 6: 9.0}
 
 
 def test_between_two_keyframes_it_moves_evenly_in_time_not_by_frame_number() -> None:
