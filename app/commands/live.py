@@ -77,7 +77,7 @@ def _show(reports: list[SensorReport]) -> None:
     table = Table("sensor", "state", "rate", "jitter", "age", "lost", "refused", "clock offset", "about")
     for report in reports:
         health = report.health
-        about = [health.note]
+        about = [health.note, report.cost or ""]
         if report.pps is not None:
             about.append(f"PPS {report.pps}")
         if report.skew_ms is not None:

@@ -6,24 +6,29 @@ import time
 from dataclasses import dataclass
 
 from pipeline.sources.live.lidar import LidarInput
+from pipeline.sources.live.own_motion import yaw_rate_lag_s
 from pipeline.sources.live.source import LiveSensors
 from pipeline.types import StreamHealth
 
 _LATE_S, _LOOK_S = 2.0, 0.1
 """How long a late sensor is waited for in the end, and how often it is looked at."""
+_ENOUGH_HZ = 5.0
+"""Own motion that comes so often is fresh enough for anything here."""
 
 
 @dataclass(frozen=True)
 class SensorReport:
     """clock_offset_ms: host time less the sensor's, the shortest delay on the way included; of a VLP-16, which counts
     from the full hour, at most half an hour either way; null where the sensor sends no time. pps: what the LiDAR says
-    of the pulse per second; null where it says nothing. skew_ms: median of picture less sweep, over the ticks."""
+    of the pulse per second; null where it says nothing. skew_ms: median of picture less sweep, over the ticks. cost:
+    what it costs that a receiver whose speed is the own speed sends so seldom; null where it costs nothing."""
 
     health: StreamHealth
     clock_offset_ms: float | None = None
     refused: int = 0
     pps: str | None = None
     skew_ms: float | None = None
+    cost: str | None = None
 
     @property
     def is_good(self) -> bool:
@@ -54,7 +59,7 @@ def _is_one_late(source: LiveSensors) -> bool:
 def _report(source: LiveSensors, health: StreamHealth, skews_ms: list[float]) -> SensorReport:
     each = source.inputs.get(health.sensor)
     if each is None:
-        return SensorReport(health)
+        return SensorReport(health, cost=_cost(health))
     return SensorReport(
         health,
         each.clock_offset_ms(),
@@ -62,3 +67,16 @@ def _report(source: LiveSensors, health: StreamHealth, skews_ms: list[float]) ->
         each.pps if isinstance(each, LidarInput) else None,
         sorted(skews_ms)[len(skews_ms) // 2] if skews_ms and health.sensor == "camera" else None,
     )
+
+
+def _cost(ego: StreamHealth) -> str | None:
+    """Of own motion that a receiver gives."""
+    if ego.state != "ok":
+        return None
+    if ego.rate_hz is None:
+        return "too few fixes for a rate: listen longer with --seconds"
+    if ego.rate_hz >= _ENOUGH_HZ - 0.1:
+        return None
+    lag_s = yaw_rate_lag_s(round(ego.rate_hz, 1))
+    yaw_rate = "the yaw rate is never known" if lag_s is None else f"the yaw rate lags by {lag_s:.1f} s more"
+    return f"own speed is up to {1.0 / ego.rate_hz:.1f} s old, {yaw_rate}: let the receiver send at {_ENOUGH_HZ:g} Hz"

@@ -10,9 +10,8 @@ import numpy as np
 
 from pipeline.types import StreamHealth
 
-SILENT_NS = 1_000_000_000
-"""Nothing for this long: the sensor is silent."""
-_STALE_NS = 250_000_000
+_SILENT_NS, _STALE_NS, _MISSED = 1_000_000_000, 250_000_000, 3
+"""Nothing for this long, and for so many of its periods: the sensor is silent, or stale before that."""
 _WINDOW_NS = 3_000_000_000
 _FEWEST = 3
 _KEPT = 1024
@@ -67,9 +66,10 @@ class StreamStats:
         since = self.since_ns(now_ns)
         if since is None:
             return "absent"
-        if since >= SILENT_NS:
+        missed_ns = _MISSED * (self.period_ns() or 0)
+        if since >= max(_SILENT_NS, missed_ns):
             return "silent"
-        return "stale" if since >= max(_STALE_NS, 3 * (self.period_ns() or 0)) else "ok"
+        return "stale" if since >= max(_STALE_NS, missed_ns) else "ok"
 
     def _said(self) -> str:
         refused = f"{self.refused} messages refused" if self.refused else ""

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections import deque
+from math import ceil
 
 import numpy as np
 
 from pipeline.types import EgoState, GnssFix
 
-_WINDOW_NS = 600_000_000
+_SPAN_NS, _LONGEST_NS = 600_000_000, 1_500_000_000
 """Course is noisy (0.2° of an RTK receiver): a line through 0.6 s of it halves the noise of two neighbours eight times,
-and lags by 0.3 s, less than a car takes to turn in."""
-_FEWEST = 4
+and lags by 0.3 s, less than a car takes to turn in. Of a slower receiver it is the fewest fixes that span as much: two
+that are a second apart are as quiet, and lag by 0.5 s. Further apart they say nothing about one turn."""
 _SLOWEST_MPS = 3.0
 """Slower, the course says little about where the car points."""
 
@@ -25,20 +26,26 @@ class MotionFromGnss:
     def push(self, fix: GnssFix) -> EgoState:
         """Speed as measured; the yaw rate (left positive) once there is course for it, else null."""
         courses = self._courses
-        if courses and not 0 < fix.t_ns - courses[-1][0] <= _WINDOW_NS:
+        if courses and not 0 < fix.t_ns - courses[-1][0] <= _LONGEST_NS:
             courses.clear()
         if fix.course_rad is None or fix.speed_mps < _SLOWEST_MPS:
             courses.clear()
         else:
             courses.append((fix.t_ns, fix.course_rad))
-        while courses and fix.t_ns - courses[0][0] > _WINDOW_NS:
+        while len(courses) > 1 and fix.t_ns - courses[1][0] >= _SPAN_NS:
             courses.popleft()
         return EgoState(fix.t_ns, fix.speed_mps, _turning_left_radps(list(courses)))
 
 
+def yaw_rate_lag_s(rate_hz: float) -> float | None:
+    """By how much the yaw rate lags behind the car, of a receiver that sends so often; null where it is never known."""
+    span_s = ceil(_SPAN_NS / 1e9 * rate_hz - 1e-3) / rate_hz
+    return span_s / 2.0 if span_s <= _LONGEST_NS / 1e9 else None
+
+
 def _turning_left_radps(courses: list[tuple[int, float]]) -> float | None:
-    """Slope of the line through (t_ns, course clockwise from north), its sign turned."""
-    if len(courses) < _FEWEST:
+    """Slope of the line through (t_ns, course clockwise from north), its sign turned; null where it is too short."""
+    if not courses or courses[-1][0] - courses[0][0] < _SPAN_NS:
         return None
     t_s = np.array([(t - courses[0][0]) / 1e9 for t, _ in courses])
     course = np.unwrap([angle for _, angle in courses])

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Generic, TypeVar
 
 from pipeline.params import SyncParams
@@ -22,7 +23,9 @@ _PATIENCE_NS, _LONGEST_PATIENCE_NS = 250_000_000, 1_000_000_000
 """The LiDAR is waited for three of its periods, within these bounds, before the camera ticks instead."""
 _KEPT, _PICTURES_KEPT = 64, 24
 """Pictures are large; so many are 0.4 s of a 60 Hz camera, and a sweep is 0.05 s old when it is whole."""
-_OWN_MOTION_WITHIN_NS = 500_000_000
+_HELD_PERIODS, _HELD_AT_LEAST_NS, _HELD_UNKNOWN_NS = 1.5, 500_000_000, 1_500_000_000
+"""Own motion holds for so many periods of who tells it; a receiver that sends once a second is a second late before
+its next word. The last is for one that has spoken once."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,11 @@ class Stream(Generic[T]):
         place = bisect_left(self._kept, t_ns, key=lambda item: item.t_ns)
         around = self._kept[max(0, place - 1) : place + 1]
         return min(reversed(around), key=lambda item: abs(item.t_ns - t_ns), default=None)
+
+    def period_ns(self) -> int | None:
+        """The usual step from one message to the next; null while there is one at most."""
+        steps = sorted(later.t_ns - earlier.t_ns for earlier, later in pairwise(self._kept))
+        return steps[len(steps) // 2] if steps else None
 
 
 @dataclass(frozen=True)
@@ -171,7 +179,11 @@ class Synchroniser(Generic[P]):
 
 
 def _own_motion_at(stream: Stream[T], t_ns: int, offset_ms: float) -> T | None:
-    """What a speedometer or receiver said nearest to a moment; null when that is over half a second away."""
+    """What a speedometer or receiver said nearest to a moment; null when that is further away than it holds."""
     at_ns = t_ns - round(offset_ms * 1e6)
     item = stream.nearest(at_ns)
-    return item.value if item is not None and abs(item.t_ns - at_ns) <= _OWN_MOTION_WITHIN_NS else None
+    return item.value if item is not None and abs(item.t_ns - at_ns) <= _holds_for_ns(stream.period_ns()) else None
+
+
+def _holds_for_ns(period_ns: int | None) -> float:
+    return _HELD_UNKNOWN_NS if period_ns is None else max(_HELD_PERIODS * period_ns, _HELD_AT_LEAST_NS)

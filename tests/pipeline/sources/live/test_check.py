@@ -52,6 +52,33 @@ def test_a_late_sensor_is_waited_for_and_a_silent_one_is_not(states: tuple[State
     assert not sensor.is_open
 
 
+class Ego(Sensor):
+    """Own motion from a receiver, at a rate."""
+
+    def __init__(self, rate_hz: float | None) -> None:
+        super().__init__("ok")
+        self._rate_hz = rate_hz
+
+    def health(self) -> tuple[StreamHealth, ...]:
+        return (StreamHealth("ego", "ok", self._rate_hz, None, None, 0),)
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "said"),
+    [
+        (10.0, None),
+        (4.98, None),
+        (2.02, "own speed is up to 0.5 s old, the yaw rate lags by 0.5 s more: let the receiver send at 5 Hz"),
+        (1.0, "own speed is up to 1.0 s old, the yaw rate lags by 0.5 s more: let the receiver send at 5 Hz"),
+        (0.5, "own speed is up to 2.0 s old, the yaw rate is never known: let the receiver send at 5 Hz"),
+        (None, "too few fixes for a rate: listen longer with --seconds"),
+    ],
+)
+def test_what_a_slow_receiver_costs_is_said(rate_hz: float | None, said: str | None) -> None:
+    (report,) = check(cast("LiveSensors", Ego(rate_hz)), 1e-3)
+    assert report.cost == said
+
+
 def test_one_that_stays_late_is_late(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("pipeline.sources.live.check._LATE_S", 0.01)
     (report,) = check(cast("LiveSensors", Sensor("stale")), 1e-3)

@@ -50,6 +50,11 @@ def test_a_slow_sensor_is_not_stale_between_its_messages() -> None:
     assert after([0.0, 300.0, 600.0], 600.0 + 700.0).state == "ok"
 
 
+@pytest.mark.parametrize(("since_ms", "state"), [(999, "ok"), (1300, "ok"), (2999, "ok"), (3001, "silent")])
+def test_one_that_speaks_once_a_second_is_not_silent_before_its_next_word(since_ms: float, state: str) -> None:
+    assert after([1000.0 * k for k in range(5)], 4000.0 + since_ms).state == state
+
+
 def test_after_the_window_the_rate_is_unknown_again() -> None:
     health = after([100.0 * k for k in range(10)], 900.0 + 5000.0)
     assert (health.state, health.rate_hz, health.jitter_ms) == ("silent", None, None)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from math import ceil
+
 import numpy as np
 import pytest
 
-from pipeline.sources.live.own_motion import MotionFromGnss
+from pipeline.sources.live.own_motion import MotionFromGnss, yaw_rate_lag_s
 from pipeline.types import EgoState, GnssFix
 
 SECOND = 1_000_000_000
@@ -36,13 +38,29 @@ def test_noise_of_a_receiver_is_smoothed() -> None:
     assert np.std([rate for rate in rates if rate is not None]) < 0.01, "two neighbours alone would give 0.05 rad/s"
 
 
+@pytest.mark.parametrize("rate_hz", [1.0, 2.0, 4.0, 5.0, 10.0, 20.0])
+def test_a_turn_is_known_at_every_usual_rate_as_late_as_said(rate_hz: float) -> None:
+    """The course of a turn that tightens evenly: the line's slope is the yaw rate of its middle."""
+    courses = [-0.05 * (k / rate_hz) ** 2 for k in range(round(3 * rate_hz) + 1)]
+    known = [state.yaw_rate_radps for state in drive(list(courses), step_s=1.0 / rate_hz)]
+    lag_s = yaw_rate_lag_s(rate_hz)
+    assert lag_s is not None
+    assert lag_s <= 0.5
+    assert known[-1] == pytest.approx(0.1 * (3.0 - lag_s))
+    assert None not in known[ceil(2 * lag_s * rate_hz) :]
+
+
+def test_a_receiver_too_slow_for_a_yaw_rate_says_so() -> None:
+    assert yaw_rate_lag_s(0.5) is None
+
+
 @pytest.mark.parametrize(
     ("case", "courses", "speed_mps", "step_s"),
     [
         ("too few", [1.0, 1.0, 1.0], 20.0, 0.1),
         ("too slow", [1.0] * 10, 1.0, 0.1),
         ("no course", [None] * 10, 20.0, 0.1),
-        ("once a second", [1.0] * 10, 20.0, 1.0),
+        ("once in two seconds", [1.0] * 10, 20.0, 2.0),
     ],
 )
 def test_what_cannot_be_known_is_null(case: str, courses: list[float | None], speed_mps: float, step_s: float) -> None:

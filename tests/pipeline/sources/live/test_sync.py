@@ -217,6 +217,22 @@ def test_own_motion_is_the_nearest_and_not_an_old_one() -> None:
     assert later.ego is None
 
 
+@pytest.mark.parametrize("rate_hz", [1, 2, 5, 10])
+def test_own_motion_holds_until_its_receiver_speaks_again(rate_hz: int) -> None:
+    """Fixes come 120 ms after their moment; then the receiver falls silent, and its last word holds no longer."""
+    bench, period_ms = Bench(), 1000 // rate_hz
+    fixes = list(range(0, 6000, period_ms))
+    for t in range(200, fixes[-1] + 3000, 100):
+        while fixes and fixes[0] + 120 <= t:
+            at_ns = START + fixes[0] * MS
+            bench.sync.egos.add(at_ns, EgoState(at_ns, 20.0), at_ns + 120 * MS)
+            last_ms = fixes.pop(0)
+        bench.lidar(t, t + 51)
+        together = bench.tick(t + 51)
+        assert together is not None
+        assert (together.ego is not None) == (t - last_ms <= max(1.5 * period_ms, 500)) or t < 1500
+
+
 @given(st.lists(st.tuples(st.integers(0, 3000), st.booleans(), st.integers(0, 200)), max_size=60))
 def test_whatever_arrives_in_whatever_order_ticks_go_forward(messages: list[tuple[int, bool, int]]) -> None:
     bench, last = Bench(), -1.0
