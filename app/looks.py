@@ -12,11 +12,17 @@ from pipeline.geometry import Cuboid
 
 @dataclass(frozen=True)
 class Held:
-    """A labelled cuboid of the shown frame that may be dragged in the 3D view. page: whose it is; track: its label."""
+    """A labelled cuboid that may be dragged in the 3D view. page: whose it is; track: its label; frame: that the page
+    shows it in."""
 
     page: object
     track: int
+    frame: int
     cuboid: Cuboid
+
+    def is_of(self, other: Held | None) -> bool:
+        """The same label in the same frame at the same page, wherever it is."""
+        return other is not None and (self.page, self.track, self.frame) == (other.page, other.track, other.frame)
 
 
 OnDrag = Callable[[Held, bool], None]
@@ -77,9 +83,9 @@ class Looks:
         with self._lock:
             return self._held
 
-    def hold(self, page: object, track: int, cuboid: Cuboid) -> None:
+    def hold(self, held: Held) -> None:
         with self._lock:
-            self._held = Held(page, track, cuboid)
+            self._held = held
         self._listener()
 
     def let_go(self, page: object) -> None:
@@ -94,10 +100,9 @@ class Looks:
         """Call ``listener`` when what is held is dragged; there is one."""
         self._on_drag = listener
 
-    def drag(self, cuboid: Cuboid, ended: bool) -> None:
-        """What is held is dragged there. Any thread."""
+    def drag(self, held: Held, ended: bool) -> None:
+        """A hand has this label and has brought it there, whatever else is held by now. Any thread."""
         with self._lock:
-            if self._held is None:
-                return
-            self._held = held = Held(self._held.page, self._held.track, cuboid)
+            if held.is_of(self._held):
+                self._held = held
         self._on_drag(held, ended)

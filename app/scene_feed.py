@@ -60,8 +60,7 @@ class SceneFeed:
             if self._view.watchers <= self._looks.hiding:
                 continue
             self._view.select(self._looks.selected)
-            held = self._looks.held
-            self._view.hold(held.cuboid if held is not None else None)
+            self._view.hold(self._looks.held)
             if drawn is None or newest.params is not drawn.params:
                 self._view.set_params(newest.params)
             if newest.tick is not None and (drawn is None or newest.tick is not drawn.tick):

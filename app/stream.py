@@ -47,6 +47,7 @@ class _Held(BaseModel):
     """A label that may be dragged in the 3D view."""
 
     track: int = Field(ge=0, lt=2**53)
+    frame: int = Field(ge=0, lt=2**53)
     cuboid: GivenCuboid
 
 
@@ -200,11 +201,12 @@ class Stream:
         except ValidationError:
             self._looks.let_go(slot)
         else:
-            self._looks.hold(slot, held.track, held.cuboid.value())
+            self._looks.hold(Held(slot, held.track, held.frame, held.cuboid.value()))
 
     def _tell_dragged(self, held: Held, ended: bool) -> None:
         """Tell the page that holds it; on a thread of the 3D view's."""
-        message = _dump({"type": "held", "track": held.track, "cuboid": held.cuboid._asdict(), "ended": ended})
+        said = {"track": held.track, "frame": held.frame, "cuboid": held.cuboid._asdict(), "ended": ended}
+        message = _dump({"type": "held", **said})
         if self._loop is not None and isinstance(held.page, Slot):
             with suppress(RuntimeError):  # the server closed its loop
                 self._loop.call_soon_threadsafe(held.page.put, "held", message)

@@ -7,17 +7,16 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import viser
 
+from app.looks import Held, OnDrag
 from app.views.scene import cuboid_edges
 from pipeline.geometry import Cuboid
 from pipeline.types import F64
-
-OnDrag = Callable[[Cuboid, bool], None]
-"""The cuboid as it is now, and whether the hand has let go."""
 
 NODE = "/held"
 FACES = {"front": (0, 1), "rear": (0, -1), "left": (1, 1), "right": (1, -1), "top": (2, 1)}
@@ -30,27 +29,44 @@ _COLOR = (255, 255, 255)
 
 
 class CuboidGizmo:
-    """Shown while a cuboid is held. Any thread; ``on_drag`` is called on viser's event loop and must be quick."""
+    """Shown while a cuboid is held. Any thread; ``on_drag`` is called on viser's event loop and must be quick. A drag
+    is about the label that it began with, whatever is held meanwhile."""
 
     def __init__(self, scene: viser.SceneApi, on_drag: OnDrag) -> None:
         self._scene, self._on_drag = scene, on_drag
         self._lock = threading.Lock()
-        self._cuboid: Cuboid | None = None
+        self._wanted: Held | None = None
+        self._held: Held | None = None
         self._before: Cuboid | None = None
+        self._hand: int | None = None
         self._handles: dict[str, viser.TransformControlsHandle] = {}
 
-    def hold(self, cuboid: Cuboid | None) -> None:
-        """Show it here; null takes it away. While a hand drags it, the hand is right."""
+    def hold(self, held: Held | None) -> None:
+        """Show it here; null takes it away. While a hand drags something, the hand is right."""
         with self._lock:
-            if self._before is not None or cuboid == self._cuboid:
+            self._wanted = held
+            if self._before is None:
+                self._show(held)
+
+    def leave(self, client: int) -> None:
+        """This browser is gone: what its hand had stays where it has brought it."""
+        with self._lock:
+            held = self._held
+            if self._before is None or held is None or client != self._hand:
                 return
-            self._cuboid = cuboid
-            if cuboid is None:
-                self._remove()
-                return
-            if not self._handles:
-                self._add(cuboid)
-            self._place(cuboid, None)
+            self._let_go(held)
+        self._on_drag(held, True)
+
+    def _show(self, held: Held | None) -> None:
+        if held == self._held:
+            return
+        self._held = held
+        if held is None:
+            self._remove()
+            return
+        if not self._handles:
+            self._add(held.cuboid)
+        self._place(held.cuboid, None)
 
     def _add(self, cuboid: Cuboid) -> None:
         middle = self._scene.add_transform_controls(
@@ -71,21 +87,26 @@ class CuboidGizmo:
 
     def _follower(self, name: str) -> Callable[[viser.TransformControlsEvent], Coroutine[Any, Any, None]]:
         async def follow(event: viser.TransformControlsEvent) -> None:  # on the loop, so that they come in order
+            ended = event.phase == "end"
             with self._lock:
-                if self._cuboid is None:
+                if self._held is None or (self._before is not None and event.client_id != self._hand):
                     return
-                self._before = self._before or self._cuboid
-                position, wxyz = event.target.position, event.target.wxyz
-                self._cuboid = moved(self._before, name, position, wxyz)
-                ended = event.phase == "end"
+                self._before, self._hand = self._before or self._held.cuboid, event.client_id
+                cuboid = moved(self._before, name, event.target.position, event.target.wxyz)
+                self._held = held = replace(self._held, cuboid=cuboid)
+                self._place(cuboid, None if ended else name)
                 if ended:
-                    self._before = None
-                self._place(self._cuboid, None if ended else name)
-                cuboid = self._cuboid
+                    self._let_go(held)
             if event.phase != "start":
-                self._on_drag(cuboid, ended)
+                self._on_drag(held, ended)
 
         return follow
+
+    def _let_go(self, held: Held) -> None:
+        """The hand is off it. Its page says where it is from now on; another label that is held by now is shown."""
+        self._before = self._hand = None
+        if not held.is_of(self._wanted):
+            self._show(self._wanted)
 
     def _place(self, cuboid: Cuboid, held: str | None) -> None:
         """Draw it, and put every handle but the held one where it belongs."""

@@ -16,13 +16,13 @@ import numpy as np
 import rich
 import viser
 
+from app.looks import Held, OnDrag
 from app.views import scene, viser_nodes
 from app.views.colors import Role, rgb
 from app.views.picking import object_on_ray
-from app.views.viser_gizmo import CuboidGizmo, OnDrag
+from app.views.viser_gizmo import CuboidGizmo
 from app.views.viser_gui import OnChange, ParamsGui
 from app.views.viser_nodes import Strokes
-from pipeline.geometry import Cuboid
 from pipeline.params import Params
 from pipeline.types import Frame, FusedObject, Point3, Result
 
@@ -62,7 +62,7 @@ class _Display:
 class ViserView:
     """Starts the server at once. ``port`` 0 takes a free one; a taken port silently becomes the next: read ``port``.
 
-    ``on_change(name, value)`` hears of every slider that a person moves, on a thread of viser's; ``on_drag(cuboid,
+    ``on_change(name, value)`` hears of every slider that a person moves, on a thread of viser's; ``on_drag(held,
     ended)`` of a held cuboid that is dragged; ``on_pick(id)`` of every click into the scene: the object that was met,
     or null.
     """
@@ -72,7 +72,7 @@ class ViserView:
         params: Params,
         on_change: OnChange = lambda name, value: None,
         port: int = 0,
-        on_drag: OnDrag = lambda cuboid, ended: None,
+        on_drag: OnDrag = lambda held, ended: None,
         on_pick: OnPick = lambda number: None,
     ) -> None:
         self._lock = threading.Lock()
@@ -91,6 +91,7 @@ class ViserView:
         camera.fov = math.radians(CAMERA_FOV_DEG)
         self._scene = self._server.scene
         self._gizmo = CuboidGizmo(self._scene, on_drag)
+        self._server.on_client_disconnect(self._left)
         self._add_static()
         self._add_cameras()
         self._add_display_options()
@@ -124,9 +125,9 @@ class ViserView:
                 self._selected = number
                 self._draw()
 
-    def hold(self, cuboid: Cuboid | None) -> None:
+    def hold(self, held: Held | None) -> None:
         """Show a cuboid with handles to move, turn and resize it by; null for none."""
-        self._gizmo.hold(cuboid)
+        self._gizmo.hold(held)
 
     def set_params(self, params: Params) -> None:
         """Put the sliders where the parameters are; ``on_change`` does not hear of it."""
@@ -136,6 +137,9 @@ class ViserView:
         """Stop the server and disconnect everybody."""
         with _silent():
             self._server.stop()
+
+    async def _left(self, client: viser.ClientHandle) -> None:  # on the loop: after whatever it said before
+        self._gizmo.leave(client.client_id)
 
     def _met(self, origin: Point3, direction: Point3) -> int | None:
         """The object that a click's ray meets."""

@@ -41,7 +41,7 @@ export function showPictureAt(width) {
   if (steps > 0) tell("picture_px", steps * WIDTH_STEP_PX);
 }
 
-/** @typedef {number|boolean|null|{track: number, cuboid: import("./labeling/types.js").Cuboid}} Told */
+/** @typedef {number|boolean|null|{track: number, frame: number, cuboid: import("./labeling/types.js").Cuboid}} Told */
 
 /** Let the server know something about this page, now and after every reconnection; once for each value.
  * @param {string} name @param {Told} value */

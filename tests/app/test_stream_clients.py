@@ -222,22 +222,26 @@ def test_what_a_page_looks_at_is_heard_until_it_leaves(site: Site):
 def test_a_label_that_is_held_in_3d_is_followed_by_its_page_alone(site: Site):
     looks, cuboid = site.stream._looks, {"center": [20, 0, 1], "size": [4, 2, 1.5], "yaw_rad": 0.5}
     with site.connected() as page, site.connected() as other:
-        page.send(json.dumps({"held": {"track": 7, "cuboid": cuboid}}))
+        page.send(json.dumps({"held": {"track": 7, "frame": 3, "cuboid": cuboid}}))
         _heard(page)
         held = looks.held
         assert held is not None
-        assert (held.track, held.cuboid) == (7, Cuboid((20.0, 0.0, 1.0), (4.0, 2.0, 1.5), 0.5))
-        looks.drag(held.cuboid._replace(yaw_rad=1.0), True)
-        said = {"type": "held", "track": 7, "cuboid": cuboid | {"yaw_rad": 1.0}, "ended": True}
+        assert (held.track, held.frame, held.cuboid) == (7, 3, Cuboid((20.0, 0.0, 1.0), (4.0, 2.0, 1.5), 0.5))
+        other.send(json.dumps({"held": {"track": 9, "frame": 3, "cuboid": cuboid}}))
+        _heard(other)
+        looks.drag(replace(held, cuboid=held.cuboid._replace(yaw_rad=1.0)), True)
+        said = {"type": "held", "track": 7, "frame": 3, "cuboid": cuboid | {"yaw_rad": 1.0}, "ended": True}
         assert next(message for message in _texts(page) if message["type"] == "held") == said
+        assert (looks.held and looks.held.track) == 9, "the other's stays where it is"
+        looks.hold(held)
         other.send(json.dumps({"held": None}))
         _heard(other)
         assert looks.held is not None, "another page holds nothing of this one's"
-        for nonsense in ({"track": "7", "cuboid": 3}, {"track": 7}, 5):
+        for nonsense in ({"track": "7", "cuboid": 3}, {"track": 7, "cuboid": cuboid}, 5):
             page.send(json.dumps({"held": nonsense}))
             _heard(page)
             assert looks.held is None
-            page.send(json.dumps({"held": {"track": 7, "cuboid": cuboid}}))
+            page.send(json.dumps({"held": {"track": 7, "frame": 3, "cuboid": cuboid}}))
         _heard(page)
         assert looks.held is not None
 

@@ -31,8 +31,11 @@ export function settle(draft, act) {
 }
 
 /** Everything that is labelled in the shown frame, as it looks now. @returns {LabelSighting[]} */
-export function present() {
-  const frame = shown(), draft = get("draft"), known = sightingsAt(frame);
+export const present = () => presentIn(shown());
+
+/** @param {number} frame @returns {LabelSighting[]} */
+function presentIn(frame) {
+  const draft = get("draft"), known = sightingsAt(frame);
   if (!draft || draft.frame !== frame || draft.track === null) return known;
   const held = { track: draft.track, cuboid: draft.cuboid, bbox: draft.bbox, keyframe: true };
   return [...known.filter(({ track }) => track !== held.track), held];
@@ -41,9 +44,9 @@ export function present() {
 /** @param {number|null} track @returns {LabelSighting|null} */
 export const presentOf = (track) => (track === null ? null : present().find((each) => each.track === track) ?? null);
 
-/** Draw a track's label otherwise than it is held. @param {number} track @param {{cuboid?: Cuboid|null, bbox?: Box|null}} shape */
-export function hold(track, shape) {
-  const frame = shown(), draft = get("draft"), before = presentOf(track);
+/** Draw a track's label otherwise than it is held. @param {number} track @param {{cuboid?: Cuboid|null, bbox?: Box|null}} shape @param {number} [frame] */
+export function hold(track, shape, frame = shown()) {
+  const draft = get("draft"), before = presentIn(frame).find((each) => each.track === track);
   const isSame = draft?.track === track && draft.frame === frame;
   const revision = isSame ? draft.revision : trackOf(track)?.revision ?? 0;
   set("draft", { track, frame, revision, cuboid: before?.cuboid ?? null, bbox: before?.bbox ?? null, ...shape, settled: null });

@@ -2,9 +2,10 @@
 import { tell } from "../connection.js";
 import { get, on } from "../store.js";
 import { hold, presentOf, release } from "./draft.js";
+import { shown, trackOf } from "./held.js";
 import { isOn } from "./mode.js";
 
-/** @typedef {{track: number, cuboid: import("./types.js").Cuboid, ended: boolean}} Dragged */
+/** frame: that the hand sees, whatever is shown by now. @typedef {{track: number, frame: number, cuboid: import("./types.js").Cuboid, ended: boolean}} Dragged */
 
 export function setUp() {
   on(["track", "draft", "labelFrames", "frame", "labeling", "layout"], offer);
@@ -14,12 +15,12 @@ export function setUp() {
 function offer() {
   const track = get("track"), isSeen = isOn() && get("layout")?.tab === "3d";
   const cuboid = isSeen ? presentOf(track)?.cuboid : null;
-  tell("held", track !== null && cuboid ? { track, cuboid } : null);
+  tell("held", track !== null && cuboid ? { track, frame: shown(), cuboid } : null);
 }
 
 function follow() {
   const dragged = get("dragged");
-  if (!dragged || !isOn() || dragged.track !== get("track")) return;
-  hold(dragged.track, { cuboid: dragged.cuboid });
+  if (!dragged || !isOn() || !trackOf(dragged.track)) return;
+  hold(dragged.track, { cuboid: dragged.cuboid }, dragged.frame);
   if (dragged.ended) release();
 }

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.looks import Held
 from app.views.viser_gizmo import FACES, NODE, moved
 from app.views.viser_view import ViserView
 from pipeline.geometry import Cuboid
@@ -18,7 +19,8 @@ from pipeline.params import Params
 CAR = Cuboid((20.0, 1.0, 0.8), (4.0, 2.0, 1.5), 0.4)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 WAIT_S = 20.0
-Drags = queue.Queue[tuple[Cuboid, bool]]
+Drags = queue.Queue[tuple[Held, bool]]
+PAGE = object()
 
 
 @pytest.fixture
@@ -28,7 +30,7 @@ def drags() -> Drags:
 
 @pytest.fixture
 def view(drags: Drags) -> Iterator[ViserView]:
-    view = ViserView(Params(), on_drag=lambda cuboid, ended: drags.put((cuboid, ended)))
+    view = ViserView(Params(), on_drag=lambda held, ended: drags.put((held, ended)))
     yield view
     view.close()
 
@@ -81,21 +83,51 @@ def drag(client: Any, name: str, position: tuple[float, ...]) -> None:
     client._send("TransformControlsUpdateMessage", name=f"{NODE}/{name}", wxyz=(1.0, 0.0, 0.0, 0.0), position=position)
 
 
+def held(track: int, cuboid: Cuboid) -> Held:
+    return Held(PAGE, track, 3, cuboid)
+
+
+def grab(client: Any, name: str) -> None:
+    client._send("TransformControlsDragStartMessage", name=f"{NODE}/{name}")
+
+
 def test_a_browser_drags_it_and_the_hand_is_right_until_it_lets_go(
     view: ViserView, drags: Drags, open_scene: Any
 ) -> None:
-    view.hold(CAR._replace(yaw_rad=0.0))
+    view.hold(held(7, CAR._replace(yaw_rad=0.0)))
     client = open_scene(view.port)
     client.read_present_state()
     assert {f"{NODE}/{name}" for name in ("move", "edges", *FACES)} <= set(client.nodes())
-    client._send("TransformControlsDragStartMessage", name=f"{NODE}/front")
+    grab(client, "front")
     drag(client, "front", (23.0, 1.0, 0.8))
-    assert drags.get(timeout=WAIT_S) == (Cuboid((20.5, 1.0, 0.8), (5.0, 2.0, 1.5), 0.0), False)
-    view.hold(CAR)
+    assert drags.get(timeout=WAIT_S) == (held(7, Cuboid((20.5, 1.0, 0.8), (5.0, 2.0, 1.5), 0.0)), False)
+    view.hold(held(9, CAR))
     drag(client, "front", (24.0, 1.0, 0.8))
     client._send("TransformControlsDragEndMessage", name=f"{NODE}/front")
-    assert drags.get(timeout=WAIT_S) == (Cuboid((21.0, 1.0, 0.8), (6.0, 2.0, 1.5), 0.0), False)
-    assert drags.get(timeout=WAIT_S) == (Cuboid((21.0, 1.0, 0.8), (6.0, 2.0, 1.5), 0.0), True)
+    longest = held(7, Cuboid((21.0, 1.0, 0.8), (6.0, 2.0, 1.5), 0.0))
+    assert drags.get(timeout=WAIT_S) == (longest, False), "another label is held by now: the hand has the first"
+    assert drags.get(timeout=WAIT_S) == (longest, True)
+    grab(client, "front")
+    drag(client, "move", (5.0, 1.0, 0.8))
+    assert drags.get(timeout=WAIT_S)[0].track == 9, "what was held meanwhile is there when the hand is free"
+    client._send("TransformControlsDragEndMessage", name=f"{NODE}/move")
+    assert drags.get(timeout=WAIT_S)[1]
     view.hold(None)
     client.read_until(lambda each: each["type"] == "RemoveSceneNodeMessage" and each["name"] == f"{NODE}/edges")
     assert not {name for name, shown in client.nodes().items() if name.startswith(f"{NODE}/") and shown}
+
+
+def test_a_browser_that_goes_away_lets_go(view: ViserView, drags: Drags, open_scene: Any) -> None:
+    view.hold(held(7, CAR._replace(yaw_rad=0.0)))
+    client, other = open_scene(view.port), open_scene(view.port)
+    client.read_present_state()
+    other.read_present_state()
+    grab(client, "front")
+    drag(client, "front", (23.0, 1.0, 0.8))
+    brought = held(7, Cuboid((20.5, 1.0, 0.8), (5.0, 2.0, 1.5), 0.0))
+    assert drags.get(timeout=WAIT_S) == (brought, False)
+    client.connection.close()
+    assert drags.get(timeout=WAIT_S) == (brought, True)
+    view.hold(held(9, CAR._replace(yaw_rad=0.0)))
+    drag(other, "front", (23.0, 1.0, 0.8))
+    assert drags.get(timeout=WAIT_S)[0].track == 9
