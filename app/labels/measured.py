@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pydantic import ValidationError
 
+from app.given import GivenCuboid
 from app.labels.drive import DriveLabels
 from app.labels.refusals import ActRefused, BadAct
-from app.labels.requests import AddTrack, CuboidIn, Lift, Refit, SetSighting
+from app.labels.requests import AddTrack, Lift, Refit, SetSighting
 from pipeline.geometry import Cuboid
 from pipeline.labels.lift import lift
 from pipeline.labels.model import LabelTrack
@@ -36,7 +37,7 @@ def refitted(labels: DriveLabels, frame: Frame, act: Refit) -> tuple[SetSighting
             track=act.track,
             revision=act.revision,
             frame=act.frame,
-            cuboid=_cuboid_in(found.cuboid),
+            cuboid=_given(found.cuboid),
             bbox=sighting.bbox,
         ),
         note,
@@ -51,15 +52,15 @@ def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddTrack, str]:
     if act.bbox is not None and not (act.bbox[0] < act.bbox[2] and act.bbox[1] < act.bbox[3]):
         raise BadAct("the box is none")
     found = lift(frame, params, canonical(act.label), act.bbox, act.pixel)
-    cuboid = _cuboid_in(found.cuboid)
+    cuboid = _given(found.cuboid)
     return AddTrack(kind="add_track", label=act.label, frame=frame.index, cuboid=cuboid, bbox=found.bbox), found.how
 
 
-def _cuboid_in(cuboid: Cuboid) -> CuboidIn:
+def _given(cuboid: Cuboid) -> GivenCuboid:
     """ActRefused for one that nobody could have drawn."""
     x, y, z = (round(value, _DECIMALS) for value in cuboid.center)
     length, width, height = (round(value, _DECIMALS) for value in cuboid.size)
     try:
-        return CuboidIn(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
+        return GivenCuboid(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
     except ValidationError:
         raise ActRefused(f"the points there are {length:.0f} × {width:.0f} × {height:.0f} m: no vehicle") from None

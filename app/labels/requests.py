@@ -6,11 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
+from app.given import Finite, GivenCuboid, Meters
 from app.labels.refusals import BadAct
 from app.labels.tables import LONGEST_NAME
 from app.labels.values import ItemKind
 from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid
 from pipeline.labels.check import check_sighting
 from pipeline.labels.model import Sighting
 from pipeline.types import Point2
@@ -19,7 +19,6 @@ _LARGEST_ID = 2**63 - 1
 MOST_FRAMES = 2**31 - 1
 _MOST_ITEMS = 10_000
 _MOST_POINTS = 1000
-_FARTHEST = 1e6
 
 
 def _clean(text: str) -> str:
@@ -43,8 +42,6 @@ def _commented(text: str) -> str:
 
 Id = Annotated[int, Field(ge=0, le=_LARGEST_ID)]
 Index = Annotated[int, Field(ge=0, le=MOST_FRAMES)]
-Finite = Annotated[float, Field(ge=-_FARTHEST, le=_FARTHEST, allow_inf_nan=False)]
-Meters = Annotated[float, Field(gt=0.0, le=200.0, allow_inf_nan=False)]
 Person = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_named)]
 PersonOrNobody = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_clean)]
 """Cleaned as ``Person`` is, so that both name the same one; empty for nobody in particular."""
@@ -59,27 +56,18 @@ class Strict(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-class CuboidIn(Strict):
-    """Ego frame, metres: middle x y z, length width height, turn of the length axis in radians."""
-
-    center: tuple[Finite, Finite, Finite]
-    size: tuple[Meters, Meters, Meters]
-    yaw_rad: Annotated[float, Field(ge=-100.0, le=100.0, allow_inf_nan=False)]
-
-
 class Placed(Strict):
     """Where something is in one frame. bbox: x1 y1 x2 y2 in pixels of the raw picture."""
 
     frame: Index
-    cuboid: CuboidIn | None = None
+    cuboid: GivenCuboid | None = None
     bbox: tuple[Finite, Finite, Finite, Finite] | None = None
 
     def sighting(self) -> Sighting:
         """As a keyframe. BadAct for a box that is none, or when nothing is there."""
         if self.cuboid is None and self.bbox is None:
             raise BadAct("neither a cuboid nor a box")
-        cuboid = Cuboid(self.cuboid.center, self.cuboid.size, self.cuboid.yaw_rad) if self.cuboid else None
-        sighting = Sighting(self.frame, cuboid, self.bbox)
+        sighting = Sighting(self.frame, self.cuboid.value() if self.cuboid else None, self.bbox)
         try:
             return check_sighting(sighting, f"frame {self.frame}")
         except BadInput as error:

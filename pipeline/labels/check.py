@@ -9,10 +9,11 @@ from itertools import pairwise
 from pipeline.errors import BadInput
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
 
-_FARTHEST_M = 1e6
+FARTHEST_M = 1e6
 _LARGEST_PX = 1e6
 _LARGEST_INT = 2**63
-_LARGEST_YAW_RAD = 1e3
+LARGEST_YAW_RAD = 1e3
+LARGEST_SIDE_M = 200.0
 
 
 def check(labels: LabelSet, what: str) -> LabelSet:
@@ -70,9 +71,9 @@ def _check_track(track: LabelTrack, count: int) -> None:
 def _check_sighting(sighting: Sighting, what: str) -> None:
     if sighting.cuboid is not None:
         center, size, yaw_rad = sighting.cuboid
-        _require(_below(center, _FARTHEST_M), f"{what}: the cuboid has no place")
-        _require(_below(size, _FARTHEST_M) and min(size) > 0.0, f"{what}: the cuboid has no size")
-        _require(_below((yaw_rad,), _LARGEST_YAW_RAD), f"{what}: the cuboid has no direction")
+        _require(_below(center, FARTHEST_M), f"{what}: the cuboid has no place")
+        _require(all(0.0 < side <= LARGEST_SIDE_M for side in size), f"{what}: the cuboid has no size")
+        _require(_below((yaw_rad,), LARGEST_YAW_RAD), f"{what}: the cuboid has no direction")
     if sighting.bbox is not None:
         x1, y1, x2, y2 = sighting.bbox
         _require(_below(sighting.bbox, _LARGEST_PX) and x1 < x2 and y1 < y2, f"{what}: the box is none")
@@ -93,7 +94,7 @@ def _check_apart(leads: list[LeadRange]) -> None:
 
 def _check_path(path: PathLabel) -> None:
     for line in (path.left, path.right):
-        _require(_below((v for point in line or () for v in point), _FARTHEST_M), "a path line without place")
+        _require(_below((v for point in line or () for v in point), FARTHEST_M), "a path line without place")
 
 
 def _fits(number: int) -> bool:

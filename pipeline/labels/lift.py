@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.alignment import Alignment, project_cuboid, resolve
+from pipeline.alignment import Alignment, resolve
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.labels.refit import FEWEST_POINTS, onto_points
@@ -70,14 +70,6 @@ def lift(
         raise NothingThere(f"no points there, and a {label}'s box like this tells no distance")
     how = f"no points there: about {law.distance_m:.0f} ± {law.sigma_m:.0f} m by its height in the picture"
     return Lifted(_at_height(alignment, label, bbox, law, ground), bbox, 0, how)
-
-
-def box_in_picture(frame: Frame, params: Params, cuboid: Cuboid) -> Box | None:
-    """Where a cuboid is in the picture; null outside it, or without a calibrated camera."""
-    alignment, camera = resolve(params.alignment, frame.camera), frame.camera
-    if alignment is None or camera is None:
-        return None
-    return project_cuboid(alignment, cuboid.corners(), camera.width, camera.height)
 
 
 def _detected_at(frame: Frame, pixel: tuple[float, float]) -> Box | None:

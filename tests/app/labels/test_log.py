@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
+from app.given import GivenCuboid
 from app.labels.acts import do
 from app.labels.acts.scope import Scope
 from app.labels.database import Database
@@ -20,15 +21,15 @@ from app.labels.draft import Draft
 from app.labels.drive import DriveLabels
 from app.labels.log import Acted
 from app.labels.refusals import ActRefused, Stale
-from app.labels.requests import Act, AddTrack, CuboidIn, Relabel, SetLead, SetSighting
+from app.labels.requests import Act, AddTrack, Relabel, SetLead, SetSighting
 from pipeline.labels.model import LabelSet, LeadRange
 from tests.app.labels.conftest import fresh, info
 
 ACT: TypeAdapter[Any] = TypeAdapter(Act)
 
 
-def cuboid(x: float = 20.0) -> CuboidIn:
-    return CuboidIn(center=(x, 0.0, 0.7), size=(4.0, 1.8, 1.5), yaw_rad=0.0)
+def cuboid(x: float = 20.0) -> GivenCuboid:
+    return GivenCuboid(center=(x, 0.0, 0.7), size=(4.0, 1.8, 1.5), yaw_rad=0.0)
 
 
 def act(labels: DriveLabels, person: str, doing: object) -> Acted:

@@ -57,6 +57,9 @@ def test_nothing_is_asked_and_nothing_is_answered(client: httpx.Client):
         {"cuboids": [AHEAD | {"size": [1, 2]}]},
         {"cuboids": [AHEAD | {"colour": "red"}]},
         {"cuboids": [AHEAD] * (MOST_CUBOIDS + 1)},
+        {"cuboids": [AHEAD | {"size": [4.5, -1.8, 1.5]}]},
+        {"cuboids": [AHEAD | {"size": [4.5, 1.8, 0.0]}]},
+        {"cuboids": [AHEAD | {"center": [1e9, 0.0, 0.0]}]},
     ],
 )
 def test_what_is_no_cuboid_is_refused_in_a_sentence(client: httpx.Client, body: dict[str, object]):

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.alignment import project_cuboid, resolve
 from pipeline.geometry import Cuboid
-from pipeline.labels.lift import NothingThere, box_in_picture, lift
+from pipeline.labels.lift import NothingThere, lift
 from pipeline.labels.refit import TooFewPoints, refit
 from pipeline.params import Params
 from pipeline.sources import open_source
-from pipeline.types import F32, Frame, RawBoxes
+from pipeline.types import F32, Box, Frame, RawBoxes
 from tests.app.recording import Recording
 
 GROUND_M = -0.6
@@ -34,6 +35,14 @@ def sweep_of(car: Cuboid, *, faces: str = "both") -> F32:
     placed = np.column_stack([cx + c * flat[:, 0] - s * flat[:, 1], cy + s * flat[:, 0] + c * flat[:, 1], z])
     xyz = np.vstack([road, placed])
     return np.column_stack([xyz, np.full(len(xyz), 10.0)]).astype(np.float32)
+
+
+def box_in_picture(frame: Frame, cuboid: Cuboid) -> Box | None:
+    """Where a cuboid is in the picture; null outside it."""
+    assert frame.camera is not None
+    alignment = resolve(Params().alignment, frame.camera)
+    assert alignment is not None
+    return project_cuboid(alignment, cuboid.corners(), frame.camera.width, frame.camera.height)
 
 
 def standing(x: float, y: float, yaw_rad: float = 0.0, size: tuple[float, float, float] = (4.4, 1.8, 1.5)) -> Cuboid:
@@ -107,7 +116,7 @@ def test_a_click_takes_the_detection_it_is_in_or_the_points_it_is_on(frame: Fram
 def test_without_points_it_is_as_far_as_it_looks(frame: Frame) -> None:
     blind = replace(frame, sweep=None)
     car = standing(40.0, 0.0)
-    bbox = box_in_picture(frame, Params(), car)
+    bbox = box_in_picture(frame, car)
     assert bbox is not None
     found = lift(blind, Params(), "car", bbox=bbox)
     assert found.points == 0
@@ -136,7 +145,7 @@ def test_real_cars_are_found_where_the_labels_have_them(data_dir: Path) -> None:
         assert frame.sweep is not None
         assert frame.camera is not None
         for item in source.truth(index) or ():
-            box = box_in_picture(frame, Params(), item.cuboid)
+            box = box_in_picture(frame, item.cuboid)
             if item.label.lower() != "car" or box is None or _points_in(frame, item.cuboid) < 10:
                 continue
             x, y, z = item.cuboid.center

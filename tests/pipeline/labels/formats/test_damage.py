@@ -96,6 +96,7 @@ IMPOSSIBLE = {
     "no place": of(Sighting(0, at((float("nan"), 0.0, 0.0)))),
     "far beyond": of(Sighting(0, at((1e12, 0.0, 0.0)))),
     "no size": of(Sighting(0, at(size=(4.0, 0.0, 1.0)))),
+    "a side beyond all measure": of(Sighting(0, at(size=(201.0, 2.0, 1.0)))),
     "a box inside out": of(Sighting(0, None, (10.0, 10.0, 5.0, 20.0))),
     "beyond the end": of(Sighting(6, at())),
     "backwards": of(Sighting(2, at()), Sighting(1, at())),
