@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -107,6 +108,12 @@ class Control:
         params, preset = self._settled
         values = {name: value for name, value in changes.items() if name != PRESET}
         return with_changes(params, values), changes.get(PRESET, preset)
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Nobody else settles parameters while the block runs."""
+        with self._settling:
+            yield
 
     def forget_tried(self) -> bool:
         """Back to what was settled on; false when nothing else is being tried."""

@@ -147,6 +147,7 @@ def serve(
     if port not in (0, number):
         print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
     address = f"http://{_reachable(host)}:{number}"
+    engine.labels.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
     app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks, tokens)
     engine.start()
     try:

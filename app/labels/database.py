@@ -10,16 +10,18 @@ from __future__ import annotations
 import logging
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, create_engine, event, inspect, text
+from sqlalchemy import Connection, Insert, create_engine, event, inspect, text
+from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import URL, Engine, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
 from app.labels.migrations import HEAD
+from app.labels.tables import Base
 from app.recording import SESSIONS
 from pipeline.errors import BadInput
 
@@ -79,15 +81,24 @@ class Database:
 
     @contextmanager
     def reading(self) -> Iterator[Connection]:
-        """One consistent view. DatabaseError for whatever the database says."""
-        with self._speaking(), self._engine.connect() as connection, connection.begin():
-            yield connection
+        """One view, from the first question to the last, whatever others write meanwhile. DatabaseError for whatever
+        the database says."""
+        with self._speaking(), self._engine.connect() as connection:
+            if not self.is_sqlite:  # SQLite's readers have it
+                connection.execution_options(isolation_level="REPEATABLE READ")
+            with connection.begin():
+                yield connection
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
         """A transaction: on disk when the block has ended, and not at all when it raised."""
         with self._speaking(), self._engine.connect().execution_options(writes=True) as connection, connection.begin():
             yield connection
+
+    def insert_new(self, table: type[Base], values: Mapping[str, Any]) -> Insert:
+        """A row, unless one with its key is there already: then nothing, and no row is counted."""
+        insert = sqlite.insert if self.is_sqlite else postgresql.insert
+        return insert(table).values(values).on_conflict_do_nothing()
 
     def close(self) -> None:
         """Safe to call twice."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
+import socket
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,12 +18,14 @@ from app.labels.acts.scope import Scope
 from app.labels.database import Database
 from app.labels.drive import DriveInfo, DriveLabels, info_of
 from app.labels.files import importing_file
-from app.labels.log import Acted, Way
+from app.labels.log import Acted
 from app.labels.long import importing_truth, proposing
 from app.labels.measured import lifted, refitted
-from app.labels.refusals import NoSuchLabel
+from app.labels.refusals import ActRefused, NoSuchLabel
 from app.labels.requests import AddTrack, Import, Lift, Propose, Refit, SetSighting
 from app.labels.scoring import LabelScores
+from app.labels.steps import Way
+from app.labels.tables import LONGEST_ITEM
 from app.labels.tasks import Tasks, TaskState
 from pipeline.errors import BadInput
 from pipeline.labels.formats.base import FormatName
@@ -32,12 +36,14 @@ logger = logging.getLogger("cipv.labels")
 _LOOK_EVERY_S = 0.4
 """Others see within a second what was done through another server."""
 _PATIENCE_S = 10.0
+_NOTHING_OPEN = "no recording is open that could be labelled"
 
 
 @dataclass(frozen=True)
 class LabelState:
-    """revision: the number of the newest act. can_undo, can_redo: for anyone here. labelled: it is a recording; else
-    only parameters are changed."""
+    """revision: the number of the newest act. can_undo, can_redo: of changes of parameters that nobody put a name to;
+    what a person can take back is for that person to ask. labelled: it is a recording; else only parameters are
+    changed."""
 
     revision: int = 0
     can_undo: bool = False
@@ -57,6 +63,15 @@ class LabelState:
         }
 
 
+@dataclass(frozen=True)
+class Done:
+    """An act that is on disk, or changed nothing, and the labels that it was done to: those stay what they are when
+    something else is opened meanwhile."""
+
+    acted: Acted
+    labels: DriveLabels
+
+
 @dataclass(eq=False)
 class _Open:
     """What is open. recording: null for what has no frames to label."""
@@ -70,9 +85,11 @@ class _Open:
 class LabelDesk:
     """Any thread. database: where labels are kept; null: in one that is gone at the end, and made when first needed.
     It hears of parameters that are settled from ``Control`` and gives them back when they are undone, and wakes it
-    whenever ``state`` is another."""
+    whenever ``state`` is another. station: whose parameters are meant: of this server, and of the same one when it is
+    started again; set before anything is opened."""
 
     def __init__(self, database: Database | None = None) -> None:
+        self.station = socket.gethostname()
         self._control = Control(Wish(Params()))
         self._database = database
         self._lock = threading.Lock()
@@ -82,6 +99,9 @@ class LabelDesk:
         self._ended = False
         self._trouble = ""
         self._thread = threading.Thread(target=self._look, name="cipv-labels", daemon=True)
+        self._beginning = threading.Lock()
+        self._begun: tuple[str | None, int] = (None, 0)
+        self._forgot: str | None = None
         self.tasks = Tasks(self._told)
         self.scores = LabelScores()
 
@@ -121,55 +141,61 @@ class LabelDesk:
         """What can be labelled. NoSuchLabel when nothing can."""
         recording = self._open.recording
         if recording is None:
-            raise NoSuchLabel("no recording is open that could be labelled")
+            raise NoSuchLabel(_NOTHING_OPEN)
         return recording
 
     @property
     def labels(self) -> DriveLabels:
         """Of the open recording. NoSuchLabel when none is open."""
-        _ = self.recording
-        return self._labels_of(self._open)
+        return self._named()[1]
 
     # ------------------------------------------------------------ acts
 
-    def act(self, person: str, act: Any) -> Acted:
-        """Do it; on disk when this returns. Whatever refuses it."""
-        labels = self.labels
-        scope = Scope(labels.info.t_ns)
-        return self._done(labels.log.act(act.kind, person, lambda draft: do(draft, scope, act)))
+    def act(self, person: str, act: Any, drive: str | None = None, act_id: str | None = None) -> Done:
+        """Do it; on disk when this returns. Whatever refuses it. drive: the key of the recording that is meant, the
+        open one without. act_id: of who sends it; what was sent before is not done again."""
+        recording, labels = self._named(drive)
+        done = labels.log.sent_before(act_id, person)
+        if done is None:
+            doing, note = self._measured(recording, labels, act) if isinstance(act, Refit | Lift) else (act, "")
+            scope = Scope(labels.info.t_ns)
+            done = labels.log.act(doing.kind, person, lambda draft: do(draft, scope, doing), act_id=act_id, note=note)
+            self.refresh()
+        return Done(done, labels)
 
-    def move(self, way: Way, person: str) -> Acted:
+    def move(self, way: Way, person: str, drive: str | None = None, act_id: str | None = None) -> Done:
         """Undo or redo, across labels and parameters; what is only being tried is undone first. ActRefused when there
-        is nothing to, or somebody else is in the way."""
-        labels = self._labels_of(self._open)
-        if way == "undo" and self._control.forget_tried():
-            return Acted(labels.revision, None, "what was being tried")
-        acted = labels.log.move(way, person, self._control.check)
-        if acted.params:
-            self._control.restore(acted.params)
-        return self._done(acted)
+        is nothing to, or somebody else is in the way. drive, act_id: as in ``act``."""
+        labels = self._named(drive)[1] if drive is not None else self._labels_of(self._open)
+        with self._control.alone():  # a change that comes between would be lost to what is restored
+            acted = labels.log.sent_before(act_id, person)
+            if acted is None and way == "undo" and self._forget_tried(act_id):
+                return Done(Acted(labels.revision, None, "what was being tried"), labels)
+            if acted is None:
+                acted = labels.log.move(way, person, self._control.check, act_id=act_id)
+            if acted.params:
+                self._control.restore(acted.params)
+        self.refresh()
+        return Done(acted, labels)
 
-    def begin(self, person: str, act: Propose | Import) -> int:
-        """Something that takes a while; its number. ActRefused while another one goes on, or when it cannot be done."""
-        labels, recording = self.labels, self.recording
-        if isinstance(act, Propose):
-            return self.tasks.begin("propose", proposing(labels, recording, person, act.first, act.last))
-        return self.tasks.begin("import", importing_truth(labels, recording, person))
+    def begin(self, person: str, act: Propose | Import, drive: str | None = None, act_id: str | None = None) -> int:
+        """Something that takes a while; its number. ActRefused while another one goes on, or when it cannot be done.
+        drive, act_id: as in ``act``."""
+        recording, labels = self._named(drive)
+        with self._beginning:
+            if act_id is not None and self._begun[0] == act_id:
+                return self._begun[1]
+            if isinstance(act, Propose):
+                number = self.tasks.begin("propose", proposing(labels, recording, person, act.first, act.last))
+            else:
+                number = self.tasks.begin("import", importing_truth(labels, recording, person))
+            self._begun = (act_id, number)
+            return number
 
-    def begin_import(self, person: str, file: Path, name: FormatName) -> int:
+    def begin_import(self, person: str, file: Path, name: FormatName, drive: str | None = None) -> int:
         """Labels of a file or folder that was handed in, as another tool made them; it is removed in the end."""
-        labels, recording = self.labels, self.recording
+        recording, labels = self._named(drive)
         return self.tasks.begin("import", importing_file(labels, recording, person, file, name))
-
-    def measured(self, act: Refit | Lift) -> tuple[SetSighting | AddTrack, str]:
-        """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found.
-        BadInput where there is nothing to measure."""
-        recording, labels = self.recording, self.labels
-        Scope(labels.info.t_ns).check(act.frame)
-        frame = recording.input(act.frame)
-        if isinstance(act, Refit):
-            return refitted(labels, frame, act)
-        return lifted(frame, self._control.peek().params, act)
 
     def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
         """Parameters were changed. A database that fails does not keep anybody from driving: it is said, and the change
@@ -187,7 +213,7 @@ class LabelDesk:
             return
         try:
             labels = self._labels_of(opened)
-            revision, (can_undo, can_redo) = labels.revision, labels.log.possible()
+            revision, (can_undo, can_redo) = labels.revision, labels.log.possible("")
         except Exception as error:  # whatever a database or a recording does, people go on driving
             if str(error) != self._trouble:
                 logger.warning("labels: %s", error)
@@ -204,9 +230,35 @@ class LabelDesk:
 
     # ------------------------------------------------------------ inside
 
-    def _done(self, acted: Acted) -> Acted:
-        self.refresh()
-        return acted
+    def _named(self, drive: str | None = None) -> tuple[Recording, DriveLabels]:
+        """What is open. ActRefused when it is not the recording with that key, NoSuchLabel when it has no frames to
+        label."""
+        opened = self._open
+        if opened.recording is None:
+            raise NoSuchLabel(_NOTHING_OPEN)
+        labels = self._labels_of(opened)
+        if drive not in (None, labels.info.key):
+            raise ActRefused("another recording is open now")
+        return opened.recording, labels
+
+    def _measured(
+        self, recording: Recording, labels: DriveLabels, act: Refit | Lift
+    ) -> tuple[SetSighting | AddTrack, str]:
+        """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found.
+        BadInput where there is nothing to measure."""
+        Scope(labels.info.t_ns).check(act.frame)
+        frame = recording.input(act.frame)
+        if isinstance(act, Refit):
+            return refitted(labels, frame, act)
+        return lifted(frame, self._control.peek().params, act)
+
+    def _forget_tried(self, act_id: str | None) -> bool:
+        """Whether this took back what was being tried, now or when it was sent before."""
+        if act_id is not None and act_id == self._forgot:
+            return True
+        forgot = self._control.forget_tried()
+        self._forgot = act_id if forgot else self._forgot
+        return forgot
 
     def _told(self) -> None:
         """A task has come further."""
@@ -216,7 +268,7 @@ class LabelDesk:
         """Found in the database when first asked for."""
         with opened.lock:
             if opened.labels is None:
-                opened.labels = DriveLabels(self._opened_database(), _info(opened.uri, opened.recording))
+                opened.labels = DriveLabels(self._opened_database(), _info(opened.uri, opened.recording), self.station)
             return opened.labels
 
     def _opened_database(self) -> Database:
@@ -236,5 +288,11 @@ class LabelDesk:
 
 def _info(uri: str, recording: Recording | None) -> DriveInfo:
     if recording is None:
-        return DriveInfo(f"uri {uri}"[:120], uri, uri, (), tuple)
+        return DriveInfo(_key_of(uri), uri, uri, (), tuple)
     return info_of(recording.recipe.source, recording.names)
+
+
+def _key_of(uri: str) -> str:
+    """Of what has no content to know it by, short enough for the database; two addresses never share one."""
+    key = f"uri {uri}"
+    return key if len(key) <= LONGEST_ITEM else f"uri sha256 {hashlib.sha256(uri.encode()).hexdigest()}"

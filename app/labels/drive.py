@@ -8,8 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from sqlalchemy import and_, func, insert, select
-from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy import and_, func, select
 
 from app.labels.database import Database
 from app.labels.items import SIGHTINGS, read_changed, read_extents, read_item, read_items, read_track, read_window
@@ -137,24 +136,25 @@ class DriveLabels:
 
     def freeze(self, name: str, person: str) -> Version:
         """Keep all labels as they are now under a name. ActRefused when it is taken."""
+        taken = f"there is a version {name!r} already; versions are never overwritten"
         if name == WORKING or any(version.name == name for version in self.versions()):
-            raise ActRefused(f"there is a version {name!r} already; versions are never overwritten")
+            raise ActRefused(taken)
         labels = replace(self.label_set(), name=name)
         covered = {each.frame for track in labels.tracks for each in track.sightings}
         covered |= {frame for lead in labels.leads for frame in range(lead.first, lead.last + 1)}
         version = Version(name, person, int(time.time() * 1000), len(labels.tracks), len(covered))
+        values = {
+            "drive_id": self._id,
+            "name": name,
+            "person": person,
+            "t_unix_ms": version.t_unix_ms,
+            "tracks": version.tracks,
+            "frames": version.frames,
+            "labels": zlib.compress(to_json(labels), 1),
+        }
         with self._database.writing() as connection:
-            connection.execute(
-                insert(VersionRow).values(
-                    drive_id=self._id,
-                    name=name,
-                    person=person,
-                    t_unix_ms=version.t_unix_ms,
-                    tracks=version.tracks,
-                    frames=version.frames,
-                    labels=zlib.compress(to_json(labels), 1),
-                )
-            )
+            if connection.execute(self._database.insert_new(VersionRow, values)).rowcount == 0:
+                raise ActRefused(taken)  # somebody else froze under it at the same moment
         return version
 
     def version_json(self, name: str) -> bytes:
@@ -221,8 +221,5 @@ def _drive_row(database: Database, info: DriveInfo) -> int:
     if found is not None:
         return found
     with database.writing() as connection:
-        if database.is_sqlite:
-            connection.execute(sqlite.insert(DriveRow).values(values).on_conflict_do_nothing())
-        else:
-            connection.execute(postgresql.insert(DriveRow).values(values).on_conflict_do_nothing())
+        connection.execute(database.insert_new(DriveRow, values))
         return connection.scalars(wanted).one()

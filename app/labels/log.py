@@ -1,8 +1,8 @@
 """The acts on one drive: each is one transaction and one row, and can be taken back and done again.
 
 A person takes back what that person did, newest first, and no other's: not even when both changed the same label, where
-it is refused instead. Parameters belong to the machine they were changed on (``station``); who changes them without
-a name there does it for everybody there.
+it is refused instead. Parameters belong to the server they were changed on (``station``); who changes them without
+a name there does it for everybody there. An act may come with an id of who sends it: sent again, it is not done again.
 """
 
 from __future__ import annotations
@@ -11,31 +11,30 @@ import socket
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
-from sqlalchemy import ColumnElement, Connection, and_, func, insert, or_, select, update
+from sqlalchemy import Connection, and_, insert, select, update
 
 from app.labels.database import Database
 from app.labels.draft import Draft, name_of
 from app.labels.refusals import ActRefused
+from app.labels.steps import Steps, Way
 from app.labels.tables import ActRow, ChangeRow, DriveRow
 from app.labels.values import ItemKind, unpack, unpack_pair
 from app.labels.whole import check_whole
 
-Way = Literal["undo", "redo"]
-_OF_PARAMS = ("params", "nudge")
-_WAYS = ("undo", "redo")
 _LONGEST_HISTORY = 200
 
 
 @dataclass(frozen=True)
 class Acted:
-    """What was done. revision: the drive's; act: its number, null when nothing changed. params: what parameters of this
-    program are to be now, by name."""
+    """What was done. revision: the drive's; act: its number, null when nothing changed. note: what there is to say
+    of it besides. params: what parameters of this program are to be now, by name."""
 
     revision: int
     act: int | None
     what: str
+    note: str = ""
     params: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -62,21 +61,33 @@ class Log:
     def __init__(self, database: Database, drive_id: int, station: str | None = None) -> None:
         self._database, self._drive_id = database, drive_id
         self._station = socket.gethostname() if station is None else station
+        self._steps = Steps(drive_id, self._station)
 
     # ------------------------------------------------------------ doing
 
-    def act(self, kind: str, person: str, apply: Apply) -> Acted:
-        """Do it; on disk when this returns. What ``apply`` raises leaves everything as it was."""
+    def act(self, kind: str, person: str, apply: Apply, *, act_id: str | None = None, note: str = "") -> Acted:
+        """Do it; on disk when this returns. What ``apply`` raises leaves everything as it was. With the ``act_id`` of
+        one that is done already, that one is answered."""
         with self._database.writing() as connection:
             draft = self._draft(connection, person)
+            done = self._sent_before(connection, act_id, person)
+            if done is not None:
+                connection.get_transaction().rollback()  # type: ignore[union-attr]
+                return done
             what = apply(draft)
             check_whole(draft)
             if not draft.write():
                 connection.get_transaction().rollback()  # type: ignore[union-attr]
-                return Acted(draft.number - 1, None, "nothing changed")
-            self._drop_redo(connection, person)
-            self._write(connection, draft, kind, what)
-            return Acted(draft.number, draft.number, what)
+                return Acted(draft.number - 1, None, "nothing changed", note)
+            self._steps.drop_redo(connection, person)
+            self._write(connection, draft, kind, what, act_id=act_id, note=note)
+            return Acted(draft.number, draft.number, what, note)
+
+    def sent_before(self, act_id: str | None, person: str) -> Acted | None:
+        """What was answered to the act that was sent with this id; null when there is none. ActRefused when it is
+        another person's."""
+        with self._database.reading() as connection:
+            return self._sent_before(connection, act_id, person)
 
     def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
         """Parameters that were changed, by name: before and after. merges: one step with the change before it, when
@@ -90,23 +101,35 @@ class Log:
             if not draft.write():
                 connection.get_transaction().rollback()  # type: ignore[union-attr]
                 return
-            step = self._step_before(connection, draft.number - 1, person, set(changes)) if merges else None
-            self._drop_redo(connection, person)
+            step = self._steps.before(connection, draft.number - 1, person, set(changes)) if merges else None
+            self._steps.drop_redo(connection, person)
             named = ", ".join(f"{name} {_short(old)} → {_short(new)}" for name, (old, new) in list(changes.items())[:3])
             more = f" and {len(changes) - 3} more" if len(changes) > 3 else ""
             self._write(connection, draft, "nudge" if merges else "params", named + more, step=step)
 
     # ------------------------------------------------------------ going back and forth
 
-    def move(self, way: Way, person: str, check: Callable[[Mapping[str, Any]], object] = lambda _: None) -> Acted:
+    def move(
+        self,
+        way: Way,
+        person: str,
+        check: Callable[[Mapping[str, Any]], object] = lambda _: None,
+        *,
+        act_id: str | None = None,
+    ) -> Acted:
         """Take back the person's newest act, or do again the one taken back last. ActRefused when there is none, or
-        when somebody else changed the same label or parameter since. check: raises for parameters that cannot be."""
+        when somebody else changed the same label or parameter since. check: raises for parameters that cannot be.
+        act_id: as in ``act``."""
         with self._database.writing() as connection:
             draft = self._draft(connection, person)
-            step = self._next(connection, way, person)
+            done = self._sent_before(connection, act_id, person)
+            if done is not None:
+                connection.get_transaction().rollback()  # type: ignore[union-attr]
+                return done
+            step = self._steps.following(connection, way, person)
             if step is None:
                 raise ActRefused(f"there is nothing to {way}")
-            acts = self._acts_of(connection, step)
+            acts = self._steps.acts_of(connection, step)
             for number, _ in reversed(acts) if way == "undo" else acts:
                 self._put(connection, draft, number, way)
             check(draft.params)
@@ -120,15 +143,15 @@ class Log:
                 .values(status=status)
             )
             said = f"took back: {what}" if way == "undo" else f"did again: {what}"
-            self._write(connection, draft, way, said, target=step)
-            return Acted(draft.number, draft.number, what, draft.params)
+            self._write(connection, draft, way, said, target=step, act_id=act_id)
+            return Acted(draft.number, draft.number, what, params=draft.params)
 
-    def possible(self, person: str | None = None) -> tuple[bool, bool]:
-        """(there is something to take back, something to do again) for a person; null: for anyone here."""
+    def possible(self, person: str) -> tuple[bool, bool]:
+        """(there is something to take back, something to do again) for a person."""
         with self._database.reading() as connection:
             return (
-                self._next(connection, "undo", person) is not None,
-                self._next(connection, "redo", person) is not None,
+                self._steps.following(connection, "undo", person) is not None,
+                self._steps.following(connection, "redo", person) is not None,
             )
 
     # ------------------------------------------------------------ looking back
@@ -177,6 +200,8 @@ class Log:
         *,
         step: int | None = None,
         target: int | None = None,
+        act_id: str | None = None,
+        note: str = "",
     ) -> None:
         connection.execute(
             insert(ActRow).values(
@@ -190,8 +215,25 @@ class Log:
                 step=step or draft.number,
                 status="done",
                 target=target,
+                act_id=act_id,
+                note=note,
             )
         )
+
+    def _sent_before(self, connection: Connection, act_id: str | None, person: str) -> Acted | None:
+        if act_id is None:
+            return None
+        row = connection.execute(
+            select(ActRow.number, ActRow.what, ActRow.note, ActRow.person, ActRow.target).where(
+                ActRow.drive_id == self._drive_id, ActRow.act_id == act_id
+            )
+        ).first()
+        if row is None:
+            return None
+        if row.person != person:
+            raise ActRefused("an act of somebody else has that id")
+        what = row.what if row.target is None else self._steps.acts_of(connection, row.target)[-1][1]
+        return Acted(row.number, row.number, what, row.note)
 
     def _put(self, connection: Connection, draft: Draft, act: int, way: Way) -> None:
         """What an act found (undo) or left (redo), again. ActRefused when anything does not stand as the act left it
@@ -202,7 +244,7 @@ class Log:
         for row in rows:
             here, there = (row.after, row.before) if way == "undo" else (row.before, row.after)
             if row.kind == "param":
-                if (other := self._changed_since(connection, row, draft.person)) is not None:
+                if (other := self._steps.changed_since(connection, row, draft.person)) is not None:
                     raise ActRefused(f"{other} changed {row.item} since; {way} would take that back too")
                 draft.put_param(row.item, unpack(here), unpack(there))
                 continue
@@ -210,81 +252,11 @@ class Log:
             number = int(row.item)
             was, to = unpack_pair(kind, here, there)
             if not draft.stands(kind, number, was):
-                other = self._changed_since(connection, row, draft.person) or "somebody"
+                other = self._steps.changed_since(connection, row, draft.person) or "somebody"
                 raise ActRefused(f"{other} changed {name_of(kind, number)} since; {way} would take that back too")
             draft.put(kind, number, to.value)
             if kind == "track":
                 draft.put_sightings(number, to.frames)
-
-    def _changed_since(self, connection: Connection, change: Any, person: str) -> str | None:
-        """Who else changed the same thing after ``change``, the last one; null when nobody did. A parameter is changed
-        by acts in force on this station alone, and by who has a name."""
-        wanted = [
-            ChangeRow.drive_id == self._drive_id,
-            ChangeRow.kind == change.kind,
-            ChangeRow.item == change.item,
-            ChangeRow.act > change.act,
-            ActRow.person != person,
-        ]
-        if change.kind == "param":
-            wanted += [
-                ActRow.status == "done",
-                ActRow.kind.not_in(_WAYS),
-                ActRow.station == self._station,
-                ActRow.person != "",
-            ]
-        return connection.scalars(
-            select(ActRow.person)
-            .join(ChangeRow, and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act))
-            .where(*wanted)
-            .order_by(ActRow.number.desc())
-            .limit(1)
-        ).first()
-
-    # ------------------------------------------------------------ whose acts
-
-    def _mine(self, person: str | None) -> ColumnElement[bool]:
-        """The acts that a person can take back or do again; null: that anyone here can."""
-        of_params: ColumnElement[bool] = and_(ActRow.kind.in_(_OF_PARAMS), ActRow.station == self._station)
-        of_labels: ColumnElement[bool] = ActRow.kind.not_in((*_OF_PARAMS, *_WAYS))
-        if person is not None:
-            of_params = and_(of_params, ActRow.person.in_(("", person)))
-            of_labels = and_(of_labels, ActRow.person == person)
-        return and_(ActRow.drive_id == self._drive_id, or_(of_params, of_labels))
-
-    def _next(self, connection: Connection, way: Way, person: str | None) -> int | None:
-        """The step that is next to be taken back or done again."""
-        if way == "undo":
-            wanted = select(func.max(ActRow.step)).where(self._mine(person), ActRow.status == "done")
-        else:
-            wanted = select(func.min(ActRow.step)).where(self._mine(person), ActRow.status == "undone")
-        return connection.scalar(wanted)
-
-    def _acts_of(self, connection: Connection, step: int) -> list[tuple[int, str]]:
-        found = connection.execute(
-            select(ActRow.number, ActRow.what)
-            .where(ActRow.drive_id == self._drive_id, ActRow.step == step, ActRow.kind.not_in(_WAYS))
-            .order_by(ActRow.number)
-        )
-        return [(row.number, row.what) for row in found]
-
-    def _drop_redo(self, connection: Connection, person: str) -> None:
-        """Who does something else does not do again what was taken back."""
-        connection.execute(update(ActRow).where(self._mine(person), ActRow.status == "undone").values(status="dropped"))
-
-    def _step_before(self, connection: Connection, number: int, person: str, names: set[str]) -> int | None:
-        """The step of act ``number``, when it nudged the same parameters; else null."""
-        row = connection.execute(
-            select(ActRow.step, ActRow.kind, ActRow.person, ActRow.station, ActRow.status).where(
-                ActRow.drive_id == self._drive_id, ActRow.number == number
-            )
-        ).first()
-        if row is None or tuple(row[1:]) != ("nudge", person, self._station, "done"):
-            return None
-        before = connection.scalars(
-            select(ChangeRow.item).where(ChangeRow.drive_id == self._drive_id, ChangeRow.act == number)
-        )
-        return row.step if set(before) == names else None
 
 
 def _short(value: Any) -> str:

@@ -68,8 +68,9 @@ class SightingRow(Base):
 
 class ActRow(Base):
     """What a person did. number: from 1, by drive. step: the act that this one goes on with, else itself; they are
-    taken back together. station: the machine whose parameters it changed. status: done, undone (can be redone) or
-    dropped (was undone, and something else was done since). target: of an undo or redo, the step that it is about."""
+    taken back together. station: the server whose parameters it changed. status: done, undone (can be redone) or
+    dropped (was undone, and something else was done since). target: of an undo or redo, the step that it is about.
+    act_id: who sent it made it, so that what is sent again is not done again. note: what was said of it besides."""
 
     __tablename__ = "act"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
@@ -82,7 +83,12 @@ class ActRow(Base):
     step: Mapped[int] = mapped_column(BigInteger)
     status: Mapped[str] = mapped_column(String(8))
     target: Mapped[int | None] = mapped_column(BigInteger)
-    __table_args__ = (Index("act_by_status", "drive_id", "status", "person", "step"),)
+    act_id: Mapped[str | None] = mapped_column(String(36))
+    note: Mapped[str] = mapped_column(Text, server_default="")
+    __table_args__ = (
+        Index("act_by_status", "drive_id", "status", "person", "step"),
+        Index("act_by_id", "drive_id", "act_id", unique=True),
+    )
 
 
 class ChangeRow(Base):

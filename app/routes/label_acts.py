@@ -8,10 +8,10 @@ from fastapi import APIRouter, Response
 from fastapi.responses import JSONResponse
 
 from app.labels.answers import changes_json
-from app.labels.desk import LabelDesk
-from app.labels.log import Acted, Way
+from app.labels.desk import Done, LabelDesk
 from app.labels.refusals import Stale
-from app.labels.requests import Import, Lift, Propose, Refit
+from app.labels.requests import Import, Propose
+from app.labels.steps import Way
 from app.routes.label_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
 from app.routes.refusals import refusing
 
@@ -32,13 +32,9 @@ def label_acts_router(desk: LabelDesk) -> APIRouter:
         try:
             with refusing():
                 if isinstance(body.act, Propose | Import):
-                    number = desk.begin(body.person, body.act)
+                    number = desk.begin(body.person, body.act, body.drive, body.sent_as)
                     return JSONResponse({"status": "begun", "what": body.act.kind, "task": number}, 202)
-                note = ""
-                doing: Any = body.act
-                if isinstance(doing, Lift | Refit):
-                    doing, note = desk.measured(doing)
-                return _answer(desk, desk.act(body.person, doing), note)
+                return _answer(desk.act(body.person, body.act, body.drive, body.sent_as))
         except Stale as stale:
             yours = body.act.model_dump(mode="json", by_alias=True)
             item = {"kind": stale.kind, "id": stale.number}
@@ -57,17 +53,18 @@ def label_acts_router(desk: LabelDesk) -> APIRouter:
 
     def _move(way: Way, body: Who) -> Response:
         with refusing():
-            return _answer(desk, desk.move(way, body.person))
+            return _answer(desk.move(way, body.person, body.drive, body.sent_as))
 
     return router
 
 
-def _answer(desk: LabelDesk, acted: Acted, note: str = "") -> Response:
+def _answer(done: Done) -> Response:
+    """changed: null for what has no frames to label."""
+    acted, labels = done.acted, done.labels
     changed = None
-    if desk.state.labelled:
-        labels = desk.labels
+    if labels.info.t_ns:
         since = acted.revision if acted.act is None else acted.revision - 1
         changed = changes_json(labels.info, labels.changes(since))
     return JSONResponse(
-        {"revision": acted.revision, "act": acted.act, "what": acted.what, "changed": changed, "note": note}
+        {"revision": acted.revision, "act": acted.act, "what": acted.what, "changed": changed, "note": acted.note}
     )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal
+from uuid import UUID
 
 from pydantic import BaseModel, Field
 
 from app.labels.requests import Act, Person, PersonOrNobody, Strict
-from app.labels.tables import LONGEST_NAME
+from app.labels.tables import LONGEST_ITEM, LONGEST_NAME
 from app.labels.tasks import Kind
 from app.labels.values import ItemKind
 from app.routes.shapes import CuboidJson, MetricJson, Point
@@ -191,14 +192,27 @@ class ScoreJson(BaseModel):
     metrics: list[MetricJson]
 
 
-class ActBody(Strict):
+class Sent(Strict):
+    """drive: id of the recording that is meant; 409 when another one is open. act_id: made by who sends it, one for
+    each act: sent again, the act is not done again, and answered as before."""
+
+    drive: Annotated[str, Field(max_length=LONGEST_ITEM)] | None = None
+    act_id: UUID | None = None
+
+    @property
+    def sent_as(self) -> str | None:
+        """The id as the log keeps it."""
+        return str(self.act_id) if self.act_id is not None else None
+
+
+class ActBody(Sent):
     """person: whose act it is."""
 
     person: Person
     act: Act
 
 
-class Who(Strict):
+class Who(Sent):
     """person: whose newest act is meant."""
 
     person: PersonOrNobody = ""
