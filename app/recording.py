@@ -23,8 +23,8 @@ class RecordingDesk:
     """At most one recording at a time, of one source, into ``folder``. Any thread; ``take`` on the engine's.
 
     A recording holds what was shown: playing a drive at double speed or seeking leaves out what was skipped. Of live
-    sensors it holds every tick that the line ran, also while the page is paused, and every picture, fix and own motion
-    that came in between. A frame whose result is not exact yet
+    sensors it holds every tick that the line ran, also while the page is paused, and every sweep, picture, fix and own
+    motion that came in between. A frame whose result is not exact yet
     waits, with its marks, for the exact one, until the next frame comes or recording ends.
     """
 

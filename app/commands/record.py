@@ -101,6 +101,11 @@ class Record:
             print("cipv: no sensor ticked; there is nothing to keep", file=sys.stderr)
             return 1
         _say(list(state.files), state.frames, state.bytes)
+        if source.dropped:
+            print(
+                f"cipv: the line was too slow for {source.dropped} ticks; their sensor data is recorded",
+                file=sys.stderr,
+            )
         if state.dropped:
             print(f"cipv: {state.dropped} frames or samples were dropped: the disk was too slow", file=sys.stderr)
         if state.error is not None:

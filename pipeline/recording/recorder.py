@@ -24,7 +24,7 @@ from pipeline.recording.packets import RawLidar
 from pipeline.recording.segments import NEVER, Rotation, Segments
 from pipeline.recording.writer import About
 from pipeline.sources.live.pictures import Shot
-from pipeline.types import EgoState, Frame, GnssFix, Result
+from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
 
 logger = logging.getLogger("cipv.recording")
 
@@ -32,7 +32,7 @@ FLUSH_S, SYNC_S = 1.0, 5.0
 _QUEUED = 64
 """Six seconds of frames at 10 Hz; with pictures of 1280×720 that is 200 MB at worst."""
 _QUEUED_BYTES = 200_000_000
-"""Of what comes between frames; the JPEGs of ten seconds are 50 MB."""
+"""Of what comes between frames; the JPEGs and clouds of ten seconds are 120 MB."""
 _UNPACKED_BYTES, _SMALL_BYTES = 3_000_000, 500
 """A picture of a camera that sends video, and a sample of own motion or GNSS, as they wait."""
 
@@ -43,7 +43,7 @@ _PATIENCE_S = 15.0
 """A disk that takes nothing for so long at the end is not waited for."""
 
 _Do = Callable[[Segments], None]
-_Kind = Literal["frames", "packets", "pictures", "samples"]
+_Kind = Literal["frames", "packets", "sweeps", "pictures", "samples"]
 
 
 class _Job(NamedTuple):
@@ -55,7 +55,7 @@ class _Job(NamedTuple):
 @dataclass(frozen=True)
 class RecordingState:
     """How a recording does. file: the newest of ``files``. seconds, bytes: over all of them. dropped: frames, batches
-    of packets, pictures and samples that did not fit. error: why it ended by itself, null while all is well."""
+    of packets, sweeps, pictures and samples that did not fit. error: why it ended by itself, null while all is well."""
 
     file: Path
     files: tuple[Path, ...]
@@ -133,6 +133,11 @@ class Recorder:
         if len(self._batch) >= _BATCH:
             batch, self._batch = self._batch, []
             self.put_packets(batch)
+
+    def sweep(self, sweep: Sweep, arrived_ns: int) -> None:
+        """Every sweep, not only those of frames; where packets are recorded they hold it already."""
+        if not self._takes_packets:
+            self._put(lambda segments: segments.write_sweep(sweep, arrived_ns), "sweeps", _bytes_of(sweep))
 
     def picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
         """Every picture, not only those of frames."""
@@ -267,3 +272,7 @@ class Recorder:
         logger.error("%s: %s", self._segments.files[-1], self._error)
         while not self._jobs.empty():  # the frames that wait hold memory
             self._jobs.get_nowait()
+
+
+def _bytes_of(sweep: Sweep) -> int:
+    return sweep.points.nbytes + sweep.ring.nbytes + (sweep.time_s.nbytes if sweep.time_s is not None else 0)

@@ -13,7 +13,7 @@ from pipeline.recording.packets import RawLidar
 from pipeline.recording.writer import About, SessionWriter
 from pipeline.sources.base import TruthObject
 from pipeline.sources.live.pictures import Shot
-from pipeline.types import EgoState, Frame, GnssFix, Result
+from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,10 @@ class Segments:
         """See ``SessionWriter.write_packets``."""
         self._recent_packets.append(packets)
         self._writer.write_packets(packets)
+
+    def write_sweep(self, sweep: Sweep, arrived_ns: int) -> None:
+        """See ``SessionWriter.write_sweep``."""
+        self._writer.write_sweep(sweep, arrived_ns)
 
     def write_picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
         """See ``SessionWriter.write_picture``."""

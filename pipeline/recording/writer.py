@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections import deque
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from pipeline.params import Params
 from pipeline.recording import topics
+from pipeline.recording.came import Came
 from pipeline.recording.clock import SessionClock
 from pipeline.recording.messages import (
     calibration_message,
@@ -44,8 +44,8 @@ from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture,
 
 VERSION = 1
 
-_CAME = 256
-"""What came lately and a frame may refer to: a second of everything that a car's sensors send."""
+_KEPT, _SWEEPS_KEPT = 256, 16
+"""Of what came and a frame may refer to: a second of all that sensors send; of clouds, which are large, less."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class SessionWriter:
         self._params: Params | None = None
         self._ego: EgoState | None = None
         self._gnss: GnssFix | None = None
-        self._came: deque[tuple[object, int]] = deque(maxlen=_CAME)
+        self._came, self._sweeps = Came(_KEPT), Came(_SWEEPS_KEPT)
 
     @property
     def path(self) -> Path:
@@ -172,6 +172,12 @@ class SessionWriter:
         at_ns = self._clock.log_time(received_ns, received_ns)
         self._add(topics.PACKETS, at_ns, scan_message(packets), packets[0][0])
 
+    def write_sweep(self, sweep: Sweep, arrived_ns: int) -> None:
+        """A sweep when it came, whether or not a frame shows it. A frame with these very points then refers to it; one
+        that was quicker has written it."""
+        if self._sweeps.log_time(sweep.points) is None:
+            self._add_sweep(sweep, self._clock.log_time(sweep.t_ns, arrived_ns))
+
     def write_picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> None:
         """A picture when it came, whether or not a tick shows it: the JPEG as it is; of a camera that gives none, one
         of good quality. A frame with this very JPEG then refers to it."""
@@ -180,17 +186,17 @@ class SessionWriter:
             return
         at_ns = self._clock.log_time(t_ns, arrived_ns)
         self._add(topics.IMAGE, at_ns, jpeg_message(data, t_ns), t_ns)
-        self._came.append((data, at_ns))
+        self._came.add(data, at_ns)
 
     def write_ego(self, ego: EgoState, arrived_ns: int) -> None:
         """Own motion when it came."""
         self._add(topics.EGO, self._clock.log_time(ego.t_ns, arrived_ns), ego_message(ego), ego.t_ns)
-        self._came.append((ego, 0))
+        self._came.add(ego, 0)
 
     def write_fix(self, fix: GnssFix, arrived_ns: int) -> None:
         """A fix when it came."""
         self._add(topics.GNSS, self._clock.log_time(fix.t_ns, arrived_ns), location_message(fix), fix.t_ns)
-        self._came.append((fix, 0))
+        self._came.add(fix, 0)
 
     def write_mark(self, text: str) -> None:
         """ "Something happened here", by a person, right after the last frame."""
@@ -230,8 +236,14 @@ class SessionWriter:
     def _put_sweep(self, sweep: Sweep | None, at_ns: int) -> SweepRef | None:
         if sweep is None:
             return None
+        came_at_ns = self._sweeps.log_time(sweep.points)
+        if came_at_ns is None:
+            self._add_sweep(sweep, at_ns)
+        return SweepRef(at_ns if came_at_ns is None else came_at_ns, sweep.t_ns, sweep.channels)
+
+    def _add_sweep(self, sweep: Sweep, at_ns: int) -> None:
         self._add(topics.POINTS, at_ns, points_message(sweep), sweep.t_ns)
-        return SweepRef(at_ns, sweep.t_ns, sweep.channels)
+        self._sweeps.add(sweep.points, at_ns)
 
     def _put_picture(self, picture: Picture | None, at_ns: int) -> PictureRef | None:
         if picture is None:
@@ -239,15 +251,11 @@ class SessionWriter:
         if picture is self._picture and self._tick is not None and self._tick.picture is not None:
             return self._tick.picture
         self._picture = picture
-        came_at_ns = self._came_at_ns(picture.encoded)
+        came_at_ns = self._came.log_time(picture.encoded)
         if came_at_ns is not None:
             return PictureRef(came_at_ns, picture.t_ns)
         self._add(topics.IMAGE, at_ns, image_message(picture, self._header_ns), picture.t_ns)
         return PictureRef(at_ns, picture.t_ns)
-
-    def _came_at_ns(self, value: object) -> int | None:
-        """The log time under which it was written when it came; null when it was not."""
-        return next((at_ns for came, at_ns in reversed(self._came) if came is value), None)
 
     def _put_camera(self, camera: CameraCalibration | None, at_ns: int) -> CameraRecord | None:
         before = self._tick.camera if self._tick is not None else None
@@ -288,9 +296,9 @@ class SessionWriter:
 
     def _put_small(self, frame: Frame, at_ns: int) -> None:
         """What a tick holds itself, once more for viewers, on topics of its own."""
-        if frame.ego is not None and frame.ego is not self._ego and self._came_at_ns(frame.ego) is None:
+        if frame.ego is not None and frame.ego is not self._ego and self._came.log_time(frame.ego) is None:
             self._add(topics.EGO, at_ns, ego_message(frame.ego), frame.ego.t_ns)
-        if frame.gnss is not None and frame.gnss is not self._gnss and self._came_at_ns(frame.gnss) is None:
+        if frame.gnss is not None and frame.gnss is not self._gnss and self._came.log_time(frame.gnss) is None:
             self._add(topics.GNSS, at_ns, location_message(frame.gnss), frame.gnss.t_ns)
         if frame.streams:
             self._add(topics.HEALTH, at_ns, health_message(frame.streams))

@@ -9,7 +9,7 @@ from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.params import SyncParams
 from pipeline.sources.live.pictures import Shot
-from pipeline.types import F64, CameraCalibration, EgoState, Frame, GnssFix, StreamHealth
+from pipeline.types import F64, CameraCalibration, EgoState, Frame, GnssFix, StreamHealth, Sweep
 
 LIVE = "live:"
 """Scheme of what is read from devices."""
@@ -59,12 +59,14 @@ class Source(Protocol):
 
 class Tap(Protocol):
     """Is told of everything that comes, whether or not a tick takes it, each on the thread of its reader: it must be
-    quick. t_ns: when it was measured; arrived_ns: when it came; both on the source's timeline."""
+    quick. A frame's sweep has the very points that were told. t_ns: when it was measured; arrived_ns: when it came;
+    both on the source's timeline."""
 
     def packet(self, payload: bytes, arrived_ns: int) -> object:
         """A data packet of the LiDAR."""
         ...
 
+    def sweep(self, sweep: Sweep, arrived_ns: int) -> object: ...
     def picture(self, shot: Shot, t_ns: int, arrived_ns: int) -> object: ...
     def ego(self, ego: EgoState, arrived_ns: int) -> object: ...
     def fix(self, fix: GnssFix, arrived_ns: int) -> object: ...

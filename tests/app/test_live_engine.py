@@ -217,8 +217,10 @@ def test_what_comes_between_ticks_is_recorded_until_the_end(start: Start, tmp_pa
     assert tap is not None
     shown = Recording().frame(0)
     assert shown.picture is not None
+    assert shown.sweep is not None
     for step in range(3):
         tap.picture(Shot(pixels=shown.picture.bgr), shown.t_ns + step, 10**18 + step)
+        tap.sweep(replace(shown.sweep, points=shown.sweep.points + step), 10**18 + step)
         tap.fix(GnssFix(shown.t_ns + step, 48.0, 9.0, 300.0, None, 0.0, "single", 4.0), 10**18 + step)
     shown_after(engine, sensors, 1)
     state = engine.desk.stop()
@@ -226,8 +228,10 @@ def test_what_comes_between_ticks_is_recorded_until_the_end(start: Start, tmp_pa
     assert state is not None
     assert (state.frames, state.dropped) == (1, 0)
     session = SessionSource("a", str(state.file))
-    counts = {topic: len(list(session.file.messages((topic,)))) for topic in ("/camera/image", "/gnss")}
-    assert counts == {"/camera/image": 4, "/gnss": 3}
+    counts = {
+        topic: len(list(session.file.messages((topic,)))) for topic in ("/camera/image", "/lidar/points", "/gnss")
+    }
+    assert counts == {"/camera/image": 4, "/lidar/points": 4, "/gnss": 3}
 
 
 def test_lanes_are_looked_for_as_often_as_the_line_runs_whatever_is_dropped() -> None:

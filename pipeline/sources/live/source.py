@@ -141,7 +141,9 @@ class LiveSensors:
             return was_taken
 
     def _take_sweep(self, t_ns: int, sweep: Sweep, arrived_ns: int) -> None:
-        self._add(self._sync.sweeps, t_ns, sweep, arrived_ns)
+        tap, sweep = self._tap, replace(sweep, t_ns=t_ns)
+        if self._add(self._sync.sweeps, t_ns, sweep, arrived_ns) and tap is not None:
+            tap.sweep(sweep, arrived_ns)
 
     def _take_shot(self, t_ns: int, shot: Shot, arrived_ns: int) -> None:
         tap = self._tap
@@ -178,7 +180,7 @@ class LiveSensors:
             self._index,
             f"{self._index:06d}",
             together.t_ns,
-            sweep=_sweep(together),
+            sweep=together.sweep.value if together.sweep is not None else None,
             picture=picture,
             camera=calibration_for(self.camera, picture, notes),
             ego=together.ego,
@@ -201,10 +203,6 @@ class LiveSensors:
             notes.append("the picture is damaged")
             return None
         return Picture(together.picture.t_ns, bgr, shot.encoded)
-
-
-def _sweep(together: Together[Shot]) -> Sweep | None:
-    return None if together.sweep is None else replace(together.sweep.value, t_ns=together.sweep.t_ns)
 
 
 def _about(config: LiveConfig) -> tuple[str, ...]:

@@ -80,6 +80,30 @@ def test_sensors_that_give_nothing_are_said_and_leave_no_file(
     assert sensors.tapped is None
 
 
+class Overwhelming(Sensors):
+    """Sensors that tick thrice for every frame that is taken, until somebody presses Ctrl-C."""
+
+    lidar_mount = None
+
+    def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
+        if self.given >= 6:
+            os.kill(os.getpid(), signal.SIGINT)
+            return None
+        for _ in range(3):
+            self.give(self.given + 1)
+        return super().next(timeout_s, params)
+
+
+def test_ticks_that_the_line_was_too_slow_for_are_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(SourceOptions, "open_live", lambda self: Overwhelming())
+    assert Record(SourceOptions("live:test"), tmp_path / "a.mcap", LineOptions(lanes="off"))() == 0
+    said = capsys.readouterr().err
+    assert "2 frames" in said
+    assert "the line was too slow for 4 ticks" in said
+
+
 @pytest.mark.parametrize("arguments", [(), ("--packets",)], ids=["clouds", "packets"])
 def test_live_sensors_are_recorded(arguments: tuple[str, ...], tmp_path: Path) -> None:
     config = loopback_config()
@@ -107,6 +131,10 @@ def test_live_sensors_are_recorded(arguments: tuple[str, ...], tmp_path: Path) -
     assert len(pictures) > len(shown), "those that came between ticks, too"
     assert shown <= {each.publish_time_ns for each in pictures}
     assert len({each.publish_time_ns for each in pictures}) == len(pictures)
+    if not arguments:
+        clouds = [each.publish_time_ns for each in session.file.messages(("/lidar/points",))]
+        assert {frame.sweep.t_ns for frame in frames if frame.sweep is not None} <= set(clouds)
+        assert len(set(clouds)) == len(clouds), "each once, when it came"
     for index, result in enumerate(results):
         assert result is not None
         sweep = frames[index].sweep
