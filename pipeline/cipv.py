@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from math import exp, hypot
 from typing import NamedTuple
 
-from pipeline.eligibility import BESIDE_PLACE, ELIGIBILITY, QUESTIONS, Candidate
+from pipeline.eligibility import BESIDE_PLACE, QUESTIONS, Candidate
 from pipeline.motion import closing_speed_mps
 from pipeline.params import CipvParams
 from pipeline.path.placing import believed_mps, place
@@ -67,10 +67,10 @@ def choose(
             before = state.odds.get(item.id, now)
             odds[item.id] = before + _fresh(dt_s, decide_s) * (now - before)
         now_in = where is not None and where.ahead_m > 0.0 and odds[item.id] > 0.0
-        candidate = Candidate(item, where, odds.get(item.id, 0.0), now_in, leads, widening_m, path, params)
+        candidate = Candidate(item, where, odds.get(item.id, 0.0), leads, widening_m, path, params)
         if where is not None and where.margin_m() >= 0.0 and where.ahead_m > 0.0 and not now_in:
             crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
-        gates = [ask(candidate) for ask in QUESTIONS]
+        gates = [question.ask(candidate) for question in QUESTIONS]
         item = evolve(
             item,
             gates=(*item.gates, *gates),
@@ -85,7 +85,7 @@ def choose(
         if failed is None:
             able.append(item)
         else:
-            failures[item.id] = ELIGIBILITY[failed].why_not(candidate)
+            failures[item.id] = QUESTIONS[failed].why_not(candidate)
     nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
     lead = _surer(nearest, able) if nearest is not None else None
     if lead is not None:

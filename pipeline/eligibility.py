@@ -20,12 +20,11 @@ STAYS_UP_TO = 1.5
 
 class Candidate(NamedTuple):
     """An object with what its tests need to know: its place against the path, the running log-odds of being in it,
-    whether these put it in, whether it led in the frame before, by how much the path is wider for it, and the path."""
+    whether it led in the frame before, by how much the path is wider for it, and the path."""
 
     item: FusedObject
     place: Place | None
     odds: float
-    inside: bool
     leads: bool
     widening_m: float
     path: Path
@@ -43,8 +42,8 @@ class Candidate(NamedTuple):
         return self.place.limit_m + self.widening_m - so_far_m
 
 
-class Test(NamedTuple):
-    """One question to a candidate: the gate with its number and limit, and the sentence that says why it failed, which
+class Question(NamedTuple):
+    """One test of a candidate: the gate with its number and limit, and the sentence that says why it failed, which
     is only made for the one failure of an object that is given as its reason."""
 
     ask: Callable[[Candidate], Gate]
@@ -107,25 +106,24 @@ def _wrong_size(who: Candidate) -> str:
     return f"{across:.0f} m long: not a vehicle"
 
 
+def _ahead(who: Candidate) -> Gate:
+    """By the way along the path to it, from the bumper."""
+    ahead_m = who.place.ahead_m if who.place is not None else None
+    return Gate("ahead", ahead_m, 0.0, ahead_m is not None and ahead_m > 0.0)
+
+
 def _path_offset(who: Candidate) -> Gate:
-    """In metres, what the odds say: see ``aside_m``."""
+    """In metres, what the running mean of the log-odds says: see ``aside_m``."""
     if who.place is None:
         return Gate("path_offset", None, who.path.half_width_m, False)
-    return Gate("path_offset", who.aside_m, who.place.limit_m + who.widening_m, who.inside)
+    return Gate("path_offset", who.aside_m, who.place.limit_m + who.widening_m, who.odds > 0.0)
 
 
 def _out_of_path(who: Candidate) -> str:
     if who.place is None:
         return "place not known"
-    if who.place.ahead_m <= 0.0:
-        return "beside or behind the bumper"
     outside_m = -who.place.margin_m(who.widening_m)
     return f"out of path by {outside_m:.1f} m" if outside_m > 0.0 else "in path for a moment only"
-
-
-def _path_odds(who: Candidate) -> Gate:
-    """By the running mean of what the sightings say."""
-    return Gate("path_odds", who.odds, 0.0, who.inside)
 
 
 def _path_sigma(who: Candidate) -> Gate:
@@ -141,16 +139,15 @@ def _uncertain(who: Candidate) -> str:
     return f"its place against the path is uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
 
 
-ELIGIBILITY = (
-    Test(_vehicle_class, lambda who: f"class {who.item.label}"),
-    Test(_distance_known, lambda _: "distance not known"),
-    Test(_hits, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
-    Test(_seen, _not_seen),
-    Test(_size, _wrong_size),
-    Test(_path_offset, _out_of_path),
-    Test(_path_odds, _out_of_path),
-    Test(_path_sigma, _uncertain),
+QUESTIONS = (
+    Question(_vehicle_class, lambda who: f"class {who.item.label}"),
+    Question(_distance_known, lambda _: "distance not known"),
+    Question(_hits, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
+    Question(_seen, _not_seen),
+    Question(_size, _wrong_size),
+    Question(_ahead, lambda who: "place not known" if who.place is None else "beside or behind the bumper"),
+    Question(_path_offset, _out_of_path),
+    Question(_path_sigma, _uncertain),
 )
-QUESTIONS = tuple(test.ask for test in ELIGIBILITY)
 BESIDE_PLACE = frozenset({"vehicle_class", "distance_known", "hits", "size"})
 """The gates that one which is not in the path yet must pass all the same."""

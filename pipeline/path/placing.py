@@ -182,7 +182,8 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
     outlines = _outlines(rows, _headings(center, nearest(center, middles)[1], step))
     aside, reached = nearest(center, outlines)
     headings = _headings(center, reached[::5], step)
-    beside, _ = nearest(center, np.ascontiguousarray(rows[:, 14:18]).reshape(-1, 2))
+    edges = np.ascontiguousarray(rows[:, 14:18]).reshape(-1, 2)
+    beside, _ = nearest(center, np.where(np.isfinite(edges), edges, 0.0))  # its kernel is told that nothing is NaN
     out = np.empty((len(rows), 11))
     for n in range(len(rows)):
         offsets, ahead = aside[5 * n : 5 * n + 5], reached[5 * n]
@@ -195,12 +196,13 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
         # its box does: of a dark flank at 30 m a few points come back.
         low, high = min(offsets[1], offsets[2]), max(offsets[1], offsets[2])
         flank = _LONGEST_M * abs(near_y * cos - near_x * sin) / max(np.hypot(near_x, near_y), 0.1)
-        too_wide = abs(beside[2 * n + 1] - beside[2 * n]) > _WIDEST_M + flank
+        first, second = beside[2 * n], beside[2 * n + 1]
+        has_sides = np.isfinite(rows[n, 14:18]).all()
+        too_wide = has_sides and abs(second - first) > _WIDEST_M + flank
         if too_wide or abs(np.sin(2.0 * (rows[n, 8] - heading))) > _SLANTED:
             low, high = min(low, offsets[3], offsets[4]), max(high, offsets[3], offsets[4])
-            if rows[n, 14] == rows[n, 14]:
-                low = min(low, beside[2 * n], beside[2 * n + 1])
-                high = max(high, beside[2 * n], beside[2 * n + 1])
+            if has_sides:
+                low, high = min(low, first, second), max(high, first, second)
         vx, vy = rows[n, 9], rows[n, 10]
         # the path lies still on the ground: over ground one that follows its bend does not move sideways; where the own
         # speed is not known, relative to ego and its x axis

@@ -21,8 +21,8 @@ const KINDS = {
   hits: { label: "Times seen", test: "least", param: "cipv.confirm_hits" },
   seen: { label: "Measured now", test: "flag", param: "cipv.carried_may_become_lead" },
   size: { label: "Size of a vehicle", test: "flag", unit: "m", param: "cipv.max_size_m" },
+  ahead: { label: "Ahead of the bumper", test: "least", unit: "m" },
   path_offset: { label: "Off the path's middle", test: "most", unit: "m", param: "path.half_width_m" },
-  path_odds: { label: "In path over time", test: "least", unit: "log odds" },
   path_sigma: { label: "Place uncertain by", test: "most", unit: "m", param: "cipv.max_sigma_m" },
 };
 /** How far a bar reaches beyond the larger of value and limit. */

@@ -163,6 +163,14 @@ def test_of_one_that_stands_across_the_box_says_how_far_it_reaches() -> None:
     assert (both.low_m, both.high_m) == (pytest.approx(-4.4, abs=0.02), pytest.approx(0.1, abs=0.02))
 
 
+@pytest.mark.parametrize("edge", [(math.nan, math.nan), (30.0, math.nan), (math.inf, -4.0)])
+def test_a_box_of_which_one_edge_is_nowhere_says_nothing(edge: tuple[float, float]) -> None:
+    item = crossing_car(30.0, -4.4, 0.1)
+    alone = placed(dataclasses.replace(item, box_sides=None))
+    assert placed(dataclasses.replace(item, box_sides=(edge, (30.0, -8.0)))) == alone
+    assert placed(dataclasses.replace(item, box_sides=((30.0, -8.0), edge))) == alone
+
+
 def test_the_flank_of_a_car_in_the_next_lane_does_not_widen_it() -> None:
     """Its box covers rear and flank: from 4.4 m aside at its rear to 2.6 m at its front, which is farther away."""
     item = fused(1, 15.0, 3.5, length=4.5)
