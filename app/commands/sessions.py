@@ -26,6 +26,8 @@ from pipeline.sources.base import Source
 
 _WIDE = 120
 """Columns of what is written to a file or another program."""
+_SAME_RATE = 0.05
+"""Rates that differ less are one."""
 
 
 @dataclass(frozen=True)
@@ -177,13 +179,21 @@ def _topics_table(found: Info) -> Table:
     for topic in found.topics:
         beat = topic.rhythm
         longest = "" if beat.longest_gap_s is None else f"{beat.longest_gap_s:.3f} s"
-        rate = "" if beat.rate_hz is None else f"{beat.rate_hz:.2f}"
-        table.add_row(topic.topic, topic.schema, str(beat.count), rate, str(beat.gaps or ""), longest)
+        table.add_row(topic.topic, topic.schema, str(beat.count), _rate(beat), str(beat.gaps or ""), longest)
     return table
 
 
+def _rate(beat: Rhythm, unit: str = "") -> str:
+    """Over the whole, with what it is between gaps where that is another."""
+    if beat.rate_hz is None or beat.usual_step_s is None:
+        return ""
+    usual_hz = 1.0 / beat.usual_step_s
+    differs = abs(usual_hz - beat.rate_hz) > _SAME_RATE * beat.rate_hz
+    return f"{beat.rate_hz:.2f}{unit}" + (f" (usually {usual_hz:.2f})" if differs else "")
+
+
 def _rhythm(frames: Rhythm) -> str:
-    rate = "" if frames.rate_hz is None else f", {frames.rate_hz:.2f} Hz"
+    rate = "" if frames.rate_hz is None else f", {_rate(frames, ' Hz')}"
     gaps = "" if not frames.gaps else f", {frames.gaps} gaps, the longest {frames.longest_gap_s:.2f} s"
     return f"{frames.count} frames, {frames.duration_s:.1f} s{rate}{gaps}"
 

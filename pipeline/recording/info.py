@@ -14,21 +14,22 @@ from pipeline.recording.session import SessionSource
 from pipeline.recording.writer import About
 from pipeline.sources.base import Source, SourceError
 
-_GAP_STEPS = 3.0
+_GAP_STEPS = 1.5
 """A gap is a step of more than so many usual ones."""
 
 
 @dataclass(frozen=True)
 class Rhythm:
-    """How something came over time. rate_hz: by the median step, null for fewer than two or all at once. gaps: steps of
-    more than three usual ones; longest_gap_s: the longest step of all. duration_s: all steps together, but those back
-    in time."""
+    """How something came over time. rate_hz: over the whole of it, null for fewer than two or all at once;
+    usual_step_s: the median step, which is shorter where there are gaps. gaps: steps of more than 1.5 usual ones;
+    longest_gap_s: the longest step of all. duration_s: all steps together, but those back in time."""
 
     count: int
     first_ns: int | None
     last_ns: int | None
     duration_s: float
     rate_hz: float | None
+    usual_step_s: float | None
     gaps: int
     longest_gap_s: float | None
 
@@ -102,7 +103,8 @@ def rhythm(stamps_ns: npt.NDArray[np.int64]) -> Rhythm:
         first_ns=int(stamps_ns[0]) if len(stamps_ns) else None,
         last_ns=int(stamps_ns[-1]) if len(stamps_ns) else None,
         duration_s=float(steps.sum() / 1e9),
-        rate_hz=round(1e9 / usual_ns, 3) if usual_ns else None,
+        rate_hz=round(len(steps) * 1e9 / float(steps.sum()), 3) if usual_ns else None,
+        usual_step_s=usual_ns / 1e9 if usual_ns else None,
         gaps=int(np.count_nonzero(steps > _GAP_STEPS * usual_ns)) if usual_ns else 0,
         longest_gap_s=float(steps.max() / 1e9) if len(steps) else None,
     )

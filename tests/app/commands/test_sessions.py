@@ -124,6 +124,14 @@ def test_info_prints_topics_rates_and_duration(
     assert "10.00 Hz" in capsys.readouterr().out
 
 
+def test_info_says_what_is_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of ten a second every fourth is missing."""
+    path = write(tmp_path / "a.mcap", [full(index) for index in range(32) if index % 4 != 3])
+    assert cipv("info", path) == 0
+    said = capsys.readouterr().out
+    assert "24 frames, 3.0 s, 7.67 Hz (usually 10.00), 7 gaps, the longest 0.20 s" in said
+
+
 def test_recover_says_what_was_saved(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole = write(tmp_path / "a.mcap", [full(index) for index in range(3)])
     cut = tmp_path / "cut.mcap"

@@ -127,7 +127,9 @@ def test_info_counts_what_is_there(drive: SessionSource) -> None:
 
 GAPS = {
     "steady": ([0, 1, 2, 3, 4], 1e9, 0, 1e-9),
-    "a hole": ([0, 1, 2, 9, 10], 1e9, 1, 7e-9),
+    "a hole": ([0, 1, 2, 9, 10], 0.4e9, 1, 7e-9),
+    "every fifth is missing": ([k for k in range(26) if k % 5 != 4], 20e9 / 25, 5, 2e-9),
+    "jitter is no gap": ([0, 10, 22, 30, 41, 50], 0.1e9, 0, 12e-9),
     "a clock that was set back": ([5, 6, 0, 1], 1e9, 0, 1e-9),
     "a drive played in a loop": ([0, 1, 2, 0, 1, 2], 1e9, 0, 1e-9),
     "one": ([7], None, 0, None),
