@@ -14,27 +14,11 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from pipeline.alignment import Alignment, project_cuboids
+from pipeline.fused_rows import box_row, hit_row, lidar_sigma_m, quad, range_m
 from pipeline.geometry import F64, corners_of, iou_matrix
 from pipeline.params import FusionParams
 from pipeline.records import evolve
 from pipeline.types import Box, FusedObject, Gate, LidarTrack, Point2, VisionTrack
-
-LIDAR_RANGE_SIGMA_M = 0.1
-"""Uncertainty of a cluster's nearest point: the VLP-16's ±3 cm and the spacing of its beams on a bumper."""
-
-CARRIED_SPEED_SIGMA_MPS, CARRIED_ACCEL_SIGMA_MPS2 = 0.5, 3.0
-
-Quad = tuple[Point2, Point2, Point2, Point2]
-
-TYPICAL_SIZE_M = {
-    "car": (4.5, 1.8),
-    "truck": (8.0, 2.5),
-    "bus": (11.0, 2.5),
-    "motorcycle": (2.1, 0.8),
-    "bicycle": (1.8, 0.6),
-    "person": (0.5, 0.5),
-}
-"""Length and width drawn for an object that only the camera sees; its nearest face is what was measured."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +50,7 @@ def fuse(
     """One row per physical object. ``picture_size`` is (width, height) in pixels; without it or without an alignment
     nothing can be compared, and every track keeps a row of its own."""
     corners = corners_of([track.obstacle.cuboid for track in lidar])
-    ranges_m, sigmas_m = [_range(track) for track in lidar], [_lidar_sigma(track) for track in lidar]
+    ranges_m, sigmas_m = [range_m(track) for track in lidar], [lidar_sigma_m(track) for track in lidar]
     projected: list[Box | None] = [None] * len(lidar)
     if alignment is not None and picture_size is not None:
         projected = project_cuboids(alignment, _to_the_gaps(corners, ranges_m, params), *picture_size)
@@ -92,10 +76,10 @@ def fuse(
         tested = gates.get(compared, ())
         seen = vision[i] if i is not None else None
         if j is not None:
-            quad = _quad(footprints[j])
-            row = _hit_row(object_id, seen, lidar[j], projected[j], quad, ranges_m[j], sigmas_m[j], tested)
+            footprint = quad(footprints[j])
+            row = hit_row(object_id, seen, lidar[j], projected[j], footprint, ranges_m[j], sigmas_m[j], tested)
         elif seen is not None:
-            row = _box_row(object_id, seen, tested)
+            row = box_row(object_id, seen, tested)
         objects.append(evolve(row, box_sides=sides[i]) if i is not None and i in sides else row)
         box = projected[j] if j is not None else None
         if box is not None:
@@ -203,120 +187,3 @@ def _identities(state: FusionState, keys: list[tuple[int | None, int | None]]) -
     by_lidar = {hit: ids[k] for k, (_, hit) in enumerate(keys) if hit is not None}
     by_vision = {seen: ids[k] for k, (seen, _) in enumerate(keys) if seen is not None}
     return FusionState(next_id, by_lidar, by_vision), ids
-
-
-_UNKNOWN = FusedObject(
-    id=0,
-    source="V",
-    label=None,
-    score=None,
-    bbox=None,
-    bev=None,
-    cuboid=None,
-    closest_point=None,
-    distance_m=None,
-    distance_sigma_m=None,
-    velocity_mps=None,
-    seen_by="",
-    hits=0,
-    lidar_points=0,
-    lidar_track=None,
-    vision_track=None,
-)
-"""Of which nothing is known: every row is made from it, because ``evolve`` takes a quarter of the time of a frozen
-record's ``__init__``."""
-
-
-def _hit_row(
-    object_id: int,
-    seen: VisionTrack | None,
-    hit: LidarTrack,
-    box: Box | None,
-    footprint: Quad,
-    range_m: float,
-    sigma_m: float,
-    gates: tuple[Gate, ...],
-) -> FusedObject:
-    """Table 3 of what the LiDAR has: place, distance and velocity are its own, the type is the camera's."""
-    row = evolve(
-        _UNKNOWN,
-        id=object_id,
-        source="L",
-        bbox=box,
-        bev=footprint,
-        cuboid=hit.obstacle.cuboid,
-        closest_point=hit.obstacle.closest_point,
-        distance_m=range_m,
-        distance_sigma_m=sigma_m,
-        velocity_mps=hit.velocity_mps,
-        seen_by="" if hit.carried else "L",
-        measured=not hit.carried,
-        hits=hit.hits,
-        lidar_points=hit.obstacle.points,
-        lidar_track=hit.id,
-        lidar_hits=hit.hits,
-        gates=gates,
-    )
-    if seen is None:
-        return row
-    return evolve(
-        row,
-        source="VL",
-        label=seen.label,
-        score=seen.score,
-        bbox=box if box is not None else seen.bbox,
-        # for the one frame in which the LiDAR has just found what the camera follows the velocity is the camera's:
-        # whoever brakes for it must not lose its speed then
-        velocity_mps=hit.velocity_mps if hit.velocity_mps is not None else seen.velocity_mps,
-        seen_by=row.seen_by if seen.carried else "V" if hit.carried else "VL",
-        hits=max(hit.hits, seen.hits),
-        vision_track=seen.id,
-    )
-
-
-def _box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...]) -> FusedObject:
-    """Table 3 of what the camera alone has."""
-    place = seen.position
-    return evolve(
-        _UNKNOWN,
-        id=object_id,
-        label=seen.label,
-        score=seen.score,
-        bbox=seen.bbox,
-        bev=_typical_footprint(place, seen.label) if place is not None else None,
-        closest_point=(*place, 0.0) if place is not None else None,
-        distance_m=seen.distance_m,
-        distance_sigma_m=seen.sigma_m,
-        velocity_mps=seen.velocity_mps,
-        seen_by="" if seen.carried else "V",
-        measured=seen.measured,
-        hits=seen.hits,
-        vision_track=seen.id,
-        gates=gates,
-    )
-
-
-def _range(track: LidarTrack) -> float:
-    """Horizontal range from the ego origin to the cluster's nearest point."""
-    x, y, _ = track.obstacle.closest_point
-    return math.hypot(x, y)
-
-
-def _typical_footprint(near_face: Point2, label: str) -> Quad:
-    """A rectangle of a class's usual size behind a measured nearest face. Its turn is not known: vehicles ahead are
-    drawn along ego x."""
-    length, width = TYPICAL_SIZE_M.get(label, TYPICAL_SIZE_M["car"])
-    x, y = near_face
-    return (x + length, y + width / 2), (x + length, y - width / 2), (x, y - width / 2), (x, y + width / 2)
-
-
-def _lidar_sigma(track: LidarTrack) -> float:
-    """Standard deviation of a LiDAR track's distance. It grows while the track is carried, by what the tracked speed
-    may be off and by what the object may do meanwhile."""
-    drift_m = CARRIED_SPEED_SIGMA_MPS * track.unseen_s + CARRIED_ACCEL_SIGMA_MPS2 * track.unseen_s**2 / 2
-    return math.hypot(LIDAR_RANGE_SIGMA_M, drift_m)
-
-
-def _quad(corners: list[list[float]]) -> Quad:
-    (ax, ay), (bx, by), (cx, cy), (dx, dy) = corners
-    return (ax, ay), (bx, by), (cx, cy), (dx, dy)

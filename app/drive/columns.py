@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.evaluation.lead import Judged
-from pipeline.fusion import LIDAR_RANGE_SIGMA_M
+from pipeline.fused_rows import LIDAR_RANGE_SIGMA_M
 from pipeline.motion import closing_speed_mps
 from pipeline.types import VEHICLES, Frame, FusedObject, Result, VisionTrack
 from pipeline.vision.labels import COCO_80

@@ -13,7 +13,7 @@ from pipeline.alignment import Alignment, resolve
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.labels.refit import FEWEST_POINTS, onto_points
-from pipeline.labels.sizes import usual_size_m
+from pipeline.sizes import usual_size_m
 from pipeline.lidar.boxes import fit_obstacles
 from pipeline.lidar.cluster import candidates, cluster
 from pipeline.lidar.ground import Ground, fit_ground

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.geometry import Cuboid, iou_matrix
 from pipeline.labels.interpolate import resized
 from pipeline.labels.model import LabelTrack, Lead, LeadRange, Origin, Sighting
-from pipeline.labels.sizes import usual_size_m
+from pipeline.sizes import usual_size_m
 from pipeline.types import VEHICLES, Box
 
 ROAD_USERS = VEHICLES | {"person", "bicycle"}
