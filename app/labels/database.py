@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Insert, create_engine, event, inspect, text
+from sqlalchemy import Connection, create_engine, event, inspect, text
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import URL, Engine, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
@@ -95,10 +95,11 @@ class Database:
         with self._speaking(), self._engine.connect().execution_options(writes=True) as connection, connection.begin():
             yield connection
 
-    def insert_new(self, table: type[Base], values: Mapping[str, Any]) -> Insert:
-        """A row, unless one with its key is there already: then nothing, and no row is counted."""
+    def insert_new(self, connection: Connection, table: type[Base], values: Mapping[str, Any]) -> bool:
+        """A row, unless one with its key is there already; whether it was written."""
         insert = sqlite.insert if self.is_sqlite else postgresql.insert
-        return insert(table).values(values).on_conflict_do_nothing()
+        made = insert(table).values(values).on_conflict_do_nothing().returning(*table.__table__.primary_key)
+        return connection.execute(made).first() is not None
 
     def close(self) -> None:
         """Safe to call twice."""

@@ -6,10 +6,11 @@ import json
 from collections.abc import Mapping, Set
 from typing import Any
 
-from sqlalchemy import Connection, bindparam, delete, func, insert, select, tuple_
+from sqlalchemy import Connection, and_, bindparam, delete, func, insert, select, tuple_
 
 from app.labels.items import read_item, read_items, read_track
 from app.labels.refusals import ActRefused, NoSuchLabel, Stale
+from app.labels.steps import WAYS
 from app.labels.tables import ActRow, ChangeRow, ItemRow, SightingRow
 from app.labels.values import (
     Content,
@@ -45,6 +46,8 @@ class Draft:
         self._frames_after: dict[int, dict[int, Sighting | None]] = {}
         self._params: dict[str, tuple[Any, Any]] = {}
         self._given: dict[ItemKind, int] = {}
+        self._tracks: set[int] | None = None
+        """Numbers of all that ever were; null until somebody asks."""
 
     # ------------------------------------------------------------ reading
 
@@ -134,6 +137,14 @@ class Draft:
             )
         return self._given[kind] + 1
 
+    def number_for(self, track: LabelTrack) -> int:
+        """A track's own number, unless another one has it, or had: its history is not this one's."""
+        if self._tracks is None:
+            wanted = select(ItemRow.id).where(ItemRow.drive_id == self._drive_id, ItemRow.kind == "track")
+            self._tracks = set(self._connection.scalars(wanted))
+        is_given = track.id in self._tracks or ("track", track.id) in self._after
+        return self.next_number("track") if is_given or track.id == 0 else track.id
+
     def put_sightings(self, track: int, frames: Frames) -> None:
         """Change some of a track's sightings; null takes one away. The track itself counts as changed."""
         if not frames:
@@ -183,6 +194,23 @@ class Draft:
                 ItemRow.drive_id == self._drive_id, ItemRow.kind == kind, ItemRow.id == number
             )
         )
+
+    def changed_by(self, kind: ItemKind, number: int) -> str | None:
+        """Who did the last act on an item that is in force: what was taken back, and taking back, are not. Null when
+        there is none."""
+        return self._connection.scalars(
+            select(ActRow.person)
+            .join(ChangeRow, and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act))
+            .where(
+                ChangeRow.drive_id == self._drive_id,
+                ChangeRow.kind == kind,
+                ChangeRow.item == str(number),
+                ActRow.status == "done",
+                ActRow.kind.not_in(WAYS),
+            )
+            .order_by(ActRow.number.desc())
+            .limit(1)
+        ).first()
 
     def who(self, act: int) -> str:
         """The person of an act."""

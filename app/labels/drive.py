@@ -153,7 +153,7 @@ class DriveLabels:
             "labels": zlib.compress(to_json(labels), 1),
         }
         with self._database.writing() as connection:
-            if connection.execute(self._database.insert_new(VersionRow, values)).rowcount == 0:
+            if not self._database.insert_new(connection, VersionRow, values):
                 raise ActRefused(taken)  # somebody else froze under it at the same moment
         return version
 
@@ -221,5 +221,5 @@ def _drive_row(database: Database, info: DriveInfo) -> int:
     if found is not None:
         return found
     with database.writing() as connection:
-        connection.execute(database.insert_new(DriveRow, values))
+        database.insert_new(connection, DriveRow, values)
         return connection.scalars(wanted).one()

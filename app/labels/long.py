@@ -109,8 +109,7 @@ def _put_tracks(draft: Draft, tracks: Sequence[LabelTrack], known: list[int]) ->
             if _is_untouched(same):
                 draft.put("track", same.id, replace(track, id=same.id, sightings=()))
             continue
-        taken = draft.find("track", track.id) is not None or track.id == 0
-        numbers[track.id] = draft.next_number("track") if taken else track.id
+        numbers[track.id] = draft.number_for(track)
         draft.add("track", replace(track, id=numbers[track.id], sightings=()))
         draft.put_sightings(numbers[track.id], {each.frame: each for each in track.sightings})
     return numbers
@@ -186,8 +185,7 @@ def _put_proposals(draft: Draft, found: Proposals, first: int, last: int) -> int
         count += 1
         number = numbers.get(track.id)
         if number is None:
-            taken = draft.find("track", track.id) is not None or track.id == 0
-            number = numbers[track.id] = draft.next_number("track") if taken else track.id
+            number = numbers[track.id] = draft.number_for(track)
             draft.add("track", replace(track, id=number, sightings=()))
         else:
             draft.put("track", number, replace(track, id=number, sightings=()))

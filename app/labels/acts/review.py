@@ -29,12 +29,13 @@ def reject(draft: Draft, scope: Scope, act: Reject) -> str:
 
 
 def review_ok(draft: Draft, scope: Scope, act: ReviewOk) -> str:
-    """By a second person: who changed a label last does not review it."""
+    """By a second person: who made a label as it is, or changed it last, does not review it."""
     for ref in act.items:
-        item = draft.get(ref.kind, ref.id, ref.revision)
-        if draft.who(item.revision) == draft.person:
+        value = stated(draft.get(ref.kind, ref.id, ref.revision))
+        made = value.origin.name if value.origin.maker == "person" else None
+        if draft.person in (made, draft.changed_by(ref.kind, ref.id)):
             raise ActRefused(f"you changed {name_of(ref.kind, ref.id)} last: a second person reviews it")
-        draft.put(ref.kind, ref.id, replace(_answered(stated(item)), state="accepted"))
+        draft.put(ref.kind, ref.id, replace(_answered(value), state="accepted"))
     return f"reviewed and accepted {_names(act.items)}"
 
 

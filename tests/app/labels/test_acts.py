@@ -84,6 +84,31 @@ def test_a_correction_that_is_accepted_stays_one_until_a_second_person_reviews_i
     assert (track(labels).state, track(labels).origin.name) == ("accepted", "Ada")
 
 
+@pytest.mark.parametrize(
+    ("before", "refused"),
+    [
+        pytest.param([("Ada", "relabel", "bus"), ("Bob", "relabel", "van"), ("Bob", "undo", "")], "Ada", id="undone"),
+        pytest.param([("Ada", "relabel", "bus"), ("Ada", "undo", ""), ("Ada", "redo", "")], "Ada", id="done again"),
+        pytest.param([("Ada", "relabel", "bus"), ("Bob", "send_back", "no")], "Ada", id="sent back to its maker"),
+        pytest.param([("Ada", "relabel", "bus"), ("Bob", "relabel", "van")], "Bob", id="changed by the second"),
+    ],
+)
+def test_ones_own_work_is_reviewed_by_another(
+    labels: DriveLabels, before: list[tuple[str, Any, str]], refused: str
+) -> None:
+    for person, kind, more in before:
+        if kind == "relabel":
+            act(labels, person, kind=kind, track=1, label=more)
+        elif kind == "send_back":
+            act(labels, person, kind=kind, items=[("track", 1)], comment=more)
+        else:
+            labels.log.move(kind, person)
+    with pytest.raises(ActRefused, match="a second person reviews it"):
+        act(labels, refused, kind="review_ok", items=[("track", 1)])
+    act(labels, "Cy", kind="review_ok", items=[("track", 1)])
+    assert track(labels).state == "accepted"
+
+
 def test_what_is_sent_back_is_proposed_again_with_the_comment(labels: DriveLabels) -> None:
     act(labels, kind="accept", items=[("track", 1)])
     act(labels, "Bob", kind="send_back", items=[("track", 1)], comment="its rear\n is too low")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+import itertools
 import zipfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from http.client import HTTPConnection
 from typing import Any
+from uuid import UUID
 
 import httpx
 import pytest
@@ -15,6 +17,7 @@ import pytest
 from app.engine import Engine
 from app.labels.database import Database, DatabaseError
 from app.labels.desk import LabelDesk
+from app.labels.log import Log
 from app.limits import LARGEST_FILE
 from app.routes.label_shapes import LabelsOfPerson, ScoreJson, Window
 from app.server import create_app
@@ -364,6 +367,67 @@ def test_the_display_in_the_car_may_look_and_not_touch(engine: Engine) -> None:
                 assert display.post(f"/api/labels/{path}").status_code == 403
 
 
+# ------------------------------------------------------------ what is sent
+
+
+def test_what_is_sent_again_is_answered_as_before_and_done_once(engine: Engine, client: httpx.Client) -> None:
+    def sent(path: str, person: str = "Ada", **more: Any) -> httpx.Response:
+        return client.post(f"/api/labels/{path}", json={"person": person, "act_id": str(UUID(int=number))} | more)
+
+    numbers = itertools.count(1)
+    for path, body in (
+        ("act", {"act": {"kind": "tag", "frame": 3, "tag": "night"}}),
+        ("act", {"act": {"kind": "lift", "frame": 10, "pixel": [160, 92]}}),
+        ("undo", {}),
+        ("redo", {}),
+    ):
+        number = next(numbers)
+        first, again = (sent(path, **body).json() for _ in range(2))
+        assert first["act"] is not None
+        assert again == first
+        assert sent(path, "Bob", **body).json() == {"detail": "an act of somebody else has that id"}
+    there = labels(client)
+    assert (len(there["tags"]), len(there["tracks"])) == (1, 1)
+    number = next(numbers)
+    first, again = (sent("act", act={"kind": "propose"}).json()["task"] for _ in range(2))
+    assert first == again
+    engine.wait_for(lambda shown: shown.labels.task is not None and not shown.labels.task.running, WAIT_S)
+    number = next(numbers)
+    client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 9}, "final": False})
+    assert [sent("undo").json()["what"] for _ in range(2)] == ["what was being tried"] * 2
+
+
+def test_what_was_meant_for_another_recording_is_not_done_to_this_one(client: httpx.Client) -> None:
+    drive = labels(client)["drive"]["id"]
+    tag = {"kind": "tag", "frame": 3, "tag": "night"}
+    assert client.post("/api/labels/act", json={"person": "Ada", "act": tag, "drive": drive}).status_code == 200
+    before = labels(client)["revision"]
+    for path, body in (("act", {"act": tag}), ("act", {"act": {"kind": "propose"}}), ("undo", {}), ("redo", {})):
+        answer = client.post(f"/api/labels/{path}", json={"person": "Ada", "drive": "another"} | body)
+        assert (answer.status_code, answer.json()["detail"]) == (409, "another recording is open now")
+    assert labels(client)["revision"] == before
+
+
+def test_an_act_is_answered_from_the_recording_that_it_was_done_to(
+    engine: Engine, client: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Something else is opened between the commit and the answer."""
+    opened = engine.labels._open
+    do = Log.act
+
+    def act_and_close(self: Log, *args: Any, **more: Any) -> Any:
+        done = do(self, *args, **more)
+        engine.labels.open("another", None)
+        return done
+
+    monkeypatch.setattr(Log, "act", act_and_close)
+    try:
+        answer = act(client, kind="tag", frame=3, tag="night")
+    finally:
+        engine.labels.open(opened.uri, opened.recording)
+    assert (answer.status_code, len(answer.json()["changed"]["tags"])) == (200, 1)
+
+
 # ------------------------------------------------------------ two people
 
 
@@ -401,9 +465,9 @@ def test_after_a_restart_everything_is_there_and_can_be_undone(tmp_path: Any) ->
     with team(Database.in_file(file)) as (_, client):
         act(client, kind="tag", frame=3, tag="night")
         client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 5}, "person": "Ada"})
-    with team(Database.in_file(file)) as (engine, client):
+    with team(Database.in_file(file)) as (_, client):
         assert len(labels(client)["tags"]) == 1
-        assert engine.snapshot.labels.can_undo
+        assert labels(client, person="Ada")["can_undo"]
         undone = [client.post("/api/labels/undo", json={"person": "Ada"}).json()["what"] for _ in range(2)]
         assert undone == ["cipv.confirm_hits 3 → 5", "tagged frame 3 night"]
         assert client.post("/api/labels/undo", json={"person": "Ada"}).status_code == 409

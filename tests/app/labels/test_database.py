@@ -10,13 +10,14 @@ from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import text
+from sqlalchemy import select, text
 
 from app.labels import migrations
 from app.labels.database import Database, DatabaseError, open_database
 from app.labels.drive import DriveLabels
-from app.labels.tables import Base
-from tests.app.labels.conftest import info
+from app.labels.tables import Base, DriveRow
+from app.labels.values import pack
+from tests.app.labels.conftest import fresh, info
 
 
 def test_the_migrations_make_the_tables_as_they_are_declared(database: Database) -> None:
@@ -104,3 +105,34 @@ def test_a_database_at_the_newest_schema_is_opened_as_it_is(file: Path, monkeypa
 
     monkeypatch.setattr("app.labels.database.migrate", migrate)
     Database.in_file(file).close()
+
+
+def test_a_reader_has_one_view_whatever_others_write(database: Database) -> None:
+    labels = DriveLabels(database, fresh())
+    with database.reading() as connection:
+        before = [list(connection.execute(select(DriveRow.revision).order_by(DriveRow.id)))]
+        labels.log.settle({"a.b": (1, 2)})
+        before.append(list(connection.execute(select(DriveRow.revision).order_by(DriveRow.id))))
+    assert before[0] == before[1]
+    assert labels.revision == 1
+
+
+def test_a_database_of_an_older_program_goes_on(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parameters that were changed on the machine are those of its usual server."""
+    monkeypatch.setattr("app.labels.database.HEAD", "0001")
+    old = Database.in_file(file)
+    key = info("drive").key
+    with old.writing() as connection:
+        for statement in (
+            f"INSERT INTO drive VALUES (1, '{key}', 'test:drive', 'a drive', 100, 1)",
+            "INSERT INTO act VALUES (1, 1, 'params', 'a.b 1 → 2', 'Ada', 'here', 0, 1, 'done', NULL)",
+        ):
+            connection.exec_driver_sql(statement)
+        body = {"before": pack(1), "after": pack(2)}
+        connection.execute(text("INSERT INTO change VALUES (1, 1, 'param', 'a.b', :before, :after)"), body)
+    old.close()
+    monkeypatch.undo()
+    new = Database.in_file(file)
+    labels = DriveLabels(new, info("drive"), station="here:8420")
+    assert labels.log.move("undo", "Ada", act_id="1").params == {"a.b": 1}
+    new.close()

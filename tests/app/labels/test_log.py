@@ -376,7 +376,7 @@ def test_all_labels_come_back_as_they_were_put(labels: DriveLabels) -> None:
     assert track.sightings[0].cuboid.center == (20.0, 0.0, 0.7)
 
 
-def test_a_frozen_version_stays_as_it_was(labels: DriveLabels) -> None:
+def test_a_frozen_version_stays_as_it_was(labels: DriveLabels, monkeypatch: pytest.MonkeyPatch) -> None:
     number = add(labels)
     before = shown(labels)
     version = labels.freeze("first", "Ada")
@@ -387,6 +387,9 @@ def test_a_frozen_version_stays_as_it_was(labels: DriveLabels) -> None:
     for taken in ("first", "working"):
         with pytest.raises(ActRefused, match="never overwritten"):
             labels.freeze(taken, "Bob")
+    monkeypatch.setattr(DriveLabels, "versions", lambda _: [])  # as for who looked before the other wrote
+    with pytest.raises(ActRefused, match="never overwritten"):
+        labels.freeze("first", "Bob")
 
 
 def test_labels_of_one_drive_are_not_anothers(labels: DriveLabels, database: Database) -> None:

@@ -135,3 +135,16 @@ def test_what_is_cancelled_while_it_is_written_is_not_written(labels: DriveLabel
     with pytest.raises(Cancelled):
         importing(labels, of(labels, car(1, "accepted", FILE)), "Ada", (), nobody)
     assert labels.revision == 0
+
+
+def test_a_number_that_a_removed_track_had_is_not_given_to_what_comes_from_elsewhere(labels: DriveLabels) -> None:
+    """Its history is another vehicle's."""
+    put(labels, car(7, "accepted", FILE))
+    labels.log.act("remove", "Ada", lambda draft: draft.put("track", 7, None) or "removed")
+    put(labels, car(7, "accepted", FILE, x=30.0))
+    put_proposals(labels, Proposals((car(7, "proposed", PIPELINE, x=60.0),), (lead(7),)), "Ada", 0, 30)
+    assert sorted(labels.items("track")) == [8, 9]
+    assert [entry.what for entry in labels.log.history("track", 7)] == [
+        "removed",
+        "imported 1 tracks and 0 ranges of the lead",
+    ]
