@@ -32,8 +32,9 @@ class CameraInput:
         if config.file is not None:
             path = config.file
             return lambda stop: video.play_file(path, self._shot, stop)
-        number = config.device or 0
-        return lambda stop: video.read_device(number, self._shot, stop)
+        device = config.device
+        assert device is not None
+        return lambda stop: video.read_device(device, self._shot, stop)
 
     def receive(self, data: bytes, stamp_us: int | None) -> None:
         """Take a JPEG and its own stamp, µs since 1970, if it has one. One that is cut off is counted as lost."""

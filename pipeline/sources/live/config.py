@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from pipeline.complaint import first_complaint
 from pipeline.geometry import inverse, rotation
@@ -19,6 +20,18 @@ Port = Annotated[int, Field(ge=1, le=65535)]
 Metres = Annotated[float, Field(ge=-20.0, le=20.0)]
 Degrees = Annotated[float, Field(ge=-180.0, le=180.0)]
 OffsetMs = Annotated[float, Field(ge=-2000.0, le=2000.0)]
+
+
+def _is_device(given: object) -> object:
+    """A camera's number or path."""
+    is_number = isinstance(given, int) and not isinstance(given, bool) and 0 <= given < _DEVICES
+    if is_number or (isinstance(given, str) and _DEVICE_PATH.fullmatch(given)):
+        return given
+    raise ValueError(f"0 to {_DEVICES - 1}, or a path such as /dev/v4l/by-id/…")
+
+
+_DEVICES, _DEVICE_PATH = 64, re.compile(r"/dev/[^\s\0]+")
+Device = Annotated[int | str, BeforeValidator(_is_device)]
 
 
 class Strict(BaseModel):
@@ -82,9 +95,10 @@ class CalibrationConfig(Strict):
 
 
 class CameraConfig(Strict):
-    """Exactly one of device (its number), url (rtsp:// or http://, MJPEG too) and file (a video, played in a loop)."""
+    """Exactly one of device (its number or path), url (rtsp:// or http://, MJPEG too) and file (a video, played in a
+    loop)."""
 
-    device: Annotated[int, Field(ge=0, le=63)] | None = None
+    device: Device | None = None
     url: str | None = Field(default=None, pattern=r"^(rtsp|rtsps|http|https)://\S+$")
     file: Path | None = None
     time_offset_ms: OffsetMs = 0.0

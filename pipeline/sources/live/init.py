@@ -24,7 +24,7 @@ lidar:                      # Velodyne on the network
 
 camera:                     # exactly one of device, url, file
   url: http://192.168.1.20:8080/video   # MJPEG or RTSP (rtsp://…); its JPEGs are kept as they come
-  # device: 0               # a camera plugged in
+  # device: 0               # a camera plugged in; better its path below /dev/v4l/by-id/, which stays its own
   # file: drive.mp4         # a video played in a loop, to try things out
   time_offset_ms: 0         # added to its times; without a stamp of its own, minus the time from exposure to arrival
   calibration:              # without it LiDAR and camera are not fused

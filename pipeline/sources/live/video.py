@@ -3,6 +3,8 @@ through OpenCV (which knows the devices of every system), and a video file playe
 
 from __future__ import annotations
 
+import os
+import re
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -53,21 +55,33 @@ def play_file(path: Path, receive: Receive, stop: Stop) -> None:
             raise DeviceLost(f"{path}: no pictures in it")
 
 
-def read_device(number: int, receive: Receive, stop: Stop) -> None:
-    """A camera plugged in. DeviceLost when there is none or it was pulled out."""
+def read_device(device: int | str, receive: Receive, stop: Stop) -> None:
+    """A camera plugged in, by number or path. DeviceLost when there is none or it was pulled out."""
+    number = device_number(device)
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # what is wrong is said once, and by us
     capture = cv2.VideoCapture(number)
     try:
         if not capture.isOpened():
-            raise DeviceLost(f"camera {number}: not plugged in, or used by another program")
+            raise DeviceLost(f"camera {device}: not plugged in, or used by another program")
         capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
         while not stop:
             ok, pixels = capture.read()
             if not ok or pixels is None:
-                raise DeviceLost(f"camera {number}: gives no pictures")
+                raise DeviceLost(f"camera {device}: gives no pictures")
             receive(Shot(pixels=np.ascontiguousarray(pixels, dtype=np.uint8)))
     finally:
         capture.release()
+
+
+def device_number(device: int | str) -> int:
+    """A camera's number, which OpenCV knows it by. A path, such as /dev/v4l/by-id/…, is a link to where the camera is
+    now: it has another number when it is plugged in anew. DeviceLost when it leads to no camera."""
+    if isinstance(device, int):
+        return device
+    found = re.fullmatch(r"/dev/video(\d+)", os.path.realpath(device))
+    if found is None:
+        raise DeviceLost(f"camera {device}: not plugged in, or no camera")
+    return int(found[1])
 
 
 def _shots(container: av.container.InputContainer) -> Iterator[tuple[Shot, float]]:

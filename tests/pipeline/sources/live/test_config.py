@@ -61,6 +61,9 @@ def test_defaults_of_the_written_file_are_the_programs() -> None:
          " width_px: 1280, height_px: 720, distortion: [1, 2, 3]}}", "0, 4, 5 or 8 numbers"),
         ("a camera that looks back", "camera: {device: 0, calibration: {fx_px: 900, fy_px: 900, cx_px: 640, cy_px: 360,"
          " width_px: 1280, height_px: 720, mount: {yaw_deg: 180}}}", "the camera does not look ahead"),
+        ("a device out of range", "camera: {device: 64}", "camera.device: 0 to 63, or a path"),
+        ("a device that is no number", "camera: {device: true}", "camera.device: 0 to 63, or a path"),
+        ("a path that is no device", "camera: {device: drive.mp4}", "camera.device: 0 to 63, or a path"),
         ("a list", "- 1", "expected sensors"),
         ("not YAML", "lidar: {", "not YAML"),
         ("not a number", "lidar: {time_offset_ms: .nan}", "lidar.time_offset_ms"),
@@ -88,6 +91,13 @@ def test_live_is_no_recording(tmp_path: Path) -> None:
         "no camera: LiDAR goes on alone",
         "no own speed: neither gnss nor CAN gives it",
     )
+
+
+@pytest.mark.parametrize("device", [0, "/dev/v4l/by-id/usb-046d_C920_1A2B-video-index0"])
+def test_a_plugged_in_camera_is_named_by_number_or_path(tmp_path: Path, device: int | str) -> None:
+    camera = load(written(tmp_path, f"camera: {{device: {device}}}")).camera
+    assert camera is not None
+    assert camera.device == device
 
 
 def test_files_are_found_beside_the_config(tmp_path: Path) -> None:
