@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.geometry import inverse
 from pipeline.recording import topics
-from pipeline.sources.live.pictures import Shot
+from pipeline.sources.shots import Shot
 from pipeline.types import U8, CameraCalibration, GnssFix, Picture, Sweep
 
 _XYZI = ("x", "y", "z", "intensity")

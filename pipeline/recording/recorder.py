@@ -23,7 +23,7 @@ from pipeline.params import Params
 from pipeline.recording.packets import RawLidar
 from pipeline.recording.segments import NEVER, Rotation, Segments
 from pipeline.recording.writer import About
-from pipeline.sources.live.pictures import Shot
+from pipeline.sources.shots import Shot
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
 
 logger = logging.getLogger("cipv.recording")

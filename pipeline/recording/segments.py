@@ -12,7 +12,7 @@ from pipeline.recording.output import Compression
 from pipeline.recording.packets import RawLidar
 from pipeline.recording.writer import About, SessionWriter
 from pipeline.sources.base import TruthObject
-from pipeline.sources.live.pictures import Shot
+from pipeline.sources.shots import Shot
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
 
 

@@ -39,7 +39,7 @@ from pipeline.recording.tick import (
 )
 from pipeline.results import to_json
 from pipeline.sources.base import TruthObject
-from pipeline.sources.live.pictures import Shot
+from pipeline.sources.shots import Shot
 from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Result, Route, Sweep
 
 VERSION = 1

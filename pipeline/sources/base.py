@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.params import SyncParams
-from pipeline.sources.live.pictures import Shot
+from pipeline.sources.shots import Shot
 from pipeline.types import F64, CameraCalibration, EgoState, Frame, GnssFix, StreamHealth, Sweep
 
 LIVE = "live:"

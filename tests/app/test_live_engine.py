@@ -21,7 +21,7 @@ from pipeline.progress import Progress
 from pipeline.recording.session import SessionSource
 from pipeline.run import Detectors
 from pipeline.sources.base import AnySource, SourceError, Tap
-from pipeline.sources.live.pictures import Shot
+from pipeline.sources.shots import Shot
 from pipeline.types import U8, CameraCalibration, Frame, GnssFix, RawLanes, StreamHealth
 from tests.app.recording import CountingDetector, Recording
 from tests.app.waiting import wait_until

@@ -7,8 +7,8 @@ from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.config import CameraConfig
 from pipeline.sources.live.health import StreamStats
 from pipeline.sources.live.inputs import Deliver
-from pipeline.sources.live.pictures import Shot, is_whole_jpeg
 from pipeline.sources.live.reader import Read, Reader, Stop
+from pipeline.sources.shots import Shot, is_whole_jpeg
 
 _ARRIVAL = "times are when its pictures arrive: it sends none of its own"
 

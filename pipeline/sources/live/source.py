@@ -22,9 +22,9 @@ from pipeline.sources.live.health import StreamStats, not_delivering
 from pipeline.sources.live.inputs import Input
 from pipeline.sources.live.lidar import LidarInput
 from pipeline.sources.live.own_motion import MotionFromGnss
-from pipeline.sources.live.pictures import Shot
 from pipeline.sources.live.sync import Stream, Synchroniser, Together
 from pipeline.sources.rig import calibration_for
+from pipeline.sources.shots import Shot
 from pipeline.types import F64, EgoState, Frame, GnssFix, Picture, StreamHealth, Sweep
 
 T = TypeVar("T")

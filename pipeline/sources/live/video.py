@@ -13,8 +13,8 @@ import av
 import cv2
 import numpy as np
 
-from pipeline.sources.live.pictures import Shot
 from pipeline.sources.live.reader import SILENCE_S, DeviceLost, Stop
+from pipeline.sources.shots import Shot
 
 _OPEN_S = 2.0
 _RTSP = {"rtsp_transport": "tcp", "fflags": "nobuffer", "flags": "low_delay"}

@@ -21,7 +21,7 @@ from pipeline.recording.recorder import Recorder
 from pipeline.recording.rewrite import recover
 from pipeline.recording.topics import protobuf_class
 from pipeline.results import to_json
-from pipeline.sources.live.pictures import Shot
+from pipeline.sources.shots import Shot
 from pipeline.step import State, step
 from tests.pipeline.recording.frames import ABOUT, full, picture
 

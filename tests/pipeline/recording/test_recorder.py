@@ -26,7 +26,7 @@ from pipeline.recording.recorder import Recorder, RecordingState
 from pipeline.recording.rewrite import recover
 from pipeline.recording.segments import Rotation, Segments
 from pipeline.recording.session import Mark, SessionSource
-from pipeline.sources.live.pictures import Shot
+from pipeline.sources.shots import Shot
 from tests.conftest import ROOT
 from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, picture, same, sweep
 
