@@ -1,8 +1,10 @@
 """Routes from files: CSV, GPX, a receiver's NMEA log, or an earlier session.
 
 CSV: a column of latitudes and one of longitudes in degrees, found by their names, or the first two where there are
-none. GPX 1.0 and 1.1: the points of the first track, else of the first route. NMEA 0183: GGA sentences, whose quality
-says how good each place is, else RMC. A session: the fixes in it.
+none; or easting and northing in metres of one UTM zone, which a third column names (``zone`` 32N, ``epsg`` 32632) or
+the name of the file is given with: ``route.csv?epsg=32632``. GPX 1.0 and 1.1: the points of the first track, else of
+the first route. NMEA 0183: GGA sentences, whose quality says how good each place is, else RMC. A session: the fixes in
+it.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from statistics import median
@@ -17,12 +20,17 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pynmea2
+from pyproj import Transformer
 
 from pipeline.errors import BadInput
 from pipeline.types import GnssFix, Route
 
 _LAT_NAMES = ("lat", "lat_deg", "latitude", "latitude_deg")
 _LON_NAMES = ("lon", "lon_deg", "lng", "long", "longitude", "longitude_deg")
+_EAST_NAMES = ("easting", "easting_m", "east", "utm_easting", "utm_x")
+_NORTH_NAMES = ("northing", "northing_m", "north", "utm_northing", "utm_y")
+_ZONE_NAMES = ("epsg", "zone", "utm_zone")
+_UTM_NORTH, _UTM_SOUTH = 32600, 32700
 SIGMA_BY_NMEA_QUALITY_M = {1: 2.0, 2: 0.8, 4: 0.02, 5: 0.3}
 """Of GGA's quality field: single, differential, RTK fixed, RTK float."""
 _UNKNOWN_SIGMA_M = 0.5
@@ -37,7 +45,9 @@ class RouteError(BadInput):
 
 
 def load_route(path: str) -> Route:
-    """The route in a file. RouteError says in one sentence what is wrong."""
+    """The route in a file, ``?epsg=32632`` behind its name where its places are of a UTM zone that it does not name.
+    RouteError says in one sentence what is wrong."""
+    path, _, zone = path.partition("?epsg=")
     file = Path(path).expanduser()
     try:
         if file.suffix.lower() == ".mcap":
@@ -47,7 +57,10 @@ def load_route(path: str) -> Route:
         text = file.read_text(encoding="utf-8", errors="replace")
     except OSError as error:
         raise RouteError(f"{path}: {error.strerror}") from None
-    rows, sigma_m = _reader(file.suffix.lower(), text)(text, path)
+    reader = _reader(file.suffix.lower(), text)
+    if zone and reader is not _csv:
+        raise RouteError(f"{path}: only CSV has places of a UTM zone")
+    rows, sigma_m = _csv(text, path, zone) if reader is _csv else reader(text, path)
     return _route(file.stem, rows, sigma_m, path)
 
 
@@ -74,7 +87,7 @@ def _reader(suffix: str, text: str) -> Callable[[str, str], tuple[Rows, float]]:
     return _nmea if suffix == ".nmea" or start.startswith(("$", "!")) else _csv
 
 
-def _csv(text: str, path: str) -> tuple[Rows, float]:
+def _csv(text: str, path: str, zone: str = "") -> tuple[Rows, float]:
     sample = text[:4096]
     delimiter = max(",;\t ", key=sample.count)
     try:
@@ -84,16 +97,52 @@ def _csv(text: str, path: str) -> tuple[Rows, float]:
     if not lines:
         return [], _UNKNOWN_SIGMA_M
     names = [cell.strip().lower() for cell in lines[0]]
-    lat = next((names.index(name) for name in _LAT_NAMES if name in names), None)
-    lon = next((names.index(name) for name in _LON_NAMES if name in names), None)
+    east, north = _column(names, _EAST_NAMES), _column(names, _NORTH_NAMES)
+    if east is not None and north is not None:
+        return _from_utm(lines[1:], east, north, _column(names, _ZONE_NAMES), zone, path), _UNKNOWN_SIGMA_M
+    if zone:
+        raise RouteError(f"{path}: no columns named easting and northing; it has {', '.join(names[:8])}")
+    lat, lon = _column(names, _LAT_NAMES), _column(names, _LON_NAMES)
     if lat is None or lon is None:
         if _number(lines[0][0]) is None:
-            raise RouteError(f"{path}: no columns named lat and lon; it has {', '.join(names[:8])}")
+            raise RouteError(
+                f"{path}: no columns named lat and lon, or easting and northing; it has {', '.join(names[:8])}"
+            )
         lat, lon = 0, 1
     else:
         lines = lines[1:]
     pairs = [(_number(row[lat]), _number(row[lon])) for row in lines if len(row) > max(lat, lon)]
     return [(a, b) for a, b in pairs if a is not None and b is not None], _UNKNOWN_SIGMA_M
+
+
+def _column(names: list[str], known: tuple[str, ...]) -> int | None:
+    return next((names.index(name) for name in known if name in names), None)
+
+
+def _from_utm(lines: list[list[str]], east: int, north: int, zone_at: int | None, zone: str, path: str) -> Rows:
+    """Latitudes and longitudes of places in metres of one UTM zone: the one asked for, else the file's own."""
+    rows = [row for row in lines if len(row) > max(east, north)]
+    named = {row[zone_at].strip() for row in rows if len(row) > zone_at} if zone_at is not None and not zone else {zone}
+    epsg = {utm_epsg(each) for each in named}
+    if len(epsg) != 1 or None in epsg:
+        wrong = f"not one UTM zone: {', '.join(sorted(named))[:80]}" if named - {""} else "its UTM zone is not said"
+        raise RouteError(f"{path}: {wrong}; a column zone (32N) or epsg (32632) says it, or {path}?epsg=32632")
+    pairs = [(_number(row[east]), _number(row[north])) for row in rows]
+    places = [(x, y) for x, y in pairs if x is not None and y is not None]
+    to_degrees = Transformer.from_crs(epsg.pop(), 4326, always_xy=True)
+    degrees = [to_degrees.transform(x, y) for x, y in places]
+    return [(lat, lon) for lon, lat in degrees if math.isfinite(lat) and math.isfinite(lon)]
+
+
+def utm_epsg(zone: str) -> int | None:
+    """EPSG code of a UTM zone on WGS 84 given as one (32632, EPSG:32632) or as number and hemisphere (32N); null for
+    anything else. Letters of latitude bands are not taken: band S lies in the north."""
+    match = re.fullmatch(r"(?:EPSG:)?(32[67])(\d\d)|(\d{1,2}) ?([NS])", zone.strip().upper())
+    if match is None:
+        return None
+    base = int(match[1]) * 100 if match[1] else _UTM_NORTH if match[4] == "N" else _UTM_SOUTH
+    number = int(match[2] or match[3])
+    return base + number if 1 <= number <= 60 else None
 
 
 def _gpx(text: str, path: str) -> tuple[Rows, float]:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pyproj import Transformer
 
 from pipeline.recording.writer import SessionWriter
 from pipeline.sources import open_source
@@ -38,6 +39,41 @@ def gga(latitude: str, quality: str) -> str:
 def written(folder: Path, name: str, text: str) -> str:
     (folder / name).write_text(text, encoding="utf-8")
     return str(folder / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "asked"),
+    [
+        pytest.param("easting,northing\n{0},{1}\n{2},{3}\n", "?epsg=32632", id="asked for by EPSG code"),
+        pytest.param("easting,northing\n{0},{1}\n{2},{3}\n", "?epsg=32N", id="asked for by zone"),
+        pytest.param("t,Northing,Easting,zone\n0,{1},{0},32N\n1,{3},{2},32N\n", "", id="a column of zones"),
+        pytest.param("easting;northing;epsg\n{0};{1};32632\nx;y;32632\n{2};{3};32632\n", "", id="a column of codes"),
+    ],
+)
+def test_places_of_a_utm_zone(tmp_path: Path, text: str, asked: str) -> None:
+    """The same places as in degrees, to a millimetre."""
+    utm = Transformer.from_crs(4326, 32632, always_xy=True)
+    places = [*utm.transform(11.2, 48.1), *utm.transform(11.3, 48.2)]
+    route = load_route(written(tmp_path, "a.csv", text.format(*places)) + asked)
+    assert route.name == "a"
+    assert route.lat_deg == pytest.approx([48.1, 48.2], abs=1e-8)
+    assert route.lon_deg == pytest.approx([11.2, 11.3], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("text", "asked", "says"),
+    [
+        pytest.param("easting,northing\n1,2\n3,4\n", "", "its UTM zone is not said", id="no zone"),
+        pytest.param("easting,northing\n1,2\n3,4\n", "?epsg=4326", "not one UTM zone: 4326", id="no UTM"),
+        pytest.param("easting,northing\n1,2\n3,4\n", "?epsg=61N", "not one UTM zone: 61N", id="no such zone"),
+        pytest.param("east,north,zone\n1,2,32N\n3,4,33N\n", "", "not one UTM zone: 32N, 33N", id="two zones"),
+        pytest.param("lat,lon\n48,11\n48.1,11\n", "?epsg=32632", "no columns named easting and", id="degrees"),
+        pytest.param(GGA, "?epsg=32632", "only CSV has places of a UTM zone", id="another kind of file"),
+    ],
+)
+def test_a_utm_zone_that_is_missing_or_wrong_is_said(tmp_path: Path, text: str, asked: str, says: str) -> None:
+    with pytest.raises(RouteError, match=says):
+        load_route(written(tmp_path, "a.csv", text) + asked)
 
 
 @pytest.mark.parametrize(
