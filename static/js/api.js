@@ -40,13 +40,14 @@ const newerOf = (_, newer) => newer;
  * @param {(waiting: T, newer: T) => T} merge  what to keep of two that wait
  */
 export function newestOnly(send, merge = newerOf) {
-  let busy = false;
-  /** @type {T|undefined} */
+  let busy = false, hasWaiting = false;
+  /** @type {T|undefined} undefined is a body too */
   let waiting;
   /** @param {T} body */
   return async function submit(body) {
     if (busy) {
-      waiting = waiting === undefined ? body : merge(waiting, body);
+      waiting = hasWaiting ? merge(/** @type {T} */ (waiting), body) : body;
+      hasWaiting = true;
       return;
     }
     busy = true;
@@ -54,9 +55,10 @@ export function newestOnly(send, merge = newerOf) {
       await send(body);
     } finally {
       busy = false;
-      const next = waiting;
+      const next = /** @type {T} */ (waiting), goesOn = hasWaiting;
       waiting = undefined;
-      if (next !== undefined) submit(next);
+      hasWaiting = false;
+      if (goesOn) submit(next);
     }
   };
 }

@@ -54,7 +54,7 @@ function refreshIfForeign() {
   if (!state || state.frame === null || (state.params_revision <= knownRevision && state.uri === knownUri)) return;
   knownRevision = state.params_revision;
   knownUri = state.uri;
-  request("api/params").then(accept, refuse);
+  request(`api/params?person=${encodeURIComponent(knownName())}`).then(accept, refuse);
 }
 
 /** @param {ParamsAnswer} answer */

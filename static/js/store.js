@@ -27,6 +27,8 @@
  * @property {import("./labeling/span.js").Marked} marked  the frames that a lead is painted over
  * @property {import("./labeling/acts.js").Saving} saving
  * @property {import("./labeling/three.js").Dragged} dragged  the selected label under a hand in the 3D view
+ * @property {string} person  who labels, once it was said here
+ * @property {import("./labeling/steps.js").Steps} steps
  * @property {string} said  what the labeling mode has to say
  * @property {import("./labeling/projection.js").Projected} projected
  * @property {{left: import("./types.js").Point2[], right: import("./types.js").Point2[]}} drawnPath  a path under a hand

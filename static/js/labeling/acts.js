@@ -1,18 +1,24 @@
 /**
  * Acts on their way to the server: one after the other, so that each is based on what the one before it left. What is
- * said to be saved is what the server has answered.
+ * said to be saved is what the server has answered. Each has an id of its own: one whose answer was lost is sent once
+ * more, and done once.
  */
 import { Refused, request } from "../api.js";
 import { get, on, set } from "../store.js";
 import { choose } from "./conflict.js";
 import * as data from "./data.js";
 import { knownName, personName } from "./person.js";
-import { refsOf, rebased } from "./refs.js";
+import { rebased } from "./refs.js";
+import { driveNow } from "./steps.js";
 
 /** @typedef {import("./types.js").Act} Act */
 /** @typedef {import("./types.js").ActAnswer} ActAnswer */
 /** at_ms: when the server last said that something is on disk; problem: why the next is not. @typedef {{state: "saved"|"saving"|"failed", at_ms: number|null, problem: string}} Saving */
-/** @typedef {{act: Act, path: string, person: string, done: (answer: ActAnswer|null) => void}} Waiting */
+/** What is sent. @typedef {{person: string, drive?: string, act_id: string, act?: Act}} Body */
+/** @typedef {{act: Act, path: string, body: Body, done: (answer: ActAnswer|null) => void}} Waiting */
+
+/** Of a server that is not there now, or of what stands before it: it may be sent once more. */
+const AWAY = [502, 503, 504];
 
 /** @type {Waiting[]} the first is under way, or waits for the server to be reached */
 const queue = [];
@@ -21,8 +27,8 @@ let busy = false;
 let savedAt_ms = null;
 
 export function setUp() {
-  addEventListener("beforeunload", (event) => queue.length && event.preventDefault());
-  on(["link"], () => get("link")?.status === "live" && queue.length && send());
+  addEventListener("beforeunload", (event) => (busy || queue.length) && event.preventDefault());
+  on(["link"], () => get("link")?.status === "live" && send());
 }
 
 /**
@@ -38,16 +44,26 @@ export async function act(act) {
 export const move = (direction) => put({ kind: direction }, `api/labels/${direction}`, knownName());
 
 /** @param {Act} act @param {string} path @param {string} person @returns {Promise<ActAnswer|null>} */
-function put(act, path, person) {
+async function put(act, path, person) {
+  const drive = await driveNow();
   return new Promise((done) => {
     const last = queue.at(-1);
     if (last && queue.length > 1 && isSameShape(last.act, act)) {
       last.done(null); // another nudge of the same cuboid, before the one before it went out
       queue.pop();
     }
-    queue.push({ act, path, person, done });
+    queue.push({ act, path, body: { person, ...(drive && { drive }), act_id: newId() }, done });
     send();
   });
+}
+
+/** A UUID of version 4. A page that came over plain HTTP from another machine has no `randomUUID`. @returns {string} */
+export function newId() {
+  if (crypto.randomUUID) return crypto.randomUUID();
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  bytes[6] = (bytes[6] & 0x0f) | 0x40;
+  bytes[8] = (bytes[8] & 0x3f) | 0x80;
+  return [...bytes].map((byte, i) => ([4, 6, 8, 10].includes(i) ? "-" : "") + byte.toString(16).padStart(2, "0")).join("");
 }
 
 /** @param {Act} a @param {Act} b */
@@ -57,53 +73,55 @@ const isSameShape = (a, b) => a.kind === "set_sighting" && b.kind === a.kind && 
 export async function send() {
   if (busy) return;
   busy = true;
-  for (let next = queue[0]; next; next = queue[0]) {
-    tell("saving");
-    if (!(await one(next))) break;
-    queue.shift();
+  try {
+    for (let next = queue[0]; next; next = queue[0]) {
+      tell("saving");
+      /** @type {ActAnswer|Error} */
+      const answer = await request(next.path, "POST", next.path.endsWith("/act") ? { ...next.body, act: next.act } : next.body).catch((error) => error);
+      const refusal = answer instanceof Refused && !AWAY.includes(answer.status) ? answer : null;
+      if (answer instanceof Error && !refusal) return tell("failed", answer instanceof Refused ? answer.message : "the server cannot be reached");
+      queue.shift();
+      if (refusal) await refused(next, refusal);
+      else settle(next, /** @type {ActAnswer} */ (answer));
+    }
+  } finally {
+    busy = false;
   }
-  busy = false;
 }
 
-/** Send one. @param {Waiting} waiting @returns {Promise<boolean>} whether nothing more is to be done about it */
-async function one(waiting) {
-  const { act, path, person, done } = waiting;
-  try {
-    /** @type {ActAnswer} */
-    const answer = await request(path, "POST", path.endsWith("/act") ? { person, act } : { person });
-    settle(act, answer);
-    done(answer);
-    return true;
-  } catch (error) {
-    if (!(error instanceof Refused) || error.status >= 500) {
-      tell("failed", error instanceof Refused ? error.message : "the server cannot be reached");
-      return false;
-    }
-    if (error.status === 409 && error.answer?.theirs) {
-      data.look();
-      const mine = await choose(act, error.message, error.answer.theirs);
-      if (mine) {
-        waiting.act = mine;
-        return one(waiting);
-      }
-    }
-    tell("saved");
-    set("said", error.message);
-    done(null);
-    return true;
+/** Give up everything that is not saved; what the server has is shown again. */
+export function discard() {
+  if (busy) return;
+  for (const { done } of queue.splice(0)) done(null);
+  tell("saved");
+  data.look();
+}
+
+/** The server will not do it: of two people's changes the person here chooses, of all else it is said why. @param {Waiting} waiting @param {Refused} refusal */
+async function refused(waiting, refusal) {
+  const { detail, item, theirs } = refusal.answer ?? {};
+  data.look(); // this page may have been behind, or the server half way through
+  if (item && theirs) {
+    const mine = await choose(waiting.act, detail, item, theirs);
+    if (mine) return queue.unshift({ ...waiting, act: mine, body: { ...waiting.body, act_id: newId() } });
   }
+  tell("saved");
+  set("said", refusal.message);
+  waiting.done(null);
 }
 
 /** @param {Saving["state"]} state */
 const tell = (state, problem = "") => set("saving", { state, at_ms: savedAt_ms, problem });
 
-/** What has only begun (proposals, imports) and what changed nothing is not said to be saved. @param {Act} act @param {ActAnswer} answer */
-function settle(act, answer) {
+/** What has only begun (proposals, imports) and what changed nothing is not said to be saved. @param {Waiting} waiting @param {ActAnswer} answer */
+function settle({ act, done }, answer) {
   if (answer.act != null) savedAt_ms = Date.now();
   tell("saved");
   const how = { undo: "undone: ", redo: "done again: " }[act.kind] ?? "";
   set("said", how + [answer.what, answer.note].filter(Boolean).join(": "));
-  if (!answer.changed) return;
-  for (const later of queue.slice(1)) later.act = rebased(later.act, refsOf(act), answer.changed);
-  data.accept(answer.changed);
+  if (answer.changed) {
+    for (const later of queue) later.act = rebased(later.act, act, answer);
+    data.accept(answer.changed);
+  }
+  done(answer);
 }

@@ -1,8 +1,8 @@
 /** The labeling mode's bar: who leads here, where to go next, and what is saved. Below the timeline: its keys. */
 import { $, el, keyed, mark, press, text } from "../dom.js";
 import { get, on, paint, set } from "../store.js";
-import { redo, undo } from "../whatif/history.js";
-import { send } from "./acts.js";
+import { possible, redo, undo } from "../whatif/history.js";
+import { discard, send } from "./acts.js";
 import * as commands from "./commands.js";
 import { CLASSES } from "./cuboid.js";
 import { present } from "./draft.js";
@@ -22,7 +22,7 @@ const MOST_LEADS = 7;
 let ended = null;
 
 const where = el("span", { class: "facts where" }), leads = el("span", { class: "joined leads", aria: { role: "group", label: "Who leads" } });
-const saved = el("span", { class: "saved", aria: { role: "status" } }), again = el("button", { type: "button", textContent: "Retry", hidden: true, onclick: send });
+const saved = el("span", { class: "saved", aria: { role: "status" } }), again = el("button", { type: "button", textContent: "Retry", hidden: true, onclick: send }), discarded = el("button", { type: "button", textContent: "Discard", title: "Give up what is not saved", hidden: true, onclick: discard });
 const said = el("span", { class: "facts said", aria: { role: "status" } });
 const task = el("span", { class: "task", hidden: true }, el("progress", { max: 1, aria: { label: "Progress" } }), el("span", { class: "facts" }));
 const name = el("button", { type: "button", class: "quiet", title: "Who labels" });
@@ -48,12 +48,16 @@ export function setUp() {
     el("b", { textContent: "Lead" }), leads, where,
     el("b", { textContent: "Next" }), el("span", { class: "joined", aria: { role: "group", label: "Go to the next" } }, next("Unlabelled", "Next frame in which something is unlabelled (N)", "unlabelled"),
       next("Disagreement", "Next disagreement of labels and pipeline (V)", "disagreement"), next("Proposed", "Next proposal (B)", "proposed"), next("Sent back", "Next label that was sent back (Y)", "sent_back")),
-    fresh, kind, said, task, saved, again, back, forth, name);
+    fresh, kind, said, task, saved, again, discarded, back, forth, name);
   $("#label-keys").append(...labelKeys().flatMap(({ bindings }) => bindings).filter(({ brief }) => brief).map(({ shown: keys, brief }) =>
     el("span", {}, el("kbd", { textContent: keys }), ` ${brief}`)));
   paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);
   on(["saving", "said", "link"], reflectSaving);
   on(["state"], reflectTask);
+  on(["state", "steps"], () => {
+    back.disabled = !possible()?.can_undo;
+    forth.disabled = !possible()?.can_redo;
+  });
   on(["frame"], () => get("said") && text(said, ""));
 }
 
@@ -80,15 +84,13 @@ function reflectSaving() {
   const saving = get("saving"), at = saving?.at_ms ? new Date(saving.at_ms).toLocaleTimeString("en-GB") : "";
   saved.dataset.state = saving?.state ?? "";
   text(saved, !saving ? "" : saving.state === "saving" ? "saving…" : saving.state === "failed" ? `not saved: ${saving.problem}` : at ? `saved ${at}` : "");
-  again.hidden = saving?.state !== "failed";
+  again.hidden = discarded.hidden = saving?.state !== "failed";
   text(said, get("said") ?? "");
   said.title = get("said") ?? "";
 }
 
 function reflectTask() {
   const state = get("state"), current = state?.labels?.task ?? null;
-  back.disabled = !state?.labels?.can_undo;
-  forth.disabled = !state?.labels?.can_redo;
   ended ??= current && !current.running ? current.id : -1;
   const isFailed = Boolean(current?.error) && current?.id !== ended;
   task.hidden = !current?.running && !isFailed;

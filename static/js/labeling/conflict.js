@@ -2,21 +2,22 @@
 import { request } from "../api.js";
 import { el } from "../dom.js";
 import { open } from "./dialogs.js";
-import { based, refsOf } from "./refs.js";
+import { based } from "./refs.js";
 
 /** @typedef {import("./types.js").Act} Act */
 
 /**
  * The act to send instead, based on what the other person left; null to let theirs stand.
- * @param {Act} act @param {string} sentence what the server says @param {any} theirs the item as it is now @returns {Promise<Act|null>}
+ * @param {Act} act @param {string} sentence what the server says @param {{kind: import("./types.js").ItemKind, id: number}} item which they changed
+ * @param {any} theirs the item as it is now @returns {Promise<Act|null>}
  */
-export async function choose(act, sentence, theirs) {
+export async function choose(act, sentence, item, theirs) {
   const place = typeof act.track === "number" && typeof act.frame === "number" ? await placeOf(act.track, act.frame) : null;
   const body = el("div", {}, el("p", { textContent: sentence }),
     el("div", { class: "conflict" }, side("Yours", act), side("Theirs", { ...theirs, cuboid: place?.cuboid, bbox: place?.bbox })));
   return open("Two people changed the same label", body, null, [
     ["Take theirs", null],
-    ["Keep mine", () => based(act, (ref) => (isThat(act, ref, theirs) ? theirs.revision : ref.revision))],
+    ["Keep mine", () => based(act, (ref) => (ref.kind === item.kind && ref.id === item.id ? theirs.revision : ref.revision))],
   ]);
 }
 
@@ -26,9 +27,6 @@ async function placeOf(track, frame) {
   const { sightings } = await request(`api/labels/frames?first=${frame}&last=${frame}`).catch(() => ({ sightings: {} }));
   return sightings[frame]?.find((each) => each.track === track) ?? null;
 }
-
-/** Of an act about several items, `theirs` is the one that has moved on. @param {Act} act @param {import("./types.js").ItemRef} ref @param {any} theirs */
-const isThat = (act, ref, theirs) => ref.id === theirs.id || refsOf(act).length === 1;
 
 /** What a person does not choose by. */
 const HIDDEN = ["kind", "id", "track", "items", "tracks", "revision", "interpolate", "sightings", "origin", "keyframes"];

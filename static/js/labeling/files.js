@@ -70,8 +70,8 @@ async function freeze(event) {
   event.preventDefault();
   const person = await personName();
   if (person === null) return;
-  await attempt(() => request("api/labels/versions", "POST", { name: freezeName.value.trim(), person }));
-  freezeName.value = "";
+  const isDone = await attempt(() => request("api/labels/versions", "POST", { name: freezeName.value.trim(), person }));
+  if (isDone) freezeName.value = "";
   look();
 }
 
@@ -88,8 +88,11 @@ async function upload(event) {
   });
 }
 
-/** @param {() => Promise<unknown>} what */
+/** @param {() => Promise<unknown>} what @returns {Promise<boolean>} whether it was done */
 async function attempt(what) {
   text(problem, "");
-  await what().catch((error) => text(problem, error.message));
+  return what().then(() => true, (error) => {
+    text(problem, error.message);
+    return false;
+  });
 }

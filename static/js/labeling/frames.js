@@ -19,18 +19,18 @@ const fetchChunk = newestOnly(async (/** @type {number} */ number) => {
   const asked = size, last = Math.min((get("state")?.count ?? 1) - 1, (number + 1) * size - 1);
   /** @type {import("./types.js").SightingsAnswer|null} */
   const answer = await request(`api/labels/frames?first=${number * size}&last=${last}`).catch(() => null);
-  if (!answer || get("labels")?.uri !== labels.uri || asked !== size) return;
+  if (!answer || get("labels")?.load !== labels.load || asked !== size) return;
   keep(number, { revision: answer.revision, byFrame: answer.sightings });
   set("labelFrames", (get("labelFrames") ?? 0) + 1);
 });
 
 export function setUp() {
-  let uri = "";
+  let load = 0;
   on(["labels", "frame", "labeling"], () => {
     const labels = get("labels");
     const fitting = labels ? sizeFor(labels) : size;
-    if (labels?.uri !== uri || fitting !== size) {
-      uri = labels?.uri ?? "";
+    if ((labels?.load ?? 0) !== load || fitting !== size) {
+      load = labels?.load ?? 0;
       size = fitting;
       chunks.clear();
     }

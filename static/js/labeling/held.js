@@ -10,6 +10,8 @@ import { get } from "../store.js";
  * @typedef {object} Labels
  * @property {number} revision
  * @property {string} uri
+ * @property {string} drive  of its content
+ * @property {number} load  grows whenever everything was fetched anew: nothing that was known before holds
  * @property {Map<number, LabelTrack>} tracks
  * @property {LeadRange[]} leads  by first frame
  * @property {import("./types.js").PathLabel[]} paths
@@ -17,8 +19,10 @@ import { get } from "../store.js";
  * @property {import("./types.js").FrameTag[]} tags
  */
 
-/** @param {string} uri @returns {Labels} */
-export const nothing = (uri) => ({ revision: 0, uri, tracks: new Map(), leads: [], paths: [], events: [], tags: [] });
+let loads = 0;
+
+/** @param {string} uri @param {string} drive @returns {Labels} */
+export const nothing = (uri, drive) => ({ revision: 0, uri, drive, load: ++loads, tracks: new Map(), leads: [], paths: [], events: [], tags: [] });
 
 /** What is held, with what changed. @param {Labels} before @param {LabelsAnswer} answer @returns {Labels} */
 export function merged(before, answer) {
@@ -27,7 +31,7 @@ export function merged(before, answer) {
   for (const id of gone("track")) tracks.delete(id);
   for (const track of answer.tracks) tracks.set(track.id, track);
   return {
-    revision: answer.revision, uri: before.uri, tracks,
+    ...before, revision: answer.revision, tracks,
     leads: joined(before.leads, answer.leads, gone("lead")).sort((a, b) => a.first - b.first),
     paths: joined(before.paths, answer.paths, gone("path")),
     events: joined(before.events, answer.events, gone("event")),

@@ -1,5 +1,6 @@
 /** Who labels. Asked once, kept in this browser, and changed by pressing the name. */
 import { el, memory } from "../dom.js";
+import { set } from "../store.js";
 import { ask } from "./dialogs.js";
 
 /** @type {Promise<string|null>|null} */
@@ -16,7 +17,10 @@ export async function personName() {
 export function askName() {
   asking ??= ask("Who labels?", el("p", { class: "facts", textContent: "Every label keeps the name of who made it." }), "Name", knownName()).then((name) => {
     asking = null;
-    if (name) memory.write("person", name);
+    if (name) {
+      memory.write("person", name);
+      set("person", name);
+    }
     return name;
   });
   return asking;

@@ -2,7 +2,7 @@
 
 /** @typedef {import("./types.js").Act} Act */
 /** @typedef {import("./types.js").ItemRef} ItemRef */
-/** @typedef {import("./types.js").LabelsAnswer} LabelsAnswer */
+/** @typedef {import("./types.js").ActAnswer} ActAnswer */
 
 /** @type {Record<import("./types.js").ItemKind, "tracks"|"leads"|"paths"|"events"|"tags">} */
 const LISTS = { track: "tracks", lead: "leads", path: "paths", event: "events", tag: "tags" };
@@ -25,14 +25,15 @@ export function based(act, revisionOf) {
 }
 
 /**
- * An act that waited while this page's own earlier act changed one of its items: it is based on what that one left. Changes
- * by others stay a conflict.
- * @param {Act} act @param {ItemRef[]} sent what the earlier act was based on @param {LabelsAnswer} changed @returns {Act}
+ * An act that waited while this page's own earlier one changed its items: it is based on what that one left. Changes by
+ * others stay a conflict; an undo or redo is refused where there are any.
+ * @param {Act} act @param {Act} earlier @param {ActAnswer} answer to the earlier one @returns {Act}
  */
-export function rebased(act, sent, changed) {
-  return based(act, (ref) => {
-    const isOwn = sent.some((each) => each.kind === ref.kind && each.id === ref.id && each.revision === ref.revision);
-    const list = /** @type {{id: number, revision: number}[]} */ (changed[LISTS[ref.kind]]);
-    return (isOwn ? list.find(({ id }) => id === ref.id)?.revision : null) ?? ref.revision;
+export function rebased(act, earlier, answer) {
+  const sent = refsOf(earlier), isMove = earlier.kind === "undo" || earlier.kind === "redo";
+  return based(act, ({ kind, id, revision }) => {
+    const isOwn = isMove || sent.some((each) => each.kind === kind && each.id === id && each.revision === revision);
+    const list = /** @type {{id: number, revision: number}[]} */ (answer.changed?.[LISTS[kind]] ?? []);
+    return isOwn && list.some((each) => each.id === id && each.revision === answer.act) ? /** @type {number} */ (answer.act) : revision;
   });
 }

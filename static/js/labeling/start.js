@@ -13,10 +13,11 @@ import * as pictureHand from "./picturehand.js";
 import { drawInPlan } from "./plan.js";
 import * as planHand from "./planhand.js";
 import * as projection from "./projection.js";
+import * as steps from "./steps.js";
 import * as three from "./three.js";
 
 export function setUp() {
-  for (const part of [mode, acts, data, frames, draft, projection, three, bar, panel, pictureHand]) part.setUp();
+  for (const part of [mode, acts, data, steps, frames, draft, projection, three, bar, panel, pictureHand]) part.setUp();
   addMode({ isOn: mode.isOn, draw: drawInPlan, ...planHand });
   addLayer(drawInPicture, "over");
 }
