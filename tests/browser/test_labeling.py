@@ -10,36 +10,45 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, Route, expect
+from playwright.sync_api import Page, Route, expect
 
 from pipeline.params import Params
-from tests.browser.conftest import START, OpenPage, Site, opening
+from tests.browser.conftest import START, OpenPage, Pages, Site, opening
 from tests.browser.judges import LOW_CONTRAST
 from tests.browser.labeling import Hand, Labels, begin, is_at, is_saved
 from tests.browser.looks import COUNT, box_of, go_to, on_timeline, pixels, repainted, wait_for_frame, whole_drive
 
 SCREENS = Path(__file__).resolve().parents[2] / "build" / "screens"
+EXPORT = "#label-pane .pane-bar > button"
 LEAD_X, LEAD_Y = 34.6, 0.0
 """Where the simulated lead's middle is in the shown frame."""
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
 
-REFUSED = ("status of 409", "status of 503", "ERR_FAILED")
+REFUSED = ("status of 409", "status of 500", "status of 503", "ERR_FAILED")
 """What a browser's console says of requests that are refused."""
 
 
 @dataclass
 class Line:
     """Between a page and its server. Put there when the page opens: a busy browser may let a request through that comes
-    right after. full: acts find no room on the server's disk. deaf: the page does not hear what changed."""
+    right after. full: acts find no room on the server's disk. broken: the server fails at them. mute: they are done, and
+    the answer is lost. deaf: the page does not hear what changed."""
 
     full: bool = False
+    broken: bool = False
+    mute: bool = False
     deaf: bool = False
 
     def act(self, route: Route) -> None:
         if self.full:
             route.fulfill(status=503, json={"detail": "the disk is full"})
+        elif self.broken:
+            route.fulfill(status=500, body="")
+        elif self.mute:
+            route.fetch()
+            route.abort()
         else:
             route.continue_()
 
@@ -51,12 +60,12 @@ class Line:
 
 
 @pytest.fixture(scope="module")
-def desk(browser: Browser, site: Site) -> Iterator[tuple[Page, Line]]:
+def desk(pages: Pages, site: Site) -> Iterator[tuple[Page, Line]]:
     """One page in the labeling mode, for all who label here."""
     line = Line()
-    with opening(browser, site) as open_page:
+    with opening(pages, site) as open_page:
         page = open_page(expects=REFUSED)
-        page.route(re.compile(r"/api/labels/act$"), line.act)
+        page.route(re.compile(r"/api/labels/(act|undo)$"), line.act)
         page.route(re.compile(r"/api/labels\?since="), line.changes)
         begin(page)
         yield page, line
@@ -71,7 +80,7 @@ def line(desk: tuple[Page, Line]) -> Line:
 def hand(desk: tuple[Page, Line], site: Site) -> Hand:
     """Nothing is labelled, nothing is selected, and the page is at ``START``."""
     page, line = desk
-    line.full = line.deaf = False
+    line.full = line.broken = line.mute = line.deaf = False
     Labels(page, site.address).clear(COUNT)
     page.get_by_role("tab", name="Tracks").click()
     for _ in range(3):
@@ -209,17 +218,22 @@ def test_a_hand_in_the_3d_view_moves_it_in_every_view(hand: Hand, labels: Labels
     is_saved(page)
     cuboid = labels.cuboid(made, START)
     cuboid["center"][0] -= 6.0
-    dragged = """async ([track, cuboid, ended]) => {
+    dragged = """async ([track, frame, cuboid, ended]) => {
       const { set } = await import("/js/store.js");
-      set("dragged", { track, cuboid, ended });
+      set("dragged", { track, frame, cuboid, ended });
     }"""
     plan, picture = pixels(page, "#bev"), pixels(page, "#camera")
-    page.evaluate(dragged, [made, cuboid, False])
+    page.evaluate(dragged, [made, START, cuboid, False])
     assert repainted(page, "#bev", plan)
     assert repainted(page, "#camera", picture)
     assert labels.cuboid(made, START) != cuboid, "the hand still holds it"
-    page.evaluate(dragged, [made, cuboid, True])
+    hand.keys("f")
+    is_at(page, START + 1)
+    page.evaluate(dragged, [made, START, cuboid, True])
     labels.wait_for(lambda now: now.cuboid(made, START) == cuboid)
+    assert labels.cuboid(made, START + 1) is None, (
+        "the frame in which it was taken hold of, not the one shown at the end"
+    )
 
 
 def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, site: Site):
@@ -269,7 +283,10 @@ def test_two_people_see_each_other_and_choose_when_they_disagree(
     row = other.locator(f".track-row[data-id='{made}']")
     expect(row).to_contain_text("car")
     row.click()
+    undo = other.get_by_role("button", name="Undo your last change")
+    expect(undo).to_be_disabled()  # what Ada did is hers to take back
     second.keys("t")
+    expect(undo).to_be_enabled()
     expect(hand.page.locator(f".track-row[data-id='{made}']")).to_contain_text("truck")
 
     line.deaf = True  # the other's change does not reach this page before its own act
@@ -300,6 +317,119 @@ def test_what_is_called_saved_is_what_the_server_answered(hand: Hand, labels: La
     page.get_by_role("button", name="Retry").click()
     labels.wait_for(lambda now: now.cuboid(made, START)["center"][0] == pytest.approx(before["center"][0] + 0.1))
     expect(state).to_contain_text("saved ")
+
+
+def test_an_act_whose_answer_was_lost_is_done_once(hand: Hand, labels: Labels, line: Line):
+    page = hand.page
+    made = draw(hand, labels)
+    is_saved(page)
+    line.mute = True
+    hand.keys("t")
+    expect(page.locator(".saved")).to_have_text("not saved: the server cannot be reached")
+    done = labels.get(f"/history?kind=track&id={made}")
+    line.mute = False
+    page.get_by_role("button", name="Retry").click()
+    is_saved(page)
+    assert labels.get(f"/history?kind=track&id={made}") == done
+    assert len(done) == 2
+
+
+def test_what_the_server_fails_at_or_a_person_gives_up_holds_nothing_up(hand: Hand, labels: Labels, line: Line):
+    page = hand.page
+    made = draw(hand, labels)
+    is_saved(page)
+    line.broken = True
+    hand.keys("t")
+    expect(page.locator(".said")).to_have_text("the server answered 500")
+    line.broken, line.full = False, True
+    hand.keys("t")
+    expect(page.locator(".saved")).to_have_text("not saved: the disk is full")
+    line.full = False
+    page.get_by_role("button", name="Discard").click()
+    is_saved(page)
+    assert labels.tracks[made]["label"] == "car"
+    hand.keys("t")
+    labels.wait_for(lambda now: now.tracks[made]["label"] == "truck")
+
+
+def test_what_follows_an_undo_that_waits_is_no_conflict_with_oneself(hand: Hand, labels: Labels, line: Line):
+    page = hand.page
+    made = draw(hand, labels)
+    hand.keys("t")
+    labels.wait_for(lambda now: now.tracks[made]["label"] == "truck")
+    is_saved(page)
+    line.full = True
+    hand.keys("Control+z")
+    expect(page.locator(".saved")).to_have_text("not saved: the disk is full")
+    before = labels.cuboid(made, START)["center"][0]
+    hand.keys("ArrowUp")
+    line.full = False
+    page.get_by_role("button", name="Retry").click()
+    labels.wait_for(lambda now: now.cuboid(made, START)["center"][0] == pytest.approx(before + 0.1))
+    assert labels.tracks[made]["label"] == "car"
+    expect(page.get_by_role("dialog")).to_be_hidden()
+
+
+def test_the_labels_of_another_database_are_read_anew(hand: Hand, labels: Labels):
+    """As after a restart of the server: it knows less than the page does."""
+    page = hand.page
+    made = draw(hand, labels)
+    is_saved(page)
+    page.evaluate(
+        """async (made) => {
+          const { get, set } = await import("/js/store.js"), labels = get("labels");
+          const tracks = new Map(labels.tracks).set(99999, { ...labels.tracks.get(made), id: 99999 });
+          set("labels", { ...labels, tracks, revision: labels.revision + 50 });
+        }""",
+        made,
+    )
+    page.get_by_role("button", name="All", exact=True).click()
+    expect(page.locator(".track-row[data-id='99999']")).to_be_visible()
+    page.evaluate("""async () => { (await import("/js/labeling/data.js")).look(); }""")
+    expect(page.locator(".track-row[data-id='99999']")).to_have_count(0)
+    expect(page.locator(f".track-row[data-id='{made}']")).to_be_visible()
+
+
+def test_the_small_rules_of_sending(hand: Hand):
+    """Where a page has no ``randomUUID``; two that ask for nothing in particular while one is under way; two items of
+    one number."""
+    page = hand.page
+    made = page.evaluate(
+        """async () => {
+          const { newId } = await import("/js/labeling/acts.js"), own = newId();
+          Object.defineProperty(crypto, "randomUUID", { value: undefined, configurable: true });
+          const ids = [own, newId(), newId()];
+          delete crypto.randomUUID;
+          return ids;
+        }"""
+    )
+    assert len(set(made)) == 3
+    assert all(
+        re.fullmatch(r"[0-9a-f]{8}-[0-9a-f]{4}-4[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}", each) for each in made
+    )
+    sent = page.evaluate(
+        """async () => {
+          const { newestOnly } = await import("/js/api.js"), waits = [];
+          let sent = 0;
+          const submit = newestOnly(() => new Promise((done) => { sent += 1; waits.push(done); }));
+          const first = submit(undefined);
+          submit(undefined);
+          submit(undefined);
+          waits[0]();
+          await first;
+          return sent;
+        }"""
+    )
+    assert sent == 2
+    page.evaluate(
+        """async () => {
+          const { choose } = await import("/js/labeling/conflict.js");
+          const items = [{ kind: "track", id: 3, revision: 5 }, { kind: "lead", id: 3, revision: 6 }];
+          window.chosen = choose({ kind: "accept", items }, "Bob changed #3 since", { kind: "track", id: 3 }, { id: 3, revision: 9 });
+        }"""
+    )
+    page.get_by_role("button", name="Keep mine").click()
+    assert [each["revision"] for each in page.evaluate("async () => (await window.chosen).items")] == [9, 6]
 
 
 def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, site: Site):
@@ -337,7 +467,7 @@ def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, hei
     page.screenshot(path=SCREENS / f"labeling_{width}_{theme}.png")
     assert page.evaluate(LOW_CONTRAST) == []
     assert nameless(page) == []
-    for part in ("#label-bar", "#label-pane", "#label-keys", "#timeline-front", "#bev", "#camera"):
+    for part in ("#label-bar", "#label-pane", "#label-keys", "#timeline-front", "#bev", "#camera", EXPORT):
         box = box_of(page.locator(part))
         assert box["x"] >= 0, part
         assert box["y"] >= 0, part
@@ -428,6 +558,11 @@ def test_a_drive_is_reviewed_frozen_and_taken_back_in(hand: Hand, labels: Labels
     page.get_by_label("Name of the version").fill("reviewed")
     page.get_by_role("button", name="Freeze").click()
     version = page.locator(".label-files a", has_text="reviewed")
+    expect(version).to_be_visible()
+    page.get_by_label("Name of the version").fill("reviewed")
+    page.get_by_role("button", name="Freeze").click()
+    expect(page.locator("#label-files [role=alert]")).not_to_be_empty()
+    expect(page.get_by_label("Name of the version")).to_have_value("reviewed")
     with page.expect_download() as download:
         version.click()
     download.value.save_as(tmp_path / "reviewed.json")
