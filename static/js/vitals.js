@@ -1,4 +1,4 @@
-/** How fresh and how fast: from result made to painted, frames painted a second, and what the stages took. */
+/** How fresh and how fast: from result made to painted, frames painted a second, what the stages took, what was skipped. */
 import { serverNow } from "./connection.js";
 import { $, el, text } from "./dom.js";
 import { num } from "./format.js";
@@ -9,6 +9,7 @@ const ITEMS = [
   ["age", "age", "Milliseconds from the result made to the frame painted", ""],
   ["line", "line", "Milliseconds that the stages took, without the network", "optional"],
   ["net", "net", "Milliseconds of the network; 0 when its boxes were cached", "optional"],
+  ["skipped", "skipped", "Frames since the opening that came faster than they could be computed or shown", ""],
 ];
 /** @type {Record<string, HTMLElement>} */
 const values = {};
@@ -19,6 +20,8 @@ export function setUp() {
   $("#vitals").append(...ITEMS.map(([key, label, title, className]) =>
     el("div", { title, class: className }, el("dt", { textContent: label }), (values[key] = el("dd", { textContent: "–" })))));
   on(["frame"], () => requestAnimationFrame(afterPaint));
+  on(["state"], showSkipped);
+  showSkipped();
   setInterval(showRate, 500);
 }
 
@@ -31,6 +34,13 @@ function afterPaint() {
   text(values.net, num(frame.detectMs, 0));
   const { timing_ms: stages } = frame.result;
   $("#vitals").title = Object.entries(stages).map(([stage, ms]) => `${stage} ${num(ms, 2)} ms`).join("\n");
+}
+
+/** Whoever is spared nothing needs no word of it. */
+function showSkipped() {
+  const skipped = get("state")?.skipped ?? 0;
+  text(values.skipped, String(skipped));
+  $("#vitals").lastElementChild?.toggleAttribute("hidden", !skipped);
 }
 
 function showRate() {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,6 +12,7 @@ from playwright.sync_api import Page, expect
 from app.engine import Engine
 from pipeline.params import Params
 from pipeline.sources import open_any
+from pipeline.sources.base import is_live_source
 from pipeline.sources.live.config import load
 from tests.app.recording import CountingDetector
 from tests.browser.conftest import WAIT_MS, OpenPage, Site
@@ -61,6 +63,11 @@ def test_live_sensors_are_watched_held_and_let_go_on(open_page: OpenPage, car: t
         expect(page.get_by_role("button", name=name)).to_be_disabled()
     seen = until(page, "get('frame').bitmap && get('frame').count > 1000 && get('drive')?.count > 5")
     assert until(page, f"get('frame').state.sequence > {seen} + 3") > seen + 3, "it goes on by itself"
+    source = site.engine.source
+    assert source is not None
+    assert is_live_source(source)
+    source.dropped += 1000
+    expect(page.locator("#vitals div", has_text="skipped")).to_contain_text(re.compile(r"skipped1\d{3}$"))
     page.keyboard.press("Space")
     site.engine.wait_for(lambda s: not s.playing, WAIT_MS / 1e3)
     until(page, "!get('state').playing")
