@@ -9,9 +9,10 @@ import tempfile
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, HTTPException, Query, Request, Response
 from fastapi.responses import FileResponse, JSONResponse
 from starlette.background import BackgroundTask
+from starlette.requests import ClientDisconnect
 
 from app.labels.desk import LabelDesk
 from app.labels.files import exported
@@ -44,8 +45,10 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
                     await asyncio.to_thread(file.write, piece)
             with refusing():
                 number = await asyncio.to_thread(desk.begin_import, person, path, format)
-        except BaseException:
+        except BaseException as error:
             path.unlink(missing_ok=True)
+            if isinstance(error, ClientDisconnect):  # nobody hears it, but it is no trouble of this program
+                raise HTTPException(400, "the file did not come whole") from None
             raise
         return JSONResponse({"status": "begun", "what": "import", "task": number}, 202)
 

@@ -327,11 +327,26 @@ def test_a_version_is_frozen_and_given_out(engine: Engine, client: httpx.Client)
     assert client.get("/api/labels/versions/nobody").status_code == 404
 
 
+def test_a_name_is_the_same_however_it_is_spaced(client: httpx.Client) -> None:
+    spaced = " Ada  Lovelace "
+    assert act(client, spaced, kind="tag", frame=3, tag="night").is_success
+    assert labels(client, person=spaced)["can_undo"]
+    assert client.post("/api/labels/undo", json={"person": spaced}).json()["what"].endswith("night")
+    change = {"changes": {"cipv.confirm_hits": 5}, "person": spaced}
+    assert client.patch("/api/params", json=change).is_success
+    assert client.post("/api/labels/undo", json={"person": "Ada Lovelace"}).is_success
+    assert client.get("/api/params").json()["values"]["cipv.confirm_hits"] == 3
+
+
 @pytest.mark.parametrize(
     ("method", "path", "status"),
     [
         ("GET", "/api/labels/tracks/77", 404),
         ("GET", "/api/labels/tracks/x", 422),
+        ("GET", f"/api/labels/tracks/{2**63}", 422),
+        ("GET", f"/api/labels/frames?first={2**63}&last={2**63}", 422),
+        ("GET", f"/api/labels/next?what=unlabelled&frame={2**63}", 422),
+        ("GET", f"/api/labels?since={2**63}", 422),
         ("GET", "/api/labels/frames?first=0&last=200", 422),
         ("GET", "/api/labels/frames?first=3&last=2", 422),
         ("GET", "/api/labels?since=-1", 422),
@@ -489,6 +504,9 @@ def test_a_database_that_fails_keeps_nobody_from_driving(
             client.post("/api/labels/undo", json={"person": "A"}),
         ):
             assert (refused.status_code, refused.json()["detail"]) == (503, "labels: the server is away")
+        patched.setattr(Database, "reading", away)
+        compared = client.get("/api/compare")
+        assert (compared.status_code, compared.json()["truth"] != "labels") == (200, True)
     client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 3}})
     assert act(client, kind="tag", frame=1, tag="x").status_code == 200
 
