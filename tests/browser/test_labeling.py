@@ -33,8 +33,8 @@ REFUSED = ("status of 409", "status of 500", "status of 503", "ERR_FAILED")
 @dataclass
 class Line:
     """Between a page and its server. Put there when the page opens: a busy browser may let a request through that comes
-    right after. full: acts find no room on the server's disk. broken: the server fails at them. mute: they are done, and
-    the answer is lost. deaf: the page does not hear what changed."""
+    right after. full: acts find no room on the server's disk. broken: the server fails at them. mute: they are done,
+    and the answer is lost. deaf: the page does not hear what changed."""
 
     full: bool = False
     broken: bool = False
@@ -425,7 +425,8 @@ def test_the_small_rules_of_sending(hand: Hand):
         """async () => {
           const { choose } = await import("/js/labeling/conflict.js");
           const items = [{ kind: "track", id: 3, revision: 5 }, { kind: "lead", id: 3, revision: 6 }];
-          window.chosen = choose({ kind: "accept", items }, "Bob changed #3 since", { kind: "track", id: 3 }, { id: 3, revision: 9 });
+          const item = { kind: "track", id: 3 }, theirs = { id: 3, revision: 9 };
+          window.chosen = choose({ kind: "accept", items }, "Bob changed #3 since", item, theirs);
         }"""
     )
     page.get_by_role("button", name="Keep mine").click()
