@@ -57,8 +57,6 @@ class LabelState:
             return None
         return {
             "revision": self.revision,
-            "can_undo": self.can_undo,
-            "can_redo": self.can_redo,
             "task": self.task.to_json() if self.task is not None else None,
         }
 
@@ -196,6 +194,16 @@ class LabelDesk:
         """Labels of a file or folder that was handed in, as another tool made them; it is removed in the end."""
         recording, labels = self._named(drive)
         return self.tasks.begin("import", importing_file(labels, recording, person, file, name))
+
+    def possible(self, person: str) -> tuple[bool, bool]:
+        """(there is something to take back, something to do again) for a person; nothing while the database fails:
+        nobody who changes parameters waits for one that is known to be away."""
+        if self._trouble:
+            return False, False
+        try:
+            return self._labels_of(self._open).log.possible(person)
+        except BadInput:
+            return False, False
 
     def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
         """Parameters were changed. A database that fails does not keep anybody from driving: it is said, and the change

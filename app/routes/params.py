@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
-from fastapi import APIRouter, HTTPException, Response
+from fastapi import APIRouter, HTTPException, Query, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
@@ -21,22 +21,27 @@ from pipeline.types import REAL_VEHICLES, Frame
 _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": ParamsJson}}
 
 
-class Changes(BaseModel):
+class Step(BaseModel):
+    """A change of parameters that can be undone."""
+
+    person: PersonOrNobody = Field("", description="Whose step it is to undo; anyone's without a name")
+
+
+class Changes(Step):
     """Dotted names with their new values; null, where permitted, takes the calibration's or the detector's own."""
 
     changes: dict[str, Any] = Field(min_length=1, examples=[{"cluster.z_weight": 0.4}])
     final: bool = Field(True, description="False while a slider is dragged: shown, but no step and no whole-drive run")
-    person: PersonOrNobody = Field("", description="Whose step it is to undo; anyone's without a name")
 
 
-class Replacement(BaseModel):
+class Replacement(Step):
     """A preset, and what differs from it."""
 
     preset: str = Field("default", examples=list(PRESETS))
     values: dict[str, Any] = Field(default_factory=dict, examples=[{"cluster.z_weight": 0.4}])
 
 
-class PresetChoice(BaseModel):
+class PresetChoice(Step):
     """A preset's name."""
 
     name: str = Field(examples=list(PRESETS))
@@ -47,9 +52,10 @@ def params_router(engine: Engine) -> APIRouter:
     router = APIRouter(prefix="/api", tags=["parameters"])
 
     @router.get("/params", responses=_ANSWER)
-    def read() -> JSONResponse:
-        """Sections with every parameter's bounds, step, unit and help; values; what null means now."""
-        return _params_json(engine)
+    def read(person: Annotated[PersonOrNobody, Query()] = "") -> JSONResponse:
+        """Sections with every parameter's bounds, step, unit and help; values; what null means now. can_undo, can_redo:
+        of the person, across labels and parameters."""
+        return _params_json(engine, person)
 
     @router.patch("/params", responses=_ANSWER)
     def change(body: Changes) -> JSONResponse:
@@ -58,16 +64,17 @@ def params_router(engine: Engine) -> APIRouter:
             engine.control.change_params(body.changes, final=body.final, person=body.person)
         except ParamsError as error:
             raise HTTPException(422, str(error)) from None
-        return _params_json(engine)
+        return _params_json(engine, body.person)
 
     @router.post("/params", responses=_ANSWER)
     def replace_all(body: Replacement) -> JSONResponse:
         """Replace every parameter: a preset's values, then those that are given."""
         try:
-            engine.control.set_params(with_changes(preset(body.preset), body.values), body.preset)
+            params = with_changes(preset(body.preset), body.values)
+            engine.control.set_params(params, body.preset, person=body.person)
         except ParamsError as error:
             raise HTTPException(422, str(error)) from None
-        return _params_json(engine)
+        return _params_json(engine, body.person)
 
     @router.post("/params/undo", responses=_ANSWER)
     def undo() -> JSONResponse:
@@ -88,10 +95,10 @@ def params_router(engine: Engine) -> APIRouter:
     def choose_preset(body: PresetChoice) -> JSONResponse:
         """Replace every parameter by a preset's."""
         try:
-            engine.control.set_params(preset(body.name), body.name)
+            engine.control.set_params(preset(body.name), body.name, person=body.person)
         except ParamsError as error:
             raise HTTPException(422, str(error)) from None
-        return _params_json(engine)
+        return _params_json(engine, body.person)
 
     @router.get("/params.yaml", response_class=Response, responses=file_of("application/yaml"))
     def download() -> Response:
@@ -136,14 +143,15 @@ def effective(frame: Frame | None, params: Params) -> dict[str, float]:
     }
 
 
-def _params_json(engine: Engine) -> JSONResponse:
+def _params_json(engine: Engine, person: str = "") -> JSONResponse:
     wish, tick = engine.control.peek(), engine.snapshot.tick
+    can_undo, can_redo = engine.labels.possible(person)
     answer = {
         "preset": wish.preset,
         "presets": list(PRESETS),
         "revision": wish.params_revision,
-        "can_undo": engine.labels.state.can_undo,
-        "can_redo": engine.labels.state.can_redo,
+        "can_undo": can_undo,
+        "can_redo": can_redo,
         "sections": describe(),
         "values": flat(wish.params),
         "base": flat(preset(wish.preset)),

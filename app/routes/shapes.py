@@ -203,16 +203,15 @@ class LabelTaskJson(_Exact):
 
 
 class LabelStateJson(_Exact):
-    """revision: the number of acts; when it is another, GET /api/labels?since=. can_undo, can_redo: for anyone."""
+    """revision: the number of acts; when it is another, GET /api/labels?since=."""
 
     revision: int
-    can_undo: bool
-    can_redo: bool
     task: LabelTaskJson | None
 
 
 class StateJson(_Exact):
-    """Source, position, playback. streams: how live sensors do, by sensor. sequence grows with every result."""
+    """Source, position, playback. streams: how live sensors do, by sensor. sequence grows with every result. can_undo,
+    can_redo: of changes of parameters that nobody put a name to; a person's own are in /api/labels and /api/params."""
 
     uri: str | None
     title: str
@@ -283,7 +282,7 @@ class ParamSectionJson(_Exact):
 
 class ParamsJson(_Exact):
     """values and base (the preset's) by dotted name; effective: what null stands for with the shown camera and the
-    detector in use."""
+    detector in use. can_undo, can_redo: of the person who asks, or of steps that nobody put a name to."""
 
     preset: str
     presets: list[str]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -14,7 +15,10 @@ import httpx
 import pytest
 from websockets.sync.client import connect
 
-from app.server import listen_socket
+from app.engine import Engine
+from app.server import Server, listen_socket, serve
+from pipeline.params import Params
+from tests.app.recording import Recording, opener
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
@@ -34,6 +38,14 @@ def taken_port() -> Iterator[int]:
     with listen_socket("127.0.0.1", 0) as held:
         held.listen()
         yield held.getsockname()[1]
+
+
+def test_two_servers_of_one_machine_keep_their_parameters_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    ports: list[int] = []
+    monkeypatch.setattr(Server, "run", lambda _, sockets: ports.append(sockets[0].getsockname()[1]))
+    engine = Engine(opener(Recording()), None, Params())
+    serve(engine, port=0)
+    assert engine.labels.station == f"{socket.gethostname()}:{ports[0]}"
 
 
 def test_it_passes_over_a_taken_port_answers_and_ends_with_open_streams(taken_port: int):
