@@ -31,12 +31,14 @@ class AccState:
 
 @dataclass(frozen=True)
 class Demand:
-    """One wish for a speed, what asks for it, and the object it slows down for."""
+    """One wish for a speed, what asks for it, and the object it slows down for. no_faster: than now, whatever the PID
+    remembers."""
 
     speed_mps: float
     state: State
     reason: str
     object_id: int | None = None
+    no_faster: bool = False
 
 
 def control(
@@ -48,7 +50,8 @@ def control(
     dt_s: float | None,
     params: AccParams,
 ) -> tuple[AccState, AccCommand | None]:
-    """Pedals for this frame; null, with the memory cleared, where ego speed is not known."""
+    """Pedals for this frame; null, with the memory cleared, where ego speed is not known, nor was a moment ago
+    (``own_motion.recent``)."""
     if ego is None:
         return AccState(), None
     demand = min(
@@ -56,6 +59,7 @@ def control(
         key=lambda wish: wish.speed_mps,
     )
     state, accel = pid(state, demand.speed_mps - ego.speed_mps, dt_s, params)
+    accel = min(accel, 0.0) if demand.no_faster else accel
     return state, AccCommand(
         state=demand.state,
         desired_speed_mps=demand.speed_mps,
@@ -117,13 +121,15 @@ def avoid(
 
 def hold(ego: EgoState, path: Path, params: AccParams) -> list[Demand]:
     """No faster than now where nobody knows well enough where the car is going: a lead could be anywhere. Slower than
-    the speed at which a curve shows at all, the car may creep on."""
-    if path.usable:
+    the speed at which a curve shows at all, the car may creep on. Nor where the own speed is one of a while ago."""
+    coasts = ego.coasting is not None
+    if path.usable and not coasts:
         return []
-    allowed = max(ego.speed_mps, CREEP_MPS)
+    allowed = ego.speed_mps if coasts else max(ego.speed_mps, CREEP_MPS)
     if allowed >= params.set_speed_kmh / 3.6:
         return []
-    return [Demand(allowed, "cruise", f"path known for {path.reach_m:.0f} m only: no faster than now")]
+    why = f"own speed not measured for {ego.coasting.age_s:.1f} s" if ego.coasting is not None else path.doubt
+    return [Demand(allowed, "cruise", f"{why}: no faster than now", no_faster=allowed <= ego.speed_mps)]
 
 
 def pid(state: AccState, error_mps: float, dt_s: float | None, params: AccParams) -> tuple[AccState, float]:

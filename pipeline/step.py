@@ -15,7 +15,7 @@ from time import perf_counter_ns
 
 import numpy as np
 
-from pipeline import acc, aeb, alignment, cipv, fusion, kalman, motion
+from pipeline import acc, aeb, agreement, alignment, cipv, fusion, kalman, motion, own_motion
 from pipeline.geometry import iou_matrix
 from pipeline.lidar import boxes, cluster, deskew, downsample, ground
 from pipeline.lidar import tracking as lidar_tracking
@@ -25,6 +25,7 @@ from pipeline.path import corridor, lanes, placing, yaw_rate
 from pipeline.types import (
     VEHICLES,
     CameraCalibration,
+    EgoState,
     Frame,
     Ground,
     Layers,
@@ -46,6 +47,8 @@ class State:
     lidar: lidar_tracking.LidarTrackerState = lidar_tracking.LidarTrackerState()
     vision: vision_tracking.VisionTrackerState = vision_tracking.VisionTrackerState()
     fusion: fusion.FusionState = fusion.FusionState()
+    agreement: agreement.AgreementState = agreement.AgreementState()
+    own: EgoState | None = None
     lanes: lanes.LaneState = lanes.LaneState()
     path: corridor.PathState = corridor.PathState()
     cipv: cipv.CipvState = cipv.CipvState()
@@ -58,7 +61,9 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     state, dt_s = _continue_or_restart(state, frame, params)
     clock = _Stopwatch()
     aligned = alignment.resolve(params.alignment, frame.camera)
-    ego = yaw_rate.believable(frame.ego)
+    measured_ego = yaw_rate.believable(frame.ego)
+    own = own_motion.follow(state.own, measured_ego, dt_s, params.motion)
+    ego = own_motion.recent(own, params.motion)
 
     sweep = deskew.deskew(frame.sweep, ego, params.deskew)
     clock.lap("deskew")
@@ -79,15 +84,18 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         state.fusion, lidar_tracks, vision_tracks, aligned, _picture_size(frame), params.fusion
     )
     clock.lap("fusion")
-    objects = motion.describe(fused.objects, ego, params.motion)
+    objects = motion.describe(fused.objects, measured_ego, params.motion)
     vehicles = [each.detection.bbox for each in measured or () if each.detection.label in VEHICLES]
     lane_state, lane = lanes.follow(
         state.lanes, frame.raw_lanes, aligned, seen.ground, ego, dt_s, params.lanes, vehicles
     )
     clock.lap("lanes")
+    moved_by = frame.ego if measured_ego is not None else own
     path_state, path = corridor.predict(
-        state.path, frame.ego, lane, frame.gnss, frame.route, frame.t_ns, dt_s, params.path
+        state.path, moved_by, lane, frame.gnss, frame.route, frame.t_ns, dt_s, params.path
     )
+    agreed = agreement.follow(state.agreement, objects, dt_s, params.fusion)
+    path = agreement.heed(path, agreed, params.fusion)
     clock.lap("path")
     cipv_state, chosen = cipv.choose(state.cipv, objects, path, ego, dt_s, params.cipv)
     objects, lead = chosen.objects, chosen.lead
@@ -124,7 +132,17 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         ),
     )
     return State(
-        frame.t_ns, lidar_state, vision_state, fusion_state, lane_state, path_state, cipv_state, acc_state, aeb_state
+        frame.t_ns,
+        lidar_state,
+        vision_state,
+        fusion_state,
+        agreed,
+        own,
+        lane_state,
+        path_state,
+        cipv_state,
+        acc_state,
+        aeb_state,
     ), result
 
 

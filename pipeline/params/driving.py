@@ -9,6 +9,15 @@ class MotionParams(Section):
     """What counts as moving."""
 
     moving_mps: float = slider(1.5, 0.1, 10.0, 0.1, "m/s", "Speed over ground above which an object is moving")
+    coast_s: float = slider(
+        2.0, 0.0, 5.0, 0.1, "s", "ACC and AEB go on with the last own speed for this long when none is measured"
+    )
+    coast_accel_mps2: float = slider(
+        1.0, 0.1, 5.0, 0.1, "m/s²", "How fast an own speed that is not measured may change"
+    )
+    coast_turn_radps2: float = slider(
+        0.03, 0.001, 0.2, 0.001, "rad/s²", "How fast a yaw rate that is not measured may change"
+    )
 
 
 class PathParams(Section):

@@ -21,7 +21,7 @@ import numpy as np
 from pipeline.geometry import F64
 from pipeline.params import PathParams
 from pipeline.path import fusing, gnss, yaw_rate
-from pipeline.path.estimates import SOURCES, STEP_M, between_lines, straight
+from pipeline.path.estimates import SOURCES, STEP_M, PathEstimate, between_lines, straight
 from pipeline.path.fusing import FusedPath
 from pipeline.path.gnss import GnssState
 from pipeline.path.lane_types import EgoLane
@@ -66,14 +66,16 @@ def predict(
         along_route,
         yaw_rate.ahead(yaw, ego, params),
     )
-    estimates = [each for each in seen if each is not None] or [straight(ego, params)]
+    estimates = [each for each in seen if each is not None]
+    if not estimates or _fades(ego, estimates):
+        estimates.append(straight(ego, params))
     expected = _expected(state.last, yaw, ego, dt_s, len(estimates[0].center))
     fresh, left_out = fusing.fuse(estimates, expected, params.half_width_m, params.outlier_sigmas)
     path = fresh
     if expected is not None and dt_s:
         keep = exp(-dt_s / params.smoothing_s) if params.smoothing_s > 0.0 else 0.0
         path = fusing.blend(fresh, expected, keep, _FASTEST_SHIFT_MPS * dt_s)
-    notes = (*_about_yaw_rate(ego), *wrong_fix, *wrong_route, *left_out)
+    notes = (*_about_own_motion(ego), *wrong_fix, *wrong_route, *left_out)
     return PathState(yaw, placed, path if ego is not None else None), _as_path(path, ego, notes, params)
 
 
@@ -104,10 +106,18 @@ def _expected(
         rate = yaw.rate_radps
     if rate is None:
         return None
-    return fusing.moved(last, max(ego.speed_mps, 0.0) * dt_s, rate * dt_s, dt_s)
+    return fusing.moved(last, max(ego.speed_mps, 0.0) * dt_s, rate * dt_s, dt_s, ego.coasting)
 
 
-def _about_yaw_rate(ego: EgoState | None) -> tuple[str, ...]:
+def _fades(ego: EgoState | None, estimates: list[PathEstimate]) -> bool:
+    """Whether yaw rate and pose are those of a while ago and no line shows the road: as they get less sure, a straight
+    guess takes over little by little."""
+    return ego is not None and ego.coasting is not None and all(each.source != "lane" for each in estimates)
+
+
+def _about_own_motion(ego: EgoState | None) -> tuple[str, ...]:
+    if ego is not None and ego.coasting is not None:
+        return (f"own speed not measured for {ego.coasting.age_s:.1f} s: taken for {ego.speed_mps * 3.6:.0f} km/h",)
     broken = ego is not None and ego.yaw_rate_radps is not None and yaw_rate.usable_rate(ego) is None
     return ("the yaw rate is not one that a car can have: left out",) if broken else ()
 
@@ -129,7 +139,9 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
     needed_m = _needed_m(ego, params)
     sigma = float(sigma_m[min(int(needed_m / STEP_M), len(sigma_m) - 1)])
     usable = reach_m >= min(needed_m, params.length_m)
+    doubt = ""
     if not usable:
+        doubt = f"path known for {max(reach_m, 0.0):.0f} m only"
         notes = (*notes, f"the path is known well enough for {max(reach_m, 0.0):.0f} m only")
     return Path(
         source=source,
@@ -143,6 +155,7 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
         carried_by=carried_by,
         reach_m=max(reach_m, 0.0),
         usable=usable,
+        doubt=doubt,
         confidence=erf(params.half_width_m / sigma / sqrt(2.0)) if sigma > 0.0 else 1.0,
         notes=notes,
     )

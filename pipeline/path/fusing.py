@@ -15,6 +15,7 @@ import numpy as np
 
 from pipeline.geometry import F64
 from pipeline.path.estimates import SOURCES, STEP_M, PathEstimate
+from pipeline.types import Coasting
 
 COMPARED_M = 60.0
 """Sources are compared up to here: farther ahead none of them is meant to agree closely."""
@@ -82,7 +83,8 @@ def _edges(estimates: list[PathEstimate], half_width_m: float) -> tuple[F64, F64
 
 def blend(fresh: FusedPath, expected: FusedPath, keep: float, largest_m: float) -> FusedPath:
     """The path follows its sources smoothly. keep: 0–1, how much of the expected path stays at equal sigmas.
-    largest_m: no point moves farther than this and the expected path's own sigma in one frame.
+    largest_m: no point moves farther than this in one frame, and by what the fresh path knows better: one that has just
+    lost a source does not jump to what is left.
 
     The two share their sources, so they are joined by covariance intersection (Julier and Uhlmann 1997): the weights
     are ``keep`` and 1 − ``keep`` times the inverse variances, and the outcome is never surer than either."""
@@ -100,14 +102,20 @@ def blend(fresh: FusedPath, expected: FusedPath, keep: float, largest_m: float) 
     )
 
 
-def moved(path: FusedPath, travelled_m: float, turned_rad: float, dt_s: float) -> FusedPath:
+def moved(
+    path: FusedPath, travelled_m: float, turned_rad: float, dt_s: float, coasting: Coasting | None = None
+) -> FusedPath:
     """The path of ``dt_s`` ago as the car sees it now, having driven a little arc. It is less sure by what speed and
-    yaw rate may be off by: 0.3 m sideways and 0.003 rad in a second, growing with the root of time."""
+    yaw rate may be off by: 0.3 m sideways and 0.003 rad in a second, growing with the root of time. coasting: and by
+    what they may be off by where they are those of a while ago; a way that is longer or shorter shifts a bend aside."""
     rows = np.column_stack([path.sigma_m, path.left_m, path.right_m, path.shares])
     center, rows = _moved(path.center, rows, travelled_m, turned_rad, STEP_M)
     s = np.arange(len(center)) * STEP_M
-    grown = np.sqrt(rows[:, 0] ** 2 + (0.3**2 + (0.003 * s) ** 2) * dt_s)
-    return FusedPath(center, grown, rows[:, 1], rows[:, 2], rows[:, 3:], np.zeros(len(center)))
+    variance = rows[:, 0] ** 2 + (0.3**2 + (0.003 * s) ** 2) * dt_s
+    if coasting is not None:
+        bent2 = (normals(center)[:, 0]) ** 2
+        variance = variance + coasting.turned_var_rad2 * s * s + coasting.travelled_var_m2 * bent2
+    return FusedPath(center, np.sqrt(variance), rows[:, 1], rows[:, 2], rows[:, 3:], np.zeros(len(center)))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -205,7 +213,7 @@ def _blend(fresh, fresh_sigma, old, old_sigma, keep, largest):  # type: ignore[n
         share = a / (a + b)
         sigma[k] = np.sqrt(1.0 / (a + b))
         step = abs(apart) * (1.0 - share)
-        allowed = largest + old_sigma[k]
+        allowed = largest + np.sqrt(max(old_sigma[k] ** 2 - fresh_sigma[k] ** 2, 0.0))
         if step > allowed:
             share = 1.0 - allowed / abs(apart)
             behind[k] = step - allowed

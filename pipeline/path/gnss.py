@@ -67,12 +67,12 @@ def follow(
 
 
 def _dead_reckoned(state: GnssState, ego: EgoState | None, dt_s: float) -> GnssState:
-    """Moved on by ego speed and yaw rate; without ego speed the pose is lost."""
+    """Moved on by ego speed and yaw rate; where there never was an ego speed the pose is lost."""
     if state.pose is None or dt_s <= 0.0:
         return state
     pose = None
     if ego is not None and isfinite(ego.speed_mps):
-        pose = poses.predict(state.pose, ego.speed_mps, usable_rate(ego), dt_s)
+        pose = poses.predict(state.pose, ego.speed_mps, usable_rate(ego), dt_s, ego.coasting)
     doubt_m = state.doubt_m * exp(-dt_s / _DOUBT_FADES_S)
     return GnssState(state.line, pose, state.fix_t_ns, state.fix_sigma_m, doubt_m, state.refused_s, state.at_m)
 
@@ -102,7 +102,7 @@ def _with_fix(
             return state, ()
         pose = poses.start(*_moved_on(x, y, heading, fix.speed_mps, age_s), heading, scatter_m)
         return GnssState(line, pose, fix.t_ns, fix.sigma_m, state.doubt_m), ()
-    speed_mps = ego.speed_mps if ego is not None else fix.speed_mps
+    speed_mps = ego.speed_mps if ego is not None and ego.coasting is None else fix.speed_mps
     x, y = _moved_on(x, y, float(state.pose.mean[2]), speed_mps, age_s)
     jump = poses.jump_m(state.pose, x, y, scatter_m, params.gnss_gate_sigmas)
     if jump is not None:

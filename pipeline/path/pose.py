@@ -18,6 +18,7 @@ import numba
 import numpy as np
 
 from pipeline.geometry import F64
+from pipeline.types import Coasting
 
 WHITE_SHARE = 0.2
 """Scatter from fix to fix as a share of the receiver's sigma (0.3 m where it says 1.5 m; 2 mm where RTK says 1 cm)."""
@@ -60,11 +61,17 @@ def white_sigma_m(sigma_m: float) -> float:
     return max(WHITE_FLOOR_M, WHITE_SHARE * sigma_m)
 
 
-def predict(pose: Pose, speed_mps: float, yaw_rate_radps: float | None, dt_s: float) -> Pose:
-    """The pose ``dt_s`` later by dead reckoning; a yaw rate that nobody measures is 0 ± 0.05 rad/s."""
+def predict(
+    pose: Pose, speed_mps: float, yaw_rate_radps: float | None, dt_s: float, coasting: Coasting | None = None
+) -> Pose:
+    """The pose ``dt_s`` later by dead reckoning; a yaw rate that nobody ever measured is 0 ± 0.05 rad/s. coasting: what
+    comes on top where speed and yaw rate are those of a while ago."""
     turn = GROWTH.heading_rad_per_root_s if yaw_rate_radps is not None else GROWTH.heading_without_yaw_rate
     along = (GROWTH.speed_share * speed_mps + GROWTH.speed_mps) * dt_s
-    mean, cov = _predict(pose.mean, pose.cov, speed_mps, yaw_rate_radps or 0.0, dt_s, along**2, turn**2 * dt_s)
+    along_var, turn_var = along**2, turn**2 * dt_s
+    if coasting is not None:
+        along_var, turn_var = along_var + coasting.travelled_var_m2, turn_var + coasting.turned_var_rad2
+    mean, cov = _predict(pose.mean, pose.cov, speed_mps, yaw_rate_radps or 0.0, dt_s, along_var, turn_var)
     return Pose(mean, cov)
 
 

@@ -49,8 +49,9 @@ def follow(before: YawRate | None, ego: EgoState | None, dt_s: float | None, par
         return None
     if before is not None and dt_s:
         change = params.lateral_jerk_mps3 / ego.speed_mps * dt_s
-        before = YawRate(before.rate_radps, before.variance + change * change)
-    measured = usable_rate(ego)
+        coasted = ego.coasting.rate_var_rad2ps2 if ego.coasting is not None else 0.0
+        before = YawRate(before.rate_radps, before.variance + change * change + coasted)
+    measured = usable_rate(ego) if ego.coasting is None else None
     if measured is None:
         return before
     noise = params.yaw_rate_sigma_radps**2

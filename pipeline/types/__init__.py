@@ -9,6 +9,7 @@ from pipeline.types.arrays import F32, F64, I32, I64, U8, VEHICLES, Box, Mask, P
 from pipeline.types.frame import (
     REAL_VEHICLES,
     CameraCalibration,
+    Coasting,
     DistanceLaw,
     EgoState,
     Frame,
@@ -60,6 +61,7 @@ __all__ = [
     "Box",
     "CameraCalibration",
     "Cipv",
+    "Coasting",
     "Detection",
     "DistanceLaw",
     "EgoState",

@@ -51,12 +51,25 @@ class CameraCalibration:
 
 
 @dataclass(frozen=True)
+class Coasting:
+    """Of an own motion that is not measured any more. age_s: for how long. The others are what this tick adds to the
+    variances of the way driven, the heading and the yaw rate."""
+
+    age_s: float
+    travelled_var_m2: float
+    turned_var_rad2: float
+    rate_var_rad2ps2: float
+
+
+@dataclass(frozen=True)
 class EgoState:
-    """Own motion. ``yaw_rate_radps`` is positive to the left; null when no sensor gives it."""
+    """Own motion. ``yaw_rate_radps`` is positive to the left; null when no sensor gives it. coasting: null while it is
+    measured."""
 
     t_ns: int
     speed_mps: float
     yaw_rate_radps: float | None = None
+    coasting: Coasting | None = None
 
 
 GnssQuality = Literal["single", "dgnss", "rtk_float", "rtk_fixed"]

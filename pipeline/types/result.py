@@ -21,8 +21,9 @@ class Path:
     not be parallel to the centre. source: which one carries it at 30 m, or ``fused`` when none does alone. sigma_m: of
     the centre's sideways place at 10, 30, 60 m; profile_m: (K,) float64, the same at every point, empty where nobody
     worked it out. weights: each source's share over the whole; carried_by: at 10, 30, 60 m. reach_m: how far it is good
-    enough to drive after. usable: that is far enough at this speed. confidence: 0–1, that the true centre lies within
-    the corridor there. notes: what is wrong with the sources, for a person."""
+    enough to drive after. usable: that is far enough at this speed, and nothing speaks against it. doubt: else why not,
+    in words. confidence: 0–1, that the true centre lies within the corridor there. notes:
+    what is wrong with the sources, for a person."""
 
     source: PathSource
     center: F64
@@ -35,6 +36,7 @@ class Path:
     carried_by: dict[str, dict[str, float]] = field(default_factory=dict)
     reach_m: float = 0.0
     usable: bool = True
+    doubt: str = ""
     confidence: float = 1.0
     notes: tuple[str, ...] = ()
 

@@ -139,7 +139,7 @@ def test_approaching_a_standing_car_from_100_m_at_72_km_h_the_car_stops_before_i
 def test_where_nobody_knows_the_way_it_gets_no_faster() -> None:
     """Whoever may lead on an unknown path: with the set speed far above, the car holds its speed and says why; slowing
     down for a lead comes first all the same, and from standstill it may creep on."""
-    vague = dataclasses.replace(PATH, usable=False, reach_m=12.0)
+    vague = dataclasses.replace(PATH, usable=False, reach_m=12.0, doubt="path known for 12 m only")
     for speed_mps, wanted_mps in ((20.0, 20.0), (0.0, 3.0)):
         _, held = control(AccState(), EgoState(0, speed_mps), None, (), vague, 0.1, PARAMS)
         assert held is not None

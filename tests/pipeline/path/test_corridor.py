@@ -44,8 +44,9 @@ def test_source_of_the_path(state: EgoState | None, source: str) -> None:
 
 
 def test_a_guess_is_less_sure_than_a_measurement() -> None:
+    """As far ahead as a yaw rate is good for, two seconds of driving."""
     guessed, measured = corridor(None, PARAMS), corridor(ego(20.0, 0.0), PARAMS)
-    assert guessed.sigma_m["60"] > measured.sigma_m["60"] > measured.sigma_m["10"] > 0.0
+    assert guessed.sigma_m["30"] > 1.5 * measured.sigma_m["30"] > measured.sigma_m["10"] > 0.0
 
 
 def test_left_is_left() -> None:
