@@ -30,16 +30,22 @@ def fingerprint(uri: str) -> str:
 
 def content_key(t_ns: Sequence[int], frame: Callable[[int], Frame]) -> str:
     """Sixteen characters of what is in a recording, wherever it lies and whatever form it has: a session that was made
-    of it has the same. From the ticks of all frames, and the pictures (without one, the points) of the first, the
-    middle and the last one."""
+    of it has the same, and so has one whose LiDAR was found to be mounted otherwise, or beside which a video was put.
+    From the ticks of all frames, and what the sensor sent in the first, the middle and the last one."""
     digest = hashlib.sha256(np.array(t_ns, np.int64).tobytes())
     for index in sorted({0, len(t_ns) // 2, len(t_ns) - 1}) if t_ns else ():
-        shown = frame(index)
-        if shown.picture is not None:
-            digest.update(shown.picture.encoded or np.ascontiguousarray(shown.picture.bgr).tobytes())
-        elif shown.sweep is not None:
-            digest.update(np.ascontiguousarray(shown.sweep.points).tobytes())
+        digest.update(_as_sent(frame(index)))
     return digest.hexdigest()[:16]
+
+
+def _as_sent(frame: Frame) -> bytes:
+    """The intensities of a sweep, which no mount changes; where there are none the picture, or else the places."""
+    intensity = frame.sweep.points[:, 3] if frame.sweep is not None else np.empty(0)
+    if (intensity != intensity[:1]).any():
+        return intensity.tobytes()
+    if frame.picture is not None:
+        return frame.picture.encoded or np.ascontiguousarray(frame.picture.bgr).tobytes()
+    return np.ascontiguousarray(frame.sweep.points).tobytes() if frame.sweep is not None else b""
 
 
 def _files(rest: str) -> Iterator[Path]:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.recording.save import save
@@ -95,6 +96,43 @@ def test_another_recording_has_another_key() -> None:
             return super().t_ns(index) + 1
 
     assert len({key(each) for each in (Recording(count=5), Recording(count=6), Darker(count=5), Later(count=5))}) == 4
+
+
+class Sensed(Recording):
+    """Its LiDAR says how bright things are, as a real one does."""
+
+    def frame(self, index: int) -> Frame:
+        frame = super().frame(index)
+        assert frame.sweep is not None
+        points = frame.sweep.points.copy()
+        points[:, 3] = np.random.default_rng(index).integers(0, 255, len(points))
+        return replace(frame, sweep=replace(frame.sweep, points=points))
+
+
+def test_neither_a_mount_nor_a_video_beside_it_makes_it_another(tmp_path: Path) -> None:
+    class Mounted(Sensed):
+        """Found to look a little to the left."""
+
+        def frame(self, index: int) -> Frame:
+            frame = super().frame(index)
+            assert frame.sweep is not None
+            points = frame.sweep.points + np.array([0.0, 0.1, 0.0, 0.0], np.float32)
+            return replace(frame, sweep=replace(frame.sweep, points=points))
+
+    class Blind(Sensed):
+        def frame(self, index: int) -> Frame:
+            return replace(super().frame(index), picture=None)
+
+    class Elsewhere(Sensed):
+        """Other things are seen there, at the same times."""
+
+        def frame(self, index: int) -> Frame:
+            return super().frame(index + 1)
+
+    save(Sensed(count=5), tmp_path / "drive.mcap")
+    same = [Sensed(count=5), Mounted(count=5), Blind(count=5), open_source(str(tmp_path / "drive.mcap"))]
+    assert len({key(each) for each in same}) == 1  # type: ignore[arg-type]
+    assert key(Elsewhere(count=5)) != key(same[0])  # type: ignore[arg-type]
 
 
 def test_without_pictures_the_points_tell_recordings_apart() -> None:
