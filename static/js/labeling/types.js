@@ -82,8 +82,6 @@
  *
  * @typedef {object} LabelsState  in the stream's state
  * @property {number} revision  how many acts the drive has seen
- * @property {boolean} can_undo
- * @property {boolean} can_redo
  * @property {LabelTask|null} task
  *
  * @typedef {object} LabelsAnswer  what changed since a revision
