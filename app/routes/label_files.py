@@ -17,7 +17,7 @@ from starlette.requests import ClientDisconnect
 from app.labels.desk import LabelDesk
 from app.labels.files import exported
 from app.labels.requests import Person
-from app.labels.tables import LONGEST_NAME
+from app.labels.tables import LONGEST_ITEM, LONGEST_NAME
 from app.routes.label_shapes import VERSION_NAME, LostJson, NativeFile, NewVersion, TaskBegun, VersionJson
 from app.routes.refusals import refusing
 from app.routes.shapes import file_of
@@ -35,16 +35,22 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
     router = APIRouter(prefix="/api/labels", tags=["labels"])
 
     @router.post("/import", status_code=202, responses={202: {"model": TaskBegun}})
-    async def take(request: Request, person: Annotated[Person, Query()], format: FormatName = "native") -> Response:
+    async def take(
+        request: Request,
+        person: Annotated[Person, Query()],
+        format: FormatName = "native",
+        drive: Annotated[str | None, Query(max_length=LONGEST_ITEM)] = None,
+    ) -> Response:
         """Labels that another tool made of this recording: the body is the file, of a format that is a folder a .zip of
-        it. They come beside those that are there, as one act. state.labels.task tells how far it is."""
+        it. They come beside those that are there, as one act. state.labels.task tells how far it is. drive: id of the
+        recording that is meant; 409 when another one is open."""
         path = _new_file()
         try:
             with path.open("wb") as file:
                 async for piece in request.stream():
                     await asyncio.to_thread(file.write, piece)
             with refusing():
-                number = await asyncio.to_thread(desk.begin_import, person, path, format)
+                number = await asyncio.to_thread(desk.begin_import, person, path, format, drive)
         except BaseException as error:
             path.unlink(missing_ok=True)
             if isinstance(error, ClientDisconnect):  # nobody hears it, but it is no trouble of this program

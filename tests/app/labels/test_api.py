@@ -420,6 +420,8 @@ def test_what_was_meant_for_another_recording_is_not_done_to_this_one(client: ht
     for path, body in (("act", {"act": tag}), ("act", {"act": {"kind": "propose"}}), ("undo", {}), ("redo", {})):
         answer = client.post(f"/api/labels/{path}", json={"person": "Ada", "drive": "another"} | body)
         assert (answer.status_code, answer.json()["detail"]) == (409, "another recording is open now")
+    handed = client.post("/api/labels/import", params={"person": "Ada", "drive": "another"}, content=b"{}")
+    assert (handed.status_code, handed.json()["detail"]) == (409, "another recording is open now")
     assert labels(client)["revision"] == before
 
 
@@ -505,8 +507,7 @@ def test_a_database_that_fails_keeps_nobody_from_driving(
         ):
             assert (refused.status_code, refused.json()["detail"]) == (503, "labels: the server is away")
         patched.setattr(Database, "reading", away)
-        compared = client.get("/api/compare")
-        assert (compared.status_code, compared.json()["truth"] != "labels") == (200, True)
+        assert client.get("/api/compare").status_code == 200
     client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 3}})
     assert act(client, kind="tag", frame=1, tag="x").status_code == 200
 
