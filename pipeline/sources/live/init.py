@@ -37,7 +37,7 @@ camera:                     # exactly one of device, url, file
     distortion: []          # k1 k2 p1 p2 [k3 [k4 k5 k6]], as OpenCV gives them
     mount: {x_m: -1.5, y_m: 0.0, z_m: 0.9, roll_deg: 0.0, pitch_deg: 0.0, yaw_deg: 0.0}
 
-gnss:                       # NMEA sentences (GGA and RMC; GST if it is there); exactly one of serial, tcp, udp_port
+gnss:                       # NMEA (GGA, RMC, GST if it is there), best 5 a second; exactly one of serial, tcp, udp_port
   serial: /dev/ttyACM0
   baud: 115200
   # tcp: 192.168.1.30:9001

@@ -180,11 +180,13 @@ def test_what_a_slow_disk_leaves_no_room_for_is_counted_by_kind(
     assert len(list(session.file.messages(("/camera/image",)))) == state.frames + 3
 
 
-def test_a_new_file_holds_the_picture_of_its_first_frame(tmp_path: Path) -> None:
+def test_a_new_file_holds_the_picture_and_the_sweep_of_its_first_frame(tmp_path: Path) -> None:
     parts = Segments(tmp_path / "a.mcap", ABOUT, Rotation(max_s=0.2))
     frames = [full(index) for index in range(8)]
     for frame in frames:
         assert frame.picture is not None
+        assert frame.sweep is not None
+        parts.write_sweep(frame.sweep, frame.t_ns - 2)
         parts.write_picture(Shot(encoded=frame.picture.encoded), frame.t_ns - 7_000_001, frame.t_ns - 1)
         parts.write(frame, received_ns=frame.t_ns)
     parts.close()
@@ -192,8 +194,9 @@ def test_a_new_file_holds_the_picture_of_its_first_frame(tmp_path: Path) -> None
     sessions = [SessionSource("a", str(path)) for path in parts.files]
     read = [session.frame(index) for session in sessions for index in range(len(session))]
     assert [same(replace(a, index=b.index), b) for a, b in zip(read, frames, strict=True)] == [True] * 8
-    pictures = [len(list(session.file.messages(("/camera/image",)))) for session in sessions]
-    assert pictures == [4, 4, 2], "the one that came before a file began is in both"
+    for topic in ("/camera/image", "/lidar/points"):
+        counts = [len(list(session.file.messages((topic,)))) for session in sessions]
+        assert counts == [4, 4, 2], "the one that came before a file began is in both"
 
 
 def test_a_mark_stays_with_its_frame_however_many_wait(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
