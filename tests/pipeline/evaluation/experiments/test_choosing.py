@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from pipeline.evaluation.experiments.choosing import (
+    SENSORS,
+    UNDECIDABLE,
     Case,
     Frame,
     InSight,
+    Verdict,
     Way,
     acquired_m,
     report,
@@ -19,6 +22,23 @@ from pipeline.evaluation.lead import switches
 from pipeline.simulation import scenario, world
 from pipeline.simulation.camera import calibration
 from tests.pipeline.simulation.worlds import with_actors
+
+
+@pytest.mark.parametrize(("verdict", "fails"), [("correct", False), ("missed", True), ("new", False)])
+def test_one_wrong_frame_of_the_fused_fails_the_suite(verdict: Verdict, fails: bool) -> None:
+    cases = [Case("straight", sensors, 0) for sensors in SENSORS]
+    good, other = Frame(0.0, "correct", 1, 20.0, 1, 20.0), Frame(0.1, verdict, 1, 20.0, None, None)
+    section = report(cases, [[good], [good], [good, other]])
+    assert bool(section.failures) is fails
+    assert not report(cases, [[good, other], [good], [good]]).failures, "it is the fused line that is judged"
+
+
+def test_every_decidable_frame_is_right() -> None:
+    """One drive of the suite's twenty: the one in which a false alarm beside the lead once took its box."""
+    frames = run(Case("straight", "both", 8))
+    judged = [frame.verdict for frame in frames if frame.verdict not in UNDECIDABLE]
+    assert len(judged) > 50
+    assert set(judged) <= {"correct", "none"}
 
 
 def lead_of(actors: str, segments: str = "{length_m: 2000}") -> int | None:
