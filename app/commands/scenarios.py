@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -20,7 +21,8 @@ from pipeline.evaluation.experiments.sections import as_json
 
 @dataclass(frozen=True)
 class Scenarios:
-    """Drive experiments in the closed loop and report their figures beside the printed ones.
+    """Drive experiments in the closed loop and report their figures beside the printed ones. Exit status 1 when the
+    CIPV is not right as often as is demanded, in the four scenarios or in curves.
 
     Example: cipv scenarios run --suite euroncap --report ncap.html --drives ncap-drives
     """
@@ -60,4 +62,7 @@ class Scenarios:
             print(json.dumps([as_json(section) for section in sections], indent=1, ensure_ascii=False))
         else:
             show(sections)
-        return 0
+        failures = [failure for section in sections for failure in section.failures]
+        for failure in failures:
+            print(f"does not hold: {failure}", file=sys.stderr)
+        return 1 if failures else 0

@@ -234,6 +234,11 @@ def report(cases: Sequence[Case], runs: Sequence[list[Frame]]) -> Section:
         ),
         (Table("Frames", _COLUMNS, tuple(_row(*key, group) for key, group in groups.items()), decimals=1),),
         tuple(_chart(scene, groups) for scene in scenes),
+        tuple(
+            f"{SCENARIOS[scene].capitalize()}: fused is not right in every decidable frame"
+            for scene in scenes
+            if groups[scene, "both"] and _share_correct(groups[scene, "both"]) < 1.0
+        ),
     )
 
 

@@ -67,13 +67,15 @@ class Chart:
 
 @dataclass(frozen=True)
 class Section:
-    """One experiment's report. text: paragraphs, what was done and what it shows."""
+    """One experiment's report. text: paragraphs, what was done and what it shows. failures: a sentence for each demand
+    that does not hold."""
 
     name: str
     title: str
     text: tuple[str, ...] = ()
     tables: tuple[Table, ...] = ()
     charts: tuple[Chart, ...] = ()
+    failures: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -134,6 +136,7 @@ def as_json(section: Section) -> dict[str, Any]:
             }
             for chart in section.charts
         ],
+        "failures": list(section.failures),
     }
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from app.cli import main
+from app.commands import scenarios
+from pipeline.evaluation.experiments.sections import Section
 from pipeline.params import Params, from_yaml
 from pipeline.sources import open_source
 
@@ -69,3 +71,18 @@ def test_bad_usage_is_named_before_anything_is_driven(
         main(["scenarios", "run", *arguments])
     assert ended.value.code == 2
     assert named in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("failures", "code"), [((), 0), (("Left turn: fused is wrong",), 1)])
+def test_a_demand_that_does_not_hold_fails_the_command(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], failures: tuple[str, ...], code: int
+) -> None:
+    """The figures are written all the same."""
+    section = Section("choosing", "Choosing", failures=failures)
+    monkeypatch.setattr(scenarios, "run_all", lambda *_: [section])
+    with pytest.raises(SystemExit) as ended:
+        main(["scenarios", "run", "--suite", "choosing", "--json"])
+    assert ended.value.code == code
+    out, err = capsys.readouterr()
+    assert json.loads(out)[0]["failures"] == list(failures)
+    assert ("does not hold: Left turn" in err) is bool(failures)
