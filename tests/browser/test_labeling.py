@@ -82,9 +82,9 @@ def hand(desk: tuple[Page, Line], site: Site) -> Hand:
     page, line = desk
     line.full = line.broken = line.mute = line.deaf = False
     Labels(page, site.address).clear(COUNT)
-    page.get_by_role("tab", name="Tracks").click()
     for _ in range(3):
         page.keyboard.press("Escape")
+    page.get_by_role("tab", name="Tracks").click()
     page.get_by_role("button", name="Here", exact=True).click()
     is_at(page, START)
     expect(page.locator(".track-row")).to_have_count(0)
