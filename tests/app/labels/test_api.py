@@ -390,12 +390,13 @@ def test_what_is_sent_again_is_answered_as_before_and_done_once(engine: Engine, 
         return client.post(f"/api/labels/{path}", json={"person": person, "act_id": str(UUID(int=number))} | more)
 
     numbers = itertools.count(1)
-    for path, body in (
+    acts: tuple[tuple[str, dict[str, Any]], ...] = (
         ("act", {"act": {"kind": "tag", "frame": 3, "tag": "night"}}),
         ("act", {"act": {"kind": "lift", "frame": 10, "pixel": [160, 92]}}),
         ("undo", {}),
         ("redo", {}),
-    ):
+    )
+    for path, body in acts:
         number = next(numbers)
         first, again = (sent(path, **body).json() for _ in range(2))
         assert first["act"] is not None
