@@ -41,7 +41,8 @@ class SourceOptions:
     rings: int = 16
     """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
     route: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The road to be driven, on which GNSS places the car: CSV, GPX, an NMEA log or an earlier session"""
+    """The road to be driven, on which GNSS places the car: CSV (degrees, or metres of a UTM zone: r.csv?epsg=32632),
+    GPX, an NMEA log or an earlier session"""
 
     def open(self) -> Source:
         """A recording. SourceError says in one sentence what is wrong, RouteError the same of the route."""

@@ -59,8 +59,9 @@ def _costs(
         growth = np.clip(np.array(unseen_s) / _NOMINAL_DT_S, 1.0, _MAX_GROWTH)
         moved = moved_px / (np.maximum(params.gate_px, params.gate_sizes * old_width) * growth)[:, None]
         ratio = np.maximum(new_width, 1.0) / np.maximum(old_width, 1.0)[:, None]
-        cost = np.hypot(moved, np.abs(np.log(ratio)) / math.log(params.max_size_ratio))
-        # in a gate three times as wide each place is a third as likely: one long unseen takes nobody else's box
-        cost = np.where(cost < 1.0, 1.0 - (1.0 - cost) / growth[:, None], cost)
+        size = np.abs(np.log(ratio)) / math.log(params.max_size_ratio)
+        cost = np.hypot(moved, size)
+        # a gate that has grown lets in more, but what is far is no nearer for it: nobody else's box is taken
+        cost = np.where(cost < 1.0, np.minimum(np.hypot(moved * growth[:, None], size), 0.99), cost)
     named = [seen.detection.label for seen in measurements]
     return np.where([[same_kind(track.label, name) for name in named] for track in expected], cost, np.inf)
