@@ -13,11 +13,11 @@ from pipeline.alignment import Alignment, resolve
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.labels.refit import FEWEST_POINTS, onto_points
-from pipeline.sizes import usual_size_m
 from pipeline.lidar.boxes import fit_obstacles
 from pipeline.lidar.cluster import candidates, cluster
 from pipeline.lidar.ground import Ground, fit_ground
 from pipeline.params import BoxParams, ClusterParams, GroundParams, Params
+from pipeline.sizes import usual_size_m
 from pipeline.types import F32, I32, REAL_VEHICLES, Box, Detection, Frame, Mask, VisionMeasurement
 from pipeline.vision.distance import measure
 
