@@ -80,7 +80,7 @@ def test_it_is_taken_whole_and_others_are_served_meanwhile(
 ) -> None:
     taken: list[tuple[bytes, bool]] = []
 
-    def begin(person: str, file: Path, name: str) -> int:
+    def begin(person: str, file: Path, name: str, drive: str | None) -> int:
         taken.append((file.read_bytes(), threading.current_thread() is threading.main_thread()))
         return 1
 
