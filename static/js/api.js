@@ -43,23 +43,29 @@ export function newestOnly(send, merge = newerOf) {
   let busy = false, hasWaiting = false;
   /** @type {T|undefined} undefined is a body too */
   let waiting;
-  /** @param {T} body */
-  return async function submit(body) {
-    if (busy) {
-      waiting = hasWaiting ? merge(/** @type {T} */ (waiting), body) : body;
-      hasWaiting = true;
-      return;
-    }
-    busy = true;
+  let idle = Promise.resolve();
+  /** @param {T} body @returns {Promise<void>} */
+  async function work(body) {
     try {
       await send(body);
     } finally {
-      busy = false;
       const next = /** @type {T} */ (waiting), goesOn = hasWaiting;
       waiting = undefined;
       hasWaiting = false;
-      if (goesOn) submit(next);
+      busy = goesOn;
+      if (goesOn) await work(next);
     }
+  }
+  /** Settled once this and whatever waits with it was answered. @param {T} body */
+  return function submit(body) {
+    if (busy) {
+      waiting = hasWaiting ? merge(/** @type {T} */ (waiting), body) : body;
+      hasWaiting = true;
+    } else {
+      busy = true;
+      idle = work(body);
+    }
+    return idle;
   };
 }
 

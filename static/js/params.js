@@ -36,6 +36,10 @@ const submit = newestOnly(
   (waiting, newer) => ({ changes: { ...waiting.changes, ...newer.changes }, final: waiting.final || newer.final }),
 );
 
+let told = Promise.resolve();
+/** Once the server has answered every change so far. */
+export const settled = () => told;
+
 export function setUp() {
   const download = el("a", { href: "api/params.yaml", textContent: "Save preset", title: "A file for `cipv run --params FILE`" });
   download.setAttribute("download", "cipv-params.yaml");
@@ -114,7 +118,7 @@ function build({ sections: described, presets: names }) {
  */
 export function change(changes, isFinal) {
   const model = Object.entries(changes).map(([name, value]) => (value === null ? undefined : MODEL_OF[name])).find(Boolean);
-  submit({ changes: { ...changes, ...(model ? { "alignment.model": model } : {}) }, final: isFinal });
+  told = submit({ changes: { ...changes, ...(model ? { "alignment.model": model } : {}) }, final: isFinal });
 }
 
 /** Show one parameter. @param {string} name @returns {HTMLElement|null} its control */
