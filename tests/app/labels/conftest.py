@@ -7,11 +7,14 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 
+import httpx
 import pytest
 
+from app.engine import Engine
 from app.labels.database import Database
 from app.labels.drive import DriveInfo, DriveLabels
 from tests.app.labels import postgres
+from tests.app.labels.site import team
 
 COUNT = 100
 _numbers = itertools.count()
@@ -69,3 +72,31 @@ def labels(database: Database) -> DriveLabels:
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     return tmp_path / "labels.db"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[tuple[Engine, httpx.Client]]:
+    with team() as both:
+        yield both
+
+
+@pytest.fixture
+def engine(server: tuple[Engine, httpx.Client]) -> Engine:
+    return server[0]
+
+
+@pytest.fixture
+def client(server: tuple[Engine, httpx.Client]) -> httpx.Client:
+    """Nothing is labelled at the start of each test."""
+    found = server[1]
+    there = found.get("/api/labels").json()
+    items = [
+        {"kind": kind, "id": each["id"], "revision": each["revision"]}
+        for kind in ("track", "lead", "path", "event", "tag")
+        for each in there[f"{kind}s"]
+    ]
+    if items:
+        assert found.post(
+            "/api/labels/act", json={"person": "broom", "act": {"kind": "remove", "items": items}}
+        ).is_success
+    return found

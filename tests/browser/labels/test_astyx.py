@@ -21,12 +21,12 @@ from pipeline.run import detector_for
 from pipeline.sources import open_source
 from pipeline.sources.base import TruthObject
 from tests.browser.conftest import OpenPage, Site
-from tests.browser.labeling import KEYSTROKE_S, Hand, Labels, begin, is_at, is_saved
+from tests.browser.labels.hands import KEYSTROKE_S, Hand, Labels, begin, is_at, is_saved
 from tests.browser.looks import pixels
 
 FRAMES = range(414, 426)
 COUNT = len(FRAMES)
-BUILD = Path(__file__).resolve().parents[2] / "build"
+BUILD = Path(__file__).resolve().parents[3] / "build"
 
 
 @pytest.fixture(scope="module")

@@ -18,6 +18,8 @@ FROM_M, TO_M, HALF_M = -5.0, 74.0, 13.0
 KEYSTROKE_S = {"key": 0.28, "press": 0.20, "point": 1.10, "decide": 1.35}
 """Seconds of the keystroke-level model (Card, Moran and Newell 1980): a key, a mouse button down and up, pointing at
 something, and making up one's mind before an act. For a person's time, which no test can measure."""
+LEAD_X, LEAD_Y = 34.6, 0.0
+"""Where the simulated lead's middle is in the shown frame."""
 
 Spot = tuple[float, float]
 
@@ -152,3 +154,14 @@ def is_at(page: Page, index: int) -> None:
 def is_saved(page: Page) -> None:
     """Every act so far has been answered."""
     expect(page.locator(".saved")).to_have_attribute("data-state", "saved")
+
+
+def draw(hand: Hand, labels: Labels) -> int:
+    """A cuboid on the simulated lead, drawn from its rear to its front; the new track's number."""
+    before = set(labels.tracks)
+    hand.keys("g")
+    hand.drag(hand.plan(LEAD_X - 2.2, LEAD_Y), hand.plan(LEAD_X + 2.2, LEAD_Y))
+    labels.wait_for(lambda now: len(now.tracks) == len(before) + 1)
+    (made,) = set(labels.tracks) - before
+    expect(hand.page.locator(".track-row[aria-selected=true]")).to_have_attribute("data-id", str(made))
+    return made

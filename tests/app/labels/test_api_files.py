@@ -1,0 +1,117 @@
+"""Labels that come and go as files, over HTTP: truth, other tools' formats, frozen versions."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from http.client import HTTPConnection
+
+import httpx
+import pytest
+
+from app.engine import Engine
+from app.limits import LARGEST_FILE
+from pipeline.labels.formats.native import from_json
+from tests.app.labels.site import act, labels, ref, task
+from tests.app.serving import WAIT_S
+
+
+def test_truth_is_imported_and_points_out_where_the_pipeline_says_otherwise(
+    engine: Engine, client: httpx.Client
+) -> None:
+    assert "10 of 30 frames are not labelled" in task(engine, act(client, kind="import", what="truth"))
+    (track,) = labels(client)["tracks"]
+    assert (track["state"], track["sightings"], track["origin"]["maker"]) == ("accepted", 20, "import")
+    act(client, kind="set_lead", first=0, last=9, lead=track["id"])
+    act(client, kind="set_lead", first=10, last=12, lead="none")
+    following = client.get("/api/labels/next", params={"what": "disagreement", "frame": 5}).json()
+    assert following["frame"] == 10
+    assert following["why"].endswith("the labels say none")
+    assert client.get("/api/labels/next", params={"what": "unlabelled", "frame": 5}).json()["frame"] == 13
+    assert client.get("/api/labels/next", params={"what": "proposed", "frame": 5}).json() == {
+        "frame": None,
+        "why": "no proposal is waiting there",
+    }
+    track = labels(client)["tracks"][0]
+    act(client, "Bob", kind="send_back", items=[ref(track)], comment="too low")
+    back = client.get("/api/labels/next", params={"what": "sent_back", "frame": 5, "direction": -1}).json()
+    assert back == {"frame": 0, "why": f"#{track['id']}: too low"}
+
+
+def test_what_is_there_already_is_not_imported_twice(engine: Engine, client: httpx.Client) -> None:
+    for said in ("imported 1 tracks", "1 tracks are there already, place for place"):
+        assert said in task(engine, act(client, kind="import", what="truth"))
+    assert len(labels(client)["tracks"]) == 1
+
+
+@pytest.mark.parametrize("name", ["native", "openlabel", "kitti-tracking"])
+def test_what_is_exported_can_be_imported(engine: Engine, client: httpx.Client, name: str) -> None:
+    task(engine, act(client, kind="import", what="truth"))
+    before = client.get(f"/api/labels/tracks/{labels(client)['tracks'][0]['id']}").json()
+    answer = client.get("/api/labels/export", params={"format": name})
+    assert answer.headers["content-disposition"].startswith(f'attachment; filename="labels-{name}.')
+    lost = client.get("/api/labels/export/notes", params={"format": name}).json()["lost"]
+    assert (answer.headers["x-cipv-lost"] == "0") == (lost == [])
+    act(client, kind="remove", items=[ref(labels(client)["tracks"][0])])
+    done = task(
+        engine, client.post("/api/labels/import", params={"format": name, "person": "Bob"}, content=answer.content)
+    )
+    assert done.startswith("imported 1 tracks")
+    after = client.get(f"/api/labels/tracks/{labels(client)['tracks'][0]['id']}").json()
+    for one, other in zip(before["sightings"], after["sightings"], strict=True):
+        assert one["frame"] == other["frame"]
+        assert one["cuboid"]["center"] == pytest.approx(other["cuboid"]["center"], abs=0.01)
+    assert client.post("/api/labels/undo", json={"person": "Bob"}).json()["what"].startswith("imported")
+    assert labels(client)["tracks"] == []
+
+
+def packed(**files: str) -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as made:
+        for name, text in files.items():
+            made.writestr(name.replace("__", "/"), text)
+    return out.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("name", "body", "says"),
+    [
+        ("native", b"these are no labels", "the file: no JSON"),
+        ("kitti", b"these are no labels", "no .zip of a folder"),
+        ("kitti", packed(**{"..__..__out.txt": "x"}), "leads out of it"),
+        ("openlabel", b"{}", "the file: "),
+    ],
+)
+def test_a_file_that_is_none_is_said_and_changes_nothing(
+    engine: Engine, client: httpx.Client, name: str, body: bytes, says: str
+) -> None:
+    before = labels(client)["revision"]
+    answer = client.post("/api/labels/import", params={"format": name, "person": "Bob"}, content=body)
+    assert says in task(engine, answer)
+    assert labels(client)["revision"] == before
+
+
+def test_a_version_is_frozen_and_given_out(engine: Engine, client: httpx.Client) -> None:
+    act(client, kind="tag", frame=3, tag="night")
+    names = [each["name"] for each in client.get("/api/labels/versions").json()]
+    name = f"v{len(names) + 1}"
+    assert client.post("/api/labels/versions", json={"name": name, "person": "Ada"}).status_code == 201
+    assert client.post("/api/labels/versions", json={"name": name, "person": "Ada"}).status_code == 409
+    found = from_json(client.get(f"/api/labels/versions/{name}").content, "version")
+    assert (found.name, [each.tag for each in found.tags]) == (name, ["night"])
+    assert (
+        client.get("/api/labels/export", params={"version": name}).content
+        == client.get(f"/api/labels/versions/{name}").content
+    )
+    for bad in ("../../etc/passwd", "", "x" * 100):
+        assert client.post("/api/labels/versions", json={"name": bad, "person": "Ada"}).status_code == 422
+    assert client.get("/api/labels/versions/nobody").status_code == 404
+
+
+def test_a_file_beyond_all_measure_is_not_read(client: httpx.Client) -> None:
+    connection = HTTPConnection(client.base_url.host, client.base_url.port or 0, timeout=WAIT_S)
+    connection.putrequest("POST", "/api/labels/import?format=native&person=Ada")
+    connection.putheader("content-length", str(LARGEST_FILE + 1))
+    connection.endheaders()
+    assert connection.getresponse().status == 413
+    connection.close()

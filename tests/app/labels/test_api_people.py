@@ -1,0 +1,142 @@
+"""What is sent twice, too late or at the same time: two people, two servers of one team, a server that starts anew."""
+
+from __future__ import annotations
+
+import itertools
+from contextlib import ExitStack
+from typing import Any
+from uuid import UUID
+
+import httpx
+import pytest
+
+from app.engine import Engine
+from app.labels.database import Database, DatabaseError
+from app.labels.log import Log
+from tests.app.labels.site import act, labels, proposed, team
+from tests.app.serving import WAIT_S
+
+
+def test_what_is_sent_again_is_answered_as_before_and_done_once(engine: Engine, client: httpx.Client) -> None:
+    def sent(path: str, person: str = "Ada", **more: Any) -> httpx.Response:
+        return client.post(f"/api/labels/{path}", json={"person": person, "act_id": str(UUID(int=number))} | more)
+
+    numbers = itertools.count(1)
+    acts: tuple[tuple[str, dict[str, Any]], ...] = (
+        ("act", {"act": {"kind": "tag", "frame": 3, "tag": "night"}}),
+        ("act", {"act": {"kind": "lift", "frame": 10, "pixel": [160, 92]}}),
+        ("undo", {}),
+        ("redo", {}),
+    )
+    for path, body in acts:
+        number = next(numbers)
+        first, again = (sent(path, **body).json() for _ in range(2))
+        assert first["act"] is not None
+        assert again == first
+        assert sent(path, "Bob", **body).json() == {"detail": "an act of somebody else has that id"}
+    there = labels(client)
+    assert (len(there["tags"]), len(there["tracks"])) == (1, 1)
+    number = next(numbers)
+    first, again = (sent("act", act={"kind": "propose"}).json()["task"] for _ in range(2))
+    assert first == again
+    engine.wait_for(lambda shown: shown.labels.task is not None and not shown.labels.task.running, WAIT_S)
+    number = next(numbers)
+    client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 9}, "final": False})
+    assert [sent("undo").json()["what"] for _ in range(2)] == ["what was being tried"] * 2
+
+
+def test_what_was_meant_for_another_recording_is_not_done_to_this_one(client: httpx.Client) -> None:
+    drive = labels(client)["drive"]["id"]
+    tag = {"kind": "tag", "frame": 3, "tag": "night"}
+    assert client.post("/api/labels/act", json={"person": "Ada", "act": tag, "drive": drive}).status_code == 200
+    before = labels(client)["revision"]
+    for path, body in (("act", {"act": tag}), ("act", {"act": {"kind": "propose"}}), ("undo", {}), ("redo", {})):
+        answer = client.post(f"/api/labels/{path}", json={"person": "Ada", "drive": "another"} | body)
+        assert (answer.status_code, answer.json()["detail"]) == (409, "another recording is open now")
+    handed = client.post("/api/labels/import", params={"person": "Ada", "drive": "another"}, content=b"{}")
+    assert (handed.status_code, handed.json()["detail"]) == (409, "another recording is open now")
+    assert labels(client)["revision"] == before
+
+
+def test_an_act_is_answered_from_the_recording_that_it_was_done_to(
+    engine: Engine, client: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Something else is opened between the commit and the answer."""
+    opened = engine.labels._open
+    do = Log.act
+
+    def act_and_close(self: Log, *args: Any, **more: Any) -> Any:
+        done = do(self, *args, **more)
+        engine.labels.open("another", None)
+        return done
+
+    monkeypatch.setattr(Log, "act", act_and_close)
+    try:
+        answer = act(client, kind="tag", frame=3, tag="night")
+    finally:
+        engine.labels.open(opened.uri, opened.recording)
+    assert (answer.status_code, len(answer.json()["changed"]["tags"])) == (200, 1)
+
+
+def test_a_conflict_shows_both_and_loses_neither(engine: Engine, client: httpx.Client) -> None:
+    track = proposed(engine, client)
+    mine = {"kind": "relabel", "track": track["id"], "revision": track["revision"], "label": "bus"}
+    theirs = act(client, "Bob", **(mine | {"label": "truck"})).json()["changed"]["tracks"][0]
+    refused = act(client, **mine)
+    assert refused.status_code == 409
+    assert refused.json()["detail"] == f"Bob changed #{track['id']} since"
+    assert refused.json()["theirs"]["label"] == "truck"
+    assert refused.json()["item"] == {"kind": "track", "id": mine["track"]}
+    assert refused.json()["yours"] == mine
+    assert act(client, **(mine | {"revision": theirs["revision"]})).status_code == 200
+    history = client.get("/api/labels/history", params={"kind": "track", "id": track["id"]}).json()
+    assert [entry["after"]["label"] for entry in history[:2]] == ["bus", "truck"]
+    undo = client.post("/api/labels/undo", json={"person": "Bob"})
+    assert (undo.status_code, "Ada changed" in undo.json()["detail"]) == (409, True)
+
+
+def test_two_servers_of_a_team_see_each_others_acts(postgres_url: str) -> None:
+    with ExitStack() as stack:
+        first, ada = stack.enter_context(team(Database(postgres_url)))
+        second, bob = stack.enter_context(team(Database(postgres_url)))
+        done = act(ada, kind="tag", frame=3, tag="night").json()
+        second.wait_for(lambda shown: shown.labels.revision == done["revision"], WAIT_S)
+        (tag,) = labels(bob)["tags"]
+        act(bob, "Bob", kind="remove", items=[{"kind": "tag", "id": tag["id"], "revision": tag["revision"]}])
+        first.wait_for(lambda shown: shown.labels.revision == done["revision"] + 1, WAIT_S)
+        assert labels(ada, since=done["revision"])["removed"] == [{"kind": "tag", "id": tag["id"]}]
+
+
+def test_after_a_restart_everything_is_there_and_can_be_undone(tmp_path: Any) -> None:
+    file = tmp_path / "labels.db"
+    with team(Database.in_file(file)) as (_, client):
+        act(client, kind="tag", frame=3, tag="night")
+        client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 5}, "person": "Ada"})
+    with team(Database.in_file(file)) as (_, client):
+        assert len(labels(client)["tags"]) == 1
+        assert labels(client, person="Ada")["can_undo"]
+        undone = [client.post("/api/labels/undo", json={"person": "Ada"}).json()["what"] for _ in range(2)]
+        assert undone == ["cipv.confirm_hits 3 → 5", "tagged frame 3 night"]
+        assert client.post("/api/labels/undo", json={"person": "Ada"}).status_code == 409
+        assert labels(client)["tags"] == []
+
+
+def test_a_database_that_fails_keeps_nobody_from_driving(
+    engine: Engine, client: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def away(_: Database) -> None:
+        raise DatabaseError("labels: the server is away")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Database, "writing", away)
+        assert client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 6}}).status_code == 200
+        assert engine.control.peek().params.cipv.confirm_hits == 6
+        for refused in (
+            act(client, kind="tag", frame=1, tag="x"),
+            client.post("/api/labels/undo", json={"person": "A"}),
+        ):
+            assert (refused.status_code, refused.json()["detail"]) == (503, "labels: the server is away")
+        patched.setattr(Database, "reading", away)
+        assert client.get("/api/compare").status_code == 200
+    client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 3}})
+    assert act(client, kind="tag", frame=1, tag="x").status_code == 200

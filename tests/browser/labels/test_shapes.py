@@ -1,0 +1,147 @@
+"""Cuboids and boxes under a hand: in the plan, in the picture, in 3D."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.conftest import START, Site
+from tests.browser.labels.hands import LEAD_X, LEAD_Y, Hand, Labels, draw, is_at, is_saved
+from tests.browser.looks import pixels, repainted
+
+pytestmark = pytest.mark.usefixtures("paused_in_traffic")
+
+
+def test_a_cuboid_is_drawn_moved_turned_and_resized_in_the_plan(hand: Hand, labels: Labels):
+    page = hand.page
+    empty = pixels(page, "#camera")
+    made = draw(hand, labels)
+    drawn = labels.cuboid(made, START)
+    assert drawn["center"][:2] == pytest.approx((LEAD_X, LEAD_Y), abs=0.2)
+    assert drawn["size"][0] == pytest.approx(4.4, abs=0.3)
+    assert repainted(page, "#camera", empty), "its edges are in the picture"
+
+    hand.drag(hand.plan(LEAD_X, LEAD_Y), hand.plan(LEAD_X + 2, LEAD_Y + 1))
+    labels.wait_for(lambda now: now.cuboid(made, START)["center"][0] > LEAD_X + 1)
+    moved = labels.cuboid(made, START)
+    assert moved["center"][:2] == pytest.approx((LEAD_X + 2, LEAD_Y + 1), abs=0.3)
+    assert (moved["size"], moved["yaw_rad"]) == (drawn["size"], drawn["yaw_rad"])
+
+    x, y = moved["center"][:2]
+    hand.drag(hand.plan(x + moved["size"][0] / 2, y), hand.plan(x + moved["size"][0] / 2 + 1.5, y))
+    labels.wait_for(lambda now: now.cuboid(made, START)["size"][0] > moved["size"][0] + 1)
+    longer = labels.cuboid(made, START)
+    rear = [each["center"][0] - each["size"][0] / 2 * math.cos(each["yaw_rad"]) for each in (moved, longer)]
+    assert rear[1] == pytest.approx(rear[0], abs=0.02), "the opposite face stays"
+
+    front = longer["center"][0] + longer["size"][0] / 2
+    knob_u, knob_v = hand.plan(front, y)
+    hand.drag((knob_u, knob_v - 16), hand.plan(longer["center"][0], y + 8))
+    labels.wait_for(lambda now: abs(now.cuboid(made, START)["yaw_rad"]) > 1.3)
+    assert labels.cuboid(made, START)["yaw_rad"] == pytest.approx(math.pi / 2, abs=0.1)
+    is_saved(page)
+
+
+def test_a_hand_in_the_3d_view_moves_it_in_every_view(hand: Hand, labels: Labels):
+    """What the server says of a drag there, as ``app/stream.py`` sends it."""
+    page = hand.page
+    made = draw(hand, labels)
+    is_saved(page)
+    cuboid = labels.cuboid(made, START)
+    cuboid["center"][0] -= 6.0
+    dragged = """async ([track, frame, cuboid, ended]) => {
+      const { set } = await import("/js/store.js");
+      set("dragged", { track, frame, cuboid, ended });
+    }"""
+    plan, picture = pixels(page, "#bev"), pixels(page, "#camera")
+    page.evaluate(dragged, [made, START, cuboid, False])
+    assert repainted(page, "#bev", plan)
+    assert repainted(page, "#camera", picture)
+    assert labels.cuboid(made, START) != cuboid, "the hand still holds it"
+    hand.keys("f")
+    is_at(page, START + 1)
+    page.evaluate(dragged, [made, START, cuboid, True])
+    labels.wait_for(lambda now: now.cuboid(made, START) == cuboid)
+    assert labels.cuboid(made, START + 1) is None, (
+        "the frame in which it was taken hold of, not the one shown at the end"
+    )
+
+
+def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, site: Site):
+    page = hand.page
+    tick = site.engine.snapshot.tick
+    assert tick is not None
+    assert tick.frame.picture is not None
+    height, width = tick.frame.picture.bgr.shape[:2]
+    lead = next(each for each in tick.result.objects if each.id == tick.result.cipv.id)
+    assert lead.bbox is not None
+    u, v = (lead.bbox[0] + lead.bbox[2]) / 2, (lead.bbox[1] + lead.bbox[3]) / 2
+    hand.keys("g")
+    hand.press(hand.picture(u, v, width, height))
+    labels.wait_for(lambda now: len(now.tracks) == 1)
+    (made,) = labels.tracks
+    lifted = labels.cuboid(made, START)
+    assert lifted["center"][:2] == pytest.approx((LEAD_X, LEAD_Y), abs=2.5), "where the car is"
+    expect(page.locator(".said")).to_contain_text("points")
+
+    box = labels.sighting(made, START)["bbox"] or list(lead.bbox)
+    hand.keys("Shift+G")
+    corners = (
+        hand.picture(box[0] - 20, box[1] - 10, width, height),
+        hand.picture(box[2] + 10, box[3] + 10, width, height),
+    )
+    hand.drag(*corners)
+    wanted = [box[0] - 20, box[1] - 10, box[2] + 10, box[3] + 10]
+    labels.wait_for(lambda now: now.sighting(made, START)["bbox"] == pytest.approx(wanted, abs=6))
+    drawn = labels.sighting(made, START)["bbox"]
+    hand.drag(
+        hand.picture(drawn[0], (drawn[1] + drawn[3]) / 2, width, height),
+        hand.picture(drawn[0] + 15, (drawn[1] + drawn[3]) / 2, width, height),
+    )
+    labels.wait_for(lambda now: now.sighting(made, START)["bbox"][0] == pytest.approx(drawn[0] + 15, abs=6))
+    assert labels.sighting(made, START)["bbox"][1:] == pytest.approx(drawn[1:], abs=0.01), "one side moved"
+    assert labels.cuboid(made, START)["center"] == lifted["center"], "a box is no cuboid"
+
+
+EDGES = [
+    ("front", (13.0, 0.0), (10.5, 0.0), (5.0, 2.0)),
+    ("rear", (7.0, 0.0), (9.5, 0.0), (5.0, 2.0)),
+    ("left", (10.0, 2.0), (10.0, 0.5), (4.0, 3.0)),
+    ("right", (10.0, 0.0), (10.0, 0.5), (4.0, 1.0)),
+]
+"""An edge, where it is dragged to, and the middle and the size that come of it."""
+
+
+def test_the_opposite_face_is_held_whatever_the_heading(hand: Hand):
+    """A cuboid of 4 m by 2 m at (10, 0), each edge dragged; and the same turned by any angle about its middle."""
+    page = hand.page
+    found = page.evaluate(
+        """async (angles) => {
+          const { dragged, footprint } = await import("/js/labeling/cuboid.js");
+          const cuboid = (yaw_rad) => ({ center: [10, 0, 1], size: [4, 2, 2], yaw_rad });
+          const held = { front: [2, 3], rear: [0, 1], left: [1, 2], right: [0, 3] };
+          const away = [];
+          for (const yaw of angles) for (const [grip, corners] of Object.entries(held)) {
+            const before = cuboid(yaw), after = dragged(before, grip, { x: 0, y: 0 }, { x: 13.3, y: 2.7 });
+            const [a, b] = [footprint(before), footprint(after)];
+            away.push(Math.max(...corners.map((i) => Math.hypot(a[i][0] - b[i][0], a[i][1] - b[i][1]))));
+            away.push(Math.max(0, 0.2 - Math.min(...after.size)));
+          }
+          return away;
+        }""",
+        [0.0, 0.4, 1.7, 3.0, -2.2],
+    )
+    assert max(found) < 1e-9
+    sizes = page.evaluate(
+        """async (edges) => {
+          const { dragged } = await import("/js/labeling/cuboid.js");
+          const cuboid = { center: [10, 0, 1], size: [4, 2, 2], yaw_rad: 0 };
+          return edges.map(([grip, [x, y]]) => dragged(cuboid, grip, { x: 0, y: 0 }, { x, y }));
+        }""",
+        [[grip, to] for grip, to, _, _ in EDGES],
+    )
+    for (grip, to, center, size), got in zip(EDGES, sizes, strict=True):
+        assert got["center"][:2] == pytest.approx(center), (grip, to)
+        assert got["size"][:2] == pytest.approx(size), (grip, to)

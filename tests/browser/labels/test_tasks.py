@@ -1,0 +1,164 @@
+"""A drive labelled from one end to the other, by keys and by hand."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+
+from pipeline.params import Params
+from tests.browser.conftest import START, Site
+from tests.browser.labels.hands import Hand, Labels, begin, draw, is_at, is_saved
+from tests.browser.looks import box_of, go_to, on_timeline, pixels, repainted, wait_for_frame, whole_drive
+
+pytestmark = pytest.mark.usefixtures("paused_in_traffic")
+
+
+def test_everything_is_done_by_keys_and_taken_back(hand: Hand, labels: Labels):
+    page = hand.page
+    made = draw(hand, labels)
+    start = labels.cuboid(made, START)
+    for keys, dx, dy, deg in (
+        (("ArrowUp", "ArrowUp", "ArrowLeft"), 0.2, 0.1, 0),
+        (("Shift+ArrowDown", "Shift+ArrowRight"), -0.8, -0.9, 0),
+        (("q", "Shift+Q", "e"), -0.8, -0.9, 10),
+    ):
+        hand.keys(*keys)
+        labels.wait_for(
+            lambda now, dx=dx, dy=dy, deg=deg: (
+                now.cuboid(made, START)["center"][:2]
+                == pytest.approx((start["center"][0] + dx, start["center"][1] + dy), abs=1e-6)
+                and now.cuboid(made, START)["yaw_rad"] == pytest.approx(start["yaw_rad"] + math.radians(deg), abs=1e-6)
+            )
+        )
+    hand.keys("t")
+    labels.wait_for(lambda now: now.tracks[made]["label"] == "truck")
+    hand.keys("f", "f", "f")
+    is_at(page, START + 3)
+    hand.keys("k")
+    labels.wait_for(lambda now: now.tracks[made]["keyframes"] == [START, START + 3])
+    assert labels.tracks[made]["sightings"] == 4, "the frames between follow"
+    expect(page.locator(".track-detail .facts").first).to_contain_text("keyframe")
+    hand.keys("x")
+    labels.wait_for(lambda now: len(now.tracks) == 2)
+    hand.keys("r")
+    labels.wait_for(lambda now: now.tracks[made]["state"] == "rejected")
+    is_saved(page)
+
+    page.reload()
+    wait_for_frame(page, START + 3)
+    begin(page)
+    expect(page.locator(".track-row")).not_to_have_count(0)
+    page.keyboard.press("Control+z")
+    labels.wait_for(lambda now: now.tracks[made]["state"] != "rejected")
+    page.keyboard.press("Control+z")
+    labels.wait_for(lambda now: len(now.tracks) == 1)
+    page.keyboard.press("Control+Shift+Z")
+    labels.wait_for(lambda now: len(now.tracks) == 2)
+
+
+def test_the_lead_is_painted_by_keys_by_number_and_by_a_drag(hand: Hand, labels: Labels):
+    page = hand.page
+    made = draw(hand, labels)
+    bare = pixels(page, "#timeline-back")
+    hand.keys("i", *["f"] * 4)
+    is_at(page, START + 4)
+    hand.keys("c")
+    labels.wait_for(lambda now: now.leads == [(START, START + 4, made)])
+    assert repainted(page, "#timeline-back", bare)
+    hand.keys("f")
+    is_at(page, START + 5)
+    hand.keys("u")
+    labels.wait_for(lambda now: now.leads == [(START, START + 4, made), (START + 5, START + 5, "unknown")])
+    expect(page.locator(".leads button[aria-pressed=true]")).to_have_text("can't tell")
+    hand.keys("0")
+    labels.wait_for(lambda now: now.leads[-1] == (START + 5, START + 5, "none"))
+
+    front = box_of(page.locator("#timeline-front"))
+    y = front["y"] + 37
+    hand.drag((front["x"] + on_timeline(page, 100), y), (front["x"] + on_timeline(page, 120), y), steps=8)
+    labels.wait_for(lambda now: (100, 120, made) in now.leads)
+    is_at(page, 120)
+    hand.keys("Escape", "i")
+    go_to(page, 130)
+    is_at(page, 130)
+    hand.keys(*str(made))
+    labels.wait_for(lambda now: (100, 130, made) in now.leads or (121, 130, made) in now.leads)
+    hand.keys("Shift+U")
+    labels.wait_for(lambda now: now.leads[-1][1] == 129)
+
+
+def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, site: Site):
+    page = hand.page
+    whole_drive(page, site)
+    hand.keys("p")
+    labels.wait_for(lambda now: len(now.leads) > 0)
+    expect(page.locator(".track-row")).not_to_have_count(0)
+    assert {each["state"] for each in labels.tracks.values()} == {"proposed"}
+    expect(page.locator(".leads button[aria-pressed=true]")).to_have_count(1)
+    hand.keys("Shift+A")
+    labels.wait_for(lambda now: any(each["state"] == "accepted" for each in now.everything["leads"]))
+    page.get_by_role("tab", name="Score").click()
+    expect(page.locator(".label-score .metrics tbody tr")).not_to_have_count(0)
+    page.get_by_role("tab", name="Tracks").click()
+    page.get_by_role("button", name="To do").click()
+    hand.keys("b")
+    expect(page.locator(".said")).not_to_be_empty()
+    with page.expect_download() as download:
+        page.locator("#label-pane").get_by_role("button", name="Export").click()
+        page.locator("#menu").get_by_text("CIPV Studio").click()
+    written = json.loads(download.value.path().read_text(encoding="utf-8"))
+    assert {each["id"] for each in written["labels"]["tracks"]} == set(labels.tracks)
+
+
+def test_a_drive_is_reviewed_frozen_and_taken_back_in(hand: Hand, labels: Labels, tmp_path: Path):
+    page = hand.page
+    made = draw(hand, labels)
+    hand.keys("h")
+    dialog = page.get_by_role("dialog", name="Send back")
+    dialog.get_by_label("Comment").fill("a metre too long")
+    dialog.get_by_role("button", name="OK").click()
+    expect(page.locator(".track-detail .comment")).to_have_text("Sent back: a metre too long")
+    assert labels.tracks[made]["state"] == "proposed"
+    hand.keys("a")
+    labels.wait_for(lambda now: now.tracks[made]["state"] == "accepted")
+
+    page.get_by_role("tab", name="Frame").click()
+    page.get_by_role("button", name="Cut-in", exact=True).click()
+    page.get_by_label("Tag of this frame").fill("rain")
+    page.get_by_role("button", name="Add", exact=True).click()
+    page.get_by_role("button", name="Draw the path").click()
+    bare = pixels(page, "#bev")
+    hand.drag(hand.plan(1, 0), hand.plan(30, 1), steps=6)
+    labels.wait_for(lambda now: len(now.everything["paths"]) == 1)
+    assert repainted(page, "#bev", bare)
+    expect(page.locator(".moment-row")).to_have_count(2)
+    held = labels.everything
+    assert [(each["kind"], each["tracks"]) for each in held["events"]] == [("cut_in", [made])]
+    assert [each["tag"] for each in held["tags"]] == ["rain"]
+    (path,) = held["paths"]
+    assert path["left"][0][1] - path["right"][0][1] == pytest.approx(2 * Params().path.half_width_m, abs=0.05)
+
+    page.get_by_role("tab", name="Files").click()
+    page.get_by_label("Name of the version").fill("reviewed")
+    page.get_by_role("button", name="Freeze").click()
+    version = page.locator(".label-files a", has_text="reviewed")
+    expect(version).to_be_visible()
+    page.get_by_label("Name of the version").fill("reviewed")
+    page.get_by_role("button", name="Freeze").click()
+    expect(page.locator("#label-files [role=alert]")).not_to_be_empty()
+    expect(page.get_by_label("Name of the version")).to_have_value("reviewed")
+    with page.expect_download() as download:
+        version.click()
+    download.value.save_as(tmp_path / "reviewed.json")
+    page.get_by_role("tab", name="Tracks").click()
+    hand.keys("Shift+Delete")
+    labels.wait_for(lambda now: not now.tracks)
+    page.get_by_role("tab", name="Files").click()
+    page.get_by_label("File with labels").set_input_files(tmp_path / "reviewed.json")
+    page.get_by_role("button", name="Import the file").click()
+    labels.wait_for(lambda now: len(now.tracks) == 1)
+    expect(page.locator(".said")).to_contain_text("1 track")
