@@ -2,123 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack
-from pathlib import Path
-
 import pytest
 
-import app.engine as engine_module
-from app.engine import Engine
 from app.line import WARM_UP_FRAMES, DetectionCache, Line
 from app.snapshot import Snapshot
 from pipeline.params import Params, with_changes
-from pipeline.progress import Progress
-from pipeline.results import to_json
 from pipeline.run import Detectors
-from pipeline.sources.base import Source
-from pipeline.step import State, step
-from pipeline.types import Result
-from pipeline.vision.runtime import DetectorMissing
-from tests.app.recording import CountingDetector, Recording, opener
-
-WAIT_S = 60.0
-Start = Callable[..., tuple[Engine, Recording, CountingDetector]]
-
-
-@pytest.fixture
-def start() -> Iterator[Start]:
-    """An engine on a recording, showing its first frame, paused."""
-    with ExitStack() as stack:
-
-        def begin(recording: Recording | None = None, **options) -> tuple[Engine, Recording, CountingDetector]:
-            recording, detector = recording or Recording(), CountingDetector()
-            engine = Engine(opener(recording), lambda _: detector, Params(), uri=recording.uri, **options)
-            engine.start()
-            stack.callback(engine.stop)
-            stack.callback(recording.gate.set)
-            engine.wait_for(lambda s: s.tick is not None, WAIT_S)
-            return engine, recording, detector
-
-        yield begin
-
-
-def body(result: Result) -> str:
-    """A result's bytes, times of this machine apart."""
-    plain = to_json(result)
-    del plain["timing_ms"]
-    return json.dumps(plain)
-
-
-def at(index: int) -> Callable[[Snapshot], bool]:
-    """The frame is shown, after a whole warm-up."""
-    return lambda s: s.tick is not None and s.index == index and s.tick.warmed
-
-
-def played(recording: Recording, first: int, last: int, params: Params) -> Result:
-    """What the plain line says at ``last``, run from a fresh state at ``first``."""
-    detector, state = CountingDetector(), State()
-    for index in range(first, last + 1):
-        frame = recording.frame(index)
-        assert frame.picture is not None
-        boxes = detector.detect(frame.picture.bgr)
-        state, result = step(state, type(frame)(**{**vars(frame), "raw_boxes": boxes}), params)
-    return result
-
-
-class Slowly:
-    """Opens "test:long" word by word, each when the test lets it; anything else at once."""
-
-    def __init__(self) -> None:
-        self.goes_on = threading.Semaphore(0)
-        self.given_up = threading.Event()
-
-    def __call__(self, uri: str, /, *, progress: Progress) -> Recording:
-        if uri == "test:long":
-            try:
-                for done in range(0, 101, 25):
-                    progress(done, 100)
-                    assert self.goes_on.acquire(timeout=WAIT_S)
-            except BaseException:
-                self.given_up.set()
-                raise
-        return Recording(uri)
-
-
-@pytest.fixture
-def slowly(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Engine, Slowly]]:
-    monkeypatch.setattr(engine_module, "_TELL_EVERY_S", 0.0)
-    opens = Slowly()
-    engine = Engine(opens, lambda _: CountingDetector(), Params(), uri="test:car")
-    engine.start()
-    engine.wait_for(lambda s: s.uri == "test:car", WAIT_S)
-    yield engine, opens
-    opens.goes_on.release(10)
-    engine.stop()
-
-
-def test_what_takes_long_to_open_says_how_far_it_is(slowly: tuple[Engine, Slowly]):
-    engine, opens = slowly
-    engine.control.change(uri="test:long")
-    for percent in (0, 25, 50):
-        shown = engine.wait_for(lambda s, percent=percent: s.busy == f"Opening test:long … {percent} %", WAIT_S)
-        assert shown.uri == "test:car", "what is open stays until then"
-        opens.goes_on.release()
-    opens.goes_on.release(2)
-    assert engine.wait_for(lambda s: s.uri == "test:long", WAIT_S).busy is None
-
-
-def test_what_takes_long_to_open_is_given_up_for_something_else(slowly: tuple[Engine, Slowly]):
-    engine, opens = slowly
-    engine.control.change(uri="test:long")
-    engine.wait_for(lambda s: s.busy == "Opening test:long … 0 %", WAIT_S)
-    engine.control.change(uri="test:other")
-    opens.goes_on.release()
-    assert opens.given_up.wait(WAIT_S)
-    shown = engine.wait_for(lambda s: s.uri == "test:other" and s.tick is not None, WAIT_S)
-    assert (shown.busy, [n for n in shown.notices if n.level == "error"]) == (None, [])
+from tests.app.engine.running import WAIT_S, Start, at, body, played
+from tests.app.recording import CountingDetector, Recording
 
 
 def test_opens_paused_on_the_first_frame_and_finds_the_car(start: Start):
@@ -240,28 +131,6 @@ def test_a_frame_that_was_seen_costs_no_network_again(start: Start):
     assert detector.calls == len({0, *range(2, 13)})
 
 
-def test_reopening_costs_no_network_either(start: Start):
-    engine, recording, detector = start()
-    engine.control.seek(5)
-    engine.wait_for(at(5), WAIT_S)
-    calls = detector.calls
-    engine.control.change(uri=recording.uri)
-    engine.wait_for(at(0), WAIT_S)
-    assert detector.calls == calls
-
-
-def test_a_recording_replaced_under_its_name_is_looked_at_anew(tmp_path: Path):
-    file = tmp_path / "my.yaml"
-    file.write_text("before")
-    cache, detector, source = DetectionCache(), CountingDetector(), Recording(f"sim:{file}")
-    for calls in (1, 1):
-        Line(source, Detectors(detector), cache, "both").seek(0, Params())
-        assert detector.calls == calls
-    file.write_text("and after")
-    Line(source, Detectors(detector), cache, "both").seek(0, Params())
-    assert detector.calls == 2
-
-
 def test_an_overtaken_seek_is_dropped_on_the_way(start: Start):
     engine, recording, _ = start()
     shown: list[int] = []
@@ -311,21 +180,6 @@ def test_a_parameter_is_answered_while_the_next_frame_is_still_being_read(start:
     engine.wait_for(lambda s: s.index > 0, WAIT_S)
 
 
-def test_a_recording_that_cannot_be_opened_leaves_the_old_one(start: Start):
-    engine, recording, _ = start()
-    engine.control.change(uri="test:nowhere")
-    shown = engine.wait_for(lambda s: any(n.level == "error" for n in s.notices), WAIT_S)
-    assert "test:nowhere: no such recording" in [n.text for n in shown.notices]
-    assert shown.uri == recording.uri
-    engine.control.change(loop=False)
-    later = engine.wait_for(lambda s: not s.loop, WAIT_S)
-    assert later.notices == shown.notices, "it stays said"
-    assert later.sequence == shown.sequence, "and nothing was run again"
-    engine.control.seek(3)
-    shown = engine.wait_for(at(3), WAIT_S)
-    assert not any(n.level == "error" for n in shown.notices), "the next frame takes the complaint away"
-
-
 def test_a_frame_that_cannot_be_read_is_said_and_the_worker_goes_on(start: Start):
     engine, _, _ = start(Recording(broken=frozenset({7})))
     engine.control.seek(7)
@@ -335,62 +189,6 @@ def test_a_frame_that_cannot_be_read_is_said_and_the_worker_goes_on(start: Start
     engine.control.seek(2)
     engine.wait_for(at(2), WAIT_S)
     assert engine.alive
-
-
-def test_without_a_detector_lidar_goes_on_alone_and_the_page_is_told_the_remedy():
-    def missing(_: Source) -> CountingDetector:
-        raise DetectorMissing("No detector is installed: run `cipv models pull yolox_nano`.")
-
-    engine = Engine(opener(Recording()), missing, Params(), uri="test:car")
-    engine.start()
-    try:
-        shown = engine.wait_for(lambda s: s.tick is not None, WAIT_S)
-        assert any("cipv models pull" in n.text and n.level == "warning" for n in shown.notices)
-        assert shown.tick is not None
-        assert {item.source for item in shown.tick.result.objects} == {"L"}
-    finally:
-        engine.stop()
-
-
-def test_what_a_detector_has_to_say_is_said_on_the_page():
-    network = CountingDetector(notes=("it knows simulated cars only",))
-    engine = Engine(opener(Recording()), lambda _: network, Params(), uri="test:car")
-    engine.start()
-    try:
-        shown = engine.wait_for(lambda s: s.tick is not None, WAIT_S)
-        assert [n.text for n in shown.notices] == [*Recording().notes, "it knows simulated cars only"]
-    finally:
-        engine.stop()
-
-
-def test_the_detector_is_asked_for_again_where_pictures_are_drawn():
-    """A network for real pictures is not the one for the simulator, even when the pictures are equally large."""
-    asked: list[str] = []
-
-    def open_detector(source: Source) -> CountingDetector:
-        asked.append(source.uri)
-        return CountingDetector()
-
-    recordings = [Recording(uri=uri) for uri in ("test:car", "test:other", "sim:car")]
-    engine = Engine(opener(*recordings), open_detector, Params(), uri="test:car")
-    engine.start()
-    try:
-        for uri in ("test:car", "test:other", "sim:car", "test:car"):
-            engine.control.change(uri=uri)
-            engine.wait_for(lambda s, uri=uri: s.uri == uri and s.tick is not None, WAIT_S)
-        assert asked == ["test:car", "sim:car"]
-    finally:
-        engine.stop()
-
-
-@pytest.mark.parametrize(("sensors", "sources"), [("lidar", {"L"}), ("camera", {"V"}), ("both", {"VL"})])
-def test_sensors_can_be_taken_away(start: Start, sensors: str, sources: set[str]):
-    engine, _, detector = start(sensors=sensors)
-    tick = engine.snapshot.tick
-    assert tick is not None
-    assert {item.source for item in tick.result.objects} == sources
-    assert tick.frame.picture is not None, "people still want to see the picture"
-    assert (detector.calls == 0) == (sensors == "lidar")
 
 
 def test_a_view_that_fails_takes_nothing_with_it(start: Start, caplog: pytest.LogCaptureFixture):

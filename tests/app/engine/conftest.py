@@ -1,0 +1,30 @@
+"""An engine on a recording that counts what is asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack
+
+import pytest
+
+from app.engine import Engine
+from pipeline.params import Params
+from tests.app.engine.running import WAIT_S, Start
+from tests.app.recording import CountingDetector, Recording, opener
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """An engine on a recording, showing its first frame, paused."""
+    with ExitStack() as stack:
+
+        def begin(recording: Recording | None = None, **options) -> tuple[Engine, Recording, CountingDetector]:
+            recording, detector = recording or Recording(), CountingDetector()
+            engine = Engine(opener(recording), lambda _: detector, Params(), uri=recording.uri, **options)
+            engine.start()
+            stack.callback(engine.stop)
+            stack.callback(recording.gate.set)
+            engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+            return engine, recording, detector
+
+        yield begin

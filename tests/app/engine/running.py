@@ -1,0 +1,42 @@
+"""What tests ask of a running engine."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+from app.engine import Engine
+from app.snapshot import Snapshot
+from pipeline.params import Params
+from pipeline.results import to_json
+from pipeline.step import State, step
+from pipeline.types import Result
+from tests.app.recording import CountingDetector, Recording
+
+WAIT_S = 60.0
+
+
+Start = Callable[..., tuple[Engine, Recording, CountingDetector]]
+
+
+def body(result: Result) -> str:
+    """A result's bytes, times of this machine apart."""
+    plain = to_json(result)
+    del plain["timing_ms"]
+    return json.dumps(plain)
+
+
+def at(index: int) -> Callable[[Snapshot], bool]:
+    """The frame is shown, after a whole warm-up."""
+    return lambda s: s.tick is not None and s.index == index and s.tick.warmed
+
+
+def played(recording: Recording, first: int, last: int, params: Params) -> Result:
+    """What the plain line says at ``last``, run from a fresh state at ``first``."""
+    detector, state = CountingDetector(), State()
+    for index in range(first, last + 1):
+        frame = recording.frame(index)
+        assert frame.picture is not None
+        boxes = detector.detect(frame.picture.bgr)
+        state, result = step(state, type(frame)(**{**vars(frame), "raw_boxes": boxes}), params)
+    return result

@@ -1,0 +1,166 @@
+"""Recordings and detectors that come, take long, fail, and are asked for again."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import app.engine as engine_module
+from app.engine import Engine
+from app.line import DetectionCache, Line
+from pipeline.params import Params
+from pipeline.progress import Progress
+from pipeline.run import Detectors
+from pipeline.sources.base import Source
+from pipeline.vision.runtime import DetectorMissing
+from tests.app.engine.running import WAIT_S, Start, at
+from tests.app.recording import CountingDetector, Recording, opener
+
+
+class Slowly:
+    """Opens "test:long" word by word, each when the test lets it; anything else at once."""
+
+    def __init__(self) -> None:
+        self.goes_on = threading.Semaphore(0)
+        self.given_up = threading.Event()
+
+    def __call__(self, uri: str, /, *, progress: Progress) -> Recording:
+        if uri == "test:long":
+            try:
+                for done in range(0, 101, 25):
+                    progress(done, 100)
+                    assert self.goes_on.acquire(timeout=WAIT_S)
+            except BaseException:
+                self.given_up.set()
+                raise
+        return Recording(uri)
+
+
+@pytest.fixture
+def slowly(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Engine, Slowly]]:
+    monkeypatch.setattr(engine_module, "_TELL_EVERY_S", 0.0)
+    opens = Slowly()
+    engine = Engine(opens, lambda _: CountingDetector(), Params(), uri="test:car")
+    engine.start()
+    engine.wait_for(lambda s: s.uri == "test:car", WAIT_S)
+    yield engine, opens
+    opens.goes_on.release(10)
+    engine.stop()
+
+
+def test_what_takes_long_to_open_says_how_far_it_is(slowly: tuple[Engine, Slowly]):
+    engine, opens = slowly
+    engine.control.change(uri="test:long")
+    for percent in (0, 25, 50):
+        shown = engine.wait_for(lambda s, percent=percent: s.busy == f"Opening test:long … {percent} %", WAIT_S)
+        assert shown.uri == "test:car", "what is open stays until then"
+        opens.goes_on.release()
+    opens.goes_on.release(2)
+    assert engine.wait_for(lambda s: s.uri == "test:long", WAIT_S).busy is None
+
+
+def test_what_takes_long_to_open_is_given_up_for_something_else(slowly: tuple[Engine, Slowly]):
+    engine, opens = slowly
+    engine.control.change(uri="test:long")
+    engine.wait_for(lambda s: s.busy == "Opening test:long … 0 %", WAIT_S)
+    engine.control.change(uri="test:other")
+    opens.goes_on.release()
+    assert opens.given_up.wait(WAIT_S)
+    shown = engine.wait_for(lambda s: s.uri == "test:other" and s.tick is not None, WAIT_S)
+    assert (shown.busy, [n for n in shown.notices if n.level == "error"]) == (None, [])
+
+
+def test_reopening_costs_no_network_either(start: Start):
+    engine, recording, detector = start()
+    engine.control.seek(5)
+    engine.wait_for(at(5), WAIT_S)
+    calls = detector.calls
+    engine.control.change(uri=recording.uri)
+    engine.wait_for(at(0), WAIT_S)
+    assert detector.calls == calls
+
+
+def test_a_recording_replaced_under_its_name_is_looked_at_anew(tmp_path: Path):
+    file = tmp_path / "my.yaml"
+    file.write_text("before")
+    cache, detector, source = DetectionCache(), CountingDetector(), Recording(f"sim:{file}")
+    for calls in (1, 1):
+        Line(source, Detectors(detector), cache, "both").seek(0, Params())
+        assert detector.calls == calls
+    file.write_text("and after")
+    Line(source, Detectors(detector), cache, "both").seek(0, Params())
+    assert detector.calls == 2
+
+
+def test_a_recording_that_cannot_be_opened_leaves_the_old_one(start: Start):
+    engine, recording, _ = start()
+    engine.control.change(uri="test:nowhere")
+    shown = engine.wait_for(lambda s: any(n.level == "error" for n in s.notices), WAIT_S)
+    assert "test:nowhere: no such recording" in [n.text for n in shown.notices]
+    assert shown.uri == recording.uri
+    engine.control.change(loop=False)
+    later = engine.wait_for(lambda s: not s.loop, WAIT_S)
+    assert later.notices == shown.notices, "it stays said"
+    assert later.sequence == shown.sequence, "and nothing was run again"
+    engine.control.seek(3)
+    shown = engine.wait_for(at(3), WAIT_S)
+    assert not any(n.level == "error" for n in shown.notices), "the next frame takes the complaint away"
+
+
+def test_without_a_detector_lidar_goes_on_alone_and_the_page_is_told_the_remedy():
+    def missing(_: Source) -> CountingDetector:
+        raise DetectorMissing("No detector is installed: run `cipv models pull yolox_nano`.")
+
+    engine = Engine(opener(Recording()), missing, Params(), uri="test:car")
+    engine.start()
+    try:
+        shown = engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+        assert any("cipv models pull" in n.text and n.level == "warning" for n in shown.notices)
+        assert shown.tick is not None
+        assert {item.source for item in shown.tick.result.objects} == {"L"}
+    finally:
+        engine.stop()
+
+
+def test_what_a_detector_has_to_say_is_said_on_the_page():
+    network = CountingDetector(notes=("it knows simulated cars only",))
+    engine = Engine(opener(Recording()), lambda _: network, Params(), uri="test:car")
+    engine.start()
+    try:
+        shown = engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+        assert [n.text for n in shown.notices] == [*Recording().notes, "it knows simulated cars only"]
+    finally:
+        engine.stop()
+
+
+def test_the_detector_is_asked_for_again_where_pictures_are_drawn():
+    """A network for real pictures is not the one for the simulator, even when the pictures are equally large."""
+    asked: list[str] = []
+
+    def open_detector(source: Source) -> CountingDetector:
+        asked.append(source.uri)
+        return CountingDetector()
+
+    recordings = [Recording(uri=uri) for uri in ("test:car", "test:other", "sim:car")]
+    engine = Engine(opener(*recordings), open_detector, Params(), uri="test:car")
+    engine.start()
+    try:
+        for uri in ("test:car", "test:other", "sim:car", "test:car"):
+            engine.control.change(uri=uri)
+            engine.wait_for(lambda s, uri=uri: s.uri == uri and s.tick is not None, WAIT_S)
+        assert asked == ["test:car", "sim:car"]
+    finally:
+        engine.stop()
+
+
+@pytest.mark.parametrize(("sensors", "sources"), [("lidar", {"L"}), ("camera", {"V"}), ("both", {"VL"})])
+def test_sensors_can_be_taken_away(start: Start, sensors: str, sources: set[str]):
+    engine, _, detector = start(sensors=sensors)
+    tick = engine.snapshot.tick
+    assert tick is not None
+    assert {item.source for item in tick.result.objects} == sources
+    assert tick.frame.picture is not None, "people still want to see the picture"
+    assert (detector.calls == 0) == (sensors == "lidar")
