@@ -220,6 +220,16 @@ class ClearLead(Strict):
     last: Index
 
 
+class TrimLead(Strict):
+    """A range begins or ends elsewhere: it is from first to last now, whatever was said where it was not before."""
+
+    kind: Literal["trim_lead"]
+    range: Id
+    revision: Id
+    first: Index
+    last: Index
+
+
 class SetPath(Strict):
     """The ego lane's lines in a frame: ego x, y from the bumper on."""
 
@@ -281,7 +291,7 @@ class Import(Strict):
 
 Act = Annotated[
     Accept | Reject | SendBack | ReviewOk | Remove | SetSighting | DropKeyframe | DropSightings | SizeAlong | Refit
-    | AddTrack | Lift | Relabel | Split | Merge | SetLead | ClearLead | SetPath | RemovePath | AddEvent | Tag
-    | Propose | Import,
+    | AddTrack | Lift | Relabel | Split | Merge | SetLead | ClearLead | TrimLead | SetPath | RemovePath | AddEvent
+    | Tag | Propose | Import,
     Field(discriminator="kind"),
 ]  # fmt: skip

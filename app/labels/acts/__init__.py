@@ -28,6 +28,7 @@ from app.labels.requests import (
     SizeAlong,
     Split,
     Tag,
+    TrimLead,
 )
 
 _ACTS: dict[type, Callable[[Draft, Scope, Any], str]] = {
@@ -46,6 +47,7 @@ _ACTS: dict[type, Callable[[Draft, Scope, Any], str]] = {
     Merge: tracks.merge,
     SetLead: leads.set_lead,
     ClearLead: leads.clear_lead,
+    TrimLead: leads.trim_lead,
     SetPath: frames.set_path,
     RemovePath: frames.remove_path,
     AddEvent: frames.add_event,

@@ -8,7 +8,7 @@ from typing import cast
 from app.labels.acts.scope import Scope, by_person, frames_text, track_of
 from app.labels.draft import Draft
 from app.labels.refusals import ActRefused
-from app.labels.requests import ClearLead, SetLead
+from app.labels.requests import ClearLead, SetLead, TrimLead
 from pipeline.labels.model import Lead, LeadRange
 
 
@@ -27,12 +27,27 @@ def clear_lead(draft: Draft, scope: Scope, act: ClearLead) -> str:
     return f"lead of {frames_text(act.first, act.last)}: not said"
 
 
-def paint(draft: Draft, new: LeadRange) -> None:
+def trim_lead(draft: Draft, scope: Scope, act: TrimLead) -> str:
+    """What a person has painted stays as it was said; what a pipeline or a file said is corrected."""
+    scope.check(act.first, act.last)
+    old = cast("LeadRange", draft.get("lead", act.range, act.revision).value)
+    if old.state == "rejected":
+        raise ActRefused("that range is rejected: paint who leads there")
+    if (old.first, old.last) != (act.first, act.last):
+        state = old.state if old.origin.maker == "person" else "corrected"
+        new = replace(old, first=act.first, last=act.last, state=state, origin=by_person(draft))
+        paint(draft, new, act.range)
+    return f"lead {_named(old.lead)} in {frames_text(act.first, act.last)}, not {frames_text(old.first, old.last)}"
+
+
+def paint(draft: Draft, new: LeadRange, number: int | None = None) -> None:
     """Over what was there: ranges are cut. One that says the same, by a person too, right before or after is lengthened
-    instead."""
-    clear(draft, new.first, new.last)
-    joined: list[int] = []
-    for number, item in draft.all("lead").items():
+    instead. number: of the range that is to be so, where it is there already."""
+    clear(draft, new.first, new.last, but=number)
+    joined = [number] if number is not None else []
+    for other, item in draft.all("lead").items():
+        if other == number:
+            continue
         old = cast("LeadRange", item.value)
         same = (old.lead, old.state, old.origin.maker, old.origin.name) == (
             new.lead,
@@ -42,21 +57,21 @@ def paint(draft: Draft, new: LeadRange) -> None:
         )
         if same and (old.last + 1 == new.first or old.first == new.last + 1):
             new = replace(new, first=min(old.first, new.first), last=max(old.last, new.last))
-            joined.append(number)
-    for number in joined[1:]:
-        draft.put("lead", number, None)
+            joined.append(other)
+    for other in joined[1:]:
+        draft.put("lead", other, None)
     if joined:
         draft.put("lead", joined[0], new)
     else:
         draft.add("lead", new)
 
 
-def clear(draft: Draft, first: int, last: int) -> bool:
-    """Cut all ranges out of frames first … last; false when there was none."""
+def clear(draft: Draft, first: int, last: int, *, but: int | None = None) -> bool:
+    """Cut all ranges out of frames first … last, but one; false when there was none."""
     touched = False
     for number, item in draft.all("lead").items():
         old = cast("LeadRange", item.value)
-        if old.last < first or old.first > last:
+        if old.last < first or old.first > last or number == but:
             continue
         touched = True
         before = replace(old, last=first - 1) if old.first < first else None

@@ -12,7 +12,7 @@ from app.labels.acts.scope import Scope
 from app.labels.database import Database
 from app.labels.drive import DriveLabels
 from app.labels.log import Acted
-from app.labels.refusals import ActRefused, BadAct, NoSuchLabel
+from app.labels.refusals import ActRefused, BadAct, NoSuchLabel, Stale
 from app.labels.requests import Act
 from pipeline.geometry import Cuboid
 from pipeline.labels.model import LabelTrack, LeadRange, Origin, Sighting
@@ -229,6 +229,40 @@ def test_strokes_side_by_side_are_one_range(labels: DriveLabels) -> None:
         act(labels, kind="set_lead", first=first, last=first + 1, lead=2)
     act(labels, "Bob", kind="set_lead", first=46, last=47, lead=2)
     assert [each[:3] for each in leads(labels)][1:] == [(40, 45, 2), (46, 47, 2)]
+
+
+@pytest.mark.parametrize(
+    ("ends", "left"),
+    [
+        ((12, 20), [(5, 9, 2, "accepted"), (12, 20, 1, "corrected"), (21, 30, "none", "accepted")]),
+        ((7, 20), [(5, 6, 2, "accepted"), (7, 20, 1, "corrected"), (21, 30, "none", "accepted")]),
+        ((10, 25), [(5, 9, 2, "accepted"), (10, 25, 1, "corrected"), (26, 30, "none", "accepted")]),
+        ((0, 35), [(0, 35, 1, "corrected")]),
+        ((10, 10), [(5, 9, 2, "accepted"), (10, 10, 1, "corrected"), (21, 30, "none", "accepted")]),
+    ],
+)
+def test_a_range_ends_elsewhere_and_its_neighbours_give_way(
+    labels: DriveLabels, ends: tuple[int, int], left: list[tuple[int, int, Any, str]]
+) -> None:
+    act(labels, kind="set_lead", first=5, last=9, lead=2)
+    act(labels, kind="set_lead", first=21, last=30, lead="none")
+    (number, before), *_ = ((number, item) for number, item in labels.items("lead").items() if item.value.lead == 1)  # type: ignore[union-attr]
+    there = leads(labels)
+    act(labels, kind="trim_lead", range=number, revision=before.revision, first=ends[0], last=ends[1])
+    assert leads(labels) == left
+    with pytest.raises(Stale):
+        act(labels, "Bob", kind="trim_lead", range=number, revision=before.revision, first=10, last=11)
+    labels.log.move("undo", "Ada")
+    assert leads(labels) == there
+
+
+def test_a_range_that_comes_to_one_that_says_the_same_is_one_with_it(labels: DriveLabels) -> None:
+    act(labels, kind="set_lead", first=40, last=50, lead=2)
+    act(labels, kind="set_lead", first=60, last=70, lead=2)
+    number, later = max(labels.items("lead").items())
+    act(labels, kind="trim_lead", range=number, revision=later.revision, first=51, last=70)
+    assert leads(labels)[1:] == [(40, 70, 2, "accepted")]
+    assert labels.log.history("lead", number)[0].what == "lead #2 in frames 51–70, not frames 60–70"
 
 
 def test_the_lead_can_be_unsaid(labels: DriveLabels) -> None:
