@@ -25,6 +25,7 @@
  * @property {number} track  id of the selected label
  * @property {import("./labeling/draft.js").Draft} draft  a label under a hand, or on its way to the server
  * @property {import("./labeling/span.js").Marked} marked  the frames that a lead is painted over
+ * @property {import("./labeling/ends.js").Trimmed} trimmed  a lead range whose end is under a hand
  * @property {import("./labeling/acts.js").Saving} saving
  * @property {import("./labeling/three.js").Dragged} dragged  the selected label under a hand in the 3D view
  * @property {string} person  who labels, once it was said here

@@ -29,7 +29,7 @@ async function placeOf(track, frame) {
 }
 
 /** What a person does not choose by. */
-const HIDDEN = ["kind", "id", "track", "items", "tracks", "revision", "interpolate", "sightings", "origin", "keyframes"];
+const HIDDEN = ["kind", "id", "track", "range", "items", "tracks", "revision", "interpolate", "sightings", "origin", "keyframes"];
 
 /** @param {string} title @param {Record<string, any>} item */
 function side(title, item) {

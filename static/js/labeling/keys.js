@@ -2,6 +2,7 @@
 import { playback } from "../api.js";
 import { get } from "../store.js";
 import * as commands from "./commands.js";
+import { bringHere } from "./ends.js";
 import { cancel, isOn, setTool, toggleObjects } from "./mode.js";
 import * as span from "./span.js";
 
@@ -39,6 +40,8 @@ export const labelKeys = () => [
   { mode: "labeling", title: "Labeling: who leads", bindings: [
     key("i", "I", "the lead begins here", span.begin, "lead from"),
     key("o", "O", "the lead ends here", span.end, "to"),
+    key("[", "[", "the nearest beginning of a range comes here (or drag it on the timeline)", () => bringHere("after"), "begins here"),
+    key("]", "]", "the nearest end of a range comes here", () => bringHere("before"), "ends here"),
     key("c", "C", "the selected track leads", () => (get("track") === null ? commands.say("Select a label first") : span.paint(/** @type {number} */ (get("track")))), "is the lead"),
     ...[..."123456789"].map((digit) => key(digit, digit === "1" ? "1–9" : digit, digit === "1" ? "the track of that number leads" : "", () => span.type(digit))),
     key("0", "0", "nobody leads", () => span.type("0"), "none"),
@@ -80,6 +83,6 @@ export const labelKeys = () => [
     key("Shift+D", "Shift D", "", () => playback({ step: -10 })),
     key("z", "Z", "the pipeline's objects too", toggleObjects, "pipeline"),
     { ...key("Enter", "Enter", "take the number that is typed", () => span.enter()), isOn: () => isOn() && Boolean(get("marked")?.typed) },
-    { ...key("Escape", "Esc", "let go: tool, marked frames, selection", () => cancel()), isOn: () => isOn() && (get("labeling")?.tool !== null || get("marked") !== null || get("track") !== null) },
+    { ...key("Escape", "Esc", "let go: a dragged end, tool, marked frames, selection", () => cancel()), isOn: () => isOn() && (get("trimmed") !== null || get("labeling")?.tool !== null || get("marked") !== null || get("track") !== null) },
   ] },
 ];

@@ -23,6 +23,7 @@ export function toggle() {
   change({ on: !isOn(), tool: null });
   set("draft", null);
   set("marked", null);
+  set("trimmed", null);
   if (!isOn()) return;
   togglePane("params", true); // the labels' panel stands in the inspector's column
   personName();
@@ -39,7 +40,8 @@ export function toggleObjects() {
 
 /** Let go of one thing, the newest first. @returns {boolean} whether there was one */
 export function cancel() {
-  if (get("labeling")?.tool) setTool(null);
+  if (get("trimmed")) set("trimmed", null);
+  else if (get("labeling")?.tool) setTool(null);
   else if (get("marked")) set("marked", null);
   else if (get("track") !== null) set("track", null);
   else return false;

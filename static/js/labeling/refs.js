@@ -10,8 +10,9 @@ const LISTS = { track: "tracks", lead: "leads", path: "paths", event: "events", 
 /** @param {Act} act @returns {ItemRef[]} */
 export function refsOf(act) {
   const one = typeof act.track === "number" ? [{ kind: /** @type {const} */ ("track"), id: act.track, revision: act.revision }] : [];
+  const range = typeof act.range === "number" ? [{ kind: /** @type {const} */ ("lead"), id: act.range, revision: act.revision }] : [];
   const two = Array.isArray(act.tracks) && act.kind === "merge" ? act.tracks.map((/** @type {any} */ each) => ({ kind: "track", ...each })) : [];
-  return [...one, ...two, ...(act.items ?? [])];
+  return [...one, ...range, ...two, ...(act.items ?? [])];
 }
 
 /** The act, based on other revisions of its items. @param {Act} act @param {(ref: ItemRef) => number} revisionOf @returns {Act} */
@@ -19,6 +20,7 @@ export function based(act, revisionOf) {
   /** @type {Act} */
   const copy = { ...act };
   if (typeof act.track === "number") copy.revision = revisionOf({ kind: "track", id: act.track, revision: act.revision });
+  if (typeof act.range === "number") copy.revision = revisionOf({ kind: "lead", id: act.range, revision: act.revision });
   if (act.kind === "merge") copy.tracks = act.tracks.map((/** @type {any} */ each) => ({ ...each, revision: revisionOf({ kind: "track", ...each }) }));
   if (act.items) copy.items = act.items.map((/** @type {ItemRef} */ each) => ({ ...each, revision: revisionOf(each) }));
   return copy;

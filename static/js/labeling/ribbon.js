@@ -64,6 +64,20 @@ function drawTrack(ctx, span, row) {
   }
 }
 
+/** A range whose end is under a hand, as it would be; what it leaves is empty. @param {CanvasRenderingContext2D} ctx @param {Span} span @param {Row} row @param {boolean} isLight */
+export function drawTrimmed(ctx, span, row, isLight) {
+  const held = get("trimmed");
+  if (!held) return;
+  const clamp = (/** @type {number} */ frame) => Math.min(span.left + span.width, Math.max(span.left, span.x(frame)));
+  const [before, from, to, after] = [Math.min(held.range.first, held.first), held.first, held.last + 1, Math.max(held.range.last, held.last) + 1].map(clamp);
+  ctx.fillStyle = ui("raised");
+  ctx.fillRect(before, row.top, after - before, row.height);
+  drawRange(ctx, held.range, { x: from, width: Math.max(1, to - from), ...row }, isLight);
+  ctx.strokeStyle = ui("accent");
+  ctx.lineWidth = 2;
+  ctx.strokeRect(from + 1, row.top + 1, Math.max(2, to - from - 2), row.height - 2);
+}
+
 /** What is marked for a lead, over the rows. @param {CanvasRenderingContext2D} ctx @param {Span} span @param {Row} row */
 export function drawMarked(ctx, span, row) {
   if (!get("marked")) return;

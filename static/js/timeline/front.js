@@ -1,7 +1,7 @@
 /** What a hand has put onto the timeline: the marked clip, labels being painted, and the frame under the pointer. */
 import { color, ui } from "../colors.js";
 import { here } from "../drive/seek.js";
-import { drawMarked } from "../labeling/ribbon.js";
+import { drawMarked, drawTrimmed } from "../labeling/ribbon.js";
 import { get } from "../store.js";
 
 /** @typedef {import("./span.js").Span} Span */
@@ -9,10 +9,11 @@ import { get } from "../store.js";
 
 /**
  * @param {CanvasRenderingContext2D} ctx @param {{width: number, height: number}} size @param {Span} span @param {Rows} rows
- * @param {number|null} hover the frame under the pointer
+ * @param {number|null} hover the frame under the pointer @param {boolean} isLight
  */
-export function drawFront(ctx, size, span, rows, hover) {
+export function drawFront(ctx, size, span, rows, hover, isLight) {
   drawClip(ctx, size, span, rows);
+  if (rows.labels) drawTrimmed(ctx, span, rows.labels.leads, isLight);
   if (rows.labels) drawMarked(ctx, span, rows.labels.leads);
   if (hover !== null && hover !== here()) drawLine(ctx, span, hover, rows.axis.height, size.height);
 }

@@ -33,7 +33,7 @@ export function setUp() {
   $("#timeline-curves").append(...CURVES.map(chip));
   on(["drive", "curve", "selection", "theme", "labeling", "labels", "track"], redraw);
   on(["state"], () => frames() !== span.count && redraw());
-  on(["clip", "marked"], redrawFront);
+  on(["clip", "marked", "trimmed"], redrawFront);
   on(["state", "scrub"], redrawValues);
   paint(["state", "drive"], describe);
   followPointer(front, { span, rows, zoomed: redraw, hovered });
@@ -90,7 +90,7 @@ function draw() {
 }
 
 function drawHand() {
-  if (!hand.isHidden) drawFront(hand.begin(), hand, span, shared, hover);
+  if (!hand.isHidden) drawFront(hand.begin(), hand, span, shared, hover, isLight);
 }
 
 /** The frame has moved. */

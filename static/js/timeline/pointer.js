@@ -1,5 +1,6 @@
 /** The hand on the timeline: press or drag to go to a frame, wheel to zoom, shift or two fingers to move along. */
 import { seekTo } from "../drive/seek.js";
+import { dragEnd, endAt } from "../labeling/ends.js";
 import { leadAt } from "../labeling/held.js";
 import * as marking from "../labeling/span.js";
 import { get, set } from "../store.js";
@@ -12,7 +13,7 @@ const CLICK_PX = 4;
 const ZOOM_PER_PX = 0.0018;
 const GRAB_PX = 8;
 
-/** What a drag does on the way, and when the hand lets go after it. @typedef {((x: number, dx: number) => void) & {ended?: () => void}} Act */
+/** What a drag does on the way, and when it ends: by the hand that lets go, or because something else took over. @typedef {((x: number, dx: number) => void) & {ended?: (isKept: boolean) => void}} Act */
 /**
  * @typedef {object} Hand
  * @property {Span} span
@@ -31,13 +32,19 @@ export function followPointer(canvas, hand) {
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     down.set(event.pointerId, { x: event.offsetX, y: event.offsetY });
-    if (down.size > 1) return void (drag = null);
+    if (down.size > 1) {
+      drag?.act.ended?.(false);
+      return void (drag = null);
+    }
     drag = { x: event.offsetX, y: event.offsetY, moved: false, act: actionAt(hand, event) };
     drag.act(event.offsetX, 0);
   });
   canvas.addEventListener("pointermove", (event) => {
     const was = down.get(event.pointerId);
-    if (!was) return hand.hovered(event.offsetX >= hand.span.left ? hand.span.index(event.offsetX) : null);
+    if (!was) {
+      canvas.style.cursor = endUnder(hand, event) ? "ew-resize" : "";
+      return hand.hovered(event.offsetX >= hand.span.left ? hand.span.index(event.offsetX) : null);
+    }
     down.set(event.pointerId, { x: event.offsetX, y: event.offsetY });
     if (down.size === 2) pinch(hand, [...down.values()], was, { x: event.offsetX, y: event.offsetY });
     else if (drag) {
@@ -48,7 +55,7 @@ export function followPointer(canvas, hand) {
   const lift = (/** @type {PointerEvent} */ event) => {
     down.delete(event.pointerId);
     if (drag && !drag.moved && event.type === "pointerup") click(hand, drag.x, drag.y);
-    else if (event.type === "pointerup") drag?.act.ended?.();
+    else drag?.act.ended?.(event.type === "pointerup");
     if (!down.size) drag = null;
   };
   for (const name of /** @type {const} */ (["pointerup", "pointercancel"])) canvas.addEventListener(name, lift);
@@ -79,9 +86,14 @@ function actionAt({ span, rows, zoomed }, event) {
     if (Math.abs(event.offsetX - span.x(clip.first)) < GRAB_PX) return (x) => set("clip", { first: Math.min(span.index(x), clip.last), last: clip.last });
     if (Math.abs(event.offsetX - span.x(clip.last + 1)) < GRAB_PX) return (x) => set("clip", { first: clip.first, last: Math.max(span.index(x), clip.first) });
   }
+  const end = endUnder({ span, rows }, event);
+  if (end) return dragEnd(span, end);
   if (isIn(rows().labels?.leads ?? null, event.offsetY)) return marks(span, span.index(event.offsetX));
   return (x) => seekTo(span.index(x));
 }
+
+/** The end of a lead range under the pointer. @param {Pick<Hand, "span"|"rows">} hand @param {PointerEvent} event */
+const endUnder = ({ span, rows }, event) => (isIn(rows().labels?.leads ?? null, event.offsetY) ? endAt(span, event.offsetX) : null);
 
 /** A drag along the labels' ribbon marks frames; the selected track leads there when the hand lets go. @param {Span} span @param {number} from @returns {Act} */
 function marks(span, from) {
@@ -92,7 +104,7 @@ function marks(span, from) {
     if (hasMoved) marking.markAll(from, to);
     seekTo(to);
   };
-  return Object.assign(along, { ended: () => { if (hasMoved && get("track") !== null) marking.paint(/** @type {number} */ (get("track"))); } });
+  return Object.assign(along, { ended: (/** @type {boolean} */ isKept) => { if (isKept && hasMoved && get("track") !== null) marking.paint(/** @type {number} */ (get("track"))); } });
 }
 
 /** @param {{top: number, height: number}|null} row @param {number} y */

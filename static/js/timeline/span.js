@@ -51,6 +51,11 @@ export class Span {
     return Math.min(this.count - 1, Math.max(0, Math.floor(this.first + (x - this.left) / this.perFrame)));
   }
 
+  /** The border between frames nearest a pixel column: the number of the frame after it. @param {number} x */
+  border(x) {
+    return Math.min(this.count, Math.max(0, Math.round(this.first + (x - this.left) / this.perFrame)));
+  }
+
   /** Zoom so that what lies under a pixel column stays there. @param {number} factor above 1 shows more @param {number} x */
   zoom(factor, x) {
     const size = this.end - this.first;
