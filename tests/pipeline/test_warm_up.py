@@ -1,4 +1,5 @@
-"""After warming up no frame waits for a compiler: in a process of its own, where no other test compiled anything."""
+"""After warming up no frame waits for a compiler, nor for the collector to look through all modules: in a process of its
+own, where no other test compiled or warmed up anything."""
 
 from __future__ import annotations
 
@@ -14,8 +15,10 @@ from pipeline.sources import open_source
 from pipeline.step import State, step, warm_up
 from pipeline.types import RawBoxes, RawLanes
 
+kernels = [thing for thing in gc.get_objects() if isinstance(thing, Dispatcher)]
+loaded = len(gc.get_objects())
+
 def compiled():
-    kernels = [thing for thing in gc.get_objects() if isinstance(thing, Dispatcher)]
     return {f"{each.py_func.__module__}.{each.py_func.__name__}": len(each.signatures) for each in kernels}
 
 v = np.linspace(400.0, 700.0, 60, dtype=np.float32)
@@ -28,6 +31,7 @@ before = compiled()
 for index in range(4):
     frame = dataclasses.replace(source.frame(index), raw_boxes=boxes, raw_lanes=lanes)
     state, result = step(state, frame, Params())
+assert len(gc.get_objects()) < loaded / 10, "the collector looks through all that is loaded"
 assert result.objects and result.layers.lanes is not None
 line = {name for name in before if name.startswith("pipeline.") and not name.startswith("pipeline.simulation.")}
 print(sorted(name for name, count in compiled().items() if name in line and count != before[name]))
