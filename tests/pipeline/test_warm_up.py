@@ -1,5 +1,5 @@
-"""After warming up no frame waits for a compiler, nor for the collector to look through all modules: in a process of its
-own, where no other test compiled or warmed up anything."""
+"""After warming up no frame waits for a compiler, nor for a collector that looks through all modules: in a process of
+its own, where no other test compiled anything."""
 
 from __future__ import annotations
 
