@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from app.bench.timing import interleaved
+from app.bench.timing import figures, interleaved
 from pipeline.types import U8
 from pipeline.vision.detector import Detector
 
@@ -34,8 +34,7 @@ def stages(pictures: Sequence[U8], detector: Detector, budget_s: float) -> dict[
     peers = {name: float(np.median(spent) * 1e3) for name, spent in times.items() if name != "ours"}
     return {
         "detector": {
-            "median_ms": round(median, 4),
-            "p99_ms": round(float(np.percentile(times["ours"], 99)) * 1e3, 4),
+            **figures(times["ours"]),
             "peers": {name: {"median_ms": round(ms, 4), "ratio": round(ms / median, 2)} for name, ms in peers.items()},
             "model": detector.name,
             "providers": list(detector.providers),

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from app.bench.ground_reference import fit_ground_numpy
-from app.bench.timing import interleaved
+from app.bench.timing import figures, interleaved
 from pipeline.lidar import warm_up
 from pipeline.lidar.boxes import fit_obstacles
 from pipeline.lidar.cluster import candidates, cluster
@@ -160,4 +160,4 @@ def _row(times: dict[str, list[float]], absent: dict[str, str]) -> dict[str, Any
         name: {"median_ms": ms, "ratio": ms / median[OURS]} for name, ms in median.items() if name != OURS
     }
     peers |= {name: {"median_ms": None, "ratio": None, "absent": reason} for name, reason in absent.items()}
-    return {"median_ms": median[OURS], "p99_ms": float(np.percentile(times[OURS], 99)) * 1e3, "peers": peers}
+    return {**figures(times[OURS]), "peers": peers}

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from velodyne_decoder import Config, Model, StreamDecoder
 
-from app.bench.timing import interleaved
+from app.bench.timing import figures, interleaved
 from pipeline.data import data_dir
 from pipeline.sources import open_source
 from pipeline.sources.velodyne import PACKET_BYTES, RotationCutter, SensorClock, Vlp16Decoder
@@ -48,8 +48,7 @@ def _stage(rotations: Rotations, budget_s: float) -> dict[str, Any]:
     median = {name: float(np.median(spent)) * 1e3 for name, spent in times.items()}
     peers = {name: {"median_ms": ms, "ratio": ms / median[OURS]} for name, ms in median.items() if name != OURS}
     return {
-        "median_ms": median[OURS],
-        "p99_ms": float(np.percentile(times[OURS], 99)) * 1e3,
+        **figures(times[OURS]),
         "packets": round(float(np.mean([len(rotation) for rotation in rotations])), 1),
         "peers": peers,
     }

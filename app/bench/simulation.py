@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from app.bench.timing import figures
 from pipeline.evaluation.experiments.network import embedded
 from pipeline.simulation import scenario
 from pipeline.simulation.loop import Eyes, NetworkEyes, Setup, TruthEyes, drive
@@ -40,8 +41,7 @@ def _stage(eyes: Eyes, budget_s: float) -> dict[str, Any]:
     tick_ms, median_ms = 1e3 / scene.rate_hz, float(np.median(wall_s)) * 1e3
     cpu_ms = float(np.mean(cpu_s)) * 1e3  # a mean: a processor's clock may tick more slowly than the loop
     return {
-        "median_ms": round(median_ms, 4),
-        "p99_ms": round(float(np.percentile(wall_s, 99)) * 1e3, 4),
+        **figures(wall_s),
         "cpu_ms": round(cpu_ms, 4),
         "peers": {
             "real time": {"median_ms": tick_ms, "ratio": round(tick_ms / median_ms, 2)},

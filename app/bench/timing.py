@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
+from typing import Any
+
+import numpy as np
 
 _MAX_REPEATS = 20
 _MIN_ROUNDS = 3
@@ -27,6 +30,12 @@ def interleaved(contestants: Mapping[str, Callable[[], object]], budget_s: float
             times[name] += [_time(run) for _ in range(repeats[name])]
         rounds += 1
     return times
+
+
+def figures(spent_s: Sequence[float]) -> dict[str, Any]:
+    """``median_ms``, ``p99_ms`` and of how many samples."""
+    median, p99 = (np.percentile(spent_s, [50, 99]) * 1e3).tolist()
+    return {"median_ms": median, "p99_ms": p99, "samples": len(spent_s)}
 
 
 def _time(run: Callable[[], object]) -> float:

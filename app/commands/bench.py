@@ -53,13 +53,22 @@ class Bench:
 
 
 def _table(figures: dict[str, dict[str, Any]]) -> Table:
-    table = Table("stage", "median ms", "p99 ms", "peer", "median ms", "times faster", title="cipv bench")
+    table = Table("stage", "median ms", "p99 ms", "samples", "peer", "median ms", "times faster", title="cipv bench")
     for stage, row in figures.items():
-        peers = [_peer_cells(name, peer) for name, peer in row["peers"].items()] or [("", "", "")]
+        peers = [_peer_cells(name, peer) for name, peer in row["peers"].items()] or [_remark(row)]
         for n, cells in enumerate(peers):
-            own = (stage, f"{row['median_ms']:.3f}", f"{row['p99_ms']:.3f}") if n == 0 else ("", "", "")
+            own = (
+                (stage, f"{row['median_ms']:.3f}", f"{row['p99_ms']:.3f}", f"{row['samples']}") if n == 0 else [""] * 4
+            )
             table.add_row(*own, *cells)
     return table
+
+
+def _remark(row: dict[str, Any]) -> tuple[str, str, str]:
+    """What is said of a stage without peers."""
+    if "p99_to_idle_median" in row:
+        return f"p99 is {row['p99_to_idle_median']:.1f} × the idle step's median", "", ""
+    return (f"{row['rate_hz']:.0f} Hz", "", "") if "rate_hz" in row else ("", "", "")
 
 
 def _peer_cells(name: str, peer: dict[str, Any]) -> tuple[str, str, str]:
