@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from app.drive.drives import DriveState
-from app.labels.desk import LabelState
+from app.labels.state import LabelState
 from app.line import Tick
 from pipeline.params import Params
 from pipeline.recording.recorder import RecordingState
@@ -87,5 +87,8 @@ class Snapshot:
             "live": self.live,
             "streams": streams_json(self.streams),
             "recording": self.recording.to_json() if self.recording is not None else None,
-            "notices": [{"level": n.level, "text": n.text} for n in self.notices],
+            "notices": [{"level": n.level, "text": n.text} for n in (*self.notices, *self._of_labels())],
         }
+
+    def _of_labels(self) -> tuple[Notice, ...]:
+        return (Notice("warning", self.labels.trouble),) if self.labels.trouble else ()

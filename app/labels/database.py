@@ -153,7 +153,8 @@ def _engine(url: URL) -> Engine:
     if url.get_backend_name() == "postgresql":
         if url.drivername == "postgresql":
             url = url.set(drivername="postgresql+psycopg")
-        return create_engine(url, pool_pre_ping=True, connect_args={"connect_timeout": _CONNECT_S})
+        patience = f"-c lock_timeout={int(_BUSY_S * 1e3)}ms"
+        return create_engine(url, pool_pre_ping=True, connect_args={"connect_timeout": _CONNECT_S, "options": patience})
     raise ArgumentError(f"{url.get_backend_name()}: sqlite or postgresql is kept labels in")
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
 import socket
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ from app.drive.recording import Recording
 from app.labels.acts import do
 from app.labels.acts.scope import Scope
 from app.labels.database import Database
-from app.labels.drive import DriveInfo, DriveLabels, info_of
+from app.labels.drive import DriveInfo, DriveLabels, info_of, info_of_uri
 from app.labels.files import importing_file
 from app.labels.log import Acted
 from app.labels.long import importing_truth, proposing
@@ -24,9 +23,10 @@ from app.labels.measured import lifted, refitted
 from app.labels.refusals import ActRefused, NoSuchLabel
 from app.labels.requests import AddTrack, Import, Lift, Propose, Refit, SetSighting
 from app.labels.scoring import LabelScores
+from app.labels.settling import SettlingQueue
+from app.labels.state import LabelState
 from app.labels.steps import Way
-from app.labels.tables import LONGEST_ITEM
-from app.labels.tasks import Tasks, TaskState
+from app.labels.tasks import Tasks
 from pipeline.errors import BadInput
 from pipeline.labels.formats.base import FormatName
 from pipeline.params import Params
@@ -37,28 +37,6 @@ _LOOK_EVERY_S = 0.4
 """Others see within a second what was done through another server."""
 _PATIENCE_S = 10.0
 _NOTHING_OPEN = "no recording is open that could be labelled"
-
-
-@dataclass(frozen=True)
-class LabelState:
-    """revision: the number of the newest act. can_undo, can_redo: of changes of parameters that nobody put a name to;
-    what a person can take back is for that person to ask. labelled: it is a recording; else only parameters are
-    changed."""
-
-    revision: int = 0
-    can_undo: bool = False
-    can_redo: bool = False
-    labelled: bool = False
-    task: TaskState | None = None
-
-    def to_json(self) -> dict[str, Any] | None:
-        """Null for what cannot be labelled."""
-        if not self.labelled:
-            return None
-        return {
-            "revision": self.revision,
-            "task": self.task.to_json() if self.task is not None else None,
-        }
 
 
 @dataclass(frozen=True)
@@ -100,6 +78,7 @@ class LabelDesk:
         self._beginning = threading.Lock()
         self._begun: tuple[str | None, int] = (None, 0)
         self._forgot: str | None = None
+        self._settling = SettlingQueue(self.refresh)
         self.tasks = Tasks(self._told)
         self.scores = LabelScores()
 
@@ -116,6 +95,7 @@ class LabelDesk:
         self._ended = True
         self._wake.set()
         self.tasks.stop()
+        self._settling.stop()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
         with self._lock:
@@ -157,6 +137,7 @@ class LabelDesk:
         if done is None:
             doing, note = self._measured(recording, labels, act) if isinstance(act, Refit | Lift) else (act, "")
             scope = Scope(labels.info.t_ns)
+            self._settling.finish()
             done = labels.log.act(doing.kind, person, lambda draft: do(draft, scope, doing), act_id=act_id, note=note)
             self.refresh()
         return Done(done, labels)
@@ -165,7 +146,9 @@ class LabelDesk:
         """Undo or redo, across labels and parameters; what is only being tried is undone first. ActRefused when there
         is nothing to, or somebody else is in the way. drive, act_id: as in ``act``."""
         labels = self._named(drive)[1] if drive is not None else self._labels_of(self._open)
+        self._settling.finish()
         with self._control.alone():  # a change that comes between would be lost to what is restored
+            self._settling.finish()  # of what came in between
             acted = labels.log.sent_before(act_id, person)
             if acted is None and way == "undo" and self._forget_tried(act_id):
                 return Done(Acted(labels.revision, None, "what was being tried"), labels)
@@ -197,7 +180,10 @@ class LabelDesk:
 
     def possible(self, person: str) -> tuple[bool, bool]:
         """(there is something to take back, something to do again) for a person; nothing while the database fails:
-        nobody who changes parameters waits for one that is known to be away."""
+        nobody who changes parameters waits for one that is known to be away. What is on its way there can be taken
+        back: that waits for it."""
+        if self._settling.has(self._open.uri, person):
+            return True, False
         if self._trouble:
             return False, False
         try:
@@ -206,13 +192,14 @@ class LabelDesk:
             return False, False
 
     def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
-        """Parameters were changed. A database that fails does not keep anybody from driving: it is said, and the change
-        cannot be undone."""
-        try:
-            self._labels_of(self._open).log.settle(changes, person, merges=merges)
-        except BadInput as error:
-            logger.warning("a change of parameters was not kept: %s", error)
-        self.refresh()
+        """Parameters were changed. A database that is held or fails does not keep anybody from driving: the change is
+        written later, or it is said that it cannot be undone."""
+        opened = self._open
+        if not changes:
+            return
+        self._settling.put(opened.uri, lambda: self._labels_of(opened).log, changes, person, merges=merges)
+        if self._settling.has(opened.uri, ""):
+            self._show(opened, replace(self._state, can_undo=True, can_redo=False))
 
     def refresh(self) -> None:
         """Look at the database now. What goes wrong there is said once, until it goes right again."""
@@ -221,22 +208,28 @@ class LabelDesk:
             return
         try:
             labels = self._labels_of(opened)
-            revision, (can_undo, can_redo) = labels.revision, labels.log.possible("")
+            on_its_way = self._settling.has(opened.uri, "")
+            can_undo, can_redo = (True, False) if on_its_way else labels.log.possible("")
+            revision = labels.revision
         except Exception as error:  # whatever a database or a recording does, people go on driving
             if str(error) != self._trouble:
                 logger.warning("labels: %s", error)
             self._trouble = str(error)
             return
         self._trouble = ""
+        self._show(opened, LabelState(revision, can_undo, can_redo, opened.recording is not None, self.tasks.state))
+
+    # ------------------------------------------------------------ inside
+
+    def _show(self, opened: _Open, new: LabelState) -> None:
+        """To everybody, unless something else is open by now."""
         with self._lock:
             if opened is not self._open:
                 return
-            new = LabelState(revision, can_undo, can_redo, opened.recording is not None, self.tasks.state)
+            new = replace(new, trouble=self._settling.trouble)
             changed, self._state = new != self._state, new
         if changed:
             self._control.change()
-
-    # ------------------------------------------------------------ inside
 
     def _named(self, drive: str | None = None) -> tuple[Recording, DriveLabels]:
         """What is open. ActRefused when it is not the recording with that key, NoSuchLabel when it has no frames to
@@ -295,12 +288,4 @@ class LabelDesk:
 
 
 def _info(uri: str, recording: Recording | None) -> DriveInfo:
-    if recording is None:
-        return DriveInfo(_key_of(uri), uri, uri, (), tuple)
-    return info_of(recording.recipe.source, recording.names)
-
-
-def _key_of(uri: str) -> str:
-    """Of what has no content to know it by, short enough for the database; two addresses never share one."""
-    key = f"uri {uri}"
-    return key if len(key) <= LONGEST_ITEM else f"uri sha256 {hashlib.sha256(uri.encode()).hexdigest()}"
+    return info_of_uri(uri) if recording is None else info_of(recording.recipe.source, recording.names)

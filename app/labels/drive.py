@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
 import zlib
 from collections.abc import Callable
@@ -14,7 +15,7 @@ from app.labels.database import Database
 from app.labels.items import SIGHTINGS, read_changed, read_extents, read_item, read_items, read_track, read_window
 from app.labels.log import Log
 from app.labels.refusals import ActRefused, NoSuchLabel
-from app.labels.tables import DriveRow, ItemRow, SightingRow, VersionRow
+from app.labels.tables import LONGEST_ITEM, DriveRow, ItemRow, SightingRow, VersionRow
 from app.labels.values import KINDS, Item, ItemKind, sighting_of
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
@@ -40,6 +41,14 @@ def info_of(source: Source, names: Callable[[], tuple[str, ...]]) -> DriveInfo:
     """What a recording is, wherever it lies: three of its frames are read."""
     t_ns = tuple(source.t_ns(index) for index in range(len(source)))
     return DriveInfo(content_key(t_ns, source.frame), source.uri, source.title, t_ns, names)
+
+
+def info_of_uri(uri: str) -> DriveInfo:
+    """Of what has no frames, as live sensors, and no content to know it by. The key is short enough for the database;
+    two addresses never share one."""
+    key = f"uri {uri}"
+    short = key if len(key) <= LONGEST_ITEM else f"uri sha256 {hashlib.sha256(uri.encode()).hexdigest()}"
+    return DriveInfo(short, uri, uri, (), tuple)
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ def labels_router(desk: LabelDesk) -> APIRouter:
         with refusing():
             labels = desk.labels
             body = changes_json(labels.info, labels.changes(since))
-            can_undo, can_redo = labels.log.possible(person)
+            can_undo, can_redo = desk.possible(person)
         return JSONResponse(body | {"can_undo": can_undo, "can_redo": can_redo})
 
     @router.get("/frames", responses={200: {"model": Window}})

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import sqlite3
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from app.control import Control, Wish
+from app.labels import database as databases
+from app.labels.database import Database
 from app.labels.desk import LabelDesk
 from app.labels.log import Log
+from app.snapshot import Snapshot
 from pipeline.params import Params
+from tests.app.serving import WAIT_S
 
 
 @pytest.fixture
@@ -74,3 +81,87 @@ def test_nobody_changes_parameters_between_an_undo_and_what_it_restores(
     desk.move("undo", "")
     others[0].join()
     assert (seen, control.peek().params.cipv.confirm_hits) == ([5], 7)
+
+
+# ------------------------------------------------------------ a database that somebody else holds
+
+
+@pytest.fixture
+def shared(control: Control, file: Path) -> Iterator[LabelDesk]:
+    """A desk on a file that others write too, and that is open there already."""
+    desk = LabelDesk(Database.in_file(file))
+    desk.start(control)
+    desk.open("live:a car", None)
+    desk.refresh()
+    yield desk
+    desk.stop()
+
+
+@contextmanager
+def held(file: Path) -> Iterator[None]:
+    """By another connection, for writing."""
+    other = sqlite3.connect(file, isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    yield
+    other.execute("ROLLBACK")
+    other.close()
+
+
+def until(desk: LabelDesk, holds: Any) -> None:
+    """The desk wakes nobody who waits for its state: its own queue is asked."""
+    ended = threading.Event()
+    for _ in range(int(WAIT_S / 0.02)):
+        if holds():
+            return
+        ended.wait(0.02)
+    raise AssertionError(desk.state)
+
+
+def test_parameters_change_at_once_while_another_holds_the_database(
+    shared: LabelDesk, control: Control, file: Path
+) -> None:
+    with held(file):
+        for value in (5, 6):
+            control.change_params({"cipv.confirm_hits": value}, person="Ada")
+        control.change_params({"cluster.z_weight": 0.3})
+        assert (control.peek().params.cipv.confirm_hits, control.peek().params.cluster.z_weight) == (6, 0.3)
+        assert (shared.possible("Ada"), shared.possible("")) == ((True, False), (True, False))
+        assert shared.state.can_undo
+    undone = [shared.move("undo", "Ada").acted.what for _ in range(3)]
+    assert undone == ["cluster.z_weight 0.4 → 0.3", "cipv.confirm_hits 5 → 6", "cipv.confirm_hits 3 → 5"]
+    assert control.peek().params == Params()
+
+
+def test_what_is_on_its_way_is_written_before_the_end(control: Control, file: Path) -> None:
+    desk = LabelDesk(Database.in_file(file))
+    desk.start(control)
+    desk.open("live:a car", None)
+    desk.refresh()
+    with held(file):
+        control.change_params({"cipv.confirm_hits": 5}, person="Ada")
+    desk.stop()
+    again = LabelDesk(Database.in_file(file))
+    again.open("live:a car", None)
+    assert again.possible("Ada") == (True, False)
+    again.stop()
+
+
+def test_what_could_not_be_written_is_said_until_it_can(
+    control: Control, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(databases, "_BUSY_S", 0.3)
+    desk = LabelDesk(Database.in_file(file))
+    desk.start(control)
+    desk.open("live:a car", None)
+    desk.refresh()
+    with held(file):
+        control.change_params({"cipv.confirm_hits": 5})
+        until(desk, lambda: desk.state.trouble)
+        assert not desk.possible("")[0]
+    words = f"A change of parameters cannot be undone: labels, {file}: database is locked"
+    assert desk.state.trouble == words
+    assert Snapshot(Params(), labels=desk.state).state_json()["notices"] == [{"level": "warning", "text": words}]
+    control.change_params({"cipv.confirm_hits": 6})
+    until(desk, lambda: not desk.state.trouble)
+    assert desk.possible("") == (True, False)
+    desk.stop()
