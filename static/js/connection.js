@@ -1,6 +1,6 @@
 /** The stream: newest frame in, reconnecting for ever, and the server's clock. */
 import { decode } from "./protocol.js";
-import { get, set } from "./store.js";
+import { drawNow, get, set } from "./store.js";
 
 const PING_MS = 2000;
 const RETRY_MS = [300, 600, 1200, 2500, 5000];
@@ -136,6 +136,7 @@ async function show({ buffer, number, done }) {
     set("state", frame.state);
   }
   set("frame", frame);
+  drawNow();
   requestAnimationFrame(() => {
     before?.bitmap?.close();
     done();

@@ -17,7 +17,13 @@ const AROUND = 2;
  */
 export function control(name, param, change) {
   const id = `param-${name}`;
-  const input = { boolean: toggle, choice: choices, number: slider, integer: slider }[param.kind](id, param, change);
+  /** What it shows, as the server said it; empty once a hand has moved it. */
+  let shown = "";
+  const moved = (/** @type {ParamValue} */ value, /** @type {boolean} */ isFinal) => {
+    shown = "";
+    change(value, isFinal);
+  };
+  const input = { boolean: toggle, choice: choices, number: slider, integer: slider }[param.kind](id, param, moved);
   const auto = el("span", { class: "auto", textContent: "auto", hidden: true, title: "Taken from the recording's calibration, or the detector's own" });
   const reset = el("button", { type: "button", class: "reset", textContent: "↺", title: "Back to the preset's value", aria: { label: `Reset ${words(param.key)}` } });
   const label = el("label", { htmlFor: id, textContent: words(param.key) });
@@ -27,13 +33,16 @@ export function control(name, param, change) {
   attachTooltip(label, `${param.help}. ${name}`);
   /** @type {ParamValue} */
   let base = null;
-  reset.addEventListener("click", () => change(base, true));
+  reset.addEventListener("click", () => moved(base, true));
   return {
     node,
     help: param.help,
     /** @param {ParamValue} value @param {ParamValue} preset @param {number|null} effective what null stands for @param {boolean} idle */
     show(value, preset, effective, idle) {
       base = preset;
+      const now = JSON.stringify([value, preset, effective, idle]);
+      if (now === shown) return;
+      shown = node.contains(document.activeElement) ? "" : now; // what is under a hand keeps what the hand gave it
       node.classList.toggle("is-changed", value !== preset);
       node.classList.toggle("is-idle", idle);
       auto.hidden = value !== null;

@@ -2,7 +2,7 @@
 import { cipvId } from "./colors.js";
 import { $, el, mark, text, within } from "./dom.js";
 import { DASH, kmh, num, side, signed } from "./format.js";
-import { get, on, paint, select, set } from "./store.js";
+import { get, on, paintAfter, select, set } from "./store.js";
 
 /** @typedef {import("./types.js").FusedObject} FusedObject */
 /**
@@ -39,7 +39,7 @@ const body = $("#objects tbody");
 export function setUp() {
   const last = el("th", { scope: "col", class: "left reason" }, el("button", { type: "button", textContent: "Why, or why not", disabled: true }));
   $("#objects thead").append(el("tr", {}, ...COLUMNS.map(heading), last));
-  paint(["frame", "selection"], update);
+  paintAfter(["frame", "selection"], update);
   on(["selection"], () => rows.get(get("selection") ?? -1)?.row.scrollIntoView({ block: "nearest" }));
   body.addEventListener("click", (event) => pick(within(event, "tr")));
   body.addEventListener("keydown", onKey);

@@ -3,7 +3,7 @@ import { newestOnly, request } from "./api.js";
 import { $, el, memory } from "./dom.js";
 import { control } from "./control.js";
 import { knownName } from "./labeling/person.js";
-import { get, on, set } from "./store.js";
+import { get, on, paintAfter, set } from "./store.js";
 import { toggle } from "./workspace/panes.js";
 
 /** @typedef {import("./types.js").ParamValue} ParamValue */
@@ -49,7 +49,8 @@ export function setUp() {
       el("button", { type: "button", textContent: "Reset", title: "Every parameter back to the preset's value", onclick: () => choosePreset(presets.value) }), download), search, error),
     list);
   on(["state"], refreshIfForeign);
-  on(["params"], show);
+  on(["params"], () => (knownRevision = Math.max(knownRevision, get("params")?.revision ?? -1)));
+  paintAfter(["params"], show); // a hundred controls: the frame that a change makes goes first
 }
 
 /** Another browser, the 3D view or another recording changed what is true: read it again. */
@@ -70,7 +71,6 @@ function accept(answer) {
 function show() {
   const answer = get("params");
   if (!answer) return;
-  knownRevision = Math.max(knownRevision, answer.revision);
   if (!controls.size) build(answer);
   presets.value = answer.preset;
   for (const [name, one] of controls) {

@@ -41,6 +41,11 @@
 const values = {};
 /** @type {Map<Key, Set<(value: any) => void>>} */
 const listeners = new Map();
+/** What is to be drawn: at the next turn of the screen, and one turn after that. @type {Set<() => void>} */
+const due = new Set();
+/** @type {Set<() => void>} */
+const after = new Set();
+let isAsked = false, hasWaited = false;
 
 /** @template {Key} K @param {K} key @returns {Values[K]|null} */
 export function get(key) {
@@ -68,17 +73,57 @@ export function paint(keys, draw) {
   return invalidate;
 }
 
+/**
+ * Like `paint`, one painted frame later: for what many words say, as a table does. Having those laid out takes longer than
+ * the views take to draw, and nobody reads that fast.
+ * @param {Key[]} keys @param {() => void} draw
+ */
+export function paintAfter(keys, draw) {
+  on(keys, () => {
+    after.add(draw);
+    ask();
+  });
+}
+
 /** A function that has `draw` run once before the next paint, however often it is called. @param {() => void} draw */
 export function painter(draw) {
-  let asked = false;
   return () => {
-    if (asked) return;
-    asked = true;
-    requestAnimationFrame(() => {
-      asked = false;
-      draw();
-    });
+    due.add(draw);
+    ask();
   };
+}
+
+/** Draw what is due without waiting for the screen's next turn, which then only has to show it. A page that nobody sees
+ * waits until somebody does. */
+export function drawNow() {
+  if (!document.hidden) run(due);
+}
+
+function ask() {
+  if (isAsked) return;
+  isAsked = true;
+  requestAnimationFrame(turn);
+}
+
+function turn() {
+  isAsked = false;
+  run(due);
+  if (hasWaited) run(after);
+  hasWaited = after.size > 0;
+  if (hasWaited) ask();
+}
+
+/** @param {Set<() => void>} draws */
+function run(draws) {
+  const all = [...draws];
+  draws.clear();
+  for (const draw of all) {
+    try {
+      draw();
+    } catch (error) {
+      reportError(error); // one view that fails takes no other with it
+    }
+  }
 }
 
 /** Select an object everywhere; selecting it again takes the selection away. @param {number|null} id */

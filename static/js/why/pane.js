@@ -2,7 +2,7 @@
  * gate that stopped it. */
 import { $, el, keyed, mark, text } from "../dom.js";
 import { DASH, num } from "../format.js";
-import { get, paint, set } from "../store.js";
+import { get, paintAfter, set } from "../store.js";
 import { gateRow, kindOf, quantity, showGate } from "./gates.js";
 
 /** @typedef {import("../types.js").Ranked} Ranked */
@@ -18,7 +18,7 @@ const nothing = el("p", { class: "facts pad", textContent: "Nothing is shown yet
 export function setUp() {
   content.hidden = true;
   $("#why").append(nothing, content);
-  paint(["frame", "selection"], update);
+  paintAfter(["frame", "selection"], update);
 }
 
 function update() {
