@@ -15,6 +15,7 @@ export function show() {
       el("p", { class: "facts", textContent: "Ribbon: plain VL, hatched upwards V, downwards L, faint carried." })),
     el("div", {}, el("h2", { textContent: "Hand" }), el("p", { textContent: "Plan: wheel zooms, dragging moves, double click fits." }),
       el("p", { textContent: "Timeline: press or drag to go there, wheel zooms, shift and wheel moves along, double click fits." }),
+      el("p", { textContent: "3D: dragging turns, wheel zooms, right drag moves; W A S D Q E and the arrows fly. Every other key does what it does everywhere; Esc gives them all back to the page." }),
       el("h2", { textContent: "In the car" }), el("p", {}, el("a", { href: "drive/", textContent: "Display for a small screen, by touch" })))),
     el("form", { method: "dialog" }, el("button", { textContent: "Close" })));
   dialog.showModal();

@@ -156,6 +156,32 @@ def test_the_help_tells_every_key(open_page: OpenPage):
             assert key in told
 
 
+def test_the_3d_view_keeps_the_keys_that_fly_and_leaves_the_page_the_others(open_page: OpenPage, site: Site):
+    page = open_page()
+    page.route("**/viser/", lambda route: route.fulfill(body="<input>", content_type="text/html"))
+    theme = "() => document.documentElement.dataset.theme ?? null"
+    before = page.evaluate(theme)
+    page.keyboard.press("3")
+    view = page.frame_locator("iframe[title='3D view']")
+    view.locator("body").click()
+    page.keyboard.press("d")
+    page.keyboard.press("?")
+    dialog = page.get_by_role("dialog")
+    expect(dialog).to_contain_text("Esc gives them all back to the page")
+    assert page.evaluate(theme) == before, "D flies"
+    dialog.get_by_role("button", name="Close").click()
+    view.locator("input").click()
+    page.keyboard.press("?")
+    expect(view.locator("input")).to_have_value("?")
+    view.locator("body").click(position={"x": 5, "y": 60})
+    page.keyboard.press("Home")
+    site.engine.wait_for(lambda s: s.index == 0, WAIT_S)
+    wait_for_frame(page, 0)
+    page.keyboard.press("Escape")
+    page.keyboard.press("ArrowRight")
+    site.engine.wait_for(lambda s: s.index == 1, WAIT_S)
+
+
 def test_a_gate_leads_to_the_parameter_behind_its_limit(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
