@@ -125,13 +125,22 @@ class LabelDesk:
     @property
     def labels(self) -> DriveLabels:
         """Of the open recording. NoSuchLabel when none is open."""
-        return self._named()[1]
+        opened = self._open
+        if opened.recording is None:
+            raise NoSuchLabel(_NOTHING_OPEN)
+        return self._labels_of(opened)
+
+    @property
+    def drive(self) -> str | None:
+        """The key of the open recording; null for what has no frames to label."""
+        opened = self._open
+        return self._labels_of(opened).info.key if opened.recording is not None else None
 
     # ------------------------------------------------------------ acts
 
-    def act(self, person: str, act: Any, drive: str | None = None, act_id: str | None = None) -> Done:
-        """Do it; on disk when this returns. Whatever refuses it. drive: the key of the recording that is meant, the
-        open one without. act_id: of who sends it; what was sent before is not done again."""
+    def act(self, person: str, act: Any, drive: str, act_id: str | None = None) -> Done:
+        """Do it; on disk when this returns. Whatever refuses it. drive: the key of the recording that is meant.
+        act_id: of who sends it; what was sent before is not done again."""
         recording, labels = self._named(drive)
         done = labels.log.sent_before(act_id, person)
         if done is None:
@@ -142,10 +151,11 @@ class LabelDesk:
             self.refresh()
         return Done(done, labels)
 
-    def move(self, way: Way, person: str, drive: str | None = None, act_id: str | None = None) -> Done:
+    def move(self, way: Way, person: str, drive: str | None, act_id: str | None = None) -> Done:
         """Undo or redo, across labels and parameters; what is only being tried is undone first. ActRefused when there
-        is nothing to, or somebody else is in the way. drive, act_id: as in ``act``."""
-        labels = self._named(drive)[1] if drive is not None else self._labels_of(self._open)
+        is nothing to, or somebody else is in the way. drive, act_id: as in ``act``; null for what has no frames to
+        label."""
+        labels = self._meant(self._open, drive)
         self._settling.finish()
         with self._control.alone():  # a change that comes between would be lost to what is restored
             self._settling.finish()  # of what came in between
@@ -159,7 +169,7 @@ class LabelDesk:
         self.refresh()
         return Done(acted, labels)
 
-    def begin(self, person: str, act: Propose | Import, drive: str | None = None, act_id: str | None = None) -> int:
+    def begin(self, person: str, act: Propose | Import, drive: str, act_id: str | None = None) -> int:
         """Something that takes a while; its number. ActRefused while another one goes on, or when it cannot be done.
         drive, act_id: as in ``act``."""
         recording, labels = self._named(drive)
@@ -173,7 +183,7 @@ class LabelDesk:
             self._begun = (act_id, number)
             return number
 
-    def begin_import(self, person: str, file: Path, name: FormatName, drive: str | None = None) -> int:
+    def begin_import(self, person: str, file: Path, name: FormatName, drive: str) -> int:
         """Labels of a file or folder that was handed in, as another tool made them; it is removed in the end."""
         recording, labels = self._named(drive)
         return self.tasks.begin("import", importing_file(labels, recording, person, file, name))
@@ -231,16 +241,20 @@ class LabelDesk:
         if changed:
             self._control.change()
 
-    def _named(self, drive: str | None = None) -> tuple[Recording, DriveLabels]:
+    def _named(self, drive: str) -> tuple[Recording, DriveLabels]:
         """What is open. ActRefused when it is not the recording with that key, NoSuchLabel when it has no frames to
         label."""
         opened = self._open
         if opened.recording is None:
             raise NoSuchLabel(_NOTHING_OPEN)
+        return opened.recording, self._meant(opened, drive)
+
+    def _meant(self, opened: _Open, drive: str | None) -> DriveLabels:
+        """ActRefused when another recording is open, or one at all where none is meant."""
         labels = self._labels_of(opened)
-        if drive not in (None, labels.info.key):
+        if drive != (labels.info.key if opened.recording is not None else None):
             raise ActRefused("another recording is open now")
-        return opened.recording, labels
+        return labels
 
     def _measured(
         self, recording: Recording, labels: DriveLabels, act: Refit | Lift

@@ -30,6 +30,15 @@ _SUFFIXES: dict[FormatName, str] = {
 """Of the file; the others are folders."""
 _LARGEST_UNPACKED = 512 << 20
 _MOST_PARTS = 100_000
+_BROKEN_ZIP = (
+    zipfile.BadZipFile,  # none at all, or a file in it is not what its checksum says
+    zlib.error,  # a damaged file in it
+    NotImplementedError,  # packed in a way that this Python does not know
+    RuntimeError,  # needs a password
+    EOFError,  # ends early
+    ValueError,  # says something of a file that cannot be
+    OSError,  # a file and a folder in it have the same name
+)
 
 
 @dataclass(frozen=True)
@@ -100,7 +109,7 @@ def _unzipped(file: Path, folder: Path) -> Path:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 with packed.open(each) as source, target.open("xb") as out:
                     _copied(source, out, each.file_size)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError, ValueError, zlib.error) as error:
+    except _BROKEN_ZIP as error:
         raise ActRefused(f"no .zip of a folder: {error}") from None
     inside = list(folder.iterdir())
     return inside[0] if len(inside) == 1 and inside[0].is_dir() and inside[0].name.startswith("labels") else folder

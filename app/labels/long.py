@@ -55,7 +55,12 @@ def put_proposals(
 
     acted = labels.log.act("propose", person, apply)
     known = len(found.tracks) - counts[-1]
-    return acted.what + (f"; {known} more are labelled already" if known else "")
+    flat = sum(all(each.cuboid is None for each in track.sightings) for track in found.tracks)
+    more = [
+        f"{known} more are labelled already" if known else "",
+        f"{flat} without a cuboid, which the camera alone has seen" if flat else "",
+    ]
+    return "; ".join((acted.what, *filter(None, more)))
 
 
 def importing(

@@ -38,8 +38,8 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
     async def take(
         request: Request,
         person: Annotated[Person, Query()],
+        drive: Annotated[str, Query(max_length=LONGEST_ITEM)],
         format: FormatName = "native",
-        drive: Annotated[str | None, Query(max_length=LONGEST_ITEM)] = None,
     ) -> Response:
         """Labels that another tool made of this recording: the body is the file, of a format that is a folder a .zip of
         it. They come beside those that are there, as one act. state.labels.task tells how far it is. drive: id of the

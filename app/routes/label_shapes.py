@@ -192,11 +192,12 @@ class ScoreJson(BaseModel):
     metrics: list[MetricJson]
 
 
-class Sent(Strict):
-    """drive: id of the recording that is meant; 409 when another one is open. act_id: made by who sends it, one for
-    each act: sent again, the act is not done again, and answered as before."""
+Drive = Annotated[str, Field(max_length=LONGEST_ITEM, description="Id of the recording, of GET /api/labels")]
 
-    drive: Annotated[str, Field(max_length=LONGEST_ITEM)] | None = None
+
+class Sent(Strict):
+    """act_id: made by who sends it, one for each act: sent again, the act is not done again, and answered as before."""
+
     act_id: UUID | None = None
 
     @property
@@ -206,16 +207,18 @@ class Sent(Strict):
 
 
 class ActBody(Sent):
-    """person: whose act it is."""
+    """person: whose act it is. drive: the recording that is meant; 409 when another one is open."""
 
     person: Person
+    drive: Drive
     act: Act
 
 
 class Who(Sent):
-    """person: whose newest act is meant."""
+    """person: whose newest act is meant. drive: as of an act; null where what is open has no frames to label."""
 
     person: PersonOrNobody = ""
+    drive: Drive | None
 
 
 class ActedJson(BaseModel):

@@ -81,14 +81,14 @@ def params_router(engine: Engine) -> APIRouter:
         """Back to the parameters before the last change that nobody put a name to. 409 when there is none. A page
         undoes by POST /api/labels/undo, which goes across labels and parameters."""
         with refusing():
-            engine.labels.move("undo", "")
+            engine.labels.move("undo", "", engine.labels.drive)
         return _params_json(engine)
 
     @router.post("/params/redo", responses=_ANSWER)
     def redo() -> JSONResponse:
         """The change that was undone last, again. 409 when there is none."""
         with refusing():
-            engine.labels.move("redo", "")
+            engine.labels.move("redo", "", engine.labels.drive)
         return _params_json(engine)
 
     @router.post("/params/preset", responses=_ANSWER)

@@ -3,6 +3,11 @@
 Not everything it follows is worth a look: roadside returns are half of it. Proposed is what the camera has called a
 road user in a frame, and what was the lead or stood in the path in one. A track ends where it was last seen, not
 where it was last predicted to be; between two sightings a prediction stands in.
+
+What the camera alone sees is proposed as a box in the picture, without a cuboid. One from how tall it looks, as
+``pipeline.labels.lift`` makes where somebody points, was tried: on Astyx its middle was 14 m off (median of 55 that have
+truth, at 68 m), two in three did not even touch the vehicle; and a distance that nobody measured must not become the
+truth by which distances are scored.
 """
 
 from __future__ import annotations

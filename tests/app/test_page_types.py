@@ -127,8 +127,10 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
 def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
     """Whatever is sent of labels."""
 
+    drive = client.get("/api/labels").json()["drive"]["id"]
+
     def act(**what: Any) -> Any:
-        answer = client.post("/api/labels/act", json={"person": "Ada", "act": what})
+        answer = client.post("/api/labels/act", json={"person": "Ada", "act": what, "drive": drive})
         assert answer.status_code < 300, (what, answer.text)
         return answer.json()
 

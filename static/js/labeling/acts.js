@@ -14,7 +14,7 @@ import { driveNow } from "./steps.js";
 /** @typedef {import("./types.js").Act} Act */
 /** @typedef {import("./types.js").ActAnswer} ActAnswer */
 /** at_ms: when the server last said that something is on disk; problem: why the next is not. @typedef {{state: "saved"|"saving"|"failed", at_ms: number|null, problem: string}} Saving */
-/** What is sent. @typedef {{person: string, drive?: string, act_id: string, act?: Act}} Body */
+/** What is sent. drive: null where nothing can be labelled. @typedef {{person: string, drive: string|null, act_id: string, act?: Act}} Body */
 /** @typedef {{act: Act, path: string, body: Body, done: (answer: ActAnswer|null) => void}} Waiting */
 
 /** Of a server that is not there now, or of what stands before it: it may be sent once more. */
@@ -46,13 +46,17 @@ export const move = (direction) => put({ kind: direction }, `api/labels/${direct
 /** @param {Act} act @param {string} path @param {string} person @returns {Promise<ActAnswer|null>} */
 async function put(act, path, person) {
   const drive = await driveNow();
+  if (drive === null && get("state")?.labels) {
+    set("said", "Nothing was done: the server cannot be reached");
+    return null;
+  }
   return new Promise((done) => {
     const last = queue.at(-1);
     if (last && queue.length > 1 && isSameShape(last.act, act)) {
       last.done(null); // another nudge of the same cuboid, before the one before it went out
       queue.pop();
     }
-    queue.push({ act, path, body: { person, ...(drive && { drive }), act_id: newId() }, done });
+    queue.push({ act, path, body: { person, drive, act_id: newId() }, done });
     send();
   });
 }

@@ -31,7 +31,7 @@ export function setUp() {
 function follow() {
   const state = get("state");
   if (!state) return;
-  if (uri !== null && state.uri !== uri) for (const key of /** @type {const} */ (["labels", "track", "draft", "marked"])) set(key, null);
+  if (uri !== null && state.uri !== uri) for (const key of /** @type {const} */ (["labels", "track", "draft", "marked", "trimmed"])) set(key, null);
   uri = state.uri;
   if (!state.labels || !get("labeling")?.on) return;
   if (!get("labels") || state.labels.revision > (get("labels")?.revision ?? 0)) refresh(false);

@@ -69,7 +69,7 @@ function show() {
 function placeWords(sighting) {
   if (!sighting) return "not in this frame";
   const kind = sighting.keyframe ? "keyframe" : "interpolated";
-  if (!sighting.cuboid) return `${kind} · box in the picture only`;
+  if (!sighting.cuboid) return `${kind} · box in the picture only: no LiDAR points tell where it is, and its height in the picture does so too roughly. Shift G draws its cuboid`;
   const { center: [x, y], size, yaw_rad } = sighting.cuboid;
   return `${kind} · ${num(x, 2)} m ahead, ${num(Math.abs(y), 2)} ${y >= 0 ? "left" : "right"} · ${size.map((each) => num(each, 1)).join(" × ")} m · ${num((yaw_rad * 180) / Math.PI, 0)}°${sighting.bbox ? "" : ` · box ${DASH}`}`;
 }

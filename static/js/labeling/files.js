@@ -1,6 +1,7 @@
 /** Labels as files: export with what a format cannot hold said by name, import, the truth that came with the recording, and versions. */
 import { Refused, request } from "../api.js";
 import { el, text } from "../dom.js";
+import { get } from "../store.js";
 import { attachMenu } from "../workspace/menu.js";
 import { act } from "./acts.js";
 import { propose, say } from "./commands.js";
@@ -78,10 +79,11 @@ async function freeze(event) {
 /** @param {Event} event */
 async function upload(event) {
   event.preventDefault();
-  const given = file.files?.[0], person = await personName();
-  if (!given || person === null) return;
+  const given = file.files?.[0], person = await personName(), drive = get("labels")?.drive;
+  if (!given || person === null || !drive) return;
   await attempt(async () => {
-    const address = new URL(`api/labels/import?format=${which.value}&person=${encodeURIComponent(person)}`, document.baseURI);
+    const query = new URLSearchParams({ format: which.value, person, drive });
+    const address = new URL(`api/labels/import?${query}`, document.baseURI);
     const response = await fetch(address, { method: "POST", body: given, headers: { "content-type": "application/octet-stream" } });
     if (!response.ok) throw new Refused(response.status, await response.json().catch(() => null));
     say(`Importing ${given.name}`);

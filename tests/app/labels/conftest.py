@@ -14,7 +14,7 @@ from app.engine import Engine
 from app.labels.database import Database
 from app.labels.drive import DriveInfo, DriveLabels
 from tests.app.labels import postgres
-from tests.app.labels.site import team
+from tests.app.labels.site import act, team
 
 COUNT = 100
 _numbers = itertools.count()
@@ -96,7 +96,5 @@ def client(server: tuple[Engine, httpx.Client]) -> httpx.Client:
         for each in there[f"{kind}s"]
     ]
     if items:
-        assert found.post(
-            "/api/labels/act", json={"person": "broom", "act": {"kind": "remove", "items": items}}
-        ).is_success
+        assert act(found, "broom", kind="remove", items=items).is_success
     return found

@@ -40,13 +40,14 @@ def _label_until_it_dies(address: str, turn: int, killer: threading.Timer, after
     """Act and frame of each answer. Every act is a track of its own. The killer is let loose after some answers."""
     said: list[tuple[int, int]] = []
     with httpx.Client(base_url=address, timeout=WAIT_S) as client:
+        drive = client.get("/api/labels").json()["drive"]["id"]
         while True:
             if len(said) == after:
                 killer.start()
             frame = len(said) % 30
             body = {"kind": "add_track", "label": f"car {turn} {len(said)}", "frame": frame, "cuboid": CUBOID}
             try:
-                answer = client.post("/api/labels/act", json={"person": "Ada", "act": body})
+                answer = client.post("/api/labels/act", json={"person": "Ada", "act": body, "drive": drive})
             except httpx.TransportError:
                 killer.join()
                 return said

@@ -50,8 +50,19 @@ def team(database: Database | None = None) -> Iterator[tuple[Engine, httpx.Clien
         engine.stop()
 
 
+def drive(client: httpx.Client) -> str | None:
+    """The id of what is open; null where nothing can be labelled."""
+    answer = client.get("/api/labels")
+    return answer.json()["drive"]["id"] if answer.is_success else None
+
+
 def act(client: httpx.Client, person: str = "Ada", **body: Any) -> httpx.Response:
-    return client.post("/api/labels/act", json={"person": person, "act": body})
+    return client.post("/api/labels/act", json={"person": person, "act": body, "drive": drive(client) or "none"})
+
+
+def move(client: httpx.Client, way: str, person: str = "Ada") -> httpx.Response:
+    """Undo or redo."""
+    return client.post(f"/api/labels/{way}", json={"person": person, "drive": drive(client)})
 
 
 def task(engine: Engine, begun: httpx.Response) -> str:

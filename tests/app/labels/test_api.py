@@ -10,7 +10,7 @@ from app.routes.label_shapes import ScoreJson, Window
 from app.server import create_app
 from app.tokens import Tokens
 from pipeline.params import Params
-from tests.app.labels.site import COUNT, CUBOID, act, labels, proposed, ref, task
+from tests.app.labels.site import COUNT, CUBOID, act, labels, move, proposed, ref, task
 from tests.app.recording import Recording, opener
 from tests.app.serving import WAIT_S, serving
 
@@ -79,24 +79,24 @@ def test_one_undo_goes_across_labels_parameters_and_calibration(engine: Engine, 
     act(client, kind="tag", frame=4, tag="rain")
     undone = []
     for _ in range(4):
-        undone.append(client.post("/api/labels/undo", json={"person": "Ada"}).json()["what"])
+        undone.append(move(client, "undo", "Ada").json()["what"])
     assert undone == [
         "tagged frame 4 rain", "alignment.yaw_deg 0 → 0.5", "cipv.confirm_hits 3 → 5", "tagged frame 3 night",
     ]  # fmt: skip
     assert engine.control.peek().params == Params()
     assert labels(client, person="Ada")["can_redo"]
     for _ in range(4):
-        assert client.post("/api/labels/redo", json={"person": "Ada"}).status_code == 200
+        assert move(client, "redo", "Ada").status_code == 200
     assert (engine.control.peek().params.cipv.confirm_hits, len(labels(client)["tags"])) == (5, 2)
     assert engine.control.peek().params.alignment.yaw_deg == 0.5
     for _ in range(3):
-        client.post("/api/labels/undo", json={"person": "Ada"})
+        move(client, "undo", "Ada")
 
 
 def test_a_slider_that_is_only_tried_is_undone_first(engine: Engine, client: httpx.Client) -> None:
     act(client, kind="tag", frame=3, tag="night")
     client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 9}, "final": False})
-    assert client.post("/api/labels/undo", json={"person": "Ada"}).json()["what"] == "what was being tried"
+    assert move(client, "undo", "Ada").json()["what"] == "what was being tried"
     assert engine.control.peek().params.cipv.confirm_hits == 3
     assert len(labels(client)["tags"]) == 1
 
@@ -125,10 +125,10 @@ def test_a_name_is_the_same_however_it_is_spaced(client: httpx.Client) -> None:
     spaced = " Ada  Lovelace "
     assert act(client, spaced, kind="tag", frame=3, tag="night").is_success
     assert labels(client, person=spaced)["can_undo"]
-    assert client.post("/api/labels/undo", json={"person": spaced}).json()["what"].endswith("night")
+    assert move(client, "undo", spaced).json()["what"].endswith("night")
     change = {"changes": {"cipv.confirm_hits": 5}, "person": spaced}
     assert client.patch("/api/params", json=change).is_success
-    assert client.post("/api/labels/undo", json={"person": "Ada Lovelace"}).is_success
+    assert move(client, "undo", "Ada Lovelace").is_success
     assert client.get("/api/params").json()["values"]["cipv.confirm_hits"] == 3
 
 
@@ -148,6 +148,7 @@ def test_a_name_is_the_same_however_it_is_spaced(client: httpx.Client) -> None:
         ("GET", "/api/labels/history?kind=param&id=1", 422),
         ("POST", "/api/labels/undo", 422),
         ("POST", "/api/labels/import?format=native", 422),
+        ("POST", "/api/labels/import?person=Ada", 422),
     ],
 )
 def test_what_cannot_be_asked_is_refused_in_a_sentence(

@@ -12,7 +12,7 @@ import pytest
 from app.engine import Engine
 from app.limits import LARGEST_FILE
 from pipeline.labels.formats.native import from_json
-from tests.app.labels.site import act, labels, ref, task
+from tests.app.labels.site import act, drive, labels, move, ref, task
 from tests.app.serving import WAIT_S
 
 
@@ -54,23 +54,41 @@ def test_what_is_exported_can_be_imported(engine: Engine, client: httpx.Client, 
     assert (answer.headers["x-cipv-lost"] == "0") == (lost == [])
     act(client, kind="remove", items=[ref(labels(client)["tracks"][0])])
     done = task(
-        engine, client.post("/api/labels/import", params={"format": name, "person": "Bob"}, content=answer.content)
+        engine,
+        client.post(
+            "/api/labels/import",
+            params={"format": name, "person": "Bob", "drive": drive(client)},
+            content=answer.content,
+        ),
     )
     assert done.startswith("imported 1 tracks")
     after = client.get(f"/api/labels/tracks/{labels(client)['tracks'][0]['id']}").json()
     for one, other in zip(before["sightings"], after["sightings"], strict=True):
         assert one["frame"] == other["frame"]
         assert one["cuboid"]["center"] == pytest.approx(other["cuboid"]["center"], abs=0.01)
-    assert client.post("/api/labels/undo", json={"person": "Bob"}).json()["what"].startswith("imported")
+    assert move(client, "undo", "Bob").json()["what"].startswith("imported")
     assert labels(client)["tracks"] == []
 
 
 def packed(**files: str) -> bytes:
     out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as made:
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as made:
         for name, text in files.items():
             made.writestr(name.replace("__", "/"), text)
     return out.getvalue()
+
+
+def spoilt(at: int, in_directory: int | None, value: int) -> bytes:
+    """A .zip of one file whose byte ``at`` of its header is another one; also in the directory at the end."""
+    body = bytearray(packed(**{"a.txt": "x"}))
+    body[at] = value
+    if in_directory is not None:
+        body[body.index(b"PK\x01\x02") + in_directory] = value
+    return bytes(body)
+
+
+FLAGS, METHOD, DATA = (6, 8), (8, 10), 30 + len("a.txt")
+"""Where they are: before the file, and in the directory at the end (PKWARE's APPNOTE, 4.3.7 and 4.3.12)."""
 
 
 @pytest.mark.parametrize(
@@ -79,6 +97,9 @@ def packed(**files: str) -> bytes:
         ("native", b"these are no labels", "the file: no JSON"),
         ("kitti", b"these are no labels", "no .zip of a folder"),
         ("kitti", packed(**{"..__..__out.txt": "x"}), "leads out of it"),
+        ("kitti", spoilt(*FLAGS, 1), "encrypted"),
+        ("kitti", spoilt(*METHOD, 99), "compression method is not supported"),
+        ("kitti", spoilt(DATA, None, 0xFF), "Error -3 while decompressing data"),
         ("openlabel", b"{}", "the file: "),
     ],
 )
@@ -86,7 +107,8 @@ def test_a_file_that_is_none_is_said_and_changes_nothing(
     engine: Engine, client: httpx.Client, name: str, body: bytes, says: str
 ) -> None:
     before = labels(client)["revision"]
-    answer = client.post("/api/labels/import", params={"format": name, "person": "Bob"}, content=body)
+    asked = {"format": name, "person": "Bob", "drive": drive(client)}
+    answer = client.post("/api/labels/import", params=asked, content=body)
     assert says in task(engine, answer)
     assert labels(client)["revision"] == before
 
@@ -110,7 +132,7 @@ def test_a_version_is_frozen_and_given_out(engine: Engine, client: httpx.Client)
 
 def test_a_file_beyond_all_measure_is_not_read(client: httpx.Client) -> None:
     connection = HTTPConnection(client.base_url.host, client.base_url.port or 0, timeout=WAIT_S)
-    connection.putrequest("POST", "/api/labels/import?format=native&person=Ada")
+    connection.putrequest("POST", "/api/labels/import?format=native&person=Ada&drive=x")
     connection.putheader("content-length", str(LARGEST_FILE + 1))
     connection.endheaders()
     assert connection.getresponse().status == 413

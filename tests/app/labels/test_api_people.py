@@ -13,13 +13,16 @@ import pytest
 from app.engine import Engine
 from app.labels.database import Database, DatabaseError
 from app.labels.log import Log
-from tests.app.labels.site import act, labels, proposed, team
+from tests.app.labels.site import act, labels, move, proposed, team
 from tests.app.serving import WAIT_S
 
 
 def test_what_is_sent_again_is_answered_as_before_and_done_once(engine: Engine, client: httpx.Client) -> None:
+    drive = labels(client)["drive"]["id"]
+
     def sent(path: str, person: str = "Ada", **more: Any) -> httpx.Response:
-        return client.post(f"/api/labels/{path}", json={"person": person, "act_id": str(UUID(int=number))} | more)
+        body = {"person": person, "drive": drive, "act_id": str(UUID(int=number))}
+        return client.post(f"/api/labels/{path}", json=body | more)
 
     numbers = itertools.count(1)
     acts: tuple[tuple[str, dict[str, Any]], ...] = (
@@ -53,6 +56,11 @@ def test_what_was_meant_for_another_recording_is_not_done_to_this_one(client: ht
     for path, body in (("act", {"act": tag}), ("act", {"act": {"kind": "propose"}}), ("undo", {}), ("redo", {})):
         answer = client.post(f"/api/labels/{path}", json={"person": "Ada", "drive": "another"} | body)
         assert (answer.status_code, answer.json()["detail"]) == (409, "another recording is open now")
+        assert client.post(f"/api/labels/{path}", json={"person": "Ada"} | body).status_code == 422, (
+            "nobody knows which"
+        )
+    live = client.post("/api/labels/undo", json={"person": "Ada", "drive": None})
+    assert live.status_code == 409, "of live sensors, which are not open"
     handed = client.post("/api/labels/import", params={"person": "Ada", "drive": "another"}, content=b"{}")
     assert (handed.status_code, handed.json()["detail"]) == (409, "another recording is open now")
     assert labels(client)["revision"] == before
@@ -91,7 +99,7 @@ def test_a_conflict_shows_both_and_loses_neither(engine: Engine, client: httpx.C
     assert act(client, **(mine | {"revision": theirs["revision"]})).status_code == 200
     history = client.get("/api/labels/history", params={"kind": "track", "id": track["id"]}).json()
     assert [entry["after"]["label"] for entry in history[:2]] == ["bus", "truck"]
-    undo = client.post("/api/labels/undo", json={"person": "Bob"})
+    undo = move(client, "undo", "Bob")
     assert (undo.status_code, "Ada changed" in undo.json()["detail"]) == (409, True)
 
 
@@ -115,9 +123,9 @@ def test_after_a_restart_everything_is_there_and_can_be_undone(tmp_path: Any) ->
     with team(Database.in_file(file)) as (_, client):
         assert len(labels(client)["tags"]) == 1
         assert labels(client, person="Ada")["can_undo"]
-        undone = [client.post("/api/labels/undo", json={"person": "Ada"}).json()["what"] for _ in range(2)]
+        undone = [move(client, "undo", "Ada").json()["what"] for _ in range(2)]
         assert undone == ["cipv.confirm_hits 3 → 5", "tagged frame 3 night"]
-        assert client.post("/api/labels/undo", json={"person": "Ada"}).status_code == 409
+        assert move(client, "undo", "Ada").status_code == 409
         assert labels(client)["tags"] == []
 
 
@@ -133,7 +141,7 @@ def test_a_database_that_fails_keeps_nobody_from_driving(
         assert engine.control.peek().params.cipv.confirm_hits == 6
         for refused in (
             act(client, kind="tag", frame=1, tag="x"),
-            client.post("/api/labels/undo", json={"person": "A"}),
+            move(client, "undo", "A"),
         ):
             assert (refused.status_code, refused.json()["detail"]) == (503, "labels: the server is away")
         patched.setattr(Database, "reading", away)

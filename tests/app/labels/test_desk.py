@@ -52,7 +52,7 @@ def test_two_long_addresses_are_two_drives(desk: LabelDesk, control: Control) ->
 def test_what_a_person_changed_is_not_offered_to_nobody(desk: LabelDesk, control: Control) -> None:
     control.change_params({"cipv.confirm_hits": 5}, person="Ada")
     assert (desk.state.can_undo, desk.possible(""), desk.possible("Ada")) == (False, (False, False), (True, False))
-    assert desk.move("undo", "Ada").acted.what == "cipv.confirm_hits 3 → 5"
+    assert desk.move("undo", "Ada", None).acted.what == "cipv.confirm_hits 3 → 5"
 
 
 def test_nobody_changes_parameters_between_an_undo_and_what_it_restores(
@@ -78,7 +78,7 @@ def test_nobody_changes_parameters_between_an_undo_and_what_it_restores(
 
     monkeypatch.setattr(Log, "move", move_and_let_another_in)
     monkeypatch.setattr(control, "restore", restored)
-    desk.move("undo", "")
+    desk.move("undo", "", None)
     others[0].join()
     assert (seen, control.peek().params.cipv.confirm_hits) == ([5], 7)
 
@@ -127,7 +127,7 @@ def test_parameters_change_at_once_while_another_holds_the_database(
         assert (control.peek().params.cipv.confirm_hits, control.peek().params.cluster.z_weight) == (6, 0.3)
         assert (shared.possible("Ada"), shared.possible("")) == ((True, False), (True, False))
         assert shared.state.can_undo
-    undone = [shared.move("undo", "Ada").acted.what for _ in range(3)]
+    undone = [shared.move("undo", "Ada", None).acted.what for _ in range(3)]
     assert undone == ["cluster.z_weight 0.4 → 0.3", "cipv.confirm_hits 5 → 6", "cipv.confirm_hits 3 → 5"]
     assert control.peek().params == Params()
 

@@ -13,7 +13,7 @@ from app.labels.refusals import ActRefused
 from app.labels.tasks import Cancelled
 from pipeline.geometry import Cuboid
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, Sighting, State
-from pipeline.labels.propose import Proposals
+from pipeline.labels.propose import Proposals, Seen, propose
 from tests.app.labels.conftest import fresh
 
 PIPELINE = Origin("pipeline", "run 1", 1, "p", "c")
@@ -42,6 +42,16 @@ def of(labels: DriveLabels, *tracks: LabelTrack, leads: tuple[LeadRange, ...] = 
 
 def put(labels: DriveLabels, *tracks: LabelTrack, leads: tuple[LeadRange, ...] = ()) -> None:
     importing(labels, of(labels, *tracks, leads=leads), "Ada", ())
+
+
+def test_what_the_camera_alone_has_seen_is_proposed_without_a_cuboid_and_that_is_said(labels: DriveLabels) -> None:
+    box = (10.0, 20.0, 60.0, 50.0)
+    flat = Seen(7, "car", None, box, in_path=False, carried=False)
+    solid = replace(flat, id=8, cuboid=Cuboid((20.0, 3.0, 0.7), (4.0, 1.8, 1.5), 0.0))
+    found = propose({frame: [flat, solid] for frame in (10, 11)}, {}, PIPELINE)
+    said = put_proposals(labels, found, "Ada", 0, 20)
+    assert said == "proposed 2 tracks in frames 0–20; 1 without a cuboid, which the camera alone has seen"
+    assert sorted(each.cuboid is None for _, each in labels.window(10, 10)[1][10]) == [False, True]
 
 
 @pytest.mark.parametrize(

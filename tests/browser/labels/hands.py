@@ -89,7 +89,8 @@ class Labels:
         return answer.json()
 
     def act(self, person: str, act: dict[str, Any]) -> Any:
-        answer = self._page.request.post(f"{self._address}/api/labels/act", data={"person": person, "act": act})
+        body = {"person": person, "act": act, "drive": self.get("")["drive"]["id"]}
+        answer = self._page.request.post(f"{self._address}/api/labels/act", data=body)
         assert answer.ok, (act, answer.text())
         return answer.json()
 

@@ -105,6 +105,17 @@ def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, 
     assert labels.cuboid(made, START)["center"] == lifted["center"], "a box is no cuboid"
 
 
+def test_a_label_without_a_cuboid_says_why_and_how_to_give_it_one(hand: Hand, labels: Labels):
+    box = [500.0, 300.0, 560.0, 350.0]
+    labels.act("Ada", {"kind": "add_track", "label": "car", "frame": START, "cuboid": None, "bbox": box})
+    hand.page.locator(".track-row").click()
+    facts = hand.page.locator(".track-detail .facts").first
+    expect(facts).to_contain_text("no LiDAR points tell where it is")
+    hand.keys("Shift+G")
+    hand.drag(hand.plan(30, 3), hand.plan(34, 3))
+    expect(facts).to_contain_text("m ahead")
+
+
 EDGES = [
     ("front", (13.0, 0.0), (10.5, 0.0), (5.0, 2.0)),
     ("rear", (7.0, 0.0), (9.5, 0.0), (5.0, 2.0)),
