@@ -150,7 +150,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
 
 def warm_up() -> None:
     """Compile every kernel before the first frame, so that the first frame is as fast as the rest, and keep the garbage
-    collector of this process from what is loaded by then."""
+    collector of the process from what is loaded by then and from the frames."""
     warm_up_lidar()
     one = np.eye(2)
     kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)
@@ -158,15 +158,21 @@ def warm_up() -> None:
     lanes.warm_up()
     corridor.warm_up()
     placing.warm_up()
-    _keep_what_is_loaded()
+    _spare_the_frames()
+
+
+_COLLECT_AFTER = 5_000
+"""Records that a frame makes, with some to spare."""
 
 
 @cache
-def _keep_what_is_loaded() -> None:
-    """Modules and kernels live as long as the process. A full collection that looks through them all takes 0.1 s, and
-    would do so in the middle of a frame."""
+def _spare_the_frames() -> None:
+    """Modules and kernels live as long as the process: a full collection that looks through them all takes 0.1 s, and
+    would do so in the middle of a frame. A frame's thousand records are freed when the next result takes their place,
+    without a collector: the small collections would find nothing in every frame."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(_COLLECT_AFTER, *gc.get_threshold()[1:])
 
 
 @dataclass(frozen=True)
