@@ -21,13 +21,15 @@ it is kept, so that it is not proposed again."""
 @dataclass(frozen=True)
 class Origin:
     """Who made a label. name: the person, or the file or run that it came
-    from. params, calibration: digests of what the pipeline ran with; null for the other makers. t_unix_ms: when."""
+    from. params, calibration: digests of what the pipeline ran with; null for the other makers. t_unix_ms: when. how: what
+    its place was measured by, where a person only pointed at it; empty otherwise."""
 
     maker: Literal["pipeline", "person", "import"]
     name: str
     t_unix_ms: int
     params: str | None = None
     calibration: str | None = None
+    how: str = ""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ class Sighting:
 @dataclass(frozen=True)
 class LabelTrack:
     """One vehicle or person over time. label: class name as in ``pipeline.types.VEHICLES`` and COCO. sightings: by
-    ascending frame, at most one a frame. comment: what a reviewer wants to say."""
+    ascending frame, at most one a frame. comment: what whoever sent it back wants to have looked at. reviewer: who
+    found it right, another than who made it; empty while nobody has, and again once it is changed."""
 
     id: int
     label: str
@@ -52,6 +55,7 @@ class LabelTrack:
     state: State
     origin: Origin
     comment: str = ""
+    reviewer: str = ""
 
     def at(self, frame: int) -> Sighting | None:
         return next((each for each in self.sightings if each.frame == frame), None)
@@ -63,40 +67,53 @@ Lead = int | Literal["none", "unknown"]
 
 @dataclass(frozen=True)
 class LeadRange:
-    """Who is the closest in-path vehicle from frame ``first`` to ``last``, both included. Ranges do not overlap."""
+    """Who is the closest in-path vehicle from frame ``first`` to ``last``, both included. Ranges do not overlap. comment,
+    reviewer: as of a track."""
 
     first: int
     last: int
     lead: Lead
     state: State
     origin: Origin
+    comment: str = ""
+    reviewer: str = ""
 
 
 @dataclass(frozen=True)
 class PathLabel:
-    """The ego path of one frame where the pipeline's is wrong or missing. Lines are ego x, y from the bumper on."""
+    """The ego path of one frame where the pipeline's is wrong or missing. Lines are ego x, y from the bumper on.
+    comment, reviewer: as of a track."""
 
     frame: int
     left: tuple[Point2, ...] | None
     right: tuple[Point2, ...] | None
     state: State
     origin: Origin
+    comment: str = ""
+    reviewer: str = ""
 
 
 @dataclass(frozen=True)
 class EventLabel:
-    """Something that happens at a frame: ``cut_in``, ``cut_out``, or another word. tracks: who takes part."""
+    """Something that happens at a frame: ``cut_in``, ``cut_out``, or another word. tracks: who takes part. comment,
+    reviewer: as of a track."""
 
     frame: int
     kind: str
     tracks: tuple[int, ...]
     state: State
     origin: Origin
+    comment: str = ""
+    reviewer: str = ""
+
+
+WHOLE_TAG = "all labelled"
+"""By this tag a person says that every vehicle of a frame is labelled."""
 
 
 @dataclass(frozen=True)
 class FrameTag:
-    """A word about a frame: ``night``, ``rain``, ``sensor dirty``."""
+    """A word about a frame: ``night``, ``rain``, ``sensor dirty``, or ``WHOLE_TAG``."""
 
     frame: int
     tag: str

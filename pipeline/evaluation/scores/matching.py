@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pipeline.evaluation.lead import LABELLED_VEHICLES, nearest_face_m
+from pipeline.evaluation.lead import LABELLED_VEHICLES, SAME_BOX_IOU, nearest_face_m
 from pipeline.evaluation.scores.truth import FrameTruth
-from pipeline.geometry import F64
+from pipeline.geometry import F64, iou_matrix
 from pipeline.params import CipvParams
 from pipeline.path.placing import near_face_middle
 from pipeline.sources.base import TruthObject
-from pipeline.types import VEHICLES, FusedObject, Point2, Result, SourceKind
+from pipeline.types import VEHICLES, Box, FusedObject, Point2, Result, SourceKind
 
 MAX_RANGE_M = 60.0
 HALF_ANGLE_RAD = np.radians(35.0)
@@ -97,22 +97,26 @@ def _error(item: FusedObject, true: TruthObject, truth: FrameTruth) -> Error:
     )
 
 
-def claims(result: Result, wanted: Sequence[TruthObject], within_m: float) -> list[FusedObject]:
+def claims(
+    result: Result, wanted: Sequence[TruthObject], within_m: float, unplaced: Sequence[Box] = ()
+) -> list[FusedObject]:
     """The objects that claim to be vehicles, to be judged as detections: those of a vehicle's class, in the field that
     is looked at, seen in this frame, by both sensors or often enough (as a lead must be).
 
     A nameless LiDAR object claims nothing: it counts where it lies within ``within_m`` of a labelled vehicle that no
-    named one stands for, and is otherwise not judged, as roadside returns must not be.
+    named one stands for, and is otherwise not judged, as roadside returns must not be. Nor is what no labelled place is
+    near and the picture shows where one of ``unplaced`` is: a vehicle is there, and nobody knows how far off.
     """
     placed = [item for item in result.objects if item.bev is not None and item.distance_m is not None]
     placed = [item for item in placed if not item.carried and (item.source == "VL" or item.hits >= CONFIRM_HITS)]
     field = [item for item in placed if _in_field(item)]
+    faces = np.array([face_of(true) for true in wanted]).reshape(-1, 2)
     named = [item for item in field if item.label in VEHICLES]
+    named = [item for item in named if _is_near(item, faces, within_m) or not _is_in_one_of(item, unplaced)]
     places = _faces(named).reshape(-1, 2)
     nameless = [item for item in field if item.label is None]
     extra: list[FusedObject] = []
-    for true in wanted:
-        face = np.array(face_of(true))
+    for face in faces:
         if len(places) and np.hypot(*(places - face).T).min() <= within_m:
             continue
         near = [(float(np.hypot(*(_faces([item])[0] - face))), item) for item in nameless if item not in extra]
@@ -120,6 +124,16 @@ def claims(result: Result, wanted: Sequence[TruthObject], within_m: float) -> li
         if item is not None and distance <= within_m:
             extra.append(item)
     return named + extra
+
+
+def _is_near(item: FusedObject, places: F64, within_m: float) -> bool:
+    return bool(len(places)) and bool(np.hypot(*(places - _faces([item])[0]).T).min() <= within_m)
+
+
+def _is_in_one_of(item: FusedObject, boxes: Sequence[Box]) -> bool:
+    if item.bbox is None or not boxes:
+        return False
+    return bool(iou_matrix(np.array([item.bbox]), np.array(boxes)).max() >= SAME_BOX_IOU)
 
 
 def _in_field(item: FusedObject) -> bool:

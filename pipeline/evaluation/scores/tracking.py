@@ -41,14 +41,17 @@ def is_available() -> bool:
 
 
 def of_frames(frames: Sequence[tuple[Result, FrameTruth]]) -> Counts | None:
-    """A drive's labelled frames, in order. Null without trackeval."""
+    """A drive's labelled frames, in order. Those that are not labelled whole are left out: a vehicle that nobody has
+    looked at is not there falsely. Null where no vehicle's place is labelled in the others, and without trackeval."""
     truths, believed = [], []
     for result, truth in frames:
+        if not truth.whole:
+            continue
         wanted = vehicles(truth.objects)
         truths.append([(item.id or 0, face_of(item)) for item in wanted])
-        found = claims(result, wanted, MATCH_M)
+        found = claims(result, wanted, MATCH_M, truth.unplaced)
         believed.append([(item.id, near_face_middle(item.bev)) for item in found if item.bev is not None])
-    return count(truths, believed)
+    return count(truths, believed) if any(truths) else None
 
 
 def count(truths: Sequence[Named], believed: Sequence[Named]) -> Counts | None:

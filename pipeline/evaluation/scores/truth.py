@@ -1,16 +1,21 @@
 """What is true of a drive, in the form that scores need: who leads in each frame, and every labelled vehicle with its
-velocity."""
+velocity.
+
+A frame is labelled *whole* when every vehicle in it is: only there is it false to claim another one. A recording's own
+truth always is. Of what people label, a frame is whole where no vehicle is left proposed, and where something says that
+all were looked for: proposals that were taken there, truth that was imported, or a person's tag.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from pipeline.errors import BadInput
-from pipeline.evaluation.lead import LeadRule, true_lead
+from pipeline.evaluation.lead import LABELLED_VEHICLES, LeadRule, true_lead
 from pipeline.labels.link import MAX_GAP_S, linked
-from pipeline.labels.model import LabelSet, LabelTrack
+from pipeline.labels.model import WHOLE_TAG, LabelSet, LabelTrack, LeadRange
 from pipeline.sources.base import Source, TruthObject
 from pipeline.types import Box, Point2
 
@@ -29,7 +34,8 @@ class NoTruth(BadInput):
 class FrameTruth:
     """A labelled frame. lead: null where none leads. lead_known: false where one can't tell, or the lead's place is not
     labelled. velocity_mps: relative to ego in the turning ego frame, by object id, of those that neighbouring frames
-    show. lead_box: the lead's id and picture box where only the picture shows it; ``lead`` is null then."""
+    show. lead_box: the lead's id and picture box where only the picture shows it; ``lead`` is null then. whole: every
+    vehicle in it is labelled. unplaced: picture boxes of labelled vehicles whose place nobody knows."""
 
     t_ns: int
     objects: tuple[TruthObject, ...]
@@ -37,6 +43,8 @@ class FrameTruth:
     lead_known: bool = True
     velocity_mps: Mapping[int, Point2] | None = None
     lead_box: tuple[int, Box] | None = None
+    whole: bool = True
+    unplaced: tuple[Box, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -91,32 +99,69 @@ def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
     """What people labelled. Only what a person or an import stands behind counts: a proposal nobody has looked at is
     the pipeline's own opinion, and a rejected one is nobody's.
 
-    Where no lead is labelled at all, it is the nearest vehicle in the lane, the lane taken as straight. NoTruth when
-    nothing counts. Where each track is in one frame only, they are linked by nearness.
+    Where no lead is labelled at all, it is the nearest vehicle in the lane, the lane taken as straight, of frames that
+    are labelled whole. NoTruth when nothing counts. Where each track is in one frame only, they are linked by nearness.
     """
     tracks = {track.id: track for track in labels.tracks if track.state in _COUNTED}
     ranges = [each for each in labels.leads if each.state in _COUNTED]
-    objects = _objects_by_frame(tracks)
+    objects, unplaced, whole = _objects_by_frame(tracks), _unplaced_by_frame(tracks), _whole_frames(labels)
     covered = {index for each in ranges for index in range(each.first, each.last + 1)}
     frames = {}
     for index in sorted((objects.keys() | covered) & set(range(len(labels.t_ns)))):
         items, tick = objects.get(index, ()), labels.t_ns[index]
+        known = FrameTruth(tick, items, None, whole=index in whole, unplaced=unplaced.get(index, ()))
         if not ranges:
-            frames[tick] = FrameTruth(tick, items, true_lead(items, rule))
+            frames[tick] = replace(known, lead=true_lead(items, rule), lead_known=known.whole)
             continue
         said = next((each.lead for each in ranges if each.first <= index <= each.last), None)
         lead = next((item for item in items if item.id == said), None)
         box = _box_of(tracks.get(said), index) if lead is None and isinstance(said, int) else None
-        frames[tick] = FrameTruth(tick, items, lead, lead is not None or box is not None or said == "none", None, box)
+        is_known = lead is not None or box is not None or said == "none"
+        frames[tick] = replace(known, lead=lead, lead_known=is_known, lead_box=box)
     if not frames:
         raise NoTruth(f"{labels.source}: none of these labels has been accepted")
     events = [each for each in labels.events if each.kind == "cut_in" and each.state in _COUNTED and each.tracks]
     cut_ins = tuple((labels.t_ns[each.frame], each.tracks[0]) for each in events) or None
-    left_out = len(labels.tracks) - len(tracks)
     followed = len(frames) < 2 or any(len(track.sightings) > 1 for track in tracks.values()) or not tracks
-    notes = [f"{left_out} of {len(labels.tracks)} tracks are not accepted and do not count."] if left_out else []
-    notes += [] if followed else [_NOT_FOLLOWED]
+    notes = [*_notes(labels, ranges, frames), *(() if followed else (_NOT_FOLLOWED,))]
     return DriveTruth(labels.source, labels.t_ns, _over_time(frames, followed), cut_ins, tuple(notes))
+
+
+def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, FrameTruth]) -> list[str]:
+    """What does not count, and why."""
+    proposed = {track.id for track in labels.tracks if track.state == "proposed"}
+    notes = []
+    for lead in sorted({each.lead for each in ranges if isinstance(each.lead, int) and each.lead in proposed}):
+        count = sum(each.last - each.first + 1 for each in ranges if each.lead == lead)
+        notes.append(f"#{lead} leads in {count} frames but is only proposed: they are judged when it is accepted.")
+    if proposed:
+        notes.append(f"{len(proposed)} of {len(labels.tracks)} tracks are only proposed and do not count.")
+    whole = sum(frame.whole for frame in frames.values())
+    if whole == len(frames):
+        return notes
+    if not ranges:
+        notes.append("Nobody says who leads: that is judged only where every vehicle is labelled.")
+    notes.append(
+        f"Detection and tracking are judged in {whole} of {len(frames)} labelled frames: where proposals were taken or "
+        f"truth imported, and no vehicle is left proposed; or that are tagged “{WHOLE_TAG}”."
+    )
+    return notes
+
+
+def _whole_frames(labels: LabelSet) -> set[int]:
+    """The frames in which every vehicle is labelled."""
+    asked = {tag.frame for tag in labels.tags if tag.tag == WHOLE_TAG}
+    left: set[int] = set()
+    for lead in labels.leads:
+        if lead.origin.maker == "pipeline":
+            asked.update(range(lead.first, lead.last + 1))
+    for track in labels.tracks:
+        if track.state == "proposed":
+            if track.label.lower() in LABELLED_VEHICLES:
+                left.update(each.frame for each in track.sightings)
+        elif track.origin.maker != "person":
+            asked.update(each.frame for each in track.sightings)
+    return asked - left
 
 
 def _box_of(track: LabelTrack | None, index: int) -> tuple[int, Box] | None:
@@ -130,6 +175,16 @@ def _objects_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Truth
         for seen in track.sightings:
             item = (TruthObject(track.label, seen.cuboid, track.id),) if seen.cuboid is not None else ()
             found[seen.frame] = (*found.get(seen.frame, ()), *item)
+    return found
+
+
+def _unplaced_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Box, ...]]:
+    """Boxes of what only the picture shows."""
+    found: dict[int, tuple[Box, ...]] = {}
+    for track in tracks.values():
+        for seen in track.sightings:
+            if seen.cuboid is None and seen.bbox is not None:
+                found[seen.frame] = (*found.get(seen.frame, ()), seen.bbox)
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import sqrt
 
 import pytest
@@ -86,6 +87,18 @@ def test_what_claims_to_be_a_vehicle() -> None:
         fused(7, 5.0, 20.0),  # too far to the side
     ]
     assert [item.id for item in claims(believed(0, objects, None), wanted, 2.0)] == [1, 3]
+
+
+def test_a_vehicle_of_which_only_the_picture_is_labelled_is_not_claimed_falsely() -> None:
+    """Nobody knows how far off it is. One whose place is labelled counts, whatever boxes overlap."""
+    wanted = vehicles([labelled(1, *A)])
+    seen, elsewhere = (0.0, 0.0, 10.0, 10.0), (50.0, 0.0, 60.0, 10.0)
+    objects = [
+        replace(fused(1, *A), bbox=seen),
+        replace(fused(2, *B, source="V"), bbox=seen),
+        replace(fused(3, 40.0), bbox=elsewhere),
+    ]
+    assert [item.id for item in claims(believed(0, objects, None), wanted, 2.0, [seen])] == [1, 3]
 
 
 def test_without_trackeval_its_figures_are_unknown(monkeypatch: pytest.MonkeyPatch) -> None:

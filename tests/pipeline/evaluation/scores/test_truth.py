@@ -9,6 +9,7 @@ import pytest
 
 from pipeline.evaluation.lead import LeadRule
 from pipeline.evaluation.scores.drive import Rules, score_drive
+from pipeline.evaluation.scores.figures import FIGURES
 from pipeline.evaluation.scores.truth import (
     DriveTruth,
     FrameTruth,
@@ -18,7 +19,18 @@ from pipeline.evaluation.scores.truth import (
     with_velocities,
 )
 from pipeline.labels.link import linked
-from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, Lead, LeadRange, Origin, Sighting, State
+from pipeline.labels.model import (
+    WHOLE_TAG,
+    EventLabel,
+    FrameTag,
+    LabelSet,
+    LabelTrack,
+    Lead,
+    LeadRange,
+    Origin,
+    Sighting,
+    State,
+)
 from pipeline.sources import open_source
 from pipeline.sources.base import TruthObject
 from pipeline.types import FusedObject
@@ -26,19 +38,28 @@ from tests.pipeline.build import cuboid, fused
 from tests.pipeline.evaluation.scores.drives import TICK_NS, believed, labelled
 
 PERSON = Origin("person", "someone", 0)
+IMPORT = Origin("import", "a file", 0)
+PIPELINE = Origin("pipeline", "run 1", 0)
 RULE = LeadRule()
 
 
-def track(key: int, x: float, y: float = 0.0, state: State = "accepted", frames: int = 3) -> LabelTrack:
-    return LabelTrack(key, "car", tuple(Sighting(n, cuboid(x - n, y)) for n in range(frames)), state, PERSON)
+def track(
+    key: int, x: float, y: float = 0.0, state: State = "accepted", by: Origin = IMPORT, label: str = "car"
+) -> LabelTrack:
+    return LabelTrack(key, label, tuple(Sighting(n, cuboid(x - n, y)) for n in range(3)), state, by)
 
 
-def labels(*tracks: LabelTrack, leads: tuple[LeadRange, ...] = (), events: tuple[EventLabel, ...] = ()) -> LabelSet:
-    return LabelSet("made:1", ("a", "b", "c"), (0, TICK_NS, 2 * TICK_NS), tracks, leads, events=events)
+def labels(
+    *tracks: LabelTrack,
+    leads: tuple[LeadRange, ...] = (),
+    events: tuple[EventLabel, ...] = (),
+    tags: tuple[FrameTag, ...] = (),
+) -> LabelSet:
+    return LabelSet("made:1", ("a", "b", "c"), (0, TICK_NS, 2 * TICK_NS), tracks, leads, events=events, tags=tags)
 
 
-def led(first: int, last: int, lead: Lead, state: State = "accepted") -> LeadRange:
-    return LeadRange(first, last, lead, state, PERSON)
+def led(first: int, last: int, lead: Lead, state: State = "accepted", by: Origin = PERSON) -> LeadRange:
+    return LeadRange(first, last, lead, state, by)
 
 
 def leads(known: DriveTruth) -> list[int | str | None]:
@@ -95,7 +116,58 @@ def test_only_what_somebody_stands_behind_counts(state: State) -> None:
     known = of_labels(labels(track(4, 30.0), track(5, 20.0, state=state)), RULE)
     counts = state in ("accepted", "corrected")
     assert {item.id for item in known.frames[0].objects} == ({4, 5} if counts else {4})
-    assert bool(known.notes) != counts
+    assert any("only proposed" in note for note in known.notes) == (state == "proposed")
+
+
+TAGGED = tuple(FrameTag(n, WHOLE_TAG, PERSON) for n in (0, 2))
+LED = (led(0, 2, 4, by=PIPELINE),)
+
+
+@pytest.mark.parametrize(
+    ("known", "whole"),
+    [
+        pytest.param(labels(track(4, 30.0), track(5, 20.0)), 3, id="imported"),
+        pytest.param(labels(track(4, 30.0), track(5, 20.0, state="proposed")), 0, id="a vehicle is left proposed"),
+        pytest.param(
+            labels(track(4, 30.0), track(5, 20.0, state="proposed", label="person")), 3, id="a person is left"
+        ),
+        pytest.param(labels(track(4, 30.0), track(5, 20.0, state="rejected", by=PIPELINE)), 3, id="the other is none"),
+        pytest.param(labels(track(4, 30.0, by=PERSON)), 0, id="drawn by hand: nobody knows what else is there"),
+        pytest.param(labels(track(4, 30.0, by=PERSON), tags=TAGGED), 2, id="drawn by hand, and said to be all"),
+        pytest.param(labels(track(4, 30.0, by=PERSON), leads=LED), 3, id="a proposal that was put right"),
+        pytest.param(labels(track(4, 30.0, state="proposed"), leads=LED, tags=TAGGED), 0, id="tagged too early"),
+    ],
+)
+def test_frames_in_which_every_vehicle_is_labelled(known: LabelSet, whole: int) -> None:
+    found = of_labels(known, RULE)
+    assert sum(frame.whole for frame in found.frames.values()) == whole
+    assert any(f"in {whole} of 3 labelled frames" in note for note in found.notes) == (whole < 3)
+
+
+def test_a_vehicle_that_nobody_looked_at_is_not_claimed_falsely() -> None:
+    """The line sees both cars. Of one nobody has said anything yet; then that it is none; then that it is one."""
+    pytest.importorskip("trackeval", reason="the extra `scores` is not installed")
+    results = [believed(n, [fused(7, 30.0 - n), fused(8, 20.0 - n, 3.5)], 7) for n in range(3)]
+
+    def precision(state: State) -> float | None:
+        other = track(5, 20.0, 3.5, state=state, by=PIPELINE)
+        score = score_drive(results, of_labels(labels(track(4, 30.0, by=PIPELINE), other, leads=LED), RULE), Rules())
+        assert all(frame.judged is not None and frame.judged.verdict == "correct" for frame in score.frames)
+        return next(figure for figure in FIGURES if figure.name == "precision").of([score])
+
+    assert (precision("proposed"), precision("rejected"), precision("accepted")) == (None, 50.0, 100.0)
+
+
+def test_no_lead_is_derived_where_a_nearer_vehicle_may_not_be_labelled() -> None:
+    known = of_labels(labels(track(4, 30.0), track(5, 20.0, state="proposed")), RULE)
+    assert leads(known) == ["?", "?", "?"]
+    assert any("who leads" in note for note in known.notes)
+
+
+def test_a_lead_that_is_only_proposed_is_said() -> None:
+    known = of_labels(labels(track(4, 30.0, state="proposed"), leads=LED), RULE)
+    assert leads(known) == ["?", "?", "?"]
+    assert "#4 leads in 3 frames but is only proposed: they are judged when it is accepted." in known.notes
 
 
 def test_labels_that_nobody_accepted_are_no_truth() -> None:
@@ -143,7 +215,7 @@ def test_labels_without_identity_are_linked_to_the_nearest_of_their_class() -> N
 
 def test_tracks_of_one_frame_each_are_linked_too() -> None:
     """As a file of KITTI's object labels gives them."""
-    alone = [LabelTrack(n + 1, "car", (Sighting(n, cuboid(30.0 - n, 0.0)),), "accepted", PERSON) for n in range(3)]
+    alone = [LabelTrack(n + 1, "car", (Sighting(n, cuboid(30.0 - n, 0.0)),), "accepted", IMPORT) for n in range(3)]
     known = of_labels(labels(*alone), RULE)
     assert leads(known) == [1, 1, 1]
     assert any("linked" in note for note in known.notes)
