@@ -19,8 +19,9 @@ from pipeline.types import F32
 from pipeline.vision import models
 
 _GIVES_WAY = 5
-"""How much nicer than who opens it a network's own threads are: a step that runs meanwhile then has a core to itself,
-and the network, which computes in the calling thread too, loses a tenth of its rate. Alone it is as fast as before."""
+"""How much nicer than who opens it a network's own threads are. Alike, a step that runs meanwhile may share its core
+with one of them for seconds on end and take twice as long. The thread that asks computes too and stays as it is: with
+all of them nicer the network would lose to whatever else runs."""
 _PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
 
 
