@@ -10,6 +10,7 @@ state with other parameters, and the same inputs give the same bytes. A branch t
 
 from __future__ import annotations
 
+import atexit
 import gc
 from dataclasses import dataclass
 from functools import cache
@@ -172,6 +173,7 @@ def _spare_the_frames() -> None:
     without a collector: the small collections would find nothing in every frame."""
     gc.collect()
     gc.freeze()
+    atexit.register(gc.unfreeze)  # at the end everything is let go of, or extension modules complain of leaks
     gc.set_threshold(_COLLECT_AFTER, *gc.get_threshold()[1:])
 
 
