@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pipeline.errors import BadInput
 
@@ -82,11 +82,25 @@ _ACT = """async ([acts, pause, patience]) => {
       range.dispatchEvent(new Event("input", { bubbles: true }));
     }
     await seen;
-    waits.push(performance.now() - start);
+    const painted = performance.now() - start;
+    await new Promise((done) => {
+      const after = new MessageChannel();
+      after.port1.onmessage = done;
+      requestAnimationFrame(() => after.port2.postMessage(0));
+    });
+    waits.push([painted, performance.now() - start]);
     await new Promise((done) => setTimeout(done, pause));
   }
   return waits;
 }"""
+
+
+class Waits(NamedTuple):
+    """Milliseconds from a hand's act: until camera, plan, the lead's figures and the timeline's cursor are painted with
+    what comes of it; and until the table, the reasons and the parameters are too, one turn of the screen later."""
+
+    painted_ms: float
+    whole_ms: float
 
 
 @contextmanager
@@ -142,16 +156,16 @@ def playing(running: Any, address: str, for_s: float) -> tuple[list[float], floa
     return painted_ms, len(painted_ms) / spent_s, cpu
 
 
-def paused(running: Any, address: str, count: int) -> tuple[list[float], list[float]]:
-    """On a recording of ``count`` frames that is paused: milliseconds from a seek, and from a slider's move, to the
-    frame that shows it painted."""
+def paused(running: Any, address: str, count: int) -> tuple[list[Waits], list[Waits]]:
+    """On a recording of ``count`` frames that is paused: how long after each seek, and each of a slider's moves."""
     page = opened(running, address)
     page.wait_for_timeout(_SETTLE_S * 1e3)
     seeks = [{"seek": (_FAR * (n + 1)) % count} for n in range(_SEEKS)] if count > 1 else []
     slides = [{"param": _PARAMETER, "value": str(0.6 + 0.02 * (n % 7))} for n in range(_SLIDES)]
-    found = tuple(page.evaluate(_ACT, [acts, _ACT_PAUSE_MS, _PATIENCE_MS]) for acts in (seeks, slides))
+    found = [page.evaluate(_ACT, [acts, _ACT_PAUSE_MS, _PATIENCE_MS]) for acts in (seeks, slides)]
     page.context.close()
-    return found[0], found[1]
+    first, second = ([Waits(*each) for each in waits] for waits in found)
+    return first, second
 
 
 def _cpu_s(processes: Any) -> dict[str, float]:

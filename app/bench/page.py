@@ -16,7 +16,7 @@ from urllib.request import Request, urlopen
 import numpy as np
 from websockets.sync.client import connect
 
-from app.bench.browser import FLAGS, browser, first_views_ms, paused, playing
+from app.bench.browser import FLAGS, Waits, browser, first_views_ms, paused, playing
 from pipeline.errors import BadInput
 
 _ALL_SEEN_WITHIN_S, _ASK_EVERY_S = 120.0, 0.5
@@ -77,9 +77,15 @@ def _playing(running: Any, address: str, for_s: float) -> dict[str, Any]:
 
 def _still(running: Any, address: str) -> dict[str, Any]:
     count = _paused_with_all_seen(address)
-    seeks_ms, slides_ms = paused(running, address, count)
+    seeks, slides = paused(running, address, count)
     first_ms = first_views_ms(running, address)
-    return {"seek": _spread(seeks_ms), "slider": _spread(slides_ms), "first_view": _spread(first_ms)}
+    return {"seek": _waits(seeks), "slider": _waits(slides), "first_view": _spread(first_ms)}
+
+
+def _waits(waits: list[Waits]) -> dict[str, Any]:
+    """To the frame painted, and to the whole page: table, reasons and parameters follow the frame."""
+    whole = _spread([each.whole_ms for each in waits])
+    return {**_spread([each.painted_ms for each in waits]), "whole": whole}
 
 
 def _paused_with_all_seen(address: str) -> int:

@@ -22,6 +22,8 @@ let stateNumber = 0;
 /** @type {Received|null} */
 let waiting = null;
 let decoding = false;
+/** The picture of the frame that is shown. @type {Uint8Array<ArrayBuffer>} */
+let shownJpeg = new Uint8Array();
 /** @type {WebSocket|null} */
 let socket = null;
 /** What the server was told about this page. @type {Map<string, Told>} */
@@ -129,8 +131,9 @@ async function show({ buffer, number, done }) {
   lastSequence = frame.state.sequence;
   frame.isLate = isFirst;
   isFirst = false;
-  if (jpeg.length) frame.bitmap = await createImageBitmap(new Blob([jpeg], { type: "image/jpeg" })).catch(() => null);
   const before = get("frame");
+  if (jpeg.length) frame.bitmap = (isSame(jpeg, shownJpeg) && before?.bitmap) || (await bitmapOf(jpeg));
+  shownJpeg = jpeg;
   if (number > stateNumber) {
     stateNumber = number;
     set("state", frame.state);
@@ -138,7 +141,16 @@ async function show({ buffer, number, done }) {
   set("frame", frame);
   drawNow();
   requestAnimationFrame(() => {
-    before?.bitmap?.close();
+    if (before?.bitmap !== frame.bitmap) before?.bitmap?.close();
     done();
   });
+}
+
+/** @param {Uint8Array<ArrayBuffer>} jpeg @returns {Promise<ImageBitmap|null>} null when it is none */
+const bitmapOf = (jpeg) => createImageBitmap(new Blob([jpeg], { type: "image/jpeg" })).catch(() => null);
+
+/** Whether it is the picture that is shown already, as while a slider moves on a paused frame.
+ * @param {Uint8Array} jpeg @param {Uint8Array} shown */
+function isSame(jpeg, shown) {
+  return jpeg.length === shown.length && jpeg.every((byte, i) => byte === shown[i]);
 }

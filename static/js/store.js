@@ -75,7 +75,7 @@ export function paint(keys, draw) {
 
 /**
  * Like `paint`, one painted frame later: for what many words say, as a table does. Having those laid out takes longer than
- * the views take to draw, and nobody reads that fast.
+ * the views take to draw, and nobody reads that fast. While a drive plays, with everything else.
  * @param {Key[]} keys @param {() => void} draw
  */
 export function paintAfter(keys, draw) {
@@ -108,7 +108,7 @@ function ask() {
 function turn() {
   isAsked = false;
   run(due);
-  if (hasWaited) run(after);
+  if (hasWaited || get("state")?.playing) run(after); // of a drive that plays nobody waits for one frame: all at once costs less
   hasWaited = after.size > 0;
   if (hasWaited) ask();
 }
