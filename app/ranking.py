@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.types import FusedObject, Gate, Result
 
-_OF_FUSION = frozenset({"iou", "range_sigmas"})
+_OF_FUSION = frozenset({"iou", "range_sigmas", "class_size"})
 """Gates between two sensors' objects: failing one makes two rows of a pair, and stops neither from leading."""
 BEHIND = "behind"
 """What stops an object that passed every test: another one is nearer, or surer in the same place."""

@@ -18,6 +18,7 @@ from pipeline.fused_rows import box_row, hit_row, lidar_sigma_m, quad, range_m
 from pipeline.geometry import F64, corners_of, iou_matrix
 from pipeline.params import FusionParams
 from pipeline.records import evolve
+from pipeline.sizes import LONGEST_M
 from pipeline.types import Box, FusedObject, Gate, LidarTrack, Point2, VisionTrack
 
 
@@ -55,7 +56,7 @@ def fuse(
     if alignment is not None and picture_size is not None:
         projected = project_cuboids(alignment, _to_the_gaps(corners, ranges_m, params), *picture_size)
     overlap = _overlap(vision, projected)
-    joinable, gates = _gates(overlap, vision, ranges_m, sigmas_m, params)
+    joinable, gates = _gates(overlap, vision, lidar, ranges_m, sigmas_m, params)
     partner = _assign(overlap, joinable, params)
     nearest_of_vision, nearest_of_lidar = _most_overlapping(overlap), _most_overlapping(overlap.T)
 
@@ -126,12 +127,14 @@ def _overlap(vision: tuple[VisionTrack, ...], projected: list[Box | None]) -> F6
 def _gates(
     overlap: F64,
     vision: tuple[VisionTrack, ...],
+    lidar: tuple[LidarTrack, ...],
     ranges_m: list[float],
     sigmas_m: list[float],
     params: FusionParams,
 ) -> tuple[np.ndarray, dict[tuple[int, int], tuple[Gate, ...]]]:
     """Which pairs may be one object, and the tests each overlapping pair went through. ranges_m, sigmas_m: of the LiDAR
     tracks."""
+    lengths_m = [max(track.obstacle.cuboid.size[:2]) for track in lidar]
     joinable = np.zeros(overlap.shape, dtype=bool)
     gates: dict[tuple[int, int], tuple[Gate, ...]] = {}
     rows, columns = np.nonzero(overlap > 0)
@@ -143,6 +146,9 @@ def _gates(
         if doubtful and distance is not None and sigma is not None:
             gap = abs(distance - ranges_m[j]) / math.hypot(sigma, sigmas_m[j])
             tests.append(Gate("range_sigmas", gap, params.range_gate_sigmas, gap <= params.range_gate_sigmas))
+        longest_m = LONGEST_M.get(vision[i].label) if params.size_gate else None
+        if longest_m is not None:
+            tests.append(Gate("class_size", lengths_m[j], longest_m, lengths_m[j] <= longest_m))
         joinable[i, j] = all(test.passed for test in tests)
         gates[i, j] = tuple(tests)
     return joinable, gates

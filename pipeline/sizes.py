@@ -1,4 +1,4 @@
-"""How large vehicles and people mostly are: one table, for the sides of them that nobody has measured."""
+"""How large vehicles and people are: mostly, for the sides of them that nobody has measured, and at most."""
 
 from __future__ import annotations
 
@@ -16,3 +16,15 @@ USUAL_SIZE_M: dict[str, tuple[float, float, float]] = {
 def usual_size_m(label: str) -> tuple[float, float, float]:
     """Length, width, height of a class; what is none of them counts as a car."""
     return USUAL_SIZE_M.get(label, USUAL_SIZE_M["car"])
+
+
+LONGEST_M: dict[str, float] = {
+    "car": 8.0,
+    "truck": 20.0,
+    "bus": 20.0,
+    "motorcycle": 3.5,
+    "bicycle": 3.0,
+    "person": 2.0,
+}
+"""The longest of a class, with half a metre or more for the noise of a cluster: the longest vans, which detectors call
+cars (7.4 m), lorries with a trailer (18.75 m, Directive 96/53/EC), tandems, cargo bicycles."""

@@ -101,6 +101,7 @@ class FusionParams(Section):
         "Boxes overlapping more are one object: of cars 1.8 times as far they cannot",
     )
     range_gate_sigmas: float = slider(3.0, 0.5, 10.0, 0.1, "σ", "Largest disagreement of the two distances")
+    size_gate: bool = choice(True, "Do not join a box with what is longer than any of its class: hedges, walls, rails")
     disagree_s: float = slider(2.0, 0.2, 10.0, 0.1, "s", "Over how long camera and LiDAR are compared as a whole")
     disagree_share: float = slider(
         0.25, 0.05, 1.0, 0.05, "", "Cars that lie apart in camera and LiDAR: with a greater share of them nobody drives"

@@ -9,14 +9,15 @@ from hypothesis import strategies as st
 
 from pipeline.alignment import Alignment, Angular, project_cuboid
 from pipeline.fusion import Fusion, FusionState, fuse
-from pipeline.params import FusionParams
+from pipeline.params import FusionParams, preset
 from pipeline.records import evolve
+from pipeline.sizes import LONGEST_M
 from pipeline.types import Box, LidarTrack, VisionTrack
 from tests.pipeline.build import lidar_track, vision_track
 
 ALIGNMENT: Alignment = Angular(np.radians(0.06), np.radians(0.06), 640.0, 360.0)
 SIZE = (1280, 720)
-OPTIMAL, GREEDY = FusionParams(), FusionParams(assignment="greedy", min_iou=0.0, range_gate=False)
+OPTIMAL, GREEDY = FusionParams(), preset("paper").fusion
 
 
 def box_of(track: LidarTrack) -> Box:
@@ -117,6 +118,36 @@ def test_boxes_of_one_place_and_size_are_one_object_though_the_height_law_errs()
     _, result = joined([van], [vision_track(1, box_of(van), 19.0, sigma_m=1.5)])
     assert [item.source for item in result.objects] == ["VL"]
     assert result.objects[0].distance_m == pytest.approx(30.0)
+
+
+HEDGE_M, LORRY_M = 35.0, 16.5
+
+
+@pytest.mark.parametrize(
+    ("label", "length_m", "params", "sources"),
+    [
+        ("car", 4.5, OPTIMAL, ["VL"]),
+        ("car", HEDGE_M, OPTIMAL, ["L", "V"]),
+        ("car", LORRY_M, OPTIMAL, ["L", "V"]),
+        ("truck", LORRY_M, OPTIMAL, ["VL"]),
+        ("truck", HEDGE_M, OPTIMAL, ["L", "V"]),
+        ("person", 4.5, OPTIMAL, ["L", "V"]),
+        ("stop sign", HEDGE_M, OPTIMAL, ["VL"]),
+        ("car", HEDGE_M, FusionParams(size_gate=False), ["VL"]),
+        ("car", HEDGE_M, GREEDY, ["VL"]),
+    ],
+)
+def test_what_is_longer_than_any_of_its_class_is_not_joined(
+    label: str, length_m: float, params: FusionParams, sources: list[str]
+) -> None:
+    """A hedge beside the road fills the box of the car before it; the row of either says how long it is."""
+    track = lidar_track(1, 12.0, 3.0, length=length_m)
+    _, result = joined([track], [vision_track(1, box_of(track), None, label=label)], params)
+    assert sorted(item.source for item in result.objects) == sources
+    if sources != ["VL"]:
+        for item in result.objects:
+            gate = next(gate for gate in item.gates if gate.name == "class_size")
+            assert (gate.passed, gate.value, gate.limit) == (False, length_m, LONGEST_M[label])
 
 
 def test_optimal_assignment_beats_first_come_first_served() -> None:
