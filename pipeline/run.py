@@ -109,7 +109,7 @@ def picture_size(source: AnySource) -> tuple[int, int] | None:
 
 def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
     """The frame with what the detectors see in its picture. Networks run here and nowhere else."""
-    if frame.picture is None:
+    if frame.picture is None or frame.detections_given:
         return frame
     bgr = frame.picture.bgr
     if detectors.boxes is not None:

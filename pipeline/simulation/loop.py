@@ -17,9 +17,9 @@ from pipeline.records import evolve
 from pipeline.run import Detectors, detect, only
 from pipeline.run import Sensors as Sensed
 from pipeline.simulation import actors, truth_boxes, vehicle, world
+from pipeline.simulation.detection_model import BoxNoise
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import Sensors
-from pipeline.simulation.truth_boxes import BoxNoise
 from pipeline.simulation.vehicle import Pedals, VehicleModel, VehicleState
 from pipeline.simulation.world import World
 from pipeline.step import State, step, warm_up

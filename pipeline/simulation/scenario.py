@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cached_property
 from math import ceil
 from pathlib import Path
+from typing import Literal
 
 import yaml
 from pydantic import Field, ValidationError, model_validator
@@ -12,6 +13,7 @@ from pydantic import Field, ValidationError, model_validator
 from pipeline.complaint import first_complaint
 from pipeline.errors import BadInput
 from pipeline.simulation.actors import Actor, Motion, Script, motion
+from pipeline.simulation.detection_model import Detections
 from pipeline.simulation.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
 from pipeline.simulation.lens import ORDINARY, CameraModel
 from pipeline.simulation.lidar_model import VLP16, LidarModel
@@ -38,7 +40,8 @@ Moment = tuple[float, float, float, float, float, float]
 
 class Scenario(Strict):
     """driven: the ego vehicle's motion as a closed loop drove it, a moment a tick; where it is given, the ego
-    vehicle moves so and not by its script."""
+    vehicle moves so and not by its script. sensors: those that the line is given. detections: what is found in the
+    pictures; null: what detectors find that look at them."""
 
     title: str
     seed: int = Field(default=0, ge=0)
@@ -52,6 +55,8 @@ class Scenario(Strict):
     ego: Ego
     actors: tuple[Actor, ...] = ()
     crossing_actors: tuple[CrossingActor, ...] = ()
+    sensors: Literal["lidar", "camera", "both"] = "both"
+    detections: Detections | None = None
     driven: tuple[Moment, ...] = ()
 
     @model_validator(mode="after")

@@ -13,6 +13,7 @@ import numpy as np
 
 from pipeline.alignment import Pinhole, project_cuboid
 from pipeline.simulation.actors import SIZES_M
+from pipeline.simulation.detection_model import BoxNoise
 from pipeline.simulation.world import ActorState, World
 from pipeline.types import F64, Box, CameraCalibration, DistanceLaw, RawBoxes
 
@@ -29,27 +30,6 @@ LAW = DistanceLaw(
 """What a true box's height tells: a pinhole camera's law, of vehicles as tall as the simulator's usually are."""
 _SCORE = 0.9
 _SAMPLES = 12
-
-
-@dataclass(frozen=True)
-class BoxNoise:
-    """A detector's errors. lasting_share, frame_share: standard deviation of each edge, as a share of the box's height,
-    that stays with a vehicle and that is new in each frame. edge_px: of each edge, never less. missed: share of clear
-    and near vehicles that a frame misses. reach_m, fall_off_m: where half are missed, and over how many metres that
-    comes. visible_share: less of a vehicle than this is not found.
-
-    The defaults are near what the embedded detector does on drawn pictures (six scenarios, 500 clear vehicles): box
-    heights 6 % off to 40 m and 7 % beyond, 1.5 px at least; 2 % missed to 80 m, half beyond 105 m. The reach is set
-    shorter, as real pictures' is.
-    """
-
-    lasting_share: float = 0.03
-    frame_share: float = 0.03
-    edge_px: float = 0.7
-    missed: float = 0.02
-    reach_m: float = 85.0
-    fall_off_m: float = 6.0
-    visible_share: float = 0.35
 
 
 @dataclass(frozen=True)

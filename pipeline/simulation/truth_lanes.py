@@ -7,25 +7,15 @@ paint here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from pipeline.alignment import Pinhole
+from pipeline.simulation.detection_model import LineNoise
 from pipeline.simulation.roads import Road
 from pipeline.simulation.world import LIDAR_HEIGHT_M, World
 from pipeline.types import CameraCalibration, RawLanes
 
 _FROM_M, _STEP_M = 4.0, 0.5
-
-
-@dataclass(frozen=True)
-class LineNoise:
-    """sigma_px: of a point, across. missed: share of points that a frame lacks. reach_m: no paint is seen beyond."""
-
-    sigma_px: float = 1.5
-    missed: float = 0.3
-    reach_m: float = 55.0
 
 
 def lane_points(now: World, road: Road, camera: CameraCalibration, noise: LineNoise, seed: int, index: int) -> RawLanes:

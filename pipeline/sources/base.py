@@ -45,7 +45,8 @@ class Source(Protocol):
     def __len__(self) -> int: ...
 
     def frame(self, index: int) -> Frame:
-        """Frame ``index`` of 0 … len−1, without ``raw_boxes``. IndexError outside."""
+        """Frame ``index`` of 0 … len−1, without ``raw_boxes`` unless detections are given with it. IndexError
+        outside."""
         ...
 
     def t_ns(self, index: int) -> int:

@@ -6,10 +6,14 @@ and its index alone, so the same index gives the same bytes in any order.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from pipeline.simulation import scenario, world
+from pipeline.records import evolve
+from pipeline.simulation import scenario, truth_boxes, world
 from pipeline.simulation.sensors import Sensors
+from pipeline.simulation.truth_lanes import lane_points
 from pipeline.sources.base import SourceError, TruthObject
 from pipeline.types import Frame
 
@@ -17,7 +21,7 @@ _TRUTH_RANGE_M = 120.0
 
 
 class SimulatedSource:
-    """The frames of one scenario. notes: none, nothing is missing in a simulated drive."""
+    """The frames of one scenario. notes: what the scenario keeps from the line, or gives it."""
 
     def __init__(self, uri: str, name: str) -> None:
         try:
@@ -25,7 +29,7 @@ class SimulatedSource:
         except scenario.ScenarioError as error:
             raise SourceError(f"{uri}: {error}") from None
         self.uri, self.title, self.rate_hz = uri, self._scenario.title, self._scenario.rate_hz
-        self.notes: tuple[str, ...] = ()
+        self.notes = tuple(_notes(self._scenario))
         self._step_ns = round(1e9 / self.rate_hz)
         last = world.at(self._scenario, self._scenario.duration_s)
         self._sensors = Sensors(self._scenario, last.s_m)
@@ -39,7 +43,8 @@ class SimulatedSource:
         return index * self._step_ns
 
     def frame(self, index: int) -> Frame:
-        return self._sensors.frame(self._world(index), index, self.t_ns(index))
+        now = self._world(index)
+        return sensed(self._sensors.frame(now, index, self.t_ns(index)), now, self._scenario)
 
     def truth(self, index: int) -> tuple[TruthObject, ...]:
         self.t_ns(index)
@@ -47,6 +52,33 @@ class SimulatedSource:
 
     def _world(self, index: int) -> world.World:
         return world.at(self._scenario, self.t_ns(index) / 1e9)
+
+
+def sensed(frame: Frame, now: world.World, scene: scenario.Scenario) -> Frame:
+    """The frame as far as the scenario's car senses it, with the detections that the scenario gives. The picture stays
+    where nobody looks at it: people still want to see it."""
+    if scene.sensors == "lidar":
+        return evolve(frame, detections_given=True)
+    frame = evolve(frame, sweep=None) if scene.sensors == "camera" else frame
+    if scene.detections is None or frame.camera is None:
+        return frame
+    noise, seed, index = scene.detections, scene.seed, frame.index
+    return evolve(
+        frame,
+        raw_boxes=truth_boxes.boxes(now, frame.camera, noise.boxes, seed, index) if noise.boxes else None,
+        raw_lanes=lane_points(now, scene.road, frame.camera, noise.lines, seed, index) if noise.lines else None,
+        detections_given=True,
+    )
+
+
+def _notes(scene: scenario.Scenario) -> Iterator[str]:
+    if scene.sensors == "lidar":
+        yield "This drive goes by the LiDAR alone; nothing looks at its pictures."
+        return
+    if scene.sensors == "camera":
+        yield "This drive goes by the camera alone; it has no LiDAR."
+    if scene.detections is not None:
+        yield "What is seen in this drive's pictures is given: the truth, with a detector's errors. No network looks."
 
 
 def truth_of(now: world.World) -> tuple[TruthObject, ...]:

@@ -178,7 +178,8 @@ class StreamHealth:
 @dataclass(frozen=True)
 class Frame:
     """Everything known at one tick. Any branch may be missing; ``notes`` says why, in words a person can act on.
-    ``timing_ms``: of a live source, how long what it holds was under way, by stage."""
+    ``timing_ms``: of a live source, how long what it holds was under way, by stage. ``detections_given``: what is seen
+    in the picture came with the frame; no detector is to look at it."""
 
     index: int
     name: str
@@ -194,3 +195,4 @@ class Frame:
     route: Route | None = None
     streams: tuple[StreamHealth, ...] = ()
     timing_ms: Mapping[str, float] = field(default_factory=dict)
+    detections_given: bool = False

@@ -20,10 +20,10 @@ from pipeline.path.placing import near_face_middle
 from pipeline.records import evolve
 from pipeline.run import only
 from pipeline.simulation import truth_boxes, world
+from pipeline.simulation.detection_model import BoxNoise, LineNoise
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import Sensors
-from pipeline.simulation.truth_boxes import BoxNoise
-from pipeline.simulation.truth_lanes import LineNoise, lane_points
+from pipeline.simulation.truth_lanes import lane_points
 from pipeline.simulation.world import ActorState, World
 from pipeline.step import State, step, warm_up
 from pipeline.types import Frame, Path, Result

@@ -20,7 +20,7 @@ from pipeline.geometry import closest_on_polygon, transform
 from pipeline.params import DistanceParams, preset
 from pipeline.simulation import truth_boxes, world
 from pipeline.simulation.camera import calibration
-from pipeline.simulation.truth_boxes import BoxNoise
+from pipeline.simulation.detection_model import BoxNoise
 from pipeline.types import REAL_VEHICLES, CameraCalibration
 from pipeline.vision.distance import PowerLaw, fit_power_law, height_at_reference, is_cut
 

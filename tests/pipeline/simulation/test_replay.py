@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Never
 
 import numpy as np
 import pytest
 
 from pipeline.params import Params
 from pipeline.results import to_json
-from pipeline.run import only
+from pipeline.run import Detectors, Sensors, run
+from pipeline.simulation.detection_model import BoxNoise, Detections
 from pipeline.simulation.loop import Setup, drive
 from pipeline.simulation.replay import as_driven, to_yaml
 from pipeline.simulation.scenario import Scenario, load, parse
 from pipeline.sources import open_source
 from pipeline.sources.simulated import truth_of
-from pipeline.step import State, step
-from pipeline.types import Result
+from pipeline.types import U8, Result
 
 TICKS = 25
 
@@ -33,19 +33,35 @@ def believed(result: Result) -> dict[str, Any]:
     return {key: value for key, value in to_json(result).items() if key not in ("timing_ms", "sensors")}
 
 
-def test_a_kept_drive_gives_the_very_frames_and_results_of_the_loop(braking: Scenario, tmp_path: Path) -> None:
-    ticks = [tick for tick, _ in zip(drive(braking, Setup(sensors="lidar")), range(TICKS), strict=False)]
-    kept = tmp_path / "drive.yaml"
-    kept.write_text(to_yaml(as_driven(braking, [tick.vehicle.motion() for tick in ticks]), "a drive"))
-    source = open_source(f"sim:{kept}")
+class Unwanted:
+    """A detector that nobody may ask."""
+
+    name, notes = "unwanted", ()
+
+    def detect(self, bgr: U8) -> Never:
+        pytest.fail("it was asked to look at a picture")
+
+
+@pytest.mark.parametrize("sensors", ["lidar", "camera", "both"])
+def test_a_kept_drive_gives_the_very_frames_and_results_of_the_loop(
+    braking: Scenario, sensors: Sensors, tmp_path: Path
+) -> None:
+    ticks = [tick for tick, _ in zip(drive(braking, Setup(sensors=sensors)), range(TICKS), strict=False)]
+    kept = as_driven(braking, [tick.vehicle.motion() for tick in ticks])
+    kept = kept.model_copy(update={"sensors": sensors, "detections": Detections(boxes=BoxNoise())})
+    file = tmp_path / "drive.yaml"
+    file.write_text(to_yaml(kept, "a drive"))
+    source = open_source(f"sim:{file}")
     assert len(source) == TICKS
-    state = State()
-    for index, tick in enumerate(ticks):
-        frame = only(source.frame(index), "lidar")
-        assert frame.sweep is not None
-        assert tick.frame.sweep is not None
-        np.testing.assert_array_equal(frame.sweep.points, tick.frame.sweep.points)
-        state, result = step(state, frame, Params())
+    assert source.notes
+    given = Detectors(Unwanted(), Unwanted())
+    for index, (tick, (frame, result)) in enumerate(zip(ticks, run(source, Params(), given), strict=True)):
+        assert frame.picture is not None
+        if tick.frame.sweep is None:
+            assert frame.sweep is None
+        else:
+            assert frame.sweep is not None
+            np.testing.assert_array_equal(frame.sweep.points, tick.frame.sweep.points)
         assert believed(result) == believed(tick.result)
         assert source.truth(index) == truth_of(tick.world)
 

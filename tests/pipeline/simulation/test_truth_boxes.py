@@ -8,12 +8,12 @@ import pytest
 from pipeline.geometry import iou_matrix
 from pipeline.simulation import truth_boxes, world
 from pipeline.simulation.camera import calibration
-from pipeline.simulation.truth_boxes import BoxNoise
+from pipeline.simulation.detection_model import BoxNoise
 from pipeline.types import RawBoxes
 
 from .worlds import with_actors
 
-PERFECT = BoxNoise(0.0, 0.0, 0.0, 0.0)
+PERFECT = BoxNoise(lasting_share=0.0, frame_share=0.0, edge_px=0.0, missed=0.0)
 
 
 def look(actors: str, noise: BoxNoise = PERFECT, seed: int = 1, index: int = 0) -> RawBoxes:

@@ -9,8 +9,9 @@ from pipeline.alignment import Pinhole
 from pipeline.path.route_line import lay_out, to_grid
 from pipeline.simulation import gnss, scenario, world
 from pipeline.simulation.camera import calibration
+from pipeline.simulation.detection_model import LineNoise
 from pipeline.simulation.planned_route import planned_route
-from pipeline.simulation.truth_lanes import LineNoise, lane_points
+from pipeline.simulation.truth_lanes import lane_points
 from pipeline.simulation.world import LIDAR_HEIGHT_M
 
 from .worlds import with_actors
