@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from app.drive.columns import Row
 from app.drive.compare import Metric
@@ -12,12 +13,28 @@ from app.drive.recording import RULE
 from app.drive.run import DriveRun
 from app.labels.drive import DriveLabels
 from pipeline.errors import BadInput
+from pipeline.evaluation.experiments.sections import Cell
 from pipeline.evaluation.lead import Judged
 from pipeline.evaluation.scores.drive import DriveScore, Rules, judged, score_drive
+from pipeline.evaluation.scores.error_tables import error_rows
 from pipeline.evaluation.scores.figures import FIGURES
+from pipeline.evaluation.scores.report import MOST
 from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels
+from pipeline.evaluation.scores.worst import Bad, worst
 
 _MOST_HELD = 8
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A run against the labels. judged: frames in which they say who leads. metrics: every figure that it or the other
+    run has. notes: what does not count, and why. errors: rows of ``error_rows``. worst: frames to look at first."""
+
+    judged: int
+    metrics: tuple[Metric, ...]
+    notes: tuple[str, ...]
+    errors: tuple[tuple[Cell, ...], ...]
+    worst: tuple[Bad, ...]
 
 
 class LabelScores:
@@ -54,17 +71,23 @@ class LabelScores:
                 self._scores[key] = _scored(run, truth)
             return self._scores[key]
 
-    def metrics(self, labels: DriveLabels, base: DriveRun, run: DriveRun) -> tuple[int, tuple[Metric, ...]]:
-        """(frames judged, every figure that either run has)."""
+    def standing(self, labels: DriveLabels, base: DriveRun, run: DriveRun) -> Standing:
+        """A run beside another, and what does not count; without figures where nothing is judged."""
+        _, truth = self.truth(labels)
         old, new = self.score(labels, base), self.score(labels, run)
         if new is None:
-            return 0, ()
+            return Standing(0, (), truth.notes if truth is not None else (), (), ())
         found = [
             Metric(figure.title, figure.unit, figure.of([old]) if old else None, figure.of([new]), figure.better)
             for figure in FIGURES
         ]
-        count = sum(frame.judged is not None for frame in new.frames)
-        return count, tuple(each for each in found if each.base is not None or each.run is not None)
+        return Standing(
+            sum(frame.judged is not None for frame in new.frames),
+            tuple(each for each in found if each.base is not None or each.run is not None),
+            new.notes,
+            error_rows([new]),
+            tuple(worst([new], MOST)),
+        )
 
     def judged_rows(self, labels: DriveLabels, run: DriveRun) -> list[Row] | None:
         """A run's rows, judged by labels instead of what the recording came with; null where they judge nothing. Asked

@@ -13,7 +13,16 @@ from app.labels.requests import MOST_FRAMES, Id, Index, PersonOrNobody
 from app.labels.values import ItemKind
 from app.labels.where_next import What, where_next
 from app.routes.drive import current
-from app.routes.label_shapes import HistoryJson, LabelsOfPerson, NextJson, ScoreJson, WholeTrack, Window
+from app.routes.label_shapes import (
+    BadFrameJson,
+    HistoryJson,
+    LabelsOfPerson,
+    NextJson,
+    ScoreJson,
+    WholeTrack,
+    Window,
+    errors_json,
+)
 from app.routes.refusals import refusing
 from app.routes.shapes import MetricJson
 
@@ -67,12 +76,18 @@ def labels_router(desk: LabelDesk) -> APIRouter:
         with refusing():
             book, labels = desk.recording.book, desk.labels
             run = current(desk.recording)
-            judged, metrics = desk.scores.metrics(labels, book.base or run, run)
+            found = desk.scores.standing(labels, book.base or run, run)
             return ScoreJson(
                 revision=labels.revision,
                 run=run.number,
-                judged=judged,
-                metrics=[MetricJson(**vars(metric)) for metric in metrics],
+                judged=found.judged,
+                metrics=[MetricJson(**vars(metric)) for metric in found.metrics],
+                notes=list(found.notes),
+                errors=[errors_json(row) for row in found.errors],
+                worst=[
+                    BadFrameJson(frame=each.index, verdict=each.verdict, truth_m=each.truth_m, error_m=each.error_m)
+                    for each in found.worst
+                ],
             )
 
     @router.get("/history", responses={200: {"model": list[HistoryJson]}})

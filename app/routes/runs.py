@@ -60,7 +60,8 @@ class Name(BaseModel):
 
 
 class ComparisonJson(BaseModel):
-    """differing: first and last frame of ranges whose lead differs; first: what differs where a range begins."""
+    """differing: first and last frame of ranges whose lead differs; first: what differs where a range begins. truth:
+    who judges: what people labelled here, else the labels that come with the recording, or the simulator."""
 
     base: int
     run: int
@@ -69,7 +70,7 @@ class ComparisonJson(BaseModel):
     frames_differing: int
     first: dict[int, str]
     metrics: list[MetricJson]
-    truth: Literal["labels", "simulator"] | None
+    truth: Literal["labels", "recording", "simulator"] | None
     judged: int
 
 
@@ -143,8 +144,7 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
             old = recording.book.get(base) if base is not None else recording.book.base or new
         judged = _judged_by_labels(engine.labels, old, new)
         found = compare(*(judged or (old.rows(), new.rows())))
-        is_own = recording.recipe.simulated and judged is None
-        truth: Literal["labels", "simulator"] = "simulator" if is_own else "labels"
+        truth: Literal["labels", "recording", "simulator"] = "simulator" if recording.recipe.simulated else "recording"
         return ComparisonJson(
             base=old.number,
             run=new.number,
@@ -153,7 +153,7 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
             frames_differing=found.frames_differing,
             first=dict(list(found.sentences.items())[:_MOST_SENTENCES]),
             metrics=[MetricJson(**vars(metric)) for metric in found.metrics],
-            truth=truth if found.judged else None,
+            truth=None if not found.judged else "labels" if judged is not None else truth,
             judged=found.judged,
         )
 

@@ -286,7 +286,7 @@
  * @property {number} frames_differing
  * @property {Record<string, string>} first
  * @property {Metric[]} metrics
- * @property {"labels"|"simulator"|null} truth
+ * @property {"labels"|"recording"|"simulator"|null} truth  who judges
  * @property {number} judged
  *
  * @typedef {object} Job

@@ -148,9 +148,11 @@ def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
     act(kind="tag", frame=3, tag="rain")
     act(kind="propose", first=0, last=5, **{"from": "run"})
     shown = engine.wait_for(lambda s: s.labels.task is not None and not s.labels.task.running, WAIT_S)
+    proposed = [each for each in get("?since=0")["tracks"] if each["state"] == "proposed"]
+    act(kind="accept", items=[{"kind": "track", "id": each["id"], "revision": each["revision"]} for each in proposed])
     assert client.post("/api/labels/versions", json={"name": "first", "person": "Ada"}).status_code == 201
     everything, window = get("?since=0"), get("/frames?first=3&last=3")
-    state = shown.state_json()["labels"]
+    state, score = shown.state_json()["labels"], get("/score")
     return {
         "LabelsState": state,
         "LabelTask": state["task"],
@@ -167,7 +169,10 @@ def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Cuboid": window["sightings"]["3"][0]["cuboid"],
         "PastAct": get(f"/history?kind=track&id={track['id']}")[0],
         "Version": get("/versions")[0],
-        "Score": get("/score"),
+        "Score": score,
+        "ScoreErrors": score["errors"][0],
+        "Sizes": score["errors"][0]["distance"],
+        "BadFrame": score["worst"][0],
         "Found": get("/next?what=unlabelled&frame=0"),
     }
 

@@ -133,7 +133,8 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
     notes = []
     for lead in sorted({each.lead for each in ranges if isinstance(each.lead, int) and each.lead in proposed}):
         count = sum(each.last - each.first + 1 for each in ranges if each.lead == lead)
-        notes.append(f"#{lead} leads in {count} frames but is only proposed: they are judged when it is accepted.")
+        frames_text = f"{count} {'frame' if count == 1 else 'frames'}"
+        notes.append(f"#{lead} leads in {frames_text} but is only proposed: not judged until it is accepted.")
     if proposed:
         notes.append(f"{len(proposed)} of {len(labels.tracks)} tracks are only proposed and do not count.")
     whole = sum(frame.whole for frame in frames.values())

@@ -7,7 +7,8 @@ import { addEvent, tagFrame } from "./commands.js";
 import { shown } from "./held.js";
 import { setTool } from "./mode.js";
 
-const TAGS = ["night", "rain", "snow", "fog", "glare", "sensor dirty", "tunnel"];
+/** By the first a person says that every vehicle of the frame is labelled (pipeline/labels/model.py, WHOLE_TAG). */
+const TAGS = ["all labelled", "night", "rain", "snow", "fog", "glare", "sensor dirty", "tunnel"];
 
 const list = el("div", { class: "moment-list" });
 const word = el("input", { type: "text", maxLength: 40, placeholder: "Tag", aria: { label: "Tag of this frame" } });

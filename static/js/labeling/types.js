@@ -128,8 +128,31 @@
  * @typedef {object} Score
  * @property {number} revision
  * @property {number} run
- * @property {number} judged
+ * @property {number} judged  frames in which the labels say who leads
  * @property {import("../types.js").Metric[]} metrics
+ * @property {string[]} notes  what does not count, and why
+ * @property {ScoreErrors[]} errors  by range and by sensor
+ * @property {BadFrame[]} worst  the worst first
+ *
+ * @typedef {object} ScoreErrors
+ * @property {string} vehicles
+ * @property {string} seen_by
+ * @property {number} count
+ * @property {Sizes|null} distance
+ * @property {Sizes|null} lateral
+ * @property {Sizes|null} longitudinal
+ * @property {Sizes|null} speed
+ *
+ * @typedef {object} Sizes  of errors, m or m/s
+ * @property {number} min
+ * @property {number} max
+ * @property {number} mae
+ *
+ * @typedef {object} BadFrame
+ * @property {number} frame
+ * @property {"correct"|"none"|"missed"|"false"|"wrong"} verdict
+ * @property {number|null} truth_m
+ * @property {number|null} error_m
  *
  * @typedef {{kind: ItemKind, id: number, revision: number}} ItemRef
  * @typedef {{kind: string, [field: string]: any}} Act  one change, as POST /api/labels/act takes it

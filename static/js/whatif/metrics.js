@@ -4,9 +4,11 @@ import { DASH, num, signed } from "../format.js";
 
 /** @typedef {import("../types.js").Metric} Metric */
 
+const JUDGES = { labels: "what people labelled here", recording: "the labels that come with the recording", simulator: "the simulator's truth" };
+
 /** @param {Pick<import("../types.js").Comparison, "metrics"|"truth"|"judged">} comparison @returns {HTMLElement} */
 export function metricsTable({ metrics, truth, judged }) {
-  const judge = truth ? `Judged in ${judged} frames against ${truth === "labels" ? "labels" : "the simulator's truth"}` : "Without labels: what needs none";
+  const judge = truth ? `Judged in ${judged} frames against ${JUDGES[truth]}` : "Without labels: what needs none";
   const head = ["", "before", "after", "change"].map((words) => el("th", { scope: "col", textContent: words }));
   return el("div", {}, el("table", { class: "metrics" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...metrics.map(row))), el("p", { class: "facts", textContent: judge }));
 }

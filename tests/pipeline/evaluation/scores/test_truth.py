@@ -167,7 +167,7 @@ def test_no_lead_is_derived_where_a_nearer_vehicle_may_not_be_labelled() -> None
 def test_a_lead_that_is_only_proposed_is_said() -> None:
     known = of_labels(labels(track(4, 30.0, state="proposed"), leads=LED), RULE)
     assert leads(known) == ["?", "?", "?"]
-    assert "#4 leads in 3 frames but is only proposed: they are judged when it is accepted." in known.notes
+    assert "#4 leads in 3 frames but is only proposed: not judged until it is accepted." in known.notes
 
 
 def test_labels_that_nobody_accepted_are_no_truth() -> None:
