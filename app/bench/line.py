@@ -21,7 +21,7 @@ _ROUNDS = 3
 _IDLE, _BESIDE = 0.3, 0.45
 """Shares of the time: beside the network, where the step is slower, it takes longer to have as many samples."""
 _SETTLE_S = 0.2
-"""A network that has just begun is no busy one yet: for 0.1 s its threads share the step's core. Players keep theirs."""
+"""A network that has just begun is no busy one yet: for 0.1 s its threads share the step's core. Players keep one."""
 
 
 def stages(
