@@ -21,7 +21,7 @@ const fetchChunk = newestOnly(async (/** @type {number} */ number) => {
   const answer = await request(`api/labels/frames?first=${number * size}&last=${last}`).catch(() => null);
   if (!answer || get("labels")?.load !== labels.load || asked !== size) return;
   keep(number, { revision: answer.revision, byFrame: answer.sightings });
-  set("labelFrames", (get("labelFrames") ?? 0) + 1);
+  if (number === Math.floor(shown() / size) || get("draft")) set("labelFrames", (get("labelFrames") ?? 0) + 1);
 });
 
 export function setUp() {
@@ -36,6 +36,11 @@ export function setUp() {
     }
     if (labels && get("labeling")?.on) look(shown());
   });
+  // what a person goes to is asked for right after the frame itself: the two are there together
+  on(["scrub"], () => queueMicrotask(() => {
+    const going = get("scrub");
+    if (going !== null && get("labels") && get("labeling")?.on) look(going);
+  }));
 }
 
 let weighed = { labels: /** @type {import("./held.js").Labels|null} */ (null), size };
