@@ -65,6 +65,7 @@ def history_json(entry: HistoryEntry) -> dict[str, Any]:
     return {
         "act": entry.act,
         "what": entry.what,
+        "note": entry.note,
         "person": entry.person,
         "t_unix_ms": entry.t_unix_ms,
         "before": _content_json(entry.before),

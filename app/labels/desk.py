@@ -21,7 +21,7 @@ from app.labels.log import Acted
 from app.labels.long import importing_truth, proposing
 from app.labels.measured import lifted, refitted
 from app.labels.refusals import ActRefused, NoSuchLabel
-from app.labels.requests import AddTrack, Import, Lift, Propose, Refit, SetSighting
+from app.labels.requests import AddMeasured, Import, Lift, Propose, Refit, SetSighting
 from app.labels.scoring import LabelScores
 from app.labels.settling import SettlingQueue
 from app.labels.state import LabelState
@@ -258,7 +258,7 @@ class LabelDesk:
 
     def _measured(
         self, recording: Recording, labels: DriveLabels, act: Refit | Lift
-    ) -> tuple[SetSighting | AddTrack, str]:
+    ) -> tuple[SetSighting | AddMeasured, str]:
         """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found.
         BadInput where there is nothing to measure."""
         Scope(labels.info.t_ns).check(act.frame)

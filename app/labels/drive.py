@@ -12,7 +12,16 @@ from typing import Any, cast
 from sqlalchemy import and_, func, select
 
 from app.labels.database import Database
-from app.labels.items import SIGHTINGS, read_changed, read_extents, read_item, read_items, read_track, read_window
+from app.labels.items import (
+    SIGHTINGS,
+    read_changed,
+    read_changers,
+    read_extents,
+    read_item,
+    read_items,
+    read_track,
+    read_window,
+)
 from app.labels.log import Log
 from app.labels.refusals import ActRefused, NoSuchLabel
 from app.labels.tables import LONGEST_ITEM, DriveRow, ItemRow, SightingRow, VersionRow
@@ -107,6 +116,11 @@ class DriveLabels:
     def items(self, kind: ItemKind) -> dict[int, Item]:
         with self._database.reading() as connection:
             return read_items(connection, self._id, kind)
+
+    def changed_by(self) -> dict[tuple[ItemKind, int], str]:
+        """Who changed each item last, by kind and number."""
+        with self._database.reading() as connection:
+            return read_changers(connection, self._id)
 
     def track(self, number: int) -> Item:
         """With its sightings. NoSuchLabel when it is not there."""

@@ -6,10 +6,11 @@ import json
 from collections.abc import Iterable, Iterator
 from typing import Any, cast
 
-from sqlalchemy import Connection, func, select
+from sqlalchemy import Connection, and_, func, select
 
-from app.labels.tables import ItemRow, SightingRow
-from app.labels.values import Item, ItemKind, sighting_of, value_from_json
+from app.labels.steps import WAYS
+from app.labels.tables import ActRow, ChangeRow, ItemRow, SightingRow
+from app.labels.values import KINDS, Item, ItemKind, sighting_of, value_from_json
 from pipeline.labels.model import Sighting
 
 SIGHTINGS = tuple(SightingRow.__table__.columns)
@@ -93,6 +94,25 @@ def read_extents(
     for track, frame in connection.execute(keys.order_by(SightingRow.track, SightingRow.frame)):
         found[track][3].append(frame)
     return found
+
+
+def read_changers(connection: Connection, drive_id: int) -> dict[tuple[ItemKind, int], str]:
+    """Who did the last act in force on each item, by kind and number: what was taken back, and taking back, are not."""
+    of_act = and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act)
+    last = (
+        select(ChangeRow.kind, ChangeRow.item, func.max(ChangeRow.act).label("act"))
+        .join(ActRow, of_act)
+        .where(ChangeRow.drive_id == drive_id, ActRow.status == "done", ActRow.kind.not_in(WAYS))
+        .where(ChangeRow.kind.in_(KINDS))
+        .group_by(ChangeRow.kind, ChangeRow.item)
+        .subquery()
+    )
+    found = connection.execute(
+        select(last.c.kind, last.c.item, ActRow.person).join(
+            ActRow, and_(ActRow.drive_id == drive_id, ActRow.number == last.c.act)
+        )
+    )
+    return {(cast("ItemKind", row.kind), int(row.item)): row.person for row in found}
 
 
 def _item(kind: ItemKind, row: Any) -> Item:

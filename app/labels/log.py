@@ -40,10 +40,11 @@ class Acted:
 
 @dataclass(frozen=True)
 class HistoryEntry:
-    """One act in the life of an item; contents as plain values, null where it was not there."""
+    """One act in the life of an item; contents as plain values, null where it was not there. note: as of ``Acted``."""
 
     act: int
     what: str
+    note: str
     person: str
     t_unix_ms: int
     before: dict[str, Any] | None
@@ -170,6 +171,7 @@ class Log:
             HistoryEntry(
                 row.number,
                 row.what,
+                row.note,
                 row.person,
                 row.t_unix_ms,
                 unpack(row.before) if row.before is not None else None,

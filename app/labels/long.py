@@ -15,6 +15,7 @@ from app.labels.draft import Draft
 from app.labels.drive import DriveLabels
 from app.labels.refusals import ActRefused
 from app.labels.tasks import Progress, Work, to_nobody
+from app.labels.words import frames_text, outside_text
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.labels.propose import Proposals, known_as, propose
 from pipeline.labels.truth import truth_labels
@@ -28,7 +29,7 @@ def proposing(labels: DriveLabels, recording: Recording, person: str, first: int
         done = run.done if run is not None else 0
         raise ActRefused(f"{done} of {last + 1} frames are computed: wait, or propose these")
     if first > last:
-        raise ActRefused(f"frames {first} to {last}: the recording has {recording.recipe.total}, counted from 0")
+        raise ActRefused(outside_text(first, last, recording.recipe.total))
 
     def work(progress: Progress) -> str:
         progress(0, 2)
@@ -51,7 +52,7 @@ def put_proposals(
     def apply(draft: Draft) -> str:
         counts.append(_put_proposals(draft, found, first, last))
         progress(1, 2)
-        return f"proposed {counts[-1]} tracks in frames {first}–{last}"
+        return f"proposed {counts[-1]} tracks in {frames_text(first, last)}"
 
     acted = labels.log.act("propose", person, apply)
     known = len(found.tracks) - counts[-1]
@@ -134,8 +135,7 @@ def _happening(event: EventLabel) -> tuple[int, str, tuple[int, ...]]:
 
 def _is_untouched(label: LabelTrack | LeadRange) -> bool:
     """A proposal of the pipeline that nobody has looked at, nor sent back."""
-    sent_back = isinstance(label, LabelTrack) and bool(label.comment)
-    return label.state == "proposed" and label.origin.maker == "pipeline" and not sent_back
+    return label.state == "proposed" and label.origin.maker == "pipeline" and not label.comment
 
 
 def _as_they_are(draft: Draft) -> list[LabelTrack]:

@@ -7,7 +7,8 @@ from pydantic import ValidationError
 from app.given import GivenCuboid
 from app.labels.drive import DriveLabels
 from app.labels.refusals import ActRefused, BadAct
-from app.labels.requests import AddTrack, Lift, Refit, SetSighting
+from app.labels.requests import AddMeasured, Lift, Refit, SetSighting
+from app.labels.words import frames_text
 from pipeline.geometry import Cuboid
 from pipeline.labels.lift import lift
 from pipeline.labels.model import LabelTrack
@@ -26,9 +27,9 @@ def refitted(labels: DriveLabels, frame: Frame, act: Refit) -> tuple[SetSighting
     assert isinstance(track, LabelTrack)
     sighting = track.at(act.frame)
     if sighting is None or sighting.cuboid is None:
-        raise ActRefused(f"#{act.track} has no cuboid in frame {act.frame}")
+        raise ActRefused(f"#{act.track} has no cuboid in {frames_text(act.frame)}")
     if frame.sweep is None:
-        raise ActRefused(f"frame {act.frame} has no points")
+        raise ActRefused(f"{frames_text(act.frame)} has no points")
     found = refit(frame.sweep.points, sighting.cuboid)
     note = f"laid on {found.points} points" + ("" if found.turned else "; they do not say how it is turned")
     return (
@@ -44,7 +45,7 @@ def refitted(labels: DriveLabels, frame: Frame, act: Refit) -> tuple[SetSighting
     )
 
 
-def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddTrack, str]:
+def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddMeasured, str]:
     """A new track from where something is in the picture, with the parameters that are in use. BadInput where neither
     points nor picture tell where it is."""
     if (act.bbox is None) == (act.pixel is None):
@@ -52,8 +53,8 @@ def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddTrack, str]:
     if act.bbox is not None and not (act.bbox[0] < act.bbox[2] and act.bbox[1] < act.bbox[3]):
         raise BadAct("the box is none")
     found = lift(frame, params, canonical(act.label), act.bbox, act.pixel)
-    cuboid = _given(found.cuboid)
-    return AddTrack(kind="add_track", label=act.label, frame=frame.index, cuboid=cuboid, bbox=found.bbox), found.how
+    cuboid, how = _given(found.cuboid), found.how
+    return AddMeasured(kind="lift", label=act.label, frame=frame.index, cuboid=cuboid, bbox=found.bbox, how=how), how
 
 
 def _given(cuboid: Cuboid) -> GivenCuboid:

@@ -10,6 +10,7 @@ from app.given import Finite, GivenCuboid, Meters
 from app.labels.refusals import BadAct
 from app.labels.tables import LONGEST_NAME
 from app.labels.values import ItemKind
+from app.labels.words import frames_text
 from pipeline.errors import BadInput
 from pipeline.labels.check import check_sighting
 from pipeline.labels.model import Sighting
@@ -69,7 +70,7 @@ class Placed(Strict):
             raise BadAct("neither a cuboid nor a box")
         sighting = Sighting(self.frame, self.cuboid.value() if self.cuboid else None, self.bbox)
         try:
-            return check_sighting(sighting, f"frame {self.frame}")
+            return check_sighting(sighting, frames_text(self.frame))
         except BadInput as error:
             raise BadAct(str(error)) from None
 
@@ -180,6 +181,14 @@ class Lift(Strict):
     label: Word = "car"
     bbox: tuple[Finite, Finite, Finite, Finite] | None = None
     pixel: tuple[Finite, Finite] | None = None
+
+
+class AddMeasured(Placed):
+    """What a lift comes to: nobody sends it. how: what it was measured by, in words."""
+
+    kind: Literal["lift"]
+    label: Word
+    how: str
 
 
 class Relabel(_OfTrack):

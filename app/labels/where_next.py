@@ -1,73 +1,161 @@
-"""Where there is something to do: the next frame without a lead, with a proposal, sent back, or judged otherwise."""
+"""Where there is something to do: the next frame without a lead, with a proposal, sent back, not reviewed, or judged
+otherwise."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from typing import Literal, cast
 
 from app.drive.run import DriveRun
 from app.labels.drive import DriveLabels
 from app.labels.scoring import LabelScores, disagreements
+from app.labels.values import KINDS, Item, ItemKind
+from app.labels.words import lead_text
 from pipeline.evaluation.lead import Judged
-from pipeline.labels.model import LabelTrack, LeadRange
+from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
 
-What = Literal["unlabelled", "disagreement", "proposed", "sent_back"]
+What = Literal["unlabelled", "disagreement", "proposed", "sent_back", "unreviewed"]
+Key = tuple[ItemKind, int]
+"""Kind and number of a label."""
 _NOTHING: dict[What, str] = {
     "unlabelled": "who leads is said in every frame there",
     "disagreement": "the pipeline and the accepted labels agree there",
     "proposed": "no proposal is waiting there",
     "sent_back": "nothing was sent back there",
+    "unreviewed": "nothing of others is waiting for a review there",
 }
 
 
+@dataclass(frozen=True)
+class Place:
+    """item: what it is about, where that is one label."""
+
+    frame: int
+    why: str
+    item: Key | None = None
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is looked for, beyond which frame, which way. after: of several labels in that frame, the one that was
+    looked at; null to go beyond the frame. person: who asks."""
+
+    what: What
+    frame: int
+    direction: int
+    person: str = ""
+    after: Key | None = None
+
+
 def where_next(
-    labels: DriveLabels, scores: LabelScores, run: DriveRun | None, what: What, frame: int, direction: int
-) -> tuple[int | None, str]:
-    """(the nearest such frame after ``frame``, or before it; why it is one). Null with why there is none."""
-    places = _places(labels, scores, run, what)
-    ahead = [each for each in places if (each[0] > frame if direction > 0 else each[0] < frame)]
+    labels: DriveLabels, scores: LabelScores, run: DriveRun | None, asked: Asked
+) -> tuple[Place | None, str, int]:
+    """(the nearest such place, why it is one or why there is none, how many there are in the drive)."""
+    places = _places(labels, scores, run, asked)
+    here, way = _order(Place(asked.frame, "", asked.after)), 1 if asked.direction > 0 else -1
+    ahead = [
+        each
+        for each in places
+        if (each.frame != asked.frame or asked.after is not None)
+        and (_order(each) > here if way > 0 else _order(each) < here)
+    ]
     if not ahead:
-        return None, _NOTHING[what]
-    return min(ahead, key=lambda each: abs(each[0] - frame))
+        blind = _unjudged(labels, scores, run) if asked.what == "disagreement" and not places else ""
+        return None, blind or _NOTHING[asked.what], len(places)
+    found = min(ahead, key=_order) if way > 0 else max(ahead, key=_order)
+    return found, found.why, len(places)
 
 
-def _places(labels: DriveLabels, scores: LabelScores, run: DriveRun | None, what: What) -> Sequence[tuple[int, str]]:
-    if what == "unlabelled":
+def _order(place: Place) -> tuple[int, int, int]:
+    kind, number = place.item if place.item is not None else (None, 0)
+    return place.frame, KINDS.index(kind) if kind is not None else 0, number
+
+
+def _places(labels: DriveLabels, scores: LabelScores, run: DriveRun | None, asked: Asked) -> Sequence[Place]:
+    if asked.what == "unlabelled":
         return _unlabelled(labels)
-    if what == "disagreement":
+    if asked.what == "disagreement":
         return _disagreements(labels, scores, run)
-    return _waiting(labels, sent_back=what == "sent_back")
+    if asked.what == "unreviewed":
+        return _unreviewed(labels, asked.person)
+    return _waiting(labels, sent_back=asked.what == "sent_back")
 
 
-def _unlabelled(labels: DriveLabels) -> list[tuple[int, str]]:
+def _unlabelled(labels: DriveLabels) -> list[Place]:
     said: set[int] = set()
     for lead in _leads(labels):
         if lead.state != "rejected":
             said.update(range(lead.first, lead.last + 1))
-    return [(index, "nobody has said who leads") for index in range(len(labels.info.t_ns)) if index not in said]
+    return [Place(index, "nobody has said who leads") for index in range(len(labels.info.t_ns)) if index not in said]
 
 
-def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[tuple[int, str]]:
-    """Where a proposed track or range begins."""
-    found = labels.changes()
+def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[Place]:
+    """Where what is proposed, or was sent back, begins."""
     places = []
-    for item in found.items:
-        if item.kind == "track":
-            track = cast("LabelTrack", item.value)
-            if track.state == "proposed" and item.id in found.extents and (bool(track.comment) or not sent_back):
-                why = f"#{item.id}: {track.comment}" if track.comment else f"#{item.id} is proposed"
-                places.append((found.extents[item.id][0], why))
-    if not sent_back:
-        places += [(lead.first, "the lead is proposed") for lead in _leads(labels) if lead.state == "proposed"]
+    for frame, item in _begun(labels):
+        value = item.value
+        if isinstance(value, FrameTag) or value.state != "proposed" or (sent_back and not value.comment):
+            continue
+        why = f"{_name(item)}: {value.comment}" if value.comment else f"{_name(item)} is proposed"
+        places.append(Place(frame, why, (item.kind, item.id)))
     return places
 
 
-def _disagreements(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> list[tuple[int, str]]:
+def _unreviewed(labels: DriveLabels, person: str) -> list[Place]:
+    """Where what somebody else stands behind begins, and no second person has looked at it. What this person made or
+    changed last is for another."""
+    changed_by = labels.changed_by()
+    places = []
+    for frame, item in _begun(labels):
+        value = item.value
+        if isinstance(value, FrameTag) or value.state not in ("accepted", "corrected") or value.reviewer:
+            continue
+        made = value.origin.name if value.origin.maker == "person" else ""
+        last = changed_by.get((item.kind, item.id), made)
+        if person not in (made, last):
+            places.append(Place(frame, f"{_name(item)} of {last or value.origin.name}", (item.kind, item.id)))
+    return places
+
+
+def _begun(labels: DriveLabels) -> Iterable[tuple[int, Item]]:
+    """Every label that is in a frame, with the first one."""
+    found = labels.changes()
+    for item in found.items:
+        value = item.value
+        if isinstance(value, LabelTrack):
+            if item.id in found.extents:
+                yield found.extents[item.id][0], item
+        elif isinstance(value, LeadRange):
+            yield value.first, item
+        else:
+            yield value.frame, item
+
+
+def _name(item: Item) -> str:
+    value = item.value
+    if isinstance(value, LeadRange):
+        return f"the lead {lead_text(value.lead)}"
+    if isinstance(value, PathLabel):
+        return "the path"
+    return value.kind if isinstance(value, EventLabel) else f"#{item.id}"
+
+
+def _disagreements(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> list[Place]:
     score = scores.score(labels, run) if run is not None else None
     if run is None or score is None:
         return []
     rows, leads = run.rows(), list(_leads(labels))
-    return [(index, _otherwise(each, rows[index].cipv_id, leads, index)) for index, each in disagreements(score)]
+    return [Place(index, _otherwise(each, rows[index].cipv_id, leads, index)) for index, each in disagreements(score)]
+
+
+def _unjudged(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> str:
+    """Why nothing can disagree; empty where something can."""
+    score = scores.score(labels, run) if run is not None else None
+    if score is not None and any(frame.judged is not None for frame in score.frames):
+        return ""
+    _, truth = scores.truth(labels)
+    return " ".join(("no frame is judged:", *(truth.notes[:1] if truth is not None else ("nothing is accepted yet",))))
 
 
 def _otherwise(judged: Judged, cipv: int | None, leads: Iterable[LeadRange], index: int) -> str:

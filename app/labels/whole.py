@@ -9,6 +9,7 @@ from typing import cast
 from app.labels.draft import Draft, name_of
 from app.labels.refusals import ActRefused
 from app.labels.values import Item, ItemKind
+from app.labels.words import frames_text
 from pipeline.labels.model import EventLabel, FrameTag, LeadRange, PathLabel
 
 
@@ -36,7 +37,7 @@ def _check_leads(draft: Draft) -> None:
     for item in leads:
         lead, before = cast("LeadRange", item.value), cast("LeadRange | None", farthest.value if farthest else None)
         if farthest is not None and before is not None and lead.first <= before.last:
-            _clash(draft, farthest, item, f"frames {lead.first}–{min(lead.last, before.last)}")
+            _clash(draft, farthest, item, frames_text(lead.first, min(lead.last, before.last)))
         if before is None or lead.last > before.last:
             farthest = item
 
@@ -47,7 +48,7 @@ def _check_once(draft: Draft, kind: ItemKind, items: Iterable[tuple[Item, object
         other = there.setdefault(key, item)
         if other is not item:
             frame = cast("PathLabel | FrameTag", item.value).frame
-            _clash(draft, other, item, f"frame {frame}")
+            _clash(draft, other, item, frames_text(frame))
 
 
 def _clash(draft: Draft, one: Item, other: Item, where: str) -> None:

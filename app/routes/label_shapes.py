@@ -22,13 +22,15 @@ VERSION_NAME = r"^[A-Za-z0-9][A-Za-z0-9._ -]*$"
 
 
 class OriginJson(BaseModel):
-    """Who made a label. params, calibration: digests of what the pipeline ran with."""
+    """Who made a label. params, calibration: digests of what the pipeline ran with. how: what its place was measured
+    by, where a person only pointed at it; empty otherwise."""
 
     maker: Literal["pipeline", "person", "import"]
     name: str
     t_unix_ms: int
     params: str | None
     calibration: str | None
+    how: str
 
 
 class LabelItem(BaseModel):
@@ -38,47 +40,47 @@ class LabelItem(BaseModel):
     revision: int
 
 
-class TrackHead(LabelItem):
-    """A track without its sightings. first, last: frames; null while it has none. sightings: how many."""
+class StatedItem(LabelItem):
+    """comment: why it was sent back. reviewer: who found it right, another than who made it; empty while nobody has."""
 
-    label: str
     state: State
     origin: OriginJson
     comment: str
+    reviewer: str
+
+
+class TrackHead(StatedItem):
+    """A track without its sightings. first, last: frames; null while it has none. sightings: how many."""
+
+    label: str
     first: int | None
     last: int | None
     keyframes: list[int]
     sightings: int
 
 
-class LeadJson(LabelItem):
+class LeadJson(StatedItem):
     """Who leads from first to last."""
 
     first: int
     last: int
     lead: int | Literal["none", "unknown"]
-    state: State
-    origin: OriginJson
 
 
-class PathLabelJson(LabelItem):
+class PathLabelJson(StatedItem):
     """The ego lane's lines in a frame, ego x, y."""
 
     frame: int
     left: list[Point] | None
     right: list[Point] | None
-    state: State
-    origin: OriginJson
 
 
-class EventLabelJson(LabelItem):
+class EventLabelJson(StatedItem):
     """kind: ``cut_in``, ``cut_out``, or another word."""
 
     frame: int
     kind: str
     tracks: list[int]
-    state: State
-    origin: OriginJson
 
 
 class TagJson(LabelItem):
@@ -155,22 +157,20 @@ class Window(BaseModel):
     sightings: dict[int, list[PlacedTrack]]
 
 
-class WholeTrack(LabelItem):
+class WholeTrack(StatedItem):
     """With every sighting."""
 
     label: str
-    state: State
-    origin: OriginJson
-    comment: str
     sightings: list[PlacedFrame]
 
 
 class HistoryJson(BaseModel):
     """One act in an item's life. before, after: the item, null where it was not there; of a track, with the sightings
-    that the act changed."""
+    that the act changed. note: what there was to say about it."""
 
     act: int
     what: str
+    note: str
     person: str
     t_unix_ms: int
     before: dict[str, Any] | None
@@ -179,10 +179,13 @@ class HistoryJson(BaseModel):
 
 
 class NextJson(BaseModel):
-    """frame: null when there is none. why: one sentence."""
+    """frame: null when there is none. why: one sentence. item: what it is about, where that is one label. left: how
+    many such places there are in the drive."""
 
     frame: int | None
     why: str
+    item: ItemKey | None
+    left: int
 
 
 class SizesJson(BaseModel):

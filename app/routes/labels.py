@@ -11,11 +11,12 @@ from app.labels.answers import changes_json, history_json, track_json, window_js
 from app.labels.desk import LabelDesk
 from app.labels.requests import MOST_FRAMES, Id, Index, PersonOrNobody
 from app.labels.values import ItemKind
-from app.labels.where_next import What, where_next
+from app.labels.where_next import Asked, What, where_next
 from app.routes.drive import current
 from app.routes.label_shapes import (
     BadFrameJson,
     HistoryJson,
+    ItemKey,
     LabelsOfPerson,
     NextJson,
     ScoreJson,
@@ -62,12 +63,20 @@ def labels_router(desk: LabelDesk) -> APIRouter:
         what: What,
         frame: Annotated[int, Query(ge=-1, le=MOST_FRAMES)],
         direction: Annotated[int, Query(ge=-1, le=1)] = 1,
+        person: Annotated[PersonOrNobody, Query()] = "",
+        after_kind: Annotated[ItemKind | None, Query()] = None,
+        after_id: Annotated[Id, Query()] = 0,
     ) -> NextJson:
-        """The nearest frame after ``frame``, or with a negative direction before it, where there is something to do."""
+        """The nearest frame after ``frame``, or with a negative direction before it, where there is something to do.
+        after_kind, after_id: a label of that frame that was looked at; the others of the frame come first then.
+        person: who asks: what one has made oneself, another reviews."""
+        after = (after_kind, after_id) if after_kind is not None else None
         with refusing():
             run = desk.recording.book.current
-            found, why = where_next(desk.labels, desk.scores, run, what, frame, direction)
-        return NextJson(frame=found, why=why)
+            asked = Asked(what, frame, direction, person, after)
+            found, why, left = where_next(desk.labels, desk.scores, run, asked)
+        item = ItemKey(kind=found.item[0], id=found.item[1]) if found is not None and found.item is not None else None
+        return NextJson(frame=found.frame if found is not None else None, why=why, item=item, left=left)
 
     @router.get("/score")
     def score() -> ScoreJson:

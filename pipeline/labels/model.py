@@ -20,9 +20,9 @@ it is kept, so that it is not proposed again."""
 
 @dataclass(frozen=True)
 class Origin:
-    """Who made a label. name: the person, or the file or run that it came
-    from. params, calibration: digests of what the pipeline ran with; null for the other makers. t_unix_ms: when. how: what
-    its place was measured by, where a person only pointed at it; empty otherwise."""
+    """Who made a label. name: the person, or the file or run that it came from. params, calibration: digests of what
+    the pipeline ran with; null for the other makers. t_unix_ms: when. how: what its place was measured by, where a
+    person only pointed at it; empty otherwise."""
 
     maker: Literal["pipeline", "person", "import"]
     name: str
@@ -67,8 +67,8 @@ Lead = int | Literal["none", "unknown"]
 
 @dataclass(frozen=True)
 class LeadRange:
-    """Who is the closest in-path vehicle from frame ``first`` to ``last``, both included. Ranges do not overlap. comment,
-    reviewer: as of a track."""
+    """Who is the closest in-path vehicle from frame ``first`` to ``last``, both included. Ranges do not overlap.
+    comment, reviewer: as of a track."""
 
     first: int
     last: int

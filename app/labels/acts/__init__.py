@@ -11,6 +11,7 @@ from app.labels.draft import Draft
 from app.labels.requests import (
     Accept,
     AddEvent,
+    AddMeasured,
     AddTrack,
     ClearLead,
     DropKeyframe,
@@ -42,6 +43,7 @@ _ACTS: dict[type, Callable[[Draft, Scope, Any], str]] = {
     DropSightings: shape.drop_sightings,
     SizeAlong: shape.size_along,
     AddTrack: tracks.add_track,
+    AddMeasured: tracks.add_measured,
     Relabel: tracks.relabel,
     Split: tracks.split,
     Merge: tracks.merge,

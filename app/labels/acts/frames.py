@@ -8,6 +8,7 @@ from app.labels.acts.scope import Scope, by_person, track_of
 from app.labels.draft import Draft
 from app.labels.refusals import NoSuchLabel
 from app.labels.requests import AddEvent, RemovePath, SetPath, Tag
+from app.labels.words import frames_text
 from pipeline.labels.model import EventLabel, FrameTag, PathLabel
 
 
@@ -20,15 +21,15 @@ def set_path(draft: Draft, scope: Scope, act: SetPath) -> str:
         draft.add("path", path)
     else:
         draft.put("path", number, path)
-    return f"drew the path of frame {act.frame}"
+    return f"drew the path of {frames_text(act.frame)}"
 
 
 def remove_path(draft: Draft, scope: Scope, act: RemovePath) -> str:
     number = _path_at(draft, act.frame)
     if number is None:
-        raise NoSuchLabel(f"there is no path in frame {act.frame}")
+        raise NoSuchLabel(f"there is no path in {frames_text(act.frame)}")
     draft.put("path", number, None)
-    return f"removed the path of frame {act.frame}"
+    return f"removed the path of {frames_text(act.frame)}"
 
 
 def add_event(draft: Draft, scope: Scope, act: AddEvent) -> str:
@@ -37,7 +38,7 @@ def add_event(draft: Draft, scope: Scope, act: AddEvent) -> str:
     for number in tracks:
         track_of(draft, number)
     draft.add("event", EventLabel(act.frame, act.event, tracks, "accepted", by_person(draft)))
-    return f"{act.event} in frame {act.frame}"
+    return f"{act.event} in {frames_text(act.frame)}"
 
 
 def tag(draft: Draft, scope: Scope, act: Tag) -> str:
@@ -51,7 +52,7 @@ def tag(draft: Draft, scope: Scope, act: Tag) -> str:
         draft.add("tag", FrameTag(act.frame, act.tag, by_person(draft)))
     for number in there if not act.on else ():
         draft.put("tag", number, None)
-    return f"tagged frame {act.frame} {act.tag}" if act.on else f"frame {act.frame} is not {act.tag}"
+    return f"tagged {frames_text(act.frame)} {act.tag}" if act.on else f"{frames_text(act.frame)} is not {act.tag}"
 
 
 def _path_at(draft: Draft, frame: int) -> int | None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
-from app.labels.acts.scope import Scope, by_person, frames_text, track_of
+from app.labels.acts.scope import Scope, by_person, track_of
 from app.labels.draft import Draft
 from app.labels.refusals import ActRefused
 from app.labels.requests import ClearLead, SetLead, TrimLead
-from pipeline.labels.model import Lead, LeadRange
+from app.labels.words import frames_text, lead_text
+from pipeline.labels.model import LeadRange
 
 
 def set_lead(draft: Draft, scope: Scope, act: SetLead) -> str:
@@ -17,7 +18,7 @@ def set_lead(draft: Draft, scope: Scope, act: SetLead) -> str:
     if isinstance(act.lead, int):
         track_of(draft, act.lead)
     paint(draft, LeadRange(act.first, act.last, act.lead, "accepted", by_person(draft)))
-    return f"lead of {frames_text(act.first, act.last)}: {_named(act.lead)}"
+    return f"lead of {frames_text(act.first, act.last)}: {lead_text(act.lead)}"
 
 
 def clear_lead(draft: Draft, scope: Scope, act: ClearLead) -> str:
@@ -35,27 +36,22 @@ def trim_lead(draft: Draft, scope: Scope, act: TrimLead) -> str:
         raise ActRefused("that range is rejected: paint who leads there")
     if (old.first, old.last) != (act.first, act.last):
         state = old.state if old.origin.maker == "person" else "corrected"
-        new = replace(old, first=act.first, last=act.last, state=state, origin=by_person(draft))
+        new = replace(old, first=act.first, last=act.last, state=state, origin=by_person(draft), reviewer="")
         paint(draft, new, act.range)
-    return f"lead {_named(old.lead)} in {frames_text(act.first, act.last)}, not {frames_text(old.first, old.last)}"
+    return f"lead {lead_text(old.lead)} in {frames_text(act.first, act.last)}, not {frames_text(old.first, old.last)}"
 
 
 def paint(draft: Draft, new: LeadRange, number: int | None = None) -> None:
-    """Over what was there: ranges are cut. One that says the same, by a person too, right before or after is lengthened
-    instead. number: of the range that is to be so, where it is there already."""
+    """Over what was there: ranges are cut. One that says the same, by the same person, right before or after is
+    lengthened instead, unless it was reviewed or sent back. number: of the range that is to be so, where it is there
+    already."""
     clear(draft, new.first, new.last, but=number)
     joined = [number] if number is not None else []
     for other, item in draft.all("lead").items():
         if other == number:
             continue
         old = cast("LeadRange", item.value)
-        same = (old.lead, old.state, old.origin.maker, old.origin.name) == (
-            new.lead,
-            new.state,
-            new.origin.maker,
-            new.origin.name,
-        )
-        if same and (old.last + 1 == new.first or old.first == new.last + 1):
+        if _says(old) == _says(new) and (old.last + 1 == new.first or old.first == new.last + 1):
             new = replace(new, first=min(old.first, new.first), last=max(old.last, new.last))
             joined.append(other)
     for other in joined[1:]:
@@ -82,5 +78,6 @@ def clear(draft: Draft, first: int, last: int, *, but: int | None = None) -> boo
     return touched
 
 
-def _named(lead: Lead) -> str:
-    return f"#{lead}" if isinstance(lead, int) else {"none": "none", "unknown": "can't tell"}[lead]
+def _says(lead: LeadRange) -> tuple[object, ...]:
+    """What two ranges that are one have in common."""
+    return lead.lead, lead.state, lead.origin.maker, lead.origin.name, lead.comment, lead.reviewer

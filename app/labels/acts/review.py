@@ -6,57 +6,68 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast
 
-from app.labels.acts.scope import Scope, Stated, stated, track_of
-from app.labels.draft import Draft, name_of
-from app.labels.refusals import ActRefused, BadAct
-from app.labels.requests import Accept, Ref, Reject, Remove, ReviewOk, SendBack
-from pipeline.labels.model import EventLabel, LabelTrack, LeadRange
+from app.labels.acts.scope import Scope, Stated, stated
+from app.labels.draft import Draft
+from app.labels.refusals import ActRefused
+from app.labels.requests import Accept, Reject, Remove, ReviewOk, SendBack
+from app.labels.values import Value
+from app.labels.words import frames_text, lead_text
+from pipeline.labels.model import EventLabel, LabelTrack, LeadRange, PathLabel
 
 
 def accept(draft: Draft, scope: Scope, act: Accept) -> str:
     """What a person corrected stays a correction. Who made a label does not change: the log knows who accepted it."""
+    done = []
     for ref in act.items:
         value = _answered(stated(draft.get(ref.kind, ref.id, ref.revision)))
         draft.put(ref.kind, ref.id, value if value.state == "corrected" else replace(value, state="accepted"))
-    return f"accepted {_names(act.items)}"
+        done.append(value)
+    return f"accepted {_names(done)}"
 
 
 def reject(draft: Draft, scope: Scope, act: Reject) -> str:
+    done = []
     for ref in act.items:
-        value = stated(draft.get(ref.kind, ref.id, ref.revision))
-        draft.put(ref.kind, ref.id, replace(_answered(value), state="rejected"))
-    return f"rejected {_names(act.items)}"
+        value = _answered(stated(draft.get(ref.kind, ref.id, ref.revision)))
+        draft.put(ref.kind, ref.id, replace(value, state="rejected", reviewer=""))
+        done.append(value)
+    return f"rejected {_names(done)}"
 
 
 def review_ok(draft: Draft, scope: Scope, act: ReviewOk) -> str:
     """By a second person: who made a label as it is, or changed it last, does not review it."""
+    done = []
     for ref in act.items:
         value = stated(draft.get(ref.kind, ref.id, ref.revision))
+        if value.reviewer == draft.person:
+            raise ActRefused(f"you have reviewed {_name(value)} already")
         made = value.origin.name if value.origin.maker == "person" else None
         if draft.person in (made, draft.changed_by(ref.kind, ref.id)):
-            raise ActRefused(f"you changed {name_of(ref.kind, ref.id)} last: a second person reviews it")
-        draft.put(ref.kind, ref.id, replace(_answered(value), state="accepted"))
-    return f"reviewed and accepted {_names(act.items)}"
+            raise ActRefused(f"you changed {_name(value)} last: a second person reviews it")
+        draft.put(ref.kind, ref.id, replace(_answered(value), state="accepted", reviewer=draft.person))
+        done.append(value)
+    return f"reviewed and accepted {_names(done)}"
 
 
 def send_back(draft: Draft, scope: Scope, act: SendBack) -> str:
+    done = []
     for ref in act.items:
-        if ref.kind != "track":
-            raise BadAct("tracks are sent back; what else is wrong is put right, or rejected")
-        track = track_of(draft, ref.id, ref.revision)
-        draft.put("track", ref.id, replace(track, state="proposed", comment=act.comment))
-    return f"sent back {_names(act.items)}: {act.comment}"
+        value = stated(draft.get(ref.kind, ref.id, ref.revision))
+        draft.put(ref.kind, ref.id, replace(value, state="proposed", comment=act.comment, reviewer=""))
+        done.append(value)
+    return f"sent back {_names(done)}: {act.comment}"
 
 
 def remove(draft: Draft, scope: Scope, act: Remove) -> str:
     """What names a removed track as the lead, or in an event, goes with it: it would name nothing."""
+    done = []
     for ref in act.items:
-        draft.get(ref.kind, ref.id, ref.revision)
+        done.append(draft.get(ref.kind, ref.id, ref.revision).value)
         draft.put(ref.kind, ref.id, None)
     gone = {ref.id for ref in act.items if ref.kind == "track"}
     if gone:
         forget_tracks(draft, gone)
-    return f"removed {_names(act.items)}"
+    return f"removed {_names(done)}"
 
 
 def forget_tracks(draft: Draft, gone: set[int]) -> None:
@@ -72,9 +83,21 @@ def forget_tracks(draft: Draft, gone: set[int]) -> None:
 
 def _answered(value: Stated) -> Stated:
     """Without what a reviewer asked for: it has been looked at."""
-    return replace(value, comment="") if isinstance(value, LabelTrack) else value
+    return replace(value, comment="")
 
 
-def _names(items: Sequence[Ref]) -> str:
-    named = ", ".join(name_of(ref.kind, ref.id) for ref in items[:3])
-    return named + (f" and {len(items) - 3} more" if len(items) > 3 else "")
+def _names(values: Sequence[Value]) -> str:
+    named = ", ".join(_name(value) for value in values[:3])
+    return named + (f" and {len(values) - 3} more" if len(values) > 3 else "")
+
+
+def _name(value: Value) -> str:
+    """As people call it: a range of the lead has no number that they know."""
+    if isinstance(value, LabelTrack):
+        return f"#{value.id}"
+    if isinstance(value, LeadRange):
+        return f"lead {lead_text(value.lead)} of {frames_text(value.first, value.last)}"
+    if isinstance(value, PathLabel):
+        return f"the path of {frames_text(value.frame)}"
+    what = value.kind if isinstance(value, EventLabel) else value.tag
+    return f"{what} in {frames_text(value.frame)}"

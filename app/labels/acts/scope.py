@@ -8,6 +8,7 @@ from typing import TypeVar, cast
 from app.labels.draft import Draft
 from app.labels.refusals import BadAct
 from app.labels.values import Item
+from app.labels.words import outside_text
 from pipeline.labels.model import EventLabel, LabelTrack, LeadRange, Origin, PathLabel
 
 Stated = LabelTrack | LeadRange | PathLabel | EventLabel
@@ -24,12 +25,12 @@ class Scope:
         """BadAct for frames that the recording does not have."""
         count, last = len(self.t_ns), first if last is None else last
         if not 0 <= first <= last < count:
-            frames = f"frame {first}" if first == last else f"frames {first} to {last}"
-            raise BadAct(f"{frames}: the recording has {count}, counted from 0")
+            raise BadAct(outside_text(first, last, count))
 
 
-def by_person(draft: Draft) -> Origin:
-    return Origin("person", draft.person, draft.t_unix_ms)
+def by_person(draft: Draft, how: str = "") -> Origin:
+    """how: what the person only pointed at was measured by."""
+    return Origin("person", draft.person, draft.t_unix_ms, how=how)
 
 
 def track_of(draft: Draft, number: int, revision: int | None = None) -> LabelTrack:
@@ -37,8 +38,8 @@ def track_of(draft: Draft, number: int, revision: int | None = None) -> LabelTra
 
 
 def corrected(draft: Draft, track: LabelTrack) -> None:
-    """A person changed it: no proposal any more, and who says so is that person."""
-    draft.put("track", track.id, replace(track, state="corrected", origin=by_person(draft)))
+    """A person changed it: no proposal any more, who says so is that person, and nobody has reviewed that."""
+    draft.put("track", track.id, replace(track, state="corrected", origin=by_person(draft), reviewer=""))
 
 
 def stated(item: Item) -> Stated:
@@ -46,7 +47,3 @@ def stated(item: Item) -> Stated:
     if item.kind == "tag":
         raise BadAct("a tag is neither accepted nor rejected")
     return cast("Stated", item.value)
-
-
-def frames_text(first: int, last: int) -> str:
-    return f"frame {first}" if first == last else f"frames {first}–{last}"

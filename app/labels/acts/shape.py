@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from app.labels.acts.scope import Scope, corrected, frames_text, track_of
+from app.labels.acts.scope import Scope, corrected, track_of
 from app.labels.draft import Draft
 from app.labels.refusals import ActRefused
 from app.labels.requests import DropKeyframe, DropSightings, SetSighting, SizeAlong
+from app.labels.words import frames_text
 from pipeline.labels import interpolate
 from pipeline.labels.model import Sighting
 
@@ -20,17 +21,17 @@ def set_sighting(draft: Draft, scope: Scope, act: SetSighting) -> str:
     after = interpolate.put_keyframe(old, new, scope.t_ns, interpolate=act.interpolate)
     _put(draft, track.id, old, after)
     corrected(draft, track)
-    return f"{_verb(old.get(act.frame), new)} #{track.id} in frame {act.frame}"
+    return f"{_verb(old.get(act.frame), new)} #{track.id} in {frames_text(act.frame)}"
 
 
 def drop_keyframe(draft: Draft, scope: Scope, act: DropKeyframe) -> str:
     track = track_of(draft, act.track, act.revision)
     old = draft.sightings(track.id)
     if act.frame not in old or not old[act.frame].keyframe:
-        raise ActRefused(f"#{track.id} has no keyframe in frame {act.frame}")
+        raise ActRefused(f"#{track.id} has no keyframe in {frames_text(act.frame)}")
     _put(draft, track.id, old, interpolate.drop_keyframe(old, act.frame, scope.t_ns))
     corrected(draft, track)
-    return f"interpolated #{track.id} in frame {act.frame}"
+    return f"interpolated #{track.id} in {frames_text(act.frame)}"
 
 
 def drop_sightings(draft: Draft, scope: Scope, act: DropSightings) -> str:

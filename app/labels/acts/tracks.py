@@ -8,8 +8,9 @@ from typing import cast
 from app.labels.acts.scope import Scope, by_person, corrected, track_of
 from app.labels.draft import Draft
 from app.labels.refusals import ActRefused
-from app.labels.requests import AddTrack, Merge, Relabel, Split
+from app.labels.requests import AddMeasured, AddTrack, Merge, Relabel, Split
 from app.labels.values import Frames
+from app.labels.words import frames_text
 from pipeline.labels.model import EventLabel, LabelTrack, LeadRange
 from pipeline.vision.labels import canonical
 
@@ -19,7 +20,16 @@ def add_track(draft: Draft, scope: Scope, act: AddTrack) -> str:
     number = draft.next_number("track")
     draft.add("track", LabelTrack(number, canonical(act.label), (), "corrected", by_person(draft)))
     draft.put_sightings(number, {act.frame: act.sighting()})
-    return f"added #{number}, a {canonical(act.label)}, in frame {act.frame}"
+    return f"added #{number}, a {canonical(act.label)}, in {frames_text(act.frame)}"
+
+
+def add_measured(draft: Draft, scope: Scope, act: AddMeasured) -> str:
+    """Where a person pointed is a vehicle; what was measured there is a proposal until somebody says that it is so."""
+    scope.check(act.frame)
+    number = draft.next_number("track")
+    draft.add("track", LabelTrack(number, canonical(act.label), (), "proposed", by_person(draft, act.how)))
+    draft.put_sightings(number, {act.frame: act.sighting()})
+    return f"proposed #{number}, a {canonical(act.label)}, in {frames_text(act.frame)}"
 
 
 def relabel(draft: Draft, scope: Scope, act: Relabel) -> str:
@@ -35,14 +45,14 @@ def split(draft: Draft, scope: Scope, act: Split) -> str:
     there = draft.sightings(track.id)
     later: Frames = {frame: each for frame, each in there.items() if frame >= act.frame}
     if not later or len(later) == len(there):
-        raise ActRefused(f"#{track.id} cannot be split at frame {act.frame}: it is on one side of it only")
+        raise ActRefused(f"#{track.id} cannot be split at {frames_text(act.frame)}: it is on one side of it only")
     number = draft.next_number("track")
     corrected(draft, track)
-    draft.add("track", replace(track, id=number, state="corrected", origin=by_person(draft), comment=""))
+    draft.add("track", replace(track, id=number, state="corrected", origin=by_person(draft), comment="", reviewer=""))
     draft.put_sightings(track.id, dict.fromkeys(later))
     draft.put_sightings(number, later)
     _rename_from(draft, track.id, number, act.frame)
-    return f"split #{track.id} at frame {act.frame}: from there it is #{number}"
+    return f"split #{track.id} at {frames_text(act.frame)}: from there it is #{number}"
 
 
 def merge(draft: Draft, scope: Scope, act: Merge) -> str:

@@ -22,7 +22,10 @@ from pipeline.labels.formats.base import Drive, Imported, write_file
 from pipeline.labels.formats.reading import fit, read_bytes
 from pipeline.labels.model import LabelSet, Lead, LeadRange, Origin, State
 
-_TOLD = ("frame", "name", "t_ns", "lead", "state", "maker", "by", "made_unix_ms", "params", "calibration")
+_TOLD = (
+    "frame", "name", "t_ns", "lead", "state", "maker", "by", "made_unix_ms", "params", "calibration", "how", "comment",
+    "reviewer",
+)  # fmt: skip
 _COLUMNS = (*_TOLD, "label", "distance_m", "x_m", "y_m")
 _LONGEST_NUMBER = 20
 _STATE: TypeAdapter[State] = TypeAdapter(State)
@@ -65,7 +68,8 @@ def _said(lead: LeadRange | None) -> tuple[str | int, ...]:
     if lead is None:
         return ("",) * (len(_TOLD) - 3)
     by = lead.origin
-    return lead.lead, lead.state, by.maker, by.name, by.t_unix_ms, by.params or "", by.calibration or ""
+    made = (by.maker, by.name, by.t_unix_ms, by.params or "", by.calibration or "", by.how)
+    return lead.lead, lead.state, *made, lead.comment, lead.reviewer
 
 
 def _seen(labels: LabelSet, lead: LeadRange | None, index: int) -> tuple[str, ...]:
@@ -97,7 +101,8 @@ def _range(row: dict[str, str], frame: int, origin: Origin, what: str) -> LeadRa
     if isinstance(lead, int) and lead < 0:
         raise BadInput(f"{what}: a lead that is no track")
     state: State = fit(_STATE, row.get("state") or "accepted", f"{what}, state")
-    return LeadRange(frame, frame, lead, state, _origin(row, what) if row.get("maker") else origin)
+    by = _origin(row, what) if row.get("maker") else origin
+    return LeadRange(frame, frame, lead, state, by, row.get("comment") or "", row.get("reviewer") or "")
 
 
 def _origin(row: dict[str, str], what: str) -> Origin:
@@ -107,6 +112,7 @@ def _origin(row: dict[str, str], what: str) -> Origin:
         _whole(row.get("made_unix_ms") or "0", what),
         row.get("params") or None,
         row.get("calibration") or None,
+        row.get("how") or "",
     )
 
 

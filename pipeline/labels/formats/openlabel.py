@@ -15,7 +15,7 @@ from typing import Any
 
 from pipeline.geometry import inverse
 from pipeline.labels.formats.base import Drive, write_file
-from pipeline.labels.model import LabelSet, LeadRange, Origin, Sighting, State
+from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.sources.files import check_looks_ahead
 from pipeline.types import Point2
 
@@ -43,12 +43,11 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
         "actions": {str(i): _lead_action(each) for i, each in enumerate(labels.leads)},
         "relations": _relations(labels),
         "events": {
-            str(i): _element(each.kind, each.kind, each.frame, each.frame)
-            | {"event_data": _marks(each.state, each.origin)}
+            str(i): _element(each.kind, each.kind, each.frame, each.frame) | {"event_data": _marks(each.origin, each)}
             for i, each in enumerate(labels.events)
         },
         "contexts": {
-            str(i): _element(each.tag, TAG_TYPE, each.frame, each.frame) | {"context_data": _marks(None, each.origin)}
+            str(i): _element(each.tag, TAG_TYPE, each.frame, each.frame) | {"context_data": _marks(each.origin)}
             for i, each in enumerate(labels.tags)
         },
         "frames": _frames(labels, drive),
@@ -73,19 +72,16 @@ def _coordinate_systems(drive: Drive) -> Element:
 def _objects(labels: LabelSet) -> dict[str, Element]:
     objects: dict[str, Element] = {EGO_UID: {"name": "ego", "type": EGO_TYPE}}
     for track in labels.tracks:
-        data = _marks(track.state, track.origin)
-        if track.comment:
-            data["text"].append({"name": "comment", "val": track.comment})
         objects[str(track.id)] = {
             "name": f"{track.label} {track.id}",
             "type": track.label,
             "frame_intervals": _intervals(each.frame for each in track.sightings),
-            "object_data": data,
+            "object_data": _marks(track.origin, track),
         }
     for place, path in enumerate(labels.paths):
         lines = [_line(name, line) for name, line in (("left", path.left), ("right", path.right)) if line is not None]
         objects[_PATH_UID.format(place)] = _element("ego path", PATH_TYPE, path.frame, path.frame) | {
-            "object_data": _marks(path.state, path.origin) | {"poly3d": lines}
+            "object_data": _marks(path.origin, path) | {"poly3d": lines}
         }
     return objects
 
@@ -97,7 +93,7 @@ def _line(name: str, line: tuple[Point2, ...]) -> Element:
 
 def _lead_action(lead: LeadRange) -> Element:
     kind = NO_LEAD if lead.lead == "none" else LEAD_UNKNOWN if lead.lead == "unknown" else LEAD
-    return _element(kind, kind, lead.first, lead.last) | {"action_data": _marks(lead.state, lead.origin)}
+    return _element(kind, kind, lead.first, lead.last) | {"action_data": _marks(lead.origin, lead)}
 
 
 def _relations(labels: LabelSet) -> dict[str, Element]:
@@ -154,10 +150,13 @@ def _seen(sighting: Sighting) -> Element:
     return data
 
 
-def _marks(state: State | None, origin: Origin) -> Element:
-    """State and origin as the texts and numbers that any element may have."""
-    texts = {"state": state, "maker": origin.maker, "by": origin.name}
+def _marks(origin: Origin, marked: LabelTrack | LeadRange | PathLabel | EventLabel | None = None) -> Element:
+    """State, review and origin as the texts and numbers that any element may have. marked: null for what has no
+    state."""
+    texts: dict[str, str | None] = {"maker": origin.maker, "by": origin.name, "how": origin.how or None}
     texts |= {"params": origin.params, "calibration": origin.calibration}
+    if marked is not None:
+        texts |= {"state": marked.state, "comment": marked.comment or None, "reviewer": marked.reviewer or None}
     return {
         "text": [{"name": name, "val": value} for name, value in texts.items() if value is not None],
         "num": [{"name": "made_unix_ms", "val": origin.t_unix_ms}],

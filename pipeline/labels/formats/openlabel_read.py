@@ -86,8 +86,7 @@ class _Reading:
             state, origin = self._made(each.object_data)
             label = each.type if self.is_ours else canonical(each.type)
             seen_in_order = tuple(sorted(sightings[uid], key=lambda s: s.frame))
-            comment = str(each.object_data.said("comment") or "")
-            yield LabelTrack(number, label, seen_in_order, state, origin, comment)
+            yield LabelTrack(number, label, seen_in_order, state, origin, *_reviewed(each.object_data))
 
     def _sighting(self, frame: int, data: Data) -> Sighting:
         cuboid = self._cuboid(data.cuboid[0]) if data.cuboid else None
@@ -135,7 +134,7 @@ class _Reading:
             for uid, action in self.content.actions.items():
                 first, last = self._span(action)
                 state, origin = self._made(action.action_data)
-                yield LeadRange(first, last, self._who(uid, action.type), state, origin)
+                yield LeadRange(first, last, self._who(uid, action.type), state, origin, *_reviewed(action.action_data))
             return
         for relation in self.content.relations.values():
             if relation.type == ol.LEADS:
@@ -171,7 +170,9 @@ class _Reading:
             if each.type == ol.PATH_TYPE:
                 lines = {shape.name: self._line(shape.val) for shape in each.object_data.poly3d}
                 state, origin = self._made(each.object_data)
-                yield PathLabel(self._span(each)[0], lines.get("left"), lines.get("right"), state, origin)
+                frame = self._span(each)[0]
+                reviewed = _reviewed(each.object_data)
+                yield PathLabel(frame, lines.get("left"), lines.get("right"), state, origin, *reviewed)
 
     def _line(self, val: list[float]) -> tuple[Point2, ...]:
         if len(val) % 3:
@@ -187,7 +188,8 @@ class _Reading:
         }
         for uid, each in self.content.events.items():
             state, origin = self._made(each.event_data)
-            yield EventLabel(self._span(each)[0], each.type, tracks.get(uid, ()), state, origin)
+            frame, reviewed = self._span(each)[0], _reviewed(each.event_data)
+            yield EventLabel(frame, each.type, tracks.get(uid, ()), state, origin, *reviewed)
 
     def _tags(self) -> Iterable[FrameTag]:
         for each in self.content.contexts.values():
@@ -209,7 +211,8 @@ class _Reading:
         at = data.said("made_unix_ms")
         texts = [data.said(name) for name in ("params", "calibration")]
         params, calibration = (str(text) if text is not None else None for text in texts)
-        return state, Origin(maker, str(data.said("by") or ""), at if type(at) is int else 0, params, calibration)
+        by, how = (str(data.said(name) or "") for name in ("by", "how"))
+        return state, Origin(maker, by, at if type(at) is int else 0, params, calibration, how)
 
     def _notes(self) -> Iterable[str]:
         if self.is_ours:
@@ -223,6 +226,11 @@ class _Reading:
 
 def _is_track(uid: str, each: Element) -> bool:
     return uid != ol.EGO_UID and each.type not in (ol.PATH_TYPE, ol.EGO_TYPE)
+
+
+def _reviewed(data: Data) -> tuple[str, str]:
+    """(comment, reviewer); empty where the file does not say them."""
+    return str(data.said("comment") or ""), str(data.said("reviewer") or "")
 
 
 def _numbers(uids: list[str]) -> dict[str, int]:

@@ -8,12 +8,12 @@ from typing import Literal, get_args
 from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
 
 Part = Literal[
-    "cuboids", "boxes", "identities", "leads", "paths", "events", "tags", "states", "origins", "comments", "keyframes",
-    "name",
+    "cuboids", "boxes", "identities", "leads", "paths", "events", "tags", "states", "origins", "comments",
+    "reviews", "keyframes", "name",
 ]  # fmt: skip
 """identities: that sightings in several frames are the same track. states: proposed, accepted, corrected, rejected.
-origins: who made a label, when, with which parameters. keyframes: which sightings were interpolated. name: of a frozen
-version."""
+origins: who made a label, when, how, with which parameters. reviews: who found it right. keyframes: which sightings
+were interpolated. name: of a frozen version."""
 
 EVERYTHING: frozenset[Part] = frozenset(get_args(Part))
 
@@ -71,7 +71,8 @@ def _lost(labels: LabelSet, holds: frozenset[Part]) -> list[str]:
         "paths": (len(labels.paths), "{} of the ego path not written: no place for them", "frame", "frames"),
         "events": (len(labels.events), "{} not written: no place for them", "event", "events"),
         "tags": (len(labels.tags), "{} not written: no place for them", "frame tag", "frame tags"),
-        "comments": (sum(bool(t.comment) for t in labels.tracks), "{} not written", "comment", "comments"),
+        "comments": (sum(bool(each.comment) for each in _marked(labels)), "{} not written", "comment", "comments"),
+        "reviews": (sum(bool(each.reviewer) for each in _marked(labels)), "{} not written", "review", "reviews"),
     }
     lost = [_count(*counted[part]) for part in counted if part in missing]
     if {"cuboids", "boxes"} <= missing:
@@ -94,8 +95,7 @@ def _lost(labels: LabelSet, holds: frozenset[Part]) -> list[str]:
 
 
 def _lost_marks(labels: LabelSet, missing: frozenset[Part]) -> list[str]:
-    marked: tuple[_Marked, ...] = (*labels.tracks, *labels.leads, *labels.paths, *labels.events)
-    states, lost = [each.state for each in marked], []
+    states, lost = [each.state for each in _marked(labels)], []
     if "states" in missing:
         lost.append(_count(states.count("rejected"), "{} left out: rejected, which it cannot say", "label"))
         lost.append(_count(states.count("proposed"), "{} written as if true: nobody has looked at it yet", "label"))
@@ -105,6 +105,10 @@ def _lost_marks(labels: LabelSet, missing: frozenset[Part]) -> list[str]:
     if "name" in missing and labels.name != "working":
         lost.append(f"the version's name {labels.name!r} is not written")
     return lost
+
+
+def _marked(labels: LabelSet) -> tuple[_Marked, ...]:
+    return (*labels.tracks, *labels.leads, *labels.paths, *labels.events)
 
 
 def _count(count: int, sentence: str, one: str, many: str = "") -> str:

@@ -25,7 +25,7 @@ from pipeline.labels.model import LabelSet, Origin
 _SHAPES: frozenset[Part] = frozenset(("cuboids", "boxes"))
 _TRACKED: frozenset[Part] = frozenset(("cuboids", "identities"))
 _BOXES: frozenset[Part] = frozenset(("boxes", "identities"))
-_LEADS: frozenset[Part] = frozenset(("leads", "states", "origins"))
+_LEADS: frozenset[Part] = frozenset(("leads", "states", "origins", "comments", "reviews"))
 
 FORMATS: dict[FormatName, Format] = {
     each.name: each

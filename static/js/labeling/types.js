@@ -18,6 +18,7 @@
  * @property {number} t_unix_ms
  * @property {string|null} params
  * @property {string|null} calibration
+ * @property {string} how  what its place was measured by, where a person only pointed at it
  *
  * @typedef {object} LabelTrack
  * @property {number} id
@@ -25,7 +26,8 @@
  * @property {string} label
  * @property {LabelState} state
  * @property {LabelOrigin} origin
- * @property {string} comment
+ * @property {string} comment  why it was sent back
+ * @property {string} reviewer  who found it right, another than who made it; "" while nobody has
  * @property {number|null} first  null of a track that is nowhere
  * @property {number|null} last
  * @property {number[]} keyframes
@@ -45,6 +47,8 @@
  * @property {Lead} lead
  * @property {LabelState} state
  * @property {LabelOrigin} origin
+ * @property {string} comment
+ * @property {string} reviewer
  *
  * @typedef {object} EventLabel
  * @property {number} id
@@ -54,6 +58,8 @@
  * @property {number[]} tracks
  * @property {LabelState} state
  * @property {LabelOrigin} origin
+ * @property {string} comment
+ * @property {string} reviewer
  *
  * @typedef {object} FrameTag
  * @property {number} id
@@ -70,6 +76,8 @@
  * @property {[number, number][]|null} right
  * @property {LabelState} state
  * @property {LabelOrigin} origin
+ * @property {string} comment
+ * @property {string} reviewer
  *
  * @typedef {object} LabelTask
  * @property {number} id  the 202 of who began it has the same
@@ -108,10 +116,13 @@
  * @typedef {object} Found  where there is something to do
  * @property {number|null} frame
  * @property {string} why
+ * @property {{kind: ItemKind, id: number}|null} item  what it is about, where that is one label
+ * @property {number} left  such places in the whole drive
  *
  * @typedef {object} PastAct
  * @property {number} act
  * @property {string} what
+ * @property {string} note  what there was to say about it
  * @property {string} person
  * @property {number} t_unix_ms
  * @property {any} before

@@ -81,7 +81,11 @@ def test_a_correction_that_is_accepted_stays_one_until_a_second_person_reviews_i
     with pytest.raises(ActRefused, match="you changed #1 last: a second person reviews it"):
         act(labels, kind="review_ok", items=[("track", 1)])
     act(labels, "Bob", kind="review_ok", items=[("track", 1)])
-    assert (track(labels).state, track(labels).origin.name) == ("accepted", "Ada")
+    assert (track(labels).state, track(labels).origin.name, track(labels).reviewer) == ("accepted", "Ada", "Bob")
+    with pytest.raises(ActRefused, match="you have reviewed #1 already"):
+        act(labels, "Bob", kind="review_ok", items=[("track", 1)])
+    act(labels, "Cy", kind="relabel", track=1, label="Bus")
+    assert track(labels).reviewer == "", "what is changed is to be reviewed again"
 
 
 @pytest.mark.parametrize(
@@ -117,6 +121,41 @@ def test_what_is_sent_back_is_proposed_again_with_the_comment(labels: DriveLabel
     assert (track(labels).state, track(labels).comment) == ("accepted", "")
 
 
+def said_of(labels: DriveLabels, kind: Any) -> tuple[str, str, str]:
+    value: Any = labels.items(kind)[1].value
+    return value.state, value.comment, value.reviewer
+
+
+@pytest.mark.parametrize(
+    ("kind", "what"),
+    [("lead", "lead #1 of frames 11–21"), ("path", "the path of frame 13"), ("event", "cut_in in frame 12")],
+)
+def test_the_lead_paths_and_events_are_sent_back_and_reviewed(labels: DriveLabels, kind: str, what: str) -> None:
+    act(labels, kind="set_path", frame=12, left=[[0, 1], [5, 1]], right=None)
+    act(labels, kind="add_event", frame=11, event="cut_in", tracks=[1])
+    act(labels, kind="accept", items=[("lead", 1)])
+    with pytest.raises(ActRefused, match=f"you changed {what} last"):
+        act(labels, kind="review_ok", items=[(kind, 1)])
+    assert act(labels, "Bob", kind="send_back", items=[(kind, 1)], comment="no").what == f"sent back {what}: no"
+    assert said_of(labels, kind) == ("proposed", "no", "")
+    act(labels, kind="accept", items=[(kind, 1)])
+    assert act(labels, "Bob", kind="review_ok", items=[(kind, 1)]).what == f"reviewed and accepted {what}"
+    assert said_of(labels, kind) == ("accepted", "", "Bob")
+    labels.log.move("undo", "Bob")
+    assert said_of(labels, kind) == ("accepted", "", "")
+
+
+def test_what_was_reviewed_is_not_lengthened_by_what_was_not(labels: DriveLabels) -> None:
+    act(labels, kind="set_lead", first=30, last=40, lead=2)
+    number = max(labels.items("lead"))
+    act(labels, "Bob", kind="review_ok", items=[("lead", number)])
+    act(labels, kind="set_lead", first=41, last=45, lead=2)
+    ranges = [labels.items("lead")[each].value for each in (number, number + 1)]
+    assert [(each.first, each.last, each.reviewer) for each in ranges] == [(30, 40, "Bob"), (41, 45, "")]  # type: ignore[union-attr]
+    act(labels, kind="set_lead", first=35, last=36, lead="none")
+    assert [(first, last) for first, last, who, _ in leads(labels) if who == 2] == [(30, 34), (37, 40), (41, 45)]
+
+
 def test_what_names_a_removed_track_goes_with_it(labels: DriveLabels) -> None:
     act(labels, kind="add_event", frame=15, event="cut_in", tracks=[1, 2])
     act(labels, kind="remove", items=[("track", 1)])
@@ -133,7 +172,7 @@ def test_what_names_a_removed_track_goes_with_it(labels: DriveLabels) -> None:
 def test_a_keyframe_moves_what_lies_beyond_it(labels: DriveLabels) -> None:
     moved = BOX | {"center": [22.0, 1.0, 0.7]}
     assert act(labels, kind="set_sighting", track=1, frame=12, cuboid=moved, bbox=[1, 2, 3, 4]).what == (
-        "moved #1 in frame 12"
+        "moved #1 in frame 13"
     )
     found = track(labels)
     assert {each.cuboid.center for each in found.sightings if each.cuboid} == {(22.0, 1.0, 0.7)}
@@ -153,14 +192,14 @@ def test_between_keyframes_the_track_follows_and_a_dropped_one_follows_too(label
     act(labels, kind="drop_keyframe", track=1, frame=15)
     places = {each.frame: each.cuboid.center[0] for each in track(labels).sightings if each.cuboid}
     assert places == {frame: pytest.approx(20.0 + (frame - 10)) for frame in range(10, 21)}
-    with pytest.raises(ActRefused, match="no keyframe in frame 15"):
+    with pytest.raises(ActRefused, match="no keyframe in frame 16"):
         act(labels, kind="drop_keyframe", track=1, frame=15)
 
 
 def test_a_vehicle_can_be_taken_out_of_frames(labels: DriveLabels) -> None:
     act(labels, kind="drop_sightings", track=1, first=0, last=15)
     assert labels.changes().extents[1][:3] == (16, 20, 5)
-    with pytest.raises(ActRefused, match="not in frames 0–15"):
+    with pytest.raises(ActRefused, match="not in frames 1–16"):
         act(labels, kind="drop_sightings", track=1, first=0, last=15)
 
 
@@ -262,13 +301,13 @@ def test_a_range_that_comes_to_one_that_says_the_same_is_one_with_it(labels: Dri
     number, later = max(labels.items("lead").items())
     act(labels, kind="trim_lead", range=number, revision=later.revision, first=51, last=70)
     assert leads(labels)[1:] == [(40, 70, 2, "accepted")]
-    assert labels.log.history("lead", number)[0].what == "lead #2 in frames 51–70, not frames 60–70"
+    assert labels.log.history("lead", number)[0].what == "lead #2 in frames 52–71, not frames 61–71"
 
 
 def test_the_lead_can_be_unsaid(labels: DriveLabels) -> None:
     act(labels, kind="clear_lead", first=0, last=15)
     assert [each[:3] for each in leads(labels)] == [(16, 20, 1)]
-    with pytest.raises(ActRefused, match="nobody has said who leads in frames 0–15"):
+    with pytest.raises(ActRefused, match="nobody has said who leads in frames 1–16"):
         act(labels, kind="clear_lead", first=0, last=15)
 
 
@@ -305,7 +344,7 @@ def test_a_tag_is_there_once_or_not(labels: DriveLabels) -> None:
         {"kind": "set_lead", "first": 5, "last": COUNT, "lead": "none"},
         {"kind": "set_path", "frame": 3, "left": None, "right": None},
         {"kind": "accept", "items": [("tag", 1)]},
-        {"kind": "send_back", "items": [("lead", 1)], "comment": "it is another"},
+        {"kind": "send_back", "items": [("tag", 1)], "comment": "it is another"},
     ],
 )
 def test_what_makes_no_sense_is_refused(labels: DriveLabels, body: dict[str, Any]) -> None:

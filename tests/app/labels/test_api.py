@@ -28,7 +28,8 @@ def test_the_pipelines_opinion_is_proposed_accepted_and_scored(engine: Engine, c
     score = client.get("/api/labels/score").json()
     assert (score["judged"], score["metrics"]) == (0, [])
     items = [ref(track), {"kind": "lead", "id": lead["id"], "revision": lead["revision"]}]
-    assert act(client, kind="accept", items=items).json()["what"] == f"accepted #{track['id']}, lead {lead['id']}"
+    said = f"accepted #{track['id']}, lead #{track['id']} of frames 1–30"
+    assert act(client, kind="accept", items=items).json()["what"] == said
     score = ScoreJson.model_validate(client.get("/api/labels/score").json())
     named = {metric.name: metric.run for metric in score.metrics}
     assert score.judged == COUNT - lead["first"]
@@ -81,7 +82,7 @@ def test_one_undo_goes_across_labels_parameters_and_calibration(engine: Engine, 
     for _ in range(4):
         undone.append(move(client, "undo", "Ada").json()["what"])
     assert undone == [
-        "tagged frame 4 rain", "alignment.yaw_deg 0 → 0.5", "cipv.confirm_hits 3 → 5", "tagged frame 3 night",
+        "tagged frame 5 rain", "alignment.yaw_deg 0 → 0.5", "cipv.confirm_hits 3 → 5", "tagged frame 4 night",
     ]  # fmt: skip
     assert engine.control.peek().params == Params()
     assert labels(client, person="Ada")["can_redo"]
@@ -107,16 +108,26 @@ def test_the_cuboid_is_laid_on_the_points_and_a_car_lifted_out_of_the_picture(
     lifted = act(client, kind="lift", frame=10, pixel=[160, 92], label="car").json()
     assert lifted["note"].startswith("laid on the")
     (track,) = labels(client)["tracks"]
+    assert (track["state"], track["origin"]["how"]) == ("proposed", lifted["note"]), "nobody has said that it is so"
+    (past,) = client.get("/api/labels/history", params={"kind": "track", "id": track["id"]}).json()
+    assert (past["what"], past["note"]) == (f"proposed #{track['id']}, a car, in frame 11", lifted["note"])
     (placed,) = client.get(f"/api/labels/tracks/{track['id']}").json()["sightings"]
     assert placed["cuboid"]["center"][0] - placed["cuboid"]["size"][0] / 2 == pytest.approx(26.0, abs=0.1)
     off = placed["cuboid"] | {"center": [placed["cuboid"]["center"][0] + 0.4, 0.3, 0.5]}
     moved = act(
         client, kind="set_sighting", track=track["id"], revision=track["revision"], frame=10, cuboid=off
     ).json()["changed"]["tracks"][0]
+    assert labels(client)["tracks"][0]["origin"]["how"] == "", "it is where a person put it now"
     fitted = act(client, kind="refit", track=track["id"], revision=moved["revision"], frame=10).json()
     assert "points" in fitted["note"]
     near = client.get("/api/labels/frames?first=10&last=10").json()["sightings"]["10"][0]["cuboid"]
     assert near["center"][0] - near["size"][0] / 2 == pytest.approx(26.0, abs=0.1)
+    far = act(client, kind="lift", frame=10, bbox=[20, 85, 40, 97], label="car").json()
+    estimated = next(each for each in labels(client)["tracks"] if each["id"] != track["id"])
+    assert "by its height in the picture" in estimated["origin"]["how"] == far["note"]
+    act(client, kind="accept", items=[ref(estimated)])
+    (accepted,) = (each for each in labels(client)["tracks"] if each["id"] == estimated["id"])
+    assert (accepted["state"], accepted["origin"]["how"]) == ("accepted", far["note"]), "still an estimate"
     nothing = act(client, kind="lift", frame=10, pixel=[3, 3])
     assert (nothing.status_code, "draw a box" in nothing.json()["detail"]) == (409, True)
 

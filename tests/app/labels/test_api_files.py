@@ -31,11 +31,14 @@ def test_truth_is_imported_and_points_out_where_the_pipeline_says_otherwise(
     assert client.get("/api/labels/next", params={"what": "proposed", "frame": 5}).json() == {
         "frame": None,
         "why": "no proposal is waiting there",
+        "item": None,
+        "left": 0,
     }
     track = labels(client)["tracks"][0]
     act(client, "Bob", kind="send_back", items=[ref(track)], comment="too low")
     back = client.get("/api/labels/next", params={"what": "sent_back", "frame": 5, "direction": -1}).json()
-    assert back == {"frame": 0, "why": f"#{track['id']}: too low"}
+    item = {"kind": "track", "id": track["id"]}
+    assert back == {"frame": 0, "why": f"#{track['id']}: too low", "item": item, "left": 1}
 
 
 def test_what_is_there_already_is_not_imported_twice(engine: Engine, client: httpx.Client) -> None:

@@ -13,7 +13,7 @@ import pytest
 from app.engine import Engine
 from app.labels.database import Database, DatabaseError
 from app.labels.log import Log
-from tests.app.labels.site import act, labels, move, proposed, team
+from tests.app.labels.site import CUBOID, act, labels, move, proposed, team
 from tests.app.serving import WAIT_S
 
 
@@ -124,7 +124,7 @@ def test_after_a_restart_everything_is_there_and_can_be_undone(tmp_path: Any) ->
         assert len(labels(client)["tags"]) == 1
         assert labels(client, person="Ada")["can_undo"]
         undone = [move(client, "undo", "Ada").json()["what"] for _ in range(2)]
-        assert undone == ["cipv.confirm_hits 3 → 5", "tagged frame 3 night"]
+        assert undone == ["cipv.confirm_hits 3 → 5", "tagged frame 4 night"]
         assert move(client, "undo", "Ada").status_code == 409
         assert labels(client)["tags"] == []
 
@@ -148,3 +148,39 @@ def test_a_database_that_fails_keeps_nobody_from_driving(
         assert client.get("/api/compare").status_code == 200
     client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 3}})
     assert act(client, kind="tag", frame=1, tag="x").status_code == 200
+
+
+def test_what_others_stand_behind_is_reviewed_one_by_one(client: httpx.Client) -> None:
+    def following(person: str, frame: int = -1, **after: Any) -> tuple[int | None, Any, int]:
+        query = {"what": "unreviewed", "frame": frame, "person": person, **after}
+        found = client.get("/api/labels/next", params=query).json()
+        return found["frame"], found["item"], found["left"]
+
+    made = act(client, kind="add_track", label="car", frame=4, cuboid=CUBOID, bbox=None).json()
+    (track,) = made["changed"]["tracks"]
+    act(client, kind="set_lead", first=4, last=9, lead=track["id"])
+    act(client, kind="add_event", frame=9, event="cut_in", tracks=[track["id"]])
+    held = labels(client)
+    car, lead, event = (
+        {"kind": kind, "id": held[f"{kind}s"][0]["id"], "revision": held[f"{kind}s"][0]["revision"]}
+        for kind in ("track", "lead", "event")
+    )
+
+    def key(item: dict[str, Any]) -> dict[str, Any]:
+        return {"kind": item["kind"], "id": item["id"]}
+
+    assert following("Ada") == (None, None, 0), "one's own work is for another"
+    assert following("Bob") == (4, key(car), 3)
+    after = {"after_kind": "track", "after_id": car["id"]}
+    assert following("Bob", 4, **after) == (4, key(lead), 3), "the other label of that frame comes first"
+    assert following("Bob", 4) == (9, key(event), 3)
+    assert act(client, "Bob", kind="review_ok", items=[car, event]).is_success
+    assert labels(client)["events"][0]["reviewer"] == "Bob"
+    assert following("Bob") == (4, key(lead), 1)
+    act(client, "Bob", kind="send_back", items=[lead], comment="it is another")
+    assert following("Bob") == (None, None, 0)
+    back = client.get("/api/labels/next", params={"what": "sent_back", "frame": 0}).json()
+    assert (back["frame"], back["why"]) == (4, f"the lead #{track['id']}: it is another")
+    assert following("Cy") == (None, None, 0), "what was reviewed once is reviewed"
+    act(client, kind="relabel", track=track["id"], revision=labels(client)["tracks"][0]["revision"], label="truck")
+    assert following("Cy") == (4, key(car), 1), "and when it is changed, to be reviewed again"

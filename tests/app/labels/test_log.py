@@ -68,7 +68,7 @@ def test_an_act_is_one_row_and_what_it_changed(labels: DriveLabels) -> None:
     assert (entry.act, entry.person, entry.what, entry.before, entry.undone) == (
         1,
         "Ada",
-        "added #1, a car, in frame 10",
+        "added #1, a car, in frame 11",
         None,
         False,
     )
@@ -152,7 +152,7 @@ def test_something_else_ends_what_could_be_redone(labels: DriveLabels) -> None:
 
 def test_each_takes_back_only_their_own(labels: DriveLabels) -> None:
     ada, bob = add(labels, "Ada"), add(labels, "Bob")
-    assert labels.log.move("undo", "Ada").what == f"added #{ada}, a car, in frame 10"
+    assert labels.log.move("undo", "Ada").what == f"added #{ada}, a car, in frame 11"
     assert set(labels.items("track")) == {bob}
     with pytest.raises(ActRefused, match="nothing to undo"):
         labels.log.move("undo", "Ada")
@@ -182,11 +182,11 @@ CLEARED = {"kind": "clear_lead", "first": 0, "last": 10}
     ("steps", "says"),
     [
         ([("Ada", LEAD), ("Ada", CLEARED), ("Bob", LEAD | {"first": 5, "last": 15}), ("Ada", "undo")],
-         "frames 5–10 would have two leads: Bob made lead 2 there"),
+         "frames 6–11 would have two leads: Bob made lead 2 there"),
         ([("Ada", LINE), ("Ada", "undo"), ("Bob", LINE), ("Ada", "redo")],
-         "frame 3 would have two paths: Bob made path 2 there"),
+         "frame 4 would have two paths: Bob made path 2 there"),
         ([("Ada", TAG), ("Ada", "undo"), ("Bob", TAG), ("Ada", "redo")],
-         "frame 3 would have two tags: Bob made tag 2 there"),
+         "frame 4 would have two tags: Bob made tag 2 there"),
         ([("Ada", CAR), ("Bob", LEAD | {"lead": 1}), ("Ada", "undo")], "lead 1 names #1, which would not be there"),
         ([("Ada", CAR), ("Bob", EVENT), ("Ada", "undo")], "event 1 names #1, which would not be there"),
         ([("Ada", CAR), ("Bob", LEAD | {"lead": 1}), ("Bob", "undo"), ("Ada", "undo"), ("Bob", "redo")],

@@ -61,6 +61,7 @@ ORIGINS = st.builds(
     st.integers(0, 2**45),
     st.none() | st.text("abcdef0123456789", min_size=1, max_size=8),
     st.none() | st.text("abcdef0123456789", min_size=1, max_size=8),
+    TEXTS,
 )
 FRAMES = st.integers(0, COUNT - 1)
 LINES = st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=4).map(tuple)
@@ -81,7 +82,9 @@ def label_sets(draw: st.DrawFn) -> LabelSet:
             Sighting(i, draw(st.none() | CUBOIDS), draw(st.none() | BOXES), draw(st.booleans())) for i in frames
         )
         tracks.append(
-            LabelTrack(number, draw(st.sampled_from(CLASSES)), seen, draw(STATES), draw(ORIGINS), draw(TEXTS))
+            LabelTrack(
+                number, draw(st.sampled_from(CLASSES)), seen, draw(STATES), draw(ORIGINS), draw(TEXTS), draw(TEXTS)
+            )
         )
     here = drive()
     return LabelSet(
@@ -90,8 +93,16 @@ def label_sets(draw: st.DrawFn) -> LabelSet:
         here.t_ns,
         tuple(tracks),
         draw(leads(ids)),
-        draw(several(st.builds(PathLabel, FRAMES, st.none() | LINES, st.none() | LINES, STATES, ORIGINS))),
-        draw(several(st.builds(EventLabel, FRAMES, TEXTS, several(st.sampled_from(ids or [7])), STATES, ORIGINS))),
+        draw(
+            several(st.builds(PathLabel, FRAMES, st.none() | LINES, st.none() | LINES, STATES, ORIGINS, TEXTS, TEXTS))
+        ),
+        draw(
+            several(
+                st.builds(
+                    EventLabel, FRAMES, TEXTS, several(st.sampled_from(ids or [7])), STATES, ORIGINS, TEXTS, TEXTS
+                )
+            )
+        ),
         draw(several(st.builds(FrameTag, FRAMES, TEXTS, ORIGINS))),
         draw(TEXTS),
     )
@@ -105,7 +116,7 @@ def leads(draw: st.DrawFn, ids: list[int]) -> tuple[LeadRange, ...]:
     for first, end in pairwise(cuts):
         if draw(st.booleans()):
             who = draw(st.sampled_from([*ids, "none", "unknown"]))
-            found.append(LeadRange(first, end - 1, who, draw(STATES), draw(ORIGINS)))
+            found.append(LeadRange(first, end - 1, who, draw(STATES), draw(ORIGINS), draw(TEXTS), draw(TEXTS)))
     return tuple(found)
 
 

@@ -100,8 +100,8 @@ def test_csv_of_the_lead(tmp_path: Path) -> None:
     export_labels(labels, here, "csv", tmp_path / "lead.csv")
     lines = (tmp_path / "lead.csv").read_text().splitlines()
     assert lines[0].startswith("frame,name,t_ns,lead,state,maker,by,")
-    assert lines[1] == "0,000000,1000000000,,,,,,,,,,,", "nobody has said"
-    assert lines[2] == '1,000001,1100000000,3,accepted,person,"Ada, B.",5,,,car,18.000,20.000,0.000'
+    assert lines[1] == "0,000000,1000000000,,,,,,,,,,,,,,", "nobody has said"
+    assert lines[2] == '1,000001,1100000000,3,accepted,person,"Ada, B.",5,,,,,,car,18.000,20.000,0.000'
     assert lines[4].startswith("3,000003,1300000000,unknown,proposed,")
     assert len(lines) == 7
 

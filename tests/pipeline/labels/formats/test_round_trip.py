@@ -90,13 +90,13 @@ def full_set() -> LabelSet:
     tracks = (
         LabelTrack(3, "car", (seen, replace(seen, frame=1, keyframe=False)), "proposed", by, "look again"),
         LabelTrack(4, "car", (replace(seen, frame=2, cuboid=None),), "rejected", by),
-        LabelTrack(5, "bus", (replace(seen, frame=2, bbox=None),), "corrected", by),
+        LabelTrack(5, "bus", (replace(seen, frame=2, bbox=None),), "corrected", by, reviewer="Bob"),
         LabelTrack(6, "bus", (), "accepted", by),
     )
     return replace(
         drive().empty(),
         tracks=tracks,
-        leads=(LeadRange(0, 1, 3, "accepted", by), LeadRange(2, 3, "none", "rejected", by)),
+        leads=(LeadRange(0, 1, 3, "accepted", by, "not yet", "Bob"), LeadRange(2, 3, "none", "rejected", by)),
         paths=(PathLabel(0, ((0.0, 1.0),), None, "accepted", by),),
         events=(EventLabel(1, "cut_in", (3,), "accepted", by),),
         tags=(FrameTag(0, "rain", by),),
@@ -108,7 +108,7 @@ LOSSES: dict[FormatName, tuple[str, ...]] = {
     "native": (),
     "openlabel": (),
     "kitti": (
-        "2 ranges of the lead", "1 frame of the ego path", "1 event", "1 frame tag", "1 comment",
+        "2 ranges of the lead", "1 frame of the ego path", "1 event", "1 frame tag", "2 comments", "2 reviews",
         "1 track lose their identity", "1 interpolated place", "2 labels left out: rejected",
         "1 label written as if true", "1 corrected label", "who made each label", "'frozen'", "tracks' numbers",
         "1 track without sightings", "1 objects have no box", "cut or hidden", "3 frames have no file",

@@ -1,0 +1,20 @@
+"""What people read of labels. Frames are counted from 1, as the page and its timeline show them; numbers in requests,
+answers and files count from 0."""
+
+from __future__ import annotations
+
+from pipeline.labels.model import Lead
+
+
+def frames_text(first: int, last: int | None = None) -> str:
+    """``frame 28``, or ``frames 28–39``. first, last: indices, both included."""
+    return f"frame {first + 1}" if last is None or first == last else f"frames {first + 1}–{last + 1}"
+
+
+def outside_text(first: int, last: int, count: int) -> str:
+    """Why frames are refused that a recording of ``count`` does not have."""
+    return f"{frames_text(first, last)}: the recording has {count}"
+
+
+def lead_text(lead: Lead) -> str:
+    return f"#{lead}" if isinstance(lead, int) else {"none": "none", "unknown": "can't tell"}[lead]
