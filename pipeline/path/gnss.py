@@ -1,7 +1,8 @@
 """The path that a route gives: the car is placed on it by GNSS, and the route ahead is drawn in the ego frame.
 
 Its sigma at s ahead adds up the route's own, the fix's (which no averaging lowers, since it lasts for minutes), what
-dead reckoning has added since, the heading's times s, and the doubt that a jump has left.
+dead reckoning has added since, the heading's times s, and the doubt that a jump has left. In doubt the route tells how
+the road bends, and no more in which lane the car is.
 """
 
 from __future__ import annotations
@@ -18,9 +19,14 @@ from pipeline.path.estimates import UNKNOWN_SIGMA_M, PathEstimate, samples
 from pipeline.path.pose import Pose
 from pipeline.path.route_line import SPACING_M, RouteLine, lay_out, to_grid
 from pipeline.path.yaw_rate import usable_rate
+from pipeline.records import evolve
 from pipeline.types import EgoState, GnssFix, Route
 
 _DOUBT_FADES_S = 3.0
+_ANEW_DOUBT_FADES_S = 60.0
+"""After a jump that stayed: what moves a receiver by metres for good, a reflection or another correction service, lasts
+for minutes, and nothing tells yet whether the old place was wrong or the new one is."""
+_SMALLEST_DOUBT_M = 0.3
 _OLDEST_FIX_S = 1.0
 _LOST_SIGMA_M = 15.0
 """A pose less sure than this places nothing on a route."""
@@ -31,8 +37,9 @@ _SEARCH_M = 60.0
 @dataclass(frozen=True, eq=False)
 class GnssState:
     """line: the route laid out. pose: of the car; null before the first fix with a course. fix_t_ns: of the last fix
-    looked at. fix_sigma_m: of the last one believed. doubt_m: size of the last jump, fading. refused_s: for how long
-    every fix has been refused. at_m: place along the route; null while not on it."""
+    looked at. fix_sigma_m: of the last one believed. doubt_m: what the last jump left, fading. refused_s: for how long
+    every fix has been refused. at_m: place along the route; null while not on it. placed_anew: after a jump that
+    stayed, until the doubt has faded."""
 
     line: RouteLine | None = None
     pose: Pose | None = None
@@ -41,6 +48,7 @@ class GnssState:
     doubt_m: float = 0.0
     refused_s: float = 0.0
     at_m: float | None = None
+    placed_anew: bool = False
 
 
 def follow(
@@ -63,6 +71,8 @@ def follow(
         state = GnssState(line=line)
     state = _dead_reckoned(state, ego, dt_s or 0.0)
     state, notes = _with_fix(state, line, fix, ego, t_ns, dt_s or 0.0, params)
+    if state.placed_anew:
+        notes = (f"GNSS placed anew after a jump, doubted by {state.doubt_m:.1f} m: the lane is not known from it",)
     return state, notes
 
 
@@ -73,8 +83,9 @@ def _dead_reckoned(state: GnssState, ego: EgoState | None, dt_s: float) -> GnssS
     pose = None
     if ego is not None and isfinite(ego.speed_mps):
         pose = poses.predict(state.pose, ego.speed_mps, usable_rate(ego), dt_s, ego.coasting)
-    doubt_m = state.doubt_m * exp(-dt_s / _DOUBT_FADES_S)
-    return GnssState(state.line, pose, state.fix_t_ns, state.fix_sigma_m, doubt_m, state.refused_s, state.at_m)
+    doubt_m = state.doubt_m * exp(-dt_s / (_ANEW_DOUBT_FADES_S if state.placed_anew else _DOUBT_FADES_S))
+    placed_anew = state.placed_anew and doubt_m > _SMALLEST_DOUBT_M
+    return evolve(state, pose=pose, doubt_m=doubt_m, placed_anew=placed_anew)
 
 
 def _with_fix(
@@ -101,7 +112,7 @@ def _with_fix(
         if heading is None:
             return state, ()
         pose = poses.start(*_moved_on(x, y, heading, fix.speed_mps, age_s), heading, scatter_m)
-        return GnssState(line, pose, fix.t_ns, fix.sigma_m, state.doubt_m), ()
+        return evolve(state, pose=pose, fix_t_ns=fix.t_ns, fix_sigma_m=fix.sigma_m, refused_s=0.0, at_m=None), ()
     speed_mps = ego.speed_mps if ego is not None and ego.coasting is None else fix.speed_mps
     x, y = _moved_on(x, y, float(state.pose.mean[2]), speed_mps, age_s)
     jump = poses.jump_m(state.pose, x, y, scatter_m, params.gnss_gate_sigmas)
@@ -110,21 +121,27 @@ def _with_fix(
     pose = poses.with_fix(state.pose, x, y, scatter_m)
     if heading is not None:
         pose = poses.with_course(pose, heading, fix.speed_mps)
-    return GnssState(line, pose, fix.t_ns, fix.sigma_m, state.doubt_m, 0.0, state.at_m), ()
+    return evolve(state, pose=pose, fix_t_ns=fix.t_ns, fix_sigma_m=fix.sigma_m, refused_s=0.0), ()
 
 
 def _refused(
     state: GnssState, fix: GnssFix, jump_m: float, x: float, y: float, dt_s: float, params: PathParams
 ) -> tuple[GnssState, tuple[str, ...]]:
     """A jump does not move the pose, it makes it doubtful. When every fix has been refused for a while it is the pose
-    that is wrong: it starts anew where the fixes are, and the doubt fades from there."""
+    that is wrong, or the receiver for long: it starts anew where the fixes are, and the doubt stays."""
     assert state.pose is not None
     refused_s, pose = state.refused_s + dt_s, state.pose
-    if refused_s >= params.gnss_restart_s:
+    stayed = refused_s >= params.gnss_restart_s
+    if stayed:
         pose = poses.start(x, y, float(pose.mean[2]), poses.white_sigma_m(fix.sigma_m))
-        refused_s = 0.0
-    doubt_m = max(state.doubt_m, jump_m)
-    kept = GnssState(state.line, pose, fix.t_ns, state.fix_sigma_m, doubt_m, refused_s, state.at_m)
+    kept = evolve(
+        state,
+        pose=pose,
+        fix_t_ns=fix.t_ns,
+        doubt_m=max(state.doubt_m, jump_m),
+        refused_s=0.0 if stayed else refused_s,
+        placed_anew=state.placed_anew or stayed,
+    )
     return kept, (f"GNSS jumped by {jump_m:.1f} m: not believed",)
 
 
@@ -147,14 +164,28 @@ def ahead(state: GnssState, params: PathParams) -> tuple[GnssState, PathEstimate
     away = np.column_stack([np.interp(at_m + s, steps, line.places[:, k]) for k in (0, 1)]) - (x, y)
     c, sn = np.cos(heading), np.sin(heading)
     center = np.column_stack([away[:, 0] * c + away[:, 1] * sn, away[:, 1] * c - away[:, 0] * sn])
+    turned = np.interp(at_m + s, steps, line.headings) - np.interp(at_m, steps, line.headings)
+    aside, doubt_var = _doubted(center[0, 1], turned, state.doubt_m, params)
+    center[:, 1] -= aside
     heading_var = float(state.pose.cov[2, 2])
-    sigma = np.sqrt(side_var + line.route.sigma_m**2 + state.doubt_m**2 + heading_var * s * s)
+    sigma = np.sqrt(side_var + line.route.sigma_m**2 + doubt_var + heading_var * s * s)
     sigma = np.where(at_m + s <= steps[-1], sigma, UNKNOWN_SIGMA_M)
     return _at(state, at_m), PathEstimate("gnss", _beyond_the_end(center, s, steps[-1] - at_m), sigma), ()
 
 
+def _doubted(aside_m: float, turned: F64, doubt_m: float, params: PathParams) -> tuple[float, F64]:
+    """By how much to move a route that lies ``aside_m`` of the car to the right, and the variance that doubt adds.
+
+    Who doubts the place still knows how the road bends. Sideways the place is weighed against that cars keep near the
+    middle of their lane: in full doubt the route leads through the car. Along the road nothing helps: where the route
+    has ``turned``, (N,) radians, from the car's place, being elsewhere along it is being aside."""
+    keeping_var = params.lane_keeping_sigma_m**2
+    believed = keeping_var / (keeping_var + doubt_m**2)
+    return (1.0 - believed) * aside_m, believed * doubt_m**2 + (doubt_m * np.sin(turned)) ** 2
+
+
 def _at(state: GnssState, at_m: float | None) -> GnssState:
-    return GnssState(state.line, state.pose, state.fix_t_ns, state.fix_sigma_m, state.doubt_m, state.refused_s, at_m)
+    return evolve(state, at_m=at_m)
 
 
 def _match(line: RouteLine, pose: Pose, last_m: float | None, reach_m: float) -> float | None:

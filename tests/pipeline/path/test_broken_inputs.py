@@ -22,7 +22,6 @@ from pipeline.records import evolve
 from pipeline.step import State, step, warm_up
 from pipeline.types import CameraCalibration, Frame, Result
 
-LAYOUT = bends.LAYOUTS["r250"]
 BREAKS_S, ENDS_S = 4.0, 7.0
 """In the bend from 3 s on."""
 PARAMS = Params()
@@ -30,16 +29,18 @@ Break = Callable[[Frame], Frame]
 
 
 @cache
-def drive() -> list[Moment]:
+def drive(layout: str = "r250", ends_s: float = ENDS_S) -> list[Moment]:
     warm_up()
-    scene = bends.scenario(LAYOUT, 0)
-    return list(takewhile(lambda moment: moment.now.t_s < ENDS_S, moments(scene, seen(scene), LAYOUT.reach_m)))
+    scene, reach_m = bends.scenario(bends.LAYOUTS[layout], 0), bends.LAYOUTS[layout].reach_m
+    return list(takewhile(lambda moment: moment.now.t_s < ends_s, moments(scene, seen(scene), reach_m)))
 
 
-def driven(broken: Break, from_start: bool = False) -> tuple[list[Result], list[str]]:
+def driven(
+    broken: Break, from_start: bool = False, moments: Callable[[], list[Moment]] = drive
+) -> tuple[list[Result], list[str]]:
     """The results from the break on, and what was chosen in each: right, missed, decoy, …"""
     state, results, verdicts = State(), [], []
-    for moment in drive():
+    for moment in moments():
         after = moment.now.t_s >= BREAKS_S
         state, result = step(state, broken(moment.frame) if after or from_start else moment.frame, PARAMS)
         if after:
@@ -169,6 +170,16 @@ def test_a_jump_is_said_and_moves_nothing() -> None:
     first = results[: int(PARAMS.path.gnss_restart_s * 10) - 2]
     for ours, theirs in zip(first, whole, strict=False):
         assert np.abs(ours.path.center - theirs.path.center)[:40].max() < 0.6
+
+
+@pytest.mark.parametrize("layout", ["straight", "r250", "r500"])
+def test_a_jump_that_stays_misleads_nobody(layout: str) -> None:
+    """Long after the fixes are believed again, without a line on the road, and beyond the end of the bend: the route is
+    followed in how it bends, not in where it lies, and the lead is right in every frame."""
+    results, verdicts = driven(lambda frame: no_lines(jumped(frame)), moments=lambda: drive(layout, 11.5))
+    assert set(verdicts) == {"right"}
+    assert results[-1].path.notes[-1].startswith("GNSS placed anew after a jump, doubted by 4.")
+    assert largest_step_m(results) < 0.6
 
 
 def test_a_broken_yaw_rate_is_said() -> None:

@@ -115,17 +115,35 @@ def test_a_jump_lowers_confidence_and_does_not_move_the_path() -> None:
     assert after is not None
     assert said == ["GNSS jumped by 5.0 m: not believed"]
     assert np.abs(after.center - before.center)[:60].max() < 0.2
-    assert np.all(after.sigma_m > 4.9)
+    assert np.all(after.sigma_m > 0.99 * PARAMS.lane_keeping_sigma_m), "no surer of the lane than any car is"
+    assert np.all(after.sigma_m > before.sigma_m + 0.1)
+    # the bend begins 60 m ahead, or somewhere within 5 m of there
+    assert after.sigma_m[100] ** 2 - before.sigma_m[100] ** 2 > (4.9 * math.sin(40.0 / 500.0)) ** 2
 
 
-def test_a_jump_that_stays_is_believed_in_the_end() -> None:
-    """Two seconds of fixes 5 m aside: the pose was wrong, or the receiver is; the doubt stays for a while."""
-    fixes = [*north_bound(20), *[fix(0.1 * k, 2.0 * k, 5.0) for k in range(20, 60)]]
-    state, path, said = drive(fixes, bend(8000.0))
-    assert 15 < len(said) < 25
+def test_a_jump_that_stays_is_doubted_for_long() -> None:
+    """Two seconds of fixes 5 m to the right: the pose was wrong, or the receiver is. The route goes on telling how the
+    road bends; that it lies 5 m to the left is believed no more than that the car keeps its lane."""
+    fixes = [*north_bound(20), *[fix(0.1 * k, 2.0 * k, 5.0) for k in range(20, 45)]]
+    state, path, said = drive(fixes, bend(250.0))
+    _, straight_on, _ = drive(north_bound(45), bend(250.0))
     assert path is not None
-    assert path.center[0, 1] == pytest.approx(5.0, abs=0.3)
-    assert 0.5 < state.doubt_m < 5.0
+    assert straight_on is not None
+    assert np.abs(path.center - straight_on.center)[:60].max() < 0.3
+    assert PARAMS.lane_keeping_sigma_m * 0.99 < path.sigma_m[0] < 1.0
+    assert state.placed_anew
+    assert 4.0 < state.doubt_m < 5.0
+    assert sum(each == "GNSS jumped by 5.0 m: not believed" for each in said) == 19
+    assert said[-1] == "GNSS placed anew after a jump, doubted by 5.0 m: the lane is not known from it"
+
+
+def test_the_doubt_of_a_jump_ends() -> None:
+    fixes = [*north_bound(20), *[fix(0.1 * k, 2.0 * k, 5.0) for k in range(20, 2000)]]
+    state, path, said = drive(fixes, bend(1e9, 4100.0))
+    assert not state.placed_anew
+    assert said[-1].startswith("GNSS placed anew after a jump, doubted by 0.3 m")
+    assert path is not None
+    assert path.center[0, 1] > 3.5, "the place counts again"
 
 
 @pytest.mark.parametrize(
