@@ -260,7 +260,7 @@ def test_at_night_there_is_no_wrong_lane(data_dir: Path, light: float) -> None:
     for kind in KINDS:
         lane, _ = alone(detector(data_dir, kind).detect(dark), dark.shape[1], dark.shape[0])
         assert lane is not None
-        assert lane.left is None or lane.right is None or lane.width_m == pytest.approx(4.2, abs=0.3)
+        assert lane.left is None or lane.right is None
 
 
 class _Part:

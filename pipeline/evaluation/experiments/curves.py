@@ -80,9 +80,10 @@ def told_before_line_s(drive: Frames) -> float | None:
     """By how many seconds before its wheel was over the line the car that cuts in was told and stayed so; negative:
     after it. Null: never."""
     assert drive.over_line_s is not None
-    late = [t for t, told in zip(drive.t_s, drive.told, strict=True) if not told]
-    first = max((t for t in late if t < drive.t_s[-1]), default=0.0)
-    return drive.over_line_s - first if drive.told[-1] else None
+    if not drive.told[-1]:
+        return None
+    since = max((k + 1 for k, told in enumerate(drive.told) if not told), default=0)
+    return drive.over_line_s - drive.t_s[since]
 
 
 def report(cases: Sequence[Case], outcomes: Sequence[Outcome]) -> Section:
@@ -109,7 +110,10 @@ def report(cases: Sequence[Case], outcomes: Sequence[Outcome]) -> Section:
                 "Told: it is the CIPV or said to be the next. All sources fused.",
             ),
         ),
-        failures=tuple(_verdict(name, drives) for name, drives in follows.items() if not _held(name, drives["fused"])),
+        failures=(
+            *(_verdict(name, drives) for name, drives in follows.items() if not _held(name, drives["fused"])),
+            *_told_too_late(cut_ins),
+        ),
     )
 
 
@@ -164,6 +168,15 @@ def _cut_in_rows(cut_ins: dict[str, dict[str, list[Frames]]]) -> Iterator[tuple[
         known = [value for value in before if value is not None]
         least = min(known) if len(known) == len(before) else None
         yield bends.LAYOUTS[layout].title, len(before), least, sum(known) / len(known) if known else None
+
+
+def _told_too_late(cut_ins: dict[str, dict[str, list[Frames]]]) -> Iterator[str]:
+    """A cut-in must be told at the latest when the wheel is over the line."""
+    for layout, by_source in cut_ins.items():
+        before = [told_before_line_s(drive) for drive in by_source["fused"]]
+        late = sum(value is None or value < 0.0 for value in before)
+        if late:
+            yield f"{bends.LAYOUTS[layout].title}: {late} of {len(before)} cut-ins told after the wheel was over the line."
 
 
 def _held(layout: str, fused: list[Frames]) -> bool:

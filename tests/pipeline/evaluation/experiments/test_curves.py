@@ -34,8 +34,19 @@ def test_the_longest_time_on_a_decoy() -> None:
 
 def test_told_before_the_wheel_is_over_the_line() -> None:
     told = (False, True, False, True, True, True)
-    assert told_before_line_s(drive(*["right"] * 6, told=told, over_line_s=0.45)) == pytest.approx(0.25)
+    assert told_before_line_s(drive(*["right"] * 6, told=told, over_line_s=0.45)) == pytest.approx(0.15)
     assert told_before_line_s(drive(*["right"] * 6, told=(True,) * 5 + (False,), over_line_s=0.45)) is None
+
+
+@pytest.mark.parametrize(
+    ("told", "fails"),
+    [((False, True, True, True), False), ((False, False, False, True), True), ((False,) * 4, True)],
+    ids=["before", "after", "never"],
+)
+def test_a_cut_in_that_is_told_too_late_is_a_demand_that_fails(told: tuple[bool, ...], fails: bool) -> None:
+    case = Case("cut_in", "straight", 0)
+    cut_in = {"fused": drive(*["right"] * 4, told=told, over_line_s=0.2)}
+    assert bool(curves.report([case], [cut_in]).failures) is fails
 
 
 @pytest.mark.parametrize("layout", bends.LAYOUTS.values(), ids=lambda layout: layout.name)
