@@ -176,7 +176,8 @@ def _told_too_late(cut_ins: dict[str, dict[str, list[Frames]]]) -> Iterator[str]
         before = [told_before_line_s(drive) for drive in by_source["fused"]]
         late = sum(value is None or value < 0.0 for value in before)
         if late:
-            yield f"{bends.LAYOUTS[layout].title}: {late} of {len(before)} cut-ins told after the wheel was over the line."
+            title = bends.LAYOUTS[layout].title
+            yield f"{title}: {late} of {len(before)} cut-ins told after the wheel was over the line."
 
 
 def _held(layout: str, fused: list[Frames]) -> bool:
