@@ -1,75 +1,55 @@
-"""How well LiDAR and pictures lie on each other: do jumps in depth fall on edges of the picture?
+"""Where the LiDAR sees something end, and how strongly the picture changes there.
 
 Where a car ends and the road behind it begins, both sensors see a border (Levinson and Thrun 2013, "Automatic Online
-Calibration of Cameras and Lasers"). A busy picture has edges everywhere, so the share of depth edges that lie on one is
-set against the share that points placed at random in the same rows would have.
+Calibration of Cameras and Lasers"). As there, edges of the picture are spread with an inverse distance transform, so
+that a border a little off still meets some of one. Unlike there, only changes from left to right count, since a border
+along a ring is an upright one, and each is taken relative to how busy the picture is around it: a fence or a tree is no
+better a match than the side of a car.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from pipeline.alignment import Alignment
-from pipeline.types import F64, U8, Sweep
+from pipeline.types import F32, F64, U8, Sweep
 
 JUMP_M, JUMP_SHARE = 0.5, 0.05
 """A neighbour on the ring that is this much farther, and by this share of the range, is behind a border."""
 NEAREST_M, FARTHEST_M = 2.0, 50.0
 WIDEST_STEP_RAD = np.radians(1.0)
 """Neighbours farther apart than this have returns that were lost between them, as against the sky: both are borders."""
-NEAR_WIDTHS = 0.003
-"""An edge this near, in picture widths, is met: 4 px at 1280."""
-FEWEST = 30
-
-
-@dataclass(frozen=True)
-class EdgeScore:
-    """score: 1 when every depth edge lies on one of the picture, 0 when no more than by chance (below it is 0 too).
-    median_px: from a depth edge to the nearest edge of the picture. pairs: depth edges in the picture. Null where there
-    are too few to say."""
-
-    score: float | None
-    median_px: float | None
-    pairs: int
+SPREAD_WIDTHS = 0.0035
+"""An edge is felt this far to its sides, in picture widths, with 1/e of its strength: 4 px at 1280."""
+AROUND_WIDTHS = 0.05
+"""How far around an edge the picture's busyness is taken from, in picture widths."""
+FLAT = 20.0
+"""A change of brightness (Sobel) no stronger than this is noise of the camera."""
+STRONGEST = 4.0
+"""Times as strong as its surroundings an edge can count."""
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeScene:
-    """What of one frame no alignment changes. points: (E, 3) depth edges. away_px: (H, W) uint8 to the nearest edge of
-    the picture, 255 for more."""
+    """What of one frame no alignment changes. points: (E, 3) depth edges, ego. strength: (H, W) uint8, how near and how
+    strong an upright edge of the picture is. usual: (H,) the mean strength of each row."""
 
     points: F64
-    away_px: U8
+    strength: U8
+    usual: F32
 
 
 def edge_scene(sweep: Sweep, bgr: U8) -> EdgeScene:
-    """bgr: (H, W, 3) uint8. Some 40 ms; scoring it afterwards is far below one."""
-    return EdgeScene(depth_edges(sweep), edge_distances(bgr))
+    """bgr: (H, W, 3) uint8. Some 40 ms."""
+    return scene_of(depth_edges(sweep), bgr)
 
 
-def edge_score(scenes: Iterable[tuple[EdgeScene, Alignment]]) -> EdgeScore:
-    """The score over several frames, each under its alignment: a single sweep of 16 rings has few borders."""
-    met: list[F64] = []
-    by_chance: list[F64] = []
-    for scene, aligned in scenes:
-        height, width = scene.away_px.shape
-        pixels = aligned.project(scene.points)
-        with np.errstate(invalid="ignore"):
-            seen = np.all((pixels >= 0) & (pixels < [width, height]), axis=1)
-        u, v = pixels[seen].astype(np.intp).T
-        near_px = NEAR_WIDTHS * width
-        met.append(np.column_stack([scene.away_px[v, u], np.full(len(u), near_px)]))
-        by_chance.append((scene.away_px[v] <= near_px).mean(axis=1))
-    distances = np.concatenate(met) if met else np.zeros((0, 2))
-    if len(distances) < FEWEST:
-        return EdgeScore(None, None, len(distances))
-    share, chance = float(np.mean(distances[:, 0] <= distances[:, 1])), float(np.mean(np.concatenate(by_chance)))
-    score = max(0.0, (share - chance) / max(1.0 - chance, 1e-6))
-    return EdgeScore(round(score, 4), float(np.median(distances[:, 0])), len(distances))
+def scene_of(points: F64, bgr: U8) -> EdgeScene:
+    """Depth edges (E, 3) and a picture (H, W, 3) uint8 that belong together."""
+    strength = upright_edges(bgr)
+    return EdgeScene(points, strength, strength.mean(axis=1, dtype=np.float32))
 
 
 def depth_edges(sweep: Sweep) -> F64:
@@ -88,8 +68,23 @@ def depth_edges(sweep: Sweep) -> F64:
     return xyz[border[(range_m[border] > NEAREST_M) & (range_m[border] < FARTHEST_M)]]
 
 
-def edge_distances(bgr: U8) -> U8:
-    """(H, W) uint8 pixels to the nearest edge of the picture (Canny 1986), 255 for more."""
+def upright_edges(bgr: U8) -> U8:
+    """(H, W) uint8: changes of brightness from left to right, relative to those around, spread to both sides."""
+    width = bgr.shape[1]
     grey = cv2.GaussianBlur(cv2.cvtColor(bgr, cv2.COLOR_BGR2GRAY), (5, 5), 0)
-    edges = cv2.Canny(grey, 60, 150)
-    return np.clip(cv2.distanceTransform(255 - edges, cv2.DIST_L2, 3), 0, 255).astype(np.uint8)
+    change = np.abs(cv2.Sobel(grey, cv2.CV_32F, 1, 0))
+    around = int(AROUND_WIDTHS * width) | 1
+    relative = np.minimum(change / (FLAT + cv2.blur(change, (around, around))), STRONGEST)
+    spread = _spread(relative.astype(np.float32), np.exp(-1.0 / (SPREAD_WIDTHS * width)))
+    return np.round(spread * (255.0 / STRONGEST)).astype(np.uint8)
+
+
+def _spread(strength: F32, keeps: float) -> F32:
+    """Each pixel's greatest neighbour in its row, where each step away keeps so much of it (inverse distance transform
+    along rows). (H, W) → (H, W)."""
+    columns = np.ascontiguousarray(strength.T)
+    for at in range(1, len(columns)):
+        np.maximum(columns[at], columns[at - 1] * np.float32(keeps), out=columns[at])
+    for at in range(len(columns) - 2, -1, -1):
+        np.maximum(columns[at], columns[at + 1] * np.float32(keeps), out=columns[at])
+    return np.ascontiguousarray(columns.T)

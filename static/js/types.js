@@ -302,8 +302,10 @@
  *
  * @typedef {object} AlignmentScore
  * @property {number|null} score
- * @property {number} pairs
- * @property {number|null} median_px
+ * @property {number|null} sigmas
+ * @property {number} borders
+ * @property {Record<string, number>} better
+ * @property {string} brief
  * @property {string} text
  *
  * @typedef {object} Series  the columns of one run, as far as it has come

@@ -12,6 +12,8 @@ import { drawEdges } from "./edges.js";
 import { addLayer } from "../camera.js";
 import { grow } from "../workspace/panes.js";
 
+/** Between two scores while the hand moves: each costs the server a tenth of a second. */
+const PAUSE_MS = 250;
 const OFF = { on: false, blend: 0.5, edges: true };
 
 const bar = $("#align-bar"), button = $("#align-button");
@@ -19,9 +21,10 @@ const score = el("b", { class: "score", title: "How well the LiDAR's depth edges
 const how = el("span", { class: "facts" });
 
 const fetchScore = newestOnly(async () => {
-  const found = /** @type {import("../types.js").AlignmentScore|null} */ (await request("api/alignment/score").catch(() => null));
-  text(score, found === null || found.score === null ? "no score" : `${Math.round(100 * found.score)} %${found.median_px === null ? "" : ` · ${found.median_px.toFixed(1)} px`}`);
-  score.title = found?.text ?? "";
+  const found = /** @type {import("../types.js").AlignmentScore|Error} */ (await request("api/alignment/score").catch((error) => error));
+  text(score, found instanceof Error ? "no score" : found.brief);
+  score.title = found instanceof Error ? found.message : found.text;
+  await new Promise((done) => setTimeout(done, PAUSE_MS));
 });
 
 export function setUp() {

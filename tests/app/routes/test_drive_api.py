@@ -15,6 +15,7 @@ from app.drive.columns import COLUMNS
 from app.drive.marks import Marks
 from app.engine import Engine
 from app.server import create_app
+from pipeline.calibration.match import FEWEST
 from pipeline.params import Params, from_yaml, preset, with_changes
 from pipeline.recording.writer import About, SessionWriter
 from pipeline.run import Detectors, run
@@ -304,8 +305,11 @@ def test_every_route_of_the_timeline_is_described(client: httpx.Client):
 
 
 def test_the_alignment_is_scored(client: httpx.Client):
-    """The small recording has one car's two sides in each sweep."""
+    """Each picture of the small recording has one car's sides, and its points' borders lie elsewhere."""
     found = client.get("/api/alignment/score").json()
-    assert set(found) == {"score", "median_px", "pairs", "text"}
-    assert found["text"]
+    assert set(found) == {"score", "sigmas", "borders", "better", "brief", "text"}
+    assert found["borders"] >= FEWEST
+    assert found["score"] < 0.5
+    assert found["brief"].startswith(f"{100 * found['score']:.0f} % · better ")
+    assert set(found["better"]) <= {"yaw_deg", "pitch_deg", "roll_deg"}
     assert found == client.get("/api/alignment/score").json()

@@ -1,77 +1,12 @@
-"""The alignment score falls when LiDAR and pictures are moved apart."""
+"""Where sweeps and pictures have borders."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pipeline.alignment import resolve
-from pipeline.calibration.edges import FEWEST, EdgeScene, EdgeScore, depth_edges, edge_distances, edge_scene, edge_score
-from pipeline.params import Params, with_changes
-from pipeline.sources import open_source
-from pipeline.types import CameraCalibration, Sweep
-
-Looked = list[tuple[EdgeScene, CameraCalibration | None]]
-
-
-def looked_at(uri: str, frames: list[int]) -> Looked:
-    source = open_source(uri)
-    found: Looked = []
-    for index in frames:
-        frame = source.frame(index)
-        assert frame.sweep is not None
-        assert frame.picture is not None
-        found.append((edge_scene(frame.sweep, frame.picture.bgr), frame.camera))
-    return found
-
-
-def score(scenes: Looked, **corrections: float) -> EdgeScore:
-    params = with_changes(Params(), {f"alignment.{name}": value for name, value in corrections.items()}).alignment
-    resolved = [(scene, resolve(params, camera)) for scene, camera in scenes]
-    return edge_score((scene, aligned) for scene, aligned in resolved if aligned is not None)
-
-
-@pytest.fixture(scope="module")
-def kitti(data_dir: Path) -> Looked:
-    return looked_at(f"kitti:{data_dir / 'kitti_0052'}", [0, 7, 14, 21])
-
-
-@pytest.fixture(scope="module")
-def astyx(data_dir: Path) -> Looked:
-    return looked_at(f"astyx:{data_dir / 'astyx'}", list(range(0, 39, 4)))
-
-
-@pytest.mark.parametrize("name", ["yaw_deg", "pitch_deg"])
-@pytest.mark.parametrize("off_deg", [-2.0, 2.0])
-def test_a_real_mount_scores_better_than_a_turned_one(kitti: Looked, name: str, off_deg: float):
-    right, turned = score(kitti), score(kitti, **{name: off_deg})
-    assert right.score is not None
-    assert turned.score is not None
-    assert right.score > turned.score + 0.05
-    assert right.median_px is not None
-    assert turned.median_px is not None
-    assert right.median_px < turned.median_px
-
-
-@pytest.mark.parametrize("off_deg", [2.0, 4.0])
-def test_a_real_vlp16_tells_a_turned_mount_too(astyx: Looked, off_deg: float):
-    right, turned = score(astyx), score(astyx, yaw_deg=off_deg)
-    assert right.score is not None
-    assert turned.score is not None
-    assert right.score > turned.score
-
-
-def test_a_picture_of_something_else_scores_next_to_nothing(kitti: Looked):
-    """A patchwork has edges everywhere, and what lies on one lies there by chance."""
-    height, width = kitti[0][0].away_px.shape
-    patches = np.random.default_rng(0).integers(0, 255, (height // 32 + 1, width // 32 + 1, 3)).astype(np.uint8)
-    away = edge_distances(np.ascontiguousarray(patches.repeat(32, axis=0).repeat(32, axis=1)[:height, :width]))
-    found, right = score([(EdgeScene(scene.points, away), camera) for scene, camera in kitti]), score(kitti)
-    assert found.score is not None
-    assert right.score is not None
-    assert found.score < 0.3 * right.score
+from pipeline.calibration.edges import depth_edges, scene_of, upright_edges
+from pipeline.types import Sweep
 
 
 def ring(ranges_m: list[float], step_deg: float = 0.4) -> Sweep:
@@ -101,9 +36,34 @@ def test_borders_in_a_sweep(name: str, ranges_m: list[float], expected_m: list[f
     assert sorted(np.hypot(edges[:, 0], edges[:, 1]).round(3)) == pytest.approx(expected_m)
 
 
-def test_too_few_borders_say_nothing(kitti: Looked):
-    few = [(EdgeScene(scene.points[:2], scene.away_px), camera) for scene, camera in kitti]
-    found = score(few)
-    assert (found.score, found.median_px) == (None, None)
-    assert found.pairs < FEWEST
-    assert edge_score([]) == EdgeScore(None, None, 0)
+def test_an_upright_edge_is_felt_to_its_sides_and_fades():
+    bgr = np.full((40, 400, 3), 60, np.uint8)
+    bgr[:, 200:] = 180
+    row = upright_edges(bgr)[20].astype(int)
+    assert row[200] > 100
+    assert np.all(np.diff(row[201:260]) <= 0)
+    assert row[200 + 14] < row[200] / 2
+    assert row[300] == 0
+
+
+def test_a_lying_edge_is_none_along_a_ring():
+    bgr = np.full((40, 400, 3), 60, np.uint8)
+    bgr[20:] = 180
+    assert not upright_edges(bgr).any()
+
+
+def test_in_a_busy_place_an_edge_counts_less():
+    bgr = np.full((64, 800, 3), 60, np.uint8)
+    bgr[:, 200:400] = 180  # one bar alone, then a fence
+    for column in range(500, 700, 16):
+        bgr[:, column : column + 8] = 180
+    strength = upright_edges(bgr)
+    assert strength[32, 600:640].max() < 0.7 * strength[32, 198:203].max()
+
+
+def test_a_scene_knows_what_is_usual_in_each_row():
+    bgr = np.zeros((30, 90, 3), np.uint8)
+    bgr[15:, 45:] = 200
+    scene = scene_of(np.zeros((0, 3)), bgr)
+    assert scene.usual == pytest.approx(scene.strength.mean(axis=1))
+    assert scene.usual[25] > scene.usual[2] == 0
