@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
-from rich.console import Console
-from rich.table import Table
 
 from app.progress import bytes_progress
 from pipeline.path.lane_network import open_lane_network
@@ -34,7 +33,7 @@ class ListModels:
             rows = [{**asdict(entry), "path": str(entry.path) if entry.path else None} for entry in entries]
             print(json.dumps(rows, indent=1))
         else:
-            Console().print(_table(entries))
+            print("\n".join(_listed(entries)))
         return 0
 
 
@@ -98,17 +97,28 @@ class Models:
         return self.action()
 
 
-def _table(entries: tuple[ModelEntry, ...]) -> Table:
-    table = Table("", "name", "task", "licence", "here", "what it is", "distance law", title=f"Networks in {store()}")
+def _listed(entries: tuple[ModelEntry, ...]) -> Iterator[str]:
+    """A network a paragraph: it must be readable, addresses and all, in a terminal of 80 columns."""
+    yield f"Networks in {store()} (● used when none is named)"
     for entry in entries:
-        mark, path = "●" if entry.default else "", str(entry.path or "—")
-        table.add_row(mark, entry.name, entry.task, entry.licence or "", path, entry.note, _law(entry))
-    table.caption = "● used when none is named; distance law: of cars, by box height h at that focal length"
-    return table
+        licence = f"  {entry.licence}" if entry.licence else ""
+        yield f"\n{'●' if entry.default else ' '} {entry.name}  {entry.task}{licence}"
+        yield f"    {entry.note}"
+        if entry.task == "detector":
+            yield f"    distance of a car: {_law(entry)}"
+        yield from (f"    {line}" for line in _where(entry))
+
+
+def _where(entry: ModelEntry) -> Iterator[str]:
+    """The file, or how to get it."""
+    if entry.path is not None:
+        yield f"here: {entry.path}"
+    elif entry.url is not None:
+        known = known_model(entry.name)
+        yield f"not here: {known.remedy}"
+        yield entry.url
 
 
 def _law(entry: ModelEntry) -> str:
-    if entry.task != "detector":
-        return ""
-    law, whose = (entry.law, "its own") if entry.law is not None else (REAL_VEHICLES, "for real cars")
-    return f"{law.coefficient:.0f} · h^{law.exponent:g} at {law.focal_px:.0f} px, {whose}"
+    law, whose = (entry.law, "its own law") if entry.law is not None else (REAL_VEHICLES, "the law of real cars")
+    return f"{law.coefficient:.0f} · h^{law.exponent:g} m, h pixels high at {law.focal_px:.0f} px ({whose})"

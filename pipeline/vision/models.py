@@ -48,6 +48,19 @@ class KnownModel:
     licence: str
     note: str
 
+    @property
+    def remedy(self) -> str:
+        """How it comes here."""
+        if self.size is not None:
+            return f"`cipv models pull {self.name}` ({self.size / 1e6:.1f} MB)"
+        return f"fetch or export its ONNX file, then {self.register}"
+
+    @property
+    def register(self) -> str:
+        """The command that takes a file fetched by hand."""
+        task = "" if self.task == "detector" else f" --task {self.task}"
+        return f"`cipv models register PATH {self.name}{task}`"
+
 
 _YOLOX = "https://github.com/Megvii-BaseDetection/YOLOX/releases/download/0.1.1rc0/"
 KNOWN: tuple[KnownModel, ...] = (
@@ -187,7 +200,7 @@ def pull(name: str, progress: Progress = silent) -> Path:
     and right is kept. ModelError says what went wrong; no part of a failed download stays."""
     known = known_model(name)
     if known.size is None or known.sha256 is None:
-        raise ModelError(f"{name} has no official ONNX file; make one with {known.url} and use {_by_hand(known)}")
+        raise ModelError(f"{name} has no file of known checksum: {known.remedy}; the project is {known.url}")
     target = store() / f"{name}.onnx"
     if target.is_file() and file_sha256(target) == known.sha256:
         return target
@@ -218,12 +231,12 @@ def _download(known: KnownModel, size: int, part: Path, progress: Progress) -> N
     except urllib.error.HTTPError as error:
         error.close()
         raise ModelError(
-            f"{known.url} answered {error.code} {error.reason}; fetch the file by hand and use {_by_hand(known)}"
+            f"{known.url} answered {error.code} {error.reason}; fetch the file by hand and use {known.register}"
         ) from None
     except (OSError, ValueError) as error:
         why = getattr(error, "reason", None) or error
         raise ModelError(
-            f"{known.name} cannot be fetched ({why}); without a network connection use {_by_hand(known)}"
+            f"{known.name} cannot be fetched ({why}); without a network connection use {known.register}"
         ) from None
     if done != size:
         raise ModelError(f"{known.url} gave {'more than ' if done > size else f'{done} of '}{size} bytes; try again")
@@ -231,11 +244,6 @@ def _download(known: KnownModel, size: int, part: Path, progress: Progress) -> N
         raise ModelError(
             f"{known.url} is not the official file: its SHA-256 is {digest.hexdigest()}, not {known.sha256}"
         )
-
-
-def _by_hand(known: KnownModel) -> str:
-    task = "" if known.task == "detector" else f" --task {known.task}"
-    return f"`cipv models register PATH {known.name}{task}`"
 
 
 def _located(name: str) -> Path | None:

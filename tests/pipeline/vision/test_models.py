@@ -207,7 +207,7 @@ def test_the_list_names_every_known_network_and_what_is_here(tmp_path: Path) -> 
 
 def test_a_network_without_an_official_file_says_how_to_get_one() -> None:
     with pytest.raises(
-        models.ModelError, match=r"make one with https://\S+ and use `cipv models register PATH ufld --task lanes`"
+        models.ModelError, match=r"then `cipv models register PATH ufld --task lanes`; the project is https://\S+"
     ):
         models.pull("ufld")
     assert _files() == []

@@ -1,0 +1,24 @@
+"""`cipv models` as people read it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.commands.models import ListModels
+from pipeline.vision import models
+
+
+def test_the_printed_list_has_every_address_and_command_whole(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("CIPV_HOME", str(tmp_path))
+    monkeypatch.setenv("CIPV_DATA", str(tmp_path))
+    assert ListModels()() == 0
+    said = capsys.readouterr().out
+    for known in models.KNOWN:
+        assert f"\n    {known.url}\n" in said
+    assert "`cipv models pull yolox_tiny` (20.2 MB)" in said
+    assert "`cipv models register PATH yolop --task lanes`" in said
+    assert "● embedded  detector" in said, "the one that is used where no other is"
