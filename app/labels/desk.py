@@ -79,7 +79,7 @@ class LabelDesk:
         self._begun: tuple[str | None, int] = (None, 0)
         self._forgot: str | None = None
         self._settling = SettlingQueue(self.refresh)
-        self.tasks = Tasks(self._told)
+        self.tasks = Tasks(self.refresh)
         self.scores = LabelScores()
 
     # ------------------------------------------------------------ what is open
@@ -274,10 +274,6 @@ class LabelDesk:
         forgot = self._control.forget_tried()
         self._forgot = act_id if forgot else self._forgot
         return forgot
-
-    def _told(self) -> None:
-        """A task has come further."""
-        self.refresh()
 
     def _labels_of(self, opened: _Open) -> DriveLabels:
         """Found in the database when first asked for."""

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -52,6 +53,15 @@ class HistoryEntry:
     undone: bool
 
 
+@dataclass
+class _Turn:
+    """An act under way. is_logged: its row is written."""
+
+    connection: Connection
+    draft: Draft
+    is_logged: bool = False
+
+
 Apply = Callable[[Draft], str]
 """Changes labels in a draft and says in a few words what it did: ``moved #7 in frame 12``."""
 
@@ -69,19 +79,17 @@ class Log:
     def act(self, kind: str, person: str, apply: Apply, *, act_id: str | None = None, note: str = "") -> Acted:
         """Do it; on disk when this returns. What ``apply`` raises leaves everything as it was. With the ``act_id`` of
         one that is done already, that one is answered."""
-        with self._database.writing() as connection:
-            draft = self._draft(connection, person)
+        with self._turn(person) as turn:
+            connection, draft = turn.connection, turn.draft
             done = self._sent_before(connection, act_id, person)
             if done is not None:
-                connection.get_transaction().rollback()  # type: ignore[union-attr]
                 return done
             what = apply(draft)
             check_whole(draft)
             if not draft.write():
-                connection.get_transaction().rollback()  # type: ignore[union-attr]
                 return Acted(draft.number - 1, None, "nothing changed", note)
             self._steps.drop_redo(connection, person)
-            self._write(connection, draft, kind, what, act_id=act_id, note=note)
+            self._write(turn, kind, what, act_id=act_id, note=note)
             return Acted(draft.number, draft.number, what, note)
 
     def sent_before(self, act_id: str | None, person: str) -> Acted | None:
@@ -95,18 +103,17 @@ class Log:
         that was of the same parameters, and merged too."""
         if not changes:
             return
-        with self._database.writing() as connection:
-            draft = self._draft(connection, person)
+        with self._turn(person) as turn:
+            connection, draft = turn.connection, turn.draft
             for name, (before, after) in changes.items():
                 draft.put_param(name, before, after)
             if not draft.write():
-                connection.get_transaction().rollback()  # type: ignore[union-attr]
                 return
             step = self._steps.before(connection, draft.number - 1, person, set(changes)) if merges else None
             self._steps.drop_redo(connection, person)
             named = ", ".join(f"{name} {_short(old)} → {_short(new)}" for name, (old, new) in list(changes.items())[:3])
             more = f" and {len(changes) - 3} more" if len(changes) > 3 else ""
-            self._write(connection, draft, "nudge" if merges else "params", named + more, step=step)
+            self._write(turn, "nudge" if merges else "params", named + more, step=step)
 
     # ------------------------------------------------------------ going back and forth
 
@@ -121,11 +128,10 @@ class Log:
         """Take back the person's newest act, or do again the one taken back last. ActRefused when there is none, or
         when somebody else changed the same label or parameter since. check: raises for parameters that cannot be.
         act_id: as in ``act``."""
-        with self._database.writing() as connection:
-            draft = self._draft(connection, person)
+        with self._turn(person) as turn:
+            connection, draft = turn.connection, turn.draft
             done = self._sent_before(connection, act_id, person)
             if done is not None:
-                connection.get_transaction().rollback()  # type: ignore[union-attr]
                 return done
             step = self._steps.following(connection, way, person)
             if step is None:
@@ -144,7 +150,7 @@ class Log:
                 .values(status=status)
             )
             said = f"took back: {what}" if way == "undo" else f"did again: {what}"
-            self._write(connection, draft, way, said, target=step, act_id=act_id)
+            self._write(turn, way, said, target=step, act_id=act_id)
             return Acted(draft.number, draft.number, what, params=draft.params)
 
     def possible(self, person: str) -> tuple[bool, bool]:
@@ -183,20 +189,25 @@ class Log:
 
     # ------------------------------------------------------------ the transaction
 
-    def _draft(self, connection: Connection, person: str) -> Draft:
-        """The first statement of an act, and what makes acts of one drive wait for each other."""
-        number = connection.execute(
-            update(DriveRow)
-            .where(DriveRow.id == self._drive_id)
-            .values(revision=DriveRow.revision + 1)
-            .returning(DriveRow.revision)
-        ).scalar_one()
-        return Draft(connection, self._drive_id, number, person, int(time.time() * 1000))
+    @contextmanager
+    def _turn(self, person: str) -> Iterator[_Turn]:
+        """The transaction of an act. Its first statement makes acts of one drive wait for each other; nothing stays of
+        one whose row was not written."""
+        with self._database.writing() as connection:
+            number = connection.execute(
+                update(DriveRow)
+                .where(DriveRow.id == self._drive_id)
+                .values(revision=DriveRow.revision + 1)
+                .returning(DriveRow.revision)
+            ).scalar_one()
+            turn = _Turn(connection, Draft(connection, self._drive_id, number, person, int(time.time() * 1000)))
+            yield turn
+            if not turn.is_logged:
+                connection.get_transaction().rollback()  # type: ignore[union-attr]
 
     def _write(
         self,
-        connection: Connection,
-        draft: Draft,
+        turn: _Turn,
         kind: str,
         what: str,
         *,
@@ -205,7 +216,8 @@ class Log:
         act_id: str | None = None,
         note: str = "",
     ) -> None:
-        connection.execute(
+        draft, turn.is_logged = turn.draft, True
+        turn.connection.execute(
             insert(ActRow).values(
                 drive_id=self._drive_id,
                 number=draft.number,
