@@ -18,13 +18,21 @@ def usual_size_m(label: str) -> tuple[float, float, float]:
     return USUAL_SIZE_M.get(label, USUAL_SIZE_M["car"])
 
 
-LONGEST_M: dict[str, float] = {
-    "car": 8.0,
-    "truck": 20.0,
-    "bus": 20.0,
-    "motorcycle": 3.5,
-    "bicycle": 3.0,
-    "person": 2.0,
+LARGEST_SIZE_M: dict[str, tuple[float, float, float]] = {
+    "car": (8.0, 2.6, 3.2),
+    "truck": (20.0, 3.2, 4.5),
+    "bus": (20.0, 3.2, 4.5),
+    "motorcycle": (3.5, 1.5, 2.2),
+    "bicycle": (3.0, 1.3, 2.3),
+    "person": (2.0, 1.5, 2.3),
 }
-"""The longest of a class, with half a metre or more for the noise of a cluster: the longest vans, which detectors call
-cars (7.4 m), lorries with a trailer (18.75 m, Directive 96/53/EC), tandems, cargo bicycles."""
+"""Length, width, height of the largest of a class, with half a metre or more of length for the noise of a cluster: the
+longest vans, which detectors call cars (7.4 m), lorries with a trailer (18.75 m long, 2.6 m wide without mirrors, 4 m
+tall, Directive 96/53/EC), tandems, cargo bicycles."""
+
+LONGEST_M: dict[str, float] = {label: size[0] for label, size in LARGEST_SIZE_M.items()}
+
+
+def largest_size_m(label: str) -> tuple[float, float, float]:
+    """Length, width, height of the largest of a class; what is none of them counts as a car."""
+    return LARGEST_SIZE_M.get(label, LARGEST_SIZE_M["car"])

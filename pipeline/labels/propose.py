@@ -2,12 +2,13 @@
 
 Not everything it follows is worth a look: roadside returns are half of it. Proposed is what the camera has called a
 road user in a frame, and what was the lead or stood in the path in one. A track ends where it was last seen, not
-where it was last predicted to be; between two sightings a prediction stands in.
+where it was last predicted to be; between two sightings a prediction stands in. A cluster larger than any of its class
+is a vehicle and what stands beside it, or none at all: where it lies tells nothing, and its box alone is kept.
 
 What the camera alone sees is proposed as a box in the picture, without a cuboid. One from how tall it looks, as
-``pipeline.labels.lift`` makes where somebody points, was tried: on Astyx its middle was 14 m off (median of 55 that have
-truth, at 68 m), two in three did not even touch the vehicle; and a distance that nobody measured must not become the
-truth by which distances are scored.
+``pipeline.labels.lift`` makes where somebody points, was tried: on Astyx its middle was 14 m off (median of 55 that
+have truth, at 68 m), two in three did not even touch the vehicle; and a distance that nobody measured must not become
+the truth by which distances are scored.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy as np
 from pipeline.geometry import Cuboid, iou_matrix
 from pipeline.labels.interpolate import resized
 from pipeline.labels.model import LabelTrack, Lead, LeadRange, Origin, Sighting
-from pipeline.sizes import usual_size_m
+from pipeline.sizes import largest_size_m, usual_size_m
 from pipeline.types import VEHICLES, Box
 
 ROAD_USERS = VEHICLES | {"person", "bicycle"}
@@ -33,6 +34,8 @@ _LARGE = 0.9
 """Of a track's sightings are smaller: single ones take in what stands beside."""
 _FEWEST = 2
 """Seen once and never again is mostly noise."""
+_OVER = 1.25
+"""How far, as a factor, a cluster may be wider or taller than the largest of its class: an open door, a branch."""
 
 
 @dataclass(frozen=True)
@@ -105,22 +108,33 @@ def _track(number: int, life: Mapping[int, Seen], leads: bool, origin: Origin) -
     is_worth_it = leads or ((names or any(each.in_path for each in life.values())) and len(seen) >= _FEWEST)
     if not seen or not is_worth_it:
         return None
-    sightings = tuple(
-        Sighting(index, each.cuboid, each.bbox, keyframe=False)
-        for index, each in life.items()
-        if seen[0] <= index <= seen[-1] and (each.cuboid is not None or each.bbox is not None)
-    )
     label = max(sorted(set(names)), key=names.count) if names else NAMELESS
+    placed = (
+        Sighting(index, _of_class(each.cuboid, label), each.bbox, keyframe=False)
+        for index, each in life.items()
+        if seen[0] <= index <= seen[-1]
+    )
+    sightings = tuple(each for each in placed if each.cuboid is not None or each.bbox is not None)
     return LabelTrack(number, label, _whole(sightings, label), "proposed", origin) if sightings else None
 
 
+def _of_class(cuboid: Cuboid | None, label: str) -> Cuboid | None:
+    """Null for one that no vehicle of a class fills."""
+    if cuboid is None:
+        return None
+    (length, width, height), (longest, widest, tallest) = cuboid.size, largest_size_m(label)
+    fits = length <= longest and width <= _OVER * widest and height <= _OVER * tallest
+    return cuboid if fits else None
+
+
 def _whole(sightings: tuple[Sighting, ...], label: str) -> tuple[Sighting, ...]:
-    """With cuboids of one size, which is at least the class's usual one: the line shows what was seen of a vehicle, and
-    that is often its rear alone. The side that was seen stays where it is."""
+    """With cuboids of one size, at least the class's usual one and at most its largest: the line shows what was seen of
+    a vehicle, and that is often its rear alone. The side that was seen stays where it is."""
     seen = np.array([each.cuboid.size for each in sightings if each.cuboid is not None]).reshape(-1, 3)
     if not len(seen):
         return sightings
-    length, width, height = np.maximum(np.quantile(seen, _LARGE, axis=0), usual_size_m(label)).round(2).tolist()
+    size = np.clip(np.quantile(seen, _LARGE, axis=0), usual_size_m(label), largest_size_m(label))
+    length, width, height = size.round(2).tolist()
     return tuple(
         replace(each, cuboid=resized(each.cuboid, (length, width, height))) if each.cuboid is not None else each
         for each in sightings

@@ -11,6 +11,7 @@ from pipeline.labels.check import check
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
 from pipeline.labels.propose import Seen, known_as, propose
 
+PERSON = Cuboid((20.0, 0.0, 0.85), (0.6, 0.6, 1.7), 0.0)
 BY = Origin("pipeline", "run 1", 5, "params", "camera")
 
 
@@ -31,7 +32,7 @@ def frames_of(track: LabelTrack) -> list[int]:
         ([seen(7, label=None), seen(7, label=None)], False),
         ([seen(7, label=None, in_path=True), seen(7, label=None)], True),
         ([seen(7, label="traffic light"), seen(7, label="traffic light")], False),
-        ([seen(7, label="person"), seen(7, label=None)], True),
+        ([seen(7, label="person", cuboid=PERSON), seen(7, label=None, cuboid=PERSON)], True),
         ([seen(7, carried=True), seen(7, carried=True)], False),
         ([seen(7, cuboid=None), seen(7, cuboid=None)], False),
         ([seen(7, cuboid=None, bbox=(1.0, 2.0, 3.0, 4.0)), seen(7, cuboid=None, bbox=(1.0, 2.0, 3.0, 4.0))], True),
@@ -78,6 +79,38 @@ def test_a_vehicle_is_proposed_whole_and_of_one_size_and_what_was_seen_of_it_sta
     assert {each.size for each in found} == {(5.0, 1.8, 1.5)}
     assert [each.center[0] - each.size[0] / 2 for each in found] == pytest.approx([19.85, 19.85, 17.5, 17.5])
     assert [each.center[2] - each.size[2] / 2 for each in found] == pytest.approx([-0.05, -0.05, -0.05, -0.05])
+
+
+@pytest.mark.parametrize(
+    ("label", "size", "is_kept"),
+    [
+        ("car", (34.4, 5.0, 3.5), False),
+        ("car", (7.4, 2.3, 2.9), True),
+        ("car", (4.5, 4.0, 1.5), False),
+        ("car", (4.5, 1.8, 4.5), False),
+        (None, (28.7, 5.4, 3.0), False),
+        ("truck", (18.7, 2.6, 4.0), True),
+    ],
+)
+def test_a_cluster_larger_than_any_of_its_class_has_a_box_alone(
+    label: str | None, size: tuple[float, float, float], is_kept: bool
+) -> None:
+    """Its middle is that of the hedge beside it."""
+    large, box = Cuboid((27.0, 9.0, 0.7), size, 0.0), (500.0, 300.0, 560.0, 340.0)
+    life = {index: [seen(7, label=label, bbox=box, in_path=True)] for index in range(4)}
+    life[2] = [seen(7, label=label, bbox=box, cuboid=large)]
+    (track,) = propose(life, {}, BY).tracks
+    assert [each.cuboid is not None for each in track.sightings] == [True, True, is_kept, True]
+    assert all(each.bbox == box for each in track.sightings)
+    only = propose({index: [seen(7, label=label, cuboid=large, in_path=True)] for index in range(4)}, {0: 7}, BY)
+    assert (len(only.tracks), len(only.leads)) == ((1, 1) if is_kept else (0, 0)), "what is nowhere is not proposed"
+
+
+def test_one_size_is_no_larger_than_the_class() -> None:
+    """A door that stands open, in every frame."""
+    wide = Cuboid((20.0, 0.0, 0.7), (4.0, 3.0, 1.5), 0.0)
+    (track,) = propose({index: [seen(7, cuboid=wide)] for index in range(3)}, {}, BY).tracks
+    assert {each.cuboid.size for each in track.sightings if each.cuboid is not None} == {(4.5, 2.6, 1.5)}
 
 
 def test_who_leads_is_one_range_as_long_as_it_stays_the_same() -> None:
