@@ -37,7 +37,9 @@ class DetectorPool:
     def both_for(self, source: AnySource, notices: list[Notice]) -> Detectors:
         """What looks at the source's pictures; what is missing is null, and a notice says so."""
         lanes = self.lanes_for(source, notices)
-        return Detectors(self.boxes_for(source, notices), lanes, self._lanes_every or usual_every(lanes))
+        return Detectors(
+            self.boxes_for(source, notices), lanes, self._lanes_every or usual_every(lanes, source.rate_hz)
+        )
 
     def lanes_for(self, source: AnySource, notices: list[Notice]) -> Detects[RawLanes] | None:
         """The lane detector, which a notice names."""

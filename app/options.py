@@ -78,8 +78,8 @@ class LineOptions:
     """Name or path of an ONNX lane network, `classical` for the detector without one, or `off`; else the registered
     default, then $CIPV_DATA/models, then the classical one, which is the default for sim:"""
     lanes_every: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Run the lane detector in every N-th frame only; between, its lines are predicted and age. Else 3 for
-    a network, 1 for the classical one"""
+    """Run the lane detector in every N-th frame only; between, its lines are predicted and age. Else in
+    every third for a network, in more of them below 10 Hz, and in all for the classical one"""
 
     def parameters(self) -> Params:
         """preset, then --params, then each --set. ParamsError names the first that is wrong."""
@@ -115,7 +115,7 @@ class LineOptions:
         lanes = lanes_for(source, self.lanes)
         for note in lanes.notes if lanes is not None else ():
             print(f"cipv: {note}", file=sys.stderr)
-        return Detectors(self.open_detector(source, sensors), lanes, every or usual_every(lanes))
+        return Detectors(self.open_detector(source, sensors), lanes, every or usual_every(lanes, source.rate_hz))
 
     def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
         """The detector for the source's pictures, with what there is to say about it. A named one that is missing is

@@ -11,15 +11,18 @@ from pipeline.types import CameraCalibration
 from pipeline.vision.runtime import find_graph
 
 OFF = "off"
-_NETWORK_EVERY = 3
-"""A network takes longer than a frame on a processor; its lines are good for the time between by the car's motion."""
+_NETWORK_EVERY, _NETWORK_EVERY_S = 3, 0.3
+"""A network takes longer than a frame on a processor; its lines are good for the time between by the car's motion, and
+for no longer: of a slow recording it looks at more of the frames."""
 LaneDetector = LaneNetwork | ClassicalLanes
 _REMEDY = "; for real roads pull a network with `cipv models pull twinlitenet`"
 
 
-def usual_every(lanes: object) -> int:
-    """In every how many frames a lane detector looks at the picture where nobody says so."""
-    return _NETWORK_EVERY if isinstance(lanes, LaneNetwork) else 1
+def usual_every(lanes: object, rate_hz: float) -> int:
+    """In every how many of ``rate_hz`` frames a second a lane detector looks at the picture where nobody says so."""
+    if not isinstance(lanes, LaneNetwork):
+        return 1
+    return max(1, min(_NETWORK_EVERY, int(_NETWORK_EVERY_S * rate_hz + 1e-6)))
 
 
 def open_lanes(spec: str | None, camera: CameraCalibration | None, drawn: bool = False) -> LaneDetector | None:

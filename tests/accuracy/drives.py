@@ -45,12 +45,13 @@ def drive(
     kind: str,
     preset_name: str = "default",
     sensors: Sensors = "both",
-    changes: tuple[tuple[str, float], ...] = (),
-    lanes: str = "off",
+    changes: tuple[tuple[str, object], ...] = (),
+    lanes: str = "twinlitenet",
     lanes_every: int | None = None,
 ) -> Drive:
-    """Run a recording of the data folder with YOLOX-nano. ``changes``: dotted parameters on top of the preset. lanes:
-    the lane detector, as on the command line; it looks at every ``lanes_every``-th picture, null: as often as usual."""
+    """Run a recording of the data folder with YOLOX-nano and, as the command line does where it is, TwinLiteNet.
+    ``changes``: dotted parameters on top of the preset. lanes: another lane detector, as on the command line; it looks
+    at every ``lanes_every``-th picture, null: as often as usual."""
     name = {"astyx": "astyx", "kitti": "kitti_0052"}[kind]
     uri = f"{kind}:{folder / name}"
     source, frames = open_source(uri), _frames(uri)
@@ -60,7 +61,7 @@ def drive(
     detector = yolox_nano(folder, picture.bgr.shape[1], picture.bgr.shape[0])
     results, judged = {}, {}
     found = looking.lanes(uri, lanes)
-    every = lanes_every or usual_every(found and found.detector)
+    every = lanes_every or usual_every(found and found.detector, source.rate_hz)
     for frame, result in through(frames, params, Detectors(detector, found, every), sensors):
         results[frame.name] = result
         truth = source.truth(frame.index)

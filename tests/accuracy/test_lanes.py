@@ -182,12 +182,15 @@ def _bright_ground(frame: Frame, result: Result) -> F64:
     return np.concatenate(found)
 
 
-@pytest.mark.parametrize(("kind", "every"), [("twinlitenet", 3), ("twinlitenet", 1), ("classical", 1)])
-def test_the_lead_is_still_right_on_astyx(data_dir: Path, kind: str, every: int) -> None:
+@pytest.mark.parametrize(
+    ("kind", "every", "least"), [("twinlitenet", None, 31), ("twinlitenet", 3, 30), ("classical", None, 30)]
+)
+def test_the_lead_is_still_right_on_astyx(data_dir: Path, kind: str, every: int | None, least: int) -> None:
     """As without lanes, although half of the clip "lead near 20 m" is a lane change without any own motion recorded,
-    and snow shines like paint. Measured: 30, 31 and 30 of 31; without lanes 31."""
+    and snow shines like paint. With three frames a second a network looks at every one: lines a second old are those
+    of the lane that the car has left by then."""
     judged = list(all_scored(drive(data_dir, "astyx", lanes=kind, lanes_every=every)))
-    assert sum(each.verdict == "correct" for each in judged) >= 30
+    assert sum(each.verdict == "correct" for each in judged) >= least
 
 
 @pytest.mark.parametrize("light", [0.1, 0.03])
@@ -213,13 +216,14 @@ def _darker(frame: Frame, light: float) -> Frame:
     return evolve(frame, picture=evolve(frame.picture, bgr=bgr))
 
 
-def test_the_lead_is_still_right_on_kitti(data_dir: Path) -> None:
-    """One frame of the 23 takes a piece of the truck beside for the lead: it reaches into the lane there."""
-    with_lanes = drive(data_dir, "kitti", lanes="twinlitenet")
-    leads = [result.cipv.id for result in with_lanes.results.values() if result.cipv is not None]
+@pytest.mark.parametrize("lanes", ["off", "classical"])
+def test_the_lead_is_still_right_on_kitti(data_dir: Path, lanes: str) -> None:
+    """As with the network, which is judged with the rest of the drive: one lead under one number in all 23 frames."""
+    as_seen = drive(data_dir, "kitti", lanes=lanes)
+    leads = [result.cipv.id for result in as_seen.results.values() if result.cipv is not None]
     assert len(leads) == 23
-    assert max(leads.count(each) for each in set(leads)) >= 22
-    assert all(each.verdict == "correct" for each in with_lanes.judged.values())
+    assert len(set(leads)) == 1
+    assert all(each.verdict == "correct" for each in as_seen.judged.values())
 
 
 SIMULATED = {

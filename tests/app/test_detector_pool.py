@@ -11,6 +11,7 @@ from app.options import LineOptions
 from app.snapshot import Notice
 from pipeline.errors import BadInput
 from pipeline.path.lane_classical import open_classical
+from pipeline.path.lane_detector import usual_every
 from pipeline.path.lane_network import open_lane_network
 from pipeline.run import Detectors
 from pipeline.vision.runtime import DetectorMissing
@@ -52,6 +53,13 @@ def test_a_network_looks_less_often_unless_told_otherwise(tmp_path: Path) -> Non
     assert both(lambda _: network)[0].lanes_every == 3
     assert both(lambda _: network, every=1)[0].lanes_every == 1
     assert both(lambda _: open_classical(None))[0].lanes_every == 1
+
+
+@pytest.mark.parametrize(("rate_hz", "every"), [(2.0, 1), (3.3, 1), (5.0, 1), (7.0, 2), (10.0, 3), (30.0, 3)])
+def test_a_network_looks_at_no_older_pictures_of_a_slow_recording(tmp_path: Path, rate_hz: float, every: int) -> None:
+    network = open_lane_network(str(lane_networks.twin(tmp_path / "tiny.onnx")))
+    assert usual_every(network, rate_hz) == every
+    assert usual_every(open_classical(None), rate_hz) == 1
 
 
 @pytest.mark.parametrize("every", [0, -2])
