@@ -8,11 +8,14 @@ import os
 import threading
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from pipeline.errors import BadInput
 
-MOST_MARKS = 1000
+MOST_MARKS = 10_000
 LONGEST_TEXT = 200
+LIVE = "live:"
+"""Whose marks are those made of live sensors: they belong to a time, and to every recording that has it."""
 
 
 class MarkRefused(BadInput):
@@ -21,11 +24,14 @@ class MarkRefused(BadInput):
 
 @dataclass(frozen=True)
 class Mark:
-    """A marked frame of one recording; ``id`` is its number there."""
+    """A marked frame of one recording; ``id`` is its number there. t_ns: the frame's stamp, which is what counts for
+    one of live sensors. in_session: it went into a session that was being recorded, too."""
 
     id: int
     index: int
     text: str = ""
+    t_ns: int | None = None
+    in_session: bool = False
 
 
 class Marks:
@@ -41,13 +47,14 @@ class Marks:
         with self._lock:
             return sorted(self._loaded(uri), key=lambda mark: (mark.index, mark.id))
 
-    def add(self, uri: str, index: int, text: str = "") -> Mark:
+    def add(self, uri: str, index: int, text: str = "", *, t_ns: int | None = None, in_session: bool = False) -> Mark:
         """MarkRefused when there are too many, or when they cannot be kept."""
         with self._lock:
             marks = self._loaded(uri)
             if len(marks) >= MOST_MARKS:
                 raise MarkRefused(f"a recording holds {MOST_MARKS} marks at most")
-            mark = Mark(max((each.id for each in marks), default=0) + 1, index, " ".join(text.split())[:LONGEST_TEXT])
+            number, words = max((each.id for each in marks), default=0) + 1, " ".join(text.split())[:LONGEST_TEXT]
+            mark = Mark(number, index, words, t_ns, in_session)
             self._save(uri, [*marks, mark])
             return mark
 
@@ -91,6 +98,18 @@ def _read(file: Path | None) -> list[Mark]:
         return []
     try:
         rows = json.loads(file.read_text(encoding="utf-8"))["marks"]
-        return [Mark(int(row["id"]), int(row["index"]), str(row["text"])) for row in rows]
-    except (OSError, ValueError, KeyError, TypeError):
+        return [_mark(row) for row in rows]
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return []
+
+
+def _mark(row: dict[str, Any]) -> Mark:
+    """As it was written; what was written before marks had a time has none."""
+    t_ns = row.get("t_ns")
+    return Mark(
+        int(row["id"]),
+        int(row["index"]),
+        str(row["text"]),
+        None if t_ns is None else int(t_ns),
+        bool(row.get("in_session", False)),
+    )

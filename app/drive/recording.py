@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
 from app.drive.book import RunBook
 from app.drive.inputs import InputStore
 from app.drive.run import DriveRun, Kept, calibration_digest, digest
@@ -17,7 +19,7 @@ from pipeline.recording.save import save
 from pipeline.run import Detectors, Sensors, detect, only
 from pipeline.sources.base import Mark, Marked, Source, TruthObject, is_simulated
 from pipeline.step import State, step
-from pipeline.types import F64, Frame
+from pipeline.types import F64, I64, Frame
 
 RULE = LeadRule()
 Truth = tuple[TruthObject, ...] | None
@@ -99,6 +101,11 @@ class Recording:
     def marks(self) -> tuple[Mark, ...]:
         """What was marked while it was recorded."""
         return self.recipe.source.marks() if isinstance(self.recipe.source, Marked) else ()
+
+    @cached_property
+    def stamps_ns(self) -> I64:
+        """(total,) when each frame was."""
+        return np.array([self.recipe.source.t_ns(index) for index in range(self.recipe.total)], np.int64)
 
     def at_hand(self, index: int) -> Frame:
         """A frame as the line takes it, its picture without pixels, if it is held; else as its source gives it."""

@@ -9,13 +9,14 @@ from pydantic import BaseModel, Field
 
 from app.drive.columns import columns_json, object_json
 from app.drive.drives import Drives
-from app.drive.events import Event, Kind, Severity, find_events, recorded_marks
-from app.drive.marks import LONGEST_TEXT, MarkRefused, Marks
+from app.drive.events import Event, Kind, Severity, find_events, marks_by_time, recorded_marks
+from app.drive.marks import LIVE, LONGEST_TEXT, MarkRefused, Marks
 from app.drive.recording import Recording
 from app.drive.run import DriveRun
 from app.engine import Engine
 from app.routes.refusals import open_recording, refusing
 from app.routes.shapes import Done
+from app.snapshot import Snapshot
 
 
 class Columns(BaseModel):
@@ -73,11 +74,13 @@ class NewMark(BaseModel):
 
 
 class MarkJson(BaseModel):
-    """A marked moment."""
+    """A marked moment. t_s: its place on the timeline. in_session: whether a session that is being recorded has it."""
 
     id: int
     index: int
+    t_s: float
     text: str
+    in_session: bool
 
 
 def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
@@ -101,15 +104,17 @@ def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
 
     @router.get("/drive/events")
     def events() -> Events:
-        """What happened, by frame, marks among it. While a run goes on, only what it has come to."""
+        """What happened, by frame, marks among it. While a run goes on, only what it has come to. Of live sensors there
+        are marks alone, those made since they were opened: ``t_s`` is theirs, ``index`` the count of ticks."""
         recording = drives.recording
         run = recording.book.current if recording is not None else None
         if recording is None or run is None:
-            return Events(run=None, events=[])
+            return Events(run=None, events=_live_marks(engine.snapshot, marks))
         marked = [
             Event("mark", mark.index, mark.text or "marked", mark=mark.id) for mark in marks.of(recording.recipe.uri)
         ]
         marked += recorded_marks(run.rows(), recording.marks)
+        marked += marks_by_time(marks.of(LIVE), recording.stamps_ns, round(1e9 / recording.recipe.source.rate_hz))
         times = recording.recipe.timeline_s
         found = sorted([*known.of(run), *marked], key=lambda event: event.index)
         return Events(
@@ -121,32 +126,58 @@ def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
 
     @router.post("/marks", status_code=201)
     def mark(body: NewMark) -> MarkJson:
-        """Mark a moment; it is kept with the recording, and lands in the session that is being recorded."""
+        """Mark a moment; it is kept with the recording, and lands in the session that is being recorded. Of live
+        sensors the shown moment is marked; the mark is kept by its time, and is on every recording of that time."""
         shown = engine.snapshot
         if shown.uri is None:
             raise HTTPException(409, "no recording is open")
-        index = shown.index if body.index is None else body.index
+        if shown.live and shown.tick is None:
+            raise HTTPException(409, "the sensors have shown nothing yet")
+        index = shown.index if body.index is None or shown.live else body.index
         if not shown.live and index >= max(shown.count, 1):
             raise HTTPException(422, f"index: the recording has {shown.count} frames")
+        in_session = index == shown.index and engine.desk.mark(body.text or "marked")
+        t_ns = shown.tick.frame.t_ns if shown.live and shown.tick is not None else None
         try:
-            made = marks.add(shown.uri, index, body.text)
+            made = marks.add(_marks_of(shown), index, body.text, t_ns=t_ns, in_session=in_session)
         except MarkRefused as error:
             raise HTTPException(409, str(error)) from None
-        if index == shown.index:
-            engine.desk.mark(body.text or "marked")
         drives.changed()
-        return MarkJson(id=made.id, index=made.index, text=made.text)
+        t_s = shown.time_s if index == shown.index else _time_s(drives, index)
+        return MarkJson(id=made.id, index=made.index, t_s=t_s, text=made.text, in_session=in_session)
 
     @router.delete("/marks/{number}")
     def unmark(number: int) -> Done:
         """Take a mark away."""
-        uri = engine.snapshot.uri
-        if uri is None or not marks.remove(uri, number):
+        shown = engine.snapshot
+        if shown.uri is None or not marks.remove(_marks_of(shown), number):
             raise HTTPException(404, f"there is no mark {number}")
         drives.changed()
         return Done(status="removed")
 
     return router
+
+
+def _marks_of(shown: Snapshot) -> str:
+    """Under which name what is shown has its marks."""
+    return LIVE if shown.live else shown.uri or ""
+
+
+def _time_s(drives: Drives, index: int) -> float:
+    recording = drives.recording
+    return float(recording.recipe.timeline_s[index]) if recording is not None else 0.0
+
+
+def _live_marks(shown: Snapshot, marks: Marks) -> list[EventJson]:
+    """Those made since the sensors were opened, by time."""
+    if not shown.live or shown.tick is None:
+        return []
+    opened_ns = shown.tick.frame.t_ns - round(shown.time_s * 1e9)
+    made = [(mark.t_ns, mark) for mark in marks.of(LIVE) if mark.t_ns is not None and mark.t_ns >= opened_ns]
+    return [
+        EventJson(**Event("mark", mark.index, mark.text or "marked", mark=mark.id).to_json((t_ns - opened_ns) / 1e9))
+        for t_ns, mark in sorted(made, key=lambda one: one[0])
+    ]
 
 
 def current(recording: Recording) -> DriveRun:

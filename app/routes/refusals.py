@@ -36,5 +36,5 @@ def refusing() -> Iterator[None]:
 def open_recording(drives: Drives) -> Recording:
     """The recording whose whole drive is computed; 404 when there is none, as with live sensors."""
     if drives.recording is None:
-        raise HTTPException(404, "no recording is open whose whole drive could be computed")
+        raise HTTPException(404, "no recording is open; live sensors are to be recorded first, and the session opened")
     return drives.recording

@@ -22,7 +22,13 @@ function toggleRecording() {
 }
 
 function markMoment() {
-  ask(request("api/marks", "POST", { text: "" }), ({ index }) => `Marked, frame ${index + 1}`, "Not marked");
+  ask(request("api/marks", "POST", { text: "" }), marked, "Not marked");
+}
+
+/** Live sensors count no frames that anybody could go to: their marks are kept by time. @param {{index: number, t_s: number, in_session: boolean}} made */
+function marked({ index, t_s, in_session }) {
+  if (!get("state")?.live) return `Marked, frame ${index + 1}`;
+  return `Marked at ${clock(t_s)}${in_session ? "" : ", not recorded"}`;
 }
 
 /** @param {Promise<any>} asked @param {(given: any) => string} done @param {string} refused */

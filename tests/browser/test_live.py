@@ -16,6 +16,7 @@ from pipeline.sources.base import is_live_source
 from pipeline.sources.live.config import load
 from tests.app.recording import CountingDetector
 from tests.browser.conftest import WAIT_MS, OpenPage, Site
+from tests.browser.display.conftest import keep
 from tests.pipeline.sources.live.rig import Replaying
 from tests.soak import live_car
 from tests.soak.test_live import config_file
@@ -43,14 +44,14 @@ def car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, Replay
     engine.stop()
 
 
-def until(page: Page, holds: str) -> Any:
-    """Wait until something holds of the store: ``holds`` is an expression of ``get``."""
+def until(page: Page, holds: str, gives: str = "get('frame').state.sequence") -> Any:
+    """Wait until something holds of the store, and what it gives then: both are expressions of ``get``."""
     return page.evaluate(
         f"""async () => {{
           const {{ get, on }} = await import('/js/store.js');
           const holds = () => {holds};
           if (!holds()) await new Promise((done) => on(['frame', 'drive', 'state'], () => holds() && done()));
-          return get('frame').state.sequence;
+          return {gives};
         }}"""
     )
 
@@ -75,6 +76,44 @@ def test_live_sensors_are_watched_held_and_let_go_on(open_page: OpenPage, car: t
     held = site.engine.snapshot.sequence
     page.keyboard.press("Space")
     until(page, f"get('state').playing && get('frame').state.sequence > {held}")
+
+
+def test_a_moment_marked_in_the_car_is_on_the_dashboards_timeline(open_page: OpenPage, car: tuple[Site, Replaying]):
+    site, _ = car
+    page = open_page(address=site.address)
+    until(page, "get('drive')?.count > 3")
+    expect(page.locator("#events-list")).to_have_text(
+        "Marks of this drive appear here. Events are looked for in recordings."
+    )
+    assert page.context.browser is not None
+    display = page.context.browser.new_page()
+    display.goto(f"{site.address}/drive/")
+    expect(display.locator("html")).to_have_attribute("data-freshness", "fresh")
+    display.locator("#mark").click()
+    expect(display.locator("#answer")).to_have_text(re.compile(r"✓ Marked at \d+:\d\d\.\d, not recorded"))
+    display.close()
+    row = page.locator("#events-list .event-row")
+    expect(row).to_contain_text("Mark")
+    keep(page, "live_mark")
+    at = until(page, "get('drive').events.length === 1 && get('drive').events[0].index >= 0", "get('drive').events[0]")
+    times = until(page, "true", "get('drive').t_s")
+    assert times[at["index"]] == pytest.approx(at["t_s"], abs=0.2), "its flag is where it was"
+    expect(row.locator(".event")).to_be_disabled()
+    row.get_by_role("button", name="Remove the mark").click()
+    expect(row).to_have_count(0)
+
+
+def test_what_live_sensors_cannot_do_is_off_and_says_why(open_page: OpenPage, car: tuple[Site, Replaying]):
+    site, _ = car
+    page = open_page(address=site.address)
+    until(page, "get('drive')?.count > 3")
+    for part in ("#export-button", "#clip-in", "#clip-out", "#event-back", "#event-next"):
+        expect(page.locator(part)).to_be_disabled()
+        expect(page.locator(part)).to_have_attribute("title", re.compile("record them, then open the session"))
+    page.keyboard.press("i")
+    assert until(page, "true", "get('clip')") is None
+    page.keyboard.press("a")
+    expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %|nothing stands out|too few borders"))
 
 
 def test_a_lidar_that_falls_silent_is_said_at_the_display_and_covered(open_page: OpenPage, car: tuple[Site, Replaying]):

@@ -1,10 +1,14 @@
-/** Live sensors have no whole recording: the timeline shows the last minutes as they came, and then lets go of them. */
+/** Live sensors have no whole recording: the timeline shows the last minutes as they came, and then lets go of them. Of
+ * events there are marks alone, which the server keeps. */
+import { newestOnly, request } from "../api.js";
 import { get, on, set } from "../store.js";
 
 /** @typedef {import("../types.js").Columns} Columns */
 /** @typedef {import("../types.js").Frame} Frame */
+/** @typedef {import("../types.js").DriveEvent} DriveEvent */
 
 const MOST_FRAMES = 1200;
+const SAME_S = 0.001;
 
 /** @type {{[K in keyof Columns]: (frame: Frame) => Columns[K][number]}} */
 const OF_FRAME = {
@@ -33,9 +37,28 @@ let uri = null;
 /** @type {number[]} */
 let times = [];
 let columns = empty();
+/** @type {DriveEvent[]} another array only when there are other marks: their index goes on changing with the frames let go of */
+let marks = [];
+let known = "";
+
+const fetchMarks = newestOnly(async (/** @type {string} */ of) => {
+  const answer = await request("api/drive/events").catch(() => null);
+  if (answer === null) known = "";
+  else if (of === known) marks = answer.events;
+});
 
 export function setUp() {
   on(["frame"], remember);
+  on(["state"], followMarks);
+}
+
+function followMarks() {
+  const state = get("state");
+  if (!state?.live) return;
+  const key = `${state.uri} ${state.drive.revision}`;
+  if (key === known) return;
+  known = key;
+  fetchMarks(key);
 }
 
 /** @param {Frame} frame */
@@ -53,6 +76,7 @@ function remember() {
     uri = frame.state.uri;
     times = [];
     columns = empty();
+    marks = [];
   }
   if (frame.state.time_s === times.at(-1)) return;
   times.push(frame.state.time_s);
@@ -61,5 +85,11 @@ function remember() {
     times.shift();
     for (const name of NAMES) columns[name].shift();
   }
-  set("drive", { uri, count: times.length, t_s: times, now: { run: -1, done: times.length, columns }, base: null, events: [], comparison: null });
+  for (const mark of marks) mark.index = placeOf(mark.t_s);
+  set("drive", { uri, count: times.length, t_s: times, now: { run: -1, done: times.length, columns }, base: null, events: marks, comparison: null });
+}
+
+/** The frame at a time; of one that is not held any more, far before all. @param {number} t_s */
+function placeOf(t_s) {
+  return t_s < times[0] - SAME_S ? -Infinity : times.findLastIndex((time) => time <= t_s + SAME_S);
 }

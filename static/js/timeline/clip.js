@@ -19,11 +19,13 @@ export function setUp() {
 }
 
 export function markIn() {
+  if (get("state")?.live) return;
   const last = get("clip")?.last ?? Math.max(0, (get("state")?.count ?? 1) - 1);
   set("clip", { first: here(), last: Math.max(here(), last) });
 }
 
 export function markOut() {
+  if (get("state")?.live) return;
   set("clip", { first: Math.min(here(), get("clip")?.first ?? 0), last: here() });
 }
 

@@ -32,14 +32,21 @@ function build() {
   shown = events;
   rows = events.map((event) => ({ event, row: rowOf(event) }));
   list.replaceChildren(...rows.map(({ row }) => row));
-  if (!rows.length) list.append(el("p", { class: "facts pad", textContent: get("state")?.drive?.running ? "Looking …" : "No events in this recording." }));
+  if (!rows.length) list.append(el("p", { class: "facts pad", textContent: nothing() }));
   reflect();
+}
+
+function nothing() {
+  const state = get("state");
+  if (state?.live) return "Marks of this drive appear here. Events are looked for in recordings.";
+  return state?.drive?.running ? "Looking …" : "No events in this recording.";
 }
 
 /** @param {DriveEvent} event */
 function rowOf(event) {
   const go = el("button", { type: "button", class: "event", title: event.text, style: { "--flag": tintOf(event) }, onclick: () => jump(event) },
     el("i"), el("span", { class: "when", textContent: clock(event.t_s) }), el("b", { textContent: nameOf(event) }), el("span", { class: "what", textContent: event.text }));
+  go.disabled = get("state")?.live === true; // there is no way back
   if (event.mark === null) return go;
   const remove = el("button", { type: "button", class: "drop", textContent: "✕", aria: { label: `Remove the mark at ${clock(event.t_s)}` },
     onclick: () => request(`api/marks/${event.mark}`, "DELETE").catch(() => {}) });
@@ -53,7 +60,7 @@ function jump({ index, ids }) {
 }
 
 function reflect() {
-  const index = get("state")?.index;
+  const state = get("state"), index = state?.live ? null : state?.index;
   for (const { event, row } of rows) {
     const isHere = event.index === index;
     if (row.classList.contains("is-here") === isHere) continue;

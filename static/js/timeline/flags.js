@@ -22,6 +22,7 @@ export function tintOf({ kind, severity }) {
 export function drawFlags(ctx, span, row, events) {
   for (const event of events) {
     const x = span.middle(event.index), { top, height } = row;
+    if (!span.holds(x)) continue;
     ctx.fillStyle = tintOf(event);
     ctx.fillRect(x - 0.5, top, 1, height + 2);
     ctx.beginPath();

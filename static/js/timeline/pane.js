@@ -10,6 +10,7 @@ import { drawBack } from "./back.js";
 import * as clip from "./clip.js";
 import { CURVES } from "./curves.js";
 import * as events from "./events.js";
+import * as live from "./live.js";
 import { nameOf } from "./flags.js";
 import { drawFront } from "./front.js";
 import { followPointer } from "./pointer.js";
@@ -40,6 +41,7 @@ export function setUp() {
   $("#timeline-fit").addEventListener("click", fit);
   clip.setUp();
   events.setUp();
+  live.setUp();
 }
 
 /** How many frames there are to show. */

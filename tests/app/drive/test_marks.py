@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.drive.marks import MOST_MARKS, Mark, MarkRefused, Marks
+from app.drive.marks import LIVE, MOST_MARKS, Mark, MarkRefused, Marks
 
 
 def test_marks_come_by_frame_and_are_the_recordings_own():
@@ -28,7 +28,17 @@ def test_marks_are_still_there_when_the_server_starts_again(tmp_path: Path):
     assert [file.parent for file in tmp_path.rglob("*.json")] == [folder], "a URI is no path"
 
 
-@pytest.mark.parametrize("content", ["", "{", "[]", '{"marks": 3}', '{"marks": [{"id": "x"}]}', "\x00"])
+def test_a_mark_of_live_sensors_keeps_its_time(tmp_path: Path):
+    Marks(tmp_path).add(LIVE, 5, "here", t_ns=17 * 10**17, in_session=True)
+    assert Marks(tmp_path).of(LIVE) == [Mark(1, 5, "here", 17 * 10**17, in_session=True)]
+    (file,) = tmp_path.iterdir()
+    file.write_text('{"marks": [{"id": 3, "index": 4, "text": "before marks had times"}]}')
+    assert Marks(tmp_path).of(LIVE) == [Mark(3, 4, "before marks had times")]
+
+
+@pytest.mark.parametrize(
+    "content", ["", "{", "[]", '{"marks": 3}', '{"marks": [{"id": "x"}]}', "\x00", '{"marks": [3]}']
+)
 def test_a_damaged_file_holds_no_marks(tmp_path: Path, content: str):
     marks = Marks(tmp_path)
     marks.add("sim:a", 4)
