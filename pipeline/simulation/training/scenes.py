@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+import cv2
 import numpy as np
 
 from pipeline.simulation import world
@@ -51,7 +53,17 @@ def moments(seed: int, count: int) -> Iterator[Moment]:
         now = world.at(random_traffic(rng, road, models), float(rng.uniform(0.0, _LONGEST_CHANGE_S)))
         if rng.random() < _SOME_TURNED:
             now = _turned(rng, now)
+        now = without_collisions(now)
         yield Moment(camera.picture(now), now)
+
+
+def without_collisions(now: world.World) -> world.World:
+    """The same world without those whom random braking and turning put into the ego vehicle: no camera can see from
+    inside of a truck."""
+    length, width, _ = SIZES_M["car"]
+    own = np.array([[-length, -width / 2], [0.0, -width / 2], [0.0, width / 2], [-length, width / 2]], np.float32)
+    clear = (cv2.intersectConvexConvex(own, s.cuboid.footprint().astype(np.float32))[0] <= 0.0 for s in now.actors)
+    return replace(now, actors=tuple(itertools.compress(now.actors, clear)))
 
 
 def _turned(rng: np.random.Generator, now: world.World) -> world.World:

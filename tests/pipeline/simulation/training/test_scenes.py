@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 
 from pipeline.geometry import iou_matrix
 from pipeline.simulation.camera import calibration
 from pipeline.simulation.training.labels import CLASSES, labels
-from pipeline.simulation.training.scenes import MOMENTS_A_ROAD, drive, moments, random_road, random_traffic, size_models
+from pipeline.simulation.training.scenes import (
+    MOMENTS_A_ROAD,
+    drive,
+    moments,
+    random_road,
+    random_traffic,
+    size_models,
+    without_collisions,
+)
 
 
 def test_equal_seeds_give_equal_pictures_and_others_do_not() -> None:
@@ -34,6 +43,21 @@ def test_traffic_holds_every_kind_near_and_far_and_nobody_overlaps() -> None:
     assert kinds == {"car", "van", "truck", "bus", "motorcycle"}
     assert min(distances) < 4.0
     assert max(distances) > 100.0
+
+
+def test_no_picture_is_drawn_from_inside_of_a_vehicle() -> None:
+    """Seed 202's picture 16 was: a truck whose rear was 1.6 m behind our bumper, with a label as large as the picture."""
+    now = next(drive("straight", 10.0)).world
+    one = now.actors[-1]
+
+    def centred(x_m: float) -> tuple[int, ...]:
+        there = one.cuboid._replace(center=(x_m, 0.0, 0.3), size=(10.0, 2.5, 3.9), yaw_rad=0.0)
+        world = without_collisions(replace(now, actors=(*now.actors[:-1], replace(one, cuboid=there))))
+        return tuple(state.actor.id for state in world.actors)
+
+    everyone = tuple(state.actor.id for state in now.actors)
+    assert centred(5.1) == centred(-10.0) == everyone
+    assert centred(3.9) == centred(-5.0) == everyone[:-1]
 
 
 def test_pictures_are_labelled_with_all_classes() -> None:
