@@ -66,7 +66,9 @@ def choose(
             now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY)
             before = state.odds.get(item.id, now)
             odds[item.id] = before + _fresh(dt_s, decide_s) * (now - before)
-        now_in = where is not None and where.ahead_m > 0.0 and odds[item.id] > 0.0
+        is_ahead = where is not None and where.ahead_m > 0.0
+        probability = 1.0 / (1.0 + exp(-odds[item.id])) if is_ahead else 0.0
+        now_in = probability > 0.5
         candidate = Candidate(item, where, odds.get(item.id, 0.0), leads, widening_m, path, params)
         if where is not None and where.margin_m() >= 0.0 and where.ahead_m > 0.0 and not now_in:
             crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
@@ -76,7 +78,7 @@ def choose(
             gates=(*item.gates, *gates),
             path_offset_m=where.offset_m if where is not None else None,
             in_path=now_in,
-            in_path_probability=where.probability() if where is not None else None,
+            in_path_probability=probability if where is not None else None,
             lateral_mps=where.sideways_mps if where is not None else None,
             crossing_s=crossing_s,
         )

@@ -8,7 +8,7 @@ middle is outside but which leaves no room is in the path too.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, copysign, erf, nan, sqrt
+from math import atan2, copysign, nan
 from typing import NamedTuple
 
 import numba
@@ -63,13 +63,6 @@ class Place(NamedTuple):
     def margin_m(self, extra_m: float = 0.0) -> float:
         """How far inside the path it is; negative: how far outside. extra_m widens the path."""
         return min(self.left_m + extra_m - self.middle_m, self.right_m + extra_m + self.middle_m)
-
-    def probability(self) -> float:
-        """That it is in the path, its place being normal around the measured one; 0 for what is not ahead."""
-        if self.ahead_m <= 0.0:
-            return 0.0
-        scale = self.sigma_m * sqrt(2.0)
-        return 0.5 * (erf((self.left_m - self.middle_m) / scale) + erf((self.right_m + self.middle_m) / scale))
 
     def log_odds(self, extra_m: float, moves_m: float) -> float:
         """What this sighting says for (positive) or against its being in the path: the log of the likelihood ratio of

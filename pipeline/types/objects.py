@@ -124,6 +124,7 @@ class FusedObject:
 
     source: which sensors' tracks it is made of. seen_by: which of them saw it in this frame; none: it is carried.
     measured: its distance was measured in this frame; else it is a prediction.
+    in_path_probability: what its sightings so far say together, the fresh ones most; in_path where it is over a half.
     lateral_mps: how fast it moves to the left of the path, over ground. crossing_s: until it is over the edge of it, or
     out of it where it is in; null when its sideways speed leads nowhere. lidar_hits: sightings of its LiDAR track.
     box_sides: ego x, y where the sight lines past its box's left and right edge are as far away as it is; null unless

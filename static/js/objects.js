@@ -23,7 +23,7 @@ const COLUMNS = [
   { key: "velocity", label: "Closing", help: "Closing speed, km/h: positive while the gap shrinks", words: (o) => signed(kmh(closing(o))), by: (o) => -(closing(o) ?? -Infinity) },
   { key: "ttc", label: "TTC", help: "Time to collision, seconds; a dash when the gap does not shrink", words: (o) => num(o.ttc_s), by: (o) => o.ttc_s ?? Infinity },
   { key: "offset", label: "Offset", help: "From the middle of the path, metres to the left or right", words: (o) => side(o.path_offset_m), by: (o) => Math.abs(o.path_offset_m ?? Infinity) },
-  { key: "inPath", label: "In path", help: "Inside our corridor, and how probable that is", words: inPath, by: (o) => -(o.in_path_probability ?? Number(o.in_path)) },
+  { key: "inPath", label: "In path", help: "Inside our corridor, and how probable its sightings so far make that: yes from 50 % on", words: inPath, by: (o) => -(o.in_path_probability ?? Number(o.in_path)) },
   { key: "hits", label: "Hits", help: "Sightings so far", words: (o) => String(o.hits), by: (o) => -o.hits },
   { key: "points", label: "Points", help: "LiDAR points on it", words: (o) => (o.lidar_points ? String(o.lidar_points) : DASH), by: (o) => -o.lidar_points },
 ];

@@ -115,7 +115,7 @@ def test_in_path_is_relative_to_a_curved_path() -> None:
     assert on_arc.in_path
     assert not straight.in_path
     assert straight.path_offset_m == pytest.approx(-4.0, abs=0.2)
-    assert on_arc.in_path_probability > 0.8 > 0.1 > straight.in_path_probability  # type: ignore[operator]
+    assert on_arc.in_path_probability > 0.6 > 0.4 > straight.in_path_probability  # type: ignore[operator]
 
 
 @given(st.lists(st.tuples(st.floats(1, 90), st.floats(-6, 6), st.sampled_from(["V", "L", "VL"]), st.integers(1, 5))))
@@ -217,7 +217,8 @@ def test_where_the_path_is_not_known_nobody_new_leads() -> None:
     (item,), lead, _, (why,) = choose(CipvState(), (fused(1, 40.0),), vague, None, None, PARAMS)[1]
     assert lead is None
     assert why.reason == "its place against the path is uncertain by 5.0 m"
-    assert item.in_path_probability == pytest.approx(0.24, abs=0.02)
+    assert item.in_path
+    assert item.in_path_probability == pytest.approx(0.51, abs=0.01)
     assert choose(CipvState(1), (fused(1, 40.0),), vague, None, None, PARAMS)[1].lead is not None, "who led may stay"
     unusable = dataclasses.replace(PATH, usable=False, profile_m=np.full(len(PATH.center), 1.5))
     assert choose(CipvState(), (fused(1, 40.0),), unusable, None, None, PARAMS)[1].lead is None
