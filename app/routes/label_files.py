@@ -26,7 +26,12 @@ from pipeline.labels.formats.parts import reduce
 from pipeline.labels.formats.registry import FORMATS
 
 IMPORT = "/api/labels/import"
-_FILE = file_of("application/octet-stream")
+_BYTES = "application/octet-stream"
+_FILE = file_of(_BYTES)
+_TAKES_A_FILE = {
+    "requestBody": {"required": True, "content": {_BYTES: {"schema": {"type": "string", "format": "binary"}}}}
+}
+"""In OpenAPI's words: the body is read piece by piece, so the framework does not see that there is one."""
 VersionName = Annotated[str, Query(max_length=LONGEST_NAME, pattern=VERSION_NAME)]
 
 
@@ -34,7 +39,7 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
     """Routes over files of labels."""
     router = APIRouter(prefix="/api/labels", tags=["labels"])
 
-    @router.post("/import", status_code=202, responses={202: {"model": TaskBegun}})
+    @router.post("/import", status_code=202, responses={202: {"model": TaskBegun}}, openapi_extra=_TAKES_A_FILE)
     async def take(
         request: Request,
         person: Annotated[Person, Query()],
@@ -67,7 +72,7 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         return FileResponse(
             made.file,
             filename=made.file.name,
-            media_type="application/octet-stream",
+            media_type=_BYTES,
             headers={"x-cipv-lost": str(len(made.lost))},
             background=BackgroundTask(shutil.rmtree, made.folder, ignore_errors=True),
         )

@@ -4,6 +4,7 @@ path traverser, the endless upload, and a display that wants to be more."""
 from __future__ import annotations
 
 import http.client
+import tempfile
 from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -16,8 +17,9 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import connect
 
 from app.engine import Engine
-from app.limits import LARGEST_BODY
+from app.limits import LARGEST_BODY, LARGEST_FILE
 from app.recording import RecordingDesk
+from app.routes.label_files import IMPORT
 from app.server import create_app
 from app.tokens import Tokens
 from tests.app.serving import WAIT_S, running, serving
@@ -239,26 +241,39 @@ def test_no_name_in_an_address_becomes_a_path(app: FastAPI, address: str, visito
 # ------------------------------------------------------------ the endless upload
 
 
-def test_nothing_can_be_uploaded(app: FastAPI):
-    kinds = {
-        kind
-        for methods in app.openapi()["paths"].values()
+def test_files_can_be_uploaded_in_one_place(app: FastAPI):
+    files = {
+        (path, kind)
+        for path, methods in app.openapi()["paths"].items()
         for operation in methods.values()
         for kind in operation.get("requestBody", {}).get("content", {})
+        if kind != "application/json"
     }
-    assert kinds == {"application/json"}
+    assert files == {(IMPORT, "application/octet-stream")}
 
 
 def _resident_bytes() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
 
-def test_ten_gigabytes_in_pieces_are_cut_off(address: str, visitor: Visitor):
+ENDLESS = {
+    # path, the most that is taken
+    "parameters": ("/api/params", LARGEST_BODY),
+    "a file of labels": (f"{IMPORT}?person=Ada&drive=any", LARGEST_FILE),
+}
+
+
+@pytest.mark.parametrize("name", ENDLESS)
+def test_ten_gigabytes_in_pieces_are_cut_off(
+    address: str, visitor: Visitor, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))  # where the server keeps what has come
+    path, largest = ENDLESS[name]
     cookie = "; ".join(f"{k}={v}" for k, v in visitor("person").cookies.items())
     connection = http.client.HTTPConnection(urlsplit(address).netloc, timeout=WAIT_S)
-    connection.putrequest("POST", "/api/params")
-    for name, value in {"cookie": cookie, "content-type": "application/json", "transfer-encoding": "chunked"}.items():
-        connection.putheader(name, value)
+    connection.putrequest("POST", path)
+    for header, value in {"cookie": cookie, "content-type": "application/json", "transfer-encoding": "chunked"}.items():
+        connection.putheader(header, value)
     connection.endheaders()
     block, sent, before = b" " * (1 << 20), 0, _resident_bytes()
     try:
@@ -268,19 +283,23 @@ def test_ten_gigabytes_in_pieces_are_cut_off(address: str, visitor: Visitor):
     except OSError:
         pass  # the server has hung up
     connection.close()
-    assert sent < 64 << 20, "cut off within what the system's buffers hold"
+    assert largest <= sent + len(block), "nothing that may come was cut off"
+    assert sent < largest + (64 << 20), "cut off within what the system's buffers hold"
     assert _resident_bytes() - before < 64 << 20
+    assert list(tmp_path.iterdir()) == [], "what came of it is thrown away"
     assert visitor("person").get("/api/state").status_code == 200
 
 
-def test_a_length_beyond_the_limit_is_refused_before_a_byte_of_it(address: str, visitor: Visitor):
+@pytest.mark.parametrize("name", ENDLESS)
+def test_a_length_beyond_the_limit_is_refused_before_a_byte_of_it(address: str, visitor: Visitor, name: str):
+    path, largest = ENDLESS[name]
     cookie = "; ".join(f"{k}={v}" for k, v in visitor("person").cookies.items())
-    for length in (str(10 << 30), str(LARGEST_BODY + 1)):
+    for length in (str(10 << 30), str(largest + 1)):
         connection = http.client.HTTPConnection(urlsplit(address).netloc, timeout=WAIT_S)
-        connection.request("POST", "/api/params", headers={"cookie": cookie, "content-length": length})
+        connection.request("POST", path, headers={"cookie": cookie, "content-length": length})
         answer = connection.getresponse()
         assert answer.status == 413
-        assert b"1 MiB at most" in answer.read()
+        assert f"{largest >> 20} MiB at most" in answer.read().decode()
         connection.close()
 
 
