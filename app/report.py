@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from html import escape
 
 from app.svg import chart_svg
-from pipeline.evaluation.experiments.sections import Cell, Coloured, Linked, Section, Table
+from pipeline.evaluation.experiments.sections import AnyCell, Cell, Coloured, Driven, Linked, Section, Table
 
 _STYLE = """
 :root { color-scheme: light dark; --ground: #fff; --ink: #1b2024; --soft: #5d6870; --edge: #d8dee2; --raised: #f4f6f7;
@@ -58,6 +58,7 @@ def section_html(section: Section, replays: str = "") -> str:
     return (
         f'<section id="{escape(section.name)}"><h2>{escape(section.title)}</h2>'
         + "".join(f"<p>{escape(paragraph)}</p>" for paragraph in section.text)
+        + (f'<p><a href="{escape(replays)}index.html#{escape(section.name)}">Every drive</a></p>' if replays else "")
         + "".join(_table(table, replays) for table in section.tables)
         + f'<div class="charts">{"".join(chart_svg(chart) for chart in section.charts)}</div></section>'
     )
@@ -74,10 +75,12 @@ def _table(table: Table, replays: str) -> str:
     return f'<h3>{escape(table.title)}</h3><div class="wide"><table>{caption}<tr>{head}</tr>{rows}</table></div>'
 
 
-def _cell(cell: Cell | Coloured | Linked, decimals: int, replays: str) -> str:
+def _cell(cell: AnyCell, decimals: int, replays: str) -> str:
     if isinstance(cell, Linked):
         return f'<td class="word"><a href="{escape(cell.href)}">{escape(in_words(cell.value, decimals))}</a></td>'
-    value, tone, replay = (cell.value, cell.tone, cell.replay) if isinstance(cell, Coloured) else (cell, "", "")
+    value = cell.value if isinstance(cell, Coloured | Driven) else cell
+    tone = cell.tone if isinstance(cell, Coloured) else ""
+    replay = cell.replay if isinstance(cell, Coloured | Driven) else ""
     kind = "word" if isinstance(value, str) and not tone else tone
     text = escape(in_words(value, decimals))
     if replay and replays:

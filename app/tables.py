@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table as RichTable
 
 from app.report import in_words
-from pipeline.evaluation.experiments.sections import Coloured, Linked, Section
+from pipeline.evaluation.experiments.sections import Coloured, Driven, Linked, Section
 
 _FILE_WIDTH = 160
 """Columns of a table that goes to a file or a pipe."""
@@ -24,6 +24,6 @@ def show(sections: Iterable[Section]) -> None:
         for table in section.tables:
             shown = RichTable(*table.columns, title=table.title, caption=table.caption or None)
             for row in table.rows:
-                values = (cell.value if isinstance(cell, Coloured | Linked) else cell for cell in row)
+                values = (cell.value if isinstance(cell, Coloured | Driven | Linked) else cell for cell in row)
                 shown.add_row(*(in_words(value, table.decimals) for value in values))
             console.print(shown)

@@ -30,7 +30,7 @@ class Scenarios:
     what: tyro.conf.Positional[Literal["run"]]
     """What to do: drive them"""
     suite: str = "paper"
-    """paper, euroncap, iso, all, or the name of one experiment"""
+    """paper, curves, euroncap, iso, all, or the name of one experiment"""
     short: bool = False
     """A few cases of each only: seconds instead of minutes"""
     jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 0
@@ -38,7 +38,7 @@ class Scenarios:
     report: Path | None = None
     """Write an HTML file with tables and charts"""
     drives: Path | None = None
-    """Keep the closed-loop drives in this folder: each opens as sim:<file>, and the report's cells link to them"""
+    """Keep every drive in this folder, listed in its index.html and linked from the report; each opens as sim:<file>"""
     json: bool = False
     """Print the figures as JSON"""
 
@@ -55,6 +55,8 @@ class Scenarios:
             sections = run_all(
                 experiments, self.short, self.jobs, lambda: progress.advance(bar), folder.keep if folder else None
             )
+        if folder is not None:
+            folder.list_all()
         if self.report is not None:
             drives = folder.link_from(self.report) if folder else ""
             self.report.write_text(html(sections, f"Experiments: {self.suite}", drives), encoding="utf-8")

@@ -15,7 +15,18 @@ from statistics import mean
 from typing import Literal
 
 from pipeline.evaluation.experiments.network import embedded
-from pipeline.evaluation.experiments.sections import Boxes, Chart, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.experiments.sections import (
+    GIVEN,
+    AnyCell,
+    Boxes,
+    Chart,
+    Driven,
+    Experiment,
+    Replay,
+    Section,
+    Series,
+    Table,
+)
 from pipeline.evaluation.experiments.track import Drive, approach, drive_charts, parameters, scene
 from pipeline.params import Params
 from pipeline.run import Sensors
@@ -84,6 +95,12 @@ class Case:
         """What runs that differ by their seed alone have in common."""
         return self.manoeuvre, self.sensors, self.controller, self.boxes
 
+    @property
+    def name(self) -> str:
+        """Fit for a file."""
+        controller = self.controller.replace(" + ", "+")
+        return f"{self.manoeuvre}_{SENSORS[self.sensors]}_{controller}_{self.boxes}_{self.seed}".lower()
+
 
 def cases(short: bool) -> list[Case]:
     manoeuvres: tuple[Manoeuvre, ...] = ("CCRs",) if short else ("CCRs", "CCRm", "CCRb")
@@ -118,18 +135,18 @@ def _params(case: Case) -> Params:
 
 def replay(case: Case, drive: Drive) -> Replay:
     """The drive of one run."""
-    controller, sensors = case.controller.replace(" + ", "+"), SENSORS[case.sensors]
-    title = f"{case.manoeuvre}: {sensors}, {case.controller}, run {case.seed}"
+    boxes = ", network" if case.boxes == "network" else ""
+    title = f"{case.manoeuvre}: {SENSORS[case.sensors]}, {case.controller}{boxes}, run {case.seed}"
     impact = f"Impact at {drive.impact_mps / KMH:.0f} km/h." if drive.impact_mps is not None else "No impact."
     return Replay(
-        f"{case.manoeuvre}_{sensors}_{controller}_{case.boxes}_{case.seed}".lower(),
+        case.name,
         title,
         (impact, f"Smallest gap {drive.smallest_gap_m:.1f} m."),
         as_driven(_scenario(case), drive.motions, title),
         _params(case),
         case.sensors,
-        case.boxes,
         drive_charts(drive),
+        GIVEN if case.boxes == "truth" else None,
     )
 
 
@@ -150,15 +167,15 @@ def _target(manoeuvre: Manoeuvre, speed_mps: float) -> tuple[dict[str, object], 
 def report(cases: Sequence[Case], drives: Sequence[Drive]) -> Section:
     done = list(zip(cases, drives, strict=True))
     groups = dict.fromkeys(case.key for case in cases)
-    rows = [_row(key, [drive for case, drive in done if case.key == key]) for key in groups]
+    rows = [_row(key, {case.name: drive for case, drive in done if case.key == key}) for key in groups]
     manoeuvres = list(dict.fromkeys(case.manoeuvre for case in cases))
     return Section(
         "braking",
         "Braking: CCRs, CCRm and CCRb in the closed loop",
         (
-            "Means over the runs; the smallest gap and the impact are the worst. Impact speed is relative to the "
-            "target. Boxes: whose the camera's are, projected truth with a detector's errors or the embedded network's "
-            "on drawn pictures.",
+            "Means over the runs; the smallest gap and the impact are the worst, and lead to that drive. Impact speed "
+            "is relative to the target. Boxes: whose the camera's are, projected truth with a detector's errors or the "
+            "embedded network's on drawn pictures.",
             *(_verdict(manoeuvre, done) for manoeuvre in manoeuvres),
         ),
         (Table("Drives", _COLUMNS, tuple(rows)), closed_forms()),
@@ -183,7 +200,9 @@ _COLUMNS = (
 )
 
 
-def _row(key: Key, drives: list[Drive]) -> tuple[str | float | int | None, ...]:
+def _row(key: Key, by_name: dict[str, Drive]) -> tuple[AnyCell, ...]:
+    drives = list(by_name.values())
+    worst = max(by_name, key=lambda name: (by_name[name].impact_mps or 0.0, -by_name[name].smallest_gap_m))
     impacts = [drive.impact_mps / KMH for drive in drives if drive.impact_mps is not None]
     return (
         key[0],
@@ -196,9 +215,9 @@ def _row(key: Key, drives: list[Drive]) -> tuple[str | float | int | None, ...]:
         _mean(drive.mean_decel_mps2() for drive in drives),
         max(drive.peak_decel_mps2() for drive in drives),
         max(drive.peak_jerk_mps3() for drive in drives),
-        min(drive.smallest_gap_m for drive in drives),
+        Driven(min(drive.smallest_gap_m for drive in drives), worst),
         len(impacts),
-        max(impacts, default=None),
+        Driven(max(impacts, default=None), worst),
     )
 
 

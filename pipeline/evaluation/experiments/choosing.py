@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.evaluation.experiments.sections import Cell, Chart, Experiment, Section, Series, Table
+from pipeline.evaluation.experiments.sections import AnyCell, Chart, Driven, Experiment, Replay, Section, Series, Table
 from pipeline.evaluation.lead import switches
 from pipeline.params import CipvParams, Params, PathParams
 from pipeline.path.corridor import nearest_on_path
@@ -54,6 +54,11 @@ class Case:
     sensors: Sensors
     seed: int
 
+    @property
+    def name(self) -> str:
+        """Fit for a file."""
+        return f"choosing_{self.scene}_{SENSORS[self.sensors]}_{self.seed}".lower()
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -73,8 +78,7 @@ def cases(short: bool) -> list[Case]:
 
 
 def run(case: Case) -> list[Frame]:
-    scene = scenario.load(case.scene)
-    scene = scene.model_copy(update={"seed": scene.seed + 100 * case.seed})
+    scene = _scenario(case)
     setup = Setup(Params(), case.sensors, closed=False)
     way, in_sight, frames = Way.of(scene), InSight(), []
     for tick in drive(scene, setup):
@@ -84,6 +88,25 @@ def run(case: Case) -> list[Frame]:
         is_new = frame.verdict == "missed" and frame.lead is not None and not in_sight.is_confirmable(frame.lead)
         frames.append(replace(frame, verdict="new") if is_new else frame)
     return frames
+
+
+def _scenario(case: Case) -> Scenario:
+    scene = scenario.load(case.scene)
+    return scene.model_copy(update={"seed": scene.seed + 100 * case.seed})
+
+
+def replay(case: Case, frames: list[Frame]) -> Replay:
+    """The drive of one run."""
+    counted = sum(frame.verdict not in UNDECIDABLE for frame in frames)
+    return Replay(
+        case.name,
+        f"{SCENARIOS[case.scene].capitalize()}: {SENSORS[case.sensors]}, run {case.seed}",
+        (f"Right in {100.0 * _share_correct([frames]):.1f} % of {counted} decidable frames.",),
+        _scenario(case),
+        Params(),
+        case.sensors,
+        (_chart(case.scene, {(case.scene, case.sensors): [frames]}),),
+    )
 
 
 def judge(way: Way, tick: Tick, in_sight: InSight) -> Frame:
@@ -214,12 +237,21 @@ def acquired_m(frames: Sequence[Frame]) -> list[float]:
 
 def report(cases: Sequence[Case], runs: Sequence[list[Frame]]) -> Section:
     scenes = list(dict.fromkeys(case.scene for case in cases))
+    by_name = {case.name: _share_correct([run]) for case, run in zip(cases, runs, strict=True)}
     groups = {
         (scene, sensors): [
             run for case, run in zip(cases, runs, strict=True) if (case.scene, case.sensors) == (scene, sensors)
         ]
         for scene in scenes
         for sensors in SENSORS
+    }
+    worst = {
+        (scene, sensors): min(
+            (case.name for case in cases if (case.scene, case.sensors) == (scene, sensors)),
+            key=lambda name: by_name[name],
+            default="",
+        )
+        for scene, sensors in groups
     }
     return Section(
         "choosing",
@@ -232,7 +264,15 @@ def report(cases: Sequence[Case], runs: Sequence[list[Frame]]) -> Section:
             "paper's was a map's, placed by simulated RTK GNSS, fused with the yaw rate.",
             *(_verdict(scene, groups) for scene in scenes),
         ),
-        (Table("Frames", _COLUMNS, tuple(_row(*key, group) for key, group in groups.items()), decimals=1),),
+        (
+            Table(
+                "Frames",
+                _COLUMNS,
+                tuple(_row(scene, sensors, group, worst[scene, sensors]) for (scene, sensors), group in groups.items()),
+                "The share leads to the run with the least.",
+                decimals=1,
+            ),
+        ),
         tuple(_chart(scene, groups) for scene in scenes),
         tuple(
             f"{SCENARIOS[scene].capitalize()}: fused is not right in every decidable frame"
@@ -257,7 +297,7 @@ _COLUMNS = (
 )
 
 
-def _row(scene: str, sensors: Sensors, runs: list[list[Frame]]) -> tuple[Cell, ...]:
+def _row(scene: str, sensors: Sensors, runs: list[list[Frame]], worst: str) -> tuple[AnyCell, ...]:
     frames = [frame for run in runs for frame in run if frame.verdict not in UNDECIDABLE]
     count = {verdict: sum(frame.verdict == verdict for frame in frames) for verdict in ("missed", "false", "wrong")}
     first = [distance for run in runs for distance in acquired_m(run)]
@@ -265,7 +305,7 @@ def _row(scene: str, sensors: Sensors, runs: list[list[Frame]]) -> tuple[Cell, .
         SCENARIOS[scene],
         SENSORS[sensors],
         len(frames),
-        100.0 * _share_correct(runs),
+        Driven(100.0 * _share_correct(runs), worst),
         *count.values(),
         sum(frame.lead is not None for frame in frames),
         sum(first) / len(first) if first else None,
@@ -299,4 +339,4 @@ def _chart(scene: str, groups: dict[tuple[str, Sensors], list[list[Frame]]]) -> 
     return Chart(f"{SCENARIOS[scene].capitalize()}: distance of the CIPV", "time s", "distance m", tuple(lines))
 
 
-CHOOSING = Experiment("choosing", "paper", "Choosing the CIPV", cases, run, report)
+CHOOSING = Experiment("choosing", "paper", "Choosing the CIPV", cases, run, report, replay)

@@ -17,9 +17,11 @@ from typing import Literal
 import numpy as np
 
 from pipeline.evaluation.experiments import bends
-from pipeline.evaluation.experiments.curve_drives import LIDAR_ALONE, Frames, driven
-from pipeline.evaluation.experiments.sections import Cell, Experiment, Section, Table
-from pipeline.params import CipvParams
+from pipeline.evaluation.experiments.curve_drives import BOXES, LIDAR_ALONE, LINES, SOURCES, Frames, driven
+from pipeline.evaluation.experiments.sections import Cell, Chart, Experiment, Replay, Section, Series, Table
+from pipeline.params import CipvParams, Params
+from pipeline.simulation.detection_model import Detections
+from pipeline.simulation.scenario import Scenario
 
 LONGEST_WRONG_S = 0.3
 
@@ -45,10 +47,44 @@ def cases(short: bool) -> list[Case]:
 
 def run(case: Case) -> Outcome:
     layout = bends.LAYOUTS[case.layout]
-    if case.kind == "cut_in":
-        scene, over_line_s = bends.cut_in(layout, case.seed)
-        return driven(scene, layout.reach_m, ("fused",), over_line_s)
-    return driven(bends.scenario(layout, case.seed), layout.reach_m)
+    scene, over_line_s = _scenario(case)
+    names = ("fused",) if case.kind == "cut_in" else tuple(SOURCES)
+    return driven(scene, layout.reach_m, names, over_line_s)
+
+
+def _scenario(case: Case) -> tuple[Scenario, float | None]:
+    """And when the wheel of who cuts in is over the line."""
+    layout = bends.LAYOUTS[case.layout]
+    return bends.cut_in(layout, case.seed) if case.kind == "cut_in" else (bends.scenario(layout, case.seed), None)
+
+
+def replay(case: Case, outcome: Outcome) -> Replay:
+    """The drive with all sources of the path fused."""
+    fused = outcome["fused"]
+    share, frames = share_right([fused])
+    return Replay(
+        f"curves_{case.kind}_{case.layout}_{case.seed}",
+        f"{bends.LAYOUTS[case.layout].title}: {'cut-in' if case.kind == 'cut_in' else 'following'}, run {case.seed}",
+        (f"All sources of the path fused: right in {100.0 * share:.1f} % of {frames} decidable frames.",),
+        _scenario(case)[0],
+        Params(),
+        "both",
+        (_lead_chart(fused),),
+        Detections(boxes=BOXES, lines=LINES),
+    )
+
+
+def _lead_chart(drive: Frames) -> Chart:
+    """The true lead's range, by whether it was chosen."""
+    series = []
+    for name, verdicts in (("right", ("right",)), ("not", ("missed", "decoy")), ("not decidable", ("undecided",))):
+        seen = [
+            (t_s, metres)
+            for t_s, verdict, metres in zip(drive.t_s, drive.verdicts, drive.lead_m, strict=True)
+            if verdict in verdicts and metres is not None
+        ]
+        series.append(Series(name, tuple(t_s for t_s, _ in seen), tuple(m for _, m in seen), points_only=True))
+    return Chart("Range of the true lead", "time s", "range m", tuple(series))
 
 
 def share_right(drives: Sequence[Frames], reach_m: float = np.inf) -> tuple[float, int]:
@@ -200,4 +236,4 @@ def _verdict(layout: str, by_source: dict[str, list[Frames]]) -> str:
     )
 
 
-CURVES = Experiment("curves", "curves", "Curves", cases, run, report)
+CURVES = Experiment("curves", "curves", "Curves", cases, run, report, replay)

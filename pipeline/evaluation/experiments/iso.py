@@ -12,10 +12,22 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Any, Literal, NamedTuple
 
-from pipeline.evaluation.experiments.sections import Cell, Chart, Coloured, Experiment, Section, Series, Table
+from pipeline.evaluation.experiments.sections import (
+    AnyCell,
+    Chart,
+    Coloured,
+    Experiment,
+    Replay,
+    Section,
+    Series,
+    Table,
+)
 from pipeline.evaluation.experiments.track import TARGET, gap_m, measured_m, parameters, target_of, true_range_m
+from pipeline.params import Params
 from pipeline.run import Sensors
+from pipeline.simulation.actors import Motion
 from pipeline.simulation.loop import Setup, drive
+from pipeline.simulation.replay import as_driven
 from pipeline.simulation.scenario import Scenario
 
 Test = Literal["acquisition", "discrimination", "curve", "stop", "following"]
@@ -40,12 +52,21 @@ class Case:
     sensors: Sensors
     seed: int
 
+    @property
+    def at(self) -> str:
+        return f"R = {self.value:g} m" if self.test == "curve" else f"{self.value:g} km/h"
+
+    @property
+    def name(self) -> str:
+        """Fit for a file."""
+        return f"iso_{self.test}_{self.value:g}_{SENSORS[self.sensors]}_{self.seed}".lower()
+
 
 @dataclass(frozen=True)
 class Outcome:
     """acquired_m: range when the lead first was the CIPV, null if never. kept: share of the frames from then on in
     which it was. smallest_gap_m: range to the lead. smallest_time_gap_s: that over own speed, while driving; null when
-    it never drove. touched: there was contact. t_s, range_m, speed_mps: each tick."""
+    it never drove. touched: there was contact. t_s, range_m, speed_mps, motions of the ego vehicle: each tick."""
 
     acquired_m: float | None
     kept: float
@@ -55,6 +76,7 @@ class Outcome:
     t_s: tuple[float, ...]
     range_m: tuple[float, ...]
     speed_mps: tuple[float, ...]
+    motions: tuple[Motion, ...] = ()
 
 
 def cases(short: bool) -> list[Case]:
@@ -81,29 +103,58 @@ def cases(short: bool) -> list[Case]:
 
 def run(case: Case) -> Outcome:
     scenario = _scenario(case)
-    speed = max(scenario.ego.speed_mps.values())
-    params = parameters("ACC", speed, {"acc.brake_limit_mps2": ACC_BRAKE_MPS2})
     rows: list[_Row] = []
     touched = False
-    for tick in drive(scenario, Setup(params, case.sensors)):
+    for tick in drive(scenario, Setup(_params(scenario), case.sensors)):
         target = target_of(tick)
         touched = case.test != "curve" and gap_m(target) <= 0.0
         if touched:
             break
         counted = case.test != "curve" or tick.world.s_m >= _BEND_FROM_M
         seen = measured_m(tick, target) is not None
-        rows.append(_Row(tick.t_s, true_range_m(target), tick.vehicle.speed_mps, seen, counted))
+        rows.append(_Row(tick.t_s, true_range_m(target), tick.vehicle.speed_mps, seen, counted, tick.vehicle.motion()))
     return _outcome(rows, touched)
 
 
+def _params(scenario: Scenario) -> Params:
+    speed = max(scenario.ego.speed_mps.values())
+    return parameters("ACC", speed, {"acc.brake_limit_mps2": ACC_BRAKE_MPS2})
+
+
+def replay(case: Case, outcome: Outcome) -> Replay:
+    """The drive of one run."""
+    scenario = _scenario(case)
+    title = f"{case.test.capitalize()}, {case.at}: {SENSORS[case.sensors]}, run {case.seed}"
+    seen_m, gap_s = outcome.acquired_m, outcome.smallest_time_gap_s
+    return Replay(
+        case.name,
+        title,
+        (
+            "Passed." if passed(outcome) else "Not passed.",
+            "Never acquired." if seen_m is None else f"Acquired at {seen_m:.1f} m, kept in {100 * outcome.kept:.0f} %.",
+            "Contact." if outcome.touched else f"Smallest gap {outcome.smallest_gap_m:.1f} m.",
+            *([f"Smallest time gap {gap_s:.2f} s."] if gap_s is not None else []),
+        ),
+        as_driven(scenario, outcome.motions, title),
+        _params(scenario),
+        case.sensors,
+        (
+            Chart("Range to the lead", "time s", "range m", (Series("true", outcome.t_s, outcome.range_m),)),
+            Chart("Speed", "time s", "m/s", (Series("own", outcome.t_s, outcome.speed_mps),)),
+        ),
+    )
+
+
 class _Row(NamedTuple):
-    """One tick. seen: the lead is the CIPV. counted: the tick counts for whether it is kept."""
+    """One tick. seen: the lead is the CIPV. counted: the tick counts for whether it is kept. motion: the ego
+    vehicle's."""
 
     t_s: float
     range_m: float
     speed_mps: float
     seen: bool
     counted: bool
+    motion: Motion
 
 
 def _outcome(rows: list[_Row], touched: bool) -> Outcome:
@@ -119,6 +170,7 @@ def _outcome(rows: list[_Row], touched: bool) -> Outcome:
         t_s=tuple(row.t_s for row in rows),
         range_m=tuple(row.range_m for row in rows),
         speed_mps=tuple(row.speed_mps for row in rows),
+        motions=tuple(row.motion for row in rows),
     )
 
 
@@ -174,9 +226,11 @@ def _drive(
 
 def report(cases: Sequence[Case], outcomes: Sequence[Outcome]) -> Section:
     groups: dict[tuple[Test, float, Sensors], list[Outcome]] = {}
+    names: dict[tuple[Test, float, Sensors], list[Case]] = {}
     for case, outcome in zip(cases, outcomes, strict=True):
         groups.setdefault((case.test, case.value, case.sensors), []).append(outcome)
-    rows = tuple(_row(*key, group) for key, group in groups.items())
+        names.setdefault((case.test, case.value, case.sensors), []).append(case)
+    rows = tuple(_row(names[key], group) for key, group in groups.items())
     return Section(
         "iso",
         "ACC after the manner of ISO 15622",
@@ -206,20 +260,23 @@ _COLUMNS = (
 )
 
 
-def _row(test: Test, value: float, sensors: Sensors, group: list[Outcome]) -> tuple[Cell | Coloured, ...]:
+def _row(cases: list[Case], group: list[Outcome]) -> tuple[AnyCell, ...]:
+    """The runs of one test with one set of sensors; its last cell leads to the first that did not pass."""
+    first = cases[0]
+    shown = next((case for case, each in zip(cases, group, strict=True) if not passed(each)), first)
     acquired = [each.acquired_m for each in group if each.acquired_m is not None]
     gaps = [each.smallest_time_gap_s for each in group if each.smallest_time_gap_s is not None]
     good = all(passed(each) for each in group)
     return (
-        test,
-        f"R = {value:g} m" if test == "curve" else f"{value:g} km/h",
-        SENSORS[sensors],
+        first.test,
+        first.at,
+        SENSORS[first.sensors],
         len(group),
         sum(acquired) / len(acquired) if acquired else None,
         100.0 * sum(each.kept for each in group) / len(group),
         min(each.smallest_gap_m for each in group),
         min(gaps, default=None),
-        Coloured("yes" if good else "no", "green" if good else "red"),
+        Coloured("yes" if good else "no", "green" if good else "red", shown.name),
     )
 
 
@@ -256,4 +313,4 @@ def _chart(test: Test, value: float, groups: dict[tuple[Test, float, Sensors], l
     return Chart(f"{test}, {name}: range to the lead", "time s", "range m", lines)
 
 
-ISO = Experiment("iso", "iso", "ACC after the manner of ISO 15622", cases, run, report)
+ISO = Experiment("iso", "iso", "ACC after the manner of ISO 15622", cases, run, report, replay)

@@ -14,7 +14,17 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from pipeline.evaluation.experiments.network import embedded
-from pipeline.evaluation.experiments.sections import Boxes, Cell, Coloured, Experiment, Replay, Section, Table, Tone
+from pipeline.evaluation.experiments.sections import (
+    GIVEN,
+    Boxes,
+    Cell,
+    Coloured,
+    Experiment,
+    Replay,
+    Section,
+    Table,
+    Tone,
+)
 from pipeline.evaluation.experiments.track import Drive, approach, drive_charts, parameters, scene
 from pipeline.params import Params
 from pipeline.run import Sensors
@@ -162,8 +172,8 @@ def replay(case: Case, result: Result) -> Replay:
         as_driven(_scenario(case), result.drive.motions, title),
         _params(case),
         case.sensors,
-        case.boxes,
         drive_charts(result.drive),
+        GIVEN if case.boxes == "truth" else None,
     )
 
 

@@ -14,10 +14,10 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.evaluation.experiments.layouts import LAYOUTS, Case, cases, scenario
-from pipeline.evaluation.experiments.sections import Chart, Experiment, Section, Series, Table
+from pipeline.evaluation.experiments.sections import Chart, Experiment, Replay, Section, Series, Table
 from pipeline.evaluation.experiments.track import TARGET, true_range_m
 from pipeline.geometry import closest_on_polygon, transform
-from pipeline.params import DistanceParams, preset
+from pipeline.params import DistanceParams, Params, preset
 from pipeline.simulation import truth_boxes, world
 from pipeline.simulation.camera import calibration
 from pipeline.simulation.detection_model import BoxNoise
@@ -49,6 +49,19 @@ def run(case: Case) -> list[Sample]:
                 height = height_at_reference(box, float(camera.K[1, 1]), DistanceParams())
                 samples.append(Sample(height, _depth_m(target, camera), true_range_m(target)))
     return samples
+
+
+def replay(case: Case, samples: list[Sample]) -> Replay:
+    """The drive of one run."""
+    return Replay(
+        f"regression_{case.layout}_{case.seed}",
+        f"Distance from box height: {LAYOUTS[case.layout]}, run {case.seed}",
+        (f"{len(samples)} boxes.",),
+        scenario(case),
+        Params(),
+        "camera",
+        (Chart("Box height and depth", "box height px", "depth m", (_points(samples),)),),
+    )
 
 
 def _depth_m(target: world.ActorState, camera: CameraCalibration) -> float:
@@ -169,4 +182,4 @@ def _by_bin(layout: str, samples: list[Sample], law: PowerLaw) -> Series:
     return Series(LAYOUTS[layout], tuple(middles), tuple(means))
 
 
-REGRESSION = Experiment("regression", "paper", "Distance from box height", cases, run, report)
+REGRESSION = Experiment("regression", "paper", "Distance from box height", cases, run, report, replay)

@@ -21,6 +21,7 @@ from pipeline.evaluation.experiments.regression import REGRESSION
 from pipeline.evaluation.experiments.sections import Experiment, Replay, Section
 
 EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, CURVES, BRAKING, NCAP, ISO)
+Keep = Callable[[Experiment[Any, Any], Replay], None]
 SUITES = ("paper", "curves", "euroncap", "iso", "all")
 
 
@@ -32,7 +33,7 @@ def of_suite(suite: str) -> tuple[Experiment[Any, Any], ...]:
     """The experiments of a suite, or the one of that name. NoSuchSuite when there is neither."""
     found = tuple(each for each in EXPERIMENTS if suite in ("all", each.suite, each.name))
     if not found:
-        names = ", ".join((*SUITES, *(each.name for each in EXPERIMENTS)))
+        names = ", ".join(dict.fromkeys((*SUITES, *(each.name for each in EXPERIMENTS))))
         raise NoSuchSuite(f"no suite or experiment named {suite!r}; there are {names}")
     return found
 
@@ -46,10 +47,10 @@ def run_all(
     short: bool = False,
     jobs: int = 0,
     done: Callable[[], None] = lambda: None,
-    keep: Callable[[Replay], None] | None = None,
+    keep: Keep | None = None,
 ) -> list[Section]:
     """Each experiment's report. jobs: processes; 0 is one a core, 1 none but this one. ``done`` is called after every
-    case, ``keep`` with every drive that can be seen again."""
+    case, ``keep`` with every drive."""
     jobs = jobs or os.cpu_count() or 1
     if jobs == 1:
         return [_reported(each, short, map(each.run, each.cases(short)), done, keep) for each in experiments]
@@ -66,13 +67,13 @@ def _reported(
     short: bool,
     outcomes: Iterable[Any],
     done: Callable[[], None],
-    keep: Callable[[Replay], None] | None,
+    keep: Keep | None,
 ) -> Section:
     """The report of outcomes that come one by one, in the order of the cases."""
     cases, got = experiment.cases(short), []
     for case, outcome in zip(cases, outcomes, strict=True):
         got.append(outcome)
-        if keep is not None and experiment.replay is not None:
-            keep(experiment.replay(case, outcome))
+        if keep is not None:
+            keep(experiment, experiment.replay(case, outcome))
         done()
     return experiment.report(cases, got)

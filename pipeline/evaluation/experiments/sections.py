@@ -8,6 +8,7 @@ from typing import Any, Generic, Literal, TypeVar
 
 from pipeline.params import Params
 from pipeline.run import Sensors
+from pipeline.simulation.detection_model import BoxNoise, Detections
 from pipeline.simulation.scenario import Scenario
 
 Suite = Literal["paper", "curves", "euroncap", "iso"]
@@ -15,6 +16,7 @@ Tone = Literal["green", "yellow", "orange", "brown", "red", "grey"]
 Boxes = Literal["truth", "network"]
 """Whose the camera's boxes are: projected truth with a detector's errors, or the embedded network's on drawn
 pictures."""
+GIVEN = Detections(boxes=BoxNoise())
 Cell = str | float | int | None
 
 
@@ -29,11 +31,22 @@ class Coloured:
 
 
 @dataclass(frozen=True)
+class Driven:
+    """A cell with the drive behind it, by the name of its ``Replay``."""
+
+    value: Cell
+    replay: str
+
+
+@dataclass(frozen=True)
 class Linked:
     """A cell that leads somewhere: href is a whole address."""
 
     value: Cell
     href: str
+
+
+AnyCell = Cell | Coloured | Driven | Linked
 
 
 @dataclass(frozen=True)
@@ -42,7 +55,7 @@ class Table:
 
     title: str
     columns: tuple[str, ...]
-    rows: tuple[tuple[Cell | Coloured | Linked, ...], ...]
+    rows: tuple[tuple[AnyCell, ...], ...]
     caption: str = ""
     decimals: int = 2
 
@@ -80,8 +93,8 @@ class Section:
 
 @dataclass(frozen=True)
 class Replay:
-    """A drive that can be seen again. name: fit for a file. scenario: with the ego vehicle as driven. text: what came
-    of it."""
+    """A drive that can be seen again. name: fit for a file. scenario: with the ego vehicle as driven, or its script.
+    text: what came of it. detections: what was seen in its pictures; null: what the embedded network saw there."""
 
     name: str
     title: str
@@ -89,8 +102,12 @@ class Replay:
     scenario: Scenario
     params: Params
     sensors: Sensors
-    boxes: Boxes
     charts: tuple[Chart, ...]
+    detections: Detections | None = GIVEN
+
+    def as_seen(self) -> Scenario:
+        """The scenario with what the line was given in that drive, so that it believes the same again."""
+        return self.scenario.model_copy(update={"sensors": self.sensors, "detections": self.detections})
 
 
 Case = TypeVar("Case")
@@ -101,7 +118,7 @@ Outcome = TypeVar("Outcome")
 class Experiment(Generic[Case, Outcome]):
     """cases: what is to be driven, in short or in full; each can be sent to another process. run: one case to its
     outcome, a pure function at a module's top level. report: all of them, in order, to a section. replay: the drive
-    behind an outcome, where an experiment keeps its drives."""
+    behind an outcome."""
 
     name: str
     suite: Suite
@@ -109,7 +126,7 @@ class Experiment(Generic[Case, Outcome]):
     cases: Callable[[bool], Sequence[Case]]
     run: Callable[[Case], Outcome]
     report: Callable[[Sequence[Case], Sequence[Outcome]], Section]
-    replay: Callable[[Case, Outcome], Replay] | None = None
+    replay: Callable[[Case, Outcome], Replay]
 
 
 def as_json(section: Section) -> dict[str, Any]:
@@ -140,7 +157,9 @@ def as_json(section: Section) -> dict[str, Any]:
     }
 
 
-def _plain(cell: Cell | Coloured | Linked) -> Any:
+def _plain(cell: AnyCell) -> Any:
     if isinstance(cell, Linked):
         return {"value": cell.value, "href": cell.href}
+    if isinstance(cell, Driven):
+        return cell.value
     return {"value": cell.value, "tone": cell.tone} if isinstance(cell, Coloured) else cell

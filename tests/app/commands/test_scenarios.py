@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from pathlib import Path
+from urllib.parse import quote, unquote
 
 import pytest
 
 from app.cli import main
 from app.commands import scenarios
+from app.report import html
+from pipeline.evaluation.experiments import braking
+from pipeline.evaluation.experiments.ncap import NCAP
 from pipeline.evaluation.experiments.sections import Section
+from pipeline.evaluation.experiments.track import Drive
 from pipeline.params import Params, from_yaml
+from pipeline.records import evolve
 from pipeline.sources import open_source
 
 
@@ -26,33 +33,50 @@ def test_a_short_experiment_as_json_and_as_a_page(tmp_path: Path, capsys: pytest
     assert "CCRs: speed" in page.read_text(encoding="utf-8")
 
 
-def test_cells_of_the_report_lead_to_the_drives_behind_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    report, drives = tmp_path / "ncap.html", tmp_path / "drives"
+def test_the_report_leads_to_every_drive_wherever_both_are_moved(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made, moved = tmp_path / "made", tmp_path / "moved here"
+    arguments = ["--suite", "euroncap", "--short", "--jobs", "1"]
     with pytest.raises(SystemExit) as ended:
         main(
-            [
-                "scenarios",
-                "run",
-                "--suite",
-                "ncap",
-                "--short",
-                "--jobs",
-                "1",
-                "--report",
-                str(report),
-                "--drives",
-                str(drives),
-            ]
+            ["scenarios", "run", *arguments, "--report", str(made / "ncap.html"), "--drives", str(made / "all drives")]
         )
     assert ended.value.code == 0
-    links = re.findall(r'href="(drives/[^"#]+)\.html"', report.read_text(encoding="utf-8"))
-    assert links
-    for link in links:
-        page = (tmp_path / f"{link}.html").read_text(encoding="utf-8")
+    made.rename(moved)
+    report = (moved / "ncap.html").read_text(encoding="utf-8")
+    cells = set(re.findall(r'href="all%20drives/([^"#]+)\.html"', report))
+    assert 'href="all%20drives/index.html#ncap"' in report
+    listed = set(
+        re.findall(r'href="([^"#]+)\.html"', (moved / "all drives" / "index.html").read_text(encoding="utf-8"))
+    )
+    assert cells == listed == {quote(case.name) for case in NCAP.cases(True)}
+    assert not [file for file in moved.rglob("*.*") if str(tmp_path) in file.read_text(encoding="utf-8")]
+    for name in map(unquote, listed):
+        file = moved / "all drives" / name
+        page = Path(f"{file}.html").read_text(encoding="utf-8")
         assert "<svg" in page
-        assert "cipv serve" in page
-        assert len(open_source(f"sim:{tmp_path / link}.yaml")) > 10
-        assert from_yaml(tmp_path / f"{link}.params.yaml", Params()).acc.brake_limit_mps2 == 0.0, "AEB alone"
+        assert f"cipv serve {shlex.quote(f'sim:{name}.yaml')}" in page
+        assert "aeb.enabled" not in page
+        assert "acc.brake_limit_mps2" in unquote(page), "the link carries what it drove with: AEB alone"
+        source = open_source(f"sim:{file}.yaml")
+        assert len(source) > 10
+        assert ("LiDAR alone" in " ".join(source.notes)) is ("_lidar_" in name)
+        assert from_yaml(Path(f"{file}.params.yaml"), Params()).acc.brake_limit_mps2 == 0.0, "AEB alone"
+
+
+def test_the_worst_drives_are_linked_from_the_braking_table(tmp_path: Path) -> None:
+    case, controller = braking.Case("CCRs", "both", "ACC", 0), braking.Case("CCRs", "lidar", "ACC", 0)
+    drive = Drive(
+        (0.0, 0.1), (20.0, 19.0), (0.0, -1.0), (9.0, 7.0), (0.0, 0.0), (None, None), ("", ""), None, None, 5.0
+    )
+    twin = evolve(drive, impact_mps=8.0)
+    again = evolve(case, seed=1)
+    pair = [evolve(each, controller="ACC + AEB") for each in (case, lidar)]
+    section = braking.report([case, again, *pair], [drive, twin, drive, drive])
+    page = html([section], "Braking", "drives/")
+    assert f'href="drives/{again.name}.html"' in page
+    assert f'href="drives/{case.name}.html"' not in page
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.evaluation.experiments.choosing import (
+    MAX_M,
     SENSORS,
     UNDECIDABLE,
     Case,
@@ -14,13 +15,16 @@ from pipeline.evaluation.experiments.choosing import (
     Verdict,
     Way,
     acquired_m,
+    replay,
     report,
     run,
     true_lead,
 )
+from pipeline.evaluation.experiments.sections import as_json
 from pipeline.evaluation.lead import switches
 from pipeline.simulation import scenario, world
 from pipeline.simulation.camera import calibration
+from tests.pipeline.evaluation.experiments.conftest import SeeAgain
 from tests.pipeline.simulation.worlds import with_actors
 
 
@@ -33,12 +37,16 @@ def test_one_wrong_frame_of_the_fused_fails_the_suite(verdict: Verdict, fails: b
     assert not report(cases, [[good, other], [good], [good]]).failures, "it is the fused line that is judged"
 
 
-def test_every_decidable_frame_is_right() -> None:
+def test_every_decidable_frame_is_right(see_again: SeeAgain) -> None:
     """One drive of the suite's twenty: the one in which a false alarm beside the lead once took its box."""
-    frames = run(Case("straight", "both", 8))
+    case = Case("straight", "both", 8)
+    frames = run(case)
     judged = [frame.verdict for frame in frames if frame.verdict not in UNDECIDABLE]
     assert len(judged) > 50
     assert set(judged) <= {"correct", "none"}
+    again = see_again(replay(case, frames), 40)
+    near = [result.cipv.id if result.cipv and result.cipv.distance_m <= MAX_M else None for result in again]
+    assert near == [frame.chosen for frame in frames[:40]], "seen again, it chooses the same"
 
 
 def lead_of(actors: str, segments: str = "{length_m: 2000}") -> int | None:
@@ -126,7 +134,8 @@ def test_on_a_straight_road_fused_sees_more_than_the_lidar() -> None:
     assert "straight" in scenario.names()
     cases = [Case("straight", sensors, 0) for sensors in ("lidar", "both")]
     runs = [run(case) for case in cases]
-    rows = {row[1]: row for row in report(cases, runs).tables[0].rows}
-    assert rows["fused"][3] > 90.0  # type: ignore[operator]
-    assert rows["fused"][3] > rows["LiDAR"][3] + 10.0  # type: ignore[operator]
-    assert rows["LiDAR"][4] > rows["fused"][4]  # type: ignore[operator]
+    table = as_json(report(cases, runs))["tables"][0]
+    rows = {row[1]: row for row in table["rows"]}
+    assert rows["fused"][3] > 90.0
+    assert rows["fused"][3] > rows["LiDAR"][3] + 10.0
+    assert rows["LiDAR"][4] > rows["fused"][4]

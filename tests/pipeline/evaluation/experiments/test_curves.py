@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from pipeline.evaluation.experiments import bends, curves
-from pipeline.evaluation.experiments.curve_drives import SOURCES, Frames
+from pipeline.evaluation.experiments.curve_drives import SOURCES, Frames, seen
 from pipeline.evaluation.experiments.curves import Case, Outcome, longest_wrong_s, share_right, told_before_line_s
+from pipeline.records import evolve
 from pipeline.simulation import world
+from pipeline.sources.simulated import sensed
 
 
 def drive(
@@ -73,6 +76,20 @@ def test_in_a_bend_of_125_m_the_lead_is_the_cipv(outcomes: dict[Case, Outcome]) 
     assert share_right([outcome["lane lines and yaw rate"]], 60.0)[0] >= 0.99, "without a route too"
     assert share_right([outcome["straight guess"]])[0] < 0.5
     assert share_right([outcome["yaw rate"]])[0] > share_right([outcome["straight guess"]])[0] + 0.3
+
+
+def test_a_drive_seen_again_has_the_boxes_and_lines_that_it_had(outcomes: dict[Case, Outcome]) -> None:
+    case, outcome = next((case, outcome) for case, outcome in outcomes.items() if case.kind == "follow")
+    kept = curves.replay(case, outcome)
+    scene = kept.as_seen()
+    _, driven = next(iter(seen(scene)))
+    now = world.at(scene, 0.0)
+    again = sensed(evolve(driven, raw_boxes=None, raw_lanes=None), now, scene)
+    for ours, theirs in ((again.raw_boxes, driven.raw_boxes), (again.raw_lanes, driven.raw_lanes)):
+        assert ours is not None
+        assert theirs is not None
+        np.testing.assert_array_equal(ours.scores, theirs.scores)
+    assert len(kept.charts[0].series[0].x) > 90
 
 
 def test_a_cut_in_is_told_before_the_wheel_is_over_the_line(outcomes: dict[Case, Outcome]) -> None:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from pipeline.evaluation.experiments.iso import Case, Outcome, cases, passed, report, run
+from pipeline.evaluation.experiments.iso import Case, Outcome, cases, passed, replay, report, run
+from pipeline.evaluation.experiments.sections import Coloured
 from pipeline.records import evolve
+from tests.pipeline.evaluation.experiments.conftest import SeeAgain
 
 GOOD = Outcome(50.0, 1.0, 12.0, 1.4, False, (0.0, 0.1), (50.0, 49.0), (20.0, 20.0))
 
@@ -25,12 +27,19 @@ def test_passing(changed: dict[str, object], good: bool) -> None:
     assert passed(evolve(GOOD, **changed)) is good
 
 
-def test_it_stops_behind_a_lead_that_brakes_and_keeps_its_time_gap() -> None:
+def test_it_stops_behind_a_lead_that_brakes_and_keeps_its_time_gap(see_again: SeeAgain) -> None:
     case = Case("stop", 50.0, "both", 0)
     outcome = run(case)
     assert passed(outcome)
     assert outcome.speed_mps[-1] == pytest.approx(0.0, abs=0.3)
     assert 2.0 < outcome.range_m[-1] < 8.0, "about d_min of 5 m"
+    again = see_again(replay(case, outcome), 80)
+    assert [result.ego is not None and result.ego.speed_mps for result in again] == pytest.approx(
+        outcome.speed_mps[:80], abs=0.1
+    ), "seen again, it brakes the same"
+    leads = [(result.cipv.distance_m, m) for result, m in zip(again, outcome.range_m, strict=False) if result.cipv]
+    assert len(leads) > 60
+    assert all(abs(measured - true) < 0.15 * true for measured, true in leads)
 
 
 def test_beside_is_not_ahead() -> None:
@@ -46,4 +55,8 @@ def test_the_tests_of_the_standard_are_there_and_the_report_names_the_failed() -
     pair = [Case("curve", 250.0, "lidar", 0), Case("curve", 250.0, "both", 0)]
     section = report(pair, [evolve(GOOD, touched=True), GOOD])
     assert "fused passes 1 of 1 runs, better than the LiDAR alone (0 of 1)" in section.text[1]
-    assert [row[-1].tone for row in section.tables[0].rows] == ["red", "green"]  # type: ignore[union-attr]
+    last = [row[-1] for row in section.tables[0].rows]
+    assert last == [
+        Coloured("no", "red", "iso_curve_250_lidar_0"),
+        Coloured("yes", "green", "iso_curve_250_fused_0"),
+    ]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from pipeline.evaluation.experiments.ranging import PRINTED, Case, Sighting, recognised_to_m, report, run
+from pipeline.evaluation.experiments.ranging import PRINTED, Case, Sighting, recognised_to_m, replay, report, run
+from tests.pipeline.evaluation.experiments.conftest import SeeAgain
 
 
-def test_near_it_is_exact_and_far_it_is_blind() -> None:
+def test_near_it_is_exact_and_far_it_is_blind(see_again: SeeAgain) -> None:
     cases = [Case("car", 0), Case("car", 1)]
     runs = [run(case) for case in cases]
     for sightings in runs:
@@ -15,6 +16,11 @@ def test_near_it_is_exact_and_far_it_is_blind() -> None:
         assert all(abs(each.measured_m - each.true_m) < 1.0 for each in near if each.measured_m is not None)
         far = [each for each in sightings if each.true_m > 85.0]
         assert sum(each.measured_m is not None for each in far) < 0.2 * len(far)
+    again = see_again(replay(cases[0], runs[0]), 75)
+    in_lane = [[item.distance_m for item in result.objects if item.in_path and not item.carried] for result in again]
+    measured = [[each.measured_m] if each.measured_m is not None else [] for each in runs[0][:75]]
+    assert in_lane == measured, "seen again, the LiDAR alone measures the same"
+    assert sum(map(len, in_lane)) > 5
     paper, car = report(cases, runs).tables[0].rows
     assert paper[1] == PRINTED["mean error %"] == 2.14
     assert car[0] == "car"

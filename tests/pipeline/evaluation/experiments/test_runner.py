@@ -7,7 +7,19 @@ from collections.abc import Sequence
 import pytest
 
 from pipeline.evaluation.experiments.runner import EXPERIMENTS, SUITES, NoSuchSuite, count_cases, of_suite, run_all
-from pipeline.evaluation.experiments.sections import Chart, Coloured, Experiment, Section, Series, Table, as_json
+from pipeline.evaluation.experiments.sections import (
+    Chart,
+    Coloured,
+    Experiment,
+    Replay,
+    Section,
+    Series,
+    Table,
+    as_json,
+)
+from pipeline.params import Params
+from pipeline.simulation.roads import Road
+from pipeline.simulation.scenario import Ego, Scenario
 
 
 def _cases(short: bool) -> list[int]:
@@ -22,7 +34,13 @@ def _report(cases: Sequence[int], outcomes: Sequence[int]) -> Section:
     return Section("squares", "Squares", (), (Table("t", ("n", "n²"), tuple(zip(cases, outcomes, strict=True))),))
 
 
-SQUARES = Experiment("squares", "paper", "Squares", _cases, _square, _report)
+def _replay(case: int, outcome: int) -> Replay:
+    road = Road.model_validate({"segments": [{"length_m": 100.0}]})
+    scenario = Scenario(title="a drive", duration_s=1.0, road=road, ego=Ego(lane=-1, speed_mps={0.0: 5.0}))
+    return Replay(f"square_{case}", f"{case}²", (str(outcome),), scenario, Params(), "both", ())
+
+
+SQUARES = Experiment("squares", "paper", "Squares", _cases, _square, _report, _replay)
 
 
 def test_the_order_of_the_cases_is_kept_and_each_is_counted() -> None:
@@ -43,10 +61,18 @@ def test_every_suite_has_experiments(suite: str) -> None:
     assert set(of_suite(suite)) <= set(EXPERIMENTS)
 
 
+def test_every_drive_of_an_experiment_is_kept() -> None:
+    kept: list[tuple[str, Replay]] = []
+    run_all(of_suite("regression"), short=True, jobs=1, keep=lambda each, replay: kept.append((each.name, replay)))
+    assert len({replay.name for _, replay in kept}) == count_cases(of_suite("regression"), short=True)
+    assert {name for name, _ in kept} == {"regression"}
+
+
 def test_one_experiment_by_name_and_none_by_a_wrong_one() -> None:
     assert [each.name for each in of_suite("braking")] == ["braking"]
-    with pytest.raises(NoSuchSuite, match="'bracing'"):
+    with pytest.raises(NoSuchSuite, match="'bracing'") as error:
         of_suite("bracing")
+    assert str(error.value).count("iso") == 1, "a suite and an experiment of one name are named once"
 
 
 def test_every_experiment_has_a_short_form_that_is_part_of_the_long_one() -> None:
