@@ -1,4 +1,5 @@
-"""Who may be a lead at all: the questions, in the order in which the first failure is the reason given."""
+"""Who may be a lead at all: the questions, in the order in which the first failure is the reason given:
+what it is, where it is, and only then how well it is known: nobody waits for the third sighting of what is aside."""
 
 from __future__ import annotations
 
@@ -142,11 +143,11 @@ def _uncertain(who: Candidate) -> str:
 QUESTIONS = (
     Question(_vehicle_class, lambda who: f"class {who.item.label}"),
     Question(_distance_known, lambda _: "distance not known"),
-    Question(_hits, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
-    Question(_seen, _not_seen),
     Question(_size, _wrong_size),
     Question(_ahead, lambda who: "place not known" if who.place is None else "beside or behind the bumper"),
     Question(_path_offset, _out_of_path),
+    Question(_hits, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
+    Question(_seen, _not_seen),
     Question(_path_sigma, _uncertain),
 )
 BESIDE_PLACE = frozenset({"vehicle_class", "distance_known", "hits", "size"})

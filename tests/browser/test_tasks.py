@@ -57,7 +57,11 @@ def test_find_where_the_lead_changed_and_say_why(page: Page, site: Site):
     expect(page.locator("#why-facts")).to_have_text("why it is not the CIPV")
     expect(page.locator("#why .verdict")).to_contain_text(f"Not the CIPV: {stopped.reason}")
     gates = next(item.gates for item in result.objects if item.id == stopped.id)
-    expect(page.locator("#why .gate[data-passed=no]")).to_have_count(sum(not gate.passed for gate in gates))
+    failed = sum(not gate.passed for gate in gates)
+    expect(page.locator("#why .gate[data-passed=no]")).to_have_count(failed)
+    assert page.locator("#why .gate").evaluate_all("rows => rows.map((row) => row.dataset.passed)") == (
+        ["no"] * failed + ["yes"] * (len(gates) - failed)
+    ), "what stopped it stands first"
 
 
 def test_a_changed_threshold_is_seen_at_once_and_over_the_whole_drive(page: Page, site: Site):

@@ -5,6 +5,7 @@ import { DASH, num } from "../format.js";
 import { get, paintAfter, set } from "../store.js";
 import { gateRow, kindOf, quantity, showGate } from "./gates.js";
 
+/** @typedef {import("../types.js").Gate} Gate */
 /** @typedef {import("../types.js").Ranked} Ranked */
 /** @typedef {import("../types.js").Result} Result */
 
@@ -45,8 +46,11 @@ function update() {
   lead.hidden = !isLead;
   text(type, `${item.type ?? "obstacle"}${item.distance_m === null ? "" : ` at ${num(item.distance_m)} m`}`);
   text(verdict, sentence(result, ranked.find((each) => each.id === id), item.id, isLead));
-  keyed(gates, item.gates, (gate) => gate.name, gateRow, showGate);
+  keyed(gates, failedFirst(item.gates), (gate) => gate.name, gateRow, showGate);
 }
+
+/** What stopped it must be seen without scrolling; otherwise in the order they are asked. @param {Gate[]} all */
+const failedFirst = (all) => [...all].sort((a, b) => Number(a.passed) - Number(b.passed));
 
 /** @param {boolean} hidden */
 function hideObject(hidden) {
