@@ -16,8 +16,11 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from pipeline.errors import BadInput
 from pipeline.recording.topics import PROFILE, Channel
 
-CHUNK_BYTES = 512 * 1024
-"""A chunk is what a crash can cost and what a seek must unpack; a frame's cloud and picture fill about one."""
+CHUNK_BYTES = 1280 * 1024
+"""A chunk is what a crash can cost and what a seek must unpack. What would make one larger begins the next: a frame of
+a full sweep (0.6 MB) and its picture (0.4 MB) is one chunk, and a seek reads nothing else."""
+_NEVER = 2**62
+"""The library's own limit, which counts after the message: ours alone decides."""
 
 Compression = Literal["lz4", "zstd"]
 _COMPRESSION = {"lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
@@ -62,8 +65,9 @@ class Output:
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._sequences: dict[int, int] = {}
         self._sound_bytes = 0
+        self._pending_bytes = 0
         self._is_open = True
-        self._writer = Writer(self._stream, CHUNK_BYTES, _COMPRESSION[compression])  # type: ignore[arg-type]
+        self._writer = Writer(self._stream, _NEVER, _COMPRESSION[compression])  # type: ignore[arg-type]
         with self._failing_neatly():
             self._writer.start(profile, "cipv-studio")
 
@@ -77,13 +81,23 @@ class Output:
         """Size of the file, without the chunk in progress."""
         return self._sound_bytes
 
+    @property
+    def is_pending(self) -> bool:
+        """Whether a chunk is in progress."""
+        return self._pending_bytes > 0
+
     def add(self, channel: Channel, log_time_ns: int, publish_time_ns: int, data: bytes) -> None:
         """Append a message. publish_time_ns: the header's time; before 1970 it becomes 0, MCAP knows no earlier."""
+        if self.is_pending and self._pending_bytes + len(data) > CHUNK_BYTES:
+            self.flush()
         with self._failing_neatly():
             number = self._channels.get(channel) or self._register(channel)
             self._sequences[number] += 1
             published_ns = max(publish_time_ns, 0)
             self._writer.add_message(number, log_time_ns, data, published_ns, self._sequences[number])
+        self._pending_bytes += len(data)
+        if self._pending_bytes >= CHUNK_BYTES:
+            self.flush()
 
     def add_metadata(self, name: str, values: dict[str, str]) -> None:
         with self._failing_neatly():
@@ -93,12 +107,14 @@ class Output:
         """After every message so far: the chunk in progress is closed first."""
         with self._failing_neatly():
             self._writer.flush()
+            self._pending_bytes = 0
             self._writer.add_attachment(log_time_ns, log_time_ns, name, media_type, data)
 
     def flush(self, *, to_disk: bool = False) -> None:
         """Close the chunk in progress."""
         with self._failing_neatly():
             self._writer.flush()
+            self._pending_bytes = 0
             if to_disk:
                 os.fsync(self._stream.file.fileno())
 

@@ -231,7 +231,8 @@ class SessionWriter:
         before = self._output.bytes_written
         self._output.add(topics.channel(topic), at_ns, self._header_ns if t_ns is None else t_ns, data)
         if self._output.bytes_written > before:
-            self._kept_frames = len(self._index) + (topic == topics.FRAMES)
+            is_kept = topic == topics.FRAMES and not self._output.is_pending
+            self._kept_frames = len(self._index) + is_kept
 
     def _put_sweep(self, sweep: Sweep | None, at_ns: int) -> SweepRef | None:
         if sweep is None:

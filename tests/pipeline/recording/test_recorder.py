@@ -252,7 +252,7 @@ def test_a_file_that_exists_is_never_written_over(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("rotation", [Rotation(max_s=1.0), Rotation(max_bytes=300_000.0)], ids=["time", "size"])
 def test_each_file_of_a_long_recording_can_be_read_alone(rotation: Rotation, tmp_path: Path) -> None:
-    frames = [replace(full(index), sweep=sweep(index, points=3000)) for index in range(35)]
+    frames = [replace(full(index), sweep=sweep(index, points=6000)) for index in range(35)]
     parts = Segments(tmp_path / "drive.mcap", ABOUT, rotation)
     for frame in frames:
         parts.write(frame, params=Params())
