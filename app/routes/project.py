@@ -1,4 +1,5 @@
-"""/api/project: where cuboids lie in the shown picture. The page that draws a cuboid under a hand asks here."""
+"""/api/project: where cuboids lie in the shown picture, and where on the road a pixel of it is. The page that draws a
+cuboid under a hand asks here."""
 
 from __future__ import annotations
 
@@ -7,11 +8,13 @@ from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.engine import Engine
-from app.given import GivenCuboid
+from app.given import Finite, GivenCuboid
 from pipeline.alignment import resolve
 from pipeline.geometry import corners_of
 
 MOST_CUBOIDS = 500
+_FARTHEST_M = 300.0
+"""A pixel near the horizon would be anywhere."""
 
 Pixel = tuple[float, float]
 
@@ -29,6 +32,21 @@ class Projected(BaseModel):
     a corner lies behind the camera. pixels is null where nothing says how LiDAR and camera lie to each other."""
 
     pixels: list[list[Pixel | None]] | None
+
+
+class OnRoad(BaseModel):
+    """A pixel of the camera's own picture, and the height of the road there, ego z."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    pixel: tuple[Finite, Finite]
+    z_m: Finite
+
+
+class PlaceOnRoad(BaseModel):
+    """Ego x, y; null where the pixel does not look at the road ahead, or where nothing says how it looks."""
+
+    place: tuple[float, float] | None
 
 
 def project_router(engine: Engine) -> APIRouter:
@@ -49,5 +67,17 @@ def project_router(engine: Engine) -> APIRouter:
         pixels = np.round(aligned.project(corners.reshape(-1, 3)), 2).tolist()
         seen = [(u, v) if np.isfinite((u, v)).all() else None for u, v in pixels]
         return Projected(pixels=[seen[start : start + 8] for start in range(0, len(seen), 8)])
+
+    @router.post("/project/road")
+    def on_road(body: OnRoad) -> PlaceOnRoad:
+        """The place of the road that a pixel of the shown frame looks at with the present parameters."""
+        shown = engine.snapshot
+        aligned = resolve(shown.params.alignment, shown.tick.frame.camera) if shown.tick is not None else None
+        if aligned is None:
+            return PlaceOnRoad(place=None)
+        start, (ray,) = aligned.rays(np.array([body.pixel]))
+        along = (body.z_m - start[2]) / ray[2] if ray[2] else -1.0
+        x, y = (float(value) for value in (start + along * ray)[:2])
+        return PlaceOnRoad(place=(x, y) if along > 0.0 and 0.0 < np.hypot(x, y) < _FARTHEST_M else None)
 
     return router

@@ -34,7 +34,7 @@
  * @property {import("./labeling/projection.js").Projected} projected
  * @property {{left: import("./types.js").Point2[], right: import("./types.js").Point2[]}} drawnPath  a path under a hand
  */
-/** @typedef {{on: boolean, tool: null|"new"|"shape"|"merge"|"path", hasObjects: boolean}} Labeling  tool: what the next drag or click does; hasObjects: whether the pipeline's objects are drawn */
+/** @typedef {{on: boolean, tool: null|"new"|"shape"|"merge"|"path", from: number|null, hasObjects: boolean, review: boolean, item: {kind: import("./labeling/types.js").ItemKind, id: number}|null}} Labeling  tool: what the next drag or click does; from: the track that is merged with another; hasObjects: whether the pipeline's objects are drawn; review: whether others' labels are looked through; item: which one now */
 /** @typedef {keyof Values} Key */
 
 /** @type {Partial<Values>} */

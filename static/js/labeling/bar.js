@@ -12,6 +12,7 @@ import { labelKeys } from "./keys.js";
 import { setTool } from "./mode.js";
 import { newLabel, setNewLabel } from "./newlabel.js";
 import { askName, knownName } from "./person.js";
+import * as review from "./review.js";
 import * as span from "./span.js";
 
 /** @typedef {import("./types.js").Lead} Lead */
@@ -20,6 +21,8 @@ import * as span from "./span.js";
 const MOST_LEADS = 7;
 /** The task whose end has been said, or was over before this page came. @type {number|null} */
 let ended = null;
+/** The frame that what is said is about: it stays until the person goes on from there. */
+let about = -1;
 
 const where = el("span", { class: "facts where" }), leads = el("span", { class: "joined leads", aria: { role: "group", label: "Who leads" } });
 const saved = el("span", { class: "saved", aria: { role: "status" } }), again = el("button", { type: "button", textContent: "Retry", hidden: true, onclick: send }), discarded = el("button", { type: "button", textContent: "Discard", title: "Give up what is not saved", hidden: true, onclick: discard });
@@ -28,7 +31,14 @@ const task = el("span", { class: "task", hidden: true }, el("progress", { max: 1
 const name = el("button", { type: "button", class: "quiet", title: "Who labels" });
 const back = el("button", { type: "button", class: "icon-button", textContent: "↶", aria: { label: "Undo your last change" }, title: "Undo (Ctrl Z)", onclick: undo });
 const forth = el("button", { type: "button", class: "icon-button", textContent: "↷", aria: { label: "Redo" }, title: "Redo (Ctrl Shift Z)", onclick: redo });
-const fresh = el("button", { type: "button", class: "toggle fresh", textContent: "New", title: "New label: drag in the plan, drag or click in the picture (G)", onclick: () => setTool("new") });
+const fresh = el("button", { type: "button", class: "toggle fresh", textContent: "New", title: "New label: drag in the plan, drag or click in the picture, or Enter (G)", onclick: () => setTool("new") });
+
+const reviewToggle = el("button", { type: "button", class: "toggle", textContent: "Review", title: "Go through what others stand behind (Shift R)", onclick: review.toggleReview });
+const under = el("span", { class: "under" }), reviewed = el("span", { class: "reviewing", hidden: true },
+  el("b", { textContent: "Review" }), under,
+  el("button", { type: "button", textContent: "Right", title: "It is right, and the next (A)", onclick: review.reviewOk }),
+  el("button", { type: "button", textContent: "Send back", title: "With a comment, and the next (R)", onclick: review.sendBack }),
+  el("button", { type: "button", textContent: "Next", title: "Leave it (N)", onclick: () => review.nextUnreviewed(1) }));
 
 const kind = el("select", { class: "kind", aria: { label: "Class of new labels" }, title: "Class of new labels" }, ...CLASSES.map((label) => el("option", { value: label, textContent: label })));
 
@@ -44,11 +54,12 @@ export function setUp() {
   });
   const next = (/** @type {string} */ words, /** @type {string} */ title, /** @type {commands.Wanted} */ what) =>
     el("button", { type: "button", class: what === "sent_back" ? "rarely" : "", textContent: words, title, onclick: () => commands.goTo(what, 1) });
-  $("#label-bar").append(
+  $("#label-bar").append(el("div", { class: "label-row" },
     el("b", { textContent: "Lead" }), leads, where,
     el("b", { textContent: "Next" }), el("span", { class: "joined", aria: { role: "group", label: "Go to the next" } }, next("Unlabelled", "Next frame in which something is unlabelled (N)", "unlabelled"),
       next("Disagreement", "Next disagreement of labels and pipeline (V)", "disagreement"), next("Proposed", "Next proposal (B)", "proposed"), next("Sent back", "Next label that was sent back (Y)", "sent_back")),
-    fresh, kind, said, task, saved, again, discarded, back, forth, name);
+    fresh, kind, reviewToggle, el("span", { class: "spacer" }), back, forth, name),
+  el("div", { class: "label-row label-line" }, reviewed, said, task, saved, again, discarded));
   $("#label-keys").append(...labelKeys().flatMap(({ bindings }) => bindings).filter(({ brief }) => brief).map(({ shown: keys, brief }) =>
     el("span", {}, el("kbd", { textContent: keys }), ` ${brief}`)));
   paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);
@@ -58,7 +69,10 @@ export function setUp() {
     back.disabled = !possible()?.can_undo;
     forth.disabled = !possible()?.can_redo;
   });
-  on(["frame"], () => get("said") && text(said, ""));
+  on(["said"], () => {
+    about = get("scrub") ?? shown();
+  });
+  on(["frame"], () => get("said") && get("scrub") === null && shown() !== about && text(said, ""));
 }
 
 function reflect() {
@@ -75,9 +89,19 @@ function reflect() {
     button.title = lead === "none" ? "Nobody leads (0)" : lead === "unknown" ? "One can't tell who leads (U)" : `#${lead} leads (type its number)`;
   });
   const { first, last } = span.span();
-  text(where, marked ? `frames ${first + 1}–${last + 1}${marked.typed ? ` · #${marked.typed}…` : ""}` : range ? `${range.state} ${range.first + 1}–${range.last + 1}` : "nobody has said");
+  text(where, marked ? `frames ${first + 1}–${last + 1}${marked.typed ? ` · #${marked.typed}…` : ""}` : range ? rangeWords(range) : "nobody has said");
+  press(reviewToggle, review.isReviewing());
+  reviewed.hidden = !review.isReviewing();
+  text(under, review.target()?.name ?? "nothing");
   press(fresh, get("labeling")?.tool === "new");
   text(name, knownName() || "your name");
+}
+
+/** @param {import("./types.js").LeadRange} range */
+function rangeWords({ state, first, last, comment, reviewer }) {
+  const frames = `${first + 1}–${last + 1}`;
+  if (comment) return `sent back ${frames}: ${comment}`;
+  return reviewer ? `reviewed ${frames} by ${reviewer}` : `${state} ${frames}`;
 }
 
 function reflectSaving() {

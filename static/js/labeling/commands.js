@@ -4,16 +4,14 @@ import { seekTo } from "../drive/seek.js";
 import { get, set } from "../store.js";
 import { act } from "./acts.js";
 import { CLASSES, moved, turned } from "./cuboid.js";
-import { ask } from "./dialogs.js";
 import * as draft from "./draft.js";
-import { chosen, leadAt, nameOf, shown } from "./held.js";
+import { chosen, leadAt, shown, trackOf } from "./held.js";
 import { setTool } from "./mode.js";
 import * as span from "./span.js";
-import { el } from "../dom.js";
 
 /** @typedef {import("./types.js").LabelTrack} LabelTrack */
 /** @typedef {import("./types.js").ItemRef} ItemRef */
-/** @typedef {"unlabelled"|"disagreement"|"proposed"|"sent_back"} Wanted */
+/** @typedef {"unlabelled"|"disagreement"|"proposed"|"sent_back"|"unreviewed"} Wanted */
 
 /** A sentence for the person, where something could not be done. @param {string} words */
 export const say = (words) => set("said", words);
@@ -26,7 +24,7 @@ function withTrack(what) {
 }
 
 /** @param {LabelTrack} track @returns {ItemRef} */
-const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
+export const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
 
 /** The pipeline's output becomes proposals, in the marked frames or in all. */
 export function propose() {
@@ -109,19 +107,20 @@ export const nextClass = (direction) => withTrack(({ label }) => {
 /** @param {string} label */
 export const relabel = (label) => withTrack(({ id, revision }) => act({ kind: "relabel", track: id, revision, label }));
 
-/** The selected track is this one too. @param {number} other */
-export function mergeWith(other) {
-  setTool(null);
-  const tracks = get("labels")?.tracks, a = chosen(), b = tracks?.get(other);
-  if (a && b && a !== b) act({ kind: "merge", tracks: [a, b].map(({ id, revision }) => ({ id, revision })) });
-}
-
-export const sendBack = () => withTrack(async (track) => {
-  const comment = await ask("Send back", el("p", { textContent: `${nameOf(track)} goes back to who labelled it.` }), "Comment", track.comment);
-  if (comment) act({ kind: "send_back", items: [refOf(track)], comment });
+/** Begin to merge the selected track: with the label that is pressed next, or with the one that is selected then. */
+export const merge = () => withTrack(({ id }) => {
+  setTool("merge");
+  if (get("labeling")?.tool === "merge") say(`Which one is #${id} too? Press it, or . until it is selected, then Enter`);
 });
 
-export const reviewOk = () => withTrack((track) => act({ kind: "review_ok", items: [refOf(track)] }));
+/** The track that the merging began with is this one too. @param {number} other */
+export function mergeWith(other) {
+  const a = trackOf(get("labeling")?.from ?? null), b = trackOf(other);
+  if (!a || !b || a === b) return say("Select the other label: press it, or .");
+  setTool(null);
+  set("track", a.id);
+  act({ kind: "merge", tracks: [a, b].map(({ id, revision }) => ({ id, revision })) });
+}
 
 /** @param {string} tag @param {boolean} on */
 export const tagFrame = (tag, on) => act({ kind: "tag", frame: shown(), tag, on });
@@ -131,11 +130,12 @@ export const addEvent = (event) => act({ kind: "add_event", frame: shown(), even
 
 /** Go where there is something to do. @param {Wanted} what @param {1|-1} direction */
 export async function goTo(what, direction) {
-  const query = `what=${what}&frame=${get("scrub") ?? shown()}&direction=${direction}`;
-  /** @type {import("./types.js").Found|Error} */
-  const found = await request(`api/labels/next?${query}`).catch((error) => error);
+  const found = await ahead(what, get("scrub") ?? shown(), direction);
   if (found instanceof Error) return say(found.message);
   if (found.frame === null) return say(`No ${what.replace("_", " ")} ${direction > 0 ? "after" : "before"} this frame`);
   seekTo(found.frame);
   say(found.why);
 }
+
+/** Where there is something to do beyond a frame. @param {Wanted} what @param {number} frame @param {1|-1} direction @param {string} [more] of the query @returns {Promise<import("./types.js").Found|Error>} */
+export const ahead = (what, frame, direction, more = "") => request(`api/labels/next?what=${what}&frame=${frame}&direction=${direction}${more}`).catch((error) => error);

@@ -8,20 +8,21 @@ import { CLASSES } from "./cuboid.js";
 import { presentOf } from "./draft.js";
 import { chosen, nameOf } from "./held.js";
 import { setTool } from "./mode.js";
+import * as review from "./review.js";
 
 const MOST_PAST = 6;
 
 const head = el("div", { class: "detail-head" }), title = el("b", {}), state = el("span", { class: "tag" });
 const classes = el("select", { aria: { label: "Class" }, title: "Class (T)" }, ...CLASSES.map((label) => el("option", { value: label, textContent: label })));
-const facts = el("p", { class: "facts" }), comment = el("p", { class: "comment" }), past = el("ol", { class: "past facts" });
+const facts = el("p", { class: "facts" }), comment = el("p", { class: "comment" }), how = el("p", { class: "how" }), past = el("ol", { class: "past facts" });
 const panel = el("div", { class: "track-detail", hidden: true });
 
 const lookBack = newestOnly(async (/** @type {number} */ id) => {
   /** @type {import("./types.js").PastAct[]} */
   const acts = await request(`api/labels/history?kind=track&id=${id}`).catch(() => []);
   if (chosen()?.id !== id) return;
-  past.replaceChildren(...acts.slice(0, MOST_PAST).map(({ what, person, t_unix_ms, undone }) =>
-    el("li", { class: undone ? "is-undone" : "" }, `${new Date(t_unix_ms).toLocaleTimeString("en-GB")} ${person}: ${what}${undone ? " (undone)" : ""}`)));
+  past.replaceChildren(...acts.slice(0, MOST_PAST).map(({ what, note, person, t_unix_ms, undone }) =>
+    el("li", { class: undone ? "is-undone" : "" }, `${new Date(t_unix_ms).toLocaleTimeString("en-GB")} ${person}: ${what}${note ? `; ${note}` : ""}${undone ? " (undone)" : ""}`)));
 });
 
 /** @param {HTMLElement} parent */
@@ -33,14 +34,14 @@ export function setUp(parent) {
     classes.blur();
   });
   head.append(title, state, el("span", { class: "spacer" }), classes);
-  panel.append(head, facts, comment,
+  panel.append(head, facts, how, comment,
     el("div", { class: "detail-buttons" },
       button("Accept", "A", "Accept the whole track", () => commands.judge("accept")), button("Reject", "R", "Reject the whole track", () => commands.judge("reject")),
-      button("Send back", "H", "Send it back with a comment", commands.sendBack), button("Reviewed", "Shift H", "A second person finds it right", commands.reviewOk),
+      button("Send back", "H", "Send it back with a comment", review.sendBack), button("Reviewed", "Shift H", "A second person finds it right", review.reviewOk),
       button("Snap", "S", "Fit the cuboid to the points", commands.snap), button("Size along", "W", "This size along the whole track", commands.sizeAlong),
       button("Keyframe", "K", "It is right in this frame", commands.keyframe), button("Draw", "Shift G", "Draw its shape in this frame", () => setTool("shape")),
       button("Not here", "Del", "It is not there in this frame, or in the marked ones", commands.notHere), button("Split", "X", "From this frame on it is another", commands.splitHere),
-      button("Merge", "M", "Merge it with the label that is pressed next", () => setTool("merge")), button("Remove", "Shift Del", "Remove the track", commands.removeTrack)),
+      button("Merge", "M", "Merge it with the label that is pressed next, or selected by . and taken by Enter", commands.merge), button("Remove", "Shift Del", "Remove the track", commands.removeTrack)),
     past);
   parent.append(panel);
   paint(["track", "labels", "labelFrames", "frame", "draft"], show);
@@ -58,10 +59,11 @@ function show() {
   panel.hidden = !track;
   if (!track) return;
   text(title, nameOf(track));
-  text(state, track.state);
+  text(state, track.reviewer ? `reviewed by ${track.reviewer}` : track.state);
   state.dataset.state = track.state;
   if (document.activeElement !== classes) classes.value = track.label;
   text(comment, track.comment ? `Sent back: ${track.comment}` : "");
+  text(how, track.origin.how ? `${track.origin.name} pointed at it: ${track.origin.how}` : "");
   text(facts, placeWords(presentOf(track.id)));
 }
 

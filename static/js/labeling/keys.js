@@ -1,9 +1,11 @@
 /** Keys of the labeling mode. They go before the page's own while it is on. */
 import { playback } from "../api.js";
 import { get } from "../store.js";
+import * as byKeys from "./bykeys.js";
 import * as commands from "./commands.js";
 import { bringHere } from "./ends.js";
 import { cancel, isOn, setTool, toggleObjects } from "./mode.js";
+import * as review from "./review.js";
 import * as span from "./span.js";
 
 /** @typedef {import("../keymap.js").Binding} Binding */
@@ -15,7 +17,19 @@ const STEP_M = 0.1, FAR_M = 1, TURN_DEG = 1, FAR_DEG = 10;
 const key = (keys, shown, words, act, brief) => ({ keys: keys.split(" "), shown, words, act, brief, isOn });
 
 /** Arrows move the selected cuboid; with none they go through the frames, as without the mode. @param {LabelBinding} binding @returns {LabelBinding} */
-const selected = (binding) => ({ ...binding, isOn: () => isOn() && get("track") !== null });
+const selected = (binding) => ({ ...binding, isOn: () => isOn() && get("track") !== null && !["shape", "path"].includes(get("labeling")?.tool ?? "") });
+
+/** While something is to be drawn. @param {import("../store.js").Labeling["tool"]} tool @param {LabelBinding} binding @returns {LabelBinding} */
+const during = (tool, binding) => ({ ...binding, isOn: () => isOn() && get("labeling")?.tool === tool });
+
+/** While others' labels are looked through. @param {LabelBinding} binding @returns {LabelBinding} */
+const reviewing = (binding) => ({ ...binding, isOn: review.isReviewing });
+
+/** The four arrows, each alone and with Shift. @param {import("../store.js").Labeling["tool"]} tool @param {string} words @param {(right: number, up: number, isShift: boolean) => unknown} act @returns {LabelBinding[]} */
+const arrows = (tool, words, act) => /** @type {[string, number, number][]} */ ([["Left", -1, 0], ["Right", 1, 0], ["Up", 0, 1], ["Down", 0, -1]]).flatMap(([name, right, up]) => [
+  during(tool, key(`Arrow${name}`, name === "Left" ? "← → ↑ ↓" : name, name === "Left" ? words : "", () => act(right, up, false))),
+  during(tool, key(`Shift+Arrow${name}`, `Shift ${name}`, "", () => act(right, up, true))),
+]);
 
 /** A pair of keys, the second with Shift for the other direction. @param {string} letter @param {string} words @param {(direction: 1|-1) => unknown} act @param {string} [brief] @returns {LabelBinding[]} */
 const pair = (letter, words, act, brief) => [
@@ -25,17 +39,24 @@ const pair = (letter, words, act, brief) => [
 
 /** @returns {{mode: string, title: string, bindings: LabelBinding[]}[]} */
 export const labelKeys = () => [
-  { mode: "labeling", title: "Labeling: proposals and review", bindings: [
+  { mode: "labeling", title: "Labeling: review", bindings: [
+    key("Shift+R", "Shift R", "review: go through what others stand behind", review.toggleReview),
+    reviewing(key("a", "A", "in a review: it is right, and the next", review.reviewOk)),
+    reviewing(key("r", "R", "in a review: send it back with a comment, and the next", review.sendBack)),
+    reviewing(key("n", "N", "in a review: leave it, the next", () => review.nextUnreviewed(1))),
+    reviewing(key("Shift+N", "Shift N", "in a review: the one before", () => review.nextUnreviewed(-1))),
+    key("h", "H", "send the selected track, or who leads here, back with a comment", review.sendBack),
+    key("Shift+H", "Shift H", "reviewed: it is right", review.reviewOk),
+    ...pair("Y", "next label that was sent back", (d) => commands.goTo("sent_back", d)),
+  ] },
+  { mode: "labeling", title: "Labeling: proposals", bindings: [
     key("p", "P", "take the pipeline's output as proposals", commands.propose, "propose"),
     key("a", "A", "accept the selected track, or who leads here", () => commands.judge("accept"), "accept"),
     key("Shift+A", "Shift A", "accept everything in this frame", commands.acceptHere),
     key("r", "R", "reject it", () => commands.judge("reject"), "reject"),
-    key("h", "H", "send it back with a comment", commands.sendBack, "send back"),
-    key("Shift+H", "Shift H", "reviewed: it is right", commands.reviewOk),
     ...pair("N", "next frame in which something is unlabelled", (d) => commands.goTo("unlabelled", d), "next unlabelled"),
     ...pair("V", "next disagreement of labels and pipeline", (d) => commands.goTo("disagreement", d), "next disagreement"),
     ...pair("B", "next proposal", (d) => commands.goTo("proposed", d), "next proposal"),
-    ...pair("Y", "next label that was sent back", (d) => commands.goTo("sent_back", d)),
   ] },
   { mode: "labeling", title: "Labeling: who leads", bindings: [
     key("i", "I", "the lead begins here", span.begin, "lead from"),
@@ -51,7 +72,7 @@ export const labelKeys = () => [
   { mode: "labeling", title: "Labeling: shapes", bindings: [
     key(".", ".", "next label in this frame", () => commands.selectNext(1), "next label"),
     key(",", ",", "label before", () => commands.selectNext(-1)),
-    key("g", "G", "new label: drag in the plan, drag or click in the picture", () => setTool("new"), "new"),
+    key("g", "G", "new label: drag in the plan, drag or click in the picture, or Enter", () => setTool("new"), "new"),
     key("Shift+G", "Shift G", "draw the selected track's shape here", () => setTool("shape")),
     selected(key("ArrowUp", "↑", "move it 0.1 m; Shift: 1 m", () => commands.nudge(STEP_M, 0))),
     selected(key("ArrowDown", "↓", "back", () => commands.nudge(-STEP_M, 0))),
@@ -74,7 +95,13 @@ export const labelKeys = () => [
     ...pair("T", "next class", commands.nextClass, "class"),
     key("Shift+P", "Shift P", "draw our path: drag along its middle in the plan", () => setTool("path")),
     key("x", "X", "split: from this frame on it is another", commands.splitHere, "split"),
-    key("m", "M", "merge with the label that is pressed next", () => setTool("merge"), "merge"),
+    key("m", "M", "merge with the label that is pressed or selected next", commands.merge, "merge"),
+    during("new", key("Enter", "G, Enter", "a new label of the class in the bar, in our path ahead; arrows, Q and E put it right", byKeys.placeAhead)),
+    during("merge", key("Enter", "M, ., Enter", "merge with the label that was selected by .", () => commands.mergeWith(get("track") ?? -1))),
+    during("shape", key("Enter", "Shift G, Enter", "a box around the selected label in the picture", byKeys.boxAround)),
+    ...arrows("shape", "after Shift G: move the box in the picture; Shift: its right and lower side", (right, up, isSize) => byKeys.changeBox(right, -up, isSize)),
+    during("path", key("Enter", "Shift P, Enter", "keep the path as drawn, or the pipeline's", byKeys.keepPath)),
+    ...arrows("path", "after Shift P: bend the path's far end, make it longer or shorter; Shift: move all of it", (right, up, isWhole) => (right ? byKeys.bendPath(-right, isWhole) : byKeys.lengthenPath(up > 0 ? 1 : -1))),
   ] },
   { mode: "labeling", title: "Labeling: frames", bindings: [
     key("f", "F", "one frame on; Shift: ten", () => playback({ step: 1 }), "frame on"),
@@ -83,6 +110,6 @@ export const labelKeys = () => [
     key("Shift+D", "Shift D", "", () => playback({ step: -10 })),
     key("z", "Z", "the pipeline's objects too", toggleObjects, "pipeline"),
     { ...key("Enter", "Enter", "take the number that is typed", () => span.enter()), isOn: () => isOn() && Boolean(get("marked")?.typed) },
-    { ...key("Escape", "Esc", "let go: a dragged end, tool, marked frames, selection", () => cancel()), isOn: () => isOn() && (get("trimmed") !== null || get("labeling")?.tool !== null || get("marked") !== null || get("track") !== null) },
+    { ...key("Escape", "Esc", "let go: a dragged end, tool, marked frames, selection, review", () => cancel()), isOn: () => isOn() && (get("trimmed") !== null || get("labeling")?.tool !== null || get("marked") !== null || get("track") !== null || review.isReviewing()) },
   ] },
 ];

@@ -4,7 +4,8 @@ import { get, on, set } from "../store.js";
 import { toggle as togglePane } from "../workspace/panes.js";
 import { personName } from "./person.js";
 
-const OFF = { on: false, tool: null, hasObjects: false };
+/** @type {import("../store.js").Labeling} */
+const OFF = { on: false, tool: null, from: null, hasObjects: false, review: false, item: null };
 
 const button = $("#label-button", HTMLButtonElement);
 
@@ -20,7 +21,7 @@ const canLabel = () => get("state")?.labels != null;
 
 export function toggle() {
   if (!isOn() && !canLabel()) return;
-  change({ on: !isOn(), tool: null });
+  change({ ...OFF, on: !isOn(), hasObjects: get("labeling")?.hasObjects ?? false });
   set("draft", null);
   set("marked", null);
   set("trimmed", null);
@@ -31,8 +32,16 @@ export function toggle() {
 
 /** What the next drag or click does. @param {import("../store.js").Labeling["tool"]} tool */
 export function setTool(tool) {
-  change({ tool: get("labeling")?.tool === tool ? null : tool });
+  const next = get("labeling")?.tool === tool ? null : tool;
+  change({ tool: next, from: next === "merge" ? get("track") : null });
+  if (next === null) set("drawnPath", null);
 }
+
+/** Which label of others is looked at; null for none. @param {import("../store.js").Labeling["item"]} item */
+export const setItem = (item) => change({ item });
+
+/** @param {boolean} review */
+export const setReview = (review) => change({ review, item: null, tool: null });
 
 export function toggleObjects() {
   change({ hasObjects: !get("labeling")?.hasObjects });
@@ -44,6 +53,7 @@ export function cancel() {
   else if (get("labeling")?.tool) setTool(null);
   else if (get("marked")) set("marked", null);
   else if (get("track") !== null) set("track", null);
+  else if (get("labeling")?.review) setReview(false);
   else return false;
   return true;
 }
@@ -58,6 +68,7 @@ function reflect() {
   press(button, isOn());
   button.disabled = !canLabel();
   document.body.classList.toggle("is-labeling", isOn());
+  document.body.classList.toggle("is-reviewing", isOn() && get("labeling")?.review === true);
   document.body.dataset.tool = get("labeling")?.tool ?? "";
   $("#label-bar").hidden = $("#label-keys").hidden = $("#label-pane").hidden = !isOn();
 }

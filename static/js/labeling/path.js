@@ -24,8 +24,9 @@ export function drawing(from) {
       set("drawnPath", sides(middle));
     },
     ended: async () => {
-      setTool(null);
       const lines = get("drawnPath");
+      setTool(null);
+      set("drawnPath", lines);
       if (lines && middle.length > 1) await act({ kind: "set_path", frame: shown(), ...lines });
       set("drawnPath", null);
     },

@@ -10,11 +10,12 @@ import { lookOf } from "./looks.js";
 import { isOn, setTool } from "./mode.js";
 import { newLabel } from "./newlabel.js";
 import { boxOf } from "./picture.js";
+import * as road from "./roadhand.js";
 
 /** @typedef {import("./types.js").Box} Box */
 /** A pixel of the camera's own picture. @typedef {{u: number, v: number}} Pixel */
 /** Which sides of a box move: left, top, right, bottom. @typedef {[boolean, boolean, boolean, boolean]} Sides */
-/** @typedef {{from: Pixel, moved: (to: Pixel) => void, ended: (isClick: boolean) => void}} Drag */
+/** @typedef {{from?: Pixel, moved: (to: Pixel) => void, ended: (isClick: boolean) => void}} Drag */
 
 const REACH_PX = 6, CLICK_PX = 4;
 const canvas = $("#camera", HTMLCanvasElement);
@@ -58,8 +59,13 @@ function takes(from) {
   const tool = get("labeling")?.tool, track = chosen()?.id ?? null;
   if (tool === "new") return drawing(from, (bbox) => lift(bbox ? { bbox } : { pixel: [from.u, from.v] }));
   if (tool === "shape" && track !== null) return drawing(from, (bbox) => (bbox ? shape(track, bbox) : drop()));
+  if (track === null) return null;
   const box = presentOf(track)?.bbox, sides = box ? sidesAt(box, from, REACH_PX * perPane()) : null;
-  if (track === null || !box || !sides) return null;
+  if (!sides || sides.every(Boolean)) {
+    const onRoad = road.takes(track, from);
+    if (onRoad) return { ...onRoad, ended: (isClick) => (isClick ? clicked(from) : onRoad.ended()) };
+  }
+  if (!box || !sides) return null;
   return {
     from, moved: (to) => hold(track, { bbox: stretched(box, sides, to.u - from.u, to.v - from.v) }),
     ended: (isClick) => (isClick ? clicked(from) : release()),

@@ -6,13 +6,14 @@ import { mergeWith } from "./commands.js";
 import { present } from "./draft.js";
 import { isKnown } from "./frames.js";
 import { shown, trackOf } from "./held.js";
+import { isReviewing } from "./review.js";
 
 /** @typedef {import("./types.js").LabelTrack} LabelTrack */
 /** @typedef {"here"|"open"|"all"} Which */
 
 /** A list longer than this is for the search of the frames, not for reading. */
 const MOST = 100;
-const WHICH = /** @type {[Which, string, string][]} */ ([["here", "Here", "Labels of this frame"], ["open", "To do", "Proposed, or sent back"], ["all", "All", "Every track of the drive"]]);
+const WHICH = /** @type {[Which, string, string][]} */ ([["here", "Here", "Labels of this frame"], ["open", "To do", "Proposed, or sent back; in a review: not reviewed"], ["all", "All", "Every track of the drive"]]);
 
 const body = el("div", { class: "track-list", tabIndex: -1, aria: { role: "listbox", label: "Tracks" } });
 const count = el("span", { class: "facts" });
@@ -47,9 +48,14 @@ export function setUp(parent) {
 function fitting() {
   const tracks = [...(get("labels")?.tracks.values() ?? [])], here = new Set(present().map(({ track }) => track));
   if (which === "here") return tracks.filter(({ id }) => here.has(id)).sort((a, b) => a.id - b.id);
-  if (which === "open") return tracks.filter(({ state, comment }) => state === "proposed" || (comment && state !== "rejected")).sort((a, b) => a.id - b.id);
+  if (which === "open") return tracks.filter(isReviewing() ? isUnreviewed : isOpen).sort((a, b) => a.id - b.id);
   return tracks.sort((a, b) => a.id - b.id);
 }
+
+/** @param {LabelTrack} track */
+const isOpen = ({ state, comment }) => state === "proposed" || (Boolean(comment) && state !== "rejected");
+/** @param {LabelTrack} track */
+const isUnreviewed = ({ state, reviewer }) => (state === "accepted" || state === "corrected") && !reviewer;
 
 function emptyWords() {
   if (!get("labels")?.tracks.size) return "Nothing is labelled yet. Press P: the pipeline's output becomes proposals.";
@@ -63,16 +69,16 @@ function create({ id }) {
 }
 
 /** @param {HTMLElement} row @param {LabelTrack} track */
-function update(row, { id, label, state, first, last, keyframes, origin, comment }) {
+function update(row, { id, label, state, first, last, keyframes, origin, comment, reviewer }) {
   row.setAttribute("aria-selected", String(id === get("track")));
   row.dataset.state = comment && state === "proposed" ? "sent-back" : state;
   const [mark, , what, frames, who] = [...row.children];
-  text(mark, { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state]);
-  mark.setAttribute("aria-label", state);
+  text(mark, reviewer ? "✓✓" : { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state]);
+  mark.setAttribute("aria-label", reviewer ? "reviewed" : state);
   text(what, label);
   text(frames, first === null || last === null ? "nowhere" : `${first + 1}–${last + 1} · ${keyframes.length} key`);
-  text(who, origin.maker === "person" ? origin.name : origin.maker);
-  row.title = `${state}${comment ? `, sent back: ${comment}` : ""}; made by ${origin.name || origin.maker}`;
+  text(who, reviewer || (origin.maker === "person" ? origin.name : origin.maker));
+  row.title = `${state}${comment ? `, sent back: ${comment}` : ""}; made by ${origin.name || origin.maker}${reviewer ? `, reviewed by ${reviewer}` : ""}${origin.how ? `; ${origin.how}` : ""}`;
 }
 
 /** Select it, and where it is not in this frame, go where it is. @param {HTMLElement|null} row */

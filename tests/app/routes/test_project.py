@@ -50,6 +50,21 @@ def test_nothing_is_asked_and_nothing_is_answered(client: httpx.Client):
     assert client.post("/api/project", json={"cuboids": []}).json() == {"pixels": []}
 
 
+@pytest.mark.parametrize("place", [(8.0, 0.0), (20.0, 3.5), (60.0, -5.0)])
+def test_a_pixel_looks_at_the_place_of_the_road_that_is_seen_there(
+    engine: Engine, client: httpx.Client, place: tuple[float, float]
+):
+    tick = engine.snapshot.tick
+    assert tick is not None
+    aligned = resolve(engine.snapshot.params.alignment, tick.frame.camera)
+    assert aligned is not None
+    (pixel,) = aligned.project(np.array([[*place, -0.4]])).tolist()
+    found = client.post("/api/project/road", json={"pixel": pixel, "z_m": -0.4}).json()["place"]
+    assert found == pytest.approx(place, abs=1e-6)
+    sky = {"pixel": [pixel[0], -500.0], "z_m": -0.4}
+    assert client.post("/api/project/road", json=sky).json() == {"place": None}, "no road there"
+
+
 @pytest.mark.parametrize(
     "body",
     [

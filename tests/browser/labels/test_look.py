@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page
+from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.judges import LOW_CONTRAST
@@ -29,6 +29,10 @@ def test_it_is_legible_and_fits(open_page: OpenPage, site: Site, width: int, hei
     wait_for_frame(page, START)
     draw(begin(page), labels)
     pixels(page, "#timeline-back")
+    said = page.locator(".said")
+    expect(said).to_contain_text(f"in frame {START + 1}")
+    assert said.evaluate("(node) => node.scrollWidth <= node.clientWidth && node.clientHeight > 0"), "all of it is read"
+    assert box_of(said)["width"] >= 200, "and what is longer, too"
     SCREENS.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=SCREENS / f"labeling_{width}_{theme}.png")
     assert page.evaluate(LOW_CONTRAST) == []

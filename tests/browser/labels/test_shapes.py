@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import pytest
 from playwright.sync_api import expect
@@ -85,6 +86,8 @@ def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, 
     lifted = labels.cuboid(made, START)
     assert lifted["center"][:2] == pytest.approx((LEAD_X, LEAD_Y), abs=2.5), "where the car is"
     expect(page.locator(".said")).to_contain_text("points")
+    expect(page.locator(".track-detail .how")).to_contain_text("laid on the")
+    assert labels.tracks[made]["state"] == "proposed", "until a person says that it is so"
 
     box = labels.sighting(made, START)["bbox"] or list(lead.bbox)
     hand.keys("Shift+G")
@@ -103,6 +106,79 @@ def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, 
     labels.wait_for(lambda now: now.sighting(made, START)["bbox"][0] == pytest.approx(drawn[0] + 15, abs=6))
     assert labels.sighting(made, START)["bbox"][1:] == pytest.approx(drawn[1:], abs=0.01), "one side moved"
     assert labels.cuboid(made, START)["center"] == lifted["center"], "a box is no cuboid"
+
+
+def foot_of(labels: Labels, cuboid: dict[str, Any]) -> tuple[float, float]:
+    """The pixel of the middle of its bottom."""
+    flat = {**cuboid, "size": [0.01, 0.01, cuboid["size"][2]]}
+    corners = labels.ask("project", {"cuboids": [flat]})["pixels"][0][:4]
+    return sum(u for u, _ in corners) / 4, sum(v for _, v in corners) / 4
+
+
+def test_a_cuboid_is_dragged_over_the_road_in_the_picture(hand: Hand, labels: Labels, site: Site):
+    page, tick = hand.page, site.engine.snapshot.tick
+    assert tick is not None
+    assert tick.frame.picture is not None
+    height, width = tick.frame.picture.bgr.shape[:2]
+    made = draw(hand, labels)
+    is_saved(page)
+    before = labels.cuboid(made, START)
+    u, v = foot_of(labels, before)
+    page.wait_for_function(
+        """async ([track, frame]) => {
+          const { get } = await import("/js/store.js");
+          return get("projected")?.frame === frame && get("projected").pixels.has(track);
+        }""",
+        arg=[made, START],
+    )
+    plan = pixels(page, "#bev")
+    hand.drag(hand.picture(u, v - 3, width, height), hand.picture(u + 30, v + 5, width, height), steps=6)
+    labels.wait_for(lambda now: now.cuboid(made, START) != before)
+    assert repainted(page, "#bev", plan)
+    after = labels.cuboid(made, START)
+    assert foot_of(labels, after) == pytest.approx((u + 30, v + 8), abs=1.5), "its foot is under the hand"
+    assert (after["size"], after["yaw_rad"]) == (before["size"], before["yaw_rad"])
+    assert after["center"][0] < before["center"][0] - 1, "lower in the picture is nearer"
+    assert after["center"][1] < before["center"][1] - 0.5
+
+
+def test_everything_is_drawn_and_merged_by_keys_alone(hand: Hand, labels: Labels):
+    page = hand.page
+    hand.keys("g", "Enter")
+    labels.wait_for(lambda now: len(now.tracks) == 1)
+    (first,) = labels.tracks
+    placed = labels.cuboid(first, START)
+    assert (placed["size"], placed["center"][0] - placed["size"][0] / 2) == ([4.5, 1.8, 1.5], pytest.approx(20.0))
+    expect(page.locator(".track-row[aria-selected=true]")).to_have_attribute("data-id", str(first))
+    hand.keys("Shift+ArrowUp")
+    labels.wait_for(lambda now: now.cuboid(first, START)["center"][0] == pytest.approx(placed["center"][0] + 1))
+
+    hand.keys("Shift+G", "Enter")
+    labels.wait_for(lambda now: now.sighting(first, START)["bbox"] is not None)
+    box = labels.sighting(first, START)["bbox"]
+    hand.keys("ArrowRight", "Shift+ArrowDown")
+    labels.wait_for(lambda now: now.sighting(first, START)["bbox"][3] > box[3])
+    moved = labels.sighting(first, START)["bbox"]
+    assert moved[0] - box[0] == pytest.approx(moved[2] - box[2]), "the arrow moves the whole box"
+    assert moved[1] == pytest.approx(box[1]), "and with Shift its lower side alone"
+    hand.keys("Escape", "g", "Enter")
+    labels.wait_for(lambda now: len(now.tracks) == 2)
+    second = max(labels.tracks)
+    expect(page.locator(".track-row[aria-selected=true]")).to_have_attribute("data-id", str(second))
+    hand.keys("m")
+    expect(page.locator(".said")).to_contain_text(f"#{second}")
+    hand.keys(".", "Enter")
+    labels.wait_for(lambda now: set(now.tracks) == {second})
+
+    hand.keys("Shift+P", "Enter")
+    labels.wait_for(lambda now: len(now.everything["paths"]) == 1)
+    ours = labels.everything["paths"][0]
+    hand.keys("Shift+P", "ArrowLeft", "ArrowLeft", "ArrowUp", "Enter")
+    labels.wait_for(lambda now: now.everything["paths"][0]["left"] != ours["left"])
+    bent = labels.everything["paths"][0]
+    assert bent["left"][0] == pytest.approx(ours["left"][0], abs=0.05), "it begins where it began"
+    assert bent["left"][len(ours["left"]) - 1][1] - ours["left"][-1][1] == pytest.approx(0.5, abs=0.05)
+    assert len(bent["left"]) == len(ours["left"]) + 1
 
 
 def test_a_label_without_a_cuboid_says_why_and_how_to_give_it_one(hand: Hand, labels: Labels):

@@ -1,0 +1,46 @@
+/** A cuboid dragged over the road in the picture, held by the middle of its foot. The server says where the road is. */
+import { newestOnly, request } from "../api.js";
+import { get } from "../store.js";
+import { groundAt } from "./cuboid.js";
+import { hold, presentOf, release } from "./draft.js";
+import { shown } from "./held.js";
+import { boundsOf } from "./picture.js";
+
+/** @typedef {import("./picturehand.js").Pixel} Pixel */
+/** @typedef {import("./types.js").Cuboid} Cuboid */
+
+/** What a drag of a track's cuboid does; null where the pixel is not on it. @param {number} track @param {Pixel} from */
+export function takes(track, from) {
+  const projected = get("projected"), corners = projected?.frame === shown() ? projected.pixels.get(track) : undefined;
+  const cuboid = presentOf(track)?.cuboid, bounds = corners ? boundsOf(corners) : null, foot = corners ? middleOf(corners) : null;
+  if (!cuboid || !bounds || !foot || from.u < bounds[0] || from.u > bounds[2] || from.v < bounds[1] || from.v > bounds[3]) return null;
+  const frame = shown(), ground = get("frame")?.display.ground ?? null;
+  const above = cuboid.center[2] - groundAt(ground, { x: cuboid.center[0], y: cuboid.center[1] });
+  /** Of the road where it is held now: one that rises is followed. */
+  let z_m = cuboid.center[2] - cuboid.size[2] / 2;
+  const move = newestOnly(async (/** @type {Pixel} */ to) => {
+    const pixel = [foot.u + to.u - from.u, foot.v + to.v - from.v];
+    /** @type {{place: [number, number]|null}} */
+    const { place } = await request("api/project/road", "POST", { pixel, z_m }).catch(() => ({ place: null }));
+    if (!place) return;
+    const [x, y] = place, z = groundAt(ground, { x, y }) + above;
+    z_m = z - cuboid.size[2] / 2;
+    hold(track, { cuboid: { ...cuboid, center: [x, y, z] } }, frame);
+  });
+  let last = Promise.resolve();
+  return {
+    moved: (/** @type {Pixel} */ to) => {
+      last = move(to);
+    },
+    ended: () => last.then(release),
+  };
+}
+
+/** Where the diagonals of its bottom cross: the middle, in whatever perspective. @param {import("../types.js").Pixels} corners @returns {Pixel|null} */
+function middleOf([a, b, c, d]) {
+  if (!a || !b || !c || !d) return null;
+  const [px, py] = [c[0] - a[0], c[1] - a[1]], [qx, qy] = [d[0] - b[0], d[1] - b[1]], cross = px * qy - py * qx;
+  if (Math.abs(cross) < 1e-9) return { u: (a[0] + b[0] + c[0] + d[0]) / 4, v: (a[1] + b[1] + c[1] + d[1]) / 4 };
+  const t = ((b[0] - a[0]) * qy - (b[1] - a[1]) * qx) / cross;
+  return { u: a[0] + t * px, v: a[1] + t * py };
+}

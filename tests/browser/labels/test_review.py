@@ -1,0 +1,46 @@
+"""A second person goes through what others have labelled, by keys."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.conftest import START
+from tests.browser.labels.hands import LEAD_X, Hand, Labels, is_at
+
+pytestmark = pytest.mark.usefixtures("paused_in_traffic")
+
+CAR = {"center": [LEAD_X, 0.0, 0.1], "size": [4.4, 1.8, 1.5], "yaw_rad": 0.0}
+
+
+def test_labels_and_who_leads_are_found_right_or_sent_back_one_after_the_other(hand: Hand, labels: Labels):
+    page = hand.page
+    added = labels.act("Bob", {"kind": "add_track", "label": "car", "frame": START + 2, "cuboid": CAR, "bbox": None})
+    made = added["changed"]["tracks"][0]["id"]
+    labels.act("Bob", {"kind": "set_lead", "first": START + 2, "last": START + 6, "lead": made})
+    under, said = page.locator(".reviewing .under"), page.locator(".said")
+
+    hand.keys("Shift+R")
+    expect(page.get_by_role("button", name="Review", exact=True)).to_have_attribute("aria-pressed", "true")
+    expect(said).to_contain_text("2 to review")
+    is_at(page, START + 2)
+    expect(under).to_have_text(f"#{made} car")
+    hand.keys("n")
+    expect(under).to_have_text(f"lead #{made}, frames {START + 3}–{START + 7}")
+    hand.keys("Shift+N")
+    expect(under).to_have_text(f"#{made} car")
+    hand.keys("a")
+    labels.wait_for(lambda now: now.tracks[made]["reviewer"] == "Ada")
+    expect(said).to_contain_text("1 to review")
+    expect(under).to_have_text(f"lead #{made}, frames {START + 3}–{START + 7}")
+    hand.keys("r")
+    dialog = page.get_by_role("dialog", name="Send back")
+    dialog.get_by_label("Comment").fill("it begins later")
+    dialog.get_by_role("button", name="OK").click()
+    expect(said).to_contain_text("Nothing of others is left to review")
+    (lead,) = labels.everything["leads"]
+    assert (lead["state"], lead["comment"], lead["reviewer"]) == ("proposed", "it begins later", "")
+    expect(page.locator("#label-bar .where")).to_have_text(f"sent back {START + 3}–{START + 7}: it begins later")
+    expect(page.locator(f".track-row[data-id='{made}'] .mark")).to_have_text("✓✓")
+    hand.keys("Shift+R")
+    expect(page.locator(".reviewing")).to_be_hidden()
