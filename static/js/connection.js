@@ -128,8 +128,8 @@ async function onBinary(message) {
 async function show({ buffer, number, done }) {
   const { frame, jpeg } = decode(buffer);
   if (frame.state.sequence < lastSequence) return done();
+  frame.isLate = isFirst || frame.state.sequence === lastSequence; // sent once more, as for a wider picture
   lastSequence = frame.state.sequence;
-  frame.isLate = isFirst;
   isFirst = false;
   const before = get("frame");
   if (jpeg.length) frame.bitmap = (isSame(jpeg, shownJpeg) && before?.bitmap) || (await bitmapOf(jpeg));

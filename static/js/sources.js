@@ -7,7 +7,7 @@ const dialog = $("#source-dialog", HTMLDialogElement);
 
 export function setUp() {
   $("#source-button").addEventListener("click", open);
-  on(["state"], () => text($("#source-title"), get("state")?.title || get("state")?.uri || "no recording"));
+  on(["state"], () => text($("#source-title"), get("state")?.title || get("state")?.uri || "opening …"));
 }
 
 export async function open() {

@@ -26,7 +26,7 @@ export function setUp() {
   speed.addEventListener("change", () => playback({ speed: Number(speed.value) }));
   const where = el("span", { class: "where" }, live, name, count, time, provisional);
   $("#transport").append(back, play, next, where, el("span", { class: "spacer" }), recordButton(), speed, loop);
-  on(["state"], update);
+  on(["state", "frame"], update);
 }
 
 /** @param {string} label @param {string} title @param {() => void} act @param {SVGElement[]} icons */
@@ -57,9 +57,10 @@ function update() {
   playIcon.classList.toggle("is-off", state.playing);
   pauseIcon.classList.toggle("is-off", !state.playing);
   play.setAttribute("aria-label", state.playing ? "Pause" : "Play");
-  text(name, state.frame ?? "");
-  text(count, has && !state.live ? `${state.index + 1}/${state.count}` : "");
-  text(time, state.live ? clock(state.time_s) : `${clock(state.time_s)} / ${clock(state.duration_s)}`);
+  const frame = get("frame")?.state, at = frame?.uri === state.uri ? frame : state; // named is what is drawn
+  text(name, at.frame ?? "");
+  text(count, has && !state.live ? `${at.index + 1}/${state.count}` : "");
+  text(time, state.live ? clock(at.time_s) : `${clock(at.time_s)} / ${clock(state.duration_s)}`);
   provisional.hidden = !state.provisional;
   live.hidden = !state.live;
   if (document.activeElement !== speed) speed.value = String(state.speed);
