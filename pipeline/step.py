@@ -89,8 +89,9 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     clock.lap("fusion")
     objects = motion.describe(fused.objects, measured_ego, params.motion)
     vehicles = [each.detection.bbox for each in measured or () if each.detection.label in VEHICLES]
+    road_z_m = frame.camera.road_z_m if frame.camera is not None else None
     lane_state, lane = lanes.follow(
-        state.lanes, frame.raw_lanes, aligned, seen.ground, ego, dt_s, params.lanes, vehicles
+        state.lanes, frame.raw_lanes, aligned, seen.ground, ego, dt_s, params.lanes, vehicles, road_z_m
     )
     clock.lap("lanes")
     moved_by = frame.ego if measured_ego is not None else own

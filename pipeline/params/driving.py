@@ -54,7 +54,7 @@ class LaneParams(Section):
 
     max_range_m: float = slider(60.0, 15.0, 100.0, 5.0, "m", "Paint farther away is left out")
     mount_height_m: float = slider(
-        0.6, 0.0, 3.0, 0.05, "m", "Height of the ego origin above the road, where no sweep shows the road"
+        0.6, 0.0, 3.0, 0.05, "m", "Height of the ego origin above the road, where neither sweep nor calibration knows"
     )
     bearing_sigma_deg: float = slider(0.1, 0.01, 1.0, 0.01, "°", "Noise of a point's direction in the picture")
     min_quality: float = slider(0.3, 0.05, 0.95, 0.01, "", "Lines supported less are not believed")

@@ -4,9 +4,9 @@
 ``follow``     the same, and the lines tracked from frame to frame: what the rest of the line calls
 ``polylines``  an ``EgoLane`` as points on the road, and ``in_picture`` as pixels, for views
 
-The road is a plane: the one that the LiDAR's ground points show, else the mount's height below the ego origin. Lines
-of a road are parallel, so the pitch of the camera against its calibration shows in how their distance seems to change
-with range, and is tracked as a slow state.
+The road is a plane: the one that the LiDAR's ground points show, else as far below the ego origin as the calibration
+or the parameter says. Lines of a road are parallel, so the pitch of the camera against its calibration shows in how
+their distance seems to change with range, and is tracked as a slow state.
 """
 
 from __future__ import annotations
@@ -89,11 +89,14 @@ def follow(
     dt_s: float | None,
     params: LaneParams,
     vehicles: Sequence[Box] = (),
+    road_z_m: float | None = None,
 ) -> tuple[LaneState, EgoLane | None]:
     """One frame: measure if a lane detector has looked at it, and track. Null until one has. ground: of this frame's
-    sweep, if any. dt_s: since the frame before; null at the start. vehicles: boxes in the picture that hide it."""
+    sweep, if any. dt_s: since the frame before; null at the start. vehicles: boxes in the picture that hide it.
+    road_z_m: of the road in the ego frame, as the calibration has it; null: as the parameter has it."""
     plane, sweeps = _settled(state, road_plane(ground))
-    road = plane if plane is not None else np.array([0.0, 0.0, -params.mount_height_m])
+    level_m = road_z_m if road_z_m is not None else -params.mount_height_m
+    road = plane if plane is not None else np.array([0.0, 0.0, level_m])
     pitch = _drifted(state.pitch, dt_s, params)
     measured = None
     if raw is not None and aligned is not None:

@@ -69,6 +69,7 @@ class CameraRecord:
     T_camera_ego: tuple[float, ...]
     width: _Size
     height: _Size
+    road_z_m: float | None = None
 
     @staticmethod
     def of(camera: CameraCalibration, at_ns: int) -> CameraRecord:
@@ -76,7 +77,7 @@ class CameraRecord:
             return tuple(float(value) for value in values.ravel())
 
         matrices = numbers(camera.K), numbers(camera.distortion), numbers(camera.T_camera_ego)
-        return CameraRecord(at_ns, *matrices, camera.width, camera.height)
+        return CameraRecord(at_ns, *matrices, camera.width, camera.height, camera.road_z_m)
 
     def calibration(self) -> CameraCalibration:
         """Damaged when the matrices are none of a camera."""
@@ -87,7 +88,7 @@ class CameraRecord:
             T_camera_ego = rigid_transform(np.reshape(self.T_camera_ego, (4, 4)), "calibration: T_camera_ego")
         except SourceError as error:
             raise Damaged(str(error)) from None
-        return CameraCalibration(K, np.array(self.distortion), T_camera_ego, self.width, self.height)
+        return CameraCalibration(K, np.array(self.distortion), T_camera_ego, self.width, self.height, self.road_z_m)
 
 
 R = TypeVar("R", SweepRef | None, PictureRef | None, CameraRecord | None)

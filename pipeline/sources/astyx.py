@@ -37,6 +37,8 @@ _HALF_ROTATION_NS = 50_000_000
 _NOMINAL_STEP_NS = 300_000_000
 _NOMINAL_SIZE = (2048, 618)
 """What the calibration files do not say, where no picture does."""
+_ROAD_Z_M = -1.55
+"""The radar's height above the road, which the files do not say: the median over its own sweeps' ground."""
 _COLUMNS = 6  # X Y Z Reflectivity LaserID Timestamp
 _HEAD_BYTES = 4096
 _LABELS = {"motorcyclist": "motorcycle", "cyclist": "bicycle", "towed object": "trailer"}
@@ -141,7 +143,7 @@ def parse_calibration(data: bytes, file: str, size: tuple[int, int]) -> tuple[F6
     T_ego_lidar = rigid_transform(to_ego, f"calibration {file}: T_to_ref_COS of lidar_vlp16")
     T_ego_camera = rigid_transform(from_camera, f"calibration {file}: T_to_ref_COS of camera_front")
     K = camera_matrix(K, f"calibration {file}: K of camera_front")
-    camera = CameraCalibration(K, np.empty(0), inverse(T_ego_camera), *size)
+    camera = CameraCalibration(K, np.empty(0), inverse(T_ego_camera), *size, road_z_m=_ROAD_Z_M)
     check_looks_ahead(camera, f"calibration {file}")
     return T_ego_lidar, camera
 

@@ -15,6 +15,9 @@ from pipeline.sources.base import SourceError
 from pipeline.sources.files import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 
+_VELODYNE_HEIGHT_M = 1.73
+"""Above the road (Geiger et al. 2013, figure 3)."""
+
 
 @dataclass(frozen=True)
 class KittiCalibration:
@@ -72,6 +75,6 @@ def _calibration(projection: F64, rectify: F64, velo_to_cam: F64, file: str, siz
     baseline = np.hstack([np.eye(3), np.linalg.solve(K, projection[:, 3:])])
     T_camera2_rect = rigid_transform(baseline, f"calibration {file}: the baseline of camera 2")
     T_rect_ego = T_rect_cam @ T_cam_ego
-    camera = CameraCalibration(K, np.empty(0), T_camera2_rect @ T_rect_ego, *size)
+    camera = CameraCalibration(K, np.empty(0), T_camera2_rect @ T_rect_ego, *size, road_z_m=-_VELODYNE_HEIGHT_M)
     check_looks_ahead(camera, f"calibration {file}")
     return KittiCalibration(T_rect_ego, camera)

@@ -40,7 +40,8 @@ class CameraCalibration:
     """Pinhole camera with OpenCV distortion.
 
     K: (3, 3). distortion: (0,), (4,), (5,) or (8,) OpenCV order, of the raw image. T_camera_ego: (4, 4) takes
-    ego points to the camera frame (z along the optical axis, x right, y down).
+    ego points to the camera frame (z along the optical axis, x right, y down). road_z_m: the road below the car in the
+    ego frame; null where the recording does not know it.
     """
 
     K: F64
@@ -48,6 +49,7 @@ class CameraCalibration:
     T_camera_ego: F64
     width: int
     height: int
+    road_z_m: float | None = None
 
 
 @dataclass(frozen=True)

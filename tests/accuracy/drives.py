@@ -16,6 +16,8 @@ from pipeline.types import Frame, Result
 from tests import looking
 from tests.looking import yolox_nano
 
+FOLDERS = {"astyx": "astyx", "kitti": "kitti_0052"}
+"""Where a kind of recording lies in the data folder."""
 SCORED_CLIPS = {
     "lead near 20 m": range(60, 69),
     "following at 22–24 m": range(183, 193),
@@ -52,8 +54,7 @@ def drive(
     """Run a recording of the data folder with YOLOX-nano and, as the command line does where it is, TwinLiteNet.
     ``changes``: dotted parameters on top of the preset. lanes: another lane detector, as on the command line; it looks
     at every ``lanes_every``-th picture, null: as often as usual."""
-    name = {"astyx": "astyx", "kitti": "kitti_0052"}[kind]
-    uri = f"{kind}:{folder / name}"
+    uri = f"{kind}:{folder / FOLDERS[kind]}"
     source, frames = open_source(uri), _frames(uri)
     params = with_changes(preset(preset_name), dict(changes))
     picture = frames[0].picture

@@ -20,7 +20,7 @@ from pipeline.params import Params
 from pipeline.path.lane_classical import open_classical
 from pipeline.path.lane_network import open_lane_network
 from pipeline.path.lane_types import EgoLane
-from pipeline.path.lanes import LaneState, follow
+from pipeline.path.lanes import LaneState, follow, road_plane
 from pipeline.records import evolve
 from pipeline.run import Detectors, Detects, lanes_for, run, through
 from pipeline.simulation.camera import calibration
@@ -28,7 +28,7 @@ from pipeline.sources import open_source
 from pipeline.step import warm_up
 from pipeline.types import F64, GROUND, U8, Frame, RawLanes, Result
 from pipeline.vision.detector import open_detector
-from tests.accuracy.drives import RULE, SCORED_CLIPS, all_scored, drive
+from tests.accuracy.drives import FOLDERS, RULE, SCORED_CLIPS, all_scored, drive
 from tests.accuracy.lane_marks import MARKS
 from tests.conftest import ROOT
 
@@ -151,6 +151,18 @@ def test_metres_on_the_astyx_road(data_dir: Path, clip: str) -> None:
         assert abs(apart[1] - apart[0]) < 0.6, name
     assert all(2.9 < width < 3.8 for width in widths), widths
     assert np.ptp(widths) < 0.35, widths
+
+
+@pytest.mark.parametrize("kind", ["astyx", "kitti"])
+def test_the_road_lies_where_the_calibration_has_it_without_a_sweep(data_dir: Path, kind: str) -> None:
+    """What a recording's own sweeps say of the road's height, and the lanes that the camera alone sees on it."""
+    planes = [road_plane(result.layers.ground) for result in drive(data_dir, kind).results.values()]
+    camera = open_source(f"{kind}:{data_dir / FOLDERS[kind]}").frame(0).camera
+    assert camera is not None
+    assert camera.road_z_m == pytest.approx(np.median([plane[2] for plane in planes if plane is not None]), abs=0.05)
+    seen = [result.layers.lanes for result in drive(data_dir, kind, sensors="camera").results.values()]
+    widths = [lane.width_m for lane in seen if lane is not None and lane.width_m is not None]
+    assert 2.9 < np.median(widths) < 3.8
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

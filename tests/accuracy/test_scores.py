@@ -12,9 +12,8 @@ from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
 from pipeline.evaluation.scores.figures import measure
 from pipeline.evaluation.scores.truth import of_source
 from pipeline.sources import open_source
-from tests.accuracy.drives import RULE, drive
+from tests.accuracy.drives import FOLDERS, RULE, drive
 
-FOLDERS = {"astyx": "astyx", "kitti": "kitti_0052"}
 AT_LEAST = {
     "astyx": {"cipv_correct": 97.0, "recall": 54.0, "precision": 56.0, "mota": 10.0, "idf1": 46.0, "hota": 49.0},
     "kitti": {"cipv_correct": 100.0, "recall": 70.0, "idf1": 50.0, "hota": 54.0},

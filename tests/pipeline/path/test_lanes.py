@@ -134,6 +134,15 @@ def test_a_wrong_mount_height_gives_no_pair(factor: float) -> None:
     assert lane.left is None or lane.right is None
 
 
+def test_the_calibration_knows_the_roads_height_better_than_the_parameter_and_a_sweep_better_than_both() -> None:
+    low = PARAMS.model_copy(update={"mount_height_m": -GROUND_M / 3})
+    assert seen(paint(), params=low).width_m != pytest.approx(3.5, abs=0.2)
+    assert seen(paint(), params=low, road_z_m=GROUND_M).width_m == pytest.approx(3.5, abs=0.1)
+    _, lane = follow(LaneState(plane=FLAT), paint(), aligned(), None, None, None, low, road_z_m=GROUND_M / 3)
+    assert lane is not None
+    assert lane.width_m == pytest.approx(3.5, abs=0.1)
+
+
 def test_a_lane_in_the_wrong_place_is_not_made_of_one_far_line() -> None:
     lane = seen(paint(((4.5, 0.0, 0.0, 0.0),)))
     assert (lane.left, lane.right) == (None, None)

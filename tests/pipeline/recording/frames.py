@@ -23,6 +23,7 @@ CAMERA = CameraCalibration(
     np.array([[0.0, -1.0, 0.0, 0.1], [0.0, 0.0, -1.0, 0.6], [1.0, 0.0, 0.0, -0.3], [0.0, 0.0, 0.0, 1.0]]),
     32,
     24,
+    road_z_m=-0.62,
 )
 ROUTE = Route("to work", np.array([50.1, 50.2, 50.30001]), np.array([8.1, 8.2, 8.3]), 0.5)
 TRUTH = (TruthObject("car", Cuboid((20.0, 0.1, 0.3), (4.0, 1.8, 1.5), 0.01), 7),)

@@ -66,7 +66,7 @@ def test_every_field_is_written() -> None:
         Frame: "index name t_ns sweep picture camera ego raw_boxes notes gnss raw_lanes route streams timing_ms",
         Sweep: "t_ns points ring channels time_s",
         Picture: "t_ns bgr encoded",
-        CameraCalibration: "K distortion T_camera_ego width height",
+        CameraCalibration: "K distortion T_camera_ego width height road_z_m",
         Route: "name lat_deg lon_deg sigma_m",
     }
     for kind, names in known.items():
