@@ -30,7 +30,7 @@ const fetchScore = newestOnly(async () => {
 export function setUp() {
   set("align", OFF);
   button.addEventListener("click", toggleAlign);
-  bar.append(model("angular"), model("pinhole"), blendSlider(), edgesButton(), el("span", { class: "spacer" }), how, el("span", { class: "facts", textContent: "Match" }), score);
+  bar.append(model("angular"), model("pinhole"), el("span", { class: "facts", textContent: "Match" }), score, el("span", { class: "spacer" }), how, blendSlider(), edgesButton());
   followHand($("#camera", HTMLCanvasElement), isOn);
   addLayer((ctx, frame, place) => isOn() && get("align")?.edges && drawEdges(ctx, frame, place));
   on(["frame"], () => isOn() && fetchScore(undefined));

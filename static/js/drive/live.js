@@ -7,6 +7,9 @@ import { get, on, set } from "../store.js";
 /** @typedef {import("../types.js").Frame} Frame */
 /** @typedef {import("../types.js").DriveEvent} DriveEvent */
 
+/** Why what asks for a recording is not to be had. */
+export const NO_DRIVE = "Live sensors have no whole drive: record them, then open the session.";
+
 const MOST_FRAMES = 1200;
 const SAME_S = 0.001;
 

@@ -1,8 +1,7 @@
 /** What asks for a recording can do nothing with live sensors: it is off, and says why. */
 import { $ } from "../dom.js";
+import { NO_DRIVE } from "../drive/live.js";
 import { get, on } from "../store.js";
-
-const WHY = "Live sensors have no whole drive: record them, then open the session";
 
 /** @type {{part: HTMLButtonElement, title: string}[]} */
 let parts = [];
@@ -19,6 +18,6 @@ function reflect() {
   isLive = !isLive;
   for (const { part, title } of parts) {
     part.disabled = isLive;
-    part.title = isLive ? WHY : title;
+    part.title = isLive ? NO_DRIVE : title;
   }
 }

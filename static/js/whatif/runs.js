@@ -2,6 +2,7 @@
 import { newestOnly, request } from "../api.js";
 import { $, el, keyed, text } from "../dom.js";
 import { toDifference } from "../drive/jumps.js";
+import { NO_DRIVE } from "../drive/live.js";
 import { get, on, paint, set } from "../store.js";
 import { metricsTable } from "./metrics.js";
 
@@ -89,7 +90,7 @@ function showRun(row, run) {
 function showComparison() {
   const drive = get("drive"), found = drive?.comparison;
   if (!drive || !found) {
-    return comparison.replaceChildren(el("p", { class: "facts pad", textContent: "Change a parameter: the whole recording is computed again and compared here." }));
+    return comparison.replaceChildren(el("p", { class: "facts pad", textContent: get("state")?.live ? NO_DRIVE : "Change a parameter: the whole recording is computed again and compared here." }));
   }
   const sentences = Object.entries(found.first).slice(0, 3).map(([at, words]) => el("li", { textContent: `frame ${Number(at) + 1}: ${words}` }));
   comparison.replaceChildren(

@@ -1,15 +1,17 @@
 /** This drive at this moment in rerun's own viewer, whose files our server serves. */
 import { request } from "../api.js";
 import { el } from "../dom.js";
+import { NO_DRIVE } from "../drive/live.js";
 import { get } from "../store.js";
 
-/** @param {HTMLElement} body the pane that the viewer is put into, once; a press of its button opens it anew */
+/** @param {HTMLElement} body the pane that the viewer is put into, once there is one; a press of its button opens it anew */
 export async function showRerun(body) {
-  if (!body.firstChild) await load(body);
+  if (!body.querySelector("iframe")) await load(body);
 }
 
 /** @param {HTMLElement} body */
 async function load(body) {
+  if (get("state")?.live) return void body.replaceChildren(el("p", { class: "facts pad", textContent: NO_DRIVE }));
   const note = el("p", { class: "busy", textContent: "Opening rerun …" });
   body.replaceChildren(note);
   try {
