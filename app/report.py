@@ -1,13 +1,14 @@
-"""The experiments' report as one HTML file: tables and charts, light or dark as the reader's system is, and nothing
-loaded from anywhere."""
+"""The experiments' report as one HTML file: scenes, tables and charts, light or dark as the reader's system is. Nothing
+is loaded from anywhere."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from html import escape
 
+from app.scene_pictures import scene_html
 from app.svg import chart_svg
-from pipeline.evaluation.experiments.sections import AnyCell, Cell, Coloured, Driven, Linked, Section, Table
+from pipeline.evaluation.experiments.sections import AnyCell, Cell, Coloured, Driven, Linked, Scene, Section, Table
 
 _STYLE = """
 :root { color-scheme: light dark; --ground: #fff; --ink: #1b2024; --soft: #5d6870; --edge: #d8dee2; --raised: #f4f6f7;
@@ -22,6 +23,12 @@ h3 { font-size: 15px; margin: 22px 0 6px; } p { max-width: 80ch; } nav a { margi
 th, td { padding: 3px 10px; border-bottom: 1px solid var(--edge); text-align: right; white-space: nowrap; }
 th { background: var(--raised); font-weight: 600; } td.word, th.word { text-align: left; }
 caption, .note { caption-side: bottom; text-align: left; color: var(--soft); font-size: 13px; padding-top: 4px; }
+.scenes { display: grid; grid-template-columns: repeat(auto-fill, minmax(340px, 1fr)); gap: 14px; }
+.scene img { display: block; width: 100%; margin-top: 4px; } .plan { display: block; background: var(--raised); }
+.tarmac { fill: #8a949b; } .paint { fill: none; stroke: #fff; stroke-width: 0.15; } .mark { stroke: var(--soft);
+  stroke-width: 0.2; } .plan text { font-size: 2.6px; } .car { stroke: #14181b; stroke-width: 0.25; }
+.car.ego { fill: #0b6bcb; } .way { fill: none; stroke: #f5d90a; stroke-width: 0.45; stroke-dasharray: 1.2 0.8; }
+.way.ego { stroke: #0b6bcb; }
 .charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); gap: 18px; }
 figure { margin: 12px 0; } figcaption { font-weight: 600; font-size: 13.5px; } figure > svg { width: 100%; }
 svg text { fill: var(--soft); font-size: 11px; } .grid { stroke: var(--edge); } .legend { font-size: 12px; }
@@ -59,9 +66,15 @@ def section_html(section: Section, replays: str = "") -> str:
         f'<section id="{escape(section.name)}"><h2>{escape(section.title)}</h2>'
         + "".join(f"<p>{escape(paragraph)}</p>" for paragraph in section.text)
         + (f'<p><a href="{escape(replays)}index.html#{escape(section.name)}">Every drive</a></p>' if replays else "")
+        + _scenes(section.scenes)
         + "".join(_table(table, replays) for table in section.tables)
         + f'<div class="charts">{"".join(chart_svg(chart) for chart in section.charts)}</div></section>'
     )
+
+
+def _scenes(scenes: Iterable[Scene]) -> str:
+    drawn = "".join(map(scene_html, scenes))
+    return f'<div class="scenes">{drawn}</div>' if drawn else ""
 
 
 def _table(table: Table, replays: str) -> str:

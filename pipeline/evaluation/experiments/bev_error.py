@@ -182,6 +182,7 @@ def report(cases: Sequence[Case], runs: Sequence[list[Sighting]]) -> Section:
         ),
         (Table("Errors, m", _COLUMNS, tuple(rows), decimals=3),),
         (_chart("Distance error over range, straight ahead", by_kind.get(("a", "both", "truth"), [])),),
+        scenes=layouts.scenes(),
     )
 
 

@@ -23,6 +23,7 @@ from pipeline.evaluation.experiments.sections import (
     Driven,
     Experiment,
     Replay,
+    Scene,
     Section,
     Series,
     Table,
@@ -39,6 +40,7 @@ Manoeuvre = Literal["CCRs", "CCRm", "CCRb"]
 Key = tuple[Manoeuvre, Sensors, str, Boxes]
 LEAD_DECEL_MPS2 = 6.0
 _LEAD_BRAKES_AT_S = 2.0
+_SHOWN_AT_S: dict[Manoeuvre, float] = {"CCRs": 3.0, "CCRm": 7.0, "CCRb": 3.0}
 _CLEAR_MPS, _CLEAR_M = 0.3, 0.3
 """Impact speed or gap that must differ by more before one is called better."""
 SENSORS: dict[Sensors, str] = {"lidar": "LiDAR", "both": "fused"}
@@ -180,6 +182,9 @@ def report(cases: Sequence[Case], drives: Sequence[Drive]) -> Section:
         ),
         (Table("Drives", _COLUMNS, tuple(rows)), closed_forms()),
         tuple(chart for manoeuvre in manoeuvres for chart in _charts(manoeuvre, done)),
+        scenes=tuple(
+            Scene(each, _scenario(Case(each, "both", "ACC + AEB", 0)), _SHOWN_AT_S[each]) for each in manoeuvres
+        ),
     )
 
 

@@ -15,7 +15,17 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.evaluation.experiments.sections import AnyCell, Chart, Driven, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.experiments.sections import (
+    AnyCell,
+    Chart,
+    Driven,
+    Experiment,
+    Replay,
+    Scene,
+    Section,
+    Series,
+    Table,
+)
 from pipeline.evaluation.lead import switches
 from pipeline.params import CipvParams, Params, PathParams
 from pipeline.path.corridor import nearest_on_path
@@ -39,6 +49,7 @@ MAX_M = 60.0
 OVERLAP_M = 0.9
 """In the path: as much of the vehicle as this reaches into the corridor, or half of what is narrower."""
 VISIBLE_SHARE = 0.35
+_SHOWN_AT = 0.4
 _EDGE_M, _MARGIN_M = 0.3, 12.0
 _AHEAD_M, _STEP_S, _LONGEST_S, _SMALLEST_MOVE_M = 90.0, 0.25, 15.0, 0.2
 _SAME_PLACE_M, _SAME_SHARE = 2.5, 0.2
@@ -278,6 +289,11 @@ def report(cases: Sequence[Case], runs: Sequence[list[Frame]]) -> Section:
             f"{SCENARIOS[scene].capitalize()}: fused is not right in every decidable frame"
             for scene in scenes
             if groups[scene, "both"] and _share_correct(groups[scene, "both"]) < 1.0
+        ),
+        scenes=tuple(
+            Scene(SCENARIOS[name].capitalize(), scene, _SHOWN_AT * scene.duration_s)
+            for name in scenes
+            for scene in (_scenario(Case(name, "both", 0)),)
         ),
     )
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from pipeline.evaluation.experiments import bends
 from pipeline.evaluation.experiments.curve_drives import BOXES, LIDAR_ALONE, LINES, SOURCES, Frames, driven
-from pipeline.evaluation.experiments.sections import Cell, Chart, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.experiments.sections import Cell, Chart, Experiment, Replay, Scene, Section, Series, Table
 from pipeline.params import CipvParams, Params
 from pipeline.simulation.detection_model import Detections
 from pipeline.simulation.scenario import Scenario
@@ -150,6 +150,7 @@ def report(cases: Sequence[Case], outcomes: Sequence[Outcome]) -> Section:
             *(_verdict(name, drives) for name, drives in follows.items() if not _held(name, drives["fused"])),
             *_told_too_late(cut_ins),
         ),
+        scenes=tuple(Scene(bends.LAYOUTS[name].title, bends.scenario(bends.LAYOUTS[name], 0), 6.0) for name in follows),
     )
 
 

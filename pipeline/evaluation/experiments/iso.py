@@ -18,6 +18,7 @@ from pipeline.evaluation.experiments.sections import (
     Coloured,
     Experiment,
     Replay,
+    Scene,
     Section,
     Series,
     Table,
@@ -244,6 +245,11 @@ def report(cases: Sequence[Case], outcomes: Sequence[Outcome]) -> Section:
         ),
         (Table("Tests", _COLUMNS, rows),),
         tuple(_chart(test, value, groups) for test, value in dict.fromkeys((key[0], key[1]) for key in groups)),
+        scenes=tuple(
+            Scene(f"{case.test.capitalize()}, {case.at}", scene, scene.duration_s / 2)
+            for case in {case.test: case for case in cases}.values()
+            for scene in (_scenario(case),)
+        ),
     )
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.evaluation.experiments.sections import Scene
 from pipeline.evaluation.experiments.track import TARGET
 from pipeline.simulation.scenario import Scenario
 
@@ -17,6 +18,7 @@ LAYOUTS = {"a": "straight ahead", "b": "one lane left", "c": "two lanes left"}
 _EGO_LANE = -3
 _SPEED_MPS, _TARGET_MPS = 15.0, 5.0
 _FROM_M, _TO_M = 75.0, 5.0
+_SHOWN_AT_S = 5.0
 COLOURS = ("#a3202a", "#e8e8e6", "#15181c", "#5b6f86", "#c9a227")
 
 
@@ -30,6 +32,10 @@ class Case:
 
 def cases(short: bool) -> list[Case]:
     return [Case(layout, seed) for layout in LAYOUTS for seed in range(2 if short else 20)]
+
+
+def scenes() -> tuple[Scene, ...]:
+    return tuple(Scene(title.capitalize(), scenario(Case(layout, 0)), _SHOWN_AT_S) for layout, title in LAYOUTS.items())
 
 
 def scenario(case: Case) -> Scenario:

@@ -21,6 +21,7 @@ from pipeline.evaluation.experiments.sections import (
     Coloured,
     Experiment,
     Replay,
+    Scene,
     Section,
     Table,
     Tone,
@@ -163,8 +164,7 @@ def replay(case: Case, result: Result) -> Replay:
     """The drive of one cell."""
     assert result.drive is not None
     ended = f"Impact at {result.impact_kmh:.0f} km/h." if result.impact_kmh else "The impact was avoided."
-    at = f"{case.gap_m:.0f} m, −{case.decel_mps2:.0f} m/s²" if case.test == "CCRb" else f"overlap {case.overlap} %"
-    title = f"{case.test}, {case.speed_kmh:.0f} km/h, {at}: {_label(case.kind)}"
+    title = f"{case.test}, {_at(case)}: {_label(case.kind)}"
     return Replay(
         case.name,
         title,
@@ -175,6 +175,11 @@ def replay(case: Case, result: Result) -> Replay:
         drive_charts(result.drive),
         GIVEN if case.boxes == "truth" else None,
     )
+
+
+def _at(case: Case) -> str:
+    at = f"{case.gap_m:.0f} m, −{case.decel_mps2:.0f} m/s²" if case.test == "CCRb" else f"overlap {case.overlap} %"
+    return f"{case.speed_kmh:.0f} km/h, {at}"
 
 
 def _label(kind: Kind) -> str:
@@ -228,6 +233,10 @@ def report(cases: Sequence[Case], results: Sequence[Result]) -> Section:
             _verdict(done),
         ),
         tuple(tables),
+        scenes=tuple(
+            Scene(f"{case.test}, {_at(case)}", _scenario(case), _RUN_UP_S + 2.0)
+            for case in {case.test: case for case in done}.values()
+        ),
     )
 
 

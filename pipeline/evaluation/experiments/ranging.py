@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipeline.evaluation.experiments.sections import Chart, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.experiments.sections import Chart, Experiment, Replay, Scene, Section, Series, Table
 from pipeline.evaluation.experiments.track import parameters, scene, target_of, true_range_m
 from pipeline.simulation.actors import Kind
 from pipeline.simulation.loop import Setup, Tick, drive
@@ -22,6 +22,7 @@ _PARAMS = parameters("ACC", _SPEED_MPS)
 _BIN_M = 5.0
 _BESIDE_M = 1.5
 _RECOGNISED = 0.5
+_SHOWN_AT_S = 8.0
 COLOURS = ("#a3202a", "#e8e8e6", "#15181c", "#5b6f86")
 
 
@@ -132,6 +133,7 @@ def report(cases: Sequence[Case], runs: Sequence[list[Sighting]]) -> Section:
                 tuple(_errors(kind, seen) for kind, seen in by_kind.items()),
             ),
         ),
+        scenes=tuple(Scene(f"A standing {kind}", _scenario(Case(kind, 0)), _SHOWN_AT_S) for kind in kinds),
     )
 
 

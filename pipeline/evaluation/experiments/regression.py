@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipeline.evaluation.experiments.layouts import LAYOUTS, Case, cases, scenario
+from pipeline.evaluation.experiments.layouts import LAYOUTS, Case, cases, scenario, scenes
 from pipeline.evaluation.experiments.sections import Chart, Experiment, Replay, Section, Series, Table
 from pipeline.evaluation.experiments.track import TARGET, true_range_m
 from pipeline.geometry import closest_on_polygon, transform
@@ -108,6 +108,7 @@ def report(cases: Sequence[Case], runs: Sequence[list[Sample]]) -> Section:
                 tuple(_by_bin(layout, samples, pinhole) for layout, samples in judged.items()),
             ),
         ),
+        scenes=scenes(),
     )
 
 

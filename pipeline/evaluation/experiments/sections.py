@@ -79,9 +79,18 @@ class Chart:
 
 
 @dataclass(frozen=True)
+class Scene:
+    """A moment of a scenario, to be drawn."""
+
+    title: str
+    scenario: Scenario
+    t_s: float
+
+
+@dataclass(frozen=True)
 class Section:
     """One experiment's report. text: paragraphs, what was done and what it shows. failures: a sentence for each demand
-    that does not hold."""
+    that does not hold. scenes: what was driven through."""
 
     name: str
     title: str
@@ -89,6 +98,7 @@ class Section:
     tables: tuple[Table, ...] = ()
     charts: tuple[Chart, ...] = ()
     failures: tuple[str, ...] = ()
+    scenes: tuple[Scene, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,9 @@ def test_a_short_experiment_as_json_and_as_a_page(tmp_path: Path, capsys: pytest
     assert section["name"] == "braking"
     assert {row[1] for row in section["tables"][0]["rows"]} == {"LiDAR", "fused"}
     assert "CCRs: speed" in page.read_text(encoding="utf-8")
+    assert page.read_text(encoding="utf-8").count("data:image/jpeg") == len(
+        {row[0] for row in section["tables"][0]["rows"]}
+    )
 
 
 def test_the_report_leads_to_every_drive_wherever_both_are_moved(

@@ -21,6 +21,7 @@ def test_errors_are_small_near_honest_far_and_stand_beside_the_print(see_again: 
     assert 0.3 < camera[4] < 6.0, "V: not the quarter of a metre that is printed"  # type: ignore[operator]
     assert rows["straight ahead", "V", "printed"][2:] == PRINTED["a", "V"]
     assert rows["two lanes left", "VL", "measured"][2:] == (None,) * 9, "not driven: no figures"
+    assert len(section.scenes) == 3
     left = rows["one lane left", "VL", "measured"]
     assert left[7] < 1.0, "lateral mean: the car is in its own lane"  # type: ignore[operator]
     assert any("better than the LiDAR alone, which does in" in text for text in section.text)
