@@ -18,6 +18,7 @@ export const look = newestOnly(async () => {
   /** @type {Score|Error} */
   const score = await request("api/labels/score").catch((error) => error);
   known = score instanceof Error ? "" : key;
+  body.dataset.revision = score instanceof Error ? "" : String(score.revision);
   body.replaceChildren(score instanceof Error ? el("p", { class: "facts pad", textContent: score.message }) : found(score));
 });
 
