@@ -159,7 +159,7 @@ class Drives:
             run.note = str(error)
         except Exception as error:  # whatever a recording or a network does, other runs go on
             logger.exception("frame %s of %s", run.done, recording.recipe.uri)
-            run.note = f"frame {run.done}: {type(error).__name__}: {error}"
+            run.note = f"frame {run.done + 1}: {type(error).__name__}: {error}"
         took_s = time.perf_counter() - began
         run.seconds += took_s
         if run.is_complete or run.note or time.monotonic() - self._told_s > _TELL_EVERY_S:

@@ -31,11 +31,14 @@ async function placeOf(track, frame) {
 /** What a person does not choose by. */
 const HIDDEN = ["kind", "id", "track", "range", "items", "tracks", "revision", "interpolate", "sightings", "origin", "keyframes"];
 
+/** Counted from 1 where people read them. */
+const FRAMES = ["frame", "first", "last"];
+
 /** @param {string} title @param {Record<string, any>} item */
 function side(title, item) {
   const rows = Object.entries(item).filter(([key, value]) => !HIDDEN.includes(key) && value !== null && value !== undefined && value !== "");
   return el("div", {}, el("h3", { textContent: item.kind ? `${title}: ${item.kind.replaceAll("_", " ")}` : title }), el("dl", { class: "facts-list" }, ...rows.flatMap(([key, value]) => [
-    el("dt", { textContent: ({ bbox: "box" })[key] ?? key.replaceAll("_", " ") }), el("dd", { textContent: words(key === "frame" ? value + 1 : value) })])));
+    el("dt", { textContent: ({ bbox: "box" })[key] ?? key.replaceAll("_", " ") }), el("dd", { textContent: words(FRAMES.includes(key) ? value + 1 : value) })])));
 }
 
 /** @param {any} value @returns {string} */

@@ -14,6 +14,7 @@ from app.labels.drive import DriveLabels
 from app.labels.log import Acted
 from app.labels.refusals import ActRefused, BadAct, NoSuchLabel, Stale
 from app.labels.requests import Act
+from app.labels.values import value_from_json
 from pipeline.geometry import Cuboid
 from pipeline.labels.model import LabelTrack, LeadRange, Origin, Sighting
 from tests.app.labels.conftest import COUNT, fresh
@@ -384,3 +385,9 @@ def test_what_is_not_there_is_said(labels: DriveLabels, body: dict[str, Any]) ->
 def test_a_form_that_is_none_is_not_taken(body: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):
         ACT.validate_python(body)
+
+
+def test_labels_that_were_kept_before_there_were_reviews_are_read() -> None:
+    origin = {"maker": "person", "name": "Ada", "t_unix_ms": 5, "params": None, "calibration": None}
+    kept = {"first": 1, "last": 2, "lead": 3, "state": "accepted", "origin": origin}
+    assert value_from_json("lead", kept) == LeadRange(1, 2, 3, "accepted", Origin("person", "Ada", 5), "", "")

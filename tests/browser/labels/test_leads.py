@@ -34,6 +34,7 @@ def test_ends_of_a_range_are_dragged_and_the_neighbour_gives_way(hand: Hand, lab
     ):
         hand.drag(border(hand, start), border(hand, end), steps=6)
         labels.wait_for(lambda now, then=then: now.leads == then)
+    is_at(page, 30)
     hand.keys("Control+z")
     labels.wait_for(lambda now: now.leads == [(40, 69, "none"), (70, 109, "unknown")])
 
@@ -54,6 +55,7 @@ def test_a_dragged_end_is_seen_on_the_way_and_escape_lets_go_of_it(hand: Hand, l
     page.mouse.up()
     hand.drag(border(hand, 40), border(hand, 50), steps=3)  # the next one is a drag of its own
     labels.wait_for(lambda now: now.leads == [(50, 79, "none")])
+    is_at(page, 50)
 
 
 def test_ends_come_to_the_shown_frame_by_keys(hand: Hand, labels: Labels):

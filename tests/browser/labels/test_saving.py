@@ -171,9 +171,10 @@ def test_the_small_rules_of_sending(hand: Hand):
         """async () => {
           const { choose } = await import("/js/labeling/conflict.js");
           const items = [{ kind: "track", id: 3, revision: 5 }, { kind: "lead", id: 3, revision: 6 }];
-          const item = { kind: "track", id: 3 }, theirs = { id: 3, revision: 9 };
+          const item = { kind: "track", id: 3 }, theirs = { id: 3, revision: 9, first: 27, last: 38 };
           window.chosen = choose({ kind: "accept", items }, "Bob changed #3 since", item, theirs);
         }"""
     )
+    expect(page.locator(".conflict dd")).to_have_text(["28", "39"])
     page.get_by_role("button", name="Keep mine").click()
     assert [each["revision"] for each in page.evaluate("async () => (await window.chosen).items")] == [9, 6]
