@@ -63,7 +63,7 @@ def _report(source: LiveSensors, health: StreamHealth, skews_ms: list[float]) ->
     return SensorReport(
         health,
         each.clock_offset_ms(),
-        each.stats.refused,
+        each.stats.refused.total(),
         each.pps if isinstance(each, LidarInput) else None,
         sorted(skews_ms)[len(skews_ms) // 2] if skews_ms and health.sensor == "camera" else None,
     )

@@ -42,6 +42,7 @@ class GnssInput:
         self._offset_ns = round(config.time_offset_ms * 1e6)
         self._own = FollowedClock()
         self._sentences = NmeaReader()
+        self._has_fix: bool | None = None
         self._rest = b""
         self.readers: tuple[Reader, ...] = (Reader("gnss", self._read(config), self._say),)
 
@@ -69,6 +70,7 @@ class GnssInput:
         self._lines(lines, self._clock.now_ns())
 
     def _lines(self, lines: list[bytes], arrived_ns: int) -> None:
+        before = self._sentences.no_fix
         for line in lines:
             if not line.strip():
                 continue
@@ -76,8 +78,16 @@ class GnssInput:
             fix = self._sentences.push(line.decode("ascii", errors="replace"), utc_near_ns)
             self.stats.lost = self._sentences.bad
             if fix is not None:
+                self._has_fix = True
                 self._give(fix, arrived_ns)
-        self.stats.note = "no fix yet" if self._sentences.no_fix and self.stats.since_ns(arrived_ns) is None else ""
+            elif self._sentences.no_fix > before:
+                self._has_fix = False
+            before = self._sentences.no_fix
+        self.stats.note = "" if self._has_fix is not False else self._without_fix(arrived_ns)
+
+    def _without_fix(self, arrived_ns: int) -> str:
+        """The receiver talks, and says that it does not know where it is."""
+        return "no fix yet" if self.stats.since_ns(arrived_ns) is None else "no fix: the receiver has lost its position"
 
     def _give(self, fix: GnssFix, arrived_ns: int) -> None:
         own_ns, by_lidar_ns = self._own.to_host_ns(fix.t_ns, arrived_ns), self._utc_to_host_ns(fix.t_ns, arrived_ns)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterable
 from typing import Literal
 
 import numpy as np
 
+from pipeline.sources.velodyne import say_refused
 from pipeline.types import StreamHealth
 
 _SILENT_NS, _STALE_NS, _MISSED = 1_000_000_000, 250_000_000, 3
@@ -21,13 +22,13 @@ Sensor = Literal["lidar", "camera", "gnss", "ego"]
 
 class StreamStats:
     """Counts one sensor's messages. Times are of the host's timeline. note: what its reader has to say (why a device
-    cannot be opened, where its times come from)."""
+    cannot be opened, where its times come from). refused: packets by reason."""
 
     def __init__(self, sensor: Sensor) -> None:
         self.sensor: Sensor = sensor
         self.note = ""
         self.lost = 0
-        self.refused = 0
+        self.refused: Counter[str] = Counter()
         self._arrived: deque[int] = deque(maxlen=_KEPT)
         self._newest_ns: int | None = None
 
@@ -72,7 +73,7 @@ class StreamStats:
         return "stale" if since >= max(_STALE_NS, missed_ns) else "ok"
 
     def _said(self) -> str:
-        refused = f"{self.refused} messages refused" if self.refused else ""
+        refused = say_refused(self.refused.copy())  # at once: a reader's thread may meet a new reason meanwhile
         return "; ".join(text for text in (self.note, refused) if text)
 
 

@@ -30,6 +30,7 @@ class LidarInput:
         self.T_ego_lidar = config.mount.T_ego_sensor()
         self.on_packet: Callable[[bytes, int], object] | None = None
         self._decoder = Vlp16Decoder(self.T_ego_lidar)
+        self.stats.refused = self._decoder.counts.refused  # by the decoder; those of the position port are added
         listen = partial(read_datagrams, interface=config.interface, group=config.multicast_group)
         listeners = [("lidar", partial(listen, config.data_port, receive=self.receive))]
         if config.position_port is not None:
@@ -58,7 +59,7 @@ class LidarInput:
             on_packet(packet, arrived_ns)
         sweep = self._decoder.push(packet, arrived_ns)
         counts = self._decoder.counts
-        self.stats.lost, self.stats.refused = counts.lost, sum(counts.refused.values())
+        self.stats.lost = counts.lost
         if counts.models and self.stats.since_ns(arrived_ns) is None:
             self.stats.note = f"packets of a {', '.join(counts.models)}, not of a VLP-16"
         if sweep is not None:
@@ -71,8 +72,8 @@ class LidarInput:
         """Take a position packet."""
         try:
             position = read_position(packet)
-        except BadPacket:
-            self.stats.refused += 1
+        except BadPacket as bad:
+            self.stats.refused[f"{bad.reason} on the position port"] += 1
             return
         self.pps, self.follows_gps = position.pps, position.locked
 

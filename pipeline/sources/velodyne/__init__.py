@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.sources.velodyne.clock import SensorClock
-from pipeline.sources.velodyne.cutter import DecoderCounts, Rotation, RotationCutter
+from pipeline.sources.velodyne.cutter import DecoderCounts, Rotation, RotationCutter, say_refused
 from pipeline.sources.velodyne.decoder import Vlp16Decoder
 from pipeline.sources.velodyne.packet import PACKET_BYTES, BadPacket, Packet, read_packet
 from pipeline.sources.velodyne.position import POSITION_BYTES, Position, read_position
@@ -21,4 +21,5 @@ __all__ = [
     "Vlp16Decoder",
     "read_packet",
     "read_position",
+    "say_refused",
 ]

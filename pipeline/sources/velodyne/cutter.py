@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect, insort
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
@@ -41,11 +42,17 @@ class DecoderCounts:
     partial: int = 0
 
     def about_refused(self) -> str:
-        """``3 packets refused: 2 all zero, 1 not 1206 bytes``; empty when none was."""
-        if not self.refused:
-            return ""
-        reasons = ", ".join(f"{count} {reason}" for reason, count in sorted(self.refused.items()))
-        return f"{sum(self.refused.values())} packets refused: {reasons}"
+        """See ``say_refused``."""
+        return say_refused(self.refused)
+
+
+def say_refused(refused: Mapping[str, int]) -> str:
+    """``3 packets refused: 2 all zero, 1 not 1206 bytes``, of packets by reason; empty when none was."""
+    if not refused:
+        return ""
+    count = sum(refused.values())
+    reasons = ", ".join(f"{count} {reason}" for reason, count in sorted(refused.items()))
+    return f"{count} {'packet' if count == 1 else 'packets'} refused: {reasons}"
 
 
 class Placed(NamedTuple):

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import pytest
 
 from pipeline.params import SyncParams
 from pipeline.replay.faults import Fault
+from pipeline.sources.live.gnss import GnssInput
+from pipeline.sources.live.lidar import LidarInput
+from tests.pipeline.sources.test_nmea import whole
 
 from .bench import START, Bench, Taken, sent, small_sweep
 
@@ -107,7 +112,7 @@ def test_garbage_between_costs_nothing(sensor: str) -> None:
     assert len(whole) >= 38
     assert_well(whole[5:])
     stats = bench.source.inputs[sensor].stats
-    assert stats.refused + stats.lost > 0, "and is counted"
+    assert stats.refused.total() + stats.lost > 0, "and is counted"
 
 
 @pytest.mark.parametrize("kind", ["duplicate", "out_of_order"])
@@ -196,3 +201,36 @@ def test_figures_of_health_are_those_of_the_wire() -> None:
         assert streams[sensor].rate_hz == pytest.approx(rate, rel=0.03)
         assert streams[sensor].state == "ok"
     assert streams["lidar"].age_ms == pytest.approx((taken[-1].at_s - (taken[-1].frame.t_ns - START) / 1e9) * 1e3)
+
+
+def test_what_is_refused_is_counted_on_both_ports_and_says_why() -> None:
+    bench = Bench()
+    lidar = cast("LidarInput", bench.source.inputs["lidar"])
+    lidar.receive_position(b"\0" * 100, START)
+    bench.drive(sent([]))
+    assert lidar.stats.health(START).note == "1 packet refused: 1 not 512 bytes on the position port"
+    lidar.receive(bytes(1206), bench.clock.at_ns)
+    lidar.receive(b"\xff\xee" * 602 + b"\x37\x28", bench.clock.at_ns)
+    said = lidar.stats.health(START).note
+    assert said.startswith("3 packets refused: ")
+    assert "1 all zero" in said
+    assert "not a VLP-16 but VLP-32C" in said, "after good sweeps, too"
+
+
+def test_a_receiver_that_talks_but_lost_its_position_says_so() -> None:
+    bench = Bench()
+    gnss = cast("GnssInput", bench.source.inputs["gnss"])
+
+    def note(has_fix: bool, second: int) -> str:
+        clock, state, quality = f"2215{second:02d}.00", "A" if has_fix else "V", 4 if has_fix else 0
+        place = "4800.0000,N,01100.0000,E" if has_fix else ",,,"
+        gga = f"GPGGA,{clock},{place},{quality},12,0.8,500.0,M,0.0,M,,"
+        bodies = gga, f"GPRMC,{clock},{state},{place},0.0,,141123,,,N"
+        gnss.receive("\r\n".join(map(whole, bodies)).encode(), START + second * 1_000_000_000)
+        return gnss.stats.note
+
+    is_there = [False, False, True, True, False, False, True, True]
+    said = [note(has_fix, second) for second, has_fix in enumerate(is_there)]
+    assert said[1] == "no fix yet"
+    assert (said[3], said[7]) == ("", "")
+    assert said[5] == "no fix: the receiver has lost its position"

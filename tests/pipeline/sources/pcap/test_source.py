@@ -106,10 +106,10 @@ def test_bad_packets_are_told(tmp_path: Path) -> None:
     sent[100:100] = [(sent[100][0], 2368, bytes(1206))]
     del sent[80]
     source = opened(tmp_path, pcap(sent))
-    assert "1 packets refused: 1 all zero" in source.notes
+    assert "1 packet refused: 1 all zero" in source.notes
     assert "1 packets lost" in source.notes
     assert source.frame(0).notes == ()
-    assert source.frame(1).notes == ("LiDAR: 1 packets refused: 1 all zero", "LiDAR: 1 packets lost")
+    assert source.frame(1).notes == ("LiDAR: 1 packet refused: 1 all zero", "LiDAR: 1 packets lost")
 
 
 WRONG = {
