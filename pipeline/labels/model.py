@@ -134,7 +134,3 @@ class LabelSet:
     events: tuple[EventLabel, ...] = ()
     tags: tuple[FrameTag, ...] = ()
     name: str = "working"
-
-    def lead_at(self, frame: int) -> Lead | None:
-        """Who leads at a frame; null where nobody has said. Rejected ranges say nothing."""
-        return next((r.lead for r in self.leads if r.first <= frame <= r.last and r.state != "rejected"), None)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from pipeline.calibration.distance import Pair, collect_pairs, fit_laws
 from pipeline.evaluation.lead import Judged, LeadRule, judge
 from pipeline.params import preset, with_changes
 from pipeline.path.lane_detector import usual_every
@@ -24,6 +25,8 @@ SCORED_CLIPS = {
     "closing from 32 to 23 m": range(414, 426),
 }
 """Astyx frames whose lead is judged; 057–059 are a lane change whose lead is half outside the corridor."""
+RECORDED_CLIPS = (range(47, 52), range(57, 69), range(183, 193), range(414, 426))
+"""What Astyx's frames were cut from."""
 EMPTY_CLIP = range(47, 52)
 """Astyx frames with nothing in path nearer than 70 m."""
 RULE = LeadRule()
@@ -82,3 +85,18 @@ def all_scored(of: Drive) -> Iterator[Judged]:
     """The 31 frames of the three clips."""
     for numbers in SCORED_CLIPS.values():
         yield from of.clip(numbers)
+
+
+def camera_alone_without_own_clip(folder: Path) -> Iterator[Judged]:
+    """The 31 frames by the camera alone, the distance law of each clip fitted on the other clips only."""
+    for numbers in SCORED_CLIPS.values():
+        own = next(recorded for recorded in RECORDED_CLIPS if numbers[0] in recorded)
+        law = fit_laws([pair for pair in _pairs(folder) if int(pair.frame) not in own], exponent=-1.0)["car"].law
+        changes = (("distance.coefficient", law.coefficient), ("distance.exponent", law.exponent))
+        yield from drive(folder, "astyx", sensors="camera", changes=changes).clip(numbers)
+
+
+@cache
+def _pairs(folder: Path) -> tuple[Pair, ...]:
+    """Every detected vehicle of Astyx with its labelled depth."""
+    return collect_pairs(open_source(f"astyx:{folder / FOLDERS['astyx']}"), yolox_nano(folder, 2048, 618))

@@ -6,21 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.calibration.distance import Pair, collect_pairs, fit_laws
-from pipeline.evaluation.lead import Judged, score
+from pipeline.evaluation.lead import score
 from pipeline.run import Sensors
-from pipeline.sources import open_source
-from tests.accuracy.drives import EMPTY_CLIP, SCORED_CLIPS, all_scored, drive
-from tests.looking import yolox_nano
-
-ALL_CLIPS = (range(47, 52), range(57, 69), range(183, 193), range(414, 426))
-
-
-@pytest.fixture(scope="module")
-def pairs(data_dir: Path) -> tuple[Pair, ...]:
-    """Every detected vehicle of the recording with its labelled depth."""
-    source = open_source(f"astyx:{data_dir / 'astyx'}")
-    return collect_pairs(source, yolox_nano(data_dir, 2048, 618))
+from tests.accuracy.drives import EMPTY_CLIP, all_scored, camera_alone_without_own_clip, drive
 
 
 def test_the_labelled_lead_is_the_cipv(data_dir: Path) -> None:
@@ -39,20 +27,8 @@ def test_no_lead_is_made_up_on_an_empty_road(data_dir: Path) -> None:
         assert lead is None or lead.distance_m > 60.0, (number, lead)
 
 
-def camera_only_without_own_clip(folder: Path, pairs: tuple[Pair, ...]) -> dict[str, list[Judged]]:
-    """Each scored clip's verdicts with the camera alone, its distance law fitted on the other clips only."""
-    verdicts = {}
-    for clip, numbers in SCORED_CLIPS.items():
-        own = next(recorded for recorded in ALL_CLIPS if numbers[0] in recorded)
-        law = fit_laws([pair for pair in pairs if int(pair.frame) not in own], exponent=-1.0)["car"].law
-        changes = (("distance.coefficient", law.coefficient), ("distance.exponent", law.exponent))
-        verdicts[clip] = drive(folder, "astyx", sensors="camera", changes=changes).clip(numbers)
-    return verdicts
-
-
-def test_camera_alone_estimates_distance_with_a_law_fitted_elsewhere(data_dir: Path, pairs: tuple[Pair, ...]) -> None:
-    by_clip = camera_only_without_own_clip(data_dir, pairs)
-    total = score(row for rows in by_clip.values() for row in rows)
+def test_camera_alone_estimates_distance_with_a_law_fitted_elsewhere(data_dir: Path) -> None:
+    total = score(camera_alone_without_own_clip(data_dir))
     assert total.frames == 31
     # 188–189: the network boxes the upper half of the lead. 060: the end of the lane change is seen late
     assert total.wrong <= 3

@@ -12,7 +12,7 @@ from pipeline.evaluation.lead import LeadScore, score
 from pipeline.params import Params
 from pipeline.run import Sensors
 from pipeline.sources import open_source
-from tests.accuracy.drives import all_scored, drive
+from tests.accuracy.drives import all_scored, camera_alone_without_own_clip, drive
 from tests.conftest import ROOT
 
 LANES = "twinlitenet"
@@ -37,6 +37,7 @@ def test_the_table_is_written(data_dir: Path) -> None:
         name: score(all_scored(drive(data_dir, "astyx", preset, sensors, changes, lanes)))
         for name, preset, sensors, lanes, changes in ROWS
     }
+    scores["default, camera alone, distance law of the other clips"] = score(camera_alone_without_own_clip(data_dir))
     text = "\n".join([*_table(scores), "", *_alignment_cost(data_dir)]) + "\n"
     (ROOT / "build").mkdir(exist_ok=True)
     (ROOT / "build" / "accuracy.md").write_text(text, encoding="utf-8")
