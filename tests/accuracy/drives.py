@@ -29,6 +29,7 @@ RECORDED_CLIPS = (range(47, 52), range(57, 69), range(183, 193), range(414, 426)
 """What Astyx's frames were cut from."""
 EMPTY_CLIP = range(47, 52)
 """Astyx frames with nothing in path nearer than 70 m."""
+_FAR_M = 60.0
 RULE = LeadRule()
 
 
@@ -85,6 +86,12 @@ def all_scored(of: Drive) -> Iterator[Judged]:
     """The 31 frames of the three clips."""
     for numbers in SCORED_CLIPS.values():
         yield from of.clip(numbers)
+
+
+def made_up_leads(of: Drive) -> int:
+    """In how many of the five frames of the empty clip something near leads."""
+    leads = [of.results[f"{number:06d}"].cipv for number in EMPTY_CLIP]
+    return sum(lead is not None and lead.distance_m <= _FAR_M for lead in leads)
 
 
 def camera_alone_without_own_clip(folder: Path) -> Iterator[Judged]:
