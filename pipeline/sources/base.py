@@ -9,7 +9,7 @@ from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.params import SyncParams
 from pipeline.sources.shots import Shot
-from pipeline.types import F64, CameraCalibration, EgoState, Frame, GnssFix, StreamHealth, Sweep
+from pipeline.types import F64, Box, CameraCalibration, EgoState, Frame, GnssFix, StreamHealth, Sweep
 
 LIVE = "live:"
 """Scheme of what is read from devices."""
@@ -21,11 +21,15 @@ class SourceError(BadInput):
 
 @dataclass(frozen=True)
 class TruthObject:
-    """One labelled object, ego frame. ``id`` is null where the labels follow no identity over time."""
+    """One labelled object, ego frame. ``id`` is null where the labels follow no identity over time. bbox: in pixels of
+    the raw picture, null where the labels have none. called: the labels' own word where ``label`` is another one, which
+    would not be written as that word again."""
 
     label: str
     cuboid: Cuboid
     id: int | None = None
+    bbox: Box | None = None
+    called: str = ""
 
 
 class Source(Protocol):

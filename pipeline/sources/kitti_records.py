@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
@@ -10,10 +11,16 @@ import numpy as np
 
 from pipeline.geometry import Cuboid, inverse, transform
 from pipeline.sources.base import SourceError, TruthObject
-from pipeline.types import F64, GnssQuality
+from pipeline.types import F64, Box, GnssQuality
 
 _LABELS = {"van": "car", "pedestrian": "person", "person_sitting": "person", "cyclist": "bicycle", "tram": "train"}
+_KINDS = {"car": "Car", "truck": "Truck", "person": "Pedestrian", "bicycle": "Cyclist", "train": "Tram"}
+DONT_CARE = "DontCare"
+"""A region of which the labels say nothing."""
+NO_CUBOID = (-1.0, -1.0, -1.0, -1000.0, -1000.0, -1000.0, -10.0)
+NO_BOX = (-1.0, -1.0, -1.0, -1.0)
 _LABEL_FIELDS = 15
+_LARGEST_PX = 1e6
 _OXTS_FIELDS = 30
 _LAT, _LON, _ALT, _YAW, _NORTH_MPS, _EAST_MPS, _FORWARD_MPS = 0, 1, 2, 5, 6, 7, 8  # as in dataformat.txt
 _YAW_RATE, _POSITION_ERROR, _POSITION_MODE = 22, 23, 27
@@ -25,37 +32,68 @@ _VELODYNE_FROM_IMU_M = (0.81, -0.32)
 _METRES_A_DEGREE = 111_320.0
 
 
+class LabelRow(NamedTuple):
+    """One line of a label file, ego frame. kind: as KITTI calls it. bbox: pixels of the rectified picture. cuboid and
+    bbox are null where the line says that it knows none. said_more: it knew how far the object is cut or hidden."""
+
+    kind: str
+    label: str
+    cuboid: Cuboid | None
+    bbox: Box | None
+    said_more: bool
+
+
 def parse_labels(data: bytes, T_rect_ego: F64) -> tuple[TruthObject, ...]:
-    """The cuboids of a ``label_2`` file, brought from the rectified camera to the ego frame.
+    """The objects of a ``label_2`` file, brought from the rectified camera to the ego frame.
 
     In print: height width length, the middle of the *bottom* face (y points down), and rotation_y about that axis,
     0 when the length lies along the camera's x. DontCare regions are passed over; vans are cars, as detectors name
-    them. SourceError when a line is none of this.
+    them. SourceError when a line is none of this, or of an object whose place nobody knows.
     """
     T_ego_rect = inverse(T_rect_ego)
     objects = []
     for line in data.decode("utf-8", "replace").splitlines():
         fields = line.split()
-        if not fields or fields[0] == "DontCare":
+        if not fields or fields[0] == DONT_CARE:
             continue
-        objects.append(_label(fields, T_ego_rect))
+        row = parse_row(fields, T_ego_rect)
+        if row.cuboid is None:
+            raise SourceError("a KITTI label without place or size")
+        objects.append(truth_of(row, row.cuboid))
     return tuple(objects)
 
 
-def _label(fields: list[str], T_ego_rect: F64) -> TruthObject:
+def truth_of(row: LabelRow, cuboid: Cuboid) -> TruthObject:
+    """A labelled object of a row whose place is known."""
+    called = row.kind if row.kind != kind_of(row.label) else ""
+    return TruthObject(row.label, cuboid, None, row.bbox, called)
+
+
+def parse_row(fields: Sequence[str], T_ego_rect: F64) -> LabelRow:
+    """One line that was split at its blanks. SourceError when it is none."""
+    if len(fields) not in (_LABEL_FIELDS, _LABEL_FIELDS + 1):  # the last one is a detector's score
+        raise SourceError(f"{len(fields)} fields in a KITTI label of {_LABEL_FIELDS}")
     try:
-        numbers = [float(field) for field in fields[8:_LABEL_FIELDS]]
+        truncated, occluded, _, x1, y1, x2, y2, *place = (float(field) for field in fields[1:_LABEL_FIELDS])
     except ValueError:
-        numbers = []
-    if len(numbers) != _LABEL_FIELDS - 8:
-        raise SourceError("not a KITTI label file")
-    return TruthObject(label_name(fields[0]), cuboid_from_label(numbers, T_ego_rect))
+        raise SourceError("a KITTI label with something else than numbers") from None
+    box: Box = (x1, y1, x2, y2)
+    if not all(math.isfinite(value) and abs(value) < _LARGEST_PX for value in (truncated, occluded, *box)):
+        raise SourceError("a KITTI label with impossible numbers")
+    cuboid = cuboid_from_label(place, T_ego_rect) if tuple(place) != NO_CUBOID else None
+    seen = box if box != NO_BOX else None
+    return LabelRow(fields[0], label_name(fields[0]), cuboid, seen, said_more=truncated > 0.0 or occluded > 0.0)
 
 
 def label_name(kind: str) -> str:
     """KITTI's type of an object as detectors name it."""
     name = kind.lower()
     return _LABELS.get(name, name.replace("_", " "))
+
+
+def kind_of(label: str) -> str:
+    """KITTI's type of a class; a class that KITTI has not is written with a capital and without spaces."""
+    return _KINDS.get(label) or "_".join(label.split()).capitalize() or "Misc"
 
 
 def cuboid_from_label(numbers: Sequence[float], T_ego_rect: F64) -> Cuboid:

@@ -6,7 +6,6 @@ there (Geiger et al. 2012, "Are we ready for autonomous driving?", and the devel
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,11 +15,12 @@ import numpy as np
 from pipeline.errors import BadInput
 from pipeline.labels.formats import kitti_rows
 from pipeline.labels.formats.base import Drive, Imported, Shot, make_folder
-from pipeline.labels.formats.kitti_rows import Row
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
+from pipeline.labels.truth import LINKED, renamed, tracks_of
 from pipeline.sources.files import check_looks_ahead, files_by_name
 from pipeline.sources.kitti_calibration import parse_object_calibration
+from pipeline.sources.kitti_records import DONT_CARE, LabelRow, kind_of, truth_of
 from pipeline.types import F64, CameraCalibration
 
 _OBJECT, _TRACKING, _CALIBRATION = "label_2", "label_02", "calib"
@@ -67,27 +67,35 @@ def write_tracking(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]
 
 
 def read_objects(path: Path, drive: Drive, origin: Origin) -> Imported:
-    """A folder with ``label_2`` in it, such a folder, or one file of it. Each object is a track of its own."""
+    """A folder with ``label_2`` in it, such a folder, or one file of it. Who is who over time is as with the labels of
+    a recording that is opened."""
     home, files = _files(path, _OBJECT)
     frames = {name: index for index, name in enumerate(drive.file_names())}
-    known = {name: file for name, file in files.items() if name in frames}
+    known = {frames[name]: (name, file) for name, file in files.items() if name in frames}
     if not known:
         raise BadInput(f"{path}: no label file is named as a frame of {drive.uri}")
-    tracks: list[LabelTrack] = []
-    rows: list[Row] = []
-    for name, file in known.items():
-        frame = frames[name]
+    rows: dict[int, list[LabelRow]] = {}
+    for frame, (name, file) in sorted(known.items()):
         T_rect_ego, camera = _view_beside(home, name, drive.shots[frame])
-        for fields, what in _lines(file):
-            row = kitti_rows.from_fields(fields, T_rect_ego, camera, what)
-            sighting = Sighting(frame, row.cuboid, row.bbox)
-            tracks.append(LabelTrack(len(tracks) + 1, row.label, (sighting,), "accepted", origin))
-            rows.append(row)
-    labels = replace(drive.empty(), tracks=tuple(tracks))
+        rows[frame] = [kitti_rows.from_fields(fields, T_rect_ego, camera, what) for fields, what in _lines(file)]
+    objects = {
+        frame: tuple(truth_of(row, row.cuboid) for row in found if row.cuboid is not None)
+        for frame, found in rows.items()
+    }
+    tracks = tracks_of(objects, drive.t_ns, origin)
+    flat = [(frame, row) for frame, found in rows.items() for row in found if row.cuboid is None]
+    alone = tuple(
+        LabelTrack(len(tracks) + n, row.label, (Sighting(frame, None, row.bbox),), "accepted", origin)
+        for n, (frame, row) in enumerate(flat, start=1)
+    )
     unknown = len(files) - len(known)
-    other = (f"{unknown} files are named as no frame of this recording: left out",) if unknown else ()
-    alone = ("no identities over time: each object of each frame is a track of its own",) if tracks else ()
-    return Imported(labels, (*other, *alone, *_notes(rows)))
+    notes = (
+        f"{unknown} files are named as no frame of this recording: left out" if unknown else "",
+        LINKED if tracks else "",
+        f"{len(flat):,} objects without a cuboid are a track each" if flat else "",
+    )
+    labels = replace(drive.empty(), tracks=(*tracks, *alone))
+    return Imported(labels, (*filter(None, notes), *_notes([row for found in rows.values() for row in found])))
 
 
 def read_tracking(path: Path, drive: Drive, origin: Origin) -> Imported:
@@ -99,7 +107,7 @@ def read_tracking(path: Path, drive: Drive, origin: Origin) -> Imported:
     shot = next((each for each in drive.shots if each.camera is not None), Shot("", 0))
     T_rect_ego, camera = _view_beside(home, name, shot)
     found: dict[int, tuple[str, dict[int, Sighting]]] = {}
-    rows: list[Row] = []
+    rows: list[LabelRow] = []
     for (frame_text, id_text, *fields), what in _lines(file, skip=2):
         frame, number = _whole(frame_text, len(drive.shots), what), _whole(id_text, _LARGEST_ID, what)
         row = kitti_rows.from_fields(fields, T_rect_ego, camera, what)
@@ -157,7 +165,7 @@ def _lines(file: Path, skip: int = 0) -> Iterator[tuple[list[str], str]]:
         fields, what = line.split(), f"{file}, line {number}"
         if 0 < len(fields) <= skip:
             raise BadInput(f"{what}: not a KITTI label")
-        if fields and fields[skip] != kitti_rows.DONT_CARE:
+        if fields and fields[skip] != DONT_CARE:
             yield fields, what
 
 
@@ -171,7 +179,7 @@ def _changes(labels: LabelSet, drive: Drive) -> tuple[str, ...]:
     """What is written otherwise than it was."""
     found = list(_sightings(labels))
     changes = [
-        f"class {label!r} is written as {kitti_rows.kind_of(label)} and will be read as another"
+        f"class {label!r} is written as {kind_of(label)} and will be read as another"
         for label in sorted({track.label for track, _ in found})
         if not kitti_rows.is_kept(label)
     ]
@@ -186,9 +194,8 @@ def _changes(labels: LabelSet, drive: Drive) -> tuple[str, ...]:
     return tuple(changes)
 
 
-def _notes(rows: list[Row]) -> tuple[str, ...]:
-    renamed = Counter((row.kind, row.label) for row in rows if row.kind != kitti_rows.kind_of(row.label))
-    notes = [f"{count:,} {kind} are taken for class {label!r}" for (kind, label), count in sorted(renamed.items())]
+def _notes(rows: list[LabelRow]) -> tuple[str, ...]:
+    notes = renamed((row.kind, row.label) for row in rows if row.kind != kind_of(row.label))
     more = sum(row.said_more for row in rows)
     if more:
         notes.append(f"how far {more:,} objects are cut or hidden is not kept: labels have no place for it")

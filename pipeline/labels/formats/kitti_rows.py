@@ -8,7 +8,6 @@ them. What is not known is −1, −1000 for places and −10 for angles, as in 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
@@ -16,36 +15,22 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid, inverse
+from pipeline.geometry import inverse
 from pipeline.labels.model import Sighting
 from pipeline.sources.base import SourceError
-from pipeline.sources.kitti_records import cuboid_from_label, cuboid_to_label, label_name
+from pipeline.sources.kitti_records import (
+    DONT_CARE,
+    NO_BOX,
+    NO_CUBOID,
+    LabelRow,
+    cuboid_to_label,
+    kind_of,
+    label_name,
+    parse_row,
+)
 from pipeline.types import F64, Box, CameraCalibration
 
-DONT_CARE = "DontCare"
-_TYPES = {"car": "Car", "truck": "Truck", "person": "Pedestrian", "bicycle": "Cyclist", "train": "Tram"}
-_NO_CUBOID = (-1.0, -1.0, -1.0, -1000.0, -1000.0, -1000.0, -10.0)
-_NO_BOX = (-1.0, -1.0, -1.0, -1.0)
-_FIELDS, _FIELDS_WITH_SCORE = 15, 16
-_LARGEST_PX = 1e6
 _ENOUGH = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
-
-
-@dataclass(frozen=True)
-class Row:
-    """One line in our terms: ego frame, pixels of the raw picture. kind: as KITTI calls it. said_more: it
-    knew how far it is cut or hidden."""
-
-    kind: str
-    label: str
-    cuboid: Cuboid | None
-    bbox: Box | None
-    said_more: bool
-
-
-def kind_of(label: str) -> str:
-    """KITTI's type of a class; a class that KITTI has not is written with a capital and without spaces."""
-    return _TYPES.get(label) or "_".join(label.split()).capitalize() or "Misc"
 
 
 def is_kept(label: str) -> bool:
@@ -55,30 +40,21 @@ def is_kept(label: str) -> bool:
 
 def to_line(label: str, sighting: Sighting, T_rect_ego: F64, camera: CameraCalibration) -> str:
     """One line without frame and track."""
-    place = cuboid_to_label(sighting.cuboid, T_rect_ego) if sighting.cuboid is not None else _NO_CUBOID
-    box = straightened(sighting.bbox, camera) if sighting.bbox is not None else _NO_BOX
+    place = cuboid_to_label(sighting.cuboid, T_rect_ego) if sighting.cuboid is not None else NO_CUBOID
+    box = straightened(sighting.bbox, camera) if sighting.bbox is not None else NO_BOX
     alpha = _wrapped(place[6] - math.atan2(place[3], place[5])) if sighting.cuboid is not None else -10.0
     numbers = " ".join(f"{value + 0.0:.6f}" for value in (alpha, *box, *place))
     return f"{kind_of(label)} -1 -1 {numbers}"
 
 
-def from_fields(fields: list[str], T_rect_ego: F64, camera: CameraCalibration | None, what: str) -> Row:
-    """One line that was split at its blanks. BadInput, beginning with ``what``, when it is none."""
-    if len(fields) not in (_FIELDS, _FIELDS_WITH_SCORE):
-        raise BadInput(f"{what}: {len(fields)} fields in a KITTI label of {_FIELDS}")
+def from_fields(fields: list[str], T_rect_ego: F64, camera: CameraCalibration | None, what: str) -> LabelRow:
+    """One line that was split at its blanks, its box in the raw picture. BadInput, beginning with ``what``, when it is
+    none."""
     try:
-        truncated, occluded, _, x1, y1, x2, y2, *place = (float(field) for field in fields[1:_FIELDS])
-    except ValueError:
-        raise BadInput(f"{what}: a KITTI label with something else than numbers") from None
-    box: Box = (x1, y1, x2, y2)
-    if not all(math.isfinite(v) and abs(v) < _LARGEST_PX for v in (truncated, occluded, *box)):
-        raise BadInput(f"{what}: a KITTI label with impossible numbers")
-    try:
-        cuboid = cuboid_from_label(place, inverse(T_rect_ego)) if tuple(place) != _NO_CUBOID else None
+        row = parse_row(fields, inverse(T_rect_ego))
     except SourceError as error:
         raise BadInput(f"{what}: {error}") from None
-    bbox = bent(box, camera) if box != _NO_BOX else None
-    return Row(fields[0], label_name(fields[0]), cuboid, bbox, said_more=truncated > 0.0 or occluded > 0.0)
+    return row._replace(bbox=bent(row.bbox, camera)) if row.bbox is not None else row
 
 
 def straightened(box: Box, camera: CameraCalibration) -> Box:

@@ -135,12 +135,26 @@ def plain(labels: LabelSet, *, cuboids: bool = True, boxes: bool = True) -> Labe
     return LabelSet(labels.source, labels.frames, labels.t_ns, tuple(tracks))
 
 
-def alone(labels: LabelSet) -> LabelSet:
-    """Each sighting a track of its own, in the order of frames."""
-    found = [(s.frame, track.label, s) for track in labels.tracks for s in track.sightings]
-    found.sort(key=lambda each: each[0])
-    tracks = tuple(LabelTrack(i, label, (s,), "accepted", IMPORT) for i, (_, label, s) in enumerate(found, start=1))
-    return replace(labels, tracks=tracks)
+def assert_same_alone(found: LabelSet, wanted: LabelSet, tolerance: float = 1e-6) -> None:
+    """Equal as ``assert_same`` has it, but for who is who over time: each sighting is a track of its own."""
+    left = _alone(found)
+    for label, seen in _alone(wanted):
+        near = (n for n, (other, each) in enumerate(left) if other == label and _are_near(each, seen, tolerance))
+        del left[next(near)]
+    assert left == []
+
+
+def _alone(labels: LabelSet) -> list[tuple[str, Sighting]]:
+    return [(track.label, sighting) for track in labels.tracks for sighting in track.sightings]
+
+
+def _are_near(one: Sighting, other: Sighting, tolerance: float) -> bool:
+    numbers = []
+    for each in (one, other):
+        shape = (*each.cuboid.center, *each.cuboid.size) if each.cuboid is not None else ()
+        turn = each.cuboid.yaw_rad if each.cuboid is not None else 0.0
+        numbers.append((each.frame, *shape, *(each.bbox or ()), math.cos(turn), math.sin(turn)))
+    return len(numbers[0]) == len(numbers[1]) and numbers[0] == pytest.approx(numbers[1], abs=max(tolerance, 1e-5))
 
 
 def assert_same(found: LabelSet, wanted: LabelSet, tolerance: float = 1e-6) -> None:
