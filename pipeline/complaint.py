@@ -13,9 +13,13 @@ _IN_OUR_WORDS = {"extra_forbidden": "no such setting", "missing": "is missing"}
 
 def first_complaint(error: ValidationError, model: type[BaseModel]) -> str:
     """The first thing that is wrong with what should have been a ``model``, after where it stands; for a name that does
-    not exist the one that was meant, if any is near."""
-    first = error.errors()[0]
+    not exist the one that was meant, if any is near. Of what is missing in one place all is named at once."""
+    errors = error.errors()
+    first = errors[0]
     place = first["loc"]
+    missing = [each["loc"] for each in errors if each["type"] == "missing" and each["loc"][:-1] == place[:-1]]
+    if first["type"] == "missing" and len(missing) > 1:
+        return f"{', '.join('.'.join(map(str, each)) for each in missing)}: are missing"
     text = _IN_OUR_WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
     if first["type"] == "extra_forbidden":
         text += did_you_mean(str(place[-1]), _names_at(model, place[:-1]))

@@ -18,10 +18,17 @@ class Wheel(Strict):
     radius_m: float = 0.3
 
 
+class Engine(Strict):
+    power_kw: float
+    cylinders: int
+    fuel: str = "petrol"
+
+
 class Car(Strict):
     title: str
     mass_kg: float = Field(1500.0, gt=0.0)
     wheels: list[Wheel] | None = None
+    engine: Engine | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Car:
@@ -37,6 +44,8 @@ class Car(Strict):
         ({"title": "a", "colour": 3}, "colour: no such setting"),
         ({"title": "a", "wheels": [{}, {"radius": 1}]}, "wheels.1.radius: no such setting; did you mean radius_m?"),
         ({}, "title: is missing"),
+        ({"title": "a", "engine": {}}, "engine.power_kw, engine.cylinders: are missing"),
+        ({"engine": {}}, "title: is missing"),
         ({"title": "a", "mass_kg": -1}, "mass_kg: Input should be greater than 0"),
         ({"title": "a", "wheels": []}, "a car without wheels"),
     ],

@@ -1,0 +1,69 @@
+"""The reference of scenario files says what the code says: every key, every default, and an example that plays."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+from pydantic import BaseModel
+
+from pipeline.simulation import scenario
+from pipeline.simulation.actors import Actor, Brake
+from pipeline.simulation.detection_model import BoxNoise, Detections, LineNoise
+from pipeline.simulation.gnss_model import GnssModel, OdometryModel
+from pipeline.simulation.lens import CameraModel
+from pipeline.simulation.lidar_model import LidarModel
+from pipeline.simulation.roads import Crossing, Road, Segment
+from pipeline.simulation.routes import CrossingActor
+from pipeline.simulation.scenario import Ego, Scenario
+
+TEXT = (Path(scenario.__file__).parent / "scenarios" / "README.md").read_text(encoding="utf-8")
+PARTS: dict[str, type[BaseModel]] = {
+    "scenario": Scenario,
+    "road": Road,
+    "segment": Segment,
+    "crossing": Crossing,
+    "ego": Ego,
+    "actor": Actor,
+    "crossing_actor": CrossingActor,
+    "brake": Brake,
+    "camera": CameraModel,
+    "lidar": LidarModel,
+    "gnss": GnssModel,
+    "odometry": OdometryModel,
+    "detections": Detections,
+    "boxes": BoxNoise,
+    "lines": LineNoise,
+}
+
+
+def documented(part: str) -> dict[str, str]:
+    """Default by key, as the table has them."""
+    body = TEXT.split(f"\n## {part}\n")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| ([a-z0-9_, ]+) \| ([^|]*)\|", body, re.MULTILINE)
+    return {key: default.strip() for keys, default in rows for key in keys.split(", ") if key != "key"}
+
+
+def test_no_part_is_left_out() -> None:
+    assert re.findall(r"^## (.+)$", TEXT, re.MULTILINE) == list(PARTS)
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_every_key_has_its_default(part: str) -> None:
+    fields, told = PARTS[part].model_fields, documented(part)
+    assert set(told) == set(fields)
+    for key, default in told.items():
+        if fields[key].is_required():
+            assert default == "", key
+        else:
+            usual = fields[key].default
+            plain = usual.model_dump(exclude_defaults=True) if isinstance(usual, BaseModel) else usual
+            assert yaml.safe_load(default) == (list(plain) if isinstance(plain, tuple) else plain), key
+
+
+def test_the_example_plays() -> None:
+    example = TEXT.split("```yaml\n")[1].split("```")[0]
+    scene = scenario.parse(example, "README.md")
+    assert scene.actors[0].brake is not None
