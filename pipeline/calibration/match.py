@@ -30,8 +30,9 @@ MARGIN = 0.2
 STANDS_OUT = 4.8
 """Robust standard deviations that the best must be above the usual one. With 20 frames of Astyx (16 rings) or 12 of
 KITTI, right mounts within reach have 5 and more; mounts 6° and more off, and other pictures, 4.6 at most."""
-GOOD = 0.9
-"""From this score on nothing better is told of."""
+CLEARLY = 1.5
+"""Standard deviations that the best must be above the present one to be told of: less is what edges cannot tell. On
+Astyx and KITTI that is less than 0.5° in yaw and 1° in pitch."""
 FEWEST = 100
 """Borders in the pictures; with fewer nothing is said."""
 
@@ -43,9 +44,9 @@ MOST = 8000
 @dataclass(frozen=True)
 class EdgeScore:
     """score: 0–1, 1 where no alignment near is better, 0 where the usual one of them is as good. better: changes of
-    parameters (``AlignmentParams``; of h_res_deg and v_res_deg a factor) that lead to the best one near, unless this
-    nearly is it. sigmas: how far the best stands out. borders: depth edges in the pictures. score is null where too few
-    borders are seen (sigmas null), or where no alignment near stands out."""
+    parameters (``AlignmentParams``; of h_res_deg and v_res_deg a factor) that lead to the best one near, if that is
+    clearly better. sigmas: how far the best stands out. borders: depth edges in the pictures. score is null where too
+    few borders are seen (sigmas null), or where no alignment near stands out."""
 
     score: float | None
     sigmas: float | None
@@ -100,8 +101,9 @@ def _placed(strengths: F64, borders: int, near: Sequence[Near]) -> EdgeScore:
     sigmas = round(height / max(1.4826 * float(np.median(np.abs(strengths - usual))), 1e-6), 2)
     if sigmas < STANDS_OUT:
         return EdgeScore(None, sigmas, borders)
-    score = round(float(np.clip((strengths[0] - usual) / height, 0.0, 1.0)), 4)
-    return EdgeScore(score, sigmas, borders, {} if score >= GOOD else near[best].change)
+    score = float(np.clip((strengths[0] - usual) / height, 0.0, 1.0))
+    is_clear = (1.0 - score) * sigmas >= CLEARLY
+    return EdgeScore(round(score, 4), sigmas, borders, near[best].change if is_clear else {})
 
 
 def _steps(step_deg: float) -> list[float]:
