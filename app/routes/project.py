@@ -1,4 +1,4 @@
-"""/api/project: where cuboids lie in the shown picture, and where on the road a pixel of it is. The page that draws a
+"""/api/project: where cuboids lie in the shown picture, and where a pixel of it looks. The page that draws a
 cuboid under a hand asks here."""
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ from pipeline.alignment import resolve
 from pipeline.geometry import corners_of
 
 MOST_CUBOIDS = 500
-_FARTHEST_M = 300.0
-"""A pixel near the horizon would be anywhere."""
 
 Pixel = tuple[float, float]
 
@@ -34,19 +32,20 @@ class Projected(BaseModel):
     pixels: list[list[Pixel | None]] | None
 
 
-class OnRoad(BaseModel):
-    """A pixel of the camera's own picture, and the height of the road there, ego z."""
+class GivenPixel(BaseModel):
+    """A pixel of the camera's own picture."""
 
     model_config = ConfigDict(extra="forbid")
 
     pixel: tuple[Finite, Finite]
-    z_m: Finite
 
 
-class PlaceOnRoad(BaseModel):
-    """Ego x, y; null where the pixel does not look at the road ahead, or where nothing says how it looks."""
+class Ray(BaseModel):
+    """Where a pixel looks: from a point, in a direction, ego frame. Null where nothing says how LiDAR and camera lie to
+    each other."""
 
-    place: tuple[float, float] | None
+    start: tuple[float, float, float] | None
+    toward: tuple[float, float, float] | None
 
 
 def project_router(engine: Engine) -> APIRouter:
@@ -68,16 +67,14 @@ def project_router(engine: Engine) -> APIRouter:
         seen = [(u, v) if np.isfinite((u, v)).all() else None for u, v in pixels]
         return Projected(pixels=[seen[start : start + 8] for start in range(0, len(seen), 8)])
 
-    @router.post("/project/road")
-    def on_road(body: OnRoad) -> PlaceOnRoad:
-        """The place of the road that a pixel of the shown frame looks at with the present parameters."""
+    @router.post("/project/ray")
+    def ray(body: GivenPixel) -> Ray:
+        """What a pixel of the shown frame looks along with the present parameters."""
         shown = engine.snapshot
         aligned = resolve(shown.params.alignment, shown.tick.frame.camera) if shown.tick is not None else None
         if aligned is None:
-            return PlaceOnRoad(place=None)
-        start, (ray,) = aligned.rays(np.array([body.pixel]))
-        along = (body.z_m - start[2]) / ray[2] if ray[2] else -1.0
-        x, y = (float(value) for value in (start + along * ray)[:2])
-        return PlaceOnRoad(place=(x, y) if along > 0.0 and 0.0 < np.hypot(x, y) < _FARTHEST_M else None)
+            return Ray(start=None, toward=None)
+        start, (toward,) = aligned.rays(np.array([body.pixel]))
+        return Ray(start=tuple(start.tolist()), toward=tuple(toward.tolist()))
 
     return router

@@ -108,10 +108,35 @@ export function drawn(from, to, label, ground_m) {
   return { center: [from.x + length / 2, from.y, z], size, yaw_rad };
 }
 
+/** Where nothing shows the ground. @type {[number, number, number, number]} */
+const FLAT = [0, 0, 1, 0];
+/** What looks farther than this looks at the horizon. */
+const FARTHEST_M = 300;
+
+/** @param {import("../types.js").GroundPlanes|null} ground @param {number} x @returns {number} which plane it is there */
+function planeAt(ground, x) {
+  const after = ground?.edges.findIndex((edge) => edge > x) ?? -1, count = ground?.planes.length ?? 0;
+  return after < 0 ? count - 1 : Math.min(count, Math.max(1, after)) - 1;
+}
+
+/**
+ * The nearest place at which a ray meets the ground; null where it looks beyond it.
+ * @param {import("../types.js").GroundPlanes|null} ground @param {number[]} start @param {number[]} toward @param {number} above metres over the ground that are meant
+ * @returns {Point2|null}
+ */
+export function seenOn(ground, [x, y, z], [dx, dy, dz], above) {
+  const planes = ground?.planes.length ? ground.planes : [FLAT], isKnown = planes[0] !== FLAT;
+  const met = planes.flatMap(([a, b, c, d], i) => {
+    const t = -(a * x + b * y + c * (z - above) + d) / (a * dx + b * dy + c * dz), at = x + t * dx;
+    return t > 0 && (!isKnown || planeAt(ground, at) === i) && Math.hypot(at, y + t * dy) < FARTHEST_M ? [t] : [];
+  });
+  const t = Math.min(...met);
+  return met.length ? [x + t * dx, y + t * dy] : null;
+}
+
 /** Height of the ground at a place; 0 where no sweep shows it. @param {import("../types.js").GroundPlanes|null} ground @param {Place} place */
 export function groundAt(ground, { x, y }) {
   if (!ground?.planes.length) return 0;
-  const { edges, planes } = ground, after = edges.findIndex((edge) => edge > x);
-  const [a, b, c, d] = planes[after < 0 ? planes.length - 1 : Math.min(planes.length, Math.max(1, after)) - 1];
+  const [a, b, c, d] = ground.planes[planeAt(ground, x)];
   return c === 0 ? 0 : -(a * x + b * y + d) / c;
 }

@@ -1,7 +1,7 @@
-/** A cuboid dragged over the road in the picture, held by the middle of its foot. The server says where the road is. */
+/** A cuboid dragged over the road in the picture, held by the middle of its foot. The server says where a pixel looks. */
 import { newestOnly, request } from "../api.js";
 import { get } from "../store.js";
-import { groundAt } from "./cuboid.js";
+import { groundAt, seenOn } from "./cuboid.js";
 import { hold, presentOf, release } from "./draft.js";
 import { shown } from "./held.js";
 import { boundsOf } from "./picture.js";
@@ -16,16 +16,12 @@ export function takes(track, from) {
   if (!cuboid || !bounds || !foot || from.u < bounds[0] || from.u > bounds[2] || from.v < bounds[1] || from.v > bounds[3]) return null;
   const frame = shown(), ground = get("frame")?.display.ground ?? null;
   const above = cuboid.center[2] - groundAt(ground, { x: cuboid.center[0], y: cuboid.center[1] });
-  /** Of the road where it is held now: one that rises is followed. */
-  let z_m = cuboid.center[2] - cuboid.size[2] / 2;
   const move = newestOnly(async (/** @type {Pixel} */ to) => {
     const pixel = [foot.u + to.u - from.u, foot.v + to.v - from.v];
-    /** @type {{place: [number, number]|null}} */
-    const { place } = await request("api/project/road", "POST", { pixel, z_m }).catch(() => ({ place: null }));
-    if (!place) return;
-    const [x, y] = place, z = groundAt(ground, { x, y }) + above;
-    z_m = z - cuboid.size[2] / 2;
-    hold(track, { cuboid: { ...cuboid, center: [x, y, z] } }, frame);
+    /** @type {{start: number[]|null, toward: number[]|null}} */
+    const { start, toward } = await request("api/project/ray", "POST", { pixel }).catch(() => ({ start: null, toward: null }));
+    const place = start && toward && seenOn(ground, start, toward, above - cuboid.size[2] / 2);
+    if (place) hold(track, { cuboid: { ...cuboid, center: [...place, groundAt(ground, { x: place[0], y: place[1] }) + above] } }, frame);
   });
   let last = Promise.resolve();
   return {

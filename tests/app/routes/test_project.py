@@ -50,19 +50,20 @@ def test_nothing_is_asked_and_nothing_is_answered(client: httpx.Client):
     assert client.post("/api/project", json={"cuboids": []}).json() == {"pixels": []}
 
 
-@pytest.mark.parametrize("place", [(8.0, 0.0), (20.0, 3.5), (60.0, -5.0)])
-def test_a_pixel_looks_at_the_place_of_the_road_that_is_seen_there(
-    engine: Engine, client: httpx.Client, place: tuple[float, float]
+@pytest.mark.parametrize("place", [(8.0, 0.0, -0.4), (20.0, 3.5, 1.0), (60.0, -5.0, 0.3)])
+def test_a_pixel_looks_along_what_is_seen_there(
+    engine: Engine, client: httpx.Client, place: tuple[float, float, float]
 ):
     tick = engine.snapshot.tick
     assert tick is not None
     aligned = resolve(engine.snapshot.params.alignment, tick.frame.camera)
     assert aligned is not None
-    (pixel,) = aligned.project(np.array([[*place, -0.4]])).tolist()
-    found = client.post("/api/project/road", json={"pixel": pixel, "z_m": -0.4}).json()["place"]
-    assert found == pytest.approx(place, abs=1e-6)
-    sky = {"pixel": [pixel[0], -500.0], "z_m": -0.4}
-    assert client.post("/api/project/road", json=sky).json() == {"place": None}, "no road there"
+    (pixel,) = aligned.project(np.array([place])).tolist()
+    found = client.post("/api/project/ray", json={"pixel": pixel}).json()
+    start, toward = np.array(found["start"]), np.array(found["toward"])
+    off = np.array(place) - start
+    assert np.linalg.norm(np.cross(toward, off)) / np.linalg.norm(toward) < 1e-6, "the place is on the ray"
+    assert toward @ off > 0.0, "and ahead"
 
 
 @pytest.mark.parametrize(

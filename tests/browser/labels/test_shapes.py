@@ -142,6 +142,26 @@ def test_a_cuboid_is_dragged_over_the_road_in_the_picture(hand: Hand, labels: La
     assert after["center"][1] < before["center"][1] - 0.5
 
 
+def test_a_ray_meets_the_ground_where_it_is_seen_first(hand: Hand):
+    """The road rises by 5 % from 20 m on, seen from 1.5 m up: (how far down, how high above the ground, where)."""
+    cases = [(0.1, 0.0, 15.0), (0.1, 0.5, 10.0), (0.05, 0.0, 25.0), (-0.01, 0.0, 62.5), (-0.2, 0.0, None)]
+    found = hand.page.evaluate(
+        """async (cases) => {
+          const { groundAt, seenOn } = await import("/js/labeling/cuboid.js");
+          const ground = { edges: [0, 20, 60], planes: [[0, 0, 1, 0], [-0.05, 0, 1, 1]] };
+          return cases.map(([down, above]) => {
+            const place = seenOn(ground, [0, 0, 1.5], [1, 0, -down], above);
+            return place && [place[0], 1.5 - down * place[0] - above - groundAt(ground, { x: place[0], y: 0 })];
+          });
+        }""",
+        cases,
+    )
+    for (down, above, x), got in zip(cases, found, strict=True):
+        assert (got is None) == (x is None), (down, above, got)
+        if x is not None:
+            assert got == pytest.approx([x, 0.0]), (down, above)
+
+
 def test_everything_is_drawn_and_merged_by_keys_alone(hand: Hand, labels: Labels):
     page = hand.page
     hand.keys("g", "Enter")
