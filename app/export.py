@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from app.line import WARM_UP_FRAMES
+from app.views.opening import PLAYING, Opening
 from pipeline.params import Params
 from pipeline.progress import Progress, silent
 from pipeline.recording.save import save
@@ -97,11 +98,13 @@ def _run(
             progress(frame.index + 1 - first, last + 1 - first)
 
 
-def write_rrd(title: str, run: Iterable[tuple[Frame, Result]], out: Path, params: Params, paused: bool = False) -> None:
-    """A replay for the rerun viewer. paused: it opens standing still at the first frame."""
+def write_rrd(
+    title: str, run: Iterable[tuple[Frame, Result]], out: Path, params: Params, opening: Opening = PLAYING
+) -> None:
+    """A replay for the rerun viewer."""
     from app.views.rerun_view import RerunSink  # half a second to import: only who asks pays
 
-    with RerunSink(out, title, params.alignment, paused) as sink:
+    with RerunSink(out, title, params.alignment, opening) as sink:
         for frame, result in run:
             sink.show(frame, result)
 

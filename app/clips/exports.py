@@ -15,6 +15,7 @@ from app.clips.video import write_film
 from app.drive.recording import Recording
 from app.drive.turn import Turn
 from app.export import write_csv, write_rrd
+from app.views.opening import Opening
 from pipeline.errors import BadInput
 from pipeline.params import Params
 from pipeline.results import to_json
@@ -26,7 +27,7 @@ MOST_FRAMES = 6000
 @dataclass(frozen=True, eq=False)
 class Clip:
     """Frames ``first`` to ``last`` of a recording, both included, run with these parameters. turn: to be asked before
-    each frame is computed. paused: a viewer opens it standing still."""
+    each frame is computed. opening: of a replay, in rerun."""
 
     recording: Recording
     params: Params
@@ -35,7 +36,7 @@ class Clip:
     turn: Turn
     title: str
     rate_hz: float
-    paused: bool = False
+    opening: Opening = Opening()
 
 
 def submit(jobs: Jobs, clip: Clip, kind: Kind) -> Job:
@@ -55,7 +56,7 @@ def _mcap(clip: Clip, path: Path, report: Report) -> None:
 
 def _rrd(clip: Clip, path: Path, report: Report) -> None:
     run = clip_frames(clip.recording, clip.params, clip.first, clip.last, report, clip.turn)
-    write_rrd(clip.title, run, path, clip.params, clip.paused)
+    write_rrd(clip.title, run, path, clip.params, clip.opening)
 
 
 def _mp4(clip: Clip, path: Path, report: Report) -> None:

@@ -18,6 +18,7 @@ from app.engine import Engine
 from app.routes.clips import clip_of
 from app.routes.refusals import open_recording, refusing
 from app.routes.shapes import file_of
+from app.views.opening import Opening
 from app.views.rerun_web import FILES, ViewerFiles
 
 AROUND = 50
@@ -47,27 +48,31 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
     router = APIRouter(tags=["rerun"])
 
     @router.get("/api/rerun/open")
-    def address() -> Address:
+    def address(
+        first: int | None = Query(None, ge=0, description="From this frame on; else from the shown one"),
+        compact: bool = Query(False, description="Laid out for a narrow pane"),
+    ) -> Address:
         """The address for a frame or a tab: the drive from the shown frame on, standing still there (a recording cannot
         say where the viewer's cursor is). 409 in one sentence when there is no web viewer here."""
         with refusing():
             open_recording(engine.drives)
             for name in FILES:
                 viewer.path(name)
-        first, last = _span(engine, engine.snapshot.index, None)
-        query = urlencode({"first": first, "last": last, "paused": 1})
-        return Address(url=f"/rerun/?{query}", first=first, last=last)
+        begin, end = _span(engine, engine.snapshot.index if first is None else first, None)
+        query = urlencode({"first": begin, "last": end, "paused": 1, "compact": int(compact)})
+        return Address(url=f"/rerun/?{query}", first=begin, last=end)
 
     @router.get("/api/rerun.rrd", response_class=FileResponse, responses=file_of("application/octet-stream"))
     def replay(
         first: int | None = Query(None, ge=0),
         last: int | None = Query(None, ge=0),
         paused: bool = Query(False, description="The viewer opens it standing still"),
+        compact: bool = Query(False, description="Laid out for a narrow pane"),
     ) -> FileResponse:
         """The drive as a rerun recording, with the present parameters: by default what is around the shown frame, at
         most 600 frames."""
         span = _span(engine, first, last)
-        clip = replace(clip_of(engine, *span), paused=paused)
+        clip = replace(clip_of(engine, *span), opening=Opening(paused, compact))
         file = tempfile.NamedTemporaryFile(prefix="cipv-", suffix=".rrd", delete=False)  # noqa: SIM115
         path = Path(file.name)
         file.close()

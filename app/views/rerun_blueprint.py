@@ -6,6 +6,8 @@ from typing import Any
 
 import rerun.blueprint as rrb
 
+from app.views.opening import PLAYING, Opening
+
 CAMERA = "world/camera"
 OVERLAYS = f"{CAMERA}/overlay"
 BEV_AHEAD_M, BEV_BEHIND_M, BEV_ASIDE_M = 80.0, 8.0, 24.0
@@ -15,8 +17,8 @@ _BACKGROUND = (13, 17, 23)
 _NO_LEGEND = rrb.PlotLegend(visible=False)
 
 
-def blueprint(paused: bool = False) -> rrb.Blueprint:
-    """The layout that a replay carries inside its file. paused: it opens standing still at its first frame."""
+def blueprint(opening: Opening = PLAYING) -> rrb.Blueprint:
+    """The layout that a replay carries inside its file."""
     camera = rrb.Spatial2DView(name="Camera", origin=CAMERA, contents=[f"{CAMERA}/image", f"{OVERLAYS}/**"])
     world = rrb.Spatial3DView(
         name="World",
@@ -39,17 +41,22 @@ def blueprint(paused: bool = False) -> rrb.Blueprint:
         columns=rrb.TextLogColumns(timeline_columns=["frame"], text_log_columns=["LogLevel", "Body"]),
         rows=rrb.TextLogRows(filter_by_log_level=["INFO", "WARN"]),
     )
-    curves = rrb.Horizontal(
+    curves = (
         _curve("Distance to the CIPV (m)", "distance"),
         _curve("Closing speed (m/s)", "closing_speed"),
         _curve("Time to collision (s)", "ttc", axis_y=rrb.ScalarAxis(range=(0.0, TTC_AXIS_S))),
         _curve("Speed (km/h)", "speed", plot_legend=rrb.PlotLegend(visible=True)),
         _curve("Stage times (ms)", "timing", plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop)),
     )
-    left = rrb.Vertical(camera, rrb.Horizontal(bev, reasons), row_shares=[2, 3])
+    if opening.compact:
+        layout = rrb.Vertical(camera, rrb.Tabs(world, bev, reasons, *curves, active_tab=0), row_shares=[2, 3])
+    else:
+        left = rrb.Vertical(camera, rrb.Horizontal(bev, reasons), row_shares=[2, 3])
+        upper = rrb.Horizontal(left, world, column_shares=[1, 1])
+        layout = rrb.Vertical(upper, rrb.Horizontal(*curves), row_shares=[3, 1])
     return rrb.Blueprint(
-        rrb.Vertical(rrb.Horizontal(left, world, column_shares=[1, 1]), curves, row_shares=[3, 1]),
-        rrb.TimePanel(state="collapsed", timeline="sensor_time", play_state="paused" if paused else None),
+        layout,
+        rrb.TimePanel(state="collapsed", timeline="sensor_time", play_state="paused" if opening.paused else None),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
         auto_views=False,

@@ -16,6 +16,7 @@ import rerun as rr
 from app.views import rerun_parts as parts
 from app.views import scene
 from app.views.colors import rgb
+from app.views.opening import PLAYING, Opening
 from app.views.rerun_blueprint import BEV_AHEAD_M, BEV_ASIDE_M, CAMERA, OVERLAYS, blueprint
 from pipeline import alignment
 from pipeline.errors import BadInput
@@ -48,7 +49,6 @@ class RerunSink:
     ``title`` names the recording in the viewer; ``params`` says which model projects the points into the picture.
     Timelines: ``frame`` (index) and ``sensor_time`` (the frame's tick), never the time of writing. ReplayError when the
     file cannot be made. Use it in a ``with`` block: a replay is complete once closed. One thread at a time.
-    ``paused``: the viewer opens it standing still at its first frame, instead of playing.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class RerunSink:
         target: str | FilePath | BinaryIO | ViewerAddress,
         title: str = APPLICATION,
         params: AlignmentParams = _CALIBRATED,
-        paused: bool = False,
+        opening: Opening = PLAYING,
     ) -> None:
         self._params = params
         self._rec = rr.RecordingStream(APPLICATION, send_properties=False)
@@ -71,7 +71,7 @@ class RerunSink:
             self._connect(target)
         else:
             self._stream, self._buffer = target, rr.binary_stream(self._rec)
-        self._rec.send_blueprint(blueprint(paused))
+        self._rec.send_blueprint(blueprint(opening))
         self._log_static()
 
     def _open_file(self, path: FilePath) -> None:

@@ -29,7 +29,7 @@ function say(text) {
 function recording() {
   const asked = new URLSearchParams(location.search);
   const part = new URLSearchParams();
-  for (const name of ["first", "last", "paused"]) {
+  for (const name of ["first", "last", "paused", "compact"]) {
     const value = asked.get(name);
     if (value !== null && /^\d{1,9}$/.test(value)) part.set(name, value);
   }

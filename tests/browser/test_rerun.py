@@ -4,22 +4,18 @@ from __future__ import annotations
 
 from urllib.parse import urlsplit
 
-import httpx
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 
 from tests.browser.conftest import Site
+from tests.browser.test_look import SCREENS
 
 WAIT_MS = 120_000
 
 
 @pytest.mark.usefixtures("paused_in_traffic")
 def test_one_click_opens_this_drive_and_no_request_leaves_the_machine(site: Site, browser: Browser):
-    answer = httpx.get(f"{site.address}/api/rerun/open", timeout=60)
-    assert answer.status_code == 200
-    address = answer.json()
-    assert address["first"] == site.engine.snapshot.index
-    context = browser.new_context(viewport={"width": 900, "height": 600})
+    context = browser.new_context(viewport={"width": 1100, "height": 720})
     page = context.new_page()
     asked: list[str] = []
     errors: list[str] = []
@@ -27,14 +23,22 @@ def test_one_click_opens_this_drive_and_no_request_leaves_the_machine(site: Site
     page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     page.on("pageerror", lambda error: errors.append(str(error)))
     try:
-        # three frames are enough to see that the replay is taken over
-        short = f"/rerun/?first={address['first']}&last={address['first'] + 2}&paused=1"
+        count = site.engine.snapshot.count
+        index = count - 4  # few frames are enough
+        site.engine.control.seek(index)
+        site.engine.wait_for(lambda shown: shown.index == index, WAIT_MS / 1e3)
+        page.goto(site.address)
+        expect(page.locator("#transport .name")).to_have_text(f"{index:06d}")
         with page.expect_response(lambda response: "/api/rerun.rrd" in response.url, timeout=WAIT_MS) as replay:
-            page.goto(site.address + short)
+            page.get_by_role("tab", name="rerun").click()
         assert replay.value.ok
-        page.wait_for_function("document.documentElement.dataset.viewer === 'started'", timeout=WAIT_MS)
-        assert page.locator("#said").text_content() == ""
-        assert page.locator("canvas#viewer").is_visible()
+        expect(page.locator("#rerun-body .facts")).to_have_text(f"frames {index + 1} to {count} of {count}")
+        assert f"first={index}&last={count - 1}&paused=1&compact=1" in replay.value.url
+        viewer = page.frame_locator("#rerun-body iframe")
+        expect(viewer.locator("html")).to_have_attribute("data-viewer", "started", timeout=WAIT_MS)
+        expect(viewer.locator("#said")).to_have_text("")
+        expect(viewer.locator("canvas#viewer")).to_be_visible()
+        page.screenshot(path=SCREENS / "rerun.png")
     finally:
         context.close()
     hosts = {urlsplit(url).netloc for url in asked if url.startswith("http")}

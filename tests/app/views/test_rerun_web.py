@@ -26,7 +26,9 @@ def client() -> Iterator[httpx.Client]:
 
 def test_the_viewer_is_opened_at_the_shown_frame_with_every_file_from_here(client: httpx.Client):
     address = client.get("/api/rerun/open").json()
-    assert (address["url"], address["first"], address["last"]) == ("/rerun/?first=0&last=29&paused=1", 0, 29)
+    assert (address["url"], address["first"], address["last"]) == ("/rerun/?first=0&last=29&paused=1&compact=0", 0, 29)
+    later = client.get("/api/rerun/open?first=7&compact=1").json()
+    assert (later["url"], later["first"]) == ("/rerun/?first=7&last=29&paused=1&compact=1", 7)
     page = client.get(address["url"])
     policy = page.headers["content-security-policy"]
     assert "connect-src 'self' blob: data:" in policy
