@@ -1,5 +1,4 @@
 /** The selected track: what can be done with it, its place in this frame, and its history. */
-import { newestOnly, request } from "../api.js";
 import { el, text } from "../dom.js";
 import { DASH, num } from "../format.js";
 import { on, paint } from "../store.js";
@@ -8,22 +7,13 @@ import { CLASSES } from "./cuboid.js";
 import { presentOf } from "./draft.js";
 import { chosen, nameOf } from "./held.js";
 import { setTool } from "./mode.js";
+import { Past } from "./past.js";
 import * as review from "./review.js";
-
-const MOST_PAST = 6;
 
 const head = el("div", { class: "detail-head" }), title = el("b", {}), state = el("span", { class: "tag" });
 const classes = el("select", { aria: { label: "Class" }, title: "Class (T)" }, ...CLASSES.map((label) => el("option", { value: label, textContent: label })));
-const facts = el("p", { class: "facts" }), comment = el("p", { class: "comment" }), how = el("p", { class: "how" }), past = el("ol", { class: "past facts" });
+const facts = el("p", { class: "facts" }), comment = el("p", { class: "comment" }), how = el("p", { class: "how" }), past = new Past();
 const panel = el("div", { class: "track-detail", hidden: true });
-
-const lookBack = newestOnly(async (/** @type {number} */ id) => {
-  /** @type {import("./types.js").PastAct[]} */
-  const acts = await request(`api/labels/history?kind=track&id=${id}`).catch(() => []);
-  if (chosen()?.id !== id) return;
-  past.replaceChildren(...acts.slice(0, MOST_PAST).map(({ what, note, person, t_unix_ms, undone }) =>
-    el("li", { class: undone ? "is-undone" : "" }, `${new Date(t_unix_ms).toLocaleTimeString("en-GB")} ${person}: ${what}${note ? `; ${note}` : ""}${undone ? " (undone)" : ""}`)));
-});
 
 /** @param {HTMLElement} parent */
 export function setUp(parent) {
@@ -42,15 +32,12 @@ export function setUp(parent) {
       button("Keyframe", "K", "It is right in this frame", commands.keyframe), button("Draw", "Shift G", "Draw its shape in this frame", () => setTool("shape")),
       button("Not here", "Del", "It is not there in this frame, or in the marked ones", commands.notHere), button("Split", "X", "From this frame on it is another", commands.splitHere),
       button("Merge", "M", "Merge it with the label that is pressed next, or selected by . and taken by Enter", commands.merge), button("Remove", "Shift Del", "Remove the track", commands.removeTrack)),
-    past);
+    past.node);
   parent.append(panel);
   paint(["track", "labels", "labelFrames", "frame", "draft"], show);
-  let seen = "";
   on(["track", "labels"], () => {
-    const track = chosen(), key = track ? `${track.id} ${track.revision}` : "";
-    if (key === seen) return;
-    seen = key;
-    if (track) lookBack(track.id);
+    const track = chosen();
+    if (track) past.look("track", track.id, track.revision);
   });
 }
 

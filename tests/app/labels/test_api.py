@@ -9,6 +9,7 @@ from app.engine import Engine
 from app.routes.label_shapes import ScoreJson, Window
 from app.server import create_app
 from app.tokens import Tokens
+from pipeline.labels.model import WHOLE_TAG
 from pipeline.params import Params
 from tests.app.labels.site import COUNT, CUBOID, act, labels, move, proposed, ref, task
 from tests.app.recording import Recording, opener
@@ -40,6 +41,37 @@ def test_the_pipelines_opinion_is_proposed_accepted_and_scored(engine: Engine, c
     )
     compared = client.get("/api/compare").json()
     assert (compared["truth"], compared["judged"]) == ("labels", score.judged)
+
+
+def test_a_lead_whose_track_is_only_proposed_judges_nothing_and_it_is_said(
+    engine: Engine, client: httpx.Client
+) -> None:
+    """Nor do labels of a frame in which other vehicles may be: nothing there is detected falsely."""
+    track = proposed(engine, client)
+    (lead,) = labels(client)["leads"]
+    act(client, kind="accept", items=[{"kind": "lead", "id": lead["id"], "revision": lead["revision"]}])
+    score = ScoreJson.model_validate(client.get("/api/labels/score").json())
+    said = f"#{track['id']} leads in 30 frames but is only proposed: not judged until it is accepted."
+    assert (score.judged, score.metrics, score.errors, score.notes[0]) == (0, [], [], said)
+    following = client.get("/api/labels/next", params={"what": "disagreement", "frame": 0}).json()
+    assert (following["frame"], following["why"]) == (None, f"no frame is judged: {said}")
+    compared = client.get("/api/compare").json()
+    assert (compared["truth"], compared["judged"]) == ("recording", 20), "the labels that come with it judge"
+
+
+def test_a_wrong_lead_is_among_the_worst_frames(engine: Engine, client: httpx.Client) -> None:
+    """Drawn by hand a lane beside; what else is there is not known."""
+    beside = CUBOID | {"center": [CUBOID["center"][0], 3.5, CUBOID["center"][2]]}
+    act(client, kind="add_track", label="car", frame=4, cuboid=beside, bbox=None)
+    (track,) = labels(client)["tracks"]
+    act(client, kind="set_lead", first=4, last=4, lead=track["id"])
+    score = ScoreJson.model_validate(client.get("/api/labels/score").json())
+    assert [(each.frame, each.verdict) for each in score.worst] == [(4, "wrong")]
+    assert not {"precision", "MOTA"} & {metric.name for metric in score.metrics}
+    assert any("in 0 of 1 labelled frames" in note for note in score.notes)
+    act(client, kind="tag", frame=4, tag=WHOLE_TAG, on=True)
+    score = ScoreJson.model_validate(client.get("/api/labels/score").json())
+    assert {"precision", "MOTA"} <= {metric.name for metric in score.metrics}
 
 
 def test_what_a_person_has_looked_at_is_not_proposed_again(engine: Engine, client: httpx.Client) -> None:

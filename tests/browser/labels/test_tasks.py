@@ -91,6 +91,35 @@ def test_the_lead_is_painted_by_keys_by_number_and_by_a_drag(hand: Hand, labels:
     labels.wait_for(lambda now: now.leads[-1][1] == 129)
 
 
+def test_everything_said_of_a_frame_has_a_history(hand: Hand, labels: Labels):
+    """Also more of it than is shown at first, and what was done while it is looked at."""
+    page = hand.page
+    made = draw(hand, labels)
+    for label in ("truck", "bus") * 4:
+        held = labels.tracks[made]["revision"]
+        labels.act("Ada", {"kind": "relabel", "track": made, "revision": held, "label": label})
+    acts = len(labels.get(f"/history?kind=track&id={made}"))
+    rows = page.locator(".track-detail .past li")
+    expect(page.locator(".track-detail .past button")).to_have_text(f"{acts - 6} earlier")
+    expect(rows).to_have_count(6)
+    page.locator(".track-detail .past button").click()
+    expect(rows).to_have_count(acts)
+    hand.keys("c")
+    labels.act("Ada", {"kind": "tag", "frame": START, "tag": "night", "on": True})
+    labels.act("Ada", {"kind": "add_event", "frame": START, "event": "cut_in", "tracks": [made]})
+    page.get_by_role("tab", name="Frame").click()
+    pasts = page.locator(".moment-pasts details")
+    expect(pasts).to_have_count(3)
+    lead = page.locator(".moment-pasts details[data-kind=lead]")
+    lead.locator("summary").click()
+    expect(lead.locator("li")).to_contain_text([f"Ada: lead of frame {START + 1}: #{made}"])
+    (said,) = labels.everything["leads"]
+    ends = {"first": START, "last": START + 3, "range": said["id"], "revision": said["revision"]}
+    labels.act("Bob", {"kind": "trim_lead", **ends})
+    expect(lead.locator("li")).to_have_count(2)
+    expect(lead.locator("li").first).to_contain_text("Bob: lead")
+
+
 def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, site: Site):
     page = hand.page
     whole_drive(page, site)
