@@ -29,7 +29,7 @@ caption, .note { caption-side: bottom; text-align: left; color: var(--soft); fon
   stroke-width: 0.2; } .plan text { font-size: 2.6px; } .car { stroke: #14181b; stroke-width: 0.25; }
 .car.ego { fill: #0b6bcb; } .way { fill: none; stroke: #f5d90a; stroke-width: 0.45; stroke-dasharray: 1.2 0.8; }
 .way.ego { stroke: #0b6bcb; }
-.charts { display: grid; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); gap: 18px; }
+.charts { display: grid; grid-template-columns: repeat(auto-fill, minmax(420px, 1fr)); gap: 18px; }
 figure { margin: 12px 0; } figcaption { font-weight: 600; font-size: 13.5px; } figure > svg { width: 100%; }
 svg text { fill: var(--soft); font-size: 11px; } .grid { stroke: var(--edge); } .legend { font-size: 12px; }
 .key { margin-right: 14px; white-space: nowrap; } .key svg { margin-right: 5px; }
