@@ -16,7 +16,7 @@ import { reveal } from "../params.js";
 const KINDS = {
   iou: { label: "Box overlap (IoU)", test: "least", param: "fusion.min_iou" },
   range_sigmas: { label: "Distances disagree", test: "most", unit: "σ", param: "fusion.range_gate_sigmas" },
-  class_size: { label: "Longest of its class", test: "most", unit: "m", param: "fusion.size_gate" },
+  class_size: { label: "Length for its class", test: "most", unit: "m", param: "fusion.size_gate" },
   vehicle_class: { label: "A vehicle by class", test: "flag" },
   distance_known: { label: "Distance known", test: "flag", unit: "m" },
   hits: { label: "Times seen", test: "least", param: "cipv.confirm_hits" },
