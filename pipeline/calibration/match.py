@@ -2,9 +2,9 @@
 mount turned a little?
 
 How strong the edges under the borders are says little by itself: it differs from road to road more than from a right
-mount to a wrong one. So the same is asked of the mount turned to all sides (as Levinson and Thrun 2013 do, section
-III-C), and the score says where between usual and best of these the present one stands. Where none of them stands out
-from the rest, there is nothing to score against, and none is given.
+mount to a wrong one. So the same is asked of the mount turned to all sides, as Levinson and Thrun (2013) do to judge
+whether a calibration still holds, and the score says where between usual and best of these the present one stands. Where
+none of them stands out from the rest, there is nothing to score against, and none is given.
 """
 
 from __future__ import annotations
@@ -29,14 +29,12 @@ MARGIN = 0.2
 """Borders this far outside the picture, in its sizes, may come in when the mount is turned."""
 STANDS_OUT = 4.8
 """Robust standard deviations that the best must be above the usual one. With 20 frames of Astyx (16 rings) or 12 of
-KITTI, right mounts within reach have 5 and more; mounts 6° and more off, and other pictures, 4.6 at most."""
+KITTI, right mounts within reach have 4.86 and more, mounts 6° and more off and other pictures 4.6 at most."""
 CLEARLY = 1.5
 """Standard deviations that the best must be above the present one to be told of: less is what edges cannot tell. On
 Astyx and KITTI that is less than 0.5° in yaw and 1° in pitch."""
 FEWEST = 100
 """Borders in the pictures; with fewer nothing is said."""
-
-
 MOST = 8000
 """Borders of one camera that are looked at: of more, every second, third …"""
 

@@ -1,6 +1,7 @@
 /** Play, step, speed and repeat. The bar asks; the stream answers. Going to a frame is the timeline's. */
 import { playback } from "./api.js";
 import { $, el, press, text } from "./dom.js";
+import { NO_DRIVE } from "./drive/live.js";
 import * as shuttle from "./drive/shuttle.js";
 import { clock } from "./format.js";
 import { icon } from "./icons.js";
@@ -17,7 +18,7 @@ const name = el("span", { class: "name", title: "The recording's own name of thi
 const count = el("span", { class: "dim" });
 const time = el("span");
 const provisional = el("span", { class: "tag", textContent: "provisional", title: "The whole recording is still being computed: numbers of objects may change", hidden: true });
-const live = el("span", { class: "tag live", textContent: "LIVE", hidden: true });
+const live = el("span", { class: "tag live", textContent: "LIVE", title: NO_DRIVE, hidden: true });
 const speed = el("select", { title: "Speed ([ and ])", aria: { label: "Speed" } }, ...SPEEDS.map((s) => el("option", { value: String(s), textContent: `${s}×` })));
 const loop = el("button", { type: "button", class: "toggle", textContent: "Repeat", title: "Start again at the end (R)", onclick: toggleLoop });
 
