@@ -3,8 +3,8 @@ mount turned a little?
 
 How strong the edges under the borders are says little by itself: it differs from road to road more than from a right
 mount to a wrong one. So the same is asked of the mount turned to all sides, as Levinson and Thrun (2013) do to judge
-whether a calibration still holds, and the score says where between usual and best of these the present one stands. Where
-none of them stands out from the rest, there is nothing to score against, and none is given.
+whether a calibration still holds, and the score says where between usual and best of these the present one stands.
+Where none of them stands out from the rest, there is nothing to score against, and none is given.
 """
 
 from __future__ import annotations
