@@ -2,7 +2,9 @@
 stays, every sensor that returns is used again, the recording is complete, and the page's frames are young.
 
 The car is a process of its own on loopback. Here run the readers, the line with its network and lane detector, the
-encoder of the page's frames, and the recorder. The short form judges what does not depend on how busy the machine is.
+encoder of the page's frames, and the recorder. The short form runs what comes with the program and judges what does not
+depend on how busy the machine is. The long form runs the network for real roads where it is here, on two cores; the
+report says which.
 """
 
 from __future__ import annotations
@@ -14,6 +16,8 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -27,15 +31,18 @@ from app.encode import Encoder
 from app.engine import Engine
 from app.recording import RecordingDesk
 from app.snapshot import Snapshot
+from pipeline.data import data_dir
 from pipeline.params import Params
+from pipeline.path.lane_classical import NAME as CLASSICAL
+from pipeline.path.lane_detector import LaneDetector, usual_every
 from pipeline.recording.session import SessionSource
 from pipeline.recording.tick import tick_from
 from pipeline.recording.topics import FRAMES, IMAGE, POINTS
 from pipeline.replay.faults import Fault
-from pipeline.run import lanes_for
+from pipeline.run import detector_for, lanes_for
 from pipeline.sources import open_any
+from pipeline.sources.base import AnySource
 from pipeline.types import Frame
-from pipeline.vision.detector import open_detector
 from pipeline.vision.models import EMBEDDED
 from tests.conftest import ROOT
 from tests.pipeline.sources.live.rig import loopback_config
@@ -45,14 +52,53 @@ KINDS = (
     ("lidar", "silence"), ("camera", "disconnect"), ("gnss", "silence"), ("lidar", "garbage"), ("camera", "silence"),
     ("lidar", "clock_jump"), ("camera", "garbage"), ("gnss", "clock_jump"), ("lidar", "out_of_order"),
     ("camera", "clock_jump"), ("gnss", "garbage"), ("lidar", "duplicate"), ("camera", "out_of_order"),
-    ("gnss", "duplicate"), ("camera", "duplicate"),
+    ("gnss", "duplicate"), ("camera", "duplicate"), ("gnss", "out_of_order"), ("gnss", "disconnect"),
 )  # fmt: skip
+"""Every fault of a replayed sensor; over UDP a receiver that is unplugged is one that is silent. What else can befall
+sensors is tested on a bench whose clock the tests move: own motion over CAN that stops or is damaged in
+``test_own_motion.py``, PPS and GPS time against the host's in ``test_clock.py``, a camera of 60 Hz against a LiDAR of
+10 in ``test_faults.py``, receivers over TCP and serial lines in ``test_loopback.py``."""
 FIRST_S, EVERY_S, LASTS_S = 6.0, 1.4, 1.2
 QUIET_S = 4.0
 PAGE = os.sysconf("SC_PAGE_SIZE")
 ALLOWED_SHARE, ALLOWED_BYTES = 0.02, 8e6
+"""Of growth, in ten minutes; in half a minute, which has hardly a warm-up."""
+CORES = 2
 P99_MS, RECOVERY_S = 150.0, 1.0
 PATIENCE_S = 120.0
+
+
+@dataclass(frozen=True)
+class Networks:
+    """Names or files, as the program takes them."""
+
+    detector: str
+    lanes: str
+
+
+OURS = Networks(EMBEDDED, CLASSICAL)
+
+
+def for_real_roads(lanes: str = OURS.lanes) -> Networks:
+    """The setting for real roads and two cores, YOLOX-nano and lanes without a network, where its file is here, else
+    what comes with the program. lanes: a file of ``models``. With TwinLiteNet, which takes both cores for 90 ms, every
+    third result is 180 ms old: it needs more cores."""
+    detector, network = data_dir() / "models" / "yolox_nano.onnx", data_dir() / "models" / lanes
+    return Networks(
+        str(detector) if detector.exists() else OURS.detector, str(network) if network.exists() else OURS.lanes
+    )
+
+
+@contextmanager
+def on_two_cores() -> Iterator[list[int]]:
+    """This thread and those that it starts. Gives the cores that are left for others, the same two where there are no
+    more."""
+    here = sorted(os.sched_getaffinity(0))
+    os.sched_setaffinity(0, here[:CORES])
+    try:
+        yield here[CORES:] or here
+    finally:
+        os.sched_setaffinity(0, here)
 
 
 def faults_for(seconds: float) -> list[Fault]:
@@ -154,19 +200,31 @@ def config_file(folder: Path) -> Path:
     return path
 
 
-def soak(folder: Path, seconds: float) -> dict[str, Any]:
+def soak(folder: Path, seconds: float, networks: Networks = OURS) -> dict[str, Any]:
     """Run it and measure."""
+    with on_two_cores() as others:
+        return _soak(folder, seconds, networks, others)
+
+
+def _soak(folder: Path, seconds: float, networks: Networks, others: list[int]) -> dict[str, Any]:
     faults, config = faults_for(seconds), config_file(folder)
     faults_path = folder / "faults.yaml"
     faults_path.write_text(yaml.safe_dump([fault.model_dump() for fault in faults]), encoding="utf-8")
     watcher, desk = Watcher(), RecordingDesk(folder)
+    lanes_every: list[int] = []
+
+    def open_lanes(source: AnySource) -> LaneDetector | None:
+        lanes = lanes_for(source, networks.lanes)
+        lanes_every.append(usual_every(lanes, source.rate_hz))
+        return lanes
+
     engine = Engine(
         open_any,
-        lambda source: open_detector(EMBEDDED, (1280, 720)),
+        lambda source: detector_for(source, networks.detector),
         Params(),
         uri=f"live:{config}",
         playing=True,
-        open_lanes=lambda source: lanes_for(source, "classical"),
+        open_lanes=open_lanes,
         desk=desk,
     )
     engine.listen(watcher)
@@ -174,6 +232,7 @@ def soak(folder: Path, seconds: float) -> dict[str, Any]:
     engine.wait_for(lambda s: s.live, PATIENCE_S)
     command = [sys.executable, "-m", "tests.soak.live_car", str(config), str(seconds), str(faults_path)]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as car:
+        os.sched_setaffinity(car.pid, others)
         watcher.start_ns = int(_line(car.stdout))
         engine.wait_for(lambda s: s.tick is not None, PATIENCE_S)
         desk.start(engine.source)
@@ -188,7 +247,14 @@ def soak(folder: Path, seconds: float) -> dict[str, Any]:
     state = desk.stop()
     engine.stop()
     assert state is not None
-    return _report(seconds, faults, watcher, memory, cpu_s, told, dropped, state)
+    ran_with = {
+        "detector": Path(networks.detector).name,
+        "lanes": Path(networks.lanes).name,
+        "lanes_every": lanes_every[0],
+        "cores": min(CORES, len(os.sched_getaffinity(0))),
+        "car_on_the_same_cores": set(others) <= os.sched_getaffinity(0),
+    }
+    return ran_with | _report(seconds, faults, watcher, memory, cpu_s, told, dropped, state)
 
 
 def _report(
@@ -232,7 +298,7 @@ def _report(
         "recoveries": recoveries,
         "resident_MB": round(resident / 1e6, 1),
         "grown_MB": round(grown / 1e6, 2),
-        "cores": round(cpu_s / seconds, 2),
+        "cores_used": round(cpu_s / seconds, 2),
         "recording": {
             "frames": state.frames,
             "pictures": pictures,
@@ -290,7 +356,6 @@ def judge(report: dict[str, Any]) -> None:
     assert recording["read_back"] == recording["frames"] > 0
     assert recording["pictures"] > 1.2 * recording["frames"], "thirty a second came, ten a second tick"
     assert recording["sweeps"] >= recording["sweeps_taken"], "of ticks that were dropped, too"
-    assert report["grown_MB"] * 1e6 < max(ALLOWED_SHARE * report["resident_MB"] * 1e6, ALLOWED_BYTES)
     assert report["right_leads"] > 0.5, "a busy machine misses sweeps, and a lead needs three in a row"
 
 
@@ -300,16 +365,19 @@ def test_half_a_minute_with_every_fault(tmp_path: Path) -> None:
     print(json.dumps({name: value for name, value in report.items() if name != "recoveries"}))
     assert {(each["sensor"], each["kind"]) for each in report["recoveries"]} >= set(KINDS[:14])
     judge(report)
+    assert report["grown_MB"] * 1e6 < ALLOWED_BYTES
 
 
 @pytest.mark.soak
 @pytest.mark.timeout(1200)
 def test_ten_minutes_with_every_fault(tmp_path: Path) -> None:
-    report = soak(tmp_path, 600.0)
+    report = soak(tmp_path, 600.0, for_real_roads())
     (ROOT / "build").mkdir(exist_ok=True)
     (ROOT / "build" / "soak_live.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     print(json.dumps({name: value for name, value in report.items() if name != "recoveries"}))
     judge(report)
+    assert {(each["sensor"], each["kind"]) for each in report["recoveries"]} == set(KINDS)
+    assert report["grown_MB"] < ALLOWED_SHARE * report["resident_MB"]
     assert report["right_leads"] > 0.95
     assert report["slowest_recovery_s"] <= RECOVERY_S
     assert report["stages"]["sensor to result"]["p99_ms"] < P99_MS
