@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from app.snapshot import Notice
 from pipeline.path.lane_detector import usual_every
-from pipeline.run import Detectors, Detects, Sensors, picture_size
+from pipeline.run import Detectors, Detects, Sensors, brings_detections, picture_size
 from pipeline.sources.base import AnySource, is_simulated
 from pipeline.types import RawBoxes, RawLanes
 from pipeline.vision.runtime import DetectorError, DetectorMissing
@@ -35,7 +35,10 @@ class DetectorPool:
         self._opened: dict[tuple[bool, tuple[int, int] | None], Detects[RawBoxes]] = {}
 
     def both_for(self, source: AnySource, notices: list[Notice]) -> Detectors:
-        """What looks at the source's pictures; what is missing is null, and a notice says so."""
+        """What looks at the source's pictures; what is missing is null, and a notice says so. Nothing where detections
+        come with them."""
+        if brings_detections(source):
+            return Detectors()
         lanes = self.lanes_for(source, notices)
         return Detectors(
             self.boxes_for(source, notices), lanes, self._lanes_every or usual_every(lanes, source.rate_hz)

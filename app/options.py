@@ -14,7 +14,7 @@ from app.progress import opened_recording
 from pipeline.errors import BadInput
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
 from pipeline.path.lane_detector import usual_every
-from pipeline.run import Detectors, Sensors, detector_for, lanes_for
+from pipeline.run import Detectors, Sensors, brings_detections, detector_for, lanes_for
 from pipeline.sources import is_live, open_live
 from pipeline.sources.along_route import along_route
 from pipeline.sources.base import AnySource, LiveSource, Source
@@ -108,9 +108,10 @@ class LineOptions:
         return self.lanes_every
 
     def open_detectors(self, source: AnySource, sensors: Sensors = "both") -> Detectors:
-        """Everything that looks at the source's pictures, with what there is to say about it. None for LiDAR alone."""
+        """Everything that looks at the source's pictures, with what there is to say about it. None for LiDAR alone, and
+        where detections come with them."""
         every = self.every()
-        if sensors == "lidar":
+        if sensors == "lidar" or brings_detections(source):
             return Detectors()
         lanes = lanes_for(source, self.lanes)
         for note in lanes.notes if lanes is not None else ():

@@ -96,6 +96,11 @@ def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None
     return open_lanes(spec, camera, is_simulated(source))
 
 
+def brings_detections(source: AnySource) -> bool:
+    """Whether what is seen in a recording's pictures comes with them, so that nothing has to look."""
+    return not is_live_source(source) and cast("Source", source).frame(0).detections_given
+
+
 def picture_size(source: AnySource) -> tuple[int, int] | None:
     """(width, height) of the source's pictures, from its first frame, of live ones from the calibration; null without
     picture and calibration."""

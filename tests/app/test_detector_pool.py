@@ -14,6 +14,9 @@ from pipeline.path.lane_classical import open_classical
 from pipeline.path.lane_detector import usual_every
 from pipeline.path.lane_network import open_lane_network
 from pipeline.run import Detectors
+from pipeline.simulation import scenario
+from pipeline.simulation.replay import to_yaml
+from pipeline.sources import open_source
 from pipeline.vision.runtime import DetectorMissing
 from tests.app.recording import CountingDetector, Recording
 from tests.pipeline.path import lane_networks
@@ -46,6 +49,19 @@ def test_a_missing_lane_network_is_said_and_boxes_go_on() -> None:
 def test_lidar_alone_opens_no_detector() -> None:
     detectors, notices = both(lambda _: open_classical(None), "lidar")
     assert (detectors.boxes, detectors.lanes, notices) == (None, None, [])
+
+
+def test_nothing_is_opened_for_a_drive_that_brings_its_detections(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "kept.yaml"
+    scene = scenario.load("straight").model_copy(update={"sensors": "lidar"})
+    file.write_text(to_yaml(scene), encoding="utf-8")
+    source = open_source(f"sim:{file}")
+    notices: list[Notice] = []
+    pool = DetectorPool(lambda _: pytest.fail("opened"), "both", lambda _: pytest.fail("opened"))
+    assert pool.both_for(source, notices) == LineOptions().open_detectors(source) == Detectors()
+    assert (notices, capsys.readouterr().err) == ([], "")
 
 
 def test_a_network_looks_less_often_unless_told_otherwise(tmp_path: Path) -> None:
