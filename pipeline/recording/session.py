@@ -60,6 +60,16 @@ class SessionSource:
         return int(self._log_ns[self._checked(index)])
 
     def frame(self, index: int) -> Frame:
+        return self._frame(index, is_whole=True)
+
+    def outline(self, index: int) -> Frame:
+        return self._frame(index, is_whole=False)
+
+    def sweep(self, index: int) -> Sweep | None:
+        tick = self._read_tick(index, [])
+        return _or_note(lambda: self._sweep(tick, self.log_time_ns(index)), []) if tick is not None else None
+
+    def _frame(self, index: int, is_whole: bool) -> Frame:
         notes: list[str] = []
         tick = self._read_tick(index, notes)
         if tick is None:
@@ -68,13 +78,13 @@ class SessionSource:
             index,
             tick.name,
             tick.t_ns,
-            _or_note(lambda: self._sweep(tick, self.log_time_ns(index)), notes),
-            _or_note(lambda: self._read_picture(tick.picture), notes),
+            _or_note(lambda: self._sweep(tick, self.log_time_ns(index)), notes) if is_whole else None,
+            _or_note(lambda: self._read_picture(tick.picture), notes) if is_whole else None,
             _or_note(lambda: _camera(tick), notes),
             tick.ego,
             notes=(*tick.notes, *notes),
             gnss=tick.gnss,
-            route=_or_note(lambda: self._read_route(tick.route_at_ns), notes),
+            route=_or_note(lambda: self._read_route(tick.route_at_ns), notes) if is_whole else None,
             streams=tick.streams,
             timing_ms=tick.timing_ms,
         )

@@ -81,6 +81,16 @@ class AstyxSource:
         picture = picture_of(self._pictures.get(name), None, self._size, notes)
         return Frame(index, name, tick, sweep, picture, camera, notes=tuple(notes))
 
+    def outline(self, index: int) -> Frame:
+        name, notes = self._names[_checked(index, len(self))], list[str]()
+        _, camera = self._calibration_of(name, notes)
+        return Frame(index, name, self.t_ns(index), camera=camera, notes=tuple(notes))
+
+    def sweep(self, index: int) -> Sweep | None:
+        name, tick = self._names[_checked(index, len(self))], self.t_ns(index)
+        T_ego_lidar, _ = self._calibration_of(name, [])
+        return self._sweep(name, tick, T_ego_lidar, [])
+
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
         path = self._labels.get(self._names[_checked(index, len(self))])
         if path is None:

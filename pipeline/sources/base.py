@@ -152,6 +152,19 @@ class Rectified(Protocol):
         ...
 
 
+@runtime_checkable
+class InParts(Protocol):
+    """A source whose frames can be had in parts: who needs one part does not pay for all."""
+
+    def outline(self, index: int) -> Frame:
+        """``frame`` without sweep, picture and route, which are not read, and without what reading them would note."""
+        ...
+
+    def sweep(self, index: int) -> Sweep | None:
+        """The frame's alone."""
+        ...
+
+
 AnySource = Source | LiveSource
 
 

@@ -77,6 +77,15 @@ class KittiSource:
         ego, gnss = self._own_motion(name, tick, notes)
         return Frame(index, name, tick, sweep, picture, calibration.camera, ego, notes=tuple(notes), gnss=gnss)
 
+    def outline(self, index: int) -> Frame:
+        name, tick, notes = self._name(index), self.t_ns(index), list[str]()
+        calibration = self._calibration_of(name, notes)
+        ego, gnss = self._own_motion(name, tick, notes)
+        return Frame(index, name, tick, camera=calibration.camera, ego=ego, notes=tuple(notes), gnss=gnss)
+
+    def sweep(self, index: int) -> Sweep | None:
+        return self._sweep(self._name(index), self.t_ns(index), [])
+
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
         name = self._name(index)
         path = self._files.labels.get(name)

@@ -13,7 +13,7 @@ from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid, corners_of
 from pipeline.labels.formats.parts import Part
 from pipeline.labels.model import LabelSet, Origin
-from pipeline.sources.base import Rectified, Source
+from pipeline.sources.base import InParts, Rectified, Source
 from pipeline.types import F32, F64, Box, CameraCalibration, EgoState, Frame
 
 FormatName = Literal["native", "mcap", "openlabel", "kitti", "kitti-tracking", "nuscenes", "coco", "csv"]
@@ -73,15 +73,14 @@ def drive_of(
     progress: Callable[[int, int], None] = lambda done, total: None,
     frame_of: Callable[[int], Frame] | None = None,
 ) -> Drive:
-    """Reads every frame of a recording once. frame_of: who has them already; a picture's pixels are not asked for."""
+    """What is known of every frame, without points and pictures where the source can tell it so. frame_of: who may
+    have whole frames already; a picture's pixels are not asked for."""
     read = frame_of or source.frame
     shots = []
     for index in range(len(source)):
-        frame = read(index)
-        camera, picture = frame.camera, frame.picture
-        size = (camera.width, camera.height) if camera is not None else None
-        if picture is not None:
-            size = picture.bgr.shape[1], picture.bgr.shape[0]
+        frame = source.outline(index) if isinstance(source, InParts) else read(index)
+        camera = frame.camera
+        size = (camera.width, camera.height) if camera is not None else _size(read(index))
         T_rect_ego = source.T_rect_ego(index) if isinstance(source, Rectified) else None
         if T_rect_ego is None and camera is not None:
             T_rect_ego = camera.T_camera_ego
@@ -89,10 +88,15 @@ def drive_of(
         progress(index + 1, len(source))
 
     def points(index: int) -> F32 | None:
-        sweep = read(index).sweep
+        sweep = source.sweep(index) if isinstance(source, InParts) else read(index).sweep
         return sweep.points if sweep is not None else None
 
     return Drive(source.uri, tuple(shots), points)
+
+
+def _size(frame: Frame) -> tuple[int, int] | None:
+    """Of the picture, where no calibration tells it."""
+    return (frame.picture.bgr.shape[1], frame.picture.bgr.shape[0]) if frame.picture is not None else None
 
 
 @dataclass(frozen=True)

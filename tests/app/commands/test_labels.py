@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from app.cli import main
+from pipeline.labels.formats.base import FormatName
+from pipeline.recording import session
 from tests.pipeline.recording.frames import full, write
 
 
@@ -38,6 +41,26 @@ def test_truth_goes_out_and_comes_back(drive: Path, tmp_path: Path, capsys: pyte
     assert [track["id"] for track in labels["labels"]["tracks"]] == [7]
     assert cipv("labels", "export", drive, "--labels", file, "--format", "csv", "--out", tmp_path / "lead.csv") == 0
     assert "cipv: 1 track not written: no place for them" in capsys.readouterr().err
+
+
+READ: dict[FormatName, tuple[int, int]] = {
+    # sweeps and pictures that are decoded of a drive of three frames
+    "native": (0, 0), "csv": (0, 0), "openlabel": (0, 0), "coco": (0, 0), "kitti": (0, 0), "kitti-tracking": (0, 0),
+    "nuscenes": (3, 0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", READ)
+def test_what_a_format_does_not_need_is_not_read(
+    name: FormatName, drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    labels = tmp_path / "labels.json"
+    assert cipv("labels", "export", drive, "--format", "native", "--out", labels) == 0
+    sweeps, pictures = Mock(wraps=session.sweep_from), Mock(wraps=session.picture_from)
+    monkeypatch.setattr(session, "sweep_from", sweeps)
+    monkeypatch.setattr(session, "picture_from", pictures)
+    assert cipv("labels", "export", drive, "--labels", labels, "--format", name, "--out", tmp_path / "out") == 0
+    assert (sweeps.call_count, pictures.call_count) == READ[name]
 
 
 def test_the_same_recording_gives_the_same_file(drive: Path, tmp_path: Path) -> None:
@@ -72,7 +95,7 @@ def test_the_database_comes_before_the_truth_and_a_file_before_both(
 
 def test_what_the_pipeline_saw_is_proposed(drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cipv("labels", "propose", drive, "--lanes", "off") == 0
-    assert "tracks in frames 0–2" in capsys.readouterr().err
+    assert "tracks in frames 1–3" in capsys.readouterr().err
     assert cipv("labels", "export", drive, "--format", "native", "--out", tmp_path / "a") == 0
     labels = json.loads((tmp_path / "a").read_text())["labels"]
     assert {each["state"] for each in (*labels["tracks"], *labels["leads"])} == {"proposed"}
