@@ -25,6 +25,7 @@ from pipeline.geometry import Cuboid, closest_on_polygon
 from pipeline.labels.formats.native import from_json
 from pipeline.params import Params
 from pipeline.run import detector_for
+from pipeline.sizes import largest_size_m
 from pipeline.sources import open_source
 from pipeline.sources.base import TruthObject
 from tests.browser.conftest import OpenPage, Site
@@ -182,6 +183,11 @@ def from_proposals(hand: Hand, labels: Labels, truth: list[Cuboid]) -> tuple[int
     labels.wait_for(lambda now: len(now.leads) > 0)
     lead = labels.leads[0][2]
     assert isinstance(lead, int)
+    held = labels.get(f"/frames?first=0&last={COUNT - 1}")["sightings"].values()
+    called = {number: track["label"] for number, track in labels.tracks.items()}
+    for row in (row for rows in held for row in rows if row["cuboid"] is not None):
+        largest = largest_size_m(called[row["track"]])
+        assert all(np.less_equal(row["cuboid"]["size"], largest)), "a hedge is no car"
     as_proposed = errors_m(labels, lead, truth)
     proposed = labels.cuboid(lead, 0)
     row = page.locator(f".track-row[data-id='{lead}']")
