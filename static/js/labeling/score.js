@@ -52,11 +52,11 @@ const ERRORS = /** @type {const} */ (["distance", "lateral", "longitudinal", "sp
 
 /** The paper's Table 4: of each error the mean size, below it the smallest and the largest. @param {import("./types.js").ScoreErrors[]} rows */
 function errorsTable(rows) {
-  const head = ["vehicles", "seen by", "n", "distance", "lateral", "longit.", "speed"].map((words) => el("th", { scope: "col", textContent: words }));
-  const body = rows.map((row) => el("tr", { data: { vehicles: row.vehicles, seen: row.seen_by } }, el("th", { scope: "row", textContent: row.seen_by === "any" ? row.vehicles : "" }),
-    el("td", { textContent: row.seen_by }), el("td", { textContent: `${row.count}` }), ...ERRORS.map((name) => sizes(row[name]))));
+  const head = ["", "n", "distance", "lateral", "longit.", "speed"].map((words) => el("th", { scope: "col", textContent: words }));
+  const body = rows.map((row) => el("tr", { data: { vehicles: row.vehicles, seen: row.seen_by } }, el("th", { scope: "row", textContent: row.seen_by === "any" ? row.vehicles : row.seen_by }),
+    el("td", { textContent: `${row.count}` }), ...ERRORS.map((name) => sizes(row[name]))));
   return el("section", {}, el("h3", { textContent: "Errors by distance and by sensor" }), el("table", { class: "metrics errors" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...body)),
-    el("p", { class: "facts", textContent: "Mean size of the error in m, of speed in m/s; below it the smallest to the largest. Distance: to the nearest point. Lateral, longitudinal: of the nearest face's middle." }));
+    el("p", { class: "facts", textContent: "Of each range all vehicles, then those seen by both sensors (VL), by camera (V) or by LiDAR (L) alone. Mean size of the error in m, of speed in m/s; below it the smallest to the largest. Distance: to the nearest point. Lateral, longitudinal: of the nearest face's middle." }));
 }
 
 /** @param {import("./types.js").Sizes|null} found */
