@@ -37,9 +37,12 @@ def track_of(draft: Draft, number: int, revision: int | None = None) -> LabelTra
     return cast("LabelTrack", draft.get("track", number, revision).value)
 
 
-def corrected(draft: Draft, track: LabelTrack) -> None:
-    """A person changed it: no proposal any more, who says so is that person, and nobody has reviewed that."""
-    draft.put("track", track.id, replace(track, state="corrected", origin=by_person(draft), reviewer=""))
+def corrected(draft: Draft, track: LabelTrack, *, placed: bool = False) -> None:
+    """A person changed it: no proposal any more, who says so is that person, and nobody has reviewed that. placed: it
+    was put somewhere by hand. Until then, where it was only pointed at, what was measured stays what it is worth."""
+    how = "" if placed else track.origin.how
+    state = track.state if how else "corrected"
+    draft.put("track", track.id, replace(track, state=state, origin=by_person(draft, how), reviewer=""))
 
 
 def stated(item: Item) -> Stated:

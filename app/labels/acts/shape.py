@@ -20,8 +20,9 @@ def set_sighting(draft: Draft, scope: Scope, act: SetSighting) -> str:
     old, new = draft.sightings(track.id), act.sighting()
     after = interpolate.put_keyframe(old, new, scope.t_ns, interpolate=act.interpolate)
     _put(draft, track.id, old, after)
-    corrected(draft, track)
-    return f"{_verb(old.get(act.frame), new)} #{track.id} in {frames_text(act.frame)}"
+    before = old.get(act.frame)
+    corrected(draft, track, placed=before is None or before.cuboid != new.cuboid)
+    return f"{_verb(before, new)} #{track.id} in {frames_text(act.frame)}"
 
 
 def drop_keyframe(draft: Draft, scope: Scope, act: DropKeyframe) -> str:

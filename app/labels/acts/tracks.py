@@ -48,7 +48,7 @@ def split(draft: Draft, scope: Scope, act: Split) -> str:
         raise ActRefused(f"#{track.id} cannot be split at {frames_text(act.frame)}: it is on one side of it only")
     number = draft.next_number("track")
     corrected(draft, track)
-    draft.add("track", replace(track, id=number, state="corrected", origin=by_person(draft), comment="", reviewer=""))
+    draft.add("track", replace(track_of(draft, track.id), id=number, comment=""))
     draft.put_sightings(track.id, dict.fromkeys(later))
     draft.put_sightings(number, later)
     _rename_from(draft, track.id, number, act.frame)

@@ -157,6 +157,11 @@ def test_the_cuboid_is_laid_on_the_points_and_a_car_lifted_out_of_the_picture(
     far = act(client, kind="lift", frame=10, bbox=[20, 85, 40, 97], label="car").json()
     estimated = next(each for each in labels(client)["tracks"] if each["id"] != track["id"])
     assert "by its height in the picture" in estimated["origin"]["how"] == far["note"]
+    act(client, kind="relabel", track=estimated["id"], revision=estimated["revision"], label="truck")
+    (estimated,) = (each for each in labels(client)["tracks"] if each["id"] == estimated["id"])
+    assert (estimated["state"], estimated["label"], estimated["origin"]["how"]) == ("proposed", "truck", far["note"]), (
+        "another class does not make the distance true"
+    )
     act(client, kind="accept", items=[ref(estimated)])
     (accepted,) = (each for each in labels(client)["tracks"] if each["id"] == estimated["id"])
     assert (accepted["state"], accepted["origin"]["how"]) == ("accepted", far["note"]), "still an estimate"
