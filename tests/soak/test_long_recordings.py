@@ -13,6 +13,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 ALLOWED_MB = 150.0
 """What opening and reading may add; the files are 70 and 16 times as large."""
+ALLOWED_CPU_S_PER_GB, ALLOWED_SEEK_CPU_MS = 12.0, 50.0
+"""Twice what it takes; CPU time, which another program on the machine does not change much."""
 ROUNDS = {"pcap": 5_600, "rosbag": 250}  # of 20 sweeps, and of 3
 
 
@@ -30,10 +32,12 @@ def test_longer_than_memory(kind: str, tmp_path: Path) -> None:
     (ROOT / "build" / f"long_{kind}.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
     assert report["GB"] > {"pcap": 10.0, "rosbag": 2.0}[kind]
     assert report["grown_MB"] < ALLOWED_MB
+    assert report["open_cpu_s"] < ALLOWED_CPU_S_PER_GB * report["GB"]
+    assert report["seek_cpu_ms_median"] < ALLOWED_SEEK_CPU_MS
 
 
 def _main(kind: str, folder: Path, rounds: int) -> dict[str, float]:
-    from time import perf_counter
+    from time import perf_counter, process_time
 
     import numpy as np
 
@@ -55,15 +59,16 @@ def _main(kind: str, folder: Path, rounds: int) -> dict[str, float]:
             bags.write_long_bag(path, 3 * rounds)
             sweeps, size = 3 * rounds, sum(file.stat().st_size for file in path.iterdir())
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        begun = perf_counter()
+        begun, spent = perf_counter(), process_time()
         source = open_source(f"{kind}:{path}")
-        opened_s = perf_counter() - begun
+        opened_s, opened_cpu_s = perf_counter() - begun, process_time() - spent
         assert len(source) == sweeps
-        seeks = []
+        seeks, seeks_cpu = [], []
         for index in np.random.default_rng(0).integers(sweeps, size=50):
-            begun = perf_counter()
+            begun, spent = perf_counter(), process_time()
             assert source.frame(int(index)).sweep is not None
             seeks.append((perf_counter() - begun) * 1e3)
+            seeks_cpu.append((process_time() - spent) * 1e3)
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     finally:
         for file in path.iterdir() if path.is_dir() else [path]:
@@ -72,6 +77,8 @@ def _main(kind: str, folder: Path, rounds: int) -> dict[str, float]:
         "GB": round(size / 1e9, 2),
         "sweeps": sweeps,
         "open_s": round(opened_s, 1),
+        "open_cpu_s": round(opened_cpu_s, 1),
+        "seek_cpu_ms_median": round(float(np.median(seeks_cpu)), 1),
         "seek_ms_median": round(float(np.median(seeks)), 1),
         "seek_ms_max": round(max(seeks), 1),
         "grown_MB": round(grown / 1e3, 1),
