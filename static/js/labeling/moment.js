@@ -36,17 +36,20 @@ function tag(event) {
 
 /** @typedef {{key: string, frame: number, words: string, drop: () => unknown}} Row */
 
+/** What a second person has said of it. @param {{comment: string, reviewer: string}} label */
+const reviewWords = ({ comment, reviewer }) => (comment ? `, sent back: ${comment}` : reviewer ? `, reviewed by ${reviewer}` : "");
+
 function show() {
   const labels = get("labels"), here = shown();
   if (!labels || !get("labeling")?.on) return;
   const path = labels.paths.find(({ frame, state }) => frame === here && state !== "rejected");
   noPath.hidden = !path;
-  text(pathWords, path ? `path ${path.state}` : "");
+  text(pathWords, path ? `path ${path.state}${reviewWords(path)}` : "");
   /** @type {Row[]} */
   const rows = [
     ...labels.tags.filter(({ frame }) => frame === here).map((each) => ({ key: `tag ${each.id}`, frame: here, words: each.tag, drop: () => tagFrame(each.tag, false) })),
     ...labels.events.filter(({ state }) => state !== "rejected").map((each) => ({
-      key: `event ${each.id}`, frame: each.frame, words: `${each.kind.replace("_", "-")} ${each.tracks.map((id) => `#${id}`).join(" ")} · frame ${each.frame + 1}`,
+      key: `event ${each.id}`, frame: each.frame, words: `${each.kind.replace("_", "-")} ${each.tracks.map((id) => `#${id}`).join(" ")} · frame ${each.frame + 1}${reviewWords(each)}`,
       drop: () => act({ kind: "remove", items: [{ kind: "event", id: each.id, revision: each.revision }] }),
     })),
   ];

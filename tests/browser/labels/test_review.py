@@ -44,3 +44,15 @@ def test_labels_and_who_leads_are_found_right_or_sent_back_one_after_the_other(h
     expect(page.locator(f".track-row[data-id='{made}'] .mark")).to_have_text("✓✓")
     hand.keys("Shift+R")
     expect(page.locator(".reviewing")).to_be_hidden()
+
+
+def test_an_event_is_reviewed_and_says_by_whom(hand: Hand, labels: Labels):
+    page = hand.page
+    labels.act("Bob", {"kind": "add_event", "frame": START, "event": "cut_in", "tracks": []})
+    page.get_by_role("tab", name="Frame").click()
+    hand.keys("Shift+R")
+    expect(page.locator(".reviewing .under")).to_have_text(f"cut-in in frame {START + 1}")
+    page.get_by_role("button", name="Right", exact=True).click()
+    expect(page.locator(".moment-row")).to_contain_text("reviewed by Ada")
+    hand.keys("Escape")
+    expect(page.locator(".reviewing")).to_be_hidden()
