@@ -87,6 +87,7 @@ class SessionSource:
             route=_or_note(lambda: self._read_route(tick.route_at_ns), notes) if is_whole else None,
             streams=tick.streams,
             timing_ms=tick.timing_ms,
+            **_given(tick, notes),
         )
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
@@ -227,6 +228,18 @@ def _params_from(data: bytes) -> Params:
 
 def _camera(tick: Tick) -> CameraCalibration | None:
     return tick.camera.calibration() if tick.camera is not None else None
+
+
+def _given(tick: Tick, notes: list[str]) -> dict[str, Any]:
+    """The fields of a frame that brings its detections."""
+    if tick.given is None:
+        return {}
+    boxes, lanes = tick.given.boxes, tick.given.lanes
+    return {
+        "raw_boxes": _or_note(boxes.raw, notes) if boxes is not None else None,
+        "raw_lanes": _or_note(lanes.raw, notes) if lanes is not None else None,
+        "detections_given": True,
+    }
 
 
 def _or_note(read: Callable[[], _T], notes: list[str]) -> _T | None:

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
 from pipeline.recording import topics
+from pipeline.recording.detections import Given
 from pipeline.recording.messages import Damaged
 from pipeline.sources.base import SourceError, TruthObject
 from pipeline.sources.files import camera_matrix, rigid_transform
@@ -97,7 +98,7 @@ R = TypeVar("R", SweepRef | None, PictureRef | None, CameraRecord | None)
 @dataclass(frozen=True)
 class Tick:
     """One frame of a session, as in ``Frame``. params_at_ns: where ``/params`` has what it was run with, null when a
-    session holds inputs alone. truth: its labels, null where nobody labelled it."""
+    session holds inputs alone. truth: its labels, null where nobody labelled it. given: detections it came with."""
 
     name: str
     t_ns: Nanoseconds
@@ -113,6 +114,7 @@ class Tick:
     route_at_ns: Nanoseconds | None = None
     params_at_ns: Nanoseconds | None = None
     truth: tuple[TruthObject, ...] | None = None
+    given: Given | None = None
 
     def references(self) -> dict[str, int]:
         """Topic → log time of every message that this tick needs besides its own."""

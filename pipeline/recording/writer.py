@@ -14,6 +14,7 @@ from pipeline.params import Params
 from pipeline.recording import topics
 from pipeline.recording.came import Came
 from pipeline.recording.clock import SessionClock
+from pipeline.recording.detections import given_of
 from pipeline.recording.messages import (
     calibration_message,
     image_message,
@@ -158,6 +159,7 @@ class SessionWriter:
             route_at_ns=self._put_route(frame.route, at_ns),
             params_at_ns=self._put_params(params, at_ns),
             truth=truth,
+            given=given_of(frame),
         )
         self._put_small(frame, at_ns)
         if result is not None:

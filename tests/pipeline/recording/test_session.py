@@ -17,7 +17,18 @@ from pipeline.recording.session import SessionSource
 from pipeline.recording.writer import VERSION, About, SessionWriter
 from pipeline.sources import SourceError, open_source
 from pipeline.sources.base import is_simulated
-from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Route, Sweep
+from pipeline.types import (
+    REAL_VEHICLES,
+    CameraCalibration,
+    EgoState,
+    Frame,
+    GnssFix,
+    Picture,
+    RawBoxes,
+    RawLanes,
+    Route,
+    Sweep,
+)
 from tests.pipeline.recording.frames import ABOUT, CAMERA, PERIOD_NS, TRUTH, full, picture, same, sweep, write
 
 
@@ -48,6 +59,21 @@ FRAMES: dict[str, Frame] = {
     "a rotation that is one only nearly": replace(full(0), camera=loose_rotation()),
     "own motion without yaw rate": replace(full(0), ego=EgoState(1, 0.1 + 0.2)),
     "a fix that stands": replace(full(0), gnss=GnssFix(1, -33.3, 151.2, -1.5, None, 0.0, "single", 4.0)),
+    "detections that it brings": replace(
+        full(0),
+        detections_given=True,
+        raw_boxes=RawBoxes(
+            "truth",
+            np.array([[1.1, 2.2, 3.3, 4.4]], np.float32),
+            np.array([0.7], np.float32),
+            ("car",),
+            replace(REAL_VEHICLES, coefficient=1300.1),
+        ),
+        raw_lanes=RawLanes(
+            "truth", np.array([[0.1, 5.5]], np.float32), np.array([1.0], np.float32), np.array([-1], np.int32)
+        ),
+    ),
+    "a drive that nobody looks at": replace(full(0), detections_given=True),
     "words of any kind": replace(full(0), name='été/"1"\n', notes=("größer als 5 °", "")),
 }
 
@@ -63,7 +89,8 @@ def test_a_frame_comes_back_to_the_last_bit(frame: Frame, tmp_path: Path) -> Non
 def test_every_field_is_written() -> None:
     """A field that someone adds must be written too; then this list grows."""
     known = {
-        Frame: "index name t_ns sweep picture camera ego raw_boxes notes gnss raw_lanes route streams timing_ms",
+        Frame: "index name t_ns sweep picture camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
+        "detections_given",
         Sweep: "t_ns points ring channels time_s",
         Picture: "t_ns bgr encoded",
         CameraCalibration: "K distortion T_camera_ego width height road_z_m",
