@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.evaluation.experiments.sections import (
+    GIVEN_SAID,
     AnyCell,
     Chart,
     Driven,
@@ -273,6 +274,7 @@ def report(cases: Sequence[Case], runs: Sequence[list[Frame]]) -> Section:
             f"confirmation asks ({CipvParams().confirm_hits}), and is not chosen yet. Such frames are not among those "
             "counted, nor are those in which it is hidden or at the edge of the path. The path is the route's, as the "
             "paper's was a map's, placed by simulated RTK GNSS, fused with the yaw rate.",
+            GIVEN_SAID,
             *(_verdict(scene, groups) for scene in scenes),
         ),
         (

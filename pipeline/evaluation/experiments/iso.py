@@ -13,6 +13,7 @@ from math import sqrt
 from typing import Any, Literal, NamedTuple
 
 from pipeline.evaluation.experiments.sections import (
+    GIVEN_SAID,
     AnyCell,
     Chart,
     Coloured,
@@ -241,6 +242,7 @@ def report(cases: Sequence[Case], outcomes: Sequence[Outcome]) -> Section:
             f"{100 * _KEPT:.0f} % of the frames, time gap never under {SMALLEST_TIME_GAP_S} s. Curves are driven at "
             f"{CURVE_LATERAL_MPS2:g} m/s² of lateral acceleration, and kept counts from where the radius is constant, "
             "as in the standard: in the transition before it the yaw rate of the moment bends the path too little.",
+            GIVEN_SAID,
             *_verdicts(groups),
         ),
         (Table("Tests", _COLUMNS, rows),),

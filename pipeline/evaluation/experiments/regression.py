@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.evaluation.experiments.layouts import LAYOUTS, Case, cases, scenario, scenes
-from pipeline.evaluation.experiments.sections import Chart, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.experiments.sections import GIVEN_SAID, Chart, Experiment, Replay, Section, Series, Table
 from pipeline.evaluation.experiments.track import TARGET, true_range_m
 from pipeline.geometry import closest_on_polygon, transform
 from pipeline.params import DistanceParams, Params, preset
@@ -91,6 +91,7 @@ def report(cases: Sequence[Case], runs: Sequence[list[Sample]]) -> Section:
             f"{pinhole.coefficient:.1f} · h^−1. Printed: 1829.1 · h^−1.093. The law of YOLOX is fitted to real cars, "
             "which are 1.59 m tall; these are 1.48 m. Depth is along the optical axis. Boxes cut by the picture's edge "
             "are left out.",
+            GIVEN_SAID,
             "Fused against the LiDAR alone: not asked here, these are the camera's boxes alone.",
         ),
         (

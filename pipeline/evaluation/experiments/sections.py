@@ -17,6 +17,10 @@ Boxes = Literal["truth", "network"]
 """Whose the camera's boxes are: projected truth with a detector's errors, or the embedded network's on drawn
 pictures."""
 GIVEN = Detections(boxes=BoxNoise())
+GIVEN_SAID = (
+    "The camera's boxes are given: projected truth with assumed errors, near those measured of the embedded detector. "
+    "No network looked at pictures."
+)
 Cell = str | float | int | None
 
 

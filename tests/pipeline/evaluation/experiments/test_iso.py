@@ -54,7 +54,7 @@ def test_the_tests_of_the_standard_are_there_and_the_report_names_the_failed() -
     assert {case.value for case in full if case.test == "curve"} == {500.0, 250.0, 125.0}
     pair = [Case("curve", 250.0, "lidar", 0), Case("curve", 250.0, "both", 0)]
     section = report(pair, [evolve(GOOD, touched=True), GOOD])
-    assert "fused passes 1 of 1 runs, better than the LiDAR alone (0 of 1)" in section.text[1]
+    assert "fused passes 1 of 1 runs, better than the LiDAR alone (0 of 1)" in section.text[2]
     assert [scene.title for scene in section.scenes] == ["Curve, R = 250 m"]
     last = [row[-1] for row in section.tables[0].rows]
     assert last == [
