@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast
 
-from app.labels.acts.scope import Scope, Stated, stated
+from app.labels.acts.scope import Scope, Stated, stated, track_of
 from app.labels.draft import Draft
 from app.labels.refusals import ActRefused
 from app.labels.requests import Accept, Reject, Remove, ReviewOk, SendBack
@@ -22,7 +22,7 @@ def accept(draft: Draft, scope: Scope, act: Accept) -> str:
         value = _answered(stated(draft.get(ref.kind, ref.id, ref.revision)))
         draft.put(ref.kind, ref.id, value if value.state == "corrected" else replace(value, state="accepted"))
         done.append(value)
-    return f"accepted {_names(done)}"
+    return f"accepted {_names(done)}{_still_proposed(draft, done)}"
 
 
 def reject(draft: Draft, scope: Scope, act: Reject) -> str:
@@ -79,6 +79,13 @@ def forget_tracks(draft: Draft, gone: set[int]) -> None:
         event = cast("EventLabel", item.value)
         left = tuple(track for track in event.tracks if track not in gone)
         draft.put("event", number, replace(event, tracks=left))
+
+
+def _still_proposed(draft: Draft, done: Sequence[Value]) -> str:
+    """Who leads in an accepted range, and has not been looked at: such a lead judges nothing yet."""
+    leads = sorted({each.lead for each in done if isinstance(each, LeadRange) and isinstance(each.lead, int)})
+    left = [f"#{lead}" for lead in leads if track_of(draft, lead).state == "proposed"]
+    return f"; {', '.join(left)} {'is' if len(left) == 1 else 'are'} still proposed" if left else ""
 
 
 def _answered(value: Stated) -> Stated:

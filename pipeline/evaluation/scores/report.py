@@ -84,7 +84,8 @@ def _scores(run: Drives) -> Section:
         "absolute ones, of every labelled vehicle that an object stands for.",
         f"Vehicles are looked for to {MAX_RANGE_M:.0f} m and 35° to either side. Two places are one within "
         f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class claims to be no vehicle: it counts where one is, "
-        "so the LiDAR alone never detects falsely. A vehicle that nobody labelled counts as a false detection.",
+        "so the LiDAR alone never detects falsely. Detection and tracking are judged in frames whose vehicles are all "
+        "labelled: there, one that nobody labelled counts as a false detection.",
     ]
     if len(run) < FEW:
         text.append(

@@ -49,7 +49,8 @@ def test_a_lead_whose_track_is_only_proposed_judges_nothing_and_it_is_said(
     """Nor do labels of a frame in which other vehicles may be: nothing there is detected falsely."""
     track = proposed(engine, client)
     (lead,) = labels(client)["leads"]
-    act(client, kind="accept", items=[{"kind": "lead", "id": lead["id"], "revision": lead["revision"]}])
+    done = act(client, kind="accept", items=[{"kind": "lead", "id": lead["id"], "revision": lead["revision"]}]).json()
+    assert done["what"].endswith(f"; #{track['id']} is still proposed")
     score = ScoreJson.model_validate(client.get("/api/labels/score").json())
     said = f"#{track['id']} leads in 30 frames but is only proposed: not judged until it is accepted."
     assert (score.judged, score.metrics, score.errors, score.notes[0]) == (0, [], [], said)
