@@ -76,7 +76,8 @@ class LineOptions:
     embedded one, which knows simulated cars only and is the default for sim:"""
     lanes: str | None = None
     """Name or path of an ONNX lane network, `classical` for the detector without one, or `off`; else the registered
-    default, then $CIPV_DATA/models, then the classical one, which is the default for sim:"""
+    default, then $CIPV_DATA/models, then the classical one, which is the default for sim:. Live sensors on two
+    cores want `classical`: TwinLiteNet makes every third result 180 ms old"""
     lanes_every: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Run the lane detector in every N-th frame only; between, its lines are predicted and age. Else in
     every third for a network, in more of them below 10 Hz, and in all for the classical one"""
