@@ -22,7 +22,7 @@ from pipeline.geometry import Cuboid, inverse, rotation
 from pipeline.labels.formats.base import Drive, Shot, make_folder
 from pipeline.labels.model import LabelSet, LabelTrack, Sighting
 from pipeline.sources.files import check_looks_ahead
-from pipeline.types import F32, F64
+from pipeline.types import F32, F64, Mask
 
 VERSION_FOLDER = "v1.0-cipv"
 CATEGORIES = {
@@ -72,9 +72,14 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
     folder = make_folder(out) / VERSION_FOLDER
     folder.mkdir()
     for name, rows in tables.items():
-        text = json.dumps(rows, indent=0, ensure_ascii=False, allow_nan=False)
-        (folder / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+        (folder / f"{name}.json").write_text(_json(rows), encoding="utf-8")
     return _changes(labels, drive, is_known)
+
+
+def _json(rows: list[Row]) -> str:
+    """A row a line; row by row, which Python does in C, as it does not with an indent."""
+    lines = (json.dumps(row, ensure_ascii=False, allow_nan=False) for row in rows)
+    return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
 def _annotations(labels: LabelSet, drive: Drive, poses: list[F64]) -> dict[int, list[Row]]:
@@ -122,12 +127,23 @@ def _points_inside(labels: LabelSet, drive: Drive) -> dict[tuple[int, int], int]
             if each.cuboid is not None:
                 by_frame.setdefault(each.frame, []).append((track.id, each.cuboid))
     counts: dict[tuple[int, int], int] = {}
-    for frame, cuboids in by_frame.items():
+    for frame, cuboids in sorted(by_frame.items()):  # as a session has them: each of its chunks is unpacked once
         points = drive.points(frame)
         if points is not None:
-            by_x = points[np.argsort(points[:, 0]), :3]
+            near = points[_is_near(points, [cuboid for _, cuboid in cuboids]), :3]
+            by_x = near[np.argsort(near[:, 0])]
             counts |= {(number, frame): count_inside(cuboid, by_x) for number, cuboid in cuboids}
     return counts
+
+
+def _is_near(points: F32, cuboids: list[Cuboid]) -> Mask:
+    """(N,) whether points are within what the cuboids reach, taken together; a millimetre more, for rounding."""
+    centers = np.array([each.center[:2] for each in cuboids])
+    reach_m = np.array([[math.hypot(*each.size[:2]) / 2 + 1e-3] for each in cuboids])
+    least, most = (centers - reach_m).min(axis=0), (centers + reach_m).max(axis=0)
+    x, y = points[:, 0], points[:, 1]
+    is_near: Mask = (x >= least[0]) & (x <= most[0]) & (y >= least[1]) & (y <= most[1])
+    return is_near
 
 
 def count_inside(cuboid: Cuboid, points: F32) -> int:
