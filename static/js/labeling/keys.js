@@ -25,9 +25,12 @@ const during = (tool, binding) => ({ ...binding, isOn: () => isOn() && get("labe
 /** While others' labels are looked through. @param {LabelBinding} binding @returns {LabelBinding} */
 const reviewing = (binding) => ({ ...binding, isOn: review.isReviewing });
 
-/** The four arrows, each alone and with Shift. @param {import("../store.js").Labeling["tool"]} tool @param {string} words @param {(right: number, up: number, isShift: boolean) => unknown} act @returns {LabelBinding[]} */
+/** After which keys the arrows are a tool's. */
+const BEGINS = { shape: "Shift G", path: "Shift P" };
+
+/** The four arrows, each alone and with Shift. @param {"shape"|"path"} tool @param {string} words @param {(right: number, up: number, isShift: boolean) => unknown} act @returns {LabelBinding[]} */
 const arrows = (tool, words, act) => /** @type {[string, number, number][]} */ ([["Left", -1, 0], ["Right", 1, 0], ["Up", 0, 1], ["Down", 0, -1]]).flatMap(([name, right, up]) => [
-  during(tool, key(`Arrow${name}`, name === "Left" ? "← → ↑ ↓" : name, name === "Left" ? words : "", () => act(right, up, false))),
+  during(tool, key(`Arrow${name}`, name === "Left" ? `${BEGINS[tool]}, ← → ↑ ↓` : name, name === "Left" ? words : "", () => act(right, up, false))),
   during(tool, key(`Shift+Arrow${name}`, `Shift ${name}`, "", () => act(right, up, true))),
 ]);
 
@@ -41,10 +44,10 @@ const pair = (letter, words, act, brief) => [
 export const labelKeys = () => [
   { mode: "labeling", title: "Labeling: review", bindings: [
     key("Shift+R", "Shift R", "review: go through what others stand behind", review.toggleReview),
-    reviewing(key("a", "A", "in a review: it is right, and the next", review.reviewOk)),
-    reviewing(key("r", "R", "in a review: send it back with a comment, and the next", review.sendBack)),
-    reviewing(key("n", "N", "in a review: leave it, the next", () => review.nextUnreviewed(1))),
-    reviewing(key("Shift+N", "Shift N", "in a review: the one before", () => review.nextUnreviewed(-1))),
+    reviewing(key("a", "Shift R, A", "in a review: it is right, and the next", review.reviewOk)),
+    reviewing(key("r", "Shift R, R", "in a review: send it back with a comment, and the next", review.sendBack)),
+    reviewing(key("n", "Shift R, N", "in a review: leave it, the next", () => review.nextUnreviewed(1))),
+    reviewing(key("Shift+N", "Shift R, Shift N", "in a review: the one before", () => review.nextUnreviewed(-1))),
     key("h", "H", "send the selected track, or who leads here, back with a comment", review.sendBack),
     key("Shift+H", "Shift H", "reviewed: it is right", review.reviewOk),
     ...pair("Y", "next label that was sent back", (d) => commands.goTo("sent_back", d)),
@@ -99,9 +102,9 @@ export const labelKeys = () => [
     during("new", key("Enter", "G, Enter", "a new label of the class in the bar, in our path ahead; arrows, Q and E put it right", byKeys.placeAhead)),
     during("merge", key("Enter", "M, ., Enter", "merge with the label that was selected by .", () => commands.mergeWith(get("track") ?? -1))),
     during("shape", key("Enter", "Shift G, Enter", "a box around the selected label in the picture", byKeys.boxAround)),
-    ...arrows("shape", "after Shift G: move the box in the picture; Shift: its right and lower side", (right, up, isSize) => byKeys.changeBox(right, -up, isSize)),
+    ...arrows("shape", "move the box in the picture; Shift: its right and lower side", (right, up, isSize) => byKeys.changeBox(right, -up, isSize)),
     during("path", key("Enter", "Shift P, Enter", "keep the path as drawn, or the pipeline's", byKeys.keepPath)),
-    ...arrows("path", "after Shift P: bend the path's far end, make it longer or shorter; Shift: move all of it", (right, up, isWhole) => (right ? byKeys.bendPath(-right, isWhole) : byKeys.lengthenPath(up > 0 ? 1 : -1))),
+    ...arrows("path", "bend the path's far end, make it longer or shorter; Shift: move all of it", (right, up, isWhole) => (right ? byKeys.bendPath(-right, isWhole) : byKeys.lengthenPath(up > 0 ? 1 : -1))),
   ] },
   { mode: "labeling", title: "Labeling: frames", bindings: [
     key("f", "F", "one frame on; Shift: ten", () => playback({ step: 1 }), "frame on"),
