@@ -49,7 +49,10 @@ class Database:
         try:
             self.url = make_url(url)
             self._engine = _engine(self.url)
-        except (ArgumentError, NoSuchModuleError, ImportError) as error:
+        except ImportError as error:
+            brought = ", which `make install` brings" if error.name == "psycopg" else ""
+            raise DatabaseError(f"labels: {error.name or error} is not installed{brought}") from None
+        except (ArgumentError, NoSuchModuleError) as error:
             raise DatabaseError(f"labels: no database address that is understood: {_first_line(error)}") from None
         self.is_sqlite = self._engine.dialect.name == "sqlite"
         with self.writing() as connection:

@@ -21,7 +21,7 @@ from pipeline.types import I64, Point2, Result
 ZERO_M = 4.0
 """From this distance on two places have nothing in common."""
 MATCH_M = 0.5 * ZERO_M
-MISSING = "Detection and tracking scores need trackeval: pip install 'cipv-studio[scores]'."
+MISSING = "Detection and tracking scores need trackeval, which `make install` brings."
 Named = list[tuple[int, Point2]]
 """Numbers and places of one frame's vehicles."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 import threading
 from pathlib import Path
 
@@ -78,6 +80,35 @@ def test_an_address_that_cannot_be_opened_is_said_without_its_password(url: str,
         Database(url)
     assert says in str(error.value)
     assert "secret" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("url", "driver", "says"),
+    [
+        ("postgresql://me@host/labels", "psycopg", "psycopg is not installed, which `make install` brings"),
+        ("postgresql+pg8000://me@host/labels", "pg8000", "pg8000 is not installed"),
+    ],
+)
+def test_a_driver_that_is_missing_is_said(url: str, driver: str, says: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, driver, None)
+    with pytest.raises(DatabaseError) as error:
+        Database(url)
+    assert str(error.value) == f"labels: {says}"
+
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_what_make_install_is_said_to_bring_is_in_the_lock() -> None:
+    locked = (ROOT / "requirements.lock").read_text()
+    assert re.search("^psycopg==", locked, re.MULTILINE)
+    assert re.search("^trackeval==", locked, re.MULTILINE)
+
+
+def test_nobody_is_told_to_install_this_program_from_where_it_is_not() -> None:
+    files = [file for folder in ("app", "pipeline", "static") for file in (ROOT / folder).rglob("*.[pjm][ysd]")]
+    assert len(files) > 300
+    assert [file.name for file in files if "cipv-studio[" in file.read_text()] == []
 
 
 def test_a_file_that_is_no_database_is_said(file: Path) -> None:
