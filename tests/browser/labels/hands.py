@@ -134,7 +134,7 @@ class Labels:
         held = self.everything
         self._remove([("track", each) for each in held["tracks"]])
         held = self.everything
-        self._remove([(kind, each) for kind in ("event", "path") for each in held[f"{kind}s"]])
+        self._remove([(kind, each) for kind in ("event", "path", "tag") for each in held[f"{kind}s"]])
         if self.leads:
             self.act("Nobody", {"kind": "clear_lead", "first": 0, "last": count - 1})
 
