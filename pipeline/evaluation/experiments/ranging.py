@@ -114,8 +114,8 @@ def report(cases: Sequence[Case], runs: Sequence[list[Sighting]]) -> Section:
         "LiDAR range check",
         (
             "A standing vehicle from 100 m to 4 m, one LiDAR, no camera. Recognised: at least half of the sweeps in a "
-            "5 m bin hold it, and so do all nearer bins. Errors are over all sweeps that hold it, of the nearest object "
-            "in its lane, however far off.",
+            "5 m bin hold it, and so do all nearer bins. Errors are over all sweeps that hold it, of the nearest "
+            "object in its lane, however far off.",
             "Fused against the LiDAR alone: not asked here, there is no camera. Within this reach a fused distance is "
             "the LiDAR's; what the camera adds beyond it is in the experiments that follow.",
         ),
