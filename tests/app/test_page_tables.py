@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from pipeline.labels.formats.registry import FORMATS
+from pipeline.labels.model import WHOLE_TAG
 from pipeline.sizes import USUAL_SIZE_M
 
 LABELING = Path(__file__).resolve().parents[2] / "static" / "js" / "labeling"
@@ -23,3 +24,9 @@ def test_every_format_can_be_chosen() -> None:
     found = re.search(r"const FORMATS = \[(.*?)\];", (LABELING / "files.js").read_text(), re.DOTALL)
     assert found is not None
     assert set(re.findall(r'\["([a-z-]+)"', found[1])) == set(FORMATS)
+
+
+def test_the_page_offers_the_tag_of_a_frame_whose_vehicles_are_all_labelled() -> None:
+    found = re.search(r'const TAGS = \["([^"]+)"', (LABELING / "moment.js").read_text())
+    assert found is not None
+    assert found[1] == WHOLE_TAG
