@@ -210,6 +210,7 @@ def test_a_label_without_a_cuboid_says_why_and_how_to_give_it_one(hand: Hand, la
     hand.keys("Shift+G")
     hand.drag(hand.plan(30, 3), hand.plan(34, 3))
     expect(facts).to_contain_text("m ahead")
+    labels.wait_for(lambda now: all(now.cuboid(made, START) is not None for made in now.tracks))
 
 
 EDGES = [
