@@ -28,7 +28,7 @@ class Label:
 
     box: of its whole outline, hidden parts too, clipped to the picture: its height tells the distance. visible: share
     of the outline inside the picture that nearer vehicles leave free. distance_m: range from the ego origin to the
-    nearest corner of its footprint. ahead: in the lane of the ego vehicle or nearer to it than 1.5 m. cut: the
+    nearest corner of its footprint. ahead: its centre is straight ahead, no more than 1.5 m to either side. cut: the
     outline leaves the picture.
     """
 

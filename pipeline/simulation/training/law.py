@@ -17,7 +17,7 @@ from pipeline.geometry import closest_on_polygon, iou_matrix, transform
 from pipeline.params import DetectionParams, DistanceParams
 from pipeline.simulation.camera import HEIGHT, WIDTH, calibration
 from pipeline.simulation.scenario import names
-from pipeline.simulation.training.evaluate import EDGES_M, MATCH_IOU
+from pipeline.simulation.training.evaluate import EDGES_M, JUDGE_SEEDS, MATCH_IOU
 from pipeline.simulation.training.labels import labels
 from pipeline.simulation.training.scenes import Moment, drive, moments
 from pipeline.types import DistanceLaw
@@ -29,7 +29,7 @@ from pipeline.vision.select import select
 
 FIT_SEEDS = (7, 8, 9)
 """Each has roads, traffic and sizes of its own; neither training nor judging knows them."""
-JUDGE_SEED = 2
+_JUDGE_COUNT = 100
 MAX_DEPTH_M = 60.0
 """Farther off a network finds the taller ones of equal cars, and a law fitted to those reads long."""
 CLEAR_SHARE = 0.9
@@ -114,7 +114,7 @@ def main() -> None:
     law = fit(seen)
     print(law)
     judged = {
-        "random traffic": list(pairs(detector, moments(JUDGE_SEED, 150))),
+        "random traffic": [pair for seed in JUDGE_SEEDS for pair in pairs(detector, moments(seed, _JUDGE_COUNT))],
         "built-in scenarios": list(pairs(detector, _scenario_pictures())),
     }
     rows = {title: _rows(found, law) for title, found in judged.items()}

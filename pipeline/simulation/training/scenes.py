@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -41,8 +41,9 @@ class Moment:
     world: world.World
 
 
-def moments(seed: int, count: int) -> Iterator[Moment]:
-    """``count`` pictures; equal seeds give equal pictures, different seeds share no road, traffic or backdrop."""
+def moments(seed: int, count: int, wanted: Callable[[world.World], bool] = lambda _: True) -> Iterator[Moment]:
+    """Those of ``count`` pictures whose world is wanted, the others are not drawn. Equal seeds give equal pictures,
+    different seeds share no road, traffic or backdrop."""
     rng = np.random.default_rng([seed, 11])
     models = size_models(rng)
     for number in range(count):
@@ -54,7 +55,8 @@ def moments(seed: int, count: int) -> Iterator[Moment]:
         if rng.random() < _SOME_TURNED:
             now = _turned(rng, now)
         now = without_collisions(now)
-        yield Moment(camera.picture(now), now)
+        if wanted(now):
+            yield Moment(camera.picture(now), now)
 
 
 def without_collisions(now: world.World) -> world.World:

@@ -18,12 +18,11 @@ import torch
 from pipeline.simulation.training.augment import view
 from pipeline.simulation.training.dataset import read_labels
 from pipeline.simulation.training.loss import losses
-from pipeline.simulation.training.network import Network, export
+from pipeline.simulation.training.network import INPUT_SIZE, Network, export
 from pipeline.simulation.training.targets import assign
 from pipeline.types import F32
 from pipeline.vision.decode import Size
 
-INPUT_SIZE: Size = (384, 640)
 _WINDOWS: tuple[tuple[Size, int], ...] = (((192, 320), 20), (INPUT_SIZE, 5))
 """Sizes of training windows with the batch that costs about the same; the small one is four times as cheap a picture,
 and far vehicles are what needs the many examples."""

@@ -1,21 +1,20 @@
-"""The detector that comes with the program, on pictures it was not trained on. Floors lie a little under what
-``python -m pipeline.simulation.training.evaluate`` measures on many more."""
+"""The detector that comes with the program, on pictures it was not trained on: a few of each of the seeds of which
+``python -m pipeline.simulation.training.evaluate`` draws many more. The lead's floor is what the card claims."""
 
 from __future__ import annotations
 
-from functools import reduce
 from itertools import chain, islice
-from operator import add
 
 import pytest
 
 from pipeline.simulation.camera import HEIGHT, WIDTH
-from pipeline.simulation.training.evaluate import EDGES_M, Bin, evaluate
+from pipeline.simulation.training.evaluate import JUDGE_SEEDS, LEAD_M, Bin, evaluate, within
 from pipeline.simulation.training.scenes import drive, moments
+from pipeline.simulation.world import World
 from pipeline.vision.detector import Detector, open_detector
 from pipeline.vision.models import EMBEDDED
 
-UNSEEN_SEED = 2
+OF_EACH_SEED = 7
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +24,7 @@ def detector() -> Detector:
 
 @pytest.fixture(scope="module")
 def random_traffic(detector: Detector) -> list[Bin]:
-    return evaluate(detector, moments(UNSEEN_SEED, 40))
+    return evaluate(detector, chain.from_iterable(moments(seed, OF_EACH_SEED) for seed in JUDGE_SEEDS))
 
 
 @pytest.fixture(scope="module")
@@ -35,12 +34,6 @@ def built_in(detector: Detector) -> list[Bin]:
     return evaluate(detector, chain.from_iterable(drives))
 
 
-def _within(bins: list[Bin], far_m: float) -> Bin:
-    """Several bins as one: every count is the sum of theirs."""
-    near = [vars(part).values() for part, end_m in zip(bins, EDGES_M[1:], strict=True) if end_m <= far_m]
-    return Bin(*(reduce(add, counts) for counts in zip(*near, strict=True)))
-
-
 def test_it_runs_as_a_yolox_network_at_the_simulator_s_size(detector: Detector) -> None:
     assert detector.head == "yolox"
     assert detector.input_size == (384, 640)
@@ -48,15 +41,29 @@ def test_it_runs_as_a_yolox_network_at_the_simulator_s_size(detector: Detector) 
 
 
 def test_the_lead_is_found(random_traffic: list[Bin], built_in: list[Bin]) -> None:
-    for bins, floor in ((random_traffic, 0.95), (built_in, 0.97)):
-        near = _within(bins, 60.0)
-        assert near.leads >= 8
-        assert near.lead_recall() >= floor
+    for bins, at_least in ((random_traffic, 35), (built_in, 8)):
+        near = within(bins, LEAD_M)
+        assert near.leads >= at_least
+        assert near.lead_recall() >= 0.97
+
+
+def test_a_motorcycle_before_a_larger_vehicle_is_found(detector: Detector) -> None:
+    """Measured 23 of 28; with the score that the other classes have it is 21."""
+    rides = chain.from_iterable(moments(seed, 40, _follows_a_motorcycle) for seed in JUDGE_SEEDS)
+    near = within(evaluate(detector, rides), LEAD_M)
+    assert near.leads >= 25
+    assert near.lead_recall() >= 0.8
+
+
+def _follows_a_motorcycle(now: World) -> bool:
+    """Whether the nearest vehicle straight ahead is one, at less than ``LEAD_M``."""
+    ahead = [s for s in now.actors if 0.0 < s.cuboid.center[0] < LEAD_M and abs(s.cuboid.center[1]) < 1.5]
+    return bool(ahead) and ahead[-1].actor.kind == "motorcycle"
 
 
 def test_most_vehicles_are_found_and_little_else(random_traffic: list[Bin], built_in: list[Bin]) -> None:
     for bins in (random_traffic, built_in):
-        near = _within(bins, 60.0)
+        near = within(bins, LEAD_M)
         assert near.vehicles >= 40
         assert near.recall() >= 0.85
         assert near.precision() >= 0.87
@@ -65,4 +72,4 @@ def test_most_vehicles_are_found_and_little_else(random_traffic: list[Bin], buil
 
 def test_the_height_of_a_box_tells_the_distance(random_traffic: list[Bin], built_in: list[Bin]) -> None:
     for bins in (random_traffic, built_in):
-        assert _within(bins, 60.0).height_error() <= 0.07
+        assert within(bins, LEAD_M).height_error() <= 0.07
