@@ -5,11 +5,14 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import pytest
 
+from app.cli import main
 from app.labels.acts import do
 from app.labels.acts.scope import Scope
 from app.labels.answers import changes_json, window_json
@@ -20,9 +23,11 @@ from app.labels.requests import SetSighting
 from pipeline.evaluation.lead import LeadRule
 from pipeline.evaluation.scores.truth import of_labels
 from pipeline.geometry import Cuboid
-from pipeline.labels.formats.base import Drive, Shot
+from pipeline.labels.formats.base import Drive, Shot, drive_of
 from pipeline.labels.formats.registry import FORMATS, export_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
+from pipeline.recording.writer import About, SessionWriter
+from pipeline.sources import open_source
 from tests.app.labels.conftest import info, postgres_url  # noqa: F401
 from tests.app.labels.kills import kill_again_and_again
 
@@ -31,6 +36,9 @@ pytestmark = pytest.mark.soak
 KILLS = 100
 FRAMES, TRACKS, LIFE = 4000, 1000, 100
 SEEK_S, EXPORT_S = 0.15, 10.0
+COMMAND_S, WITH_POINTS_S = 15.0, 30.0
+"""Of the whole command: 4,000 frames of the session are looked up; for nuScenes, which counts points in cuboids, their
+sweeps are unpacked."""
 BY = Origin("import", "made up", 1)
 REPORT = Path("build/soak_labels.json")
 
@@ -103,6 +111,55 @@ def test_a_hundred_thousand_labels_in_one_drive(kind: str, request: pytest.Fixtu
     _report(**{kind: took})
     assert max(took[what] for what in took if what.startswith("window")) < SEEK_S
     assert max(took[what] for what in took if what.startswith("export")) < EXPORT_S
+
+
+@pytest.mark.timeout(3600)
+def test_a_hundred_thousand_labels_of_a_real_session_go_out_by_the_command_line(data_dir: Path, tmp_path: Path) -> None:
+    """Frames of a real drive, over and over: camera, points and calibration are there. Every format, from the command
+    to its end; a copy of the whole session is as long as the session and has no bound."""
+    session, labels = tmp_path / "drive.mcap", tmp_path / "labels.json"
+    _write_session(session, data_dir / "kitti_0052")
+    drive = drive_of(open_source(str(session)))
+    whole = replace(many(), source=drive.uri, frames=drive.frames, t_ns=drive.t_ns)
+    export_labels(_with_boxes(whole), drive, "native", labels)
+    took: dict[str, float] = {}
+    for name in FORMATS:
+        command = ["labels", "export", session, "--labels", labels, "--format", name, "--out", tmp_path / name]
+        began = time.process_time()
+        with pytest.raises(SystemExit) as ended:
+            main([str(each) for each in command])
+        assert ended.value.code in (0, None)
+        took[name] = round(time.process_time() - began, 2)
+    _report(command_line=took)
+    assert max(took[name] for name in took.keys() - {"mcap", "nuscenes"}) < COMMAND_S
+    assert took["nuscenes"] < WITH_POINTS_S
+
+
+def _write_session(path: Path, folder: Path) -> None:
+    if not folder.is_dir():
+        pytest.skip(f"no KITTI drive at {folder}")
+    source = open_source(f"kitti:{folder}")
+    frames = [source.frame(index) for index in range(len(source))]
+    pictures = [cv2.imencode(".jpg", each.picture.bgr)[1].tobytes() if each.picture else b"" for each in frames]
+    writer = SessionWriter(path, About(source.uri, source.title, source.rate_hz))
+    for index in range(FRAMES):
+        frame, encoded, t_ns = frames[index % len(frames)], pictures[index % len(frames)], index * 100_000_000
+        picture = replace(frame.picture, t_ns=t_ns, encoded=encoded) if frame.picture else None
+        sweep = replace(frame.sweep, t_ns=t_ns) if frame.sweep else None
+        writer.write(replace(frame, index=index, name=f"{index:06d}", t_ns=t_ns, sweep=sweep, picture=picture))
+    writer.close()
+
+
+def _with_boxes(labels: LabelSet) -> LabelSet:
+    """Each sighting with a box of the picture too."""
+    box = (500.0, 150.0, 600.0, 220.0)
+    return replace(
+        labels,
+        tracks=tuple(
+            replace(track, sightings=tuple(replace(each, bbox=box) for each in track.sightings))
+            for track in labels.tracks
+        ),
+    )
 
 
 def _report(**figures: Any) -> None:
