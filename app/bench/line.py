@@ -1,8 +1,10 @@
-"""The whole step without the network, the step beside a busy network, and the whole line with the network."""
+"""The whole step without the networks, the step beside a busy network, and the whole line as the command line runs it:
+read and decoded, looked at by both networks, stepped."""
 
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterator
 from itertools import cycle
 from time import perf_counter
 from typing import Any
@@ -11,10 +13,10 @@ import numpy as np
 
 from app.bench.timing import figures
 from pipeline.params import Params
-from pipeline.run import Detectors, detect
+from pipeline.run import Detectors, Detects, detect
+from pipeline.sources.base import Source
 from pipeline.step import State, step, warm_up
-from pipeline.types import Frame
-from pipeline.vision.detector import Detector
+from pipeline.types import Frame, RawBoxes
 
 _ROUNDS = 3
 """The step alone and the step beside the network take turns, so that what slows the machine slows both."""
@@ -24,52 +26,68 @@ _SETTLE_S = 0.2
 """A network that has just begun is no busy one yet: for 0.1 s its threads share the step's core. Players keep one."""
 
 
+_NOBODY = Detectors()
+
+
 def stages(
-    frames: list[Frame], params: Params, detector: Detector | None, budget_s: float
+    source: Source, count: int, params: Params, detectors: Detectors, budget_s: float
 ) -> dict[str, dict[str, Any]]:
-    """Figures for ``step``, and with a detector for ``step_beside_network`` and ``line`` (decoded picture to result).
+    """Figures for ``step``, and with a detector of vehicles for ``step_beside_network`` and ``line`` (from the
+    recording to the result).
 
     Beside the network: it looks at one picture after the other, on as many threads as the product gives it.
 
-    frames: consecutive, with pictures, without boxes. budget_s: wall time for all of it, seconds.
+    The first ``count`` frames, round and round. budget_s: wall time for all of it, seconds.
     """
     warm_up()
-    seen = [detect(frame, Detectors(detector)) for frame in frames]
-    idle = _Laps(seen, params)
+    detector = detectors.boxes
+    seen = [detect(source.frame(index), Detectors(detector)) for index in range(count)]
+    idle = _Laps(cycle(seen), params)
     if detector is None:
         idle.go_on(budget_s)
         return {"step": idle.row()}
-    beside, whole = _Laps(seen, params), _Laps(frames, params, detector)
+    beside, whole = _Laps(cycle(seen), params), _Laps(_read(source, count), params, detectors)
     for _ in range(_ROUNDS):
         idle.go_on(budget_s * _IDLE / _ROUNDS)
         with _Busy(detector, seen):
-            _Laps(seen, params).go_on(_SETTLE_S)
+            _Laps(cycle(seen), params).go_on(_SETTLE_S)
             beside.go_on(budget_s * _BESIDE / _ROUNDS - _SETTLE_S)
     whole.go_on(budget_s * (1.0 - _IDLE - _BESIDE))
     alone, row = idle.row(), beside.row()
+    named = {"detector": _name(detector), "lanes": _name(detectors.lanes), "lanes_every": detectors.lanes_every}
     return {
         "step": alone,
         "step_beside_network": {**row, "p99_to_idle_median": round(row["p99_ms"] / alone["median_ms"], 2)},
-        "line": {**whole.row(), "rate_hz": round(1.0 / float(np.mean(whole.times_s)), 1), "detector": detector.name},
+        "line": {**whole.row(), "rate_hz": round(1.0 / float(np.mean(whole.times_s)), 1), **named},
     }
 
 
-class _Laps:
-    """Goes round the frames and times each, from a decoded picture and a sweep to the result. Without a detector: the
-    step alone. times_s: of every frame so far."""
+def _read(source: Source, count: int) -> Iterator[Frame]:
+    """Each frame anew from the recording, as when it is played."""
+    return (source.frame(index) for index in cycle(range(count)))
 
-    def __init__(self, frames: list[Frame], params: Params, detector: Detector | None = None) -> None:
+
+def _name(network: object) -> str | None:
+    """None: nothing looks."""
+    return getattr(network, "name", None)
+
+
+class _Laps:
+    """Goes through the frames and times each, from asking for it to the result. Without detectors: the step alone,
+    where the frames are held. times_s: of every frame so far."""
+
+    def __init__(self, frames: Iterator[Frame], params: Params, detectors: Detectors = _NOBODY) -> None:
         self.times_s: list[float] = []
-        self._turn, self._state = cycle(frames), State()
-        self._params, self._detectors = params, Detectors(detector)
+        self._turn, self._state = frames, State()
+        self._params, self._detectors = params, detectors
 
     def go_on(self, budget_s: float) -> None:
         """From the frame after the last one, until the time is over; one frame at least."""
         start = perf_counter()
         end = start + budget_s
         while start < end or not self.times_s:
-            frame = next(self._turn)
             start = perf_counter()
+            frame = next(self._turn)
             self._state, _ = step(self._state, detect(frame, self._detectors), self._params)
             self.times_s.append(perf_counter() - start)
 
@@ -80,7 +98,7 @@ class _Laps:
 class _Busy:
     """Keeps the network running in a thread of its own, as the player does that looks ahead."""
 
-    def __init__(self, detector: Detector, frames: list[Frame]) -> None:
+    def __init__(self, detector: Detects[RawBoxes], frames: list[Frame]) -> None:
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._work, args=(detector, frames), daemon=True)
 
@@ -91,7 +109,7 @@ class _Busy:
         self._ended.set()
         self._thread.join()
 
-    def _work(self, detector: Detector, frames: list[Frame]) -> None:
+    def _work(self, detector: Detects[RawBoxes], frames: list[Frame]) -> None:
         for frame in cycle(frames):
             if self._ended.is_set():
                 return

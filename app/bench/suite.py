@@ -12,7 +12,8 @@ from app.bench import packets as packets_bench
 from app.bench import simulation as simulation_bench
 from app.catalog import recordings
 from pipeline.params import Params
-from pipeline.run import detector_for
+from pipeline.path.lane_detector import usual_every
+from pipeline.run import Detectors, detector_for, lanes_for
 from pipeline.sources import open_source
 from pipeline.sources.base import Source
 from pipeline.types import Sweep
@@ -31,11 +32,12 @@ def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, An
     print(f"cipv: measuring on {source.title}", file=sys.stderr)
     frames = [source.frame(i) for i in range(min(FRAMES, len(source)))]
     pictures = [frame.picture.bgr for frame in frames if frame.picture is not None]
-    network = _detector(detector_spec, source)
+    network, lanes = _detector(detector_spec, source), lanes_for(source)
     figures = packets_bench.stages(BUDGET_S["decode"])
     figures |= lidar_bench.stages(_sweeps(source), BUDGET_S["lidar"], params)
     figures |= _dense_sweeps(params)
-    figures |= line_bench.stages(frames, params, network, BUDGET_S["line"])
+    looking = Detectors(network, lanes, usual_every(lanes, source.rate_hz))
+    figures |= line_bench.stages(source, len(frames), params, looking, BUDGET_S["line"])
     if network is not None:
         figures |= detector_bench.stages(pictures, network, BUDGET_S["detector"])
     figures |= simulation_bench.stages(BUDGET_S["simulation"])

@@ -13,15 +13,28 @@ from rich.console import Console
 from app.bench import line
 from app.commands.bench import _table
 from pipeline.params import Params
+from pipeline.run import Detectors
 from pipeline.sources import open_source
-from pipeline.types import U8, RawBoxes
+from pipeline.types import U8, RawBoxes, RawLanes
 from pipeline.vision.detector import Detector, open_detector
 from tests.pipeline.vision import networks
 
 
+class Paint:
+    """A lane detector that counts the pictures."""
+
+    name = "paint"
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def detect(self, bgr: U8) -> RawLanes:
+        self.asked += 1
+        return RawLanes(self.name, np.zeros((0, 2), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int32))
+
+
 def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     source = open_source("sim:straight")
-    frames = [source.frame(index) for index in range(3)]
     detector = open_detector(str(networks.yolox(tmp_path / "tiny.onnx")), (128, 128))
     asked: set[str] = set()
     look = Detector.detect
@@ -31,9 +44,12 @@ def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monke
         return look(self, bgr)
 
     monkeypatch.setattr(Detector, "detect", noting)
-    figures = line.stages(frames, Params(), detector, 0.4)
+    lanes = Paint()
+    figures = line.stages(source, 3, Params(), Detectors(detector, lanes, 2), 0.4)
     assert list(figures) == ["step", "step_beside_network", "line"]
     assert asked == {"here", "beside"}
+    assert lanes.asked > 0
+    assert (figures["line"]["lanes"], figures["line"]["lanes_every"]) == ("paint", 2)
     for row in figures.values():
         assert 0.0 < row["median_ms"] <= row["p99_ms"]
         assert row["samples"] >= 1
@@ -48,7 +64,7 @@ def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monke
 
 def test_each_round_goes_on_where_the_last_one_ended() -> None:
     source = open_source("sim:straight")
-    laps = line._Laps([source.frame(index) for index in range(2)], Params())
+    laps = line._Laps(iter([source.frame(0), source.frame(1)] * 1000), Params())
     for _ in range(2):
         laps.go_on(0.0)
     assert len(laps.times_s) == 1, "one frame at least, however short the time"

@@ -1,0 +1,43 @@
+"""What is demanded of the stages: what does not hold, or was not measured, is said."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import pytest
+
+from app.bench.demands import DEMANDS, broken
+
+
+def figures() -> dict[str, dict[str, Any]]:
+    """Each just as good as demanded."""
+    made: dict[str, dict[str, Any]] = {}
+    for demand in DEMANDS:
+        row = made.setdefault(demand.stage, {"peers": {}})
+        if demand.peer is not None:
+            row = row["peers"].setdefault(demand.peer, {})
+        row[demand.figure] = demand.at_most if demand.at_most is not None else demand.at_least
+    return made
+
+
+def test_what_is_as_fast_as_demanded_holds() -> None:
+    assert list(broken(figures())) == []
+
+
+@pytest.mark.parametrize("demand", DEMANDS, ids=lambda demand: f"{demand.stage} {demand.peer or demand.figure}")
+def test_what_is_slower_is_said(demand: Any) -> None:
+    slower = copy.deepcopy(figures())
+    row = slower[demand.stage] if demand.peer is None else slower[demand.stage]["peers"][demand.peer]
+    row[demand.figure] *= 1.01 if demand.at_most is not None else 0.99
+    (sentence,) = broken(slower)
+    assert sentence.startswith(f"{demand.stage}: {demand.figure}")
+    assert "wanted at" in sentence
+
+
+def test_what_was_not_measured_is_said_but_for_absent_peers_and_recordings() -> None:
+    less = figures()
+    del less["step"]["median_ms"]
+    less["cluster"]["peers"]["open3d cluster_dbscan"] = {"ratio": None, "absent": "not installed"}
+    del less["ground@kitti"]
+    assert list(broken(less)) == ["step: median_ms was not measured"]
