@@ -16,7 +16,7 @@ from pipeline.recording import topics
 from pipeline.recording.container import McapFile, NotMcap
 from pipeline.recording.messages import Damaged, log_text, picture_from, sweep_from
 from pipeline.recording.packets import sweep_of_packets
-from pipeline.recording.tick import PictureRef, Tick, route_from, tick_from
+from pipeline.recording.tick import CameraRecord, PictureRef, Tick, route_from, tick_from
 from pipeline.recording.writer import VERSION, About
 from pipeline.sources.base import Mark, SourceError, TruthObject
 from pipeline.types import CameraCalibration, Frame, GnssFix, Picture, Route, Sweep
@@ -47,6 +47,7 @@ class SessionSource:
         self.uri, self.origin, self.title, self.rate_hz = uri, about.origin, about.title, about.rate_hz
         self.notes = (*about.notes, *self._problems(path))
         self._picture: tuple[PictureRef, Picture] | None = None
+        self._camera: tuple[CameraRecord, CameraCalibration] | None = None
         self._route: tuple[int, Route] | None = None
 
     def __len__(self) -> int:
@@ -80,7 +81,7 @@ class SessionSource:
             tick.t_ns,
             _or_note(lambda: self._sweep(tick, self.log_time_ns(index)), notes) if is_whole else None,
             _or_note(lambda: self._read_picture(tick.picture), notes) if is_whole else None,
-            _or_note(lambda: _camera(tick), notes),
+            _or_note(lambda: self._read_camera(tick.camera), notes),
             tick.ego,
             notes=(*tick.notes, *notes),
             gnss=tick.gnss,
@@ -209,6 +210,15 @@ class SessionSource:
             held = self._picture = ref, picture_from(self.file.message(topics.IMAGE, ref.at_ns).data, ref.t_ns)
         return held[1]
 
+    def _read_camera(self, record: CameraRecord | None) -> CameraCalibration | None:
+        """One calibration serves every tick until another is set."""
+        if record is None:
+            return None
+        held = self._camera
+        if held is None or held[0] != record:
+            held = self._camera = record, record.calibration()
+        return held[1]
+
     def _read_route(self, at_ns: int | None) -> Route | None:
         if at_ns is None:
             return None
@@ -224,10 +234,6 @@ def _params_from(data: bytes) -> Params:
     return with_changes(
         Params(), {f"{name}.{key}": value for name, values in sections for key, value in values.items()}
     )
-
-
-def _camera(tick: Tick) -> CameraCalibration | None:
-    return tick.camera.calibration() if tick.camera is not None else None
 
 
 def _given(tick: Tick, notes: list[str]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from pipeline.records import evolve
 from pipeline.simulation import gnss
 from pipeline.simulation.camera import DrawnCamera, calibration
 from pipeline.simulation.lidar import Lidar
@@ -16,7 +17,7 @@ from pipeline.simulation.planned_route import planned_route
 from pipeline.simulation.roadside import Roadside
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.world import World
-from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Route
+from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Route, Sweep
 
 _BEFORE_M, _BEYOND_M = 100.0, 600.0
 
@@ -35,17 +36,27 @@ class Sensors:
     def frame(self, now: World, index: int, t_ns: int, picture: bool = True) -> Frame:
         """What the sensors give at one tick. picture: draw the camera's picture; without it the frame is made ten times
         faster, and still says how the camera is mounted."""
+        return evolve(
+            self.outline(now, index, t_ns),
+            sweep=self.sweep(now, index, t_ns),
+            picture=Picture(t_ns, self._camera.picture(now)) if picture else None,
+            route=self._route,
+        )
+
+    def outline(self, now: World, index: int, t_ns: int) -> Frame:
+        """The same without sweep, picture and route, which take nearly all of the time."""
         return Frame(
             index,
             f"{index:06d}",
             t_ns,
-            sweep=self._lidar.sweep(now, self._roadside, self._scenario.seed, index, t_ns),
-            picture=Picture(t_ns, self._camera.picture(now)) if picture else None,
             camera=self.camera,
             ego=self._odometry(now, index, t_ns),
             gnss=gnss.fix(now, self._scenario.gnss, self._scenario.seed, index, t_ns),
-            route=self._route,
         )
+
+    def sweep(self, now: World, index: int, t_ns: int) -> Sweep:
+        """The LiDAR's alone."""
+        return self._lidar.sweep(now, self._roadside, self._scenario.seed, index, t_ns)
 
     def _odometry(self, now: World, index: int, t_ns: int) -> EgoState:
         model = self._scenario.odometry

@@ -15,7 +15,7 @@ from pipeline.simulation import scenario, truth_boxes, world
 from pipeline.simulation.sensors import Sensors
 from pipeline.simulation.truth_lanes import lane_points
 from pipeline.sources.base import SourceError, TruthObject
-from pipeline.types import Frame
+from pipeline.types import Frame, Sweep
 
 _TRUTH_RANGE_M = 120.0
 
@@ -45,6 +45,15 @@ class SimulatedSource:
     def frame(self, index: int) -> Frame:
         now = self._world(index)
         return sensed(self._sensors.frame(now, index, self.t_ns(index)), now, self._scenario)
+
+    def outline(self, index: int) -> Frame:
+        now = self._world(index)
+        return sensed(self._sensors.outline(now, index, self.t_ns(index)), now, self._scenario)
+
+    def sweep(self, index: int) -> Sweep | None:
+        if self._scenario.sensors == "camera":
+            return None
+        return self._sensors.sweep(self._world(index), index, self.t_ns(index))
 
     def truth(self, index: int) -> tuple[TruthObject, ...]:
         self.t_ns(index)

@@ -150,9 +150,11 @@ def count_inside(cuboid: Cuboid, points: F32) -> int:
     """How many of (N, 3) ego points, in order of x, are in a cuboid."""
     reach_m = math.hypot(*cuboid.size[:2]) / 2
     first, last = np.searchsorted(points[:, 0], [cuboid.center[0] - reach_m, cuboid.center[0] + reach_m])
-    off = points[first:last].astype(np.float64) - cuboid.center
-    along = off @ rotation(0.0, 0.0, cuboid.yaw_rad)
-    return int(np.count_nonzero(np.all(np.abs(along) <= np.array(cuboid.size) / 2, axis=1)))
+    x, y, z = (points[first:last, k] - np.float64(cuboid.center[k]) for k in range(3))
+    c, s = math.cos(cuboid.yaw_rad), math.sin(cuboid.yaw_rad)
+    length, width, height = (side / 2 for side in cuboid.size)
+    is_inside = (np.abs(x * c + y * s) <= length) & (np.abs(y * c - x * s) <= width) & (np.abs(z) <= height)
+    return int(np.count_nonzero(is_inside))
 
 
 def _categories(labels: LabelSet) -> list[Row]:

@@ -42,7 +42,8 @@ def upload(desk: LabelDesk, *messages: dict[str, Any]) -> int:
     coming, sent = iter(messages), []
     scope = {
         "type": "http", "asgi": {"version": "3.0"}, "http_version": "1.1", "method": "POST", "scheme": "http",
-        "path": IMPORT, "raw_path": IMPORT.encode(), "query_string": b"person=Ada&drive=a", "root_path": "", "headers": [],
+        "path": IMPORT, "raw_path": IMPORT.encode(), "root_path": "", "headers": [],
+        "query_string": b"person=Ada&drive=a",
         "client": ("127.0.0.1", 1), "server": ("127.0.0.1", 2),
     }  # fmt: skip
 

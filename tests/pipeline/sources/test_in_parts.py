@@ -14,10 +14,12 @@ from pipeline.types import Frame
 from tests.pipeline.recording.frames import full, write
 
 
-@pytest.fixture(params=["session", "astyx", "kitti"])
+@pytest.fixture(params=["session", "astyx", "kitti", "simulated"])
 def source(request: pytest.FixtureRequest, tmp_path: Path) -> Source:
     if request.param == "session":
         return open_source(str(write(tmp_path / "drive.mcap", [full(index) for index in range(3)])))
+    if request.param == "simulated":
+        return open_source("sim:straight")
     folder = request.getfixturevalue("data_dir") / {"astyx": "astyx", "kitti": "kitti_0052"}[request.param]
     if not folder.is_dir():
         pytest.skip(f"no recording at {folder}")
