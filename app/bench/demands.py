@@ -55,7 +55,6 @@ DEMANDS = (
     *_faster("lidar_chain", "open3d, 0.2 m voxels", 6.0),
     *_faster("lidar_chain", "open3d", 50.0),
     Demand("decode", "median_ms", at_most=2.0),
-    Demand("decode dual", "median_ms", at_most=2.0),
     Demand("step", "median_ms", at_most=5.0),
     Demand("step_beside_network", "p99_to_idle_median", at_most=4.0),
     Demand("line", "rate_hz", at_least=10.0),
