@@ -83,12 +83,12 @@ class SessionSource:
             _or_note(lambda: self._read_picture(tick.picture), notes) if is_whole else None,
             _or_note(lambda: self._read_camera(tick.camera), notes),
             tick.ego,
-            notes=(*tick.notes, *notes),
             gnss=tick.gnss,
             route=_or_note(lambda: self._read_route(tick.route_at_ns), notes) if is_whole else None,
             streams=tick.streams,
             timing_ms=tick.timing_ms,
             **_given(tick, notes),
+            notes=(*tick.notes, *notes),  # last: reading the parts adds to them
         )
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 from pipeline.params import Params, with_changes
+from pipeline.recording.detections import BoxesRecord, Given, LanesRecord
 from pipeline.recording.session import SessionSource
 from pipeline.recording.writer import VERSION, About, SessionWriter
 from pipeline.sources import SourceError, open_source
@@ -101,6 +102,29 @@ def test_every_field_is_written() -> None:
         frame = full(0)
         made_anew = {"raw_boxes", "raw_lanes"}  # by the networks
         assert all(getattr(frame, field.name) is not None for field in fields(Frame) if field.name not in made_anew)
+
+
+@pytest.mark.parametrize(
+    ("given_of", "said"),
+    [
+        (Given(BoxesRecord("made", ((1.0, 2.0, 3.0, 4.0),), (), ("car",), REAL_VEHICLES)), "given boxes"),
+        (Given(lanes=LanesRecord("made", ((1.0, 2.0),), (1.0,), ())), "given lane lines"),
+    ],
+)
+def test_given_detections_that_do_not_fit_are_left_out_and_said(
+    given_of: Given, said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("pipeline.recording.writer.given_of", lambda frame: given_of)
+    frame = open_source(str(write(tmp_path / "a.mcap", [full(0)]))).frame(0)
+    assert (frame.raw_boxes, frame.raw_lanes, frame.detections_given) == (None, None, True)
+    assert frame.notes == (*full(0).notes, f"the {said} cannot be read")
+
+
+def test_a_route_that_cannot_be_read_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pipeline.recording.writer.route_message", lambda route: b"{}")
+    frame = open_source(str(write(tmp_path / "a.mcap", [full(0)]))).frame(0)
+    assert frame.route is None
+    assert frame.notes == (*full(0).notes, "a message of /route cannot be read")
 
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
