@@ -20,8 +20,9 @@ install: .venv/.installed
 demo: install
 	@$(BIN)/cipv demo
 
+# A file's tests stay in one process: they share servers and browsers.
 test: install check
-	@$(BIN)/python -m pytest -q $(TESTS)
+	@$(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist loadfile $(TESTS)
 
 check: install
 	@$(BIN)/ruff check app pipeline tests

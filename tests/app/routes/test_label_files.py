@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ from fastapi import FastAPI
 from app.labels.desk import LabelDesk
 from app.limits import BodyLimit
 from app.routes.label_files import IMPORT, label_files_router
+from tests.app.waiting import loop_apart
 
 MOST = 10
 """Bytes of a file."""
@@ -53,7 +53,8 @@ def upload(desk: LabelDesk, *messages: dict[str, Any]) -> int:
     async def send(message: Any) -> None:
         sent.append(message)
 
-    asyncio.run(BodyLimit(app, MOST)(scope, receive, send))
+    with loop_apart() as run:
+        run(BodyLimit(app, MOST)(scope, receive, send))
     return int(sent[0]["status"])
 
 

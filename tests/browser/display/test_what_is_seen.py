@@ -93,12 +93,19 @@ def test_the_figures_are_those_of_the_result(open_display: OpenDisplay, site: Si
 
 
 SHOW = """async (change) => {
-  const { get, set } = await import("/js/store.js");
-  const frame = get("frame"), result = { ...frame.result, acc: { ...frame.result.acc, ...change } };
-  set("frame", { ...frame, result });
+  const { get, on, set } = await import("/js/store.js");
+  const hold = () => {
+    const frame = get("frame"), { result } = frame;
+    if (result.acc.reason !== window.command.reason) {
+      set("frame", { ...frame, result: { ...result, acc: { ...result.acc, ...window.command } } });
+    }
+  };
+  if (!window.command) on(["frame"], hold);
+  window.command = change;
+  hold();
   await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
 }"""
-"""The shown frame with another command."""
+"""Another command with the shown frame, also when the server sends that again with a picture of another size."""
 
 ALARM_PIXELS = """(selector) => {
   const canvas = document.querySelector(selector), ctx = canvas.getContext("2d");
@@ -132,7 +139,7 @@ def test_warning_and_braking_differ_in_colour_word_and_shape(open_display: OpenD
     is_now(page, "paused")
     looks = set()
     for state in ("follow", "warn", "full_brake"):
-        page.evaluate(SHOW, {"state": state, "reason": "for a test"})
+        page.evaluate(SHOW, {"state": state, "reason": f"for a test of {state}"})
         looks.add(
             page.evaluate(
                 "() => [getComputedStyle(document.querySelector('#acc')).backgroundColor, "
