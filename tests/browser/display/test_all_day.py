@@ -75,10 +75,11 @@ def test_a_long_day_leaves_nothing_behind(fed: Page):
 def test_a_whole_day_of_frames_leaves_nothing_behind(fed: Page):
     """As many as ten a second make in a day, each one drawn or skipped as a page in the car would."""
     devtools, used = fed.context.new_cdp_session(fed), []
-    for _ in range(HOURS):
+    for hour in range(HOURS):
         for _ in range(FRAMES_AN_HOUR // SLICE):
             fed.evaluate(FEED, SLICE)
         used.append(used_bytes(devtools))
+        print(f"hour {hour + 1}: heap {used[-1][0] / 1e6:.2f} MB, {used[-1][1]['nodes']} nodes", flush=True)
     (first, at_first), (last, at_last) = used[0], used[-1]
     assert last - first < 2_000_000, [round(heap / 1e6, 1) for heap, _ in used]
     assert at_last["nodes"] <= at_first["nodes"] + 20
