@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from app.bench.timing import figures
-from pipeline.evaluation.experiments.network import embedded
+from pipeline.evaluation.experiments.seeing import embedded
 from pipeline.simulation import scenario
 from pipeline.simulation.loop import Eyes, NetworkEyes, Setup, TruthEyes, drive
 

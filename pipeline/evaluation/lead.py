@@ -21,7 +21,6 @@ a CIPV that is another object than the lead."""
 LABELLED_VEHICLES = VEHICLES | {"van", "tram", "trailer", "other vehicle", "motorcyclist"}
 """Label names of the recordings that may be a lead, lower case."""
 
-
 SAME_BOX_IOU = 0.5
 
 
@@ -89,7 +88,7 @@ def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judg
     counts as none."""
     if lead is not None and nearest_face_m(lead) > rule.max_range_m:
         lead = None
-    chosen = next((item for item in result.objects if result.cipv is not None and item.id == result.cipv.id), None)
+    chosen = result.chosen()
     in_reach = chosen is not None and chosen.distance_m is not None and chosen.distance_m <= rule.max_range_m
     if lead is None:
         distance = chosen.distance_m if chosen is not None and in_reach else None
@@ -106,7 +105,7 @@ def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judg
 def judge_lead_box(result: Result, bbox: Box) -> Judged:
     """One frame's CIPV against a lead that only the picture shows: correct when half of their boxes' union is common.
     Nobody knows how far off it is."""
-    chosen = next((item for item in result.objects if result.cipv is not None and item.id == result.cipv.id), None)
+    chosen = result.chosen()
     if chosen is None:
         return Judged(result.frame, "missed", None, None, None)
     on_it = chosen.bbox is not None and iou_matrix(np.array([chosen.bbox]), np.array([bbox]))[0, 0] >= SAME_BOX_IOU

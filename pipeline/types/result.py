@@ -128,3 +128,7 @@ class Result:
     layers: Layers
     next_cipv: Cipv | None = None
     streams: tuple[StreamHealth, ...] = ()
+
+    def chosen(self) -> FusedObject | None:
+        """The object that is the CIPV; null without one."""
+        return next((item for item in self.objects if self.cipv is not None and item.id == self.cipv.id), None)

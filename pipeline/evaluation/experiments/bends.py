@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from pipeline.evaluation.experiments.track import car
 from pipeline.simulation.scenario import Scenario
 
 LANE, LANES, LANE_WIDTH_M = -2, 3, 3.5
@@ -58,10 +59,10 @@ def scenario(layout: Layout, seed: int) -> Scenario:
     gain = (layout.reach_m - 22.0) / DURATION_S
     beside = [(lane, first) for lane in (LANE + 1, LANE - 1) for first in (20.0, 62.0)]
     decoys = [
-        _car(10 + k, lane, float(rng.uniform(ahead, ahead + 35.0)), speed + float(rng.uniform(-1.0, 1.0)))
+        car(10 + k, lane, float(rng.uniform(ahead, ahead + 35.0)), {0.0: speed + float(rng.uniform(-1.0, 1.0))})
         for k, (lane, ahead) in enumerate(beside)
     ]
-    return _scene(layout, seed, [_car(1, LANE, 20.0, speed + gain), *decoys])
+    return _scene(layout, seed, [car(1, LANE, 20.0, {0.0: speed + gain}), *decoys])
 
 
 def cut_in(layout: Layout, seed: int) -> tuple[Scenario, float]:
@@ -70,8 +71,9 @@ def cut_in(layout: Layout, seed: int) -> tuple[Scenario, float]:
     side = 1 if seed % 2 else -1
     start_s, takes_s = 5.0, 3.0
     change = {"start_s": start_s, "duration_s": takes_s, "lane": LANE}
-    car = _car(2, LANE + side, 25.0, layout.speed_mps) | {"lane_changes": [change]}
-    scene = _scene(layout, seed, [_car(1, LANE, 58.0, layout.speed_mps), car])
+    speed = {0.0: layout.speed_mps}
+    cutting_in = car(2, LANE + side, 25.0, speed) | {"lane_changes": [change]}
+    scene = _scene(layout, seed, [car(1, LANE, 58.0, speed), cutting_in])
     half_car_m = scene.actors[1].size()[1] / 2
     share = np.linspace(0.0, 1.0, 1001)
     moved = LANE_WIDTH_M * share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
@@ -95,10 +97,6 @@ def _scene(layout: Layout, seed: int, actors: list[dict[str, Any]]) -> Scenario:
             "actors": actors,
         }
     )
-
-
-def _car(number: int, lane: int, ahead_m: float, speed_mps: float) -> dict[str, Any]:
-    return {"id": number, "kind": "car", "lane": lane, "ahead_m": ahead_m, "speed_mps": {0.0: speed_mps}}
 
 
 def _segments(layout: Layout, side: float) -> list[dict[str, float]]:

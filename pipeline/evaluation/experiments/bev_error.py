@@ -17,23 +17,20 @@ import numpy as np
 from pipeline.alignment import Pinhole, project_cuboid
 from pipeline.evaluation.experiments import layouts
 from pipeline.evaluation.experiments.layouts import LAYOUTS
-from pipeline.evaluation.experiments.network import embedded
-from pipeline.evaluation.experiments.sections import (
-    GIVEN,
+from pipeline.evaluation.experiments.sections import Cell, Chart, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.experiments.seeing import (
+    COMPARED,
+    SENSORS,
     Boxes,
-    Cell,
-    Chart,
-    Experiment,
-    Replay,
-    Section,
-    Series,
-    Table,
+    boxes_said,
+    detections_for,
+    eyes_for,
 )
 from pipeline.evaluation.experiments.track import parameters, target_of, true_range_m
 from pipeline.geometry import iou_matrix
 from pipeline.path.placing import near_face_middle
 from pipeline.run import Sensors
-from pipeline.simulation.loop import NetworkEyes, Setup, Tick, TruthEyes, drive
+from pipeline.simulation.loop import Setup, Tick, drive
 from pipeline.simulation.scenario import Scenario
 
 MAX_M = 60.0
@@ -50,9 +47,6 @@ PRINTED: dict[tuple[str, str], tuple[float, ...]] = {
     ("c", "V"): (0.0041, 0.4821, 0.2432, 0.0572, 5.4662, 1.4343, 0.0034, 5.4662, 0.2386),
 }
 """Table 4: min, max and MAE of distance, lateral and longitudinal error, m."""
-
-
-SENSORS: dict[Sensors, str] = {"lidar": "LiDAR alone", "both": "fused"}
 
 
 @dataclass(frozen=True)
@@ -93,30 +87,29 @@ class Error:
 
 def cases(short: bool) -> list[Case]:
     """The network looks in one layout only: a drawn picture takes ten times as long as all the rest."""
-    given = [Case(each.layout, each.seed, sensors) for sensors in SENSORS for each in layouts.cases(short)]
+    given = [Case(each.layout, each.seed, sensors) for sensors in COMPARED for each in layouts.cases(short)]
     return given if short else given + [Case("a", seed, boxes="network") for seed in range(_BY_NETWORK)]
 
 
 def run(case: Case) -> list[Sighting]:
-    eyes = TruthEyes() if case.boxes == "truth" else NetworkEyes(embedded())
-    setup = Setup(_PARAMS, case.sensors, eyes, closed=False)
+    setup = Setup(_PARAMS, case.sensors, eyes_for(case.boxes), closed=False)
     return [seen for tick in drive(_scenario(case), setup) if (seen := sighting(tick)) is not None]
 
 
 def replay(case: Case, seen: list[Sighting]) -> Replay:
     """The drive of one run."""
-    boxes = ", network" if case.boxes == "network" else ""
     errors = [each.error for each in seen if each.error is not None]
+    who = f"{SENSORS[case.sensors]}{boxes_said(case.boxes)}"
     far_m = max((abs(error.distance_m) for error in errors), default=0.0)
     return Replay(
         f"bev_error_{case.layout}_{case.sensors}_{case.boxes}_{case.seed}",
-        f"Place of fused objects: {LAYOUTS[case.layout]}, {SENSORS[case.sensors]}{boxes}, run {case.seed}",
+        f"Place of fused objects: {LAYOUTS[case.layout]}, {who}, run {case.seed}",
         (f"Placed in {len(errors)} of {len(seen)} frames, {far_m:.1f} m off in range at most.",),
         _scenario(case),
         _PARAMS,
         case.sensors,
         (_chart("Distance error over range", seen),),
-        GIVEN if case.boxes == "truth" else None,
+        detections_for(case.boxes),
     )
 
 
@@ -220,7 +213,7 @@ def _chart(title: str, seen: list[Sighting]) -> Chart:
     for source in ("VL", "V", "L"):
         found = [(each.range_m, each.error.distance_m) for each in seen if each.error and each.error.source == source]
         if found:
-            series.append(Series(source, tuple(x for x, _ in found), tuple(y for _, y in found), points_only=True))
+            series.append(Series.of_points(source, found))
     return Chart(title, "true range m", "error m", tuple(series))
 
 

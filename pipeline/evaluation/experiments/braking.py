@@ -3,22 +3,18 @@
 CCRs: 100 km/h towards a standing car. CCRm: 50 km/h towards one that drives 20 km/h. CCRb: both at 50 km/h, 50 m apart,
 and the lead brakes at 6 m/s² to standstill. The LiDAR alone against both sensors, ACC alone against ACC with AEB.
 
-The paper reports no drive, only the constant deceleration that its detection ranges would ask for; ``printed`` and
-``needed`` work that out as printed and as physics has it.
+The paper reports no drive, only the constant deceleration that its detection ranges would ask for: ``closed_forms``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import mean
-from typing import Literal
 
-from pipeline.evaluation.experiments.network import embedded
+from pipeline.evaluation.experiments.closed_forms import LEAD_DECEL_MPS2, PAPER, Manoeuvre, closed_forms
 from pipeline.evaluation.experiments.sections import (
-    GIVEN,
     AnyCell,
-    Boxes,
     Chart,
     Driven,
     Experiment,
@@ -28,60 +24,26 @@ from pipeline.evaluation.experiments.sections import (
     Series,
     Table,
 )
-from pipeline.evaluation.experiments.track import Drive, approach, drive_charts, parameters, scene
+from pipeline.evaluation.experiments.seeing import (
+    COMPARED,
+    SENSORS,
+    Boxes,
+    boxes_said,
+    detections_for,
+    eyes_for,
+)
+from pipeline.evaluation.experiments.track import KMH, Drive, approach, drive_charts, parameters, scene
 from pipeline.params import Params
 from pipeline.run import Sensors
-from pipeline.simulation.loop import NetworkEyes, Setup, TruthEyes
+from pipeline.simulation.loop import Setup
 from pipeline.simulation.replay import as_driven
 from pipeline.simulation.scenario import Scenario
 
-KMH = 1.0 / 3.6
-Manoeuvre = Literal["CCRs", "CCRm", "CCRb"]
 Key = tuple[Manoeuvre, Sensors, str, Boxes]
-LEAD_DECEL_MPS2 = 6.0
 _LEAD_BRAKES_AT_S = 2.0
 _SHOWN_AT_S: dict[Manoeuvre, float] = {"CCRs": 3.0, "CCRm": 7.0, "CCRb": 3.0}
 _CLEAR_MPS, _CLEAR_M = 0.3, 0.3
 """Impact speed or gap that must differ by more before one is called better."""
-SENSORS: dict[Sensors, str] = {"lidar": "LiDAR", "both": "fused"}
-
-
-@dataclass(frozen=True)
-class Printed:
-    """A manoeuvre as the paper computes it: speed before and after, km/h; the gap it wants to be left, m; detection
-    ranges, m, and the decelerations that it prints for them."""
-
-    speed_kmh: float
-    end_kmh: float
-    keep_m: float
-    lidar_m: float
-    fused_m: float
-    lidar_mps2: float
-    fused_mps2: float
-
-
-PAPER: dict[Manoeuvre, Printed] = {
-    "CCRs": Printed(100.0, 0.0, 10.0, 30.0, 60.0, 19.29, 7.72),
-    "CCRm": Printed(50.0, 20.0, 20.0, 35.0, 60.0, 5.401, 2.025),
-    "CCRb": Printed(50.0, 0.0, 10.0, 30.0, 50.0, 4.823, 2.411),
-}
-
-
-def printed_decel_mps2(speed_mps: float, end_mps: float, detected_m: float, keep_m: float) -> float:
-    """The paper's formula: (v² − v₀²) / (2·(d − d_keep)). It takes the lead for standing, whatever it does."""
-    return (speed_mps**2 - end_mps**2) / (2.0 * (detected_m - keep_m))
-
-
-def needed_decel_mps2(closing_mps: float, detected_m: float, keep_m: float) -> float:
-    """Physics for a lead at constant speed: Δv² / (2·(d − d_keep)), in the lead's own frame."""
-    return closing_mps**2 / (2.0 * (detected_m - keep_m))
-
-
-def needed_behind_braking_mps2(
-    speed_mps: float, lead_mps: float, lead_decel_mps2: float, gap_m: float, keep_m: float
-) -> float:
-    """Physics for a lead that brakes to standstill: its own stopping distance adds to the gap."""
-    return speed_mps**2 / (2.0 * (gap_m + lead_mps**2 / (2.0 * lead_decel_mps2) - keep_m))
 
 
 @dataclass(frozen=True)
@@ -109,7 +71,7 @@ def cases(short: bool) -> list[Case]:
     fast = [
         Case(manoeuvre, sensors, controller, seed)
         for manoeuvre in manoeuvres
-        for sensors in SENSORS
+        for sensors in COMPARED
         for controller in ("ACC", "ACC + AEB")
         for seed in range(1 if short else 10)
     ]
@@ -120,8 +82,7 @@ def cases(short: bool) -> list[Case]:
 
 def run(case: Case) -> Drive:
     """One manoeuvre, driven."""
-    eyes = TruthEyes() if case.boxes == "truth" else NetworkEyes(embedded())
-    setup = Setup(_params(case), case.sensors, eyes)
+    setup = Setup(_params(case), case.sensors, eyes_for(case.boxes))
     return approach(_scenario(case), setup, stop_when_over=case.manoeuvre != "CCRm")
 
 
@@ -137,8 +98,7 @@ def _params(case: Case) -> Params:
 
 def replay(case: Case, drive: Drive) -> Replay:
     """The drive of one run."""
-    boxes = ", network" if case.boxes == "network" else ""
-    title = f"{case.manoeuvre}: {SENSORS[case.sensors]}, {case.controller}{boxes}, run {case.seed}"
+    title = f"{case.manoeuvre}: {_label(case)}, run {case.seed}"
     impact = f"Impact at {drive.impact_mps / KMH:.0f} km/h." if drive.impact_mps is not None else "No impact."
     return Replay(
         case.name,
@@ -148,8 +108,12 @@ def replay(case: Case, drive: Drive) -> Replay:
         _params(case),
         case.sensors,
         drive_charts(drive),
-        GIVEN if case.boxes == "truth" else None,
+        detections_for(case.boxes),
     )
+
+
+def _label(case: Case) -> str:
+    return f"{SENSORS[case.sensors]}, {case.controller}{boxes_said(case.boxes)}"
 
 
 def _target(manoeuvre: Manoeuvre, speed_mps: float) -> tuple[dict[str, object], float]:
@@ -226,8 +190,8 @@ def _row(key: Key, by_name: dict[str, Drive]) -> tuple[AnyCell, ...]:
     )
 
 
-def _mean(values: object) -> float | None:
-    known = [value for value in values if value is not None]  # type: ignore[attr-defined]
+def _mean(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
     return mean(known) if known else None
 
 
@@ -252,40 +216,13 @@ def _ends(worst: tuple[float, float]) -> str:
     return f"in an impact at {worst[0] / KMH:.0f} km/h" if worst[0] > 0.0 else f"{-worst[1]:.1f} m before contact"
 
 
-def closed_forms() -> Table:
-    """The printed decelerations, out of the printed formula, and the right physics beside."""
-    rows = []
-    for manoeuvre, paper in PAPER.items():
-        speed, end = paper.speed_kmh * KMH, paper.end_kmh * KMH
-        for name, detected, value in (
-            ("LiDAR", paper.lidar_m, paper.lidar_mps2),
-            ("fused", paper.fused_m, paper.fused_mps2),
-        ):
-            formula = printed_decel_mps2(speed, end, detected, paper.keep_m)
-            physics = (
-                needed_behind_braking_mps2(speed, speed, LEAD_DECEL_MPS2, detected, paper.keep_m)
-                if manoeuvre == "CCRb"
-                else needed_decel_mps2(speed - end, detected, paper.keep_m)
-            )
-            rows.append((manoeuvre, name, detected, paper.keep_m, value, formula, physics))
-    return Table(
-        "Constant deceleration needed from the paper's detection ranges, m/s²",
-        ("manoeuvre", "sensors", "detected at m", "gap kept m", "printed", "printed formula", "physics"),
-        tuple(rows),
-        "The print takes every lead for standing. Physics: CCRm closes at 30 km/h only; in CCRb the lead's own "
-        f"stopping distance (at {LEAD_DECEL_MPS2:g} m/s²) adds to the gap.",
-        3,
-    )
-
-
 def _charts(manoeuvre: Manoeuvre, done: list[tuple[Case, Drive]]) -> tuple[Chart, Chart]:
     first = [(case, drive) for case, drive in done if case.manoeuvre == manoeuvre and case.seed == 0]
-    names = {"truth": "", "network": ", network"}
 
     def lines(values: str, scale: float) -> tuple[Series, ...]:
         return tuple(
             Series(
-                f"{SENSORS[case.sensors]}, {case.controller}{names[case.boxes]}",
+                _label(case),
                 drive.t_s,
                 tuple(value * scale for value in getattr(drive, values)),
             )

@@ -9,14 +9,11 @@ just come into sight must be seen as often as confirmation asks (``cipv.confirm_
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
-import numpy as np
-
 from pipeline.evaluation.experiments.sections import (
-    GIVEN_SAID,
     AnyCell,
     Chart,
     Driven,
@@ -27,17 +24,15 @@ from pipeline.evaluation.experiments.sections import (
     Series,
     Table,
 )
+from pipeline.evaluation.experiments.seeing import GIVEN_SAID, SENSORS
+from pipeline.evaluation.experiments.true_lead import MAX_M, InSight, Way, range_m, same_place, true_lead
 from pipeline.evaluation.lead import switches
-from pipeline.params import CipvParams, Params, PathParams
-from pipeline.path.corridor import nearest_on_path
+from pipeline.params import CipvParams, Params
 from pipeline.path.placing import near_face_middle
 from pipeline.run import Sensors
-from pipeline.simulation import scenario, world
+from pipeline.simulation import scenario
 from pipeline.simulation.loop import Setup, Tick, drive
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.truth_boxes import in_picture
-from pipeline.simulation.world import ActorState, World
-from pipeline.types import F64, CameraCalibration, Path, Point2
 
 SCENARIOS = {
     "straight": "straight road",
@@ -45,15 +40,9 @@ SCENARIOS = {
     "turn_across_left": "turn across, from the left",
     "turn_across_right": "turn across, from the right",
 }
-SENSORS: dict[Sensors, str] = {"lidar": "LiDAR", "camera": "camera", "both": "fused"}
-MAX_M = 60.0
-OVERLAP_M = 0.9
-"""In the path: as much of the vehicle as this reaches into the corridor, or half of what is narrower."""
-VISIBLE_SHARE = 0.35
 _SHOWN_AT = 0.4
-_EDGE_M, _MARGIN_M = 0.3, 12.0
-_AHEAD_M, _STEP_S, _LONGEST_S, _SMALLEST_MOVE_M = 90.0, 0.25, 15.0, 0.2
-_SAME_PLACE_M, _SAME_SHARE = 2.5, 0.2
+_MARGIN_M = 12.0
+Key = tuple[str, Sensors]
 Verdict = Literal["correct", "none", "missed", "false", "wrong", "edge", "hidden", "new"]
 UNDECIDABLE = ("edge", "hidden", "new")
 """edge: either answer is right · hidden: a nearer vehicle covers the lead · new: it was covered, or the drive had not
@@ -124,11 +113,10 @@ def replay(case: Case, frames: list[Frame]) -> Replay:
 def judge(way: Way, tick: Tick, in_sight: InSight) -> Frame:
     """The frame's CIPV against the vehicle that the car will really meet first."""
     lead, doubtful = true_lead(tick.world, way.ahead(tick.world))
-    cipv = tick.result.cipv
-    chosen = next((item for item in tick.result.objects if cipv is not None and item.id == cipv.id), None)
+    chosen = tick.result.chosen()
     if chosen is not None and (chosen.distance_m or 0.0) > MAX_M:
         chosen = None
-    lead_m = _range_m(lead) if lead is not None else None
+    lead_m = range_m(lead) if lead is not None else None
     verdict: Verdict
     if doubtful:
         verdict = "edge"
@@ -152,92 +140,6 @@ def judge(way: Way, tick: Tick, in_sight: InSight) -> Frame:
     )
 
 
-@dataclass(frozen=True)
-class Way:
-    """Where the ego vehicle's script takes it. t_s: (M,). places: (M, 2) world x, y."""
-
-    t_s: F64
-    places: F64
-
-    @staticmethod
-    def of(scene: Scenario) -> Way:
-        """The whole drive and 15 s more."""
-        alone = scene.model_copy(update={"actors": (), "crossing_actors": ()})
-        t_s = np.arange(0.0, scene.duration_s + _LONGEST_S, _STEP_S)
-        return Way(t_s, np.array([world.at(alone, float(t)).pose[:2] for t in t_s]))
-
-    def ahead(self, now: World, at_most_m: float = _AHEAD_M) -> Path | None:
-        """What is left of it, 90 m at most, in the ego frame of now; null while the car stands."""
-        coming = np.vstack([now.pose[:2], self.places[self.t_s > now.t_s]])
-        moved = np.hypot(*np.diff(coming, axis=0).T)
-        keep = np.concatenate([[True], (moved > _SMALLEST_MOVE_M) & (np.cumsum(moved) < at_most_m)])
-        if keep.sum() < 2:
-            return None
-        center = now.to_ego(coming[keep])
-        return Path("gnss", center, center, center, PathParams().half_width_m, {}, {})
-
-
-def true_lead(now: World, path: Path | None, max_m: float = MAX_M) -> tuple[ActorState | None, bool]:
-    """The first vehicle on the driven path within ``max_m``, and whether one at the path's edge makes that doubtful."""
-    found: list[tuple[float, ActorState]] = []
-    doubtful_m = np.inf
-    for state in now.actors:
-        if path is None or _range_m(state) > max_m:
-            continue
-        offsets, along = nearest_on_path(path, state.cuboid.footprint())
-        low, high, nearest = float(offsets.min()), float(offsets.max()), float(along.min())
-        if nearest <= 0.0:
-            continue
-        half = path.half_width_m
-        too_little = min(high, half) - max(low, -half) - min(OVERLAP_M, 0.5 * (high - low))
-        if abs(too_little) < _EDGE_M:
-            doubtful_m = min(doubtful_m, nearest)
-        elif too_little > 0.0:
-            found.append((nearest, state))
-    nearest_m, lead = min(found, key=lambda pair: pair[0], default=(np.inf, None))
-    return lead, bool(doubtful_m < nearest_m)
-
-
-@dataclass(frozen=True)
-class InSight:
-    """For how many frames in a row each vehicle has been in sight, by number. A hidden one is not among them."""
-
-    frames: Mapping[int, int] = field(default_factory=dict)
-
-    def then(self, now: World, camera: CameraCalibration) -> InSight:
-        """One frame later."""
-        covered = _covered(now, camera)
-        ids = [state.actor.id for state in now.actors if state.actor.id not in covered]
-        return InSight({each: self.frames.get(each, 0) + 1 for each in ids})
-
-    def is_hidden(self, actor: int) -> bool:
-        """Whether nearer vehicles cover so much of it that neither sensor can see it."""
-        return actor not in self.frames
-
-    def is_confirmable(self, actor: int) -> bool:
-        """Whether it could have been seen as often as an object must be that one sensor sees."""
-        return self.frames.get(actor, 0) >= CipvParams().confirm_hits
-
-
-def _covered(now: World, camera: CameraCalibration) -> frozenset[int]:
-    return frozenset(seen.actor.actor.id for seen in in_picture(now, camera) if seen.visible < VISIBLE_SHARE)
-
-
-def _near_face(state: ActorState) -> Point2:
-    a, b, c, d = ((float(x), float(y)) for x, y in state.cuboid.footprint())
-    return near_face_middle((a, b, c, d))
-
-
-def _range_m(state: ActorState) -> float:
-    return float(np.hypot(*_near_face(state)))
-
-
-def same_place(point: Point2, lead: ActorState) -> bool:
-    """Whether a point is where a vehicle's nearest face is, give or take a fifth of its range."""
-    x, y = _near_face(lead)
-    return float(np.hypot(point[0] - x, point[1] - y)) <= max(_SAME_PLACE_M, _SAME_SHARE * _range_m(lead))
-
-
 def acquired_m(frames: Sequence[Frame]) -> list[float]:
     """For each true lead: its range in the first frame in which it was rightly chosen."""
     first: dict[int, float] = {}
@@ -249,22 +151,10 @@ def acquired_m(frames: Sequence[Frame]) -> list[float]:
 
 def report(cases: Sequence[Case], runs: Sequence[list[Frame]]) -> Section:
     scenes = list(dict.fromkeys(case.scene for case in cases))
-    by_name = {case.name: _share_correct([run]) for case, run in zip(cases, runs, strict=True)}
-    groups = {
-        (scene, sensors): [
-            run for case, run in zip(cases, runs, strict=True) if (case.scene, case.sensors) == (scene, sensors)
-        ]
-        for scene in scenes
-        for sensors in SENSORS
-    }
-    worst = {
-        (scene, sensors): min(
-            (case.name for case in cases if (case.scene, case.sensors) == (scene, sensors)),
-            key=lambda name: by_name[name],
-            default="",
-        )
-        for scene, sensors in groups
-    }
+    driven: dict[Key, dict[str, list[Frame]]] = {(scene, sensors): {} for scene in scenes for sensors in SENSORS}
+    for case, run in zip(cases, runs, strict=True):
+        driven[case.scene, case.sensors][case.name] = run
+    groups = {key: list(by_name.values()) for key, by_name in driven.items()}
     return Section(
         "choosing",
         "Choosing the CIPV: straight, left turn, turns across",
@@ -281,7 +171,7 @@ def report(cases: Sequence[Case], runs: Sequence[list[Frame]]) -> Section:
             Table(
                 "Frames",
                 _COLUMNS,
-                tuple(_row(scene, sensors, group, worst[scene, sensors]) for (scene, sensors), group in groups.items()),
+                tuple(_row(scene, sensors, by_name) for (scene, sensors), by_name in driven.items()),
                 "The share leads to the run with the least.",
                 decimals=1,
             ),
@@ -315,7 +205,10 @@ _COLUMNS = (
 )
 
 
-def _row(scene: str, sensors: Sensors, runs: list[list[Frame]], worst: str) -> tuple[AnyCell, ...]:
+def _row(scene: str, sensors: Sensors, by_name: dict[str, list[Frame]]) -> tuple[AnyCell, ...]:
+    """The runs of one scenario with one set of sensors; the share leads to the worst of them."""
+    runs = list(by_name.values())
+    worst = min(by_name, key=lambda name: _share_correct([by_name[name]]), default="")
     frames = [frame for run in runs for frame in run if frame.verdict not in UNDECIDABLE]
     count = {verdict: sum(frame.verdict == verdict for frame in frames) for verdict in ("missed", "false", "wrong")}
     first = [distance for run in runs for distance in acquired_m(run)]
@@ -337,7 +230,7 @@ def _share_correct(runs: list[list[Frame]]) -> float:
     return sum(frame.verdict in ("correct", "none") for frame in frames) / max(len(frames), 1)
 
 
-def _verdict(scene: str, groups: dict[tuple[str, Sensors], list[list[Frame]]]) -> str:
+def _verdict(scene: str, groups: dict[Key, list[list[Frame]]]) -> str:
     share = {sensors: 100.0 * _share_correct(groups[scene, sensors]) for sensors in SENSORS}
     better = "better than" if share["both"] > share["lidar"] + 0.5 else "no better than"
     return (
@@ -346,15 +239,18 @@ def _verdict(scene: str, groups: dict[tuple[str, Sensors], list[list[Frame]]]) -
     )
 
 
-def _chart(scene: str, groups: dict[tuple[str, Sensors], list[list[Frame]]]) -> Chart:
+def _chart(scene: str, groups: dict[Key, list[list[Frame]]]) -> Chart:
     """The first run: the true lead's range and what each set of sensors chose."""
     first = {sensors: runs[0] for (name, sensors), runs in groups.items() if name == scene and runs}
     truth = [(frame.t_s, frame.lead_m) for frame in next(iter(first.values()), []) if frame.lead_m is not None]
-    lines = [Series("truth", tuple(t for t, _ in truth), tuple(d for _, d in truth), points_only=True)]
-    for sensors, frames in first.items():
-        seen = [(frame.t_s, frame.chosen_m) for frame in frames if frame.chosen_m is not None]
-        lines.append(Series(SENSORS[sensors], tuple(t for t, _ in seen), tuple(d for _, d in seen), points_only=True))
-    return Chart(f"{SCENARIOS[scene].capitalize()}: distance of the CIPV", "time s", "distance m", tuple(lines))
+    seen = (
+        Series.of_points(
+            SENSORS[sensors], ((frame.t_s, frame.chosen_m) for frame in frames if frame.chosen_m is not None)
+        )
+        for sensors, frames in first.items()
+    )
+    title = f"{SCENARIOS[scene].capitalize()}: distance of the CIPV"
+    return Chart(title, "time s", "distance m", (Series.of_points("truth", truth), *seen))
 
 
 CHOOSING = Experiment("choosing", "paper", "Choosing the CIPV", cases, run, report, replay)

@@ -2,7 +2,7 @@
 
 Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge and no nearer
 vehicle hides it. Missing one that has just come into sight is not counted before confirmation can be through
-(``choosing.InSight``).
+(``true_lead.InSight``).
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.evaluation.experiments.choosing import InSight, Way, same_place, true_lead
+from pipeline.evaluation.experiments.true_lead import InSight, Way, same_place, true_lead
 from pipeline.params import Params, with_changes
 from pipeline.path.corridor import nearest_on_path
 from pipeline.path.placing import near_face_middle
@@ -142,7 +142,7 @@ def _frames(rows: Sequence[tuple[Moment, Result]], over_line_s: float | None) ->
 
 def judge(moment: Moment, result: Result) -> Verdict:
     """The frame's CIPV against the vehicle that really is the first in the lane."""
-    chosen = next((item for item in result.objects if result.cipv is not None and item.id == result.cipv.id), None)
+    chosen = result.chosen()
     place = near_face_middle(chosen.bev) if chosen is not None and chosen.bev is not None else None
     if moment.is_doubtful:
         return "undecided"

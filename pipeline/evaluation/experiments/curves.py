@@ -5,7 +5,7 @@ lanes beside it at 20–100 m. Detections are given: true boxes with the errors 
 simulated LiDAR. Every frame goes through the line with each source of the path alone, with none, without a route, and
 with all fused. Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge
 and no nearer vehicle hides it. Missing one that has just come into sight is not counted before confirmation can be
-through (``choosing.InSight``).
+through (``true_lead.InSight``).
 """
 
 from __future__ import annotations
@@ -76,14 +76,18 @@ def replay(case: Case, outcome: Outcome) -> Replay:
 
 def _lead_chart(drive: Frames) -> Chart:
     """The true lead's range, by whether it was chosen."""
-    series = []
-    for name, verdicts in (("right", ("right",)), ("not", ("missed", "decoy")), ("not decidable", ("undecided",))):
-        seen = [
-            (t_s, metres)
-            for t_s, verdict, metres in zip(drive.t_s, drive.verdicts, drive.lead_m, strict=True)
-            if verdict in verdicts and metres is not None
-        ]
-        series.append(Series(name, tuple(t_s for t_s, _ in seen), tuple(m for _, m in seen), points_only=True))
+    shown = {"right": ("right",), "not": ("missed", "decoy"), "not decidable": ("undecided",)}
+    series = (
+        Series.of_points(
+            name,
+            (
+                (t_s, metres)
+                for t_s, verdict, metres in zip(drive.t_s, drive.verdicts, drive.lead_m, strict=True)
+                if verdict in verdicts and metres is not None
+            ),
+        )
+        for name, verdicts in shown.items()
+    )
     return Chart("Range of the true lead", "time s", "range m", tuple(series))
 
 

@@ -9,11 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import sqrt
-from typing import Any, Literal, NamedTuple
+from typing import NamedTuple
 
+from pipeline.evaluation.experiments.iso_scenarios import (
+    BEND_FROM_M,
+    CURVE_LATERAL_MPS2,
+    RADII_M,
+    Test,
+    scenario,
+)
 from pipeline.evaluation.experiments.sections import (
-    GIVEN_SAID,
     AnyCell,
     Chart,
     Coloured,
@@ -24,7 +29,8 @@ from pipeline.evaluation.experiments.sections import (
     Series,
     Table,
 )
-from pipeline.evaluation.experiments.track import TARGET, gap_m, measured_m, parameters, target_of, true_range_m
+from pipeline.evaluation.experiments.seeing import COMPARED, GIVEN_SAID, SENSORS
+from pipeline.evaluation.experiments.track import gap_m, measured_m, parameters, target_of, true_range_m
 from pipeline.params import Params
 from pipeline.run import Sensors
 from pipeline.simulation.actors import Motion
@@ -32,16 +38,10 @@ from pipeline.simulation.loop import Setup, drive
 from pipeline.simulation.replay import as_driven
 from pipeline.simulation.scenario import Scenario
 
-Test = Literal["acquisition", "discrimination", "curve", "stop", "following"]
-SENSORS: dict[Sensors, str] = {"lidar": "LiDAR", "both": "fused"}
+Key = tuple[Test, float, Sensors]
 ACC_BRAKE_MPS2 = 3.5
-LEAD_BRAKE_MPS2 = 2.5
 SMALLEST_TIME_GAP_S = 0.8
-RADII_M = (500.0, 250.0, 125.0)
-CURVE_LATERAL_MPS2 = 2.0
-_LANE_M = 3.5
 _MOVING_MPS = 5.0
-_BEND_FROM_M, _TRANSITION_M = 210.0, 30.0
 _KEPT = 0.95
 
 
@@ -98,34 +98,38 @@ def cases(short: bool) -> list[Case]:
         Case(test, value, sensors, seed)
         for test, values in plan.items()
         for value in values
-        for sensors in SENSORS
+        for sensors in COMPARED
         for seed in seeds
     ]
 
 
 def run(case: Case) -> Outcome:
-    scenario = _scenario(case)
+    driven = _scenario(case)
     rows: list[_Row] = []
     touched = False
-    for tick in drive(scenario, Setup(_params(scenario), case.sensors)):
+    for tick in drive(driven, Setup(_params(driven), case.sensors)):
         target = target_of(tick)
         touched = case.test != "curve" and gap_m(target) <= 0.0
         if touched:
             break
-        counted = case.test != "curve" or tick.world.s_m >= _BEND_FROM_M
+        counted = case.test != "curve" or tick.world.s_m >= BEND_FROM_M
         seen = measured_m(tick, target) is not None
         rows.append(_Row(tick.t_s, true_range_m(target), tick.vehicle.speed_mps, seen, counted, tick.vehicle.motion()))
     return _outcome(rows, touched)
 
 
-def _params(scenario: Scenario) -> Params:
-    speed = max(scenario.ego.speed_mps.values())
+def _scenario(case: Case) -> Scenario:
+    return scenario(case.test, case.value, case.seed)
+
+
+def _params(driven: Scenario) -> Params:
+    speed = max(driven.ego.speed_mps.values())
     return parameters("ACC", speed, {"acc.brake_limit_mps2": ACC_BRAKE_MPS2})
 
 
 def replay(case: Case, outcome: Outcome) -> Replay:
     """The drive of one run."""
-    scenario = _scenario(case)
+    driven = _scenario(case)
     title = f"{case.test.capitalize()}, {case.at}: {SENSORS[case.sensors]}, run {case.seed}"
     seen_m, gap_s = outcome.acquired_m, outcome.smallest_time_gap_s
     return Replay(
@@ -137,8 +141,8 @@ def replay(case: Case, outcome: Outcome) -> Replay:
             "Contact." if outcome.touched else f"Smallest gap {outcome.smallest_gap_m:.1f} m.",
             *([f"Smallest time gap {gap_s:.2f} s."] if gap_s is not None else []),
         ),
-        as_driven(scenario, outcome.motions, title),
-        _params(scenario),
+        as_driven(driven, outcome.motions, title),
+        _params(driven),
         case.sensors,
         (
             Chart("Range to the lead", "time s", "range m", (Series("true", outcome.t_s, outcome.range_m),)),
@@ -176,63 +180,12 @@ def _outcome(rows: list[_Row], touched: bool) -> Outcome:
     )
 
 
-def _scenario(case: Case) -> Scenario:
-    speed = case.value / 3.6
-    match case.test:
-        case "acquisition":
-            return _drive(case, speed, [_car(TARGET, 0, 130.0, {0.0: 0.5 * speed})], 18.0)
-        case "discrimination":
-            gap = 5.0 + 1.8 * speed
-            beside = [_car(2, 1, gap - 8.0, {0.0: speed}), _car(3, -1, gap - 4.0, {0.0: speed})]
-            return _drive(case, speed, [_car(TARGET, 0, gap, {0.0: speed}), *beside], 12.0)
-        case "curve":
-            speed = sqrt(CURVE_LATERAL_MPS2 * case.value)
-            slows = {0.0: speed, 9.0: speed, 11.0: 0.8 * speed}
-            bend = [
-                {"length_m": _BEND_FROM_M - _TRANSITION_M},
-                {"length_m": _TRANSITION_M, "end_curvature_per_m": 1.0 / case.value},
-                {"length_m": 2000.0, "radius_m": case.value},
-            ]
-            return _drive(case, speed, [_car(TARGET, 0, 5.0 + 1.8 * speed, slows)], 16.0, bend)
-        case "stop":
-            brake = {"at_s": 4.0, "decel_mps2": LEAD_BRAKE_MPS2}
-            lead = {**_car(TARGET, 0, 5.0 + 1.8 * speed, {0.0: speed}), "brake": brake}
-            return _drive(case, speed, [lead], 22.0)
-        case "following":
-            waves = {0.0: 0.75 * speed, 14.0: 0.75 * speed, 18.0: 0.6 * speed, 24.0: 0.8 * speed}
-            return _drive(case, speed, [_car(TARGET, 0, 70.0, waves)], 32.0)
-
-
-def _car(number: int, lanes_left: int, ahead_m: float, speed_mps: dict[float, float]) -> dict[str, Any]:
-    return {"id": number, "kind": "car", "lane": -2 + lanes_left, "ahead_m": ahead_m, "speed_mps": speed_mps}
-
-
-def _drive(
-    case: Case,
-    speed_mps: float,
-    actors: list[dict[str, Any]],
-    duration_s: float,
-    segments: list[dict[str, float]] | None = None,
-) -> Scenario:
-    return Scenario.model_validate(
-        {
-            "title": f"{case.test} {case.value:g}",
-            "seed": case.seed,
-            "duration_s": duration_s,
-            "road": {"segments": segments or [{"length_m": 5000.0}], "lanes_oncoming": 0, "lane_width_m": _LANE_M},
-            "ego": {"lane": -2, "speed_mps": {0.0: speed_mps}},
-            "actors": actors,
-        }
-    )
-
-
 def report(cases: Sequence[Case], outcomes: Sequence[Outcome]) -> Section:
-    groups: dict[tuple[Test, float, Sensors], list[Outcome]] = {}
-    names: dict[tuple[Test, float, Sensors], list[Case]] = {}
+    driven: dict[Key, dict[Case, Outcome]] = {}
     for case, outcome in zip(cases, outcomes, strict=True):
-        groups.setdefault((case.test, case.value, case.sensors), []).append(outcome)
-        names.setdefault((case.test, case.value, case.sensors), []).append(case)
-    rows = tuple(_row(names[key], group) for key, group in groups.items())
+        driven.setdefault((case.test, case.value, case.sensors), {})[case] = outcome
+    groups = {key: list(by_case.values()) for key, by_case in driven.items()}
+    rows = tuple(_row(by_case) for by_case in driven.values())
     return Section(
         "iso",
         "ACC after the manner of ISO 15622",
@@ -268,10 +221,10 @@ _COLUMNS = (
 )
 
 
-def _row(cases: list[Case], group: list[Outcome]) -> tuple[AnyCell, ...]:
+def _row(by_case: dict[Case, Outcome]) -> tuple[AnyCell, ...]:
     """The runs of one test with one set of sensors; its last cell leads to the first that did not pass."""
-    first = cases[0]
-    shown = next((case for case, each in zip(cases, group, strict=True) if not passed(each)), first)
+    first, group = next(iter(by_case)), list(by_case.values())
+    shown = next((case for case, each in by_case.items() if not passed(each)), first)
     acquired = [each.acquired_m for each in group if each.acquired_m is not None]
     gaps = [each.smallest_time_gap_s for each in group if each.smallest_time_gap_s is not None]
     good = all(passed(each) for each in group)
@@ -293,7 +246,7 @@ def passed(outcome: Outcome) -> bool:
     return not outcome.touched and outcome.kept >= _KEPT and (gap is None or gap >= SMALLEST_TIME_GAP_S)
 
 
-def _verdicts(groups: dict[tuple[Test, float, Sensors], list[Outcome]]) -> list[str]:
+def _verdicts(groups: dict[Key, list[Outcome]]) -> list[str]:
     """Test by test: how many of its runs pass with each set of sensors."""
     found = []
     for test in dict.fromkeys(key[0] for key in groups):
@@ -301,7 +254,7 @@ def _verdicts(groups: dict[tuple[Test, float, Sensors], list[Outcome]]) -> list[
             sensors: [
                 passed(each) for key, group in groups.items() if key[0] == test and key[2] == sensors for each in group
             ]
-            for sensors in SENSORS
+            for sensors in COMPARED
         }
         better = "better than" if sum(count["both"]) > sum(count["lidar"]) else "no better than"
         found.append(
@@ -311,11 +264,11 @@ def _verdicts(groups: dict[tuple[Test, float, Sensors], list[Outcome]]) -> list[
     return found
 
 
-def _chart(test: Test, value: float, groups: dict[tuple[Test, float, Sensors], list[Outcome]]) -> Chart:
+def _chart(test: Test, value: float, groups: dict[Key, list[Outcome]]) -> Chart:
     name = f"R = {value:g} m" if test == "curve" else f"{value:g} km/h"
     lines = tuple(
         Series(SENSORS[sensors], groups[test, value, sensors][0].t_s, groups[test, value, sensors][0].range_m)
-        for sensors in SENSORS
+        for sensors in COMPARED
         if (test, value, sensors) in groups
     )
     return Chart(f"{test}, {name}: range to the lead", "time s", "range m", lines)

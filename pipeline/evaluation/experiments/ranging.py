@@ -173,8 +173,9 @@ def _rate(kind: str, seen: list[Sighting]) -> Series:
 
 
 def _errors(kind: str, seen: list[Sighting]) -> Series:
-    held = [(each.true_m, each.measured_m - each.true_m) for each in seen if each.measured_m is not None]
-    return Series(kind, tuple(x for x, _ in held), tuple(y for _, y in held), points_only=True)
+    return Series.of_points(
+        kind, ((each.true_m, each.measured_m - each.true_m) for each in seen if each.measured_m is not None)
+    )
 
 
 RANGING = Experiment("ranging", "paper", "LiDAR range check", cases, run, report, replay)

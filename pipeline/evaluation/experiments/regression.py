@@ -14,7 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.evaluation.experiments.layouts import LAYOUTS, Case, cases, scenario, scenes
-from pipeline.evaluation.experiments.sections import GIVEN_SAID, Chart, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.experiments.sections import Chart, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.experiments.seeing import GIVEN_SAID
 from pipeline.evaluation.experiments.track import TARGET, true_range_m
 from pipeline.geometry import closest_on_polygon, transform
 from pipeline.params import DistanceParams, Params, preset
@@ -164,9 +165,7 @@ def _error_table(law: PowerLaw, judged: dict[str, list[Sample]]) -> Table:
 
 
 def _points(samples: list[Sample]) -> Series:
-    return Series(
-        "boxes", tuple(each.height_px for each in samples), tuple(each.depth_m for each in samples), points_only=True
-    )
+    return Series.of_points("boxes", ((each.height_px, each.depth_m) for each in samples))
 
 
 def _curve(law: PowerLaw) -> Series:

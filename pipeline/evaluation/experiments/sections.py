@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
+from pipeline.evaluation.experiments.seeing import GIVEN
 from pipeline.params import Params
 from pipeline.run import Sensors
-from pipeline.simulation.detection_model import BoxNoise, Detections
+from pipeline.simulation.detection_model import Detections
 from pipeline.simulation.scenario import Scenario
 
 Suite = Literal["paper", "curves", "euroncap", "iso"]
 Tone = Literal["green", "yellow", "orange", "brown", "red", "grey"]
-Boxes = Literal["truth", "network"]
-"""Whose the camera's boxes are: projected truth with a detector's errors, or the embedded network's on drawn
-pictures."""
-GIVEN = Detections(boxes=BoxNoise())
-GIVEN_SAID = (
-    "The camera's boxes are given: projected truth with assumed errors, near those measured of the embedded detector. "
-    "No network looked at pictures."
-)
 Cell = str | float | int | None
 
 
@@ -72,6 +65,12 @@ class Series:
     x: tuple[float, ...]
     y: tuple[float, ...]
     points_only: bool = False
+
+    @staticmethod
+    def of_points(name: str, points: Iterable[tuple[float, float]]) -> Series:
+        """Points that no line joins, each x and y."""
+        found = list(points)
+        return Series(name, tuple(x for x, _ in found), tuple(y for _, y in found), points_only=True)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ from pipeline.simulation.loop import Setup, Tick, drive
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.world import ActorState
 
+KMH = 1.0 / 3.6
+"""One km/h in m/s."""
 TARGET = 1
 LANE = -2
 CONTROLLERS: Mapping[str, Mapping[str, Any]] = {
@@ -41,6 +43,11 @@ def scene(ego_speed: Mapping[float, float], target: Mapping[str, Any], duration_
             "actors": [{"id": TARGET, "kind": "car", "lane": LANE, **target}],
         }
     )
+
+
+def car(number: int, lane: int, ahead_m: float, speed_mps: Mapping[float, float]) -> dict[str, Any]:
+    """A car as a scenario file has it. speed_mps: seconds → m/s."""
+    return {"id": number, "kind": "car", "lane": lane, "ahead_m": ahead_m, "speed_mps": dict(speed_mps)}
 
 
 def parameters(controller: str, set_speed_mps: float, changes: Mapping[str, Any] | None = None) -> Params:

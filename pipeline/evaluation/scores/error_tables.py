@@ -54,7 +54,7 @@ def _scatter(title: str, unit: str, name: str, errors: Sequence[Error]) -> Chart
     lines = []
     for source in SOURCES:
         pairs = [(e.range_m, value) for e in errors if e.source == source and (value := getattr(e, name)) is not None]
-        lines.append(Series(source, tuple(x for x, _ in pairs), tuple(y for _, y in pairs), points_only=True))
+        lines.append(Series.of_points(source, pairs))
     return Chart(title, "true range m", f"believed − true {unit}", tuple(lines))
 
 
