@@ -7,6 +7,7 @@ import threading
 import weakref
 from collections import OrderedDict
 from collections.abc import Collection, Iterator
+from concurrent.futures import Future
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,16 +15,15 @@ import numpy as np
 import numpy.typing as npt
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, Message, Metadata, Schema
-from mcap.stream_reader import breakup_chunk
+from mcap.records import Attachment, Metadata
 
 from pipeline.errors import BadInput
 from pipeline.progress import Progress, silent
 from pipeline.recording import topics
+from pipeline.recording.chunk import NOTHING, UnpackedChunk, unpack
 from pipeline.recording.directory import RECORD_HEAD, ChunkEntry, Unreadable, read_directory, record_at
 from pipeline.recording.messages import Damaged
 
-_LARGEST_CHUNK_BYTES = 1 << 30
 _CHUNKS_HELD = 8
 """For two places that are read by turns, what is shown and what is computed beside it; a frame may lie in three."""
 
@@ -51,8 +51,8 @@ class McapFile:
     def __init__(self, path: Path, *, walk: bool = False) -> None:
         self.path = path
         self.damaged: set[int] = set()
-        self._held: OrderedDict[int, list[Message]] = OrderedDict()
-        self._lock = threading.RLock()
+        self._held: OrderedDict[int, Future[UnpackedChunk]] = OrderedDict()
+        self._lock = threading.Lock()
         try:
             self._file = path.open("rb")
         except OSError as error:
@@ -91,9 +91,7 @@ class McapFile:
             progress(done, len(places))
             if wanted is not None and not self._may_hold(self.directory.chunks[place], wanted):
                 continue
-            for stored in self.chunk(place):
-                if first_ns <= stored.log_time_ns <= last_ns and (wanted is None or stored.channel.topic in wanted):
-                    yield stored
+            yield from self._stored(self._unpacked(place), wanted, first_ns, last_ns)
 
     def message(self, topic: str, log_time_ns: int) -> Stored:
         """The message of a topic at a log time. Damaged when there is none, or its chunk cannot be read."""
@@ -103,9 +101,7 @@ class McapFile:
 
     def chunk(self, place: int) -> list[Stored]:
         """All messages of the chunk at this place of ``directory.chunks``, none when it cannot be read."""
-        channels = self.directory.channels
-        found = self._unpack_or_nothing(place)
-        return [Stored(channels[each.channel_id], each.log_time, each.publish_time, each.data) for each in found]
+        return list(self._stored(self._unpacked(place)))
 
     def log_times(self) -> dict[topics.Channel, npt.NDArray[np.int64]]:
         """Sorted log times of all messages, from the message indexes alone: no chunk is unpacked but those without."""
@@ -113,7 +109,7 @@ class McapFile:
         for place, entry in enumerate(self.directory.chunks):
             pairs = self._indexed_times(entry)
             if entry.channels is None:
-                pairs = ((message.channel_id, message.log_time) for message in self._unpack_or_nothing(place))
+                pairs = ((each.channel_id, each.log_time_ns) for each in self._unpacked(place).messages)
             for number, at_ns in pairs:
                 found.setdefault(number, []).append(min(at_ns, 2**63 - 1))
         channels = self.directory.channels
@@ -139,7 +135,7 @@ class McapFile:
         """A file without a summary names its channels in its chunks only: those that mention a new one are read."""
         for place, entry in enumerate(self.directory.chunks):
             if entry.channels is None or not entry.channels <= self.directory.channels.keys():
-                self._unpack_or_nothing(place)
+                self._unpacked(place)
 
     def _may_hold(self, entry: ChunkEntry, wanted: Collection[str]) -> bool:
         known = self.directory.channels
@@ -149,37 +145,49 @@ class McapFile:
         first, last = (np.uint64(min(max(value, 0), 2**64 - 1)) for value in (first_ns, last_ns))
         return [int(place) for place in np.flatnonzero((self._spans[:, 0] <= last) & (self._spans[:, 1] >= first))]
 
-    def _unpack_or_nothing(self, place: int) -> list[Message]:
-        """The messages of a chunk, none when it cannot be read. The newest few chunks are held."""
-        with self._lock:
-            if place in self._held:
-                self._held.move_to_end(place)
-                return self._held[place]
-            if place in self.damaged:
-                return []
-            try:
-                found = self._read_chunk(self.directory.chunks[place])
-            except Exception:  # damaged bytes make the decompressors and the parser raise whatever they like
-                self.damaged.add(place)
-                return []
-            self._held[place] = found
-            if len(self._held) > _CHUNKS_HELD:
-                self._held.popitem(last=False)
-            return found
+    def _stored(
+        self, chunk: UnpackedChunk, wanted: Collection[str] | None = None, first_ns: int = 0, last_ns: int = 2**64 - 1
+    ) -> Iterator[Stored]:
+        """As of ``messages``, of one chunk."""
+        for channel_id, log_time_ns, publish_time_ns, start, end in chunk.messages:
+            channel = self.directory.channels.get(channel_id)
+            if channel is None or not first_ns <= log_time_ns <= last_ns:
+                continue
+            if wanted is None or channel.topic in wanted:
+                yield Stored(channel, log_time_ns, publish_time_ns, chunk.data[start:end])
 
-    def _read_chunk(self, entry: ChunkEntry) -> list[Message]:
-        chunk = Chunk.read(ReadDataStream(io.BytesIO(self._record(entry.offset, entry.length))))
-        if chunk.uncompressed_size > _LARGEST_CHUNK_BYTES:
-            raise Damaged("a chunk of an impossible size")
-        messages = []
-        for record in breakup_chunk(chunk, validate_crc=True):
-            if isinstance(record, Schema):
-                self.directory.schemas[record.id] = record
-            elif isinstance(record, Channel):
+    def _unpacked(self, place: int) -> UnpackedChunk:
+        """A chunk, ``NOTHING`` when it cannot be read. The newest few are held; who asks for one that another thread is
+        unpacking waits for that."""
+        with self._lock:
+            found, is_mine = self._held.get(place), False
+            if found is None:
+                found, is_mine = Future(), True
+                self._held[place] = found
+                if len(self._held) > _CHUNKS_HELD:
+                    self._held.popitem(last=False)
+            else:
+                self._held.move_to_end(place)
+        if is_mine:
+            try:
+                found.set_result(self._read_chunk(place))
+            except BaseException as end:  # of this thread; who waits must not wait for ever
+                found.set_exception(end)
+        return found.result()
+
+    def _read_chunk(self, place: int) -> UnpackedChunk:
+        if place in self.damaged:
+            return NOTHING
+        entry = self.directory.chunks[place]
+        try:
+            chunk = unpack(self._record(entry.offset, entry.length))
+        except Exception:  # see ``unpack``
+            self.damaged.add(place)
+            return NOTHING
+        with self._lock:
+            for record in chunk.named:
                 self.directory.know(record)
-            elif isinstance(record, Message) and record.channel_id in self.directory.channels:
-                messages.append(record)
-        return messages
+        return chunk
 
     def _indexed_times(self, entry: ChunkEntry) -> Iterator[tuple[int, int]]:
         """(channel id, log time) of a chunk's messages, from the message indexes that follow it."""

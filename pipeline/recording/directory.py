@@ -57,8 +57,11 @@ class Directory:
     is_cut: bool = False
     sound_bytes: int = 0
 
-    def know(self, record: Channel) -> None:
-        """A channel record, met in the summary or in a chunk."""
+    def know(self, record: Schema | Channel) -> None:
+        """A channel or the schema of channels to come, met in the summary or in a chunk."""
+        if isinstance(record, Schema):
+            self.schemas[record.id] = record
+            return
         schema = self.schemas.get(record.schema_id) or Schema(0, b"", "", "")
         named = tuple(sorted(record.metadata.items()))
         self.channels[record.id] = topics.Channel(
