@@ -22,7 +22,7 @@ demo: install
 
 # A file's tests stay in one process: they share servers and browsers.
 test: install check
-	@$(BIN)/python -m pytest -q --numprocesses auto --maxprocesses 4 --dist loadfile $(TESTS)
+	@$(BIN)/python -m pytest -q --numprocesses logical --maxprocesses 4 --dist loadfile $(TESTS)
 
 check: install
 	@$(BIN)/ruff check app pipeline tests
