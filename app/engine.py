@@ -18,8 +18,6 @@ from app.drive.drives import Drives
 from app.drive.recording import Recipe
 from app.labels.desk import LabelDesk
 from app.line import DetectionCache, Line, Tick
-from app.playing.live import LivePlayer
-from app.playing.live_line import LiveLine
 from app.playing.player import Player
 from app.playing.recorded import RecordedPlayer
 from app.recording import RecordingDesk
@@ -74,6 +72,7 @@ class Engine:
         self._sensors: Sensors = sensors
         self._detections = DetectionCache()
         self.drives = Drives(self._detections)
+        self.control.on_ask = self.drives.turn.asked
         self.desk = desk or RecordingDesk()
         self.labels = labels or LabelDesk()
         self._whole_drives = whole_drives
@@ -202,6 +201,10 @@ class Engine:
 
     def _player_of(self, source: AnySource, detectors: Detectors) -> Player:
         if is_live_source(source):
+            # what decodes sensors' packets takes 0.1 s to import: only who has sensors pays
+            from app.playing.live import LivePlayer
+            from app.playing.live_line import LiveLine
+
             return LivePlayer(LiveLine(source, detectors, self._sensors), self.control, self.drives, self.desk)
         recording = cast("Source", source)
         line = Line(recording, detectors, self._detections, self._sensors, self.drives.state_before)

@@ -18,7 +18,6 @@ from pipeline.run import Detectors, Sensors, brings_detections, detector_for, la
 from pipeline.sources import is_live, open_live
 from pipeline.sources.along_route import along_route
 from pipeline.sources.base import AnySource, LiveSource, Source
-from pipeline.sources.routes import load_route
 from pipeline.types import Route
 from pipeline.vision.detector import Detector
 from pipeline.vision.runtime import DetectorMissing
@@ -28,7 +27,11 @@ S = TypeVar("S", Source, LiveSource)
 
 def planned(file: Path | None) -> Route | None:
     """The route of a file, if one is named."""
-    return load_route(str(file)) if file is not None else None
+    if file is None:
+        return None
+    from pipeline.sources.routes import load_route  # NMEA and map projections: only who names a route pays
+
+    return load_route(str(file))
 
 
 @dataclass(frozen=True)

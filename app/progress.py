@@ -1,38 +1,20 @@
-"""Progress on standard error, so that results can go to standard output."""
+"""Opening what a person named, and a bar for as long as that takes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import PurePath
-
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    DownloadColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    TaskProgressColumn,
-    TextColumn,
-    TimeRemainingColumn,
-)
+from typing import TYPE_CHECKING
 
 from pipeline import progress
 from pipeline.sources import open_any, open_source
 from pipeline.sources.base import AnySource, Source
 
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
 _LONGEST_NAME = 40
-
-
-def frames_progress() -> Progress:
-    """A bar that counts frames and vanishes when done."""
-    return _bar(MofNCompleteColumn())
-
-
-def bytes_progress() -> Progress:
-    """A bar that counts bytes."""
-    return _bar(DownloadColumn())
 
 
 def opened(uri: str, rings: int = 16) -> AnySource:
@@ -57,15 +39,10 @@ def _reading(uri: str) -> Iterator[progress.Progress]:
 
         def told(done: int, total: int) -> None:
             if not bars:
-                bars.append(stack.enter_context(_bar(TaskProgressColumn())))
+                from app.bars import share_progress  # rich takes 0.1 s to import: most recordings need no bar
+
+                bars.append(stack.enter_context(share_progress()))
                 bars[0].add_task(f"reading {name}", total=total)
             bars[0].update(bars[0].task_ids[0], completed=done, total=total)
 
         yield told
-
-
-def _bar(count: ProgressColumn) -> Progress:
-    """Vanishes when done; there is none where nobody looks, as in a log."""
-    columns = (TextColumn("{task.description}"), BarColumn(), count, TimeRemainingColumn())
-    console = Console(stderr=True)
-    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)

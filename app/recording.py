@@ -6,12 +6,14 @@ import re
 import threading
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from app.line import Tick
 from pipeline.errors import BadInput
-from pipeline.recording.recorder import Recorder, RecordingState
-from pipeline.recording.save import about
 from pipeline.sources.base import AnySource, LiveSource, is_live_source
+
+if TYPE_CHECKING:
+    from pipeline.recording.recorder import Recorder, RecordingState
 
 SESSIONS = Path(__file__).resolve().parent.parent / "sessions"
 """What this machine keeps: recordings, marks."""
@@ -55,6 +57,10 @@ class RecordingDesk:
             self._end()
             if source is None:
                 raise BadInput("nothing is open that could be recorded")
+            # what MCAP and its schemas need takes 0.2 s to import: only who records pays
+            from pipeline.recording.recorder import Recorder
+            from pipeline.recording.save import about
+
             try:
                 recorder = Recorder(new_session(self._folder, source.title), about(source))
             except OSError as error:

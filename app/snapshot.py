@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from app.drive.drives import DriveState
 from app.labels.state import LabelState
 from app.line import Tick
 from pipeline.params import Params
-from pipeline.recording.recorder import RecordingState
 from pipeline.results import streams_json
 from pipeline.types import StreamHealth
+
+if TYPE_CHECKING:
+    from pipeline.recording.recorder import RecordingState
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from urllib.parse import quote, urlsplit
 
 import tyro
 
+from app.bars import frames_progress
 from app.options import LineOptions, SourceOptions
-from app.progress import frames_progress
 from app.report import html
 from app.tables import show
 from pipeline.errors import BadInput

@@ -14,12 +14,12 @@ from typing import Annotated
 
 import tyro
 
+from app.bars import frames_progress
 from app.drive.run import calibration_digest, digest
 from app.labels.database import open_database
 from app.labels.drive import WORKING, DriveLabels, info_of, known_drives
 from app.labels.long import importing, put_proposals
 from app.options import LineOptions, SourceOptions
-from app.progress import frames_progress
 from pipeline.labels.formats.base import Drive, FormatName, drive_of
 from pipeline.labels.formats.native import from_json, onto
 from pipeline.labels.formats.reading import read_bytes

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.progress import bytes_progress
+from app.bars import bytes_progress
 from pipeline.path.lane_network import open_lane_network
 from pipeline.types import REAL_VEHICLES
 from pipeline.vision.detector import open_detector

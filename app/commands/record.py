@@ -13,8 +13,8 @@ from typing import Annotated
 
 import tyro
 
+from app.bars import frames_progress
 from app.options import LineOptions, SourceOptions
-from app.progress import frames_progress
 from app.recording import SESSIONS, new_session
 from app.waiting import Waiting
 from pipeline.errors import BadInput

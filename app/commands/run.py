@@ -13,8 +13,8 @@ from typing import Annotated, Literal, cast
 
 import tyro
 
+from app.bars import frames_progress
 from app.options import LineOptions, SourceOptions
-from app.progress import frames_progress
 from app.waiting import Waiting
 from pipeline.params import Params
 from pipeline.results import write_line

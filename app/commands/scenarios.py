@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.progress import frames_progress
+from app.bars import frames_progress
 from app.replays import ReplayFolder
 from app.report import html
 from app.tables import show

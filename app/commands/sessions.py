@@ -13,10 +13,11 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from app.bars import frames_progress
 from app.export import Kind, export_clip
 from app.options import LineOptions, SourceOptions
 from app.playing.playback import timeline_s
-from app.progress import frames_progress, opened_recording
+from app.progress import opened_recording
 from pipeline.errors import BadInput
 from pipeline.recording.info import Info, Rhythm, info, info_of_source
 from pipeline.recording.rewrite import recover

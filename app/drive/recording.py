@@ -15,7 +15,6 @@ from app.line import DetectionCache
 from pipeline.evaluation.lead import LeadRule
 from pipeline.params import Params
 from pipeline.progress import Progress
-from pipeline.recording.save import save
 from pipeline.run import Detectors, Sensors, detect, only
 from pipeline.sources.base import Mark, Marked, Source, TruthObject, is_simulated
 from pipeline.step import State, step
@@ -113,6 +112,8 @@ class Recording:
 
     def save(self, path: Path, first: int, last: int, progress: Progress) -> None:
         """Frames as a session file, with all that the source has."""
+        from pipeline.recording.save import save  # MCAP takes 0.2 s to import: only who saves pays
+
         save(self.recipe.source, path, first, last, progress)
 
     def truth(self, index: int) -> Truth:

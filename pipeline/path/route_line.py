@@ -9,7 +9,6 @@ from math import atan2, cos, radians, sin
 import numba
 import numpy as np
 from pyproj import Transformer
-from scipy.ndimage import gaussian_filter1d
 
 from pipeline.geometry import F64
 from pipeline.types import Route
@@ -48,6 +47,8 @@ def lay_out(route: Route) -> RouteLine | None:
         return None
     length_m = min(_SMOOTHING_PER_SIGMA * route.sigma_m, _LONGEST_SMOOTHING_M)
     if length_m > SPACING_M:
+        from scipy.ndimage import gaussian_filter1d  # 0.1 s to import: a planned route is smooth already
+
         line = gaussian_filter1d(_extended(line, int(4 * length_m)), length_m, axis=0)[int(4 * length_m) :][: len(line)]
     headings = np.unwrap(np.arctan2(np.gradient(line[:, 1]), np.gradient(line[:, 0])))
     return RouteLine(route, epsg, line, headings)

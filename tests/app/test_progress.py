@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-import app.progress as bars
+from app import bars, progress
 from pipeline.progress import Progress
 from pipeline.sources.base import AnySource, SourceError
 from tests.app.recording import Recording
@@ -33,14 +33,14 @@ def test_a_bar_shows_how_much_of_a_file_was_read(terminal: io.StringIO, monkeypa
             progress(done, 100)
         return Recording(uri)
 
-    monkeypatch.setattr(bars, "open_any", open_any)
-    assert bars.opened("pcap:/data/drive.pcap?port=2368", 64).uri == "pcap:/data/drive.pcap?port=2368"
+    monkeypatch.setattr(progress, "open_any", open_any)
+    assert progress.opened("pcap:/data/drive.pcap?port=2368", 64).uri == "pcap:/data/drive.pcap?port=2368"
     assert "reading drive.pcap" in terminal.getvalue()
     assert "80%" in terminal.getvalue()
 
 
 def test_what_is_opened_at_once_shows_no_bar(terminal: io.StringIO) -> None:
-    assert len(bars.opened_recording("sim:straight")) > 0
+    assert len(progress.opened_recording("sim:straight")) > 0
     assert terminal.getvalue() == ""
 
 
@@ -51,8 +51,8 @@ def test_what_cannot_be_opened_is_said_with_or_without_a_bar(
         progress(1, 2)
         raise SourceError("cut off")
 
-    monkeypatch.setattr(bars, "open_any", open_any)
+    monkeypatch.setattr(progress, "open_any", open_any)
     with pytest.raises(SourceError, match="cut off"):
-        bars.opened("pcap:a.pcap")
+        progress.opened("pcap:a.pcap")
     with pytest.raises(SourceError, match="no such file"):
-        bars.opened_recording("pcap:nothing.pcap")
+        progress.opened_recording("pcap:nothing.pcap")
