@@ -13,8 +13,6 @@ import numpy as np
 import pytest
 
 from pipeline.alignment import Pinhole
-from pipeline.evaluation import lane_pictures, lane_truth
-from pipeline.evaluation.lane_pictures import Miss, alone, draw, misses, tiles
 from pipeline.evaluation.lead import judge
 from pipeline.params import Params
 from pipeline.path.lane_classical import open_classical
@@ -28,8 +26,10 @@ from pipeline.sources import open_source
 from pipeline.step import warm_up
 from pipeline.types import F64, GROUND, U8, Frame, RawLanes, Result
 from pipeline.vision.detector import open_detector
+from tests.accuracy import lane_pictures, lane_truth
 from tests.accuracy.drives import FOLDERS, RULE, SCORED_CLIPS, all_scored, drive
 from tests.accuracy.lane_marks import MARKS
+from tests.accuracy.lane_pictures import Miss, alone, draw, misses, tiles
 from tests.conftest import ROOT
 
 BUILD = ROOT / "build" / "lanes"

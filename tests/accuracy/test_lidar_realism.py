@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.evaluation.lidar_picture import draw
-from pipeline.evaluation.lidar_realism import BIN_M, CarSeen, Pair, cars_seen, ground_plane, pairs
+from tests.accuracy.lidar_picture import draw
+from tests.accuracy.lidar_realism import BIN_M, CarSeen, Pair, cars_seen, ground_plane, pairs
 from tests.conftest import ROOT
 
 ON_THE_ROAD_M = 8.0

@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.evaluation.lidar_realism import CarSeen, Pair
 from pipeline.types import U8, Sweep
+from tests.accuracy.lidar_realism import CarSeen, Pair
 
 _WIDTH, _ABOVE, _RINGS, _CHART = 640, 640, 200, 360
 _PX_PER_M = 11.0
