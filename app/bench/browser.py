@@ -7,26 +7,10 @@ painting of the frame that shows it.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from pipeline.errors import BadInput
+from app.bench.devtools import Browser, Page
 
-CHROMIUM = Path("/usr/bin/chromium")
-FLAGS = (
-    "--no-sandbox",
-    "--enable-unsafe-swiftshader",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-)
-"""As a browser starts by itself where there is no graphics card: the page is composed by the processor, and WebGL
-is there for the 3D views."""
-SIZE_PX = (1440, 900)
 _SETTLE_S = 4.0
 _FIRST_VIEWS = 5
 _SEEKS = 24
@@ -103,74 +87,45 @@ class Waits(NamedTuple):
     whole_ms: float
 
 
-@contextmanager
-def browser() -> Iterator[Any]:
-    """Chromium without a window. BadInput where it is missing."""
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        raise BadInput("the page's bench needs the Python package playwright") from None
-    if not CHROMIUM.exists():
-        raise BadInput(f"the page's bench needs a browser at {CHROMIUM}")
-    with sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        try:
-            yield running
-        finally:
-            running.close()
-
-
-def first_views_ms(running: Any, address: str) -> list[float]:
+def first_views_ms(running: Browser, address: str) -> list[float]:
     """From opening the address to the first frame painted, each with nothing kept from before."""
     found = []
     for _ in range(_FIRST_VIEWS):
         page = opened(running, address)
-        found.append(page.evaluate("() => window.painted[0].at"))
-        page.context.close()
+        found.append(page.call("() => window.painted[0].at"))
+        page.close()
     return found
 
 
-def opened(running: Any, address: str) -> Any:
+def opened(running: Browser, address: str) -> Page:
     """The dashboard in a fresh profile, once it has painted a frame."""
-    page = running.new_page(viewport={"width": SIZE_PX[0], "height": SIZE_PX[1]})
-    page.add_init_script(f"(async () => {{ {_WATCH} }})()")
-    page.goto(address)
-    page.evaluate(_ONE_PAINTED, _PATIENCE_MS)
+    page = running.open(address, f"(async () => {{ {_WATCH} }})()")
+    page.call(_ONE_PAINTED, _PATIENCE_MS)
     return page
 
 
-def playing(running: Any, address: str, for_s: float) -> tuple[list[float], float, dict[str, float]]:
+def playing(running: Browser, address: str, for_s: float) -> tuple[list[float], float, dict[str, float]]:
     """Of each frame painted while it plays: milliseconds from the result made. Frames a second; and the browser's
     processor time in milliseconds a frame, by kind of process."""
     page = opened(running, address)
-    page.wait_for_timeout(_SETTLE_S * 1e3)
-    page.evaluate("() => { window.painted = []; }")
-    processes = running.new_browser_cdp_session()
-    before, start = _cpu_s(processes), time.monotonic()
-    page.wait_for_timeout(for_s * 1e3)
-    painted_ms = page.evaluate("() => window.painted.map(({ ms }) => ms)")
-    spent_s, after = time.monotonic() - start, _cpu_s(processes)
-    page.context.close()
+    time.sleep(_SETTLE_S)
+    page.call("() => { window.painted = []; }")
+    before, start = running.cpu_s(), time.monotonic()
+    time.sleep(for_s)
+    painted_ms: list[float] = page.call("() => window.painted.map(({ ms }) => ms)")
+    spent_s, after = time.monotonic() - start, running.cpu_s()
+    page.close()
     frames = max(1, len(painted_ms))
     cpu = {kind: round(1e3 * (after[kind] - before.get(kind, 0.0)) / frames, 1) for kind in after}
     return painted_ms, len(painted_ms) / spent_s, cpu
 
 
-def paused(running: Any, address: str, count: int) -> tuple[list[Waits], list[Waits]]:
+def paused(running: Browser, address: str, count: int) -> tuple[list[Waits], list[Waits]]:
     """On a recording of ``count`` frames that is paused: how long after each seek, and each of a slider's moves."""
     page = opened(running, address)
-    page.wait_for_timeout(_SETTLE_S * 1e3)
+    time.sleep(_SETTLE_S)
     seeks = [{"seek": (_FAR * (n + 1)) % count} for n in range(_SEEKS)] if count > 1 else []
     slides = [{"param": _PARAMETER, "value": str(0.6 + 0.02 * (n % 7))} for n in range(_SLIDES)]
-    found = [page.evaluate(_ACT, [acts, _ACT_PAUSE_MS, _PATIENCE_MS]) for acts in (seeks, slides)]
-    page.context.close()
-    first, second = ([Waits(*each) for each in waits] for waits in found)
-    return first, second
-
-
-def _cpu_s(processes: Any) -> dict[str, float]:
-    """Processor time of the browser so far, by kind of process."""
-    spent: dict[str, float] = {}
-    for process in processes.send("SystemInfo.getProcessInfo")["processInfo"]:
-        spent[process["type"]] = spent.get(process["type"], 0.0) + process["cpuTime"]
-    return spent
+    first, second = (page.call(_ACT, [acts, _ACT_PAUSE_MS, _PATIENCE_MS]) for acts in (seeks, slides))
+    page.close()
+    return [Waits(*each) for each in first], [Waits(*each) for each in second]

@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import json
 import time
-from typing import Any
 from urllib.parse import urlencode
 from urllib.request import Request, urlopen
 
 from app.bench.browser import opened
+from app.bench.devtools import Browser
 from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.labels.formats.native import from_json, to_json
@@ -23,6 +23,10 @@ _SEEKS, _FAR, _PAUSE_MS, _PATIENCE_MS = 24, 37, 120, 30_000
 _ALL_THERE_WITHIN_S, _ASK_EVERY_S = 300.0, 0.5
 _PERSON = "Bench"
 
+_BEGIN = """(person) => {
+  localStorage.setItem("cipv.person", JSON.stringify(person));
+  document.querySelector("#label-button").click();
+}"""
 _ARE_THERE = """async ([count, patience]) => {
   const { get, on } = await import("/js/store.js");
   await new Promise((done, fail) => {
@@ -62,17 +66,16 @@ _SEEK = """async ([frames, pause, patience]) => {
 }"""
 
 
-def labelled(running: Any, address: str, count: int) -> dict[str, list[float]]:
+def labelled(running: Browser, address: str, count: int) -> dict[str, list[float]]:
     """On a paused recording of ``count`` frames that is filled with labels: milliseconds of each seek, to the frame,
     its labels in the plan, and their edges in the picture."""
     tracks = _fill(address)
     page = opened(running, address)
-    page.evaluate(f"localStorage.setItem('cipv.person', JSON.stringify('{_PERSON}'))")
-    page.keyboard.press("Shift+L")
-    page.evaluate(_ARE_THERE, [tracks, _PATIENCE_MS])
+    page.call(_BEGIN, _PERSON)
+    page.call(_ARE_THERE, [tracks, _PATIENCE_MS])
     frames = [(_FAR * (n + 1)) % count for n in range(_SEEKS)]
-    waits = page.evaluate(_SEEK, [frames, _PAUSE_MS, _PATIENCE_MS])
-    page.context.close()
+    waits = page.call(_SEEK, [frames, _PAUSE_MS, _PATIENCE_MS])
+    page.close()
     return {what: [each[what] for each in waits] for what in ("frame", "plan", "picture")}
 
 

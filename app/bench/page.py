@@ -17,7 +17,8 @@ from urllib.request import Request, urlopen
 import numpy as np
 from websockets.sync.client import connect
 
-from app.bench.browser import FLAGS, Waits, browser, first_views_ms, paused, playing
+from app.bench.browser import Waits, first_views_ms, paused, playing
+from app.bench.devtools import FLAGS, Browser, browser
 from app.bench.labelled import labelled
 from pipeline.errors import BadInput
 
@@ -70,7 +71,7 @@ def _stream(address: str) -> str:
     return address.replace("http", "ws") + "/api/stream"
 
 
-def _playing(running: Any, address: str, for_s: float) -> dict[str, Any]:
+def _playing(running: Browser, address: str, for_s: float) -> dict[str, Any]:
     painted_ms, rate_hz, cpu = playing(running, address, for_s)
     return {
         **_spread(painted_ms),
@@ -81,7 +82,7 @@ def _playing(running: Any, address: str, for_s: float) -> dict[str, Any]:
     }
 
 
-def _still(running: Any, address: str) -> dict[str, Any]:
+def _still(running: Browser, address: str) -> dict[str, Any]:
     count = _paused_with_all_seen(address)
     seeks, slides = paused(running, address, count)
     first_ms = first_views_ms(running, address)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
-from app.bench.browser import CHROMIUM, FLAGS
+from app.bench.devtools import CHROMIUM, FLAGS
 from app.engine import Engine
 from app.recording import RecordingDesk
 from app.server import Server, create_app, listen_socket

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.bench import browser
+from app.bench import devtools
 from app.bench.labelled import many
 from app.bench.page import _revision_of, _spread, figures
 from pipeline.errors import BadInput
@@ -15,7 +15,7 @@ from pipeline.labels.model import LabelSet
 
 
 def test_without_a_browser_it_says_what_it_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
-    monkeypatch.setattr(browser, "CHROMIUM", tmp_path / "no-browser")
+    monkeypatch.setattr(devtools, "CHROMIUM", tmp_path / "no-browser")
     with pytest.raises(BadInput, match="needs a browser at"):
         figures("sim:straight", 0.1)
 
