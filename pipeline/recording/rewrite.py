@@ -6,16 +6,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from pipeline.progress import Progress, silent
 from pipeline.recording import topics
 from pipeline.recording.container import McapFile, Stored
+from pipeline.recording.frames import FrameList
 from pipeline.recording.messages import Damaged
 from pipeline.recording.output import Output
 from pipeline.recording.packets import PACKETS_BEFORE_NS
 from pipeline.recording.session import SessionSource
-from pipeline.recording.tick import tick_from, tick_message
+from pipeline.recording.tick import Tick, tick_from, tick_message
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,7 @@ def _referred(source: SessionSource, first: int, last: int, first_ns: int) -> li
 
 def _copy(messages: Iterable[Stored], file: McapFile, out: Path) -> tuple[int, int]:
     """(messages, frames) written to a new file, with the metadata and, for a session, the list of its frames."""
-    output, index, copied = Output(out, profile=file.directory.profile), [], 0
+    output, frames, copied = Output(out, profile=file.directory.profile), FrameList(), 0
     try:
         for name in file.directory.metadata:
             output.add_metadata(name, file.metadata(name) or {})
@@ -128,19 +127,20 @@ def _copy(messages: Iterable[Stored], file: McapFile, out: Path) -> tuple[int, i
             output.add(stored.channel, stored.log_time_ns, stored.publish_time_ns, stored.data)
             copied += 1
             if stored.channel == topics.channel(topics.FRAMES):
-                index.append((stored.log_time_ns, _header_ns(stored)))
+                tick = _tick_or_nothing(stored)
+                frames.add(stored.log_time_ns, stored.publish_time_ns if tick is None else tick.t_ns, tick)
         if topics.METADATA in file.directory.metadata:
-            output.add_attachment(topics.INDEX, "application/octet-stream", np.array(index, dtype="<i8").tobytes())
+            frames.attach(output)
         output.close()
     except BaseException:
         output.discard()
         raise
-    return copied, len(index)
+    return copied, len(frames)
 
 
-def _header_ns(stored: Stored) -> int:
-    """A frame's own time; its message's publish time cannot be before 1970."""
+def _tick_or_nothing(stored: Stored) -> Tick | None:
+    """With the frame's own time; its message's publish time cannot be before 1970."""
     try:
-        return tick_from(stored.data).t_ns
+        return tick_from(stored.data)
     except Damaged:
-        return stored.publish_time_ns
+        return None

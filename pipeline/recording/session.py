@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from pipeline.params import Params, ParamsError, with_changes
 from pipeline.progress import Progress, silent
 from pipeline.recording import topics
 from pipeline.recording.container import McapFile, NotMcap
+from pipeline.recording.frames import I64, listed_ticks, listed_times
 from pipeline.recording.messages import Damaged, log_text, picture_from, sweep_from
 from pipeline.recording.packets import sweep_of_packets
 from pipeline.recording.tick import CameraRecord, PictureRef, Tick, route_from, tick_from
@@ -22,7 +23,6 @@ from pipeline.sources.base import Mark, SourceError, TruthObject
 from pipeline.types import CameraCalibration, Frame, GnssFix, Picture, Route, Sweep
 
 _T = TypeVar("_T")
-I64 = npt.NDArray[np.int64]
 
 
 class SessionSource:
@@ -61,18 +61,19 @@ class SessionSource:
         return int(self._log_ns[self._checked(index)])
 
     def frame(self, index: int) -> Frame:
-        return self._frame(index, is_whole=True)
+        notes: list[str] = []
+        return self._frame_of(index, self._read_tick(index, notes), notes, is_whole=True)
 
-    def outline(self, index: int) -> Frame:
-        return self._frame(index, is_whole=False)
+    def outlines(self) -> Iterator[Frame]:
+        for index, tick in self._listed():
+            notes: list[str] = []
+            yield self._frame_of(index, tick or self._read_tick(index, notes), notes, is_whole=False)
 
     def sweep(self, index: int) -> Sweep | None:
         tick = self._read_tick(index, [])
         return _or_note(lambda: self._sweep(tick, self.log_time_ns(index)), []) if tick is not None else None
 
-    def _frame(self, index: int, is_whole: bool) -> Frame:
-        notes: list[str] = []
-        tick = self._read_tick(index, notes)
+    def _frame_of(self, index: int, tick: Tick | None, notes: list[str], is_whole: bool) -> Frame:
         if tick is None:
             return Frame(index, f"{index:06d}", self.t_ns(index), notes=tuple(notes))
         return Frame(
@@ -125,13 +126,8 @@ class SessionSource:
 
     def fixes(self) -> tuple[GnssFix, ...]:
         """Where the car was, frame by frame; points and pictures are left packed."""
-        found = []
-        for stored in self.file.messages((topics.FRAMES,)):
-            try:
-                found.append(tick_from(stored.data).gnss)
-            except Damaged:
-                continue
-        return tuple(fix for fix in found if fix is not None)
+        ticks = (tick or self._read_tick(index, []) for index, tick in self._listed())
+        return tuple(tick.gnss for tick in ticks if tick is not None and tick.gnss is not None)
 
     def labels(self) -> bytes | None:
         """The newest file of labels in it, null when there is none."""
@@ -161,10 +157,9 @@ class SessionSource:
 
     def _frames(self, progress: Progress) -> tuple[I64, I64]:
         """Log time and header time of every frame: from the list at the file's end, else from the frames."""
-        listed = self.file.attachment(topics.INDEX)
-        if listed is not None and len(listed) % 16 == 0:
-            pairs = np.frombuffer(listed, dtype="<i8").reshape(-1, 2)
-            return pairs[:, 0].astype(np.int64), pairs[:, 1].astype(np.int64)
+        listed = listed_times(self.file)
+        if listed is not None:
+            return listed
         stamps = []
         for stored in self.file.messages((topics.FRAMES,), progress=progress):
             try:
@@ -188,6 +183,12 @@ class SessionSource:
         if not 0 <= index < len(self):
             raise IndexError(f"frame {index} of {len(self)}")
         return index
+
+    def _listed(self) -> Iterator[tuple[int, Tick | None]]:
+        """Every frame with its tick of the list at the file's end, null where that does not tell."""
+        listed = chain(listed_ticks(self.file), repeat(None))
+        for index, (t_ns, tick) in enumerate(zip(self._t_ns, listed, strict=False)):
+            yield index, tick if tick is not None and tick.t_ns == t_ns else None
 
     def _read_tick(self, index: int, notes: list[str]) -> Tick | None:
         at_ns = self.log_time_ns(index)

@@ -46,6 +46,10 @@ METADATA = "cipv"
 INDEX = "cipv-frames"
 """Name of the attachment that lists all frames: pairs of little-endian int64, log time and header time, in order."""
 
+TICKS = "cipv-ticks"
+"""Name of the attachment with what is small of each frame: lines of ``/frames`` without labels and given detections, a
+frame each, in gzip."""
+
 
 @dataclass(frozen=True)
 class Channel:

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from pipeline.params import Params
@@ -15,6 +14,7 @@ from pipeline.recording import topics
 from pipeline.recording.came import Came
 from pipeline.recording.clock import SessionClock
 from pipeline.recording.detections import given_of
+from pipeline.recording.frames import FrameList
 from pipeline.recording.messages import (
     calibration_message,
     image_message,
@@ -95,7 +95,7 @@ class SessionWriter:
         self._output = Output(path, compression)
         self._output.add_metadata(topics.METADATA, about.to_metadata())
         self._clock = clock or SessionClock()
-        self._index: list[tuple[int, int]] = []
+        self._frames = FrameList()
         self._kept_frames = 0
         self._header_ns = 0
         self._tick: Tick | None = None
@@ -117,7 +117,7 @@ class SessionWriter:
 
     @property
     def frames(self) -> int:
-        return len(self._index)
+        return len(self._frames)
 
     @property
     def kept_frames(self) -> int:
@@ -127,7 +127,7 @@ class SessionWriter:
     @property
     def span_s(self) -> float:
         """Log time from the first frame to the last."""
-        return (self._index[-1][0] - self._index[0][0]) / 1e9 if self._index else 0.0
+        return self._frames.span_s
 
     def write(
         self,
@@ -165,7 +165,7 @@ class SessionWriter:
         if result is not None:
             self._put_result(result, at_ns)
         self._add(topics.FRAMES, at_ns, tick_message(tick))
-        self._index.append((at_ns, frame.t_ns))
+        self._frames.add(at_ns, frame.t_ns, tick)
         self._tick = tick
 
     def write_packets(self, packets: list[tuple[int, bytes]]) -> None:
@@ -215,15 +215,14 @@ class SessionWriter:
     def flush(self, *, to_disk: bool = False) -> None:
         """See ``Output.flush``."""
         self._output.flush(to_disk=to_disk)
-        self._kept_frames = len(self._index)
+        self._kept_frames = len(self._frames)
 
     def close(self) -> None:
         """Write the list of frames and the summary. Safe to call twice."""
         if self._output.is_open:
-            data = np.array(self._index, dtype="<i8").tobytes()
-            self._output.add_attachment(topics.INDEX, "application/octet-stream", data)
+            self._frames.attach(self._output)
             self._output.close()
-            self._kept_frames = len(self._index)
+            self._kept_frames = len(self._frames)
 
     def discard(self) -> None:
         """Remove the file: what it was to hold could not be made."""
@@ -234,7 +233,7 @@ class SessionWriter:
         self._output.add(topics.channel(topic), at_ns, self._header_ns if t_ns is None else t_ns, data)
         if self._output.bytes_written > before:
             is_kept = topic == topics.FRAMES and not self._output.is_pending
-            self._kept_frames = len(self._index) + is_kept
+            self._kept_frames = len(self._frames) + is_kept
 
     def _put_sweep(self, sweep: Sweep | None, at_ns: int) -> SweepRef | None:
         if sweep is None:

@@ -11,6 +11,7 @@ frame's tick. The camera has no stamps of its own and is taken at the tick.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -81,8 +82,11 @@ class AstyxSource:
         picture = picture_of(self._pictures.get(name), None, self._size, notes)
         return Frame(index, name, tick, sweep, picture, camera, notes=tuple(notes))
 
-    def outline(self, index: int) -> Frame:
-        name, notes = self._names[_checked(index, len(self))], list[str]()
+    def outlines(self) -> Iterator[Frame]:
+        return (self._outline(index) for index in range(len(self)))
+
+    def _outline(self, index: int) -> Frame:
+        name, notes = self._names[index], list[str]()
         _, camera = self._calibration_of(name, notes)
         return Frame(index, name, self.t_ns(index), camera=camera, notes=tuple(notes))
 

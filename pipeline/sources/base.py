@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
 
@@ -156,8 +157,9 @@ class Rectified(Protocol):
 class InParts(Protocol):
     """A source whose frames can be had in parts: who needs one part does not pay for all."""
 
-    def outline(self, index: int) -> Frame:
-        """``frame`` without sweep, picture and route, which are not read, and without what reading them would note."""
+    def outlines(self) -> Iterator[Frame]:
+        """Every frame, in order, without sweep, picture, route and given detections, which need not be read, and
+        without what reading them would note."""
         ...
 
     def sweep(self, index: int) -> Sweep | None:

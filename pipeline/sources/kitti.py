@@ -9,6 +9,7 @@ The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,7 +78,10 @@ class KittiSource:
         ego, gnss = self._own_motion(name, tick, notes)
         return Frame(index, name, tick, sweep, picture, calibration.camera, ego, notes=tuple(notes), gnss=gnss)
 
-    def outline(self, index: int) -> Frame:
+    def outlines(self) -> Iterator[Frame]:
+        return (self._outline(index) for index in range(len(self)))
+
+    def _outline(self, index: int) -> Frame:
         name, tick, notes = self._name(index), self.t_ns(index), list[str]()
         calibration = self._calibration_of(name, notes)
         ego, gnss = self._own_motion(name, tick, notes)

@@ -46,9 +46,10 @@ class SimulatedSource:
         now = self._world(index)
         return sensed(self._sensors.frame(now, index, self.t_ns(index)), now, self._scenario)
 
-    def outline(self, index: int) -> Frame:
-        now = self._world(index)
-        return sensed(self._sensors.outline(now, index, self.t_ns(index)), now, self._scenario)
+    def outlines(self) -> Iterator[Frame]:
+        for index in range(len(self)):
+            now = self._world(index)
+            yield sensed(self._sensors.outline(now, index, self.t_ns(index)), now, self._scenario)
 
     def sweep(self, index: int) -> Sweep | None:
         if self._scenario.sensors == "camera":

@@ -77,8 +77,7 @@ def drive_of(
     have whole frames already; a picture's pixels are not asked for."""
     read = frame_of or source.frame
     shots = []
-    for index in range(len(source)):
-        frame = source.outline(index) if isinstance(source, InParts) else read(index)
+    for index, frame in enumerate(source.outlines() if isinstance(source, InParts) else map(read, range(len(source)))):
         camera = frame.camera
         size = (camera.width, camera.height) if camera is not None else _size(read(index))
         T_rect_ego = source.T_rect_ego(index) if isinstance(source, Rectified) else None

@@ -28,8 +28,10 @@ def source(request: pytest.FixtureRequest, tmp_path: Path) -> Source:
 
 def test_a_frame_in_parts_is_the_frame(source: Source) -> None:
     assert isinstance(source, InParts)
+    outlines = list(source.outlines())
+    assert len(outlines) == len(source)
     for index in (0, len(source) - 1):
-        whole, outline, sweep = source.frame(index), source.outline(index), source.sweep(index)
+        whole, outline, sweep = source.frame(index), outlines[index], source.sweep(index)
         assert _small(outline) == _small(whole)
         assert (outline.sweep, outline.picture, outline.route) == (None, None, None)
         assert whole.sweep is not None
