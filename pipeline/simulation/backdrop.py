@@ -32,7 +32,7 @@ _CLEAREST_FAR = 0.5  # fields at the horizon keep a colour, or they would look l
 
 
 @lru_cache(maxsize=4)
-def sky(width: int, horizon: int, focal_px: float, seed: int) -> U8:
+def sky(width: int, horizon: int, seed: int) -> U8:
     """(horizon + 2, 3·width, 3): a panorama three pictures wide, to be cut by the heading."""
     rng = np.random.default_rng([seed, 3])
     rows, columns = horizon + 2, 3 * width

@@ -49,7 +49,7 @@ class DrawnCamera:
         self._sensor = Sensor(self.camera, model, seed)
         self._road, self._roadside = road, roadside
         self._ground = backdrop.Ground(self.camera, -LIDAR_HEIGHT_M, seed)
-        self._sky = backdrop.sky(WIDTH, self._ground.horizon, float(self.camera.K[0, 0]), seed)
+        self._sky = backdrop.sky(WIDTH, self._ground.horizon, seed)
 
     def picture(self, world: World) -> U8:
         """(720, 1280, 3) uint8 blue green red of one moment."""

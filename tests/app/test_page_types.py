@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import struct
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,13 +15,12 @@ import pytest
 from app.encode import Encoder
 from app.engine import Engine
 from app.recording import RecordingDesk
-from app.server import Server, create_app, listen_socket
+from app.server import create_app
 from app.snapshot import Snapshot
-from pipeline.params import Params
-from tests.app.recording import CountingDetector, Recording, opener
+from tests.app.recording import Recording
+from tests.app.serving import WAIT_S, running, serving
 
 TYPES = Path(__file__).resolve().parents[2] / "static" / "js" / "types.js"
-WAIT_S = 60.0
 
 
 def typedefs(text: str) -> dict[str, set[str]]:
@@ -41,31 +39,11 @@ def typedefs(text: str) -> dict[str, set[str]]:
 @pytest.fixture(scope="module")
 def sent(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
     """One real message of each kind, by the name of its type."""
-    recording = Recording(count=30)
-    engine = Engine(
-        opener(recording),
-        lambda _: CountingDetector(),
-        Params(),
-        uri=recording.uri,
-        whole_drives=True,
-        desk=RecordingDesk(tmp_path_factory.mktemp("sessions")),
-    )
-    bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
-    address = f"http://127.0.0.1:{bound.getsockname()[1]}"
-    server = Server(create_app(engine), address, lambda _: is_ready.set())
-    thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
-    engine.start()
-    engine.control.seek(28)
-    thread.start()
-    try:
-        assert is_ready.wait(WAIT_S)
-        with httpx.Client(base_url=address, timeout=WAIT_S) as client:
+    desk = RecordingDesk(tmp_path_factory.mktemp("sessions"))
+    with running(desk, whole_drives=True, source=Recording(count=30)) as engine:
+        engine.control.seek(28)
+        with serving(create_app(engine)) as address, httpx.Client(base_url=address, timeout=WAIT_S) as client:
             yield collect(engine, client)
-    finally:
-        server.should_exit = True
-        thread.join()
-        engine.stop()
-        bound.close()
 
 
 def is_compared(shown: Snapshot) -> bool:
