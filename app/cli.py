@@ -24,6 +24,8 @@ COMMANDS = {
     "live": "app.commands.live:Live",
     "replay": "app.commands.replay:Replay",
     "labels": "app.commands.labels:Labels",
+    "labels export": "app.commands.label_files:ExportLabels",
+    "labels import": "app.commands.label_files:ImportLabels",
     "models": "app.commands.models:Models",
     "params": "app.commands.params:ListParams",
     "calibrate": "app.commands.calibrate:Calibrate",
@@ -31,7 +33,8 @@ COMMANDS = {
     "evaluate": "app.commands.evaluate:Evaluate",
     "bench": "app.commands.bench:Bench",
 }
-"""Name → module and class. Only what was typed is imported: all together take seconds."""
+"""What is typed → module and class. Only that is imported: all together take seconds, and of a group's commands one
+may need much less than the others."""
 
 _CONFIG = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
 _NAMED_WRONG = (FileNotFoundError, PermissionError, IsADirectoryError, NotADirectoryError)
@@ -64,11 +67,12 @@ def main(arguments: list[str] | None = None) -> None:
 
 def _parse(arguments: list[str]) -> Callable[[], int]:
     """The command that was typed, with its options. SystemExit after help, and with 2 for bad usage."""
-    if arguments and arguments[0] in COMMANDS:
-        name = arguments[0]
-        return tyro.cli(_command(name), args=arguments[1:], prog=f"cipv {name}", config=_CONFIG)
+    for words in (2, 1):
+        name = " ".join(arguments[:words])
+        if name in COMMANDS:
+            return tyro.cli(_command(name), args=arguments[words:], prog=f"cipv {name}", config=_CONFIG)
     return tyro.extras.subcommand_cli_from_dict(
-        {name: _command(name) for name in COMMANDS},
+        {name: _command(name) for name in COMMANDS if " " not in name},
         args=arguments,
         prog="cipv",
         description="CIPV Studio: which vehicle ahead is the closest one in my path, how far, how fast, and why.",

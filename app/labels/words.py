@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from pipeline.labels.model import Lead
 
+WORKING = "working"
+"""The labels as they are now, beside the names of frozen versions."""
+
 
 def frames_text(first: int, last: int | None = None) -> str:
     """``frame 28``, or ``frames 28–39``. first, last: indices, both included."""

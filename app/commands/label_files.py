@@ -1,0 +1,141 @@
+"""`cipv labels export` and `import`: labels of recordings as files of other tools, and back."""
+
+from __future__ import annotations
+
+import getpass
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from app.bars import frames_progress
+from app.labels.words import WORKING
+from app.progress import opened_recording
+from pipeline.labels.formats.base import Drive, FormatName, drive_of
+from pipeline.labels.formats.native import from_json, onto
+from pipeline.labels.formats.reading import read_bytes
+from pipeline.labels.formats.registry import export_labels, import_labels
+from pipeline.labels.model import LabelSet, Origin
+from pipeline.labels.truth import truth_labels
+from pipeline.sources.base import Source
+
+if TYPE_CHECKING:
+    from app.labels.drive import DriveLabels
+
+_NOBODY_KNOWS_WHEN = 0
+"""The truth of a recording was made before it was opened; the same recording gives the same file."""
+
+Database = Annotated[str | None, tyro.conf.arg(metavar="URL")]
+Person = Annotated[str, tyro.conf.arg(metavar="NAME")]
+
+
+@dataclass(frozen=True)
+class ExportLabels:
+    """Write the labels of a recording for another tool, and say what that tool's format has no place for. Without
+    --labels: those of the database, where it has some of this recording, else the truth that comes with it.
+
+    Example: cipv labels export kitti:DRIVE --format nuscenes --out labels
+    """
+
+    source: tyro.conf.Positional[str]
+    """The recording: a session.mcap, astyx:<dir>, kitti:<dir>, sim:<scenario>, …"""
+    format: FormatName
+    """Which kind of file"""
+    out: Path
+    """The file or folder to write; there may be none yet"""
+    labels: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """A file of our own with the labels"""
+    version: Annotated[str, tyro.conf.arg(metavar="NAME")] = WORKING
+    """Which frozen version of the database's labels; else as they are now"""
+    database: Database = None
+    """A team's database; else $CIPV_LABELS_URL, else sessions/labels.db"""
+
+    def __call__(self) -> int:
+        source = opened_recording(self.source)
+        drive = _drive(source)
+        labels, notes = self._labels(source, drive)
+        lost = export_labels(labels, drive, self.format, self.out)
+        say(*notes, *lost, f"{self.out}: {_amount(labels)}")
+        return 0
+
+    def _labels(self, source: Source, drive: Drive) -> tuple[LabelSet, tuple[str, ...]]:
+        """The labels that are meant, with what there is to say of them."""
+        if self.labels is not None:
+            placed = onto(from_json(read_bytes(self.labels.expanduser()), str(self.labels)), drive, str(self.labels))
+            return placed.labels, placed.notes
+        with _kept(source, drive, self.database) as kept:
+            if self.version != WORKING or kept.has_labels():
+                return kept.label_set(self.version), ()
+        return truth_labels(source, drive.frames, Origin("import", source.title, _NOBODY_KNOWS_WHEN))
+
+
+@dataclass(frozen=True)
+class ImportLabels:
+    """Read labels of a recording that another tool wrote: into the database, beside those that are there, or with
+    --out into a file of our own.
+
+    Example: cipv labels import kitti:DRIVE label_2 --format kitti
+    """
+
+    source: tyro.conf.Positional[str]
+    """The recording: a session.mcap, astyx:<dir>, kitti:<dir>, sim:<scenario>, …"""
+    file: tyro.conf.Positional[Path]
+    """The file or folder to read"""
+    format: FormatName
+    """Which kind of file it is"""
+    out: Path | None = None
+    """The file to write; there may be none yet"""
+    database: Database = None
+    """A team's database; else $CIPV_LABELS_URL, else sessions/labels.db"""
+    person: Person = field(default_factory=getpass.getuser)
+    """Whose act it is, to be undone in the page"""
+
+    def __call__(self) -> int:
+        source = opened_recording(self.source)
+        drive = _drive(source)
+        file = self.file.expanduser()
+        origin = Origin("import", file.name, file.stat().st_mtime_ns // 1_000_000)
+        found = import_labels(file, drive, self.format, origin)
+        if self.out is not None:
+            export_labels(found.labels, drive, "native", self.out)
+            say(*found.notes, f"{self.out}: {_amount(found.labels)}")
+            return 0
+        with _kept(source, drive, self.database) as kept:
+            from app.labels.long import importing  # the database and the run: who writes a file needs neither
+
+            say(importing(kept, found.labels, self.person, found.notes))
+        return 0
+
+
+@contextmanager
+def _kept(source: Source, drive: Drive, url: str | None) -> Iterator[DriveLabels]:
+    """The database's labels of a recording."""
+    from app.labels.database import open_database  # as above
+    from app.labels.drive import DriveLabels, info_of
+
+    database = open_database(url)
+    try:
+        yield DriveLabels(database, info_of(source, lambda: drive.frames))
+    finally:
+        database.close()
+
+
+def _drive(source: Source) -> Drive:
+    with frames_progress() as bar:
+        task = bar.add_task(source.title, total=len(source))
+        return drive_of(source, lambda done, total: bar.update(task, completed=done, total=total))
+
+
+def _amount(labels: LabelSet) -> str:
+    sightings = sum(len(track.sightings) for track in labels.tracks)
+    return f"tracks {len(labels.tracks):,}, sightings {sightings:,}, ranges of the lead {len(labels.leads):,}"
+
+
+def say(*sentences: str) -> None:
+    """To the person, beside what goes to standard output."""
+    for sentence in sentences:
+        print(f"cipv: {sentence}", file=sys.stderr)
