@@ -38,16 +38,26 @@ class Settling(Protocol):
         ...
 
 
+class Asking(Protocol):
+    """Hears that a person waits for something."""
+
+    def __call__(self, *, rests: bool) -> object:
+        """rests: it is not the kind of thing that is soon asked for again."""
+        ...
+
+
 PRESET = "preset"
 """Among changes of parameters, the name of what they started from."""
 
 
 class Control:
     """The hand-over between any number of callers and the one worker. on_settle: called on the thread of who changed
-    parameters, before that returns, one change after the other."""
+    parameters, before that returns, one change after the other. on_ask: called on the thread of who wants another
+    frame, source or parameters, or the end, before the worker takes that; it must be quick."""
 
     def __init__(self, first: Wish) -> None:
         self.on_settle: Settling = lambda changes, person, *, merges: None
+        self.on_ask: Asking = lambda *, rests: None
         self._wish = first
         self._settled = (first.params, first.preset)
         self._settling = threading.RLock()
@@ -165,6 +175,10 @@ class Control:
         return revision
 
     def _replace(self, wish: Wish) -> Wish:
-        self._wish, self._changed = wish, True
+        before, self._wish, self._changed = self._wish, wish, True
+        is_moved = (wish.target, wish.steps) != (before.target, before.steps)
+        is_changed = (wish.uri, wish.params_revision, wish.stop) != (before.uri, before.params_revision, before.stop)
+        if is_moved or is_changed:
+            self.on_ask(rests=not is_moved and wish.settled)
         self._condition.notify_all()
         return wish

@@ -34,8 +34,9 @@ class Tick:
     """One frame, what the line believed before it and after it, and what it believes at it.
 
     exact: ``before`` is the state of a run through the whole drive from its first frame, so that the result is the one
-    that ``cipv run`` gives; else it comes from a short warm-up, and numbers of objects may differ. warmed: the warm-up
-    was a whole one; else the frame was wanted at once, and trackers have hardly any history."""
+    that ``cipv run`` gives; else it comes from a short warm-up, and numbers of objects may differ. whole: the warm-up
+    was a whole one, and all detectors have looked; else the frame was wanted at once: trackers have hardly any history,
+    and nobody may have looked for lanes."""
 
     before: State
     frame: Frame
@@ -44,7 +45,7 @@ class Tick:
     params: Params
     detect_ms: float
     exact: bool = False
-    warmed: bool = True
+    whole: bool = True
 
 
 class DetectionCache:
@@ -78,6 +79,10 @@ class Asker:
     def another(self) -> Asker:
         """The same for a second thread."""
         return Asker(self._cache, self._source)
+
+    def knows(self, detector: Detects[Seen], index: int) -> bool:
+        """Whether the answer about a frame is in the cache."""
+        return self._cache.get((self._source, index, detector.name)) is not None
 
     def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
         key = (self._source, frame.index, detector.name)
@@ -133,22 +138,23 @@ class Line:
         it. Either way the answer depends on nothing but the recording, the index and the parameters. Null, and nothing
         changed, when ``superseded`` said so on the way.
 
-        at_once: where the frames before are not at hand, the warm-up is cut to ``AT_ONCE_FRAMES``; the tick says so."""
+        at_once: where the frames before are not at hand, the warm-up is cut to ``AT_ONCE_FRAMES``; and where nobody has
+        looked for lanes, which takes longer than all else, nobody does. The tick says so."""
         known = self._known(index, params)
-        if known is not None:
-            self.tick = self._run(known, index, params, exact=True)
-            return self.tick
-        first = max(0, index - WARM_UP_FRAMES)
+        first = whole_first = index if known is not None else max(0, index - WARM_UP_FRAMES)
         if at_once and not all(self._is_at_hand(i) for i in range(first, index)):
             first = max(0, index - AT_ONCE_FRAMES)
-        state, tick = State(), None
+        without_lanes = at_once and not all(self._lanes_are_known(i) for i in range(first, index + 1))
+        detectors = replace(self._detectors, lanes=None) if without_lanes else self._detectors
+        is_exact = (known is not None or first == 0) and not without_lanes
+        state, tick = known or State(), None
         for i in range(first, index + 1):
             if superseded():
                 return None
-            tick = self._run(state, i, params, exact=first == 0)
+            tick = self._run(state, i, params, detectors, exact=is_exact)
             state = tick.after
         assert tick is not None
-        self.tick = replace(tick, warmed=first == max(0, index - WARM_UP_FRAMES))
+        self.tick = replace(tick, whole=first == whole_first and not without_lanes)
         return self.tick
 
     def advance(self, index: int, params: Params) -> Tick:
@@ -156,20 +162,20 @@ class Line:
         not seen; time is real."""
         shown, known = self.tick, self._known(index, params)
         if known is not None:
-            self.tick = self._run(known, index, params, exact=True)
+            self.tick = self._run(known, index, params, self._detectors, exact=True)
         elif shown is None:
-            self.tick = self._run(State(), index, params, exact=False)
+            self.tick = self._run(State(), index, params, self._detectors, exact=False)
         else:
             is_next = index == shown.frame.index + 1 and params == shown.params
-            self.tick = self._run(shown.after, index, params, exact=shown.exact and is_next)
+            self.tick = self._run(shown.after, index, params, self._detectors, exact=shown.exact and is_next)
         return self.tick
 
     def rerun(self, params: Params) -> Tick | None:
         """The shown frame with other parameters, from the state that they lead to where it is known, else from the one
-        it started with. No network, no reading."""
+        it started with. No network, no reading: what is not whole stays so."""
         if self.tick is None:
             return None
-        known = self._known(self.tick.frame.index, params)
+        known = self._known(self.tick.frame.index, params) if self.tick.whole else None
         before, exact = (self.tick.before, False) if known is None else (known, True)
         after, result = step(before, self.tick.frame, params)
         self.tick = replace(self.tick, before=before, after=after, result=result, params=params, exact=exact)
@@ -186,19 +192,25 @@ class Line:
         self._ahead_ms = (index, self._ask_ahead.spent_ms - spent_ms)
 
     def can_be_exact(self) -> bool:
-        """Whether the shown frame is not what a run through the whole drive gives, and now could be."""
+        """Whether the shown frame is not what a run through the whole drive gives, and run again could be."""
         shown = self.tick
-        return shown is not None and not shown.exact and self._known(shown.frame.index, shown.params) is not None
+        if shown is None or shown.exact or not shown.whole:
+            return False
+        return self._known(shown.frame.index, shown.params) is not None
 
     def _known(self, index: int, params: Params) -> State | None:
         return State() if index == 0 else self._state_before(index, params)
 
-    def _run(self, state: State, index: int, params: Params, *, exact: bool) -> Tick:
+    def _run(self, state: State, index: int, params: Params, detectors: Detectors, *, exact: bool) -> Tick:
         spent_ms = self._ask.spent_ms
-        frame, after, result = advance(state, self._read(index), params, self._detectors, self._sensors, self._ask)
+        frame, after, result = advance(state, self._read(index), params, detectors, self._sensors, self._ask)
         ahead, ahead_ms = self._ahead_ms
         detect_ms = self._ask.spent_ms - spent_ms + (ahead_ms if ahead == index else 0.0)
         return Tick(state, frame, after, result, params, detect_ms, exact)
+
+    def _lanes_are_known(self, index: int) -> bool:
+        lanes = self._detectors.lanes
+        return lanes is None or not self._detectors.looks_for_lanes(index) or self._ask.knows(lanes, index)
 
     def _is_at_hand(self, index: int) -> bool:
         with self._reading:

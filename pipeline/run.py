@@ -48,6 +48,10 @@ class Detectors:
     lanes: Detects[RawLanes] | None = None
     lanes_every: int = 1
 
+    def looks_for_lanes(self, index: int) -> bool:
+        """Whether a frame is one of those."""
+        return self.lanes is not None and index % self.lanes_every == 0
+
 
 class LiveDetectors:
     """Detectors for each tick of live sensors that is run, in turn. The lanes' turn comes when ``lanes_every`` ticks
@@ -119,7 +123,7 @@ def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
     bgr = frame.picture.bgr
     if detectors.boxes is not None:
         frame = replace(frame, raw_boxes=ask(detectors.boxes, frame, bgr))
-    if detectors.lanes is not None and frame.index % detectors.lanes_every == 0:
+    if detectors.lanes is not None and detectors.looks_for_lanes(frame.index):
         frame = replace(frame, raw_lanes=ask(detectors.lanes, frame, bgr))
     return frame
 

@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -17,6 +18,7 @@ from pipeline.errors import BadInput
 from pipeline.params import Params
 from pipeline.step import State, warm_up
 from pipeline.types import Frame
+from pipeline.vision.stopping import Stopped
 
 logger = logging.getLogger("cipv.drive")
 
@@ -132,10 +134,9 @@ class Drives:
 
     def _work(self) -> None:
         warm_up()
-        worked_s = 0.0
         while (work := self._next()) is not None:
-            self.turn.wait(worked_s)
-            worked_s = self._advance(*work)
+            with suppress(Stopped), self.turn.background():
+                self._advance(*work)
             del work  # a recording that is open no more is not kept while there is nothing to do
 
     def _next(self) -> tuple[Recording, DriveRun] | None:
@@ -149,19 +150,20 @@ class Drives:
                 self._condition.wait()
             return None
 
-    def _advance(self, recording: Recording, run: DriveRun) -> float:
-        """One frame; returns the seconds it took."""
+    def _advance(self, recording: Recording, run: DriveRun) -> None:
+        """One frame. Stopped leaves the run as it was."""
         began = time.perf_counter()
         self._phase = "run" if recording.inputs.get(run.done) is not None else "detect"
         try:
             recording.advance(run)
+        except Stopped:
+            raise
         except BadInput as error:
             run.note = str(error)
         except Exception as error:  # whatever a recording or a network does, other runs go on
             logger.exception("frame %s of %s", run.done, recording.recipe.uri)
             run.note = f"frame {run.done + 1}: {type(error).__name__}: {error}"
-        took_s = time.perf_counter() - began
-        run.seconds += took_s
+        finally:
+            run.seconds += time.perf_counter() - began
         if run.is_complete or run.note or time.monotonic() - self._told_s > _TELL_EVERY_S:
             self.changed()
-        return took_s

@@ -6,7 +6,6 @@ Nothing is queued: late frames are skipped, and a seek that is overtaken by anot
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 
 from app.control import Control, Wish
 from app.drive.drives import Drives
@@ -18,6 +17,7 @@ from app.recording import RecordingDesk
 from app.snapshot import Snapshot
 from pipeline.params import Params
 from pipeline.sources.base import Source
+from pipeline.vision.stopping import Stopped
 
 _READ_PATIENCE_S = 1.0
 """A read that hangs must not keep the program from ending; its thread is a daemon."""
@@ -38,6 +38,7 @@ class RecordedPlayer:
         self.skipped = 0
         self._line, self._control, self._drives, self._recipe, self._desk = line, control, drives, recipe, desk
         self._clock: PlaybackClock | None = None
+        self._given_up: int | None = None
         self._ahead = Ahead(self._prepare, control.change)
 
     def open(self) -> None:
@@ -48,8 +49,7 @@ class RecordedPlayer:
 
     def wait_s(self, index: int) -> float | None:
         if self._clock is None:
-            shown = self._line.tick
-            return 0.0 if shown is not None and not shown.warmed else None
+            return self._drives.turn.rest_s if self._can_be_whole() else None
         left_s = self._clock.wait_s(index, time.monotonic())
         if self._ahead.busy and left_s <= 0:
             return None  # what is due wakes the worker when it is there
@@ -61,7 +61,8 @@ class RecordedPlayer:
     def serve(self, wish: Wish, shown: Snapshot) -> Tick | None:
         tick = self._served(wish, shown)
         if tick is not None:
-            self._drives.offer(tick.frame)
+            if tick.whole:
+                self._drives.offer(tick.frame)
             self._desk.take(tick)
         if wish.settled:
             self._drives.want(wish.params, wish.preset)
@@ -92,34 +93,42 @@ class RecordedPlayer:
     def _served(self, wish: Wish, shown: Snapshot) -> Tick | None:
         index, last = shown.index, self.count - 1
         if wish.uri is not None or wish.target is not None:
-            return self._seek(min(max(wish.target or 0, 0), last), wish)
+            return self._seek(min(max(wish.target or 0, 0), last), wish, at_once=wish.uri is None)
         if wish.steps < 0:
-            return self._seek(max(0, index + wish.steps), wish)
+            return self._seek(max(0, index + wish.steps), wish, at_once=True)
         if wish.steps > 0:
             return self._step(index, min(last, index + wish.steps), wish)
         if wish.params is not shown.params:
             return self._line.rerun(wish.params)
         if wish.playing and shown.playing:
             return self._play(index, wish)
-        return self._better(wish)
+        return self._better(wish, shown)
 
-    def _seek(self, index: int, wish: Wish) -> Tick | None:
-        self._clock = None
-        return self._line.seek(index, wish.params, self._control.superseded, at_once=True)
+    def _seek(self, index: int, wish: Wish, *, at_once: bool) -> Tick | None:
+        self._clock = self._given_up = None
+        return self._line.seek(index, wish.params, self._control.superseded, at_once=at_once)
 
-    def _better(self, wish: Wish) -> Tick | None:
+    def _better(self, wish: Wish, shown: Snapshot) -> Tick | None:
         """The paused frame once more, when more is known of it than when it was shown: exactly as in the whole drive,
-        or after a whole warm-up, which gives way to every wish."""
+        or, once the hand rests, after a whole warm-up, which gives way to every wish."""
         if self._line.can_be_exact():
             return self._line.rerun(wish.params)
-        shown = self._line.tick
-        if shown is None or shown.warmed:
+        turn = self._drives.turn
+        if not self._can_be_whole() or turn.rest_s > 0:
             return None
         try:
-            return self._line.seek(shown.frame.index, wish.params, lambda: self._control.waiting)
+            with turn.stoppable():
+                return self._line.seek(shown.index, wish.params, lambda: self._control.waiting)
+        except Stopped:
+            return None
         except BaseException:
-            self._line.tick = replace(shown, warmed=True)  # what cannot be had is not tried again
+            self._given_up = shown.index
             raise
+
+    def _can_be_whole(self) -> bool:
+        """Whether the frame was wanted at once; what could not be had is not tried again."""
+        tick = self._line.tick
+        return tick is not None and not tick.whole and tick.frame.index != self._given_up
 
     def _step(self, shown: int, index: int, wish: Wish) -> Tick | None:
         """Every frame up to ``index``, none skipped."""
@@ -144,7 +153,7 @@ class RecordedPlayer:
             self.skipped += ready - index - 1
             return self._line.advance(ready, wish.params)
         if wish.loop:
-            return self._seek(0, wish)
+            return self._seek(0, wish, at_once=False)
         self._control.change(playing=False)
         return None
 

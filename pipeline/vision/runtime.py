@@ -17,11 +17,14 @@ import onnxruntime as ort
 from pipeline.errors import BadInput
 from pipeline.types import F32
 from pipeline.vision import models
+from pipeline.vision.stopping import Stopped, of_this_thread
 
 _GIVES_WAY = 5
 """How much nicer than who opens it a network's own threads are. Alike, a step that runs meanwhile may share its core
 with one of them for seconds on end and take twice as long. The thread that asks computes too and stays as it is: with
 all of them nicer the network would lose to whatever else runs."""
+_FATAL = 4
+"""What is said on standard error; all else comes as an exception."""
 _PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
 
 
@@ -69,7 +72,7 @@ def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
     options = ort.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
-    options.log_severity_level = 4
+    options.log_severity_level = _FATAL
     # Spinning workers starve the LiDAR chain between two pictures.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     available = [name for name in _PROVIDERS if name in ort.get_available_providers()]
@@ -83,11 +86,16 @@ def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
 
 
 def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
-    """Every output for one input. DetectorError when the network fails on it."""
-    try:
-        outputs = session.run(None, {session.get_inputs()[0].name: blob})
-    except Exception as error:
-        raise DetectorError(f"the network failed: {_first_line(error)}") from None
+    """Every output for one input. DetectorError when the network fails on it, Stopped when it was told to end."""
+    options, stop = ort.RunOptions(), of_this_thread()
+    options.log_severity_level = _FATAL
+    with stop.ends(options):
+        try:
+            outputs = session.run(None, {session.get_inputs()[0].name: blob}, options)
+        except Exception as error:
+            if stop.is_set:
+                raise Stopped from None
+            raise DetectorError(f"the network failed: {_first_line(error)}") from None
     return [np.asarray(output) for output in outputs]
 
 

@@ -69,7 +69,7 @@ def client(engine: Engine) -> Iterator[Client]:
 def show(engine: Engine, index: int) -> dict[str, Any]:
     """Seek, wait, and what is believed of the frame once all is known of it."""
     engine.control.seek(index)
-    shown = engine.wait_for(lambda shown: shown.tick is not None and shown.index == index and shown.tick.warmed, WAIT_S)
+    shown = engine.wait_for(lambda shown: shown.tick is not None and shown.index == index and shown.tick.whole, WAIT_S)
     assert shown.tick is not None
     return to_json(shown.tick.result)
 

@@ -36,7 +36,7 @@ def test_a_frame_wanted_at_once_is_shown_after_two_reads_and_again_after_a_whole
     shown: list[tuple[bool, int, str]] = []
     recording.reads.clear()
     calls = detector.calls
-    engine.listen(lambda s: shown.append((s.tick.warmed, detector.calls - calls, body(s.tick.result))))
+    engine.listen(lambda s: shown.append((s.tick.whole, detector.calls - calls, body(s.tick.result))))
     engine.control.seek(20)
     engine.wait_for(at(20), WAIT_S)
     assert recording.reads == [19, 20, *range(10, 19)]
@@ -46,12 +46,12 @@ def test_a_frame_wanted_at_once_is_shown_after_two_reads_and_again_after_a_whole
     engine.control.seek(22)
     seen = engine.wait_for(lambda s: s.index == 22, WAIT_S)
     assert seen.tick is not None
-    assert not seen.tick.warmed, "21 has not been read"
+    assert not seen.tick.whole, "21 has not been read"
     engine.wait_for(at(22), WAIT_S)
     engine.control.seek(21)
     seen = engine.wait_for(lambda s: s.index == 21, WAIT_S)
     assert seen.tick is not None
-    assert seen.tick.warmed, "all that it needs is at hand"
+    assert seen.tick.whole, "all that it needs is at hand"
 
 
 def test_a_warm_up_that_fails_is_not_tried_again(start: Start):
