@@ -211,7 +211,7 @@ class DriveLabels:
             tuple(leads),
             tuple(sorted(cast("list[PathLabel]", items["path"]), key=lambda path: path.frame)),
             tuple(sorted(cast("list[EventLabel]", items["event"]), key=lambda event: event.frame)),
-            tuple(sorted(cast("list[FrameTag]", items["tag"]), key=lambda tag: tag.frame)),
+            tuple(sorted(cast("list[FrameTag]", items["tag"]), key=lambda tag: (tag.first, tag.last))),
         )
 
 

@@ -11,12 +11,14 @@ from app.drive.kept import seen_of
 from app.drive.recording import Recording
 from app.drive.run import DriveRun
 from app.labels.acts.leads import clear
+from app.labels.acts.tags import put_tag
 from app.labels.draft import Draft
 from app.labels.drive import DriveLabels
 from app.labels.refusals import ActRefused
+from app.labels.spans import free_spans
 from app.labels.tasks import Progress, Work, to_nobody
 from app.labels.words import frames_text, outside_text
-from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
+from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.labels.propose import Proposals, known_as, propose
 from pipeline.labels.truth import truth_labels
 
@@ -91,10 +93,8 @@ def importing(
             renamed = replace(event, tracks=tuple(_numbered(numbers, each, event.kind) for each in event.tracks))
             if _happening(renamed) not in events:
                 draft.add("event", renamed)
-        tags = {(tag.frame, tag.tag) for tag in (cast("FrameTag", item.value) for item in draft.all("tag").values())}
         for tag in found.tags:
-            if (tag.frame, tag.tag) not in tags:
-                draft.add("tag", tag)
+            put_tag(draft, tag)
         progress(1, 1)
         return f"imported {len(found.tracks) - len(known)} tracks and {len(found.leads)} ranges of the lead"
 
@@ -211,18 +211,5 @@ def _put_leads(draft: Draft, leads: Sequence[LeadRange], numbers: dict[int, int]
             said.update(range(old.first, old.last + 1))
     for lead in leads:
         who = numbers[lead.lead] if isinstance(lead.lead, int) else lead.lead
-        for start, end in _free(lead.first, lead.last, said):
+        for start, end in free_spans(lead.first, lead.last, said):
             draft.add("lead", replace(lead, first=start, last=end, lead=who))
-
-
-def _free(first: int, last: int, said: set[int]) -> list[tuple[int, int]]:
-    """The parts of a range of which nobody has said anything."""
-    parts: list[tuple[int, int]] = []
-    for frame in range(first, last + 1):
-        if frame in said:
-            continue
-        if parts and parts[-1][1] == frame - 1:
-            parts[-1] = (parts[-1][0], frame)
-        else:
-            parts.append((frame, frame))
-    return parts

@@ -274,10 +274,11 @@ class AddEvent(Strict):
 
 
 class Tag(Strict):
-    """A word about a frame, or no more."""
+    """A word about the frames from first to last, or no more."""
 
     kind: Literal["tag"]
-    frame: Index
+    first: Index
+    last: Index
     tag: Word
     on: bool = True
 

@@ -31,8 +31,8 @@ class DriveRow(Base):
 
 
 class ItemRow(Base):
-    """A track (without its sightings), range of the lead, path, event or tag. revision: the act that changed it last.
-    removed ones stay, so that others hear of it and their number is not given again."""
+    """A track (without its sightings), range of the lead, path, event or range of a tag. revision: the act that changed
+    it last. removed ones stay, so that others hear of it and their number is not given again."""
 
     __tablename__ = "item"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)

@@ -126,7 +126,7 @@ def _begun(labels: DriveLabels) -> Iterable[tuple[int, Item]]:
         if isinstance(value, LabelTrack):
             if item.id in found.extents:
                 yield found.extents[item.id][0], item
-        elif isinstance(value, LeadRange):
+        elif isinstance(value, LeadRange | FrameTag):
             yield value.first, item
         else:
             yield value.frame, item

@@ -19,35 +19,38 @@ def check_whole(draft: Draft) -> None:
     touched = draft.touched
     kinds = {kind for kind, _ in touched}
     if "lead" in kinds:
-        _check_leads(draft)
+        _check_apart(draft, _all(draft, "lead"))
     if "path" in kinds:
-        _check_once(draft, "path", ((item, cast("PathLabel", item.value).frame) for item in _all(draft, "path")))
+        _check_paths(draft)
     if "tag" in kinds:
-        tags = ((item, cast("FrameTag", item.value)) for item in _all(draft, "tag"))
-        _check_once(draft, "tag", ((item, (tag.frame, tag.tag)) for item, tag in tags))
+        by_word: dict[str, list[Item]] = {}
+        for item in _all(draft, "tag"):
+            by_word.setdefault(cast("FrameTag", item.value).tag, []).append(item)
+        for items in by_word.values():
+            _check_apart(draft, items)
     gone = {number for kind, number in touched if kind == "track" and draft.find("track", number) is None}
     if gone or kinds & {"lead", "event"}:
         _check_named(draft, gone)
 
 
-def _check_leads(draft: Draft) -> None:
+def _check_apart(draft: Draft, items: Iterable[Item]) -> None:
     """Ranges by their beginning, each beside the one before it that goes farthest."""
-    leads = sorted(_all(draft, "lead"), key=lambda item: cast("LeadRange", item.value).first)
     farthest: Item | None = None
-    for item in leads:
-        lead, before = cast("LeadRange", item.value), cast("LeadRange | None", farthest.value if farthest else None)
-        if farthest is not None and before is not None and lead.first <= before.last:
-            _clash(draft, farthest, item, frames_text(lead.first, min(lead.last, before.last)))
-        if before is None or lead.last > before.last:
+    for item in sorted(items, key=lambda item: cast("LeadRange | FrameTag", item.value).first):
+        here = cast("LeadRange | FrameTag", item.value)
+        before = cast("LeadRange | FrameTag | None", farthest.value if farthest else None)
+        if farthest is not None and before is not None and here.first <= before.last:
+            _clash(draft, farthest, item, frames_text(here.first, min(here.last, before.last)))
+        if before is None or here.last > before.last:
             farthest = item
 
 
-def _check_once(draft: Draft, kind: ItemKind, items: Iterable[tuple[Item, object]]) -> None:
-    there: dict[object, Item] = {}
-    for item, key in items:
-        other = there.setdefault(key, item)
+def _check_paths(draft: Draft) -> None:
+    there: dict[int, Item] = {}
+    for item in _all(draft, "path"):
+        frame = cast("PathLabel", item.value).frame
+        other = there.setdefault(frame, item)
         if other is not item:
-            frame = cast("PathLabel | FrameTag", item.value).frame
             _clash(draft, other, item, frames_text(frame))
 
 

@@ -25,13 +25,15 @@ def check(labels: LabelSet, what: str) -> LabelSet:
         _check_leads(labels)
         for path in labels.paths:
             _check_path(path)
-        at_frames: tuple[PathLabel | EventLabel | FrameTag, ...] = (*labels.paths, *labels.events, *labels.tags)
+        for tag in labels.tags:
+            _require(0 <= tag.first <= tag.last < len(labels.frames), f"a tag from frame {tag.first} to {tag.last}")
+        at_frames: tuple[PathLabel | EventLabel, ...] = (*labels.paths, *labels.events)
         for each in at_frames:
             _require(0 <= each.frame < len(labels.frames), f"frame {each.frame} of {len(labels.frames)}")
         for event in labels.events:
             _require(all(_fits(number) for number in event.tracks), "an event of impossible tracks")
         made: tuple[LabelTrack | LeadRange | PathLabel | EventLabel | FrameTag, ...]
-        made = (*labels.tracks, *labels.leads, *at_frames)
+        made = (*labels.tracks, *labels.leads, *at_frames, *labels.tags)
         _require(all(_fits(label.origin.t_unix_ms) for label in made), "a time that no clock shows")
     except ValueError as error:
         raise BadInput(f"{what}: {error}") from None

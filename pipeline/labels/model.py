@@ -108,14 +108,16 @@ class EventLabel:
 
 
 WHOLE_TAG = "all labelled"
-"""By this tag a person says that every vehicle of a frame is labelled."""
+"""By this tag a person says that every vehicle of frames is labelled."""
 
 
 @dataclass(frozen=True)
 class FrameTag:
-    """A word about a frame: ``night``, ``rain``, ``sensor dirty``, or ``WHOLE_TAG``."""
+    """A word about the frames ``first`` to ``last``, both included: ``night``, ``rain``, ``sensor dirty``, or
+    ``WHOLE_TAG``."""
 
-    frame: int
+    first: int
+    last: int
     tag: str
     origin: Origin
 

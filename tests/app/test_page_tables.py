@@ -26,7 +26,7 @@ def test_every_format_can_be_chosen() -> None:
     assert set(re.findall(r'\["([a-z-]+)"', found[1])) == set(FORMATS)
 
 
-def test_the_page_offers_the_tag_of_a_frame_whose_vehicles_are_all_labelled() -> None:
-    found = re.search(r'const TAGS = \["([^"]+)"', (LABELING / "moment.js").read_text())
+def test_the_page_offers_the_tag_of_frames_whose_vehicles_are_all_labelled() -> None:
+    found = re.search(r'const WHOLE_TAG = "([^"]+)"', (LABELING / "tags.js").read_text())
     assert found is not None
     assert found[1] == WHOLE_TAG

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from app.labels.acts import frames, leads, review, shape, tracks
+from app.labels.acts import frames, leads, review, shape, tags, tracks
 from app.labels.acts.scope import Scope
 from app.labels.draft import Draft
 from app.labels.requests import (
@@ -53,7 +53,7 @@ _ACTS: dict[type, Callable[[Draft, Scope, Any], str]] = {
     SetPath: frames.set_path,
     RemovePath: frames.remove_path,
     AddEvent: frames.add_event,
-    Tag: frames.tag,
+    Tag: tags.tag,
 }
 
 

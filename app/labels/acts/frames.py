@@ -1,4 +1,4 @@
-"""What is said of single frames: the ego path, events, tags."""
+"""What is said of single frames: the ego path and events."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import cast
 from app.labels.acts.scope import Scope, by_person, track_of
 from app.labels.draft import Draft
 from app.labels.refusals import NoSuchLabel
-from app.labels.requests import AddEvent, RemovePath, SetPath, Tag
+from app.labels.requests import AddEvent, RemovePath, SetPath
 from app.labels.words import frames_text
-from pipeline.labels.model import EventLabel, FrameTag, PathLabel
+from pipeline.labels.model import EventLabel, PathLabel
 
 
 def set_path(draft: Draft, scope: Scope, act: SetPath) -> str:
@@ -39,20 +39,6 @@ def add_event(draft: Draft, scope: Scope, act: AddEvent) -> str:
         track_of(draft, number)
     draft.add("event", EventLabel(act.frame, act.event, tracks, "accepted", by_person(draft)))
     return f"{act.event} in {frames_text(act.frame)}"
-
-
-def tag(draft: Draft, scope: Scope, act: Tag) -> str:
-    scope.check(act.frame)
-    there = [
-        number
-        for number, item in draft.all("tag").items()
-        if (cast("FrameTag", item.value).frame, cast("FrameTag", item.value).tag) == (act.frame, act.tag)
-    ]
-    if act.on and not there:
-        draft.add("tag", FrameTag(act.frame, act.tag, by_person(draft)))
-    for number in there if not act.on else ():
-        draft.put("tag", number, None)
-    return f"tagged {frames_text(act.frame)} {act.tag}" if act.on else f"{frames_text(act.frame)} is not {act.tag}"
 
 
 def _path_at(draft: Draft, frame: int) -> int | None:

@@ -9,6 +9,7 @@ from app.labels.acts.scope import Scope, by_person, track_of
 from app.labels.draft import Draft
 from app.labels.refusals import ActRefused
 from app.labels.requests import ClearLead, SetLead, TrimLead
+from app.labels.spans import outside
 from app.labels.words import frames_text, lead_text
 from pipeline.labels.model import LeadRange
 
@@ -70,11 +71,10 @@ def clear(draft: Draft, first: int, last: int, *, but: int | None = None) -> boo
         if old.last < first or old.first > last or number == but:
             continue
         touched = True
-        before = replace(old, last=first - 1) if old.first < first else None
-        after = replace(old, first=last + 1) if old.last > last else None
-        draft.put("lead", number, before or after)
-        if before is not None and after is not None:
-            draft.add("lead", after)
+        kept = outside(old, first, last)
+        draft.put("lead", number, kept[0] if kept else None)
+        for part in kept[1:]:
+            draft.add("lead", part)
     return touched
 
 

@@ -12,7 +12,7 @@ from app.labels.refusals import ActRefused
 from app.labels.requests import Accept, Reject, Remove, ReviewOk, SendBack
 from app.labels.values import Value
 from app.labels.words import frames_text, lead_text
-from pipeline.labels.model import EventLabel, LabelTrack, LeadRange, PathLabel
+from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
 
 
 def accept(draft: Draft, scope: Scope, act: Accept) -> str:
@@ -102,9 +102,10 @@ def _name(value: Value) -> str:
     """As people call it: a range of the lead has no number that they know."""
     if isinstance(value, LabelTrack):
         return f"#{value.id}"
+    if isinstance(value, FrameTag):
+        return f"{value.tag} of {frames_text(value.first, value.last)}"
     if isinstance(value, LeadRange):
         return f"lead {lead_text(value.lead)} of {frames_text(value.first, value.last)}"
     if isinstance(value, PathLabel):
         return f"the path of {frames_text(value.frame)}"
-    what = value.kind if isinstance(value, EventLabel) else value.tag
-    return f"{what} in {frames_text(value.frame)}"
+    return f"{value.kind} in {frames_text(value.frame)}"

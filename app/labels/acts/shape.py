@@ -70,6 +70,8 @@ def _put(draft: Draft, track: int, old: Mapping[int, Sighting], new: Mapping[int
 def _verb(old: Sighting | None, new: Sighting) -> str:
     if old is None:
         return "placed"
+    if (old.cuboid, old.bbox) == (new.cuboid, new.bbox):
+        return "held"
     if old.cuboid is None or new.cuboid is None or old.cuboid == new.cuboid:
         return "boxed" if old.bbox != new.bbox else "placed"
     if old.cuboid.center != new.cuboid.center and old.cuboid.size == new.cuboid.size:

@@ -151,7 +151,7 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
 
 def _whole_frames(labels: LabelSet) -> set[int]:
     """The frames in which every vehicle is labelled."""
-    asked = {tag.frame for tag in labels.tags if tag.tag == WHOLE_TAG}
+    asked = {frame for tag in labels.tags if tag.tag == WHOLE_TAG for frame in range(tag.first, tag.last + 1)}
     left: set[int] = set()
     for lead in labels.leads:
         if lead.origin.maker == "pipeline":

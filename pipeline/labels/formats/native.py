@@ -1,10 +1,12 @@
-"""Our own file, ``cipv-labels`` version 1: JSON with every field of ``LabelSet`` under its own name; nothing is lost.
+"""Our own file, ``cipv-labels`` version 2: JSON with every field of ``LabelSet`` under its own name; nothing is lost.
 
-A reader of this version takes what it does not know for a mistake, and a newer version for one it cannot read.
+A reader of this version takes what it does not know for a mistake, and a newer version for one it cannot read. In
+version 1 a tag was of one frame.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,9 +20,10 @@ from pipeline.labels.formats.reading import fit, parse_json, read_bytes
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel
 
 KIND = "cipv-labels"
-VERSION = 1
+VERSION = 2
 _LABELS = TypeAdapter(LabelSet)
-_AtFrame = TypeVar("_AtFrame", PathLabel, EventLabel, FrameTag)
+_AtFrame = TypeVar("_AtFrame", PathLabel, EventLabel)
+_Range = TypeVar("_Range", LeadRange, FrameTag)
 
 
 def to_json(labels: LabelSet) -> bytes:
@@ -41,7 +44,16 @@ def from_json(data: bytes, what: str) -> LabelSet:
     unknown = sorted(inner.keys() - {field.name for field in fields(LabelSet)}) if isinstance(inner, dict) else []
     if unknown:
         raise BadInput(f"{what}: labels have no field {unknown[0][:40]!r}")
+    if version < 2 and isinstance(inner, dict) and isinstance(inner.get("tags"), list):
+        inner = {**inner, "tags": [as_range(tag) if isinstance(tag, dict) else tag for tag in inner["tags"]]}
     return check(fit(_LABELS, inner, what), what)
+
+
+def as_range(tag: Mapping[str, Any]) -> dict[str, Any]:
+    """A tag of one frame, as version 1 has it, as one of a range of frames."""
+    body = dict(tag)
+    frame = body.pop("frame", None)
+    return body | {"first": frame, "last": frame}
 
 
 def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
@@ -70,10 +82,10 @@ def onto(labels: LabelSet, drive: Drive, what: str) -> Imported:
         frames=drive.frames,
         t_ns=drive.t_ns,
         tracks=tuple(moved for track in labels.tracks if (moved := _moved_track(track, to)).sightings),
-        leads=tuple(part for each in labels.leads for part in _moved_lead(each, to)),
+        leads=tuple(part for each in labels.leads for part in _moved_range(each, to)),
         paths=_moved(labels.paths, to),
         events=_moved(labels.events, to),
-        tags=_moved(labels.tags, to),
+        tags=tuple(part for each in labels.tags for part in _moved_range(each, to)),
     )
     note = (
         f"{len(to)} of the labels' {len(labels.frames)} frames are in this recording; labels of the others are left out"
@@ -86,16 +98,16 @@ def _moved_track(track: LabelTrack, to: dict[int, int]) -> LabelTrack:
     return replace(track, sightings=tuple(sorted(kept, key=lambda each: each.frame)))
 
 
-def _moved_lead(lead: LeadRange, to: dict[int, int]) -> list[LeadRange]:
+def _moved_range(label: _Range, to: dict[int, int]) -> list[_Range]:
     """The range's frames in this drive, as ranges: they need not be in one piece there."""
-    frames = sorted(to[frame] for frame in range(lead.first, lead.last + 1) if frame in to)
+    frames = sorted(to[frame] for frame in range(label.first, label.last + 1) if frame in to)
     runs: list[list[int]] = []
     for frame in frames:
         if runs and runs[-1][-1] == frame - 1:
             runs[-1].append(frame)
         else:
             runs.append([frame])
-    return [replace(lead, first=run[0], last=run[-1]) for run in runs]
+    return [replace(label, first=run[0], last=run[-1]) for run in runs]
 
 
 def _moved(labels: tuple[_AtFrame, ...], to: dict[int, int]) -> tuple[_AtFrame, ...]:

@@ -47,7 +47,7 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
             for i, each in enumerate(labels.events)
         },
         "contexts": {
-            str(i): _element(each.tag, TAG_TYPE, each.frame, each.frame) | {"context_data": _marks(each.origin)}
+            str(i): _element(each.tag, TAG_TYPE, each.first, each.last) | {"context_data": _marks(each.origin)}
             for i, each in enumerate(labels.tags)
         },
         "frames": _frames(labels, drive),
@@ -132,7 +132,8 @@ def _frames(labels: LabelSet, drive: Drive) -> dict[str, Element]:
         if event.tracks:
             frames[event.frame].setdefault("relations", {})[str(len(labels.leads) + place)] = {}
     for place, tag in enumerate(labels.tags):
-        frames[tag.frame].setdefault("contexts", {})[str(place)] = {}
+        for frame in range(tag.first, tag.last + 1):
+            frames[frame].setdefault("contexts", {})[str(place)] = {}
     return {str(index): frame for index, frame in enumerate(frames)}
 
 

@@ -194,7 +194,7 @@ class _Reading:
     def _tags(self) -> Iterable[FrameTag]:
         for each in self.content.contexts.values():
             if each.type == ol.TAG_TYPE:
-                yield FrameTag(self._span(each)[0], each.name, self._made(each.context_data)[1])
+                yield FrameTag(*self._span(each), each.name, self._made(each.context_data)[1])
 
     def _span(self, each: Element) -> tuple[int, int]:
         if len(each.frame_intervals) != 1:

@@ -60,7 +60,7 @@ export function setUp() {
       next("Disagreement", "Next disagreement of labels and pipeline (V)", "disagreement"), next("Proposed", "Next proposal (B)", "proposed"), next("Sent back", "Next label that was sent back (Y)", "sent_back")),
     fresh, kind, reviewToggle, el("span", { class: "spacer" }), back, forth, name),
   el("div", { class: "label-row label-line" }, reviewed, said, task, saved, again, discarded));
-  $("#label-keys").append(...labelKeys().flatMap(({ bindings }) => bindings).filter(({ brief }) => brief).map(({ shown: keys, brief }) =>
+  $("#label-keys").append(el("span", {}, el("kbd", { textContent: "?" }), " all keys"), ...labelKeys().flatMap(({ bindings }) => bindings).filter(({ brief }) => brief).map(({ shown: keys, brief }) =>
     el("span", {}, el("kbd", { textContent: keys }), ` ${brief}`)));
   paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);
   on(["saving", "said", "link"], reflectSaving);

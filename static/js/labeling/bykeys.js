@@ -40,6 +40,15 @@ export async function placeAhead() {
   if (made !== undefined) set("track", made);
 }
 
+/** The selected label's cuboid in our path ahead: where nothing says how far it is, arrows do. */
+export function cuboidAhead() {
+  const track = chosen(), at = { x: AHEAD_M, y: lateral(middleOfPath(), AHEAD_M) };
+  if (!track) return say("Select a label first");
+  setTool(null);
+  draft.hold(track.id, { cuboid: drawn(at, at, track.label, groundAt(get("frame")?.display.ground ?? null, at)) });
+  draft.release();
+}
+
 /** The box of the selected label is where its cuboid is in the picture; in the middle where it has none. */
 export function boxAround() {
   const track = chosen();

@@ -65,7 +65,8 @@ export const turn = (deg) => change((cuboid) => turned(cuboid, (deg * Math.PI) /
 /** @param {(cuboid: import("./types.js").Cuboid) => import("./types.js").Cuboid} how */
 function change(how) {
   const track = chosen(), cuboid = draft.presentOf(track?.id ?? null)?.cuboid;
-  if (!track || !cuboid) return say("Select a label that has a cuboid in this frame");
+  if (!track) return say("Select a label first");
+  if (!cuboid) return say(`#${track.id} has no cuboid in this frame: draw it (Shift G)`);
   draft.hold(track.id, { cuboid: how(cuboid) });
   draft.release();
 }
@@ -93,7 +94,7 @@ async function nearestShape(id, frame) {
 export const sizeAlong = () => withTrack(({ id, revision }) => {
   const size = draft.presentOf(id)?.cuboid?.size;
   if (size) act({ kind: "size_along", track: id, revision, size });
-  else say(`#${id} has no cuboid in this frame`);
+  else say(`#${id} has no cuboid in this frame: draw it (Shift G)`);
 });
 
 /** The vehicle is not there, in the marked frames or in this one. */
@@ -121,9 +122,6 @@ export function mergeWith(other) {
   set("track", a.id);
   act({ kind: "merge", tracks: [a, b].map(({ id, revision }) => ({ id, revision })) });
 }
-
-/** @param {string} tag @param {boolean} on */
-export const tagFrame = (tag, on) => act({ kind: "tag", frame: shown(), tag, on });
 
 /** An event of this frame, about the selected track. @param {string} event */
 export const addEvent = (event) => act({ kind: "add_event", frame: shown(), event, tracks: chosen() ? [chosen()?.id] : [] });

@@ -51,14 +51,14 @@ function show() {
   if (document.activeElement !== classes) classes.value = track.label;
   text(comment, track.comment ? `Sent back: ${track.comment}` : "");
   text(how, track.origin.how ? `${track.origin.name} pointed at it: ${track.origin.how}` : "");
-  text(facts, placeWords(presentOf(track.id)));
+  text(facts, placeWords(track, presentOf(track.id)));
 }
 
-/** @param {import("./types.js").LabelSighting|null} sighting */
-function placeWords(sighting) {
+/** @param {import("./types.js").LabelTrack} track @param {import("./types.js").LabelSighting|null} sighting */
+function placeWords({ keyframes, origin }, sighting) {
   if (!sighting) return "not in this frame";
-  const kind = sighting.keyframe ? "keyframe" : "interpolated";
-  if (!sighting.cuboid) return `${kind} · box in the picture only: no LiDAR points tell where it is, and its height in the picture does so too roughly. Shift G draws its cuboid`;
+  const kind = sighting.keyframe ? "keyframe" : keyframes.length ? "follows its keyframes" : origin.maker === "pipeline" ? "as the pipeline saw it" : "no keyframe";
+  if (!sighting.cuboid) return `${kind} · box in the picture only: no LiDAR points tell where it is, and its height in the picture does so too roughly. Draw its cuboid (Shift G); where points are seen in its box, S lays it on them`;
   const { center: [x, y], size, yaw_rad } = sighting.cuboid;
   return `${kind} · ${num(x, 2)} m ahead, ${num(Math.abs(y), 2)} ${y >= 0 ? "left" : "right"} · ${size.map((each) => num(each, 1)).join(" × ")} m · ${num((yaw_rad * 180) / Math.PI, 0)}°${sighting.bbox ? "" : ` · box ${DASH}`}`;
 }

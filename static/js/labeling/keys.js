@@ -7,6 +7,7 @@ import { bringHere } from "./ends.js";
 import { cancel, isOn, setTool, toggleObjects } from "./mode.js";
 import * as review from "./review.js";
 import * as span from "./span.js";
+import { toggleWhole } from "./tags.js";
 
 /** @typedef {import("../keymap.js").Binding} Binding */
 /** `brief`: the words of the strip below the timeline; what has none is only in the help. @typedef {Binding & {brief?: string}} LabelBinding */
@@ -75,6 +76,7 @@ export const labelKeys = () => [
   { mode: "labeling", title: "Labeling: shapes", bindings: [
     key(".", ".", "next label in this frame", () => commands.selectNext(1), "next label"),
     key(",", ",", "label before", () => commands.selectNext(-1)),
+    during("shape", key("g", "Shift G, G", "a cuboid for the selected label, in our path ahead; arrows, Q and E put it right", byKeys.cuboidAhead)),
     key("g", "G", "new label: drag in the plan, drag or click in the picture, or Enter", () => setTool("new"), "new"),
     key("Shift+G", "Shift G", "draw the selected track's shape here", () => setTool("shape")),
     selected(key("ArrowUp", "↑", "move it 0.1 m; Shift: 1 m", () => commands.nudge(STEP_M, 0))),
@@ -111,6 +113,7 @@ export const labelKeys = () => [
     key("d", "D", "one frame back; Shift: ten", () => playback({ step: -1 }), "back"),
     key("Shift+F", "Shift F", "", () => playback({ step: 10 })),
     key("Shift+D", "Shift D", "", () => playback({ step: -10 })),
+    key("Shift+W", "Shift W", "every vehicle is labelled: in the marked frames (I, O), or in this one; again: no more", toggleWhole, "all labelled"),
     key("z", "Z", "the pipeline's objects too", toggleObjects, "pipeline"),
     { ...key("Enter", "Enter", "take the number that is typed", () => span.enter()), isOn: () => isOn() && Boolean(get("marked")?.typed) },
     { ...key("Escape", "Esc", "let go: a dragged end, tool, marked frames, selection, review", () => cancel()), isOn: () => isOn() && (get("trimmed") !== null || get("labeling")?.tool !== null || get("marked") !== null || get("track") !== null || review.isReviewing()) },

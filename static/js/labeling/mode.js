@@ -1,4 +1,5 @@
 /** The labeling mode: the pipeline's output becomes proposals, a person makes them true. */
+import { playback } from "../api.js";
 import { $, press } from "../dom.js";
 import { get, on, set } from "../store.js";
 import { toggle as togglePane } from "../workspace/panes.js";
@@ -26,13 +27,23 @@ export function toggle() {
   set("marked", null);
   set("trimmed", null);
   if (!isOn()) return;
+  if (get("state")?.playing) playback({ playing: false }); // what is labelled is what is shown
   togglePane("params", true); // the labels' panel stands in the inspector's column
   personName();
 }
 
-/** What the next drag or click does. @param {import("../store.js").Labeling["tool"]} tool */
+/** @type {Record<string, string>} */
+const HINTS = {
+  new: "A new label: drag it in the plan, drag a box or press on it in the picture, or Enter. Esc lets go",
+  shape: "Its shape: drag it in the plan, drag a box around it in the picture, Enter for a box, or G for a cuboid. Esc lets go",
+  path: "Our path: drag along its middle in the plan, or bend the pipeline's by arrows; Enter keeps it. Esc lets go",
+};
+
+/** What the next drag or click does, which is said. @param {import("../store.js").Labeling["tool"]} tool */
 export function setTool(tool) {
   const next = get("labeling")?.tool === tool ? null : tool;
+  if (next === "shape" && get("track") === null) return set("said", "Select a label first");
+  if (next || Object.values(HINTS).includes(get("said") ?? "")) set("said", (next && HINTS[next]) ?? "");
   change({ tool: next, from: next === "merge" ? get("track") : null });
   if (next === null) set("drawnPath", null);
 }

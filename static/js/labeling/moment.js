@@ -1,40 +1,45 @@
 /** What is said of the shown frame as a whole: events, tags, the path where the pipeline's is wrong; and what was done to each. */
-import { el, keyed, text } from "../dom.js";
+import { el, keyed, press, text } from "../dom.js";
 import { seekTo } from "../drive/seek.js";
 import { get, paint } from "../store.js";
 import { act } from "./acts.js";
-import { addEvent, tagFrame } from "./commands.js";
+import { addEvent } from "./commands.js";
 import { leadName, shown } from "./held.js";
 import { setTool } from "./mode.js";
 import { Past } from "./past.js";
-
-/** By the first a person says that every vehicle of the frame is labelled (pipeline/labels/model.py, WHOLE_TAG). */
-const TAGS = ["all labelled", "night", "rain", "snow", "fog", "glare", "sensor dirty", "tunnel"];
+import { span } from "./span.js";
+import { isSaid, KNOWN_TAGS, tagFrames, tagsAt, takeBack, toggleWhole, WHOLE_TAG } from "./tags.js";
 
 const list = el("div", { class: "moment-list" }), pasts = el("div", { class: "moment-pasts" }), pastTitle = el("h3", { textContent: "History" });
-const word = el("input", { type: "text", maxLength: 40, placeholder: "Tag", aria: { label: "Tag of this frame" } });
+const word = el("input", { type: "text", maxLength: 40, placeholder: "Tag", aria: { label: "Tag of these frames" } });
 const pathWords = el("span", { class: "facts" }), noPath = el("button", { type: "button", textContent: "Take back", onclick: () => act({ kind: "remove_path", frame: shown() }) });
+
+const whole = el("button", { type: "button", class: "toggle", textContent: "All labelled", title: "Every vehicle is labelled, in the marked frames or in this one (Shift W)", onclick: toggleWhole });
+const title = el("h3", {});
 
 /** @param {HTMLElement} parent */
 export function setUp(parent) {
-  const known = el("datalist", { id: "known-tags" }, ...TAGS.map((value) => el("option", { value })));
+  const known = el("datalist", { id: "known-tags" }, ...KNOWN_TAGS.map((value) => el("option", { value })));
   word.setAttribute("list", "known-tags");
-  const form = el("form", { class: "menu-row", onsubmit: tag }, word, el("button", { textContent: "Add" }));
+  const form = el("form", { class: "menu-row", onsubmit: addTag }, word, el("button", { textContent: "Add" }), whole);
   const event = (/** @type {string} */ kind, /** @type {string} */ words) => el("button", { type: "button", textContent: words, title: "An event of this frame, about the selected track", onclick: () => addEvent(kind) });
   const draw = el("button", { type: "button", textContent: "Draw the path", title: "Drag along the middle of our path in the plan (Shift P)", onclick: () => setTool("path") });
-  parent.append(el("h3", { textContent: "This frame" }), el("div", { class: "moment-buttons" }, event("cut_in", "Cut-in"), event("cut_out", "Cut-out"), draw, noPath, pathWords), form, known, list, pastTitle, pasts);
-  paint(["labels", "frame", "labeling"], show);
+  parent.append(title, el("div", { class: "moment-buttons" }, event("cut_in", "Cut-in"), event("cut_out", "Cut-out"), draw, noPath, pathWords), form, known, list, pastTitle, pasts);
+  paint(["labels", "frame", "labeling", "marked"], show);
 }
 
 /** @param {Event} event */
-function tag(event) {
+function addTag(event) {
   event.preventDefault();
   if (!word.value.trim()) return;
-  tagFrame(word.value.trim(), true);
+  tagFrames(word.value.trim(), true);
   word.value = "";
 }
 
 /** @typedef {{key: string, frame: number, words: string, drop: () => unknown}} Row */
+
+/** @param {{first: number, last: number}} range */
+const framesWords = ({ first, last }) => (first === last ? `frame ${first + 1}` : `frames ${first + 1}–${last + 1}`);
 
 /** What a second person has said of it. @param {{comment: string, reviewer: string}} label */
 const reviewWords = ({ comment, reviewer }) => (comment ? `, sent back: ${comment}` : reviewer ? `, reviewed by ${reviewer}` : "");
@@ -43,11 +48,13 @@ function show() {
   const labels = get("labels"), here = shown();
   if (!labels || !get("labeling")?.on) return;
   const path = labels.paths.find(({ frame, state }) => frame === here && state !== "rejected");
+  text(title, get("marked") ? `This frame, and marked: ${framesWords(span())}` : "This frame");
+  press(whole, isSaid(WHOLE_TAG, span()));
   noPath.hidden = !path;
   text(pathWords, path ? `path ${path.state}${reviewWords(path)}` : "");
   /** @type {Row[]} */
   const rows = [
-    ...labels.tags.filter(({ frame }) => frame === here).map((each) => ({ key: `tag ${each.id}`, frame: here, words: each.tag, drop: () => tagFrame(each.tag, false) })),
+    ...tagsAt(here).map((each) => ({ key: `tag ${each.id} ${each.revision}`, frame: each.first, words: `${each.tag} · ${framesWords(each)}`, drop: () => takeBack(each) })),
     ...labels.events.filter(({ state }) => state !== "rejected").map((each) => ({
       key: `event ${each.id}`, frame: each.frame, words: `${each.kind.replace("_", "-")} ${each.tracks.map((id) => `#${id}`).join(" ")} · frame ${each.frame + 1}${reviewWords(each)}`,
       drop: () => act({ kind: "remove", items: [{ kind: "event", id: each.id, revision: each.revision }] }),
@@ -65,10 +72,10 @@ function show() {
 function showPasts(labels, here) {
   /** @type {Dated[]} */
   const found = [
-    ...labels.leads.filter(({ first, last }) => first <= here && here <= last).map(({ id, revision, lead, first, last }) => ({ kind: /** @type {const} */ ("lead"), id, revision, words: `lead ${leadName(lead)} · ${first === last ? `frame ${first + 1}` : `frames ${first + 1}–${last + 1}`}` })),
+    ...labels.leads.filter(({ first, last }) => first <= here && here <= last).map(({ id, revision, lead, first, last }) => ({ kind: /** @type {const} */ ("lead"), id, revision, words: `lead ${leadName(lead)} · ${framesWords({ first, last })}` })),
     ...labels.paths.filter(({ frame }) => frame === here).map(({ id, revision, state }) => ({ kind: /** @type {const} */ ("path"), id, revision, words: `path · ${state}` })),
     ...labels.events.filter(({ frame }) => frame === here).map(({ id, revision, kind, state }) => ({ kind: /** @type {const} */ ("event"), id, revision, words: `${kind.replace("_", "-")} · ${state}` })),
-    ...labels.tags.filter(({ frame }) => frame === here).map(({ id, revision, tag: words }) => ({ kind: /** @type {const} */ ("tag"), id, revision, words })),
+    ...tagsAt(here).map((each) => ({ kind: /** @type {const} */ ("tag"), id: each.id, revision: each.revision, words: `${each.tag} · ${framesWords(each)}` })),
   ];
   pastTitle.hidden = !found.length;
   keyed(pasts, found, ({ kind, id }) => `${kind} ${id}`, createPast, updatePast);

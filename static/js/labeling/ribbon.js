@@ -1,19 +1,21 @@
-/** The labels' rows of the timeline: who leads, above what the pipeline says; and where the selected track is, with its keyframes. */
+/** The labels' rows of the timeline: who leads, above what the pipeline says; where the selected track is, with its keyframes; and which
+ * frames are tagged. */
 import { color, ui } from "../colors.js";
 import { get } from "../store.js";
 import { colorOf } from "../timeline/ribbon.js";
 import { chosen, leadName } from "./held.js";
 import { span as marked } from "./span.js";
+import { rangesOf, saidTags, WHOLE_TAG } from "./tags.js";
 
 /** @typedef {import("../timeline/span.js").Span} Span */
 /** @typedef {import("../timeline/rows.js").Row} Row */
 /** @typedef {import("./types.js").LeadRange} LeadRange */
 
-const NAME_FROM_PX = 22, HATCH_PX = 5;
+const NAME_FROM_PX = 22, HATCH_PX = 5, MOST_TAGS = 3;
 const FONT = '600 10.5px system-ui, "DejaVu Sans", sans-serif';
 
-/** @param {CanvasRenderingContext2D} ctx @param {Span} span @param {{leads: Row, track: Row}} rows @param {boolean} isLight */
-export function drawLabelRows(ctx, span, { leads, track }, isLight) {
+/** @param {CanvasRenderingContext2D} ctx @param {Span} span @param {{leads: Row, track: Row, tags: Row[]}} rows @param {boolean} isLight */
+export function drawLabelRows(ctx, span, { leads, track, tags }, isLight) {
   ctx.fillStyle = ui("raised");
   ctx.fillRect(span.left, leads.top, span.width, leads.height);
   for (const range of get("labels")?.leads ?? []) {
@@ -22,6 +24,26 @@ export function drawLabelRows(ctx, span, { leads, track }, isLight) {
     drawRange(ctx, range, { x, width: Math.max(1, end - x), ...leads }, isLight);
   }
   drawTrack(ctx, span, track);
+  for (const [place, { words }] of tagRows().slice(0, tags.length).entries()) for (const word of words) drawTag(ctx, span, tags[place], word);
+}
+
+/** What stands in each row of tags: a word, and in the last all that have no room. @returns {{name: string, words: string[]}[]} */
+export function tagRows() {
+  const words = saidTags(), rest = words.slice(MOST_TAGS - 1);
+  const rows = words.slice(0, MOST_TAGS - (rest.length > 1 ? 1 : 0)).map((word) => ({ name: word, words: [word] }));
+  return rest.length > 1 ? [...rows, { name: `${rest.length} other tags`, words: rest }] : rows;
+}
+
+/** @param {CanvasRenderingContext2D} ctx @param {Span} span @param {Row} row @param {string} word */
+function drawTag(ctx, span, row, word) {
+  ctx.fillStyle = ui(word === WHOLE_TAG ? "ok" : "accent");
+  ctx.globalAlpha = 0.8;
+  for (const { first, last } of rangesOf(word)) {
+    if (last < span.first || first > span.end) continue;
+    const x = Math.max(span.left, span.x(first)), end = Math.min(span.left + span.width, span.x(last + 1));
+    ctx.fillRect(x, row.top + 3, Math.max(1, end - x - 1), row.height - 6);
+  }
+  ctx.globalAlpha = 1;
 }
 
 /** @param {CanvasRenderingContext2D} ctx @param {LeadRange} range @param {{x: number, width: number, top: number, height: number}} box @param {boolean} isLight */
@@ -78,12 +100,13 @@ export function drawTrimmed(ctx, span, row, isLight) {
   ctx.strokeRect(from + 1, row.top + 1, Math.max(2, to - from - 2), row.height - 2);
 }
 
-/** What is marked for a lead, over the rows. @param {CanvasRenderingContext2D} ctx @param {Span} span @param {Row} row */
-export function drawMarked(ctx, span, row) {
+/** What is marked, over the rows that it may be said in. @param {CanvasRenderingContext2D} ctx @param {Span} span @param {{leads: Row, tags: Row[]}} rows */
+export function drawMarked(ctx, span, { leads, tags }) {
+  const top = tags[0]?.top ?? leads.top;
   if (!get("marked")) return;
   const { first, last } = marked(), x = Math.max(span.left, span.x(first)), end = Math.min(span.left + span.width, span.x(last + 1));
   if (end <= x) return;
   ctx.strokeStyle = ui("accent");
   ctx.lineWidth = 2;
-  ctx.strokeRect(x + 1, row.top + 1, Math.max(2, end - x - 2), row.height - 2);
+  ctx.strokeRect(x + 1, top + 1, Math.max(2, end - x - 2), leads.top + leads.height - top - 2);
 }

@@ -43,7 +43,7 @@ export const paint = (lead) => over((frames) => act({ kind: "set_lead", ...frame
 export const clear = () => over((frames) => act({ kind: "clear_lead", ...frames }));
 
 /** Do something to the marked frames. The mark goes at once, so that the next act is not about it; what was refused brings it back.
- * @param {(frames: {first: number, last: number}) => Promise<unknown>} what */
+ * @template T @param {(frames: {first: number, last: number}) => Promise<T>} what @returns {Promise<T>} */
 export async function over(what) {
   const held = get("marked"), frames = span();
   forget();

@@ -2,7 +2,7 @@
 import { el, keyed, memory, press, text, within } from "../dom.js";
 import { seekTo } from "../drive/seek.js";
 import { get, paint, set } from "../store.js";
-import { mergeWith } from "./commands.js";
+import { mergeWith, propose } from "./commands.js";
 import { present } from "./draft.js";
 import { isKnown } from "./frames.js";
 import { shown, trackOf } from "./held.js";
@@ -40,7 +40,7 @@ export function setUp(parent) {
     const found = fitting();
     text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
     keyed(body, found.slice(0, MOST), ({ id }) => String(id), create, update);
-    if (!found.length) body.replaceChildren(el("p", { class: "facts pad", textContent: emptyWords() }));
+    if (!found.length) body.replaceChildren(el("p", { class: "facts pad", textContent: emptyWords() }), ...(get("labels")?.tracks.size ? [] : [el("button", { type: "button", class: "begin", textContent: "Propose", title: "Take the pipeline's output as proposals (P)", onclick: propose })]));
   }
 }
 
@@ -58,7 +58,7 @@ const isOpen = ({ state, comment }) => state === "proposed" || (Boolean(comment)
 const isUnreviewed = ({ state, reviewer }) => (state === "accepted" || state === "corrected") && !reviewer;
 
 function emptyWords() {
-  if (!get("labels")?.tracks.size) return "Nothing is labelled yet. Press P: the pipeline's output becomes proposals.";
+  if (!get("labels")?.tracks.size) return "Nothing is labelled yet. Let the pipeline propose what it sees (P), or draw the first label (G).";
   return which === "open" ? "Nothing is left to do." : "Nothing is labelled in this frame.";
 }
 
@@ -76,7 +76,7 @@ function update(row, { id, label, state, first, last, keyframes, origin, comment
   text(mark, reviewer ? "✓✓" : { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state]);
   mark.setAttribute("aria-label", reviewer ? "reviewed" : state);
   text(what, label);
-  text(frames, first === null || last === null ? "nowhere" : `${first + 1}–${last + 1} · ${keyframes.length} key`);
+  text(frames, first === null || last === null ? "nowhere" : `${first + 1}–${last + 1}${keyframes.length ? ` · ${keyframes.length} key` : ""}`);
   text(who, reviewer || (origin.maker === "person" ? origin.name : origin.maker));
   row.title = `${state}${comment ? `, sent back: ${comment}` : ""}; made by ${origin.name || origin.maker}${reviewer ? `, reviewed by ${reviewer}` : ""}${origin.how ? `; ${origin.how}` : ""}`;
 }

@@ -61,10 +61,11 @@
  * @property {string} comment
  * @property {string} reviewer
  *
- * @typedef {object} FrameTag
+ * @typedef {object} FrameTag  both ends included
  * @property {number} id
  * @property {number} revision
- * @property {number} frame
+ * @property {number} first
+ * @property {number} last
  * @property {string} tag
  * @property {LabelOrigin} origin
  *

@@ -14,7 +14,7 @@ import { get } from "../store.js";
 export function drawFront(ctx, size, span, rows, hover, isLight) {
   drawClip(ctx, size, span, rows);
   if (rows.labels) drawTrimmed(ctx, span, rows.labels.leads, isLight);
-  if (rows.labels) drawMarked(ctx, span, rows.labels.leads);
+  if (rows.labels) drawMarked(ctx, span, rows.labels);
   if (hover !== null && hover !== here()) drawLine(ctx, span, hover, rows.axis.height, size.height);
 }
 

@@ -4,6 +4,7 @@ import { ui } from "../colors.js";
 import { $, el, memory, press, text } from "../dom.js";
 import { here } from "../drive/seek.js";
 import { clock, num } from "../format.js";
+import { tagRows } from "../labeling/ribbon.js";
 import { get, on, paint, painter } from "../store.js";
 import { Surface } from "../surface.js";
 import { drawBack } from "./back.js";
@@ -73,7 +74,7 @@ function chip({ key, label, title, role }) {
 }
 
 /** As last drawn: the values ask ten times a second, and asking the page for sizes and styles makes it lay itself out. */
-let shared = shareOut(0, false, curves, false);
+let shared = shareOut(0, false, curves, null);
 let isLight = false;
 const rows = () => shared;
 
@@ -83,7 +84,7 @@ function draw() {
   span.setCount(frames());
   span.left = LABELS_PX;
   span.width = Math.max(1, width - LABELS_PX - EDGE_PX);
-  shared = shareOut(height, Boolean(get("drive")?.base), curves, get("labeling")?.on === true);
+  shared = shareOut(height, Boolean(get("drive")?.base), curves, get("labeling")?.on ? tagRows().length : null);
   isLight = getComputedStyle(document.documentElement).colorScheme === "light";
   drawBack(ctx, { width, height }, span, shared, isLight);
   $("#timeline-fit").hidden = span.isWhole;

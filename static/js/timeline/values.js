@@ -3,6 +3,7 @@
 import { ui } from "../colors.js";
 import { DASH, num } from "../format.js";
 import { leadAt, leadName } from "../labeling/held.js";
+import { tagRows } from "../labeling/ribbon.js";
 import { get } from "../store.js";
 import { colorOf } from "./ribbon.js";
 
@@ -17,6 +18,7 @@ export function drawValues(ctx, rows, index, isLight, edge) {
   ctx.textBaseline = "middle";
   const lead = rows.labels ? leadAt(index)?.lead ?? null : null;
   if (rows.labels) label(ctx, "labels", lead === null ? DASH : leadName(lead), rows.labels.leads, edge, typeof lead === "number" ? colorOf(lead, isLight) : ui("dim"));
+  for (const [place, row] of (rows.labels?.tags ?? []).entries()) label(ctx, tagRows()[place]?.name ?? "", "", row, edge, ui("dim"));
   const id = columns?.cipv_id[index] ?? null;
   label(ctx, rows.labels ? "pipeline" : "CIPV", id === null ? DASH : `#${id}`, rows.ribbon, edge, id === null ? ui("dim") : colorOf(id, isLight));
   if (rows.base) {

@@ -70,7 +70,7 @@ def test_a_wrong_lead_is_among_the_worst_frames(engine: Engine, client: httpx.Cl
     assert [(each.frame, each.verdict) for each in score.worst] == [(4, "wrong")]
     assert not {"precision", "MOTA"} & {metric.name for metric in score.metrics}
     assert any("in 0 of 1 labelled frames" in note for note in score.notes)
-    act(client, kind="tag", frame=4, tag=WHOLE_TAG, on=True)
+    act(client, kind="tag", first=4, last=4, tag=WHOLE_TAG, on=True)
     score = ScoreJson.model_validate(client.get("/api/labels/score").json())
     assert {"precision", "MOTA"} <= {metric.name for metric in score.metrics}
 
@@ -107,10 +107,10 @@ def test_an_edit_shows_in_changes_window_track_and_history(engine: Engine, clien
 
 
 def test_one_undo_goes_across_labels_parameters_and_calibration(engine: Engine, client: httpx.Client) -> None:
-    act(client, kind="tag", frame=3, tag="night")
+    act(client, kind="tag", first=3, last=3, tag="night")
     for name, value in (("cipv.confirm_hits", 5), ("alignment.yaw_deg", 0.5)):
         client.patch("/api/params", json={"changes": {name: value}, "person": "Ada"})
-    act(client, kind="tag", frame=4, tag="rain")
+    act(client, kind="tag", first=4, last=4, tag="rain")
     undone = []
     for _ in range(4):
         undone.append(move(client, "undo", "Ada").json()["what"])
@@ -128,7 +128,7 @@ def test_one_undo_goes_across_labels_parameters_and_calibration(engine: Engine, 
 
 
 def test_a_slider_that_is_only_tried_is_undone_first(engine: Engine, client: httpx.Client) -> None:
-    act(client, kind="tag", frame=3, tag="night")
+    act(client, kind="tag", first=3, last=3, tag="night")
     client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 9}, "final": False})
     assert move(client, "undo", "Ada").json()["what"] == "what was being tried"
     assert engine.control.peek().params.cipv.confirm_hits == 3
@@ -172,7 +172,7 @@ def test_the_cuboid_is_laid_on_the_points_and_a_car_lifted_out_of_the_picture(
 
 def test_a_name_is_the_same_however_it_is_spaced(client: httpx.Client) -> None:
     spaced = " Ada  Lovelace "
-    assert act(client, spaced, kind="tag", frame=3, tag="night").is_success
+    assert act(client, spaced, kind="tag", first=3, last=3, tag="night").is_success
     assert labels(client, person=spaced)["can_undo"]
     assert move(client, "undo", spaced).json()["what"].endswith("night")
     change = {"changes": {"cipv.confirm_hits": 5}, "person": spaced}
@@ -223,7 +223,7 @@ def test_live_sensors_and_nothing_cannot_be_labelled() -> None:
     try:
         with serving(create_app(engine)) as address, httpx.Client(base_url=address, timeout=WAIT_S) as client:
             assert client.get("/api/state").json()["labels"] is None
-            answer = act(client, kind="tag", frame=0, tag="x")
+            answer = act(client, kind="tag", first=0, last=0, tag="x")
             assert answer.json()["detail"] == "no recording is open that could be labelled"
             assert answer.status_code == 404
     finally:

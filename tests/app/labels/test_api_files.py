@@ -117,7 +117,7 @@ def test_a_file_that_is_none_is_said_and_changes_nothing(
 
 
 def test_a_version_is_frozen_and_given_out(engine: Engine, client: httpx.Client) -> None:
-    act(client, kind="tag", frame=3, tag="night")
+    act(client, kind="tag", first=3, last=3, tag="night")
     names = [each["name"] for each in client.get("/api/labels/versions").json()]
     name = f"v{len(names) + 1}"
     assert client.post("/api/labels/versions", json={"name": name, "person": "Ada"}).status_code == 201

@@ -26,7 +26,7 @@ def test_what_is_sent_again_is_answered_as_before_and_done_once(engine: Engine, 
 
     numbers = itertools.count(1)
     acts: tuple[tuple[str, dict[str, Any]], ...] = (
-        ("act", {"act": {"kind": "tag", "frame": 3, "tag": "night"}}),
+        ("act", {"act": {"kind": "tag", "first": 3, "last": 3, "tag": "night"}}),
         ("act", {"act": {"kind": "lift", "frame": 10, "pixel": [160, 92]}}),
         ("undo", {}),
         ("redo", {}),
@@ -50,7 +50,7 @@ def test_what_is_sent_again_is_answered_as_before_and_done_once(engine: Engine, 
 
 def test_what_was_meant_for_another_recording_is_not_done_to_this_one(client: httpx.Client) -> None:
     drive = labels(client)["drive"]["id"]
-    tag = {"kind": "tag", "frame": 3, "tag": "night"}
+    tag = {"kind": "tag", "first": 3, "last": 3, "tag": "night"}
     assert client.post("/api/labels/act", json={"person": "Ada", "act": tag, "drive": drive}).status_code == 200
     before = labels(client)["revision"]
     for path, body in (("act", {"act": tag}), ("act", {"act": {"kind": "propose"}}), ("undo", {}), ("redo", {})):
@@ -80,7 +80,7 @@ def test_an_act_is_answered_from_the_recording_that_it_was_done_to(
 
     monkeypatch.setattr(Log, "act", act_and_close)
     try:
-        answer = act(client, kind="tag", frame=3, tag="night")
+        answer = act(client, kind="tag", first=3, last=3, tag="night")
     finally:
         engine.labels.open(opened.uri, opened.recording)
     assert (answer.status_code, len(answer.json()["changed"]["tags"])) == (200, 1)
@@ -107,7 +107,7 @@ def test_two_servers_of_a_team_see_each_others_acts(postgres_url: str) -> None:
     with ExitStack() as stack:
         first, ada = stack.enter_context(team(Database(postgres_url)))
         second, bob = stack.enter_context(team(Database(postgres_url)))
-        done = act(ada, kind="tag", frame=3, tag="night").json()
+        done = act(ada, kind="tag", first=3, last=3, tag="night").json()
         second.wait_for(lambda shown: shown.labels.revision == done["revision"], WAIT_S)
         (tag,) = labels(bob)["tags"]
         act(bob, "Bob", kind="remove", items=[{"kind": "tag", "id": tag["id"], "revision": tag["revision"]}])
@@ -118,7 +118,7 @@ def test_two_servers_of_a_team_see_each_others_acts(postgres_url: str) -> None:
 def test_after_a_restart_everything_is_there_and_can_be_undone(tmp_path: Any) -> None:
     file = tmp_path / "labels.db"
     with team(Database.in_file(file)) as (_, client):
-        act(client, kind="tag", frame=3, tag="night")
+        act(client, kind="tag", first=3, last=3, tag="night")
         client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 5}, "person": "Ada"})
     with team(Database.in_file(file)) as (_, client):
         assert len(labels(client)["tags"]) == 1
@@ -140,14 +140,14 @@ def test_a_database_that_fails_keeps_nobody_from_driving(
         assert client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 6}}).status_code == 200
         assert engine.control.peek().params.cipv.confirm_hits == 6
         for refused in (
-            act(client, kind="tag", frame=1, tag="x"),
+            act(client, kind="tag", first=1, last=1, tag="x"),
             move(client, "undo", "A"),
         ):
             assert (refused.status_code, refused.json()["detail"]) == (503, "labels: the server is away")
         patched.setattr(Database, "reading", away)
         assert client.get("/api/compare").status_code == 200
     client.patch("/api/params", json={"changes": {"cipv.confirm_hits": 3}})
-    assert act(client, kind="tag", frame=1, tag="x").status_code == 200
+    assert act(client, kind="tag", first=1, last=1, tag="x").status_code == 200
 
 
 def test_what_others_stand_behind_is_reviewed_one_by_one(client: httpx.Client) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import sys
 import threading
@@ -166,4 +167,32 @@ def test_a_database_of_an_older_program_goes_on(file: Path, monkeypatch: pytest.
     new = Database.in_file(file)
     labels = DriveLabels(new, info("drive"), station="here:8420")
     assert labels.log.move("undo", "Ada", act_id="1").params == {"a.b": 1}
+    new.close()
+
+
+def test_tags_of_single_frames_become_ranges(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What stands, and what can be taken back: the second was removed."""
+    monkeypatch.setattr("app.labels.database.HEAD", "0002")
+    old = Database.in_file(file)
+    origin = {"maker": "person", "name": "Ada", "t_unix_ms": 5, "params": None, "calibration": None, "how": ""}
+    tags = [{"frame": frame, "tag": tag, "origin": origin} for frame, tag in ((3, "night"), (4, "rain"))]
+    night, rain = (pack({"value": each, "frames": [], "sightings": []}) for each in tags)
+    with old.writing() as connection:
+        connection.exec_driver_sql(f"INSERT INTO drive VALUES (1, '{info('drive').key}', 'test:drive', 'x', 100, 3)")
+        for number, (item, before, after) in enumerate(((1, None, night), (2, None, rain), (2, rain, None)), 1):
+            act = f"(1, {number}, 'tag', 'x', 'Ada', 'here', 0, {number}, 'done', NULL, NULL, '')"
+            connection.exec_driver_sql(f"INSERT INTO act VALUES {act}")
+            body = {"before": before, "after": after}
+            row = f"(1, {number}, 'tag', '{item}', :before, :after)"
+            connection.execute(text(f"INSERT INTO change VALUES {row}"), body)
+        for item, revision in ((1, 1), (2, 3)):
+            row = f"(1, 'tag', {item}, {revision}, {item - 1}, :value)"
+            connection.execute(text(f"INSERT INTO item VALUES {row}"), {"value": json.dumps(tags[item - 1])})
+    old.close()
+    monkeypatch.undo()
+    new = Database.in_file(file)
+    labels = DriveLabels(new, info("drive"), station="here")
+    assert [(each.first, each.last, each.tag) for each in labels.label_set().tags] == [(3, 3, "night")]
+    labels.log.move("undo", "Ada")
+    assert [(each.first, each.last, each.tag) for each in labels.label_set().tags] == [(3, 3, "night"), (4, 4, "rain")]
     new.close()

@@ -81,7 +81,7 @@ def test_what_is_imported_again_is_there_once(labels: DriveLabels) -> None:
     file = replace(
         of(labels, car(3, "accepted", FILE), leads=(lead(3, FILE),)),
         events=(EventLabel(12, "cut_in", (3,), "accepted", FILE),),
-        tags=(FrameTag(4, "night", FILE),),
+        tags=(FrameTag(4, 6, "night", FILE),),
     )
     put(labels, car(3, "corrected", ADA, x=50.0))
     for _ in range(2):
@@ -90,7 +90,7 @@ def test_what_is_imported_again_is_there_once(labels: DriveLabels) -> None:
     assert [track.id for track in now.tracks] == [3, 4]
     assert [(each.frame, each.kind, each.tracks) for each in now.events] == [(12, "cut_in", (4,))]
     assert [(each.first, each.lead) for each in now.leads] == [(10, 4)]
-    assert len(now.tags) == 1
+    assert [(each.first, each.last, each.tag) for each in now.tags] == [(4, 6, "night")]
 
 
 @pytest.mark.parametrize(

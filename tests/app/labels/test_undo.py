@@ -72,7 +72,7 @@ def test_what_somebody_else_changed_since_is_not_taken_back(labels: DriveLabels)
 
 LEAD = {"kind": "set_lead", "first": 0, "last": 10, "lead": "none"}
 LINE = {"kind": "set_path", "frame": 3, "left": [(0.0, 1.5), (20.0, 1.5)], "right": None}
-TAG = {"kind": "tag", "frame": 3, "tag": "night"}
+TAG = {"kind": "tag", "first": 3, "last": 3, "tag": "night"}
 EVENT = {"kind": "add_event", "frame": 10, "event": "cut_in", "tracks": [1]}
 CAR = {"kind": "add_track", "label": "car", "frame": 10, "cuboid": cuboid().model_dump()}
 PLACED = {"kind": "set_sighting", "track": 1, "revision": 1, "frame": 9, "cuboid": cuboid(22.0).model_dump()}
@@ -88,6 +88,8 @@ CLEARED = {"kind": "clear_lead", "first": 0, "last": 10}
          "frame 4 would have two paths: Bob made path 2 there"),
         ([("Ada", TAG), ("Ada", "undo"), ("Bob", TAG), ("Ada", "redo")],
          "frame 4 would have two tags: Bob made tag 2 there"),
+        ([("Ada", TAG | {"last": 9}), ("Ada", TAG | {"last": 9, "on": False}), ("Bob", TAG | {"first": 8, "last": 12}),
+          ("Ada", "undo")], "frames 9–10 would have two tags: Bob made tag 2 there"),
         ([("Ada", CAR), ("Bob", LEAD | {"lead": 1}), ("Ada", "undo")], "lead 1 names #1, which would not be there"),
         ([("Ada", CAR), ("Bob", EVENT), ("Ada", "undo")], "event 1 names #1, which would not be there"),
         ([("Ada", CAR), ("Bob", LEAD | {"lead": 1}), ("Bob", "undo"), ("Ada", "undo"), ("Bob", "redo")],

@@ -113,6 +113,11 @@ class Labels:
         """(first, last, who), by frame."""
         return sorted((each["first"], each["last"], each["lead"]) for each in self.everything["leads"])
 
+    @property
+    def tags(self) -> list[tuple[int, int, str]]:
+        """(first, last, word), by frame."""
+        return sorted((each["first"], each["last"], each["tag"]) for each in self.everything["tags"])
+
     def sighting(self, track: int, frame: int) -> Any:
         """Where a track is in a frame; null where it is not."""
         rows = self.get(f"/frames?first={frame}&last={frame}")["sightings"].get(str(frame), [])

@@ -30,7 +30,7 @@ from pipeline.sources import open_source
 from pipeline.sources.base import TruthObject
 from tests.browser.conftest import OpenPage, Site
 from tests.browser.labels.hands import KEYSTROKE_S, Hand, Labels, begin, is_at, is_saved
-from tests.browser.looks import pixels
+from tests.browser.looks import pixels, repainted
 
 FRAMES = range(414, 426)
 COUNT = len(FRAMES)
@@ -235,6 +235,32 @@ def from_nothing(hand: Hand, labels: Labels, truth: list[Cuboid]) -> int:
     return made
 
 
+def tag_all(hand: Hand, labels: Labels) -> None:
+    """Every frame is said to be labelled whole with one key, which is taken back and done again."""
+    page = hand.page
+    notes = page.locator(".label-score .notes")
+    assert not score_of(page, labels).keys() & WHOLE_ONLY
+    expect(notes).to_contain_text(f"in 0 of {COUNT} labelled frames")
+    page.keyboard.press("Home")
+    is_at(page, 0)
+    bare = pixels(page, "#timeline-back")
+    hand.keys("i")
+    page.keyboard.press("End")
+    is_at(page, COUNT - 1)
+    hand.keys("o", "Shift+W")
+    labels.wait_for(lambda now: now.tags == [(0, COUNT - 1, "all labelled")])
+    assert repainted(page, "#timeline-back", bare), "it is on the timeline"
+    assert score_of(page, labels).keys() >= WHOLE_ONLY
+    expect(notes.locator("li")).to_have_count(0)
+    page.get_by_role("tab", name="Frame").click()
+    expect(page.get_by_role("button", name="All labelled", exact=True)).to_have_attribute("aria-pressed", "true")
+    hand.keys("Shift+W")
+    labels.wait_for(lambda now: now.tags == [(0, COUNT - 2, "all labelled")])
+    hand.keys("Control+z", "Control+z")
+    labels.wait_for(lambda now: now.tags == [])
+    page.get_by_role("tab", name="Tracks").click()
+
+
 def test_the_drive_is_labelled_with_and_without_proposals(
     astyx: Site, objects: list[tuple[TruthObject, ...]], truth: list[Cuboid], open_page: OpenPage
 ):
@@ -246,6 +272,7 @@ def test_the_drive_is_labelled_with_and_without_proposals(
     made = from_nothing(hand, labels, truth)
     is_saved(page)
     without = work(hand, started, errors_m(labels, made, truth))
+    tag_all(hand, labels)
     labels.clear(COUNT)
     page.keyboard.press("Escape")
     page.keyboard.press("Home")

@@ -105,7 +105,7 @@ def test_everything_said_of_a_frame_has_a_history(hand: Hand, labels: Labels):
     page.locator(".track-detail .past button").click()
     expect(rows).to_have_count(acts)
     hand.keys("c")
-    labels.act("Ada", {"kind": "tag", "frame": START, "tag": "night", "on": True})
+    labels.act("Ada", {"kind": "tag", "first": START, "last": START, "tag": "night", "on": True})
     labels.act("Ada", {"kind": "add_event", "frame": START, "event": "cut_in", "tracks": [made]})
     page.get_by_role("tab", name="Frame").click()
     pasts = page.locator(".moment-pasts details")
@@ -157,7 +157,7 @@ def test_a_drive_is_reviewed_frozen_and_taken_back_in(hand: Hand, labels: Labels
 
     page.get_by_role("tab", name="Frame").click()
     page.get_by_role("button", name="Cut-in", exact=True).click()
-    page.get_by_label("Tag of this frame").fill("rain")
+    page.get_by_label("Tag of these frames").fill("rain")
     page.get_by_role("button", name="Add", exact=True).click()
     page.get_by_role("button", name="Draw the path").click()
     bare = pixels(page, "#bev")

@@ -119,7 +119,7 @@ def test_only_what_somebody_stands_behind_counts(state: State) -> None:
     assert any("only proposed" in note for note in known.notes) == (state == "proposed")
 
 
-TAGGED = tuple(FrameTag(n, WHOLE_TAG, PERSON) for n in (0, 2))
+TAGGED = tuple(FrameTag(n, n, WHOLE_TAG, PERSON) for n in (0, 2))
 LED = (led(0, 2, 4, by=PIPELINE),)
 
 
@@ -134,6 +134,9 @@ LED = (led(0, 2, 4, by=PIPELINE),)
         pytest.param(labels(track(4, 30.0), track(5, 20.0, state="rejected", by=PIPELINE)), 3, id="the other is none"),
         pytest.param(labels(track(4, 30.0, by=PERSON)), 0, id="drawn by hand: nobody knows what else is there"),
         pytest.param(labels(track(4, 30.0, by=PERSON), tags=TAGGED), 2, id="drawn by hand, and said to be all"),
+        pytest.param(
+            labels(track(4, 30.0, by=PERSON), tags=(FrameTag(0, 2, WHOLE_TAG, PERSON),)), 3, id="all, in one range"
+        ),
         pytest.param(labels(track(4, 30.0, by=PERSON), leads=LED), 3, id="a proposal that was put right"),
         pytest.param(labels(track(4, 30.0, state="proposed"), leads=LED, tags=TAGGED), 0, id="tagged too early"),
     ],

@@ -64,6 +64,7 @@ ORIGINS = st.builds(
     TEXTS,
 )
 FRAMES = st.integers(0, COUNT - 1)
+RANGES = st.tuples(FRAMES, FRAMES).map(sorted)
 LINES = st.lists(st.tuples(NUMBERS, NUMBERS), min_size=1, max_size=4).map(tuple)
 
 
@@ -103,7 +104,7 @@ def label_sets(draw: st.DrawFn) -> LabelSet:
                 )
             )
         ),
-        draw(several(st.builds(FrameTag, FRAMES, TEXTS, ORIGINS))),
+        draw(several(st.builds(lambda ends, *said: FrameTag(*ends, *said), RANGES, TEXTS, ORIGINS))),
         draw(TEXTS),
     )
 

@@ -49,6 +49,7 @@ def test_openlabel(tmp_path: Path) -> None:
     assert relation["rdf_subjects"] == [{"type": "object", "uid": "3"}]
     assert openlabel["objects"][relation["rdf_objects"][0]["uid"]]["type"] == "ego_vehicle"
     assert "0" in openlabel["frames"]["1"]["relations"]
+    assert [index for index in "0123" if "contexts" in openlabel["frames"][index]] == ["0", "1"], "it rains there"
     assert "0" not in openlabel["frames"]["2"].get("relations", {})
     pose = openlabel["coordinate_systems"]["camera"]["pose_wrt_parent"]["matrix4x4"]
     assert [pose[3], pose[7], pose[11]] == pytest.approx([-1.0, 0.1, 1.2]), "where the camera is in the ego frame"

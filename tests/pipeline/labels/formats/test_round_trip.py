@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 
+from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid
 from pipeline.labels.formats import base, native
 from pipeline.labels.formats.base import Drive, FormatName
@@ -98,7 +99,7 @@ def full_set() -> LabelSet:
         leads=(LeadRange(0, 1, 3, "accepted", by, "not yet", "Bob"), LeadRange(2, 3, "none", "rejected", by)),
         paths=(PathLabel(0, ((0.0, 1.0),), None, "accepted", by),),
         events=(EventLabel(1, "cut_in", (3,), "accepted", by),),
-        tags=(FrameTag(0, "rain", by),),
+        tags=(FrameTag(0, 1, "rain", by),),
         name="frozen",
     )
 
@@ -151,6 +152,17 @@ def test_labels_of_a_drive_are_also_labels_of_its_clip() -> None:
     assert [(t.id, [s.frame for s in t.sightings]) for t in placed.labels.tracks] == [(3, [0]), (4, [1]), (5, [1])]
     assert [e.frame for e in placed.labels.events] == [0]
     assert placed.notes[0].startswith("3 of the labels' 6 frames")
+
+
+def test_a_file_of_version_1_has_tags_of_single_frames() -> None:
+    body = json.loads(native.to_json(full_set()))
+    (tag,) = body["labels"]["tags"]
+    single = {"frame": 1, "tag": tag["tag"], "origin": tag["origin"]}
+    old = body | {"version": 1, "labels": body["labels"] | {"tags": [single]}}
+    (read,) = native.from_json(json.dumps(old).encode(), "an old file").tags
+    assert (read.first, read.last, read.tag) == (1, 1, "rain")
+    with pytest.raises(BadInput, match="a new file"):
+        native.from_json(json.dumps(old | {"version": 2}).encode(), "a new file")
 
 
 def test_nuscenes_places_are_where_the_car_has_gone(tmp_path: Path) -> None:

@@ -1,0 +1,31 @@
+"""Ranges of frames, both ends included, beside others."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from typing import TypeVar
+
+from pipeline.labels.model import FrameTag, LeadRange
+
+S = TypeVar("S", LeadRange, FrameTag)
+
+
+def free_spans(first: int, last: int, said: Collection[int]) -> list[tuple[int, int]]:
+    """The parts of a range of which nothing is said. said: frames of which something is."""
+    parts: list[tuple[int, int]] = []
+    for frame in range(first, last + 1):
+        if frame in said:
+            continue
+        if parts and parts[-1][1] == frame - 1:
+            parts[-1] = (parts[-1][0], frame)
+        else:
+            parts.append((frame, frame))
+    return parts
+
+
+def outside(span: S, first: int, last: int) -> list[S]:
+    """What is left of a range when frames first … last are cut out of it."""
+    before = [replace(span, last=first - 1)] if span.first < first else []
+    after = [replace(span, first=last + 1)] if span.last > last else []
+    return before + after
