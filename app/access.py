@@ -10,7 +10,6 @@ Where other machines can reach the server, all that does not help: there everybo
 
 from __future__ import annotations
 
-import ipaddress
 import socket
 from collections.abc import Iterable
 from html import escape
@@ -22,11 +21,9 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
+from app.listening import LOOPBACK_HOSTS, WILDCARDS, is_address
 from app.tokens import Role, Tokens
 
-LOOPBACK_HOSTS = ("localhost", "127.0.0.1", "::1")
-WILDCARDS = ("0.0.0.0", "::")
-"""Every interface of this machine."""
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OWN_SITES = (None, "same-origin", "none")
 """Whom a browser may ask the API for: Sec-Fetch-Site of W3C Fetch Metadata. ``same-site`` is another port of ours."""
@@ -86,7 +83,7 @@ class Access:
         return self.refusal(connection.headers, changes=True) is None
 
     def _knows(self, name: str | None) -> bool:
-        return name in self._hosts or (self._any_address and _is_address(name))
+        return name in self._hosts or (self._any_address and is_address(name))
 
 
 class Guard:
@@ -135,11 +132,6 @@ def set_role(connection: HTTPConnection, role: Role) -> None:
 def is_display(connection: HTTPConnection) -> bool:
     """True for who came with the display's token."""
     return connection.scope.get("state", {}).get("role") == "display"
-
-
-def is_loopback(host: str) -> bool:
-    """True for an address or name that only this machine reaches."""
-    return host.lower() in LOOPBACK_HOSTS or (_is_address(host) and ipaddress.ip_address(host).is_loopback)
 
 
 def cookie_name(connection: HTTPConnection) -> str:
@@ -213,11 +205,3 @@ def _host_name(host: str) -> str | None:
         return urlsplit(f"//{host}").hostname
     except ValueError:
         return None
-
-
-def _is_address(name: str | None) -> bool:
-    try:
-        ipaddress.ip_address(name or "")
-    except ValueError:
-        return False
-    return True

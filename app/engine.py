@@ -260,6 +260,8 @@ class Engine:
                 notices=tuple(n for n in shown.notices if n.level != "error"),
             )
         self._showing.publish(shown)
+        if tick is not None:
+            self.labels.shown()
 
 
 class _Overtaken(Exception):

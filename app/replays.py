@@ -13,8 +13,8 @@ from typing import Any
 from urllib.parse import quote as url_quote
 from urllib.parse import urlencode
 
+from app.listening import DEFAULT_PORT
 from app.report import page, section_html
-from app.server import DEFAULT_PORT
 from app.svg import chart_svg
 from pipeline.evaluation.experiments.sections import Experiment, Linked, Replay, Section, Table
 from pipeline.params import Params, changes_of

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import errno
 import socket
-import sys
 from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -17,14 +15,13 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 
-from app.access import WILDCARDS, Access, Guard, is_loopback
+from app.access import Access, Guard
 from app.clips.jobs import Jobs
 from app.drive.marks import Marks
 from app.engine import Engine
 from app.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
 from app.looks import Looks
 from app.metrics import Metrics
-from app.recording import SESSIONS
 from app.routes.alignment import alignment_router
 from app.routes.clips import clips_router
 from app.routes.drive import drive_router
@@ -43,16 +40,8 @@ from app.tokens import Tokens
 from app.views.colors import palette_css
 from app.views.rerun_web import ViewerFiles
 from app.views.viser_proxy import viser_router
-from pipeline.errors import BadInput
 
 STATIC = Path(__file__).resolve().parent.parent / "static"
-DEFAULT_PORT = 8420
-_PORTS_TO_TRY = 20
-_LAST_PORT = 65535
-
-
-class PortTaken(BadInput):
-    """The wanted address cannot be listened on; the text says which and what to do."""
 
 
 def create_app(
@@ -103,62 +92,6 @@ def create_app(
     return app
 
 
-def listen_socket(host: str, port: int, *, strict: bool = False) -> socket.socket:
-    """A bound socket on ``port`` or, unless ``strict``, the next free one above it. PortTaken when there is none."""
-    if not 0 <= port <= _LAST_PORT:
-        raise PortTaken(f"{port} is no port: 0 to {_LAST_PORT}")
-    candidates = [port] if strict or port == 0 else range(port, min(port + _PORTS_TO_TRY, _LAST_PORT + 1))
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    for candidate in candidates:
-        # asyncio switches Nagle's delay of 40 ms off only where the protocol is named
-        bound = socket.socket(family, socket.SOCK_STREAM, socket.IPPROTO_TCP)
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            bound.bind((host, candidate))
-        except OSError as error:
-            bound.close()
-            if error.errno == errno.EADDRINUSE:
-                continue
-            raise PortTaken(f"cannot listen on {host}:{candidate}: {error.strerror}") from None
-        return bound
-    tried = f"port {port}" if len(candidates) == 1 else f"ports {candidates[0]}–{candidates[-1]}"
-    raise PortTaken(f"{tried} on {host} taken; choose another with --port")
-
-
-def serve(
-    engine: Engine,
-    *,
-    host: str = "127.0.0.1",
-    port: int = DEFAULT_PORT,
-    strict_port: bool = False,
-    hosts: Iterable[str] = (),
-    viser_port: Callable[[], int | None] = lambda: None,
-    looks: Looks | None = None,
-    on_ready: Callable[[str], None] | None = None,
-) -> None:
-    """Serve until Ctrl-C. Starts and stops the engine; prints the page's address on a line of its own when it answers,
-    and links with tokens where other machines can come.
-
-    PortTaken and BadInput (a weak token) before anything is started.
-    """
-    tokens = None if is_loopback(host) and not tuple(hosts) else Tokens.from_environment()
-    bound = listen_socket(host, port, strict=strict_port)
-    number = bound.getsockname()[1]
-    if port not in (0, number):
-        print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
-    address = f"http://{_reachable(host)}:{number}"
-    engine.labels.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
-    app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks, tokens)
-    engine.start()
-    try:
-        Server(app, address, on_ready, tokens).run(sockets=[bound])
-    except KeyboardInterrupt:
-        pass  # uvicorn raises the signal again once it has shut down
-    finally:
-        engine.stop()
-        bound.close()
-
-
 class Server(uvicorn.Server):
     """Says where it is as soon as it answers. Compressing the stream would cost more than sending it."""
 
@@ -190,20 +123,6 @@ class Server(uvicorn.Server):
                 print(f"display in the car: {self._address}/drive/?token={self._tokens.display}", flush=True)
             if self._on_ready is not None:
                 await asyncio.to_thread(self._on_ready, link)
-
-
-def _reachable(host: str) -> str:
-    """How a person writes the host in an address: for every interface, the one that leads out."""
-    if host in WILDCARDS:
-        probe = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            probe.connect(("192.0.2.1", 9))  # sends nothing: it only asks the system which way it would go
-            host = probe.getsockname()[0]
-        except OSError:
-            host = socket.gethostname()
-        finally:
-            probe.close()
-    return f"[{host}]" if ":" in host else host
 
 
 class _Pages(StaticFiles):

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import threading
 from dataclasses import dataclass
 from functools import cache
 from time import perf_counter_ns
@@ -152,7 +153,17 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
 
 def warm_up() -> None:
     """Compile every kernel before the first frame, so that the first frame is as fast as the rest, and keep the garbage
-    collector of the process from what is loaded by then and from the frames."""
+    collector of the process from what is loaded by then and from the frames. Once: a second thread that comes meanwhile
+    waits for the first."""
+    with _WARMING:
+        _warm_up()
+
+
+_WARMING = threading.Lock()
+
+
+@cache
+def _warm_up() -> None:
     warm_up_lidar()
     one = np.eye(2)
     kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)

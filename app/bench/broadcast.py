@@ -19,7 +19,7 @@ from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
 
 from app.line import DetectionCache, Line, Tick
-from app.server import listen_socket
+from app.listening import listen_socket
 from app.snapshot import Snapshot
 from app.stream import Stream
 from pipeline.params import Params

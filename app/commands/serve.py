@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import webbrowser
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -12,13 +13,14 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from app.engine import Engine
-from app.labels.database import open_database
+from app.labels import URL_VARIABLE
 from app.labels.desk import LabelDesk
+from app.late_scene import LateScene
+from app.listening import DEFAULT_PORT
 from app.looks import Looks
 from app.options import LineOptions, planned
 from app.progress import opened
-from app.scene_feed import SceneFeed
-from app.server import DEFAULT_PORT, serve
+from app.serving import serve
 from pipeline.progress import Progress
 from pipeline.run import detector_for, lanes_for
 from pipeline.sources import open_any
@@ -26,6 +28,7 @@ from pipeline.sources.along_route import along_route
 from pipeline.sources.base import AnySource
 
 if TYPE_CHECKING:
+    from app.labels.database import Database
     from app.rerun_feed import RerunFeed
 
 
@@ -47,15 +50,18 @@ class ServerOptions:
     """Keep labels in a team's database, as postgresql://person@host/cipv; else $CIPV_LABELS_URL, sessions/labels.db"""
 
     def label_desk(self) -> LabelDesk:
-        """DatabaseError when the database cannot be opened."""
-        return LabelDesk(open_database(self.labels))
+        """DatabaseError when a database that was named cannot be opened. The file of this machine is opened when the
+        first picture is shown; what is wrong with it is then said on the page."""
+        if self.labels or os.environ.get(URL_VARIABLE):
+            return LabelDesk(_open_labels(self.labels))
+        return LabelDesk(open_later=lambda: _open_labels(None))
 
     def serve(self, engine: Engine) -> int:
         """Until Ctrl-C."""
         on_ready: Callable[[str], None] | None = webbrowser.open if self.browser else None  # type: ignore[assignment]
         looks = Looks()
         with ExitStack() as stack:
-            feed = stack.enter_context(SceneFeed(engine, looks))
+            scene = stack.enter_context(LateScene(engine, looks))
             if self.rerun is not None:
                 stack.enter_context(_rerun_feed(engine, self.rerun))
             serve(
@@ -64,11 +70,17 @@ class ServerOptions:
                 port=DEFAULT_PORT if self.port is None else self.port,
                 strict_port=self.port is not None,
                 hosts=self.allow_host,
-                viser_port=lambda: feed.port,
+                viser_port=scene.port,
                 looks=looks,
                 on_ready=on_ready,
             )
         return 0
+
+
+def _open_labels(url: str | None) -> Database:
+    from app.labels.database import open_database  # SQLAlchemy takes most of a second to import: not before a picture
+
+    return open_database(url)
 
 
 def _rerun_feed(engine: Engine, url: str) -> RerunFeed:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from app.labels.drive import Changes, DriveInfo, DriveLabels
-from app.labels.log import HistoryEntry
 from app.labels.values import Item, ItemKind, value_to_json
 from pipeline.labels.model import LabelTrack, Sighting
+
+if TYPE_CHECKING:
+    from app.labels.drive import Changes, DriveInfo, DriveLabels
+    from app.labels.log import HistoryEntry
 
 _LISTS: dict[ItemKind, str] = {"track": "tracks", "lead": "leads", "path": "paths", "event": "events", "tag": "tags"}
 

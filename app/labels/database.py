@@ -20,24 +20,20 @@ from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import URL, Engine, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
+from app.labels import URL_VARIABLE
 from app.labels.migrations import HEAD
+from app.labels.refusals import DatabaseError
 from app.labels.tables import Base
 from app.recording import SESSIONS
-from pipeline.errors import BadInput
 
 logger = logging.getLogger("cipv.labels")
 
-URL_VARIABLE = "CIPV_LABELS_URL"
 FILE = SESSIONS / "labels.db"
 _BUSY_S = 30.0
 _CONNECT_S = 3
 """A server that is away must not keep anybody waiting: parameters are changed while driving."""
 _MIGRATION_LOCK = 0x63697076
 """Any number that only this program takes in PostgreSQL."""
-
-
-class DatabaseError(BadInput):
-    """The database cannot be reached, read or written; the text says which and why, never with a password."""
 
 
 class Database:

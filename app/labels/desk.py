@@ -1,35 +1,37 @@
-"""The labels of what is open: acts on them, how far they are, and what others do to them meanwhile."""
+"""The labels of what is open: acts on them, how far they are, and what others do to them meanwhile.
+
+Whatever speaks with a database is imported when labels are first asked for: SQLAlchemy takes most of a second, for which
+the first picture does not wait.
+"""
 
 from __future__ import annotations
 
 import logging
 import socket
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from app.control import Control, Wish
 from app.drive.recording import Recording
-from app.labels.acts import do
-from app.labels.acts.scope import Scope
-from app.labels.database import Database
-from app.labels.drive import DriveInfo, DriveLabels, info_of, info_of_uri
-from app.labels.files import importing_file
-from app.labels.log import Acted
-from app.labels.long import importing_truth, proposing
-from app.labels.measured import lifted, refitted
 from app.labels.refusals import ActRefused, NoSuchLabel
 from app.labels.requests import AddMeasured, Import, Lift, Propose, Refit, SetSighting
-from app.labels.scoring import LabelScores
 from app.labels.settling import SettlingQueue
 from app.labels.state import LabelState
-from app.labels.steps import Way
 from app.labels.tasks import Tasks
 from pipeline.errors import BadInput
 from pipeline.labels.formats.base import FormatName
 from pipeline.params import Params
+
+if TYPE_CHECKING:
+    from app.labels.database import Database
+    from app.labels.drive import DriveInfo, DriveLabels
+    from app.labels.log import Acted
+    from app.labels.scoring import LabelScores
+    from app.labels.steps import Way
 
 logger = logging.getLogger("cipv.labels")
 
@@ -59,15 +61,18 @@ class _Open:
 
 
 class LabelDesk:
-    """Any thread. database: where labels are kept; null: in one that is gone at the end, and made when first needed.
-    It hears of parameters that are settled from ``Control`` and gives them back when they are undone, and wakes it
+    """Any thread. database: where labels are kept. open_later: opens it when labels are first asked for, or what is
+    open is shown; without either it is gone at the end, and made only when somebody asks. It hears of parameters that are settled from ``Control`` and gives them back when they are undone, and wakes it
     whenever ``state`` is another. station: whose parameters are meant: of this server, and of the same one when it is
     started again; set before anything is opened."""
 
-    def __init__(self, database: Database | None = None) -> None:
+    def __init__(self, database: Database | None = None, *, open_later: Callable[[], Database] | None = None) -> None:
         self.station = socket.gethostname()
         self._control = Control(Wish(Params()))
         self._database = database
+        self._open_later = open_later
+        self._opening = threading.Lock()
+        self._is_shown = False
         self._lock = threading.Lock()
         self._open = _Open("", None)
         self._state = LabelState()
@@ -80,7 +85,6 @@ class LabelDesk:
         self._forgot: str | None = None
         self._settling = SettlingQueue(self.refresh)
         self.tasks = Tasks(self.refresh)
-        self.scores = LabelScores()
 
     # ------------------------------------------------------------ what is open
 
@@ -98,17 +102,21 @@ class LabelDesk:
         self._settling.stop()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
-        with self._lock:
+        with self._opening:
             if self._database is not None:
                 self._database.close()
 
     def open(self, uri: str, recording: Recording | None) -> None:
         """Something else was opened; null for what has no frames to label. Its labels are looked for a little later,
-        when its first frame is on its way."""
+        when it is shown."""
         self.tasks.cancel()
         with self._lock:
             self._open = _Open(uri, recording)
             self._state = LabelState(labelled=recording is not None)
+
+    def shown(self) -> None:
+        """What is open is shown: now is the time for its labels."""
+        self._is_shown = True
 
     @property
     def state(self) -> LabelState:
@@ -136,6 +144,13 @@ class LabelDesk:
         opened = self._open
         return self._labels_of(opened).info.key if opened.recording is not None else None
 
+    @cached_property
+    def scores(self) -> LabelScores:
+        """Runs against labels."""
+        from app.labels.scoring import LabelScores
+
+        return LabelScores()
+
     # ------------------------------------------------------------ acts
 
     def act(self, person: str, act: Any, drive: str, act_id: str | None = None) -> Done:
@@ -144,6 +159,9 @@ class LabelDesk:
         recording, labels = self._named(drive)
         done = labels.log.sent_before(act_id, person)
         if done is None:
+            from app.labels.acts import do
+            from app.labels.acts.scope import Scope
+
             doing, note = self._measured(recording, labels, act) if isinstance(act, Refit | Lift) else (act, "")
             scope = Scope(labels.info.t_ns)
             self._settling.finish()
@@ -172,6 +190,8 @@ class LabelDesk:
     def begin(self, person: str, act: Propose | Import, drive: str, act_id: str | None = None) -> int:
         """Something that takes a while; its number. ActRefused while another one goes on, or when it cannot be done.
         drive, act_id: as in ``act``."""
+        from app.labels.long import importing_truth, proposing
+
         recording, labels = self._named(drive)
         with self._beginning:
             if act_id is not None and self._begun[0] == act_id:
@@ -185,6 +205,8 @@ class LabelDesk:
 
     def begin_import(self, person: str, file: Path, name: FormatName, drive: str) -> int:
         """Labels of a file or folder that was handed in, as another tool made them; it is removed in the end."""
+        from app.labels.files import importing_file
+
         recording, labels = self._named(drive)
         return self.tasks.begin("import", importing_file(labels, recording, person, file, name))
 
@@ -225,6 +247,7 @@ class LabelDesk:
             if str(error) != self._trouble:
                 logger.warning("labels: %s", error)
             self._trouble = str(error)
+            self._show(opened, self._state)
             return
         self._trouble = ""
         self._show(opened, LabelState(revision, can_undo, can_redo, opened.recording is not None, self.tasks.state))
@@ -236,7 +259,7 @@ class LabelDesk:
         with self._lock:
             if opened is not self._open:
                 return
-            new = replace(new, trouble=self._settling.trouble)
+            new = replace(new, trouble=self._settling.trouble or self._trouble)
             changed, self._state = new != self._state, new
         if changed:
             self._control.change()
@@ -261,11 +284,15 @@ class LabelDesk:
     ) -> tuple[SetSighting | AddMeasured, str]:
         """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found.
         BadInput where there is nothing to measure."""
+        from app.labels.acts.scope import Scope
+        from app.labels.measured import lifted, refitted
+
         Scope(labels.info.t_ns).check(act.frame)
         frame = recording.input(act.frame)
+        params = self._control.peek().params
         if isinstance(act, Refit):
-            return refitted(labels, frame, act)
-        return lifted(frame, self._control.peek().params, act)
+            return refitted(labels, frame, params, act)
+        return lifted(frame, params, act)
 
     def _forget_tried(self, act_id: str | None) -> bool:
         """Whether this took back what was being tried, now or when it was sent before."""
@@ -279,13 +306,15 @@ class LabelDesk:
         """Found in the database when first asked for."""
         with opened.lock:
             if opened.labels is None:
+                from app.labels.drive import DriveLabels
+
                 opened.labels = DriveLabels(self._opened_database(), _info(opened.uri, opened.recording), self.station)
             return opened.labels
 
     def _opened_database(self) -> Database:
-        with self._lock:
+        with self._opening:
             if self._database is None:
-                self._database = Database.temporary()
+                self._database = (self._open_later or _temporary)()
             return self._database
 
     def _look(self) -> None:
@@ -293,9 +322,18 @@ class LabelDesk:
         while not self._ended:
             self._wake.wait(_LOOK_EVERY_S)
             self._wake.clear()
-            if self._database is not None and not self._ended:
+            is_time = self._database is not None or (self._open_later is not None and self._is_shown)
+            if is_time and not self._ended:
                 self.refresh()
 
 
+def _temporary() -> Database:
+    from app.labels.database import Database
+
+    return Database.temporary()
+
+
 def _info(uri: str, recording: Recording | None) -> DriveInfo:
+    from app.labels.drive import info_of, info_of_uri
+
     return info_of_uri(uri) if recording is None else info_of(recording.recipe.source, recording.names)

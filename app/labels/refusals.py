@@ -1,10 +1,14 @@
-"""Why an act on labels is not done."""
+"""Why an act on labels is not done, or they are not there."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from pipeline.errors import BadInput
+
+
+class DatabaseError(BadInput):
+    """The database cannot be reached, read or written; the text says which and why, never with a password."""
 
 
 class ActRefused(BadInput):

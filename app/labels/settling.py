@@ -7,11 +7,13 @@ import threading
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from app.labels.log import Log
 from app.labels.refusals import ActRefused
 from pipeline.errors import BadInput
+
+if TYPE_CHECKING:
+    from app.labels.log import Log
 
 logger = logging.getLogger("cipv.labels")
 

@@ -12,7 +12,7 @@ from app.labels.tasks import TaskState
 class LabelState:
     """revision: the number of the newest act. can_undo, can_redo: of changes of parameters that nobody put a name to;
     what a person can take back is for that person to ask. labelled: it is a recording; else only parameters are
-    changed. trouble: what went wrong with changes of parameters; empty for nothing."""
+    changed. trouble: what is wrong with the database, or went wrong with changes of parameters; empty for nothing."""
 
     revision: int = 0
     can_undo: bool = False

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fastapi import APIRouter, Response
 from fastapi.responses import JSONResponse
@@ -11,9 +11,11 @@ from app.labels.answers import changes_json
 from app.labels.desk import Done, LabelDesk
 from app.labels.refusals import Stale
 from app.labels.requests import Import, Propose
-from app.labels.steps import Way
 from app.routes.label_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
 from app.routes.refusals import refusing
+
+if TYPE_CHECKING:
+    from app.labels.steps import Way
 
 _ANSWERS: dict[int | str, dict[str, Any]] = {
     200: {"model": ActedJson},

@@ -15,15 +15,12 @@ from starlette.background import BackgroundTask
 from starlette.requests import ClientDisconnect
 
 from app.labels.desk import LabelDesk
-from app.labels.files import exported
 from app.labels.requests import Person
 from app.labels.tables import LONGEST_ITEM, LONGEST_NAME
 from app.routes.label_shapes import VERSION_NAME, LostJson, NativeFile, NewVersion, TaskBegun, VersionJson
 from app.routes.refusals import refusing
 from app.routes.shapes import file_of
 from pipeline.labels.formats.base import FormatName
-from pipeline.labels.formats.parts import reduce
-from pipeline.labels.formats.registry import FORMATS
 
 IMPORT = "/api/labels/import"
 _BYTES = "application/octet-stream"
@@ -67,6 +64,8 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
     def export(format: FormatName = "native", version: VersionName = "working") -> FileResponse:
         """All labels as a file, of a format that is a folder as a .zip. The header X-Cipv-Lost says how many kinds of
         things the format has no place for; /api/labels/export/notes says which."""
+        from app.labels.files import exported  # the formats' libraries: only who exchanges labels pays
+
         with refusing():
             made = exported(desk.recording, desk.labels.label_set(version), format)
         return FileResponse(
@@ -80,6 +79,9 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
     @router.get("/export/notes")
     def notes(format: FormatName = "native", version: VersionName = "working") -> LostJson:
         """What a format has no place for, a sentence each, before anything is written."""
+        from pipeline.labels.formats.parts import reduce
+        from pipeline.labels.formats.registry import FORMATS  # as above
+
         with refusing():
             _, lost = reduce(desk.labels.label_set(version), FORMATS[format].holds)
         return LostJson(lost=list(lost))

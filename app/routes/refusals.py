@@ -10,8 +10,7 @@ from fastapi import HTTPException
 from app.drive.book import NoSuchRun
 from app.drive.drives import Drives
 from app.drive.recording import Recording
-from app.labels.database import DatabaseError
-from app.labels.refusals import BadAct, NoSuchLabel, Stale
+from app.labels.refusals import BadAct, DatabaseError, NoSuchLabel, Stale
 from pipeline.errors import BadInput
 
 

@@ -15,8 +15,8 @@ from app.drive.drives import Drives, Phase
 from app.drive.recording import Recording
 from app.drive.run import DriveRun
 from app.engine import Engine
-from app.labels.database import DatabaseError
 from app.labels.desk import LabelDesk
+from app.labels.refusals import DatabaseError
 from app.routes.drive import Columns, columns_of, current
 from app.routes.refusals import open_recording, refusing
 from app.routes.shapes import MetricJson, file_of

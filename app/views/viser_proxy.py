@@ -38,7 +38,8 @@ _GONE = "The 3D view is not running."
 
 
 def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConnection], bool]) -> APIRouter:
-    """Routes for ``/viser/``. ``get_port``: where viser listens on loopback now, null when it does not.
+    """Routes for ``/viser/``. ``get_port``: where viser listens on loopback now, null when it does not; it may take a
+    while, and is asked on any thread.
     ``allowed``: the application's own rule; a WebSocket must besides come from a page of the same host and port.
 
     HTTP: 403 not allowed, 502 with one sentence when viser is not there. WebSocket: refused before it opens (HTTP 403)
@@ -55,7 +56,7 @@ def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConn
     async def page(path: str, request: Request) -> Response:
         if not allowed(request):
             return PlainTextResponse("not allowed", 403, headers=_HEADERS)
-        port = get_port()
+        port = await run_in_threadpool(get_port)
         if port is None:
             return PlainTextResponse(_GONE, 502, headers=_HEADERS)
         return await run_in_threadpool(_fetch, port, path, request.headers.get("accept-encoding", ""))
@@ -66,7 +67,7 @@ def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConn
         if not (_same_origin(browser) and allowed(browser)):
             await browser.close(CloseCode.POLICY_VIOLATION)
             return
-        await _bridge(browser, get_port())
+        await _bridge(browser, await run_in_threadpool(get_port))
 
     return router
 

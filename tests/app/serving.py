@@ -9,8 +9,9 @@ from contextlib import contextmanager
 from fastapi import FastAPI
 
 from app.engine import Engine
+from app.listening import listen_socket
 from app.recording import RecordingDesk
-from app.server import Server, listen_socket
+from app.server import Server
 from pipeline.params import Params
 from pipeline.sources.base import Source
 from tests.app.recording import CountingDetector, Recording, opener

@@ -16,7 +16,9 @@ import pytest
 from websockets.sync.client import connect
 
 from app.engine import Engine
-from app.server import Server, listen_socket, serve
+from app.listening import listen_socket
+from app.server import Server
+from app.serving import serve
 from pipeline.params import Params
 from tests.app.recording import Recording, opener
 
@@ -24,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = """
 import sys
 from app.engine import Engine
-from app.server import serve
+from app.serving import serve
 from pipeline.params import Params
 from tests.app.recording import CountingDetector, Recording, opener
 engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car", playing=True)

@@ -19,8 +19,9 @@ from starlette.routing import WebSocketRoute
 from websockets.sync.client import ClientConnection, connect
 
 from app.line import DetectionCache, Line
+from app.listening import listen_socket
 from app.sent_picture import MAX_WIDTH_PX
-from app.server import Server, listen_socket
+from app.server import Server
 from app.snapshot import Snapshot
 from app.stream import FRAMES_UNDER_WAY, Stream
 from pipeline.geometry import Cuboid

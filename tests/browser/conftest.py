@@ -15,8 +15,9 @@ from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, 
 
 from app.bench.devtools import CHROMIUM, FLAGS
 from app.engine import Engine
+from app.listening import listen_socket
 from app.recording import RecordingDesk
-from app.server import Server, create_app, listen_socket
+from app.server import Server, create_app
 from pipeline.params import Params
 from pipeline.run import detector_for
 from pipeline.sources import Source, open_source

@@ -14,7 +14,8 @@ from pathlib import Path
 from app.engine import Engine
 from app.labels.database import Database
 from app.labels.desk import LabelDesk
-from app.server import Server, create_app, listen_socket
+from app.listening import listen_socket
+from app.server import Server, create_app
 from pipeline.params import Params
 from pipeline.step import warm_up
 from tests.app.recording import Recording, opener

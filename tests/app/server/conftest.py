@@ -10,8 +10,9 @@ import pytest
 from websockets.sync.client import ClientConnection, connect
 
 from app.engine import Engine
+from app.listening import listen_socket
 from app.looks import Looks
-from app.server import Server, create_app, listen_socket
+from app.server import Server, create_app
 from pipeline.params import Params
 from tests.app.recording import CountingDetector, Recording, opener
 from tests.app.server.asking import WAIT_S

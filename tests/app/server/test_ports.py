@@ -7,7 +7,7 @@ import socket
 
 import pytest
 
-from app.server import PortTaken, listen_socket
+from app.listening import PortTaken, listen_socket
 from tests.app.waiting import loop_apart
 
 

@@ -1,0 +1,56 @@
+"""The server and the engine as one program, until Ctrl-C.
+
+The engine starts before FastAPI is imported, which takes half a second: it opens the recording and makes the first
+picture meanwhile.
+"""
+
+from __future__ import annotations
+
+import gc
+import socket
+import sys
+from collections.abc import Callable, Iterable
+
+from app.drive.marks import Marks
+from app.engine import Engine
+from app.listening import DEFAULT_PORT, is_loopback, listen_socket, reachable
+from app.looks import Looks
+from app.recording import SESSIONS
+from app.tokens import Tokens
+
+
+def serve(
+    engine: Engine,
+    *,
+    host: str = "127.0.0.1",
+    port: int = DEFAULT_PORT,
+    strict_port: bool = False,
+    hosts: Iterable[str] = (),
+    viser_port: Callable[[], int | None] = lambda: None,
+    looks: Looks | None = None,
+    on_ready: Callable[[str], None] | None = None,
+) -> None:
+    """Serve until Ctrl-C. Starts and stops the engine; prints the page's address on a line of its own when it answers,
+    and links with tokens where other machines can come.
+
+    PortTaken and BadInput (a weak token) before anything is started.
+    """
+    tokens = None if is_loopback(host) and not tuple(hosts) else Tokens.from_environment()
+    bound = listen_socket(host, port, strict=strict_port)
+    number = bound.getsockname()[1]
+    if port not in (0, number):
+        print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
+    address = f"http://{reachable(host)}:{number}"
+    engine.labels.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
+    engine.start()
+    try:
+        from app.server import Server, create_app
+
+        app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks, tokens)
+        gc.freeze()  # as ``warm_up`` does: what is loaded by now is not looked through in the middle of a frame
+        Server(app, address, on_ready, tokens).run(sockets=[bound])
+    except KeyboardInterrupt:
+        pass  # uvicorn raises the signal again once it has shut down
+    finally:
+        engine.stop()
+        bound.close()
