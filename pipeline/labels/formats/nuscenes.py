@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.geometry import Cuboid, inverse, rotation
+from pipeline.geometry import inverse, rotation
 from pipeline.labels.formats.base import Drive, Shot, make_folder
+from pipeline.labels.formats.points import points_inside
 from pipeline.labels.model import LabelSet, LabelTrack, Sighting
 from pipeline.sources.files import check_looks_ahead
-from pipeline.types import F32, F64, Mask
+from pipeline.types import F64
 
 VERSION_FOLDER = "v1.0-cipv"
 CATEGORIES = {
@@ -84,7 +85,7 @@ def _json(rows: list[Row]) -> str:
 
 def _annotations(labels: LabelSet, drive: Drive, poses: list[F64]) -> dict[int, list[Row]]:
     """Rows by track."""
-    inside = _points_inside(labels, drive)
+    inside = points_inside(labels, drive)  # which the benchmark filters by
     turns = [_quaternion(pose[:3, :3]) for pose in poses]
     rows: dict[int, list[Row]] = {}
     for track in labels.tracks:
@@ -117,44 +118,6 @@ def _box(sighting: Sighting, T_global_ego: F64, turn: list[float]) -> Row:
     c, s = math.cos(sighting.cuboid.yaw_rad / 2), math.sin(sighting.cuboid.yaw_rad / 2)
     rotation_wxyz = [w * c - z * s, x * c + y * s, y * c - x * s, z * c + w * s]
     return {"translation": center.tolist(), "size": [width, length, height], "rotation": rotation_wxyz}
-
-
-def _points_inside(labels: LabelSet, drive: Drive) -> dict[tuple[int, int], int]:
-    """(track, frame) → LiDAR points in the cuboid, which the benchmark filters by; frames without a LiDAR have none."""
-    by_frame: dict[int, list[tuple[int, Cuboid]]] = {}
-    for track in labels.tracks:
-        for each in track.sightings:
-            if each.cuboid is not None:
-                by_frame.setdefault(each.frame, []).append((track.id, each.cuboid))
-    counts: dict[tuple[int, int], int] = {}
-    for frame, cuboids in sorted(by_frame.items()):  # as a session has them: each of its chunks is unpacked once
-        points = drive.points(frame)
-        if points is not None:
-            near = points[_is_near(points, [cuboid for _, cuboid in cuboids]), :3]
-            by_x = near[np.argsort(near[:, 0])]
-            counts |= {(number, frame): count_inside(cuboid, by_x) for number, cuboid in cuboids}
-    return counts
-
-
-def _is_near(points: F32, cuboids: list[Cuboid]) -> Mask:
-    """(N,) whether points are within what the cuboids reach, taken together; a millimetre more, for rounding."""
-    centers = np.array([each.center[:2] for each in cuboids])
-    reach_m = np.array([[math.hypot(*each.size[:2]) / 2 + 1e-3] for each in cuboids])
-    least, most = (centers - reach_m).min(axis=0), (centers + reach_m).max(axis=0)
-    x, y = points[:, 0], points[:, 1]
-    is_near: Mask = (x >= least[0]) & (x <= most[0]) & (y >= least[1]) & (y <= most[1])
-    return is_near
-
-
-def count_inside(cuboid: Cuboid, points: F32) -> int:
-    """How many of (N, 3) ego points, in order of x, are in a cuboid."""
-    reach_m = math.hypot(*cuboid.size[:2]) / 2
-    first, last = np.searchsorted(points[:, 0], [cuboid.center[0] - reach_m, cuboid.center[0] + reach_m])
-    x, y, z = (points[first:last, k] - np.float64(cuboid.center[k]) for k in range(3))
-    c, s = math.cos(cuboid.yaw_rad), math.sin(cuboid.yaw_rad)
-    length, width, height = (side / 2 for side in cuboid.size)
-    is_inside = (np.abs(x * c + y * s) <= length) & (np.abs(y * c - x * s) <= width) & (np.abs(z) <= height)
-    return int(np.count_nonzero(is_inside))
 
 
 def _categories(labels: LabelSet) -> list[Row]:
