@@ -9,9 +9,8 @@ from uuid import UUID
 from pydantic import BaseModel, Field
 
 from app.labels.requests import Act, Person, PersonOrNobody, Strict
-from app.labels.tables import LONGEST_ITEM, LONGEST_NAME
 from app.labels.tasks import Kind
-from app.labels.values import ItemKind
+from app.labels.values import LONGEST_ITEM, LONGEST_NAME, ItemKind
 from app.routes.shapes import CuboidJson, MetricJson, Point
 from pipeline.evaluation.experiments.sections import Cell
 from pipeline.evaluation.lead import Verdict
@@ -84,9 +83,10 @@ class EventLabelJson(StatedItem):
 
 
 class TagJson(LabelItem):
-    """A word about a frame."""
+    """A word about the frames from first to last."""
 
-    frame: int
+    first: int
+    last: int
     tag: str
     origin: OriginJson
 

@@ -123,7 +123,7 @@ def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
     act(kind="set_lead", first=3, last=5, lead=track["id"])
     act(kind="set_path", frame=3, left=[[0, 1], [5, 1]], right=None)
     act(kind="add_event", frame=3, event="cut_in", tracks=[track["id"]])
-    act(kind="tag", frame=3, tag="rain")
+    act(kind="tag", first=3, last=3, tag="rain")
     act(kind="propose", first=0, last=5, **{"from": "run"})
     shown = engine.wait_for(lambda s: s.labels.task is not None and not s.labels.task.running, WAIT_S)
     proposed = [each for each in get("?since=0")["tracks"] if each["state"] == "proposed"]
