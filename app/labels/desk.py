@@ -1,7 +1,7 @@
 """The labels of what is open: acts on them, how far they are, and what others do to them meanwhile.
 
-Whatever speaks with a database is imported when labels are first asked for: SQLAlchemy takes most of a second, for which
-the first picture does not wait.
+Whatever speaks with a database is imported when labels are first asked for: SQLAlchemy takes most of a second, and the
+first picture does not wait for it.
 """
 
 from __future__ import annotations
@@ -62,9 +62,10 @@ class _Open:
 
 class LabelDesk:
     """Any thread. database: where labels are kept. open_later: opens it when labels are first asked for, or what is
-    open is shown; without either it is gone at the end, and made only when somebody asks. It hears of parameters that are settled from ``Control`` and gives them back when they are undone, and wakes it
-    whenever ``state`` is another. station: whose parameters are meant: of this server, and of the same one when it is
-    started again; set before anything is opened."""
+    open is shown; without either it is gone at the end, and made only when somebody asks. It hears of parameters that
+    are settled from ``Control`` and gives them back when they are undone, and wakes it whenever ``state`` is another.
+    station: whose parameters are meant: of this server, and of the same one when it is started again; set before
+    anything is opened."""
 
     def __init__(self, database: Database | None = None, *, open_later: Callable[[], Database] | None = None) -> None:
         self.station = socket.gethostname()

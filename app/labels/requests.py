@@ -8,8 +8,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from app.given import Finite, GivenCuboid, Meters
 from app.labels.refusals import BadAct
-from app.labels.tables import LONGEST_NAME
-from app.labels.values import ItemKind
+from app.labels.values import LONGEST_NAME, ItemKind
 from app.labels.words import frames_text
 from pipeline.errors import BadInput
 from pipeline.labels.check import check_sighting

@@ -5,13 +5,13 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from app.drive.columns import Row
 from app.drive.compare import Metric
 from app.drive.kept import results_of
 from app.drive.recording import RULE
 from app.drive.run import DriveRun
-from app.labels.drive import DriveLabels
 from pipeline.errors import BadInput
 from pipeline.evaluation.experiments.sections import Cell
 from pipeline.evaluation.lead import Judged
@@ -21,6 +21,9 @@ from pipeline.evaluation.scores.figures import FIGURES
 from pipeline.evaluation.scores.report import MOST
 from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels
 from pipeline.evaluation.scores.worst import Bad, worst
+
+if TYPE_CHECKING:
+    from app.labels.drive import DriveLabels
 
 _MOST_HELD = 8
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 from sqlalchemy import BigInteger, Boolean, Double, ForeignKey, Index, Integer, LargeBinary, String, Text
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-LONGEST_NAME = 80
-LONGEST_ITEM = 120
+from app.labels.values import LONGEST_ITEM, LONGEST_NAME
 
 
 class Base(DeclarativeBase):

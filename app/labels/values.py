@@ -13,6 +13,10 @@ from pydantic import TypeAdapter
 from pipeline.geometry import Cuboid
 from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel, Sighting
 
+LONGEST_NAME = 80
+"""Of a person, and of a version."""
+LONGEST_ITEM = 120
+"""Of a parameter, and of a recording's key."""
 ItemKind = Literal["track", "lead", "path", "event", "tag"]
 KINDS: tuple[ItemKind, ...] = get_args(ItemKind)
 Value = LabelTrack | LeadRange | PathLabel | EventLabel | FrameTag

@@ -5,15 +5,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, cast
+from typing import TYPE_CHECKING, Literal, cast
 
 from app.drive.run import DriveRun
-from app.labels.drive import DriveLabels
-from app.labels.scoring import LabelScores, disagreements
 from app.labels.values import KINDS, Item, ItemKind
 from app.labels.words import lead_text
 from pipeline.evaluation.lead import Judged
 from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
+
+if TYPE_CHECKING:
+    from app.labels.drive import DriveLabels
+    from app.labels.scoring import LabelScores
 
 What = Literal["unlabelled", "disagreement", "proposed", "sent_back", "unreviewed"]
 Key = tuple[ItemKind, int]
@@ -142,6 +144,8 @@ def _name(item: Item) -> str:
 
 
 def _disagreements(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> list[Place]:
+    from app.labels.scoring import disagreements  # what scores is imported with the first question
+
     score = scores.score(labels, run) if run is not None else None
     if run is None or score is None:
         return []

@@ -16,7 +16,7 @@ from starlette.requests import ClientDisconnect
 
 from app.labels.desk import LabelDesk
 from app.labels.requests import Person
-from app.labels.tables import LONGEST_ITEM, LONGEST_NAME
+from app.labels.values import LONGEST_ITEM, LONGEST_NAME
 from app.routes.label_shapes import VERSION_NAME, LostJson, NativeFile, NewVersion, TaskBegun, VersionJson
 from app.routes.refusals import refusing
 from app.routes.shapes import file_of
