@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from fastapi import APIRouter
 from pydantic import BaseModel
 
 from app.engine import Engine
 from app.routes.refusals import refusing
 from app.routes.shapes import RecordingJson
-from pipeline.recording.recorder import RecordingState
+
+if TYPE_CHECKING:
+    from pipeline.recording.recorder import RecordingState
 
 
 class RecordingChoice(BaseModel):
