@@ -18,12 +18,13 @@ from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Path
 
 STANDSTILL_MPS = 0.1
 CREEP_MPS = 3.0
+"""Slower than this no curve shows in the own motion: a car that might not creep would never learn its path."""
 State = Literal["cruise", "follow", "stop", "warn"]
 
 
 @dataclass(frozen=True)
 class AccState:
-    """The PID's memory. integral: metres (speed error times time). error: of the frame before; null at first."""
+    """The PID's memory. integral_m: of the speed error over time. error_mps: of the frame before; null at first."""
 
     integral_m: float = 0.0
     error_mps: float | None = None

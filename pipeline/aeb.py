@@ -28,12 +28,12 @@ _SMALLEST_GAP_M = 0.1
 
 @dataclass(frozen=True)
 class AebState:
-    """level: the stage that acts, 0 none to 3 full. streak: for how many frames in a row each stage has been asked for.
-    calm_s: for how long nothing has asked while a braking stage acted. cause: what it acts for, in words, and the id of
-    that object."""
+    """level: the stage that acts, 0 none to 3 full. streak: for how many frames in a row each of the three was asked
+    for. calm_s: for how long nothing has asked while a braking stage acted. cause: what it acts for, in words, and the
+    id of that object."""
 
     level: int = _NONE
-    streak: tuple[int, int, int] = (0, 0, 0)
+    streak: tuple[int, ...] = (0, 0, 0)
     calm_s: float = 0.0
     cause: str = ""
     object_id: int | None = None
@@ -117,10 +117,10 @@ def _next(state: AebState, worst: Threat | None, ego: EgoState, dt_s: float, par
     held = state.level if state.level >= _PARTIAL and not over else _NONE
     level = max(confirmed, held)
     if not level:
-        return AebState(level, streak, calm_s)  # type: ignore[arg-type]
+        return AebState(level, streak, calm_s)
     if worst is not None and confirmed >= held:
-        return AebState(level, streak, calm_s, _cause(worst), worst.id)  # type: ignore[arg-type]
-    return AebState(level, streak, calm_s, state.cause, state.object_id)  # type: ignore[arg-type]
+        return AebState(level, streak, calm_s, _cause(worst), worst.id)
+    return AebState(level, streak, calm_s, state.cause, state.object_id)
 
 
 def _cause(threat: Threat) -> str:

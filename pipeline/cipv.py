@@ -9,6 +9,7 @@ swaying distance nor one bad box makes the lead flicker. Which one will be next 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import exp, hypot
 from typing import NamedTuple
@@ -16,7 +17,7 @@ from typing import NamedTuple
 from pipeline.eligibility import BESIDE_PLACE, QUESTIONS, Candidate
 from pipeline.motion import closing_speed_mps
 from pipeline.params import CipvParams
-from pipeline.path.placing import believed_mps, place
+from pipeline.path.placing import Place, believed_mps, place
 from pipeline.records import evolve
 from pipeline.types import Cipv, EgoState, FusedObject, Path, Rejection
 
@@ -46,6 +47,15 @@ class Choice(NamedTuple):
     rejected: tuple[Rejection, ...]
 
 
+class _Judged(NamedTuple):
+    """An object with its place against the path and every gate. odds: the running mean of its log-odds, null without a
+    place. why_not: the reason why it cannot be the lead; null for one that can."""
+
+    item: FusedObject
+    odds: float | None
+    why_not: str | None
+
+
 def choose(
     state: CipvState,
     objects: tuple[FusedObject, ...],
@@ -55,47 +65,65 @@ def choose(
     params: CipvParams,
 ) -> tuple[CipvState, Choice]:
     """The CIPV of this frame, the next one, and a reason for each other object."""
-    judged, able, failures, odds = [], [], {}, {}
-    for item, placed in zip(objects, place(objects, path, ego, params), strict=True):
-        where, crossing_s = placed if placed is not None else (None, None)
-        leads, widening_m = item.id == state.lead_id, 0.0
-        if where is not None:
-            moving_mps = believed_mps(where.sideways_mps, item)
-            decide_s = min(params.decide_s, _BLUR_M / max(abs(moving_mps), 1e-3))
-            widening_m = _widening_m(leads, moving_mps, params)
-            now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY)
-            before = state.odds.get(item.id, now)
-            odds[item.id] = before + _fresh(dt_s, decide_s) * (now - before)
-        is_ahead = where is not None and where.ahead_m > 0.0
-        probability = 1.0 / (1.0 + exp(-odds[item.id])) if is_ahead else 0.0
-        now_in = probability > 0.5
-        candidate = Candidate(item, where, odds.get(item.id, 0.0), leads, widening_m, path, params)
-        if where is not None and where.margin_m() >= 0.0 and where.ahead_m > 0.0 and not now_in:
-            crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
-        gates = [question.ask(candidate) for question in QUESTIONS]
-        item = evolve(
-            item,
-            gates=(*item.gates, *gates),
-            path_offset_m=where.offset_m if where is not None else None,
-            in_path=now_in,
-            in_path_probability=probability if where is not None else None,
-            lateral_mps=where.sideways_mps if where is not None else None,
-            crossing_s=crossing_s,
-        )
-        judged.append(item)
-        failed = next((k for k, gate in enumerate(gates) if not gate.passed), None)
-        if failed is None:
-            able.append(item)
-        else:
-            failures[item.id] = QUESTIONS[failed].why_not(candidate)
+    places = place(objects, path, ego, params)
+    judged = [_judge(state, item, placed, path, dt_s, params) for item, placed in zip(objects, places, strict=True)]
+    able = [each.item for each in judged if each.why_not is None]
     nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
     lead = _surer(nearest, able) if nearest is not None else None
-    if lead is not None:
-        failures |= {item.id: _why_after(item, lead) for item in able if item.id != lead.id}
-    rejected = tuple(Rejection(item.id, failures[item.id]) for item in judged if item.id in failures)
-    named = _named(lead, _why(lead, len(able))) if lead is not None else None
-    choice = Choice(tuple(judged), named, _next_lead(judged, able, lead, params), rejected)
+    choice = Choice(
+        objects=tuple(each.item for each in judged),
+        lead=_named(lead, _why(lead, len(able))) if lead is not None else None,
+        next_lead=_next_lead([each.item for each in judged], able, lead, params),
+        rejected=tuple(_rejections(judged, lead)),
+    )
+    odds = {each.item.id: each.odds for each in judged if each.odds is not None}
     return CipvState(lead.id if lead is not None else None, odds), choice
+
+
+def _judge(
+    state: CipvState,
+    item: FusedObject,
+    placed: tuple[Place, float | None] | None,
+    path: Path,
+    dt_s: float | None,
+    params: CipvParams,
+) -> _Judged:
+    """One object. placed: where it is against the path, and when it will be over its edge."""
+    where, crossing_s = placed if placed is not None else (None, None)
+    leads, widening_m, odds = item.id == state.lead_id, 0.0, None
+    if where is not None:
+        moving_mps = believed_mps(where.sideways_mps, item)
+        decide_s = min(params.decide_s, _BLUR_M / max(abs(moving_mps), 1e-3))
+        widening_m = _widening_m(leads, moving_mps, params)
+        now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY)
+        before = state.odds.get(item.id, now)
+        odds = before + _fresh(dt_s, decide_s) * (now - before)
+    is_ahead = where is not None and where.ahead_m > 0.0
+    probability = 1.0 / (1.0 + exp(-odds)) if is_ahead and odds is not None else 0.0
+    is_in = probability > 0.5
+    if where is not None and where.margin_m() >= 0.0 and is_ahead and not is_in:
+        crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
+    candidate = Candidate(item, where, odds or 0.0, leads, widening_m, path, params)
+    gates = [question.ask(candidate) for question in QUESTIONS]
+    failed = next((question for question, gate in zip(QUESTIONS, gates, strict=True) if not gate.passed), None)
+    item = evolve(
+        item,
+        gates=(*item.gates, *gates),
+        path_offset_m=where.offset_m if where is not None else None,
+        in_path=is_in,
+        in_path_probability=probability if where is not None else None,
+        lateral_mps=where.sideways_mps if where is not None else None,
+        crossing_s=crossing_s,
+    )
+    return _Judged(item, odds, failed.why_not(candidate) if failed is not None else None)
+
+
+def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rejection]:
+    for item, _, why_not in judged:
+        if why_not is not None:
+            yield Rejection(item.id, why_not)
+        elif lead is not None and item.id != lead.id:
+            yield Rejection(item.id, _why_after(item, lead))
 
 
 def _fresh(dt_s: float | None, decide_s: float) -> float:

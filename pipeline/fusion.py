@@ -70,7 +70,7 @@ def fuse(
     sides = _box_sides(
         vision, [ranges_m[partner[i]] if i in partner else v.distance_m for i, v in enumerate(vision)], alignment
     )
-    objects, lidar_boxes, vision_boxes = [], {}, {}
+    objects = []
     for object_id, (i, j) in zip(ids, pairs, strict=True):
         # of an object that one sensor has alone: the tests of the partner it overlaps most, which say why it is alone
         compared = (i if i is not None else nearest_of_lidar[j or 0], j if j is not None else nearest_of_vision[i or 0])
@@ -82,12 +82,10 @@ def fuse(
         elif seen is not None:
             row = box_row(object_id, seen, tested)
         objects.append(evolve(row, box_sides=sides[i]) if i is not None and i in sides else row)
-        box = projected[j] if j is not None else None
-        if box is not None:
-            lidar_boxes[object_id] = box
-        if seen is not None:
-            vision_boxes[object_id] = seen.bbox
     objects.sort(key=lambda o: (o.distance_m is None, o.distance_m or 0.0, o.id))
+    numbered = list(zip(ids, pairs, strict=True))
+    lidar_boxes = {number: box for number, (_, j) in numbered if j is not None and (box := projected[j]) is not None}
+    vision_boxes = {number: vision[i].bbox for number, (i, _) in numbered if i is not None}
     return state, Fusion(tuple(objects), lidar_boxes, vision_boxes)
 
 
