@@ -15,6 +15,7 @@ import tyro
 from app.bars import frames_progress
 from app.labels.words import WORKING
 from app.progress import opened_recording
+from pipeline.collection import uncollected
 from pipeline.labels.formats.base import Drive, FormatName, drive_of
 from pipeline.labels.formats.native import from_json, onto
 from pipeline.labels.formats.reading import read_bytes
@@ -65,7 +66,9 @@ class ExportLabels:
     def _labels(self, source: Source, drive: Drive) -> tuple[LabelSet, tuple[str, ...]]:
         """The labels that are meant, with what there is to say of them."""
         if self.labels is not None:
-            placed = onto(from_json(read_bytes(self.labels.expanduser()), str(self.labels)), drive, str(self.labels))
+            with uncollected():
+                found = from_json(read_bytes(self.labels.expanduser()), str(self.labels))
+                placed = onto(found, drive, str(self.labels))
             return placed.labels, placed.notes
         with _kept(source, drive, self.database) as kept:
             if self.version != WORKING or kept.has_labels():

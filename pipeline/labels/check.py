@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from itertools import pairwise
 
@@ -42,10 +41,9 @@ def check(labels: LabelSet, what: str) -> LabelSet:
 
 def check_sighting(sighting: Sighting, what: str) -> Sighting:
     """The sighting itself. BadInput, beginning with ``what``, when it cannot be."""
-    try:
-        _check_sighting(sighting, what)
-    except ValueError as error:
-        raise BadInput(str(error)) from None
+    wrong = _wrong_with(sighting)
+    if wrong:
+        raise BadInput(f"{what}: {wrong}")
     return sighting
 
 
@@ -67,18 +65,26 @@ def _check_track(track: LabelTrack, count: int) -> None:
     _require(all(0 <= frame < count for frame in frames), f"track {track.id} is in a frame that is not there")
     _require(frames == sorted(set(frames)), f"track {track.id}: its sightings are not by ascending frame")
     for sighting in track.sightings:
-        _check_sighting(sighting, f"track {track.id}, frame {sighting.frame}")
+        wrong = _wrong_with(sighting)
+        if wrong:
+            raise ValueError(f"track {track.id}, frame {sighting.frame}: {wrong}")
 
 
-def _check_sighting(sighting: Sighting, what: str) -> None:
+def _wrong_with(sighting: Sighting) -> str:
+    """Empty when nothing is."""
     if sighting.cuboid is not None:
         center, size, yaw_rad = sighting.cuboid
-        _require(_below(center, FARTHEST_M), f"{what}: the cuboid has no place")
-        _require(all(0.0 < side <= LARGEST_SIDE_M for side in size), f"{what}: the cuboid has no size")
-        _require(_below((yaw_rad,), LARGEST_YAW_RAD), f"{what}: the cuboid has no direction")
+        if not _below(center, FARTHEST_M):
+            return "the cuboid has no place"
+        if not all(0.0 < side <= LARGEST_SIDE_M for side in size):
+            return "the cuboid has no size"
+        if not _below((yaw_rad,), LARGEST_YAW_RAD):
+            return "the cuboid has no direction"
     if sighting.bbox is not None:
         x1, y1, x2, y2 = sighting.bbox
-        _require(_below(sighting.bbox, _LARGEST_PX) and x1 < x2 and y1 < y2, f"{what}: the box is none")
+        if not (_below(sighting.bbox, _LARGEST_PX) and x1 < x2 and y1 < y2):
+            return "the box is none"
+    return ""
 
 
 def _check_leads(labels: LabelSet) -> None:
@@ -104,7 +110,8 @@ def _fits(number: int) -> bool:
 
 
 def _below(values: Iterable[float], limit: float) -> bool:
-    return all(math.isfinite(value) and abs(value) < limit for value in values)
+    """What is not finite is not."""
+    return all(-limit < value < limit for value in values)
 
 
 def _require(holds: bool, otherwise: str) -> None:

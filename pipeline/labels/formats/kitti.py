@@ -31,19 +31,21 @@ _LARGEST_ID = 2**63
 
 def write_objects(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
     """``label_2/NAME.txt`` and ``calib/NAME.txt`` for each frame with an object in it."""
-    lines: dict[int, list[str]] = {}
+    found: dict[int, list[tuple[str, Sighting]]] = {}
     for track, sighting in _sightings(labels):
-        T_rect_ego, camera = _view(drive.shots[sighting.frame])
-        lines.setdefault(sighting.frame, []).append(kitti_rows.to_line(track.label, sighting, T_rect_ego, camera))
+        found.setdefault(sighting.frame, []).append((track.label, sighting))
+    views = {frame: _view(drive.shots[frame]) for frame in found}
     make_folder(out)
     for folder in (_OBJECT, _CALIBRATION):
         (out / folder).mkdir()
     names = drive.file_names()
-    for frame, found in sorted(lines.items()):
-        (out / _OBJECT / f"{names[frame]}.txt").write_text("\n".join(found) + "\n", encoding="utf-8")
-        calibration = _object_calibration(*_view(drive.shots[frame]))
+    for frame, seen in sorted(found.items()):
+        T_rect_ego, camera = views[frame]
+        lines = (kitti_rows.to_line(label, sighting, T_rect_ego, camera) for label, sighting in seen)
+        (out / _OBJECT / f"{names[frame]}.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        calibration = _object_calibration(T_rect_ego, camera)
         (out / _CALIBRATION / f"{names[frame]}.txt").write_text(calibration, encoding="utf-8")
-    empty = len(drive.shots) - len(lines)
+    empty = len(drive.shots) - len(found)
     nothing = (f"{empty:,} frames have no file: nothing is labelled in them",) if empty else ()
     return (*_changes(labels, drive), *nothing)
 

@@ -28,7 +28,11 @@ _Range = TypeVar("_Range", LeadRange, FrameTag)
 
 def to_json(labels: LabelSet) -> bytes:
     """The file's bytes; the same labels give the same bytes. BadInput when the labels cannot be."""
-    body = _LABELS.dump_json(check(labels, "these labels"))
+    return _bytes(check(labels, "these labels"))
+
+
+def _bytes(labels: LabelSet) -> bytes:
+    body = _LABELS.dump_json(labels)
     return b'{"format":"%s","version":%d,"labels":%s}\n' % (KIND.encode(), VERSION, body)
 
 
@@ -57,7 +61,7 @@ def as_range(tag: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
-    write_file(out, to_json(labels))
+    write_file(out, _bytes(labels))
     return ()
 
 

@@ -87,15 +87,16 @@ def _annotations(labels: LabelSet, drive: Drive, poses: list[F64]) -> dict[int, 
     """Rows by track."""
     inside = points_inside(labels, drive)  # which the benchmark filters by
     turns = [_quaternion(pose[:3, :3]) for pose in poses]
+    samples = [_token("sample", index) for index in range(len(drive.shots))]
     rows: dict[int, list[Row]] = {}
     for track in labels.tracks:
         seen = [each for each in track.sightings if each.cuboid is not None]
-        tokens = [_token("annotation", track.id, each.frame) for each in seen]
+        instance, tokens = instance_token(track.id), [_token("annotation", track.id, each.frame) for each in seen]
         rows[track.id] = [
             {
                 "token": tokens[place],
-                "sample_token": _token("sample", each.frame),
-                "instance_token": instance_token(track.id),
+                "sample_token": samples[each.frame],
+                "instance_token": instance,
                 "visibility_token": "",
                 "attribute_tokens": [],
                 **_box(each, poses[each.frame], turns[each.frame]),

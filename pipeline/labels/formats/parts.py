@@ -50,17 +50,22 @@ def reduce(labels: LabelSet, holds: frozenset[Part]) -> tuple[LabelSet, tuple[st
 
 
 def _with_reduced_sightings(track: LabelTrack, holds: frozenset[Part]) -> LabelTrack:
-    kept = (_reduced(each, holds) for each in track.sightings)
-    return replace(track, sightings=tuple(each for each in kept if each is not None))
+    return replace(track, sightings=tuple(_reduced(each, holds) for each in track.sightings if _has_place(each, holds)))
 
 
-def _reduced(sighting: Sighting, holds: frozenset[Part]) -> Sighting | None:
-    """The sighting with what can be held of it; null when that is nothing of what it had."""
+def _has_place(sighting: Sighting, holds: frozenset[Part]) -> bool:
+    """Whether anything of it can be held."""
     if holds >= _SIGHTING:
-        return sighting
+        return True
+    return ("cuboids" in holds and sighting.cuboid is not None) or ("boxes" in holds and sighting.bbox is not None)
+
+
+def _reduced(sighting: Sighting, holds: frozenset[Part]) -> Sighting:
+    """The sighting with what can be held of it."""
     cuboid = sighting.cuboid if "cuboids" in holds else None
     bbox = sighting.bbox if "boxes" in holds else None
-    return replace(sighting, cuboid=cuboid, bbox=bbox) if cuboid is not None or bbox is not None else None
+    is_whole = cuboid is sighting.cuboid and bbox is sighting.bbox
+    return sighting if is_whole else replace(sighting, cuboid=cuboid, bbox=bbox)
 
 
 def _lost(labels: LabelSet, holds: frozenset[Part]) -> list[str]:
@@ -78,8 +83,8 @@ def _lost(labels: LabelSet, holds: frozenset[Part]) -> list[str]:
     if {"cuboids", "boxes"} <= missing:
         tracks = _count(len(labels.tracks), "{} not written: no place for them", "track")
         return [tracks, *lost, *_lost_marks(labels, missing)]
-    kept = [each for each in sightings if _reduced(each, holds) is not None]
-    lost.append(_count(len(sightings) - len(kept), "{} not written: nothing of it has a place", "sighting"))
+    without = sum(not _has_place(each, holds) for each in sightings)
+    lost.append(_count(without, "{} not written: nothing of it has a place", "sighting"))
     if not holds >= _SIGHTING:
         lost.append(_count(sum(not t.sightings for t in labels.tracks), "{} without sightings not written", "track"))
     if "cuboids" in missing:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+from pipeline.collection import uncollected
 from pipeline.errors import BadInput
 from pipeline.labels.check import check
 from pipeline.labels.formats import (
@@ -49,9 +50,10 @@ def export_labels(labels: LabelSet, drive: Drive, name: FormatName, out: Path) -
     the recording has not (KITTI: a camera).
     """
     kind = FORMATS[name]
-    placed = native.onto(check(labels, "these labels"), drive, "these labels")
-    kept, lost = reduce(placed.labels, kind.holds)
-    return (*placed.notes, *lost, *kind.write(kept, drive, out))
+    with uncollected():
+        placed = native.onto(check(labels, "these labels"), drive, "these labels")
+        kept, lost = reduce(placed.labels, kind.holds)
+        return (*placed.notes, *lost, *kind.write(kept, drive, out))
 
 
 def import_labels(path: Path, drive: Drive, name: FormatName, origin: Origin) -> Imported:
@@ -59,7 +61,8 @@ def import_labels(path: Path, drive: Drive, name: FormatName, origin: Origin) ->
     kind = FORMATS[name]
     if not path.exists():
         raise BadInput(f"{path}: no such file")
-    found = kind.read(path, drive, origin)
-    labels = check(found.labels, str(path))
-    check_extrinsic(labels, drive, str(path))
-    return replace(found, labels=labels)
+    with uncollected():
+        found = kind.read(path, drive, origin)
+        labels = check(found.labels, str(path))
+        check_extrinsic(labels, drive, str(path))
+        return replace(found, labels=labels)
