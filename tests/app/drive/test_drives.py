@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
 import pytest
 
 from app.drive.book import MOST_KEPT, MOST_UNKEPT, NoSuchRun, RunBook, RunRefused
@@ -13,7 +12,6 @@ from app.drive.inputs import InputStore, without_pixels
 from app.drive.recording import Recipe
 from app.drive.recording import Recording as DriveRecording
 from app.drive.run import DriveRun, digest
-from app.drive.turn import Turn
 from app.line import DetectionCache
 from app.playing.playback import timeline_s
 from pipeline.params import Params, with_changes
@@ -250,16 +248,3 @@ def test_no_more_than_a_dozen_runs_are_kept():
     with pytest.raises(RunRefused, match="kept already"):
         runs.keep(begun(runs, 19).number, "")
     runs.keep(1, "renamed")
-
-
-def test_while_a_drive_plays_the_background_waits_for_the_next_shown_frame():
-    turn = Turn()
-    turn.playing(True)
-    turn._spent_s = 1.0
-    with turn.foreground():
-        pass
-    served = turn._served
-    turn.end()
-    turn.wait(1.0)  # an ended turn lets everybody through
-    assert turn._served == served
-    assert np.isclose(turn._spent_s, 0.0), "its share is counted anew"
