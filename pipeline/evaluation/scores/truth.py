@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 from pipeline.errors import BadInput
 from pipeline.evaluation.lead import LABELLED_VEHICLES, LeadRule, true_lead
-from pipeline.labels.link import MAX_GAP_S, linked
+from pipeline.evaluation.scores.velocities import velocities
+from pipeline.labels.link import linked
 from pipeline.labels.model import WHOLE_TAG, LabelSet, LabelTrack, LeadRange
 from pipeline.sources.base import Source, TruthObject
 from pipeline.types import Box, Point2
@@ -70,16 +70,28 @@ def of_source(source: Source, rule: LeadRule) -> DriveTruth:
         raise NoTruth(f"{source.uri}: no frame of this recording is labelled")
     frames = {tick: FrameTruth(tick, truth, true_lead(truth, rule)) for tick, truth in labelled.items()}
     followed = all(item.id is not None for truth in labelled.values() for item in truth)
-    return DriveTruth(source.uri, ticks, _over_time(frames, followed), None, () if followed else (_NOT_FOLLOWED,))
+    moving, notes = _over_time(frames, followed)
+    return DriveTruth(source.uri, ticks, moving, None, notes)
 
 
-def _over_time(frames: Mapping[int, FrameTruth], followed: bool) -> dict[int, FrameTruth]:
-    """The frames with velocities. Where the labels do not follow who is who, objects are linked by nearness first."""
-    if followed:
-        return with_velocities(frames)
-    objects = linked({tick: frame.objects for tick, frame in frames.items()})
-    renamed = {tick: _renamed(frame, objects[tick]) for tick, frame in frames.items()}
-    return {tick: _only_the_leads(frame) for tick, frame in with_velocities(renamed).items()}
+def _over_time(frames: Mapping[int, FrameTruth], followed: bool) -> tuple[dict[int, FrameTruth], tuple[str, ...]]:
+    """The frames with velocities, and what of these does not count. Where the labels do not follow who is who, objects
+    are linked by nearness first."""
+    if not followed:
+        objects = linked({tick: frame.objects for tick, frame in frames.items()})
+        frames = {tick: _renamed(frame, objects[tick]) for tick, frame in frames.items()}
+    moving, jumps = with_velocities(frames)
+    if not followed:
+        moving = {tick: _only_the_leads(frame) for tick, frame in moving.items()}
+        jumps = frozenset((tick, key) for tick, key in jumps if _lead_of(moving[tick]) == key)
+    tracks = len({key for _, key in jumps})
+    told = f"{tracks} {'track jumps' if tracks == 1 else 'tracks jump'} in {len(jumps)}"
+    note = f"{told} places, as no vehicle moves: speed is not judged there."
+    return moving, (*(() if followed else (_NOT_FOLLOWED,)), *((note,) if jumps else ()))
+
+
+def _lead_of(frame: FrameTruth) -> int | None:
+    return frame.lead.id if frame.lead is not None else None
 
 
 def _renamed(frame: FrameTruth, objects: tuple[TruthObject, ...]) -> FrameTruth:
@@ -90,8 +102,7 @@ def _renamed(frame: FrameTruth, objects: tuple[TruthObject, ...]) -> FrameTruth:
 
 def _only_the_leads(frame: FrameTruth) -> FrameTruth:
     """Without the velocities of all others: what stands beside the road is easily linked to its neighbour."""
-    lead = frame.lead.id if frame.lead is not None else None
-    kept = {key: velocity for key, velocity in (frame.velocity_mps or {}).items() if key == lead}
+    kept = {key: velocity for key, velocity in (frame.velocity_mps or {}).items() if key == _lead_of(frame)}
     return replace(frame, velocity_mps=kept)
 
 
@@ -104,7 +115,9 @@ def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
     """
     tracks = {track.id: track for track in labels.tracks if track.state in _COUNTED}
     ranges = [each for each in labels.leads if each.state in _COUNTED]
-    objects, unplaced, whole = _objects_by_frame(tracks), _unplaced_by_frame(tracks), _whole_frames(labels)
+    objects, unplaced = _objects_by_frame(tracks), _unplaced_by_frame(tracks)
+    left = _left_proposed(labels)
+    whole = _said_whole(labels) - left
     covered = {index for each in ranges for index in range(each.first, each.last + 1)}
     frames = {}
     for index in sorted((objects.keys() | covered) & set(range(len(labels.t_ns)))):
@@ -123,12 +136,14 @@ def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
     events = [each for each in labels.events if each.kind == "cut_in" and each.state in _COUNTED and each.tracks]
     cut_ins = tuple((labels.t_ns[each.frame], each.tracks[0]) for each in events) or None
     followed = len(frames) < 2 or any(len(track.sightings) > 1 for track in tracks.values()) or not tracks
-    notes = [*_notes(labels, ranges, frames), *(() if followed else (_NOT_FOLLOWED,))]
-    return DriveTruth(labels.source, labels.t_ns, _over_time(frames, followed), cut_ins, tuple(notes))
+    moving, of_motion = _over_time(frames, followed)
+    left_in = sum(labels.t_ns[index] in frames for index in left)
+    notes = (*_notes(labels, ranges, frames, left_in), *of_motion)
+    return DriveTruth(labels.source, labels.t_ns, moving, cut_ins, notes)
 
 
-def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, FrameTruth]) -> list[str]:
-    """What does not count, and why."""
+def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, FrameTruth], left: int) -> list[str]:
+    """What does not count, and why. left: frames in which a vehicle is only proposed."""
     proposed = {track.id for track in labels.tracks if track.state == "proposed"}
     notes = []
     for lead in sorted({each.lead for each in ranges if isinstance(each.lead, int) and each.lead in proposed}):
@@ -137,32 +152,50 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
         notes.append(f"#{lead} leads in {frames_text} but is only proposed: not judged until it is accepted.")
     if proposed:
         notes.append(f"{len(proposed)} of {len(labels.tracks)} tracks are only proposed and do not count.")
+    own, places = _as_proposed(labels)
+    if own:
+        notes.append(
+            f"{own} of {places} labelled places are as the pipeline proposed them: there its errors are those against "
+            "itself."
+        )
     whole = sum(frame.whole for frame in frames.values())
     if whole == len(frames):
         return notes
     if not ranges:
         notes.append("Nobody says who leads: that is judged only where every vehicle is labelled.")
-    notes.append(
-        f"Detection and tracking are judged in {whole} of {len(frames)} labelled frames: where proposals were taken or "
-        f"truth imported, and no vehicle is left proposed; or that are tagged “{WHOLE_TAG}”."
-    )
+    unsaid = len(frames) - whole - left
+    why = [
+        f"In {left} a vehicle is only proposed: accept or reject it." if left else "",
+        f"Of {unsaid} nobody says that every vehicle is labelled: tag them “{WHOLE_TAG}”." if unsaid else "",
+    ]
+    judged = f"Detection and tracking are judged in {whole} of {len(frames)} labelled frames."
+    notes.append(" ".join((judged, *filter(None, why))))
     return notes
 
 
-def _whole_frames(labels: LabelSet) -> set[int]:
-    """The frames in which every vehicle is labelled."""
+def _as_proposed(labels: LabelSet) -> tuple[int, int]:
+    """(cuboids that were accepted as the pipeline saw them, all that count)."""
+    counted = [track for track in labels.tracks if track.state in _COUNTED]
+    placed = {track.id: sum(each.cuboid is not None for each in track.sightings) for track in counted}
+    return sum(placed[track.id] for track in counted if track.origin.maker == "pipeline"), sum(placed.values())
+
+
+def _said_whole(labels: LabelSet) -> set[int]:
+    """The frames of which something says that every vehicle was looked for."""
     asked = {frame for tag in labels.tags if tag.tag == WHOLE_TAG for frame in range(tag.first, tag.last + 1)}
-    left: set[int] = set()
     for lead in labels.leads:
         if lead.origin.maker == "pipeline":
             asked.update(range(lead.first, lead.last + 1))
     for track in labels.tracks:
-        if track.state == "proposed":
-            if track.label.lower() in LABELLED_VEHICLES:
-                left.update(each.frame for each in track.sightings)
-        elif track.origin.maker != "person":
+        if track.state != "proposed" and track.origin.maker != "person":
             asked.update(each.frame for each in track.sightings)
-    return asked - left
+    return asked
+
+
+def _left_proposed(labels: LabelSet) -> set[int]:
+    """The frames with a vehicle that nobody has looked at."""
+    left = [track for track in labels.tracks if track.state == "proposed" and track.label.lower() in LABELLED_VEHICLES]
+    return {each.frame for track in left for each in track.sightings}
 
 
 def _box_of(track: LabelTrack | None, index: int) -> tuple[int, Box] | None:
@@ -189,23 +222,11 @@ def _unplaced_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Box,
     return found
 
 
-def with_velocities(frames: Mapping[int, FrameTruth]) -> dict[int, FrameTruth]:
-    """Each frame with its objects' velocities, from where they are in the labelled frames before and after (one side
-    where there is only one, none across a gap)."""
-    order = [frames[tick] for tick in sorted(frames)]
-    places = [{item.id: item.cuboid.center[:2] for item in frame.objects if item.id is not None} for frame in order]
-    near = [(b.t_ns - a.t_ns) / 1e9 <= MAX_GAP_S for a, b in pairwise(order)]
-    out = {}
-    for n, frame in enumerate(order):
-        first = n - 1 if n > 0 and near[n - 1] else n
-        last = n + 1 if n < len(near) and near[n] else n
-        velocities = {}
-        for key in places[n]:
-            a, b = (first if key in places[first] else n), (last if key in places[last] else n)
-            if a == b:
-                continue
-            dt_s = (order[b].t_ns - order[a].t_ns) / 1e9
-            (x0, y0), (x1, y1) = places[a][key], places[b][key]
-            velocities[key] = ((x1 - x0) / dt_s, (y1 - y0) / dt_s)
-        out[frame.t_ns] = replace(frame, velocity_mps=velocities)
-    return out
+def with_velocities(frames: Mapping[int, FrameTruth]) -> tuple[dict[int, FrameTruth], frozenset[tuple[int, int]]]:
+    """Each frame with its objects' velocities; tick and object of those that jump."""
+    places = {
+        tick: {item.id: item.cuboid.center[:2] for item in frames[tick].objects if item.id is not None}
+        for tick in sorted(frames)
+    }
+    found = velocities(places.items())
+    return {tick: replace(frames[tick], velocity_mps=found.mps.get(tick, {})) for tick in places}, found.jumps

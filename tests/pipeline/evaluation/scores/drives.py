@@ -30,7 +30,7 @@ def truth(*frames: Mapping[int, Place] | None, uri: str = "made:1") -> DriveTrut
         if places is not None:
             objects = tuple(labelled(key, *place) for key, place in places.items())
             made[n * TICK_NS] = FrameTruth(n * TICK_NS, objects, true_lead(objects, LeadRule()))
-    return DriveTruth(uri, tuple(n * TICK_NS for n in range(len(frames))), with_velocities(made))
+    return DriveTruth(uri, tuple(n * TICK_NS for n in range(len(frames))), with_velocities(made)[0])
 
 
 def believed(n: int, objects: Sequence[FusedObject], lead: int | None, acc: str | None = None) -> Result:

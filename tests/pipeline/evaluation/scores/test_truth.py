@@ -119,6 +119,7 @@ def test_only_what_somebody_stands_behind_counts(state: State) -> None:
     assert any("only proposed" in note for note in known.notes) == (state == "proposed")
 
 
+AWAY = ((0, 30.0), (1, 39.0), (2, 29.0))
 TAGGED = tuple(FrameTag(n, n, WHOLE_TAG, PERSON) for n in (0, 2))
 LED = (led(0, 2, 4, by=PIPELINE),)
 
@@ -194,7 +195,7 @@ def test_velocity_comes_from_the_frames_around() -> None:
 
 def test_no_velocity_across_a_gap() -> None:
     frames = {tick: FrameTruth(tick, (labelled(1, 20.0),), None) for tick in (0, 10_000_000_000)}
-    assert all(frame.velocity_mps == {} for frame in with_velocities(frames).values())
+    assert all(frame.velocity_mps == {} for frame in with_velocities(frames)[0].values())
 
 
 def nameless(x: float, y: float = 0.0, label: str = "car") -> TruthObject:
@@ -248,3 +249,18 @@ def test_the_simulators_own_truth() -> None:
     assert len(known.frames) == len(known.ticks) == len(source)
     assert known.notes == (), "the simulator knows who is who"
     assert any(frame.lead is not None for frame in known.frames.values())
+
+
+def test_what_a_person_should_know_is_said() -> None:
+    """A place that no vehicle can have come to, places that are the pipeline's own, and what is left to do."""
+    jumping = replace(track(4, 30.0, by=PIPELINE), sightings=tuple(Sighting(n, cuboid(x, 0.0)) for n, x in AWAY))
+    known = of_labels(labels(jumping, track(5, 20.0, state="proposed")), RULE)
+    assert [frame.velocity_mps for frame in known.frames.values()] == [{}, {}, {}]
+    notes = " ".join(known.notes)
+    assert "1 track jumps in 3 places" in notes
+    assert "3 of 3 labelled places are as the pipeline proposed them" in notes
+    assert "In 3 a vehicle is only proposed" in notes
+    assert "nobody says that every vehicle" not in notes
+    by_hand = " ".join(of_labels(labels(track(4, 30.0, by=PERSON), tags=TAGGED), RULE).notes)
+    assert "Of 1 nobody says that every vehicle is labelled: tag them “all labelled”" in by_hand
+    assert not any(words in by_hand for words in ("jump", "as the pipeline proposed", "only proposed"))
