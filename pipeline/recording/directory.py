@@ -16,6 +16,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Header, Schema
+from mcap.summary import Summary
 
 from pipeline.recording import topics
 
@@ -99,8 +100,8 @@ def _read_profile(file: BinaryIO) -> str:
     return header.profile
 
 
-def _from_summary(file: BinaryIO, size: int, profile: str) -> Directory | None:
-    """Null when there is no summary, or none that fits the file."""
+def read_summary(file: BinaryIO, size: int) -> Summary | None:
+    """The library's reading of the file's end. Null when there is none, or none that fits the file."""
     try:
         if not _is_sound(file, size):
             return None
@@ -109,6 +110,23 @@ def _from_summary(file: BinaryIO, size: int, profile: str) -> Directory | None:
     except Exception:  # damaged bytes make the library raise whatever they like; such a summary is as good as none
         return None
     if summary is None or summary.statistics is None:
+        return None
+    ends = [index.chunk_start_offset + index.chunk_length for index in summary.chunk_indexes]
+    is_complete = len(ends) == summary.statistics.chunk_count and max(ends, default=0) <= size
+    if not is_complete or (summary.statistics.message_count and not ends):
+        return None
+    return summary
+
+
+def summary_start(file: BinaryIO, size: int) -> int:
+    """Where the summary of a whole file begins; 0 when it has none."""
+    return int(_footer(file, size)[1][0])
+
+
+def _from_summary(file: BinaryIO, size: int, profile: str) -> Directory | None:
+    """Null when there is no summary."""
+    summary = read_summary(file, size)
+    if summary is None:
         return None
     chunks = [
         ChunkEntry(
@@ -121,9 +139,6 @@ def _from_summary(file: BinaryIO, size: int, profile: str) -> Directory | None:
         )
         for index in sorted(summary.chunk_indexes, key=lambda index: index.chunk_start_offset)
     ]
-    is_complete = len(chunks) == summary.statistics.chunk_count and all(c.offset + c.length <= size for c in chunks)
-    if not is_complete or (summary.statistics.message_count and not chunks):
-        return None
     found = Directory(
         profile,
         chunks,
@@ -139,13 +154,18 @@ def _from_summary(file: BinaryIO, size: int, profile: str) -> Directory | None:
 
 def _is_sound(file: BinaryIO, size: int) -> bool:
     """Whether the summary's checksum is right, or there is none: it covers the summary and the footer up to itself."""
-    footer_offset = size - len(MAGIC) - RECORD_HEAD.size - _FOOTER.size
-    footer = record_at(file, footer_offset, RECORD_HEAD.size + _FOOTER.size, size)
-    summary_start, _, crc = _FOOTER.unpack(footer)
-    if summary_start == 0 or crc == 0:
+    footer_offset, (start, _, crc) = _footer(file, size)
+    if start == 0 or crc == 0:
         return True
-    file.seek(summary_start)
-    return zlib.crc32(file.read(footer_offset + RECORD_HEAD.size + _FOOTER.size - 4 - summary_start)) == crc
+    file.seek(start)
+    return zlib.crc32(file.read(footer_offset + RECORD_HEAD.size + _FOOTER.size - 4 - start)) == crc
+
+
+def _footer(file: BinaryIO, size: int) -> tuple[int, tuple[int, int, int]]:
+    """Where it is, and what it says."""
+    offset = size - len(MAGIC) - RECORD_HEAD.size - _FOOTER.size
+    start, offsets_start, crc = _FOOTER.unpack(record_at(file, offset, RECORD_HEAD.size + _FOOTER.size, size))
+    return offset, (start, offsets_start, crc)
 
 
 class _Walk:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.progress import Progress, silent
+from pipeline.recording.relabel import relabel
 from pipeline.recording.rewrite import clip
 from pipeline.recording.session import SessionSource
 from pipeline.recording.writer import About, SessionWriter
@@ -28,6 +29,9 @@ def save(
     """
     last = len(source) - 1 if last is None else last
     if isinstance(source, SessionSource):
+        is_whole = (first, last) == (0, len(source) - 1)
+        if labels is not None and is_whole and relabel(source.file, out, labels, source.t_ns(last), progress):
+            return
         clip(source, first, last, out, labels, progress)
         return
     writer = SessionWriter(out, about(source))

@@ -1,0 +1,174 @@
+"""A session with other labels. All that lies before its labels is copied as bytes, and no chunk of it is unpacked: a
+drive of gigabytes takes as long as the disk."""
+
+from __future__ import annotations
+
+import os
+import zlib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import BinaryIO
+
+from mcap.data_stream import RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import Footer, McapRecord, Statistics, SummaryOffset
+from mcap.summary import Summary
+from mcap.writer import MCAP0_MAGIC, Writer
+
+from pipeline.errors import BadInput
+from pipeline.progress import Progress, silent
+from pipeline.recording import topics
+from pipeline.recording.container import McapFile, Stored
+from pipeline.recording.directory import read_summary, summary_start
+from pipeline.recording.output import CHUNK_BYTES
+
+_PIECE_BYTES = 4 << 20
+_CRC_BYTES = 4
+_LABELS = topics.channel(topics.LABELS)
+
+
+def relabel(file: McapFile, out: Path, labels: bytes, t_ns: int, progress: Progress = silent) -> bool:
+    """Write a new file ``out`` with these labels, of header time ``t_ns``, in place of any that were in it. progress:
+    of bytes. False, and nothing written, where the file's end does not tell enough for that.
+
+    BadInput when ``out`` exists; whatever ends this early leaves no file behind.
+    """
+    with file.path.open("rb") as source:
+        summary = read_summary(source, file.size)
+        place = _first_with_labels(file)
+        if summary is None or place == 0 or not _is_in_order(file, summary):
+            return False
+        try:
+            target = out.open("x+b")
+        except FileExistsError:
+            raise BadInput(f"{out}: there is such a file already; choose another name or remove it") from None
+        try:
+            with target:
+                before = file.directory.chunks[place - 1]
+                end = before.offset + before.length + before.index_length
+                _copy(source, target, end, progress)
+                _write_rest(file, summary, place, end, target, labels, t_ns)
+                os.fsync(target.fileno())
+        except BaseException:
+            out.unlink(missing_ok=True)
+            raise
+    return True
+
+
+def _first_with_labels(file: McapFile) -> int:
+    """The place of the first chunk that may hold labels; the number of chunks when none does."""
+    numbers = {number for number, channel in file.directory.channels.items() if channel.topic == topics.LABELS}
+    chunks = file.directory.chunks
+    return next((i for i, each in enumerate(chunks) if each.channels is None or each.channels & numbers), len(chunks))
+
+
+def _is_in_order(file: McapFile, summary: Summary) -> bool:
+    """Whether the summary names every channel, and numbers are given as the library gives them: what comes anew then
+    has the numbers that it had."""
+    known = summary.channels.keys() == file.directory.channels.keys()
+    return known and all(sorted(each) == [*range(1, len(each) + 1)] for each in (summary.schemas, summary.channels))
+
+
+def _copy(source: BinaryIO, target: BinaryIO, end: int, progress: Progress) -> None:
+    source.seek(0)
+    while (done := source.tell()) < end:
+        progress(done, end)
+        target.write(source.read(min(_PIECE_BYTES, end - done)))
+
+
+def _write_rest(
+    file: McapFile, before: Summary, place: int, end: int, target: BinaryIO, labels: bytes, t_ns: int
+) -> None:
+    """What comes after byte ``end``: the messages from chunk ``place`` on, the labels, what was attached, the summary.
+    The library writes it as the end of a file that began with it; what lies before it is told of afterwards."""
+    chunks = file.directory.chunks
+    passed = [stored for at in range(place, len(chunks)) for stored in file.chunk(at)]
+    kept = [stored for stored in passed if stored.channel.topic != topics.LABELS]
+    log_time_ns = kept[-1].log_time_ns if kept else chunks[place - 1].end_ns
+    writer = Writer(target, CHUNK_BYTES)
+    numbers = _register(writer, file, before)
+    copied = Counter(before.statistics.channel_message_counts if before.statistics is not None else {})
+    copied -= Counter(numbers[stored.channel] for stored in passed)
+    sequences = Counter(copied)
+    for channel, at_ns, published_ns, data in (*kept, Stored(_LABELS, log_time_ns, t_ns, labels)):
+        sequences[numbers[channel]] += 1
+        writer.add_message(numbers[channel], at_ns, data, max(published_ns, 0), sequences[numbers[channel]])
+    for attached in before.attachment_indexes:
+        content = file.attachment(attached.name)
+        if attached.offset >= end and content is not None:
+            writer.add_attachment(attached.create_time, attached.log_time, attached.name, attached.media_type, content)
+    for told in before.metadata_indexes:
+        if told.offset >= end:
+            writer.add_metadata(told.name, file.metadata(told.name) or {})
+    writer.finish()
+    _tell_of_all(target, before, end, copied)
+
+
+def _register(writer: Writer, file: McapFile, before: Summary) -> dict[topics.Channel, int]:
+    """Schemas and channels under the numbers that they have, and labels' where there were none."""
+    for schema in (before.schemas[number] for number in sorted(before.schemas)):
+        writer.register_schema(schema.name, schema.encoding, schema.data)
+    numbers: dict[topics.Channel, int] = {}
+    for channel in (before.channels[number] for number in sorted(before.channels)):
+        number = writer.register_channel(channel.topic, channel.message_encoding, channel.schema_id, channel.metadata)
+        numbers[file.directory.channels[channel.id]] = number
+    if _LABELS not in numbers:
+        schema_id = writer.register_schema(_LABELS.schema_name, _LABELS.schema_encoding, _LABELS.schema_data)
+        numbers[_LABELS] = writer.register_channel(_LABELS.topic, _LABELS.message_encoding, schema_id)
+    return numbers
+
+
+def _tell_of_all(target: BinaryIO, before: Summary, end: int, copied: Counter[int]) -> None:
+    """Put the summary of the whole file in the place of that of its last part. copied: messages of each channel in the
+    first ``end`` bytes."""
+    size = target.seek(0, os.SEEK_END)
+    rest = read_summary(target, size)
+    assert rest is not None, "what was just written can be read"
+    assert rest.statistics is not None
+    chunks = [index for index in before.chunk_indexes if index.chunk_start_offset < end] + rest.chunk_indexes
+    attachments = [index for index in before.attachment_indexes if index.offset < end] + rest.attachment_indexes
+    metadata = [index for index in before.metadata_indexes if index.offset < end] + rest.metadata_indexes
+    counts = copied + Counter(rest.statistics.channel_message_counts)
+    statistics = Statistics(
+        attachment_count=len(attachments),
+        channel_count=len(rest.channels),
+        channel_message_counts=dict(sorted(counts.items())),
+        chunk_count=len(chunks),
+        message_count=counts.total(),
+        message_end_time=max(index.message_end_time for index in chunks),
+        message_start_time=min(index.message_start_time for index in chunks),
+        metadata_count=len(metadata),
+        schema_count=len(rest.schemas),
+    )
+    groups: dict[int, Sequence[McapRecord]] = {
+        Opcode.SCHEMA: list(rest.schemas.values()),
+        Opcode.CHANNEL: list(rest.channels.values()),
+        Opcode.STATISTICS: [statistics],
+        Opcode.CHUNK_INDEX: chunks,
+        Opcode.ATTACHMENT_INDEX: attachments,
+        Opcode.METADATA_INDEX: metadata,
+    }
+    start = summary_start(target, size)
+    target.truncate(start)
+    target.seek(start)
+    target.write(_summary(groups, start) + MCAP0_MAGIC)
+
+
+def _summary(groups: Mapping[int, Sequence[McapRecord]], start: int) -> bytes:
+    """The summary section of a file, to be at byte ``start``, with the footer: records by kind, where each kind is, and
+    the checksum over all of that."""
+    records, offsets = RecordBuilder(), []
+    for kind, group in groups.items():
+        first = records.count
+        for record in group:
+            record.write(records)
+        offsets.append(SummaryOffset(kind, start + first, records.count - first))
+    offsets_start = start + records.count
+    for offset in offsets:
+        offset.write(records)
+    data = records.end()
+    footer = RecordBuilder()
+    Footer(start, offsets_start, 0).write(footer)
+    unsigned = footer.end()[:-_CRC_BYTES]
+    return data + unsigned + zlib.crc32(unsigned, zlib.crc32(data)).to_bytes(_CRC_BYTES, "little")
