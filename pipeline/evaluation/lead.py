@@ -16,7 +16,7 @@ from pipeline.types import VEHICLES, Box, Point2, Result
 
 Verdict = Literal["correct", "none", "missed", "false", "wrong"]
 """correct: the right vehicle · none: rightly nothing · missed: a lead, not found · false: a CIPV, no lead · wrong:
-a CIPV that is another object than the lead."""
+a CIPV that is not where the lead is: another vehicle, or the lead at a distance too far off (`LeadRule`)."""
 
 LABELLED_VEHICLES = VEHICLES | {"van", "tram", "trailer", "other vehicle", "motorcyclist"}
 """Label names of the recordings that may be a lead, lower case."""
@@ -30,13 +30,14 @@ class LeadRule:
 
     half_lane_m: a vehicle whose centre is nearer to the car's axis is in the lane. max_range_m: farther leads are not
     asked for. lateral_slack_m: how far beside the label a CIPV may lie. range_slack: how far before or behind it, as a
-    share of its range, and never under 2 m.
+    share of its range, and never under ``range_slack_m``.
     """
 
     half_lane_m: float = 1.5
     max_range_m: float = 60.0
     lateral_slack_m: float = 0.3
     range_slack: float = 0.15
+    range_slack_m: float = 2.0
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judg
     if chosen is None or chosen.distance_m is None or chosen.bev is None:
         return Judged(result.frame, "missed", truth_m, None, None)
     lateral = max(_lateral_error(chosen.bev, lead) - rule.lateral_slack_m, 0.0)
-    lengthwise = abs(chosen.distance_m - truth_m) <= max(2.0, rule.range_slack * truth_m)
+    lengthwise = abs(chosen.distance_m - truth_m) <= max(rule.range_slack_m, rule.range_slack * truth_m)
     on_it = lateral == 0.0 and lengthwise
     return Judged(result.frame, "correct" if on_it else "wrong", truth_m, chosen.distance_m, lateral)
 

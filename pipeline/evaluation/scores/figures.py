@@ -189,7 +189,7 @@ FIGURES: tuple[Figure, ...] = (
     Figure("cipv_correct", "CIPV correct", "%", "higher", partial(_percent, ("correct", "none"))),
     Figure("lead_missed", "lead missed", "%", "lower", partial(_percent, ("missed",))),
     Figure("cipv_false", "CIPV without a lead", "%", "lower", partial(_percent, ("false",))),
-    Figure("cipv_wrong", "another vehicle than the lead", "%", "lower", partial(_percent, ("wrong",))),
+    Figure("cipv_wrong", "CIPV not where the lead is", "%", "lower", partial(_percent, ("wrong",))),
     Figure("switches", "switches", "a minute", "lower", partial(_a_minute, _switches)),
     Figure("drop_outs", "drop-outs", "a minute", "lower", partial(_a_minute, _drop_outs)),
     Figure("acquired_m", "acquisition distance", "m", "higher", partial(_acquired, "range_m")),

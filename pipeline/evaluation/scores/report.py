@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from pipeline.evaluation.experiments.sections import Linked, Section, Table
+from pipeline.evaluation.lead import LeadRule
 from pipeline.evaluation.scores import tracking
 from pipeline.evaluation.scores.drive import DriveScore
 from pipeline.evaluation.scores.error_tables import COLUMNS, error_rows, errors_section
@@ -77,11 +78,12 @@ def _cut_in_json(drive: DriveScore, n: int) -> dict[str, Any]:
 
 def _scores(run: Drives) -> Section:
     judged = sum(frame.judged is not None for drive in run for frame in drive.frames)
-    seconds = sum(drive.judged_s for drive in run)
+    seconds, rule = sum(drive.judged_s for drive in run), LeadRule()
     text = [
         f"{judged} frames with a known lead or none, {seconds:.1f} s of {_many(len(run), 'drive')}. Missed: there is a "
-        "lead, none is chosen. Wrong: another vehicle, or the lead at a distance that is too far off. Errors are mean "
-        "absolute ones, of every labelled vehicle that an object stands for.",
+        f"lead, none is chosen. Not where the lead is: another vehicle, or the lead at a distance over "
+        f"{100 * rule.range_slack:.0f} % (and {rule.range_slack_m:.0f} m) off. Errors are mean absolute ones, of every "
+        "labelled vehicle that an object stands for.",
         f"Vehicles are looked for to {MAX_RANGE_M:.0f} m and 35° to either side. Two places are one within "
         f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class claims to be no vehicle: it counts where one is, "
         "so the LiDAR alone never detects falsely. Detection and tracking are judged in frames whose vehicles are all "

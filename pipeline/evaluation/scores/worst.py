@@ -9,7 +9,7 @@ from pipeline.evaluation.lead import Verdict
 from pipeline.evaluation.scores.drive import DriveScore, FrameScore
 
 _WEIGHT: dict[Verdict, int] = {"none": 0, "correct": 0, "missed": 1, "wrong": 2, "false": 3}
-"""A CIPV that is none is worse than another vehicle than the lead, and that is worse than none."""
+"""A CIPV where nothing leads is worse than one that is not where the lead is, and that is worse than none."""
 
 
 @dataclass(frozen=True)
