@@ -14,6 +14,7 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
+from starlette.types import Scope
 
 from app.access import Access, Guard
 from app.clips.jobs import Jobs
@@ -88,7 +89,7 @@ def create_app(
     app.include_router(rerun_router(engine, viewer))
     app.include_router(viser_router(viser_port, access.allowed))
     app.add_api_route("/palette.css", _palette, include_in_schema=False)
-    app.mount("/", _Pages(directory=STATIC, html=True), name="pages")
+    app.mount("/", _Pages(engine.drives.turn.asked), name="pages")
     return app
 
 
@@ -126,7 +127,16 @@ class Server(uvicorn.Server):
 
 
 class _Pages(StaticFiles):
-    """Static files that the browser always asks about again, so that an update is never half old."""
+    """Static files that the browser always asks about again, so that an update is never half old. on_ask: called for
+    each of them: somebody waits for a page."""
+
+    def __init__(self, on_ask: Callable[[], object]) -> None:
+        super().__init__(directory=STATIC, html=True)
+        self._on_ask = on_ask
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        self._on_ask()
+        return await super().get_response(path, scope)
 
     def file_response(self, *args: Any, **kwargs: Any) -> Response:
         response = super().file_response(*args, **kwargs)

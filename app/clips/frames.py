@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 
 from app.clips.jobs import Report
@@ -22,12 +21,11 @@ def clip_frames(
     report(0, total)
     state = recording.state_from_start(first, params)
     for index in range(first, last + 1):
-        began = time.perf_counter()
-        frame = recording.frame(index) if pictures else recording.input(index)
-        state, result = step(state, frame, params)
+        with turn.background(to_the_end=True):
+            frame = recording.frame(index) if pictures else recording.input(index)
+            state, result = step(state, frame, params)
         yield frame, result
         report(index + 1 - first, total)
-        turn.wait(time.perf_counter() - began)
 
 
 def one_frame(recording: Recording, params: Params, index: int) -> tuple[Frame, Result]:

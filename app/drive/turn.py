@@ -30,7 +30,7 @@ background down; they do not stop it."""
 
 
 class Turn:
-    """Shared by the threads in front, one in the background, and whoever asks for something."""
+    """Shared by the threads in front, those in the background, and whoever asks for something."""
 
     def __init__(self) -> None:
         self._condition = threading.Condition()
@@ -103,25 +103,29 @@ class Turn:
     # ------------------------------------------------------------ in the background
 
     @contextmanager
-    def background(self) -> Iterator[None]:
-        """One piece of work, once it may begin. Its networks can be stopped, unless it has waited for too long."""
-        stop = self._let_begin()
+    def background(self, *, to_the_end: bool = False) -> Iterator[None]:
+        """One piece of work, once it may begin. Its networks can be stopped, unless it has waited for too long: for one
+        thread, which then begins the piece again. to_the_end: they are not, for any other."""
+        stop = self._let_begin(to_the_end)
         began_s = time.monotonic()
         try:
             with self._until_done(stop):
                 yield
-            self._overdue_at_s = None  # what was stopped is begun again, and waits no longer than the first time
+            if not to_the_end:
+                self._overdue_at_s = None  # what was stopped has waited since it was first begun
         finally:
             with self._condition:
                 if self._playing:
                     self._credit_s -= time.monotonic() - began_s
 
-    def _let_begin(self) -> Stop:
+    def _let_begin(self, to_the_end: bool) -> Stop:
         """Wait for it. What is to stop the work is known to ``asked`` before anybody can ask."""
         stop = Stop()
         with self._condition:
-            self._overdue_at_s = self._overdue_at_s or time.monotonic() + _LONGEST_FRONT_S
-            while not self._ended and (left_s := self._overdue_at_s - time.monotonic()) > 0:
+            overdue_at_s = time.monotonic() + _LONGEST_FRONT_S
+            if not to_the_end:
+                overdue_at_s = self._overdue_at_s = self._overdue_at_s or overdue_at_s
+            while not self._ended and (left_s := overdue_at_s - time.monotonic()) > 0:
                 if self._in_front:
                     self._condition.wait(left_s)
                 elif self.rest_s > 0:
@@ -129,7 +133,7 @@ class Turn:
                 elif self._playing and not self._has_credit():
                     self._condition.wait_for(self._is_next_frame(), _LONGEST_WAIT_S)
                 else:
-                    self._stops.add(stop)
+                    self._stops |= set() if to_the_end else {stop}
                     break
         return stop
 

@@ -32,9 +32,9 @@ class Piece:
 
     begun: the piece may begin. options: of the network's run. ended: how the piece did, ``done`` or ``stopped``."""
 
-    def __init__(self, turn: Turn) -> None:
+    def __init__(self, turn: Turn, *, to_the_end: bool = False) -> None:
         self.begun, self.answer, self.options, self.ended = threading.Event(), threading.Event(), Options(), ""
-        self._turn = turn
+        self._turn, self._to_the_end = turn, to_the_end
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
 
@@ -50,7 +50,7 @@ class Piece:
 
     def _work(self) -> None:
         try:
-            with self._turn.background():
+            with self._turn.background(to_the_end=self._to_the_end):
                 with of_this_thread().ends(self.options):
                     self.begun.set()
                     assert self.answer.wait(WAIT_S)
@@ -127,6 +127,16 @@ def test_a_network_that_runs_in_the_background_is_stopped_for_who_asks(turn: Tur
     turn.asked(rests=rests)
     assert piece.options.terminate
     assert piece.finish() == "stopped"
+
+
+def test_a_clip_that_a_person_waits_for_goes_after_who_asks_and_is_not_stopped(turn: Turn) -> None:
+    with turn.foreground():
+        piece = Piece(turn, to_the_end=True)
+        assert piece.waits
+    assert piece.begun.wait(WAIT_S)
+    turn.asked()
+    assert not piece.options.terminate
+    assert piece.finish() == "done"
 
 
 def test_a_frame_that_is_shown_while_playing_stops_no_network(turn: Turn) -> None:
