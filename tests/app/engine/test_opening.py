@@ -11,6 +11,7 @@ import pytest
 import app.engine as engine_module
 from app.engine import Engine
 from app.line import DetectionCache, Line
+from app.snapshot import Snapshot
 from pipeline.params import Params
 from pipeline.progress import Progress
 from pipeline.run import Detectors
@@ -71,6 +72,32 @@ def test_what_takes_long_to_open_is_given_up_for_something_else(slowly: tuple[En
     assert opens.given_up.wait(WAIT_S)
     shown = engine.wait_for(lambda s: s.uri == "test:other" and s.tick is not None, WAIT_S)
     assert (shown.busy, [n for n in shown.notices if n.level == "error"]) == (None, [])
+
+
+def test_with_another_recording_nothing_of_the_old_one_is_told():
+    """A page would ask for a drive that is gone, and draw it under the new name."""
+    engine = Engine(
+        opener(Recording(), Recording("test:other")),
+        lambda _: CountingDetector(),
+        Params(),
+        uri="test:car",
+        whole_drives=True,
+    )
+    engine.start()
+    try:
+        old = engine.wait_for(lambda s: s.tick is not None and s.drive.run is not None, WAIT_S).drive.run
+        engine.control.seek(5)
+        engine.wait_for(at(5), WAIT_S)
+        told: list[Snapshot] = []
+        engine.listen(told.append)
+        engine.control.change(uri="test:other")
+        engine.wait_for(lambda s: s.uri == "test:other" and s.tick is not None and s.drive.run is not None, WAIT_S)
+        first = next(s for s in told if s.uri == "test:other")
+        assert first.tick is None
+        assert (first.drive.run, first.index, first.time_s) == (None, 0, 0.0)
+        assert all(s.drive.run != old for s in told if s.uri == "test:other")
+    finally:
+        engine.stop()
 
 
 def test_reopening_costs_no_network_either(start: Start):
