@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Annotated, Literal, TypeVar
 
 import tyro
-import yaml
 
 from app.progress import opened_recording
+from pipeline.complaint import parse_yaml
 from pipeline.errors import BadInput
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
 from pipeline.path.lane_detector import usual_every
@@ -95,10 +95,7 @@ class LineOptions:
             name, separator, value = change.partition("=")
             if not separator:
                 raise ParamsError(f"--set {change}: expected NAME=VALUE")
-            try:
-                changes[name] = yaml.safe_load(value)
-            except (yaml.YAMLError, RecursionError):
-                raise ParamsError(f"--set {change}: {value!r} is no value") from None
+            changes[name] = parse_yaml(value, f"--set {change}", ParamsError)
         return with_changes(params, changes)
 
     def changes_parameters(self) -> bool:

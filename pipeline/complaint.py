@@ -2,13 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any, get_args
 
+import yaml
 from pydantic import BaseModel, ValidationError
 
+from pipeline.errors import BadInput
+
 _IN_OUR_WORDS = {"extra_forbidden": "no such setting", "missing": "is missing"}
+
+
+def read_yaml(path: Path, what: str, refuse: Callable[[str], BadInput] = BadInput) -> Any:
+    """The plain values of a YAML file, null of an empty one. Else what ``refuse`` makes of a sentence that begins with
+    ``what`` is raised."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise refuse(f"{what}: not YAML: not a text file") from None
+    except (OSError, ValueError) as error:
+        raise refuse(f"{what}: cannot be read: {reason_of(error)}") from None
+    return parse_yaml(text, what, refuse)
+
+
+def parse_yaml(text: str, what: str, refuse: Callable[[str], BadInput] = BadInput) -> Any:
+    """As ``read_yaml``, of a text."""
+    try:
+        return yaml.safe_load(text)
+    except RecursionError:
+        raise refuse(f"{what}: not YAML: nested too deep") from None
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: a day that is in no calendar, a number without end
+        raise refuse(f"{what}: not YAML: {str(error).splitlines()[0]}") from None
+
+
+def reason_of(error: Exception) -> str:
+    """Why the system refused, in words."""
+    return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
 
 
 def first_complaint(error: ValidationError, model: type[BaseModel]) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from pipeline.complaint import did_you_mean
+from pipeline.complaint import did_you_mean, read_yaml
 from pipeline.errors import BadInput
 from pipeline.params.declare import Section
 from pipeline.params.driving import (
@@ -159,12 +159,7 @@ def changes_of(base: Params, params: Params) -> dict[str, tuple[Any, Any]]:
 
 def from_yaml(path: Path, base: Params) -> Params:
     """``base`` with a preset file's values: a mapping of section to parameter to value."""
-    try:
-        loaded = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-    except OSError as error:
-        raise ParamsError(f"{path}: {error.strerror}") from None
-    except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        raise ParamsError(f"{path}: not a parameter file: {str(error).splitlines()[0]}") from None
+    loaded = read_yaml(path, str(path), ParamsError) or {}
     if not isinstance(loaded, dict) or not all(isinstance(values, dict) for values in loaded.values()):
         raise ParamsError(f"{path}: expected sections with parameters below them")
     changes = {f"{section}.{key}": value for section, values in loaded.items() for key, value in values.items()}

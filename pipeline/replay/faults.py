@@ -7,10 +7,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
-from pipeline.complaint import first_complaint
+from pipeline.complaint import first_complaint, read_yaml
 from pipeline.errors import BadInput
 from pipeline.replay.messages import Sensor
 from pipeline.replay.wire import WireEvent
@@ -41,14 +40,9 @@ class Fault(BaseModel):
 def load(path: Path) -> tuple[Fault, ...]:
     """A YAML list of faults. BadInput names what is wrong."""
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-        return tuple(TypeAdapter(list[Fault]).validate_python(data))
-    except OSError as error:
-        raise BadInput(f"{path}: {error.strerror}") from None
+        return tuple(TypeAdapter(list[Fault]).validate_python(read_yaml(path, str(path))))
     except ValidationError as error:
         raise BadInput(f"{path}: {first_complaint(error, Fault)}") from None
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
-        raise BadInput(f"{path}: not YAML: {str(error).splitlines()[0]}") from None
 
 
 def disturb(events: Iterable[WireEvent], faults: Sequence[Fault], start_ns: int, seed: int = 1) -> Iterator[WireEvent]:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from functools import cached_property
 from math import ceil
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-import yaml
 from pydantic import Field, ValidationError, model_validator
 
-from pipeline.complaint import first_complaint
+from pipeline.complaint import first_complaint, parse_yaml, read_yaml
 from pipeline.errors import BadInput
 from pipeline.simulation.actors import Actor, Motion, Script, motion
 from pipeline.simulation.detection_model import Detections
@@ -133,19 +132,15 @@ def load(name_or_path: str) -> Scenario:
         if name_or_path not in names():
             raise ScenarioError(f"no scenario named {name_or_path!r}; there are {', '.join(names())}")
         path = _FOLDER / f"{name_or_path}.yaml"
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError, ValueError) as error:
-        raise ScenarioError(f"{path.name}: cannot be read: {error}") from None
-    return parse(text, path.name)
+    return _checked(read_yaml(path, path.name, ScenarioError), path.name)
 
 
 def parse(text: str, file: str) -> Scenario:
     """The scenario of a YAML text. ScenarioError names the file, the key and what is wrong with it."""
-    try:
-        loaded = yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ScenarioError(f"{file}: not YAML: {str(error).splitlines()[0]}") from None
+    return _checked(parse_yaml(text, file, ScenarioError), file)
+
+
+def _checked(loaded: Any, file: str) -> Scenario:
     if not isinstance(loaded, dict):
         raise ScenarioError(f"{file}: expected keys such as title, road, ego and actors")
     try:

@@ -6,12 +6,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from pipeline.complaint import reason_of
 from pipeline.progress import Progress, silent
 from pipeline.records import evolve
 from pipeline.sources import rig as rig_files
 from pipeline.sources import video as video_files
 from pipeline.sources.base import SourceError
-from pipeline.sources.files import files_by_name, reason_of
+from pipeline.sources.files import files_by_name
 from pipeline.sources.live.own_motion import MotionFromGnss
 from pipeline.sources.nmea import NmeaReader
 from pipeline.sources.options import number_option

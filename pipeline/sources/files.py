@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.complaint import reason_of
 from pipeline.sources.base import SourceError
 from pipeline.types import F64, U8, CameraCalibration, Picture
 
@@ -174,8 +175,3 @@ def check_looks_ahead(camera: CameraCalibration, what: str) -> None:
         if -0.5 <= u / camera.width <= 1.5 and -0.5 <= v / camera.height <= 1.5:
             return
     raise SourceError(f"{what}: the camera does not look ahead; is its extrinsic given the wrong way round?")
-
-
-def reason_of(error: Exception) -> str:
-    """Why the system refused, in words."""
-    return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__

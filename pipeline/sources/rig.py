@@ -5,12 +5,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import yaml
 from pydantic import ValidationError
 
-from pipeline.complaint import first_complaint
+from pipeline.complaint import first_complaint, read_yaml
 from pipeline.sources.base import SourceError
-from pipeline.sources.files import check_looks_ahead, reason_of
+from pipeline.sources.files import check_looks_ahead
 from pipeline.sources.live.config import CalibrationConfig, Mount, OffsetMs, Strict
 from pipeline.types import CameraCalibration, Picture
 
@@ -45,12 +44,7 @@ class Rig(Strict):
 def load_rig(path: Path) -> Rig:
     """The file's content. SourceError in one sentence when it cannot be used."""
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8")) or {}
-        rig = Rig.model_validate(data)
-    except OSError as error:
-        raise SourceError(f"{path.name}: cannot be read: {reason_of(error)}") from None
-    except (UnicodeDecodeError, yaml.YAMLError, RecursionError) as error:
-        raise SourceError(f"{path.name}: not YAML: {str(error).splitlines()[0]}") from None
+        rig = Rig.model_validate(read_yaml(path, path.name, SourceError) or {})
     except ValidationError as error:
         raise SourceError(f"{path.name}: {first_complaint(error, Rig)}") from None
     camera = rig.camera_calibration()

@@ -9,9 +9,9 @@ from threading import Lock
 import av
 import numpy as np
 
+from pipeline.complaint import reason_of
 from pipeline.progress import Progress, silent
 from pipeline.sources.base import SourceError
-from pipeline.sources.files import reason_of
 from pipeline.sources.timeline import Times
 from pipeline.types import U8
 

@@ -46,7 +46,7 @@ def class_names(count: int, metadata: Mapping[str, str]) -> tuple[str, ...]:
 def _from_metadata(text: str) -> tuple[str, ...]:
     try:
         value = ast.literal_eval(text)
-    except (ValueError, SyntaxError):
+    except (ValueError, TypeError, SyntaxError, MemoryError, RecursionError):  # all that literal_eval may raise
         return ()
     if isinstance(value, dict) and set(value) == set(range(len(value))):
         value = [value[index] for index in range(len(value))]

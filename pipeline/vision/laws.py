@@ -39,7 +39,7 @@ def find_law(network: Path) -> FoundLaw:
         fitted_to = str(kept["network_sha256"])
     except FileNotFoundError:
         return FoundLaw(None)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
         return FoundLaw(None, f"{path.name} is damaged and not used; fit the law again with `cipv calibrate distance`")
     if not _is_possible(law):
         return FoundLaw(None, f"{path.name} holds numbers that no camera can have and is not used")

@@ -268,7 +268,7 @@ def _read_registry() -> dict[str, dict[str, Any]]:
         return {"defaults": dict(loaded["defaults"]), "models": dict(loaded["models"])}
     except FileNotFoundError:
         return {"defaults": {}, "models": {}}
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise ModelError(f"{path} is damaged; delete it and register your networks again") from None
 
 

@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from pipeline.complaint import did_you_mean, first_complaint
+from pipeline.errors import BadInput
+from pipeline.params import Params, from_yaml
+from pipeline.replay import faults
+from pipeline.simulation import scenario
+from pipeline.sources.rig import load_rig
 
 
 class Strict(BaseModel):
@@ -59,3 +66,36 @@ def test_the_first_complaint(data: dict[str, Any], sentence: str) -> None:
 def test_what_is_near_is_proposed() -> None:
     assert did_you_mean("cluster.zweight", ["acc.gap_s", "cluster.z_weight"]) == "; did you mean cluster.z_weight?"
     assert did_you_mean("xyz", ["cluster.z_weight"]) == ""
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        pytest.param(b"a: 2026-13-45", "not YAML: month must be in 1..12", id="a day in no calendar"),
+        pytest.param(b"a: " + b"9" * 5000, "not YAML: Exceeds the limit", id="a number without end"),
+        pytest.param(b"[" * 100_000, "not YAML: nested too deep", id="nested without end"),
+        pytest.param(b"a: {", "not YAML: while parsing", id="cut off"),
+        pytest.param(b"\xff\xfe", "not YAML: not a text file", id="no text"),
+        pytest.param(None, "cannot be read: No such file", id="no file"),
+    ],
+)
+@pytest.mark.parametrize(
+    "load",
+    [
+        pytest.param(lambda path: from_yaml(path, Params()), id="parameters"),
+        pytest.param(load_rig, id="rig"),
+        pytest.param(faults.load, id="faults"),
+        pytest.param(lambda path: scenario.load(str(path)), id="scenario"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_named_in_one_sentence(
+    load: Callable[[Path], object], content: bytes | None, says: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.yaml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(BadInput) as refused:
+        load(path)
+    said = str(refused.value)
+    assert f"mine.yaml: {says}" in said
+    assert "\n" not in said

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-import yaml
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from pipeline.complaint import first_complaint
+from pipeline.complaint import first_complaint, parse_yaml
 from pipeline.geometry import inverse, rotation
 from pipeline.sources.base import SourceError
 from pipeline.sources.files import check_looks_ahead
@@ -186,10 +185,7 @@ def load(path: str) -> LiveConfig:
     except (OSError, UnicodeDecodeError, RuntimeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise SourceError(f"{path or 'live:'}: {reason}; `cipv live init` writes such a file") from None
-    try:
-        data = yaml.safe_load(text)
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        raise SourceError(f"{path}: not YAML: {str(error).splitlines()[0]}") from None
+    data = parse_yaml(text, path, SourceError)
     if not isinstance(data, dict):
         raise SourceError(f"{path}: expected sensors with their settings below them")
     try:

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
+from pipeline.complaint import reason_of
 from pipeline.sources.base import SourceError
-from pipeline.sources.files import reason_of
 
 _MAX_RECORD = 1 << 18
 """libpcap's own limit; a longer record is damage."""
