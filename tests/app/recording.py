@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import cv2
 import numpy as np
 
 from pipeline.progress import Progress, silent
 from pipeline.sources.base import SourceError, TruthObject
-from pipeline.types import F32, U8, CameraCalibration, EgoState, Frame, Picture, RawBoxes, Sweep
+from pipeline.types import F32, U8, CameraCalibration, EgoState, Frame, Picture, RawBoxes, RawLanes, Sweep
+from pipeline.vision.stopping import Stopped, of_this_thread
 
 WIDTH, HEIGHT = 320, 180
 FOCAL_PX = 250.0
@@ -31,6 +32,45 @@ class CountingDetector:
         rows, columns = np.nonzero((bgr[:, :, 2] > 150) & (bgr[:, :, 0] < 60))
         box = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
         return RawBoxes(self.name, np.array([box], np.float32), np.array([0.8], np.float32), ("car",))
+
+
+class CountingLanes:
+    """Sees no lane line, and counts how often it was asked."""
+
+    name, notes = "counting lanes", ()
+
+    def __init__(self) -> None:
+        self.calls = 0
+
+    def detect(self, bgr: U8) -> RawLanes:
+        self.calls += 1
+        return RawLanes(self.name, np.zeros((0, 2), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int32))
+
+
+class Options:
+    """Of a network's run."""
+
+    terminate = False
+
+
+@dataclass
+class SlowDetector(CountingDetector):
+    """A network that takes for ever in its ``slow_at``-th call, until it is told to end: then it is quick again.
+    ``slow``: set when it does. ``stopped``: how often it was."""
+
+    slow_at: int = 0
+    slow: threading.Event = field(default_factory=threading.Event)
+    stopped: int = 0
+
+    def detect(self, bgr: U8) -> RawBoxes:
+        found, options = super().detect(bgr), Options()
+        with of_this_thread().ends(options):
+            while self.calls == self.slow_at and not options.terminate:
+                self.slow.set()
+        if options.terminate:
+            self.stopped += 1
+            raise Stopped
+        return found
 
 
 class Recording:

@@ -17,7 +17,7 @@ from app.playing.playback import timeline_s
 from pipeline.params import Params, with_changes
 from pipeline.run import Detectors, run
 from pipeline.step import State, step
-from tests.app.recording import CountingDetector, Recording
+from tests.app.recording import CountingDetector, Recording, SlowDetector
 
 WAIT_S = 60.0
 
@@ -137,6 +137,36 @@ def test_a_frame_that_cannot_be_read_fails_the_run_and_says_which(drives: Drives
     assert "frame 7 is not there" in drives.state.note
     assert drives.state_before(5, Params()) is not None, "what it has come to stays"
     assert drives.state_before(9, Params()) is None
+
+
+def test_nothing_of_a_drive_is_read_or_looked_at_while_somebody_is_in_front(drives: Drives):
+    source, detector = Recording(), CountingDetector()
+    drives.start()
+    with drives.turn.foreground():
+        drives.open(recipe(source, detector))
+        drives.want(Params(), "default")
+        assert not source.reading.wait(0.05)
+    assert wait_done(drives).is_complete
+    assert (len(source.reads), detector.calls) == (30, 30)
+
+
+@pytest.mark.parametrize("stopped_at", [1, 7, 30])
+def test_a_network_that_is_stopped_for_who_asks_looks_again_and_nothing_is_lost(drives: Drives, stopped_at: int):
+    detector = SlowDetector(slow_at=stopped_at)
+    drives.start()
+    drives.open(recipe(Recording(), detector))
+    drives.want(Params(), "default")
+    assert detector.slow.wait(WAIT_S)
+    drives.turn.asked(rests=True)
+    of = wait_done(drives)
+    assert (of.is_complete, of.note, detector.stopped, detector.calls) == (True, "", 1, 31)
+    undisturbed = opened(Recording())
+    undisturbed.book.want(Params(), "default")
+    other = undisturbed.book.current
+    assert other is not None
+    while not other.is_complete:
+        undisturbed.advance(other)
+    assert repr(of.rows()) == repr(other.rows())
 
 
 def test_without_a_recording_there_is_nothing_to_say(drives: Drives):

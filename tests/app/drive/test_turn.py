@@ -15,16 +15,13 @@ from app.engine import Engine
 from pipeline.params import Params, SyncParams
 from pipeline.types import Frame
 from pipeline.vision.stopping import Stopped, of_this_thread
+from tests.app.recording import Options
 from tests.app.test_live_engine import Sensors
 
 WAIT_S = 30.0
 FOR_EVER_S = 1e6
 A_WHILE_S = 0.05
 """Somebody who does not wait has gone on by then. Where a machine is too slow for that, a test sees nothing wrong."""
-
-
-class Options:
-    terminate = False
 
 
 class Piece:

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 
 import pytest
 
+from app.drive import turn
 from app.engine import Engine
 from pipeline.params import Params
 from tests.app.engine.running import WAIT_S, Start
@@ -14,12 +15,15 @@ from tests.app.recording import CountingDetector, Recording, opener
 
 
 @pytest.fixture
-def start() -> Iterator[Start]:
-    """An engine on a recording, showing its first frame, paused."""
+def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
+    """An engine on a recording, showing its first frame, paused. Hands rest at once."""
+    monkeypatch.setattr(turn, "HAND_RESTS_S", 0.0)
     with ExitStack() as stack:
 
-        def begin(recording: Recording | None = None, **options) -> tuple[Engine, Recording, CountingDetector]:
-            recording, detector = recording or Recording(), CountingDetector()
+        def begin(
+            recording: Recording | None = None, detector: CountingDetector | None = None, **options
+        ) -> tuple[Engine, Recording, CountingDetector]:
+            recording, detector = recording or Recording(), detector or CountingDetector()
             engine = Engine(opener(recording), lambda _: detector, Params(), uri=recording.uri, **options)
             engine.start()
             stack.callback(engine.stop)

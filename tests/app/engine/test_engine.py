@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import pytest
 
+from app.drive import turn
 from app.line import WARM_UP_FRAMES, DetectionCache, Line
 from app.snapshot import Snapshot
 from pipeline.params import Params, with_changes
 from pipeline.run import Detectors
+from pipeline.step import State
 from tests.app.engine.running import WAIT_S, Start, at, body, played
-from tests.app.recording import CountingDetector, Recording
+from tests.app.recording import CountingDetector, CountingLanes, Recording, SlowDetector
 
 
 def test_opens_paused_on_the_first_frame_and_finds_the_car(start: Start):
@@ -63,6 +65,39 @@ def test_a_warm_up_that_fails_is_not_tried_again(start: Start):
     engine.wait_for(lambda s: not s.loop, WAIT_S)
     assert recording.reads.count(12) == reads == 1
     assert engine.snapshot.index == 20
+
+
+def test_a_warm_up_gives_way_to_a_seek_also_while_a_network_runs_for_it(start: Start):
+    detector = SlowDetector(slow_at=4)
+    engine, _, _ = start(detector=detector)
+    engine.control.seek(20)
+    assert detector.slow.wait(WAIT_S), "it was asked at opening, twice for the frame at once, and for the warm-up"
+    shown = engine.snapshot
+    assert shown.index == 20
+    assert shown.tick is not None
+    assert not shown.tick.whole
+    engine.control.seek(5)
+    found = engine.wait_for(at(5), WAIT_S).tick
+    assert found is not None
+    assert body(found.result) == body(played(Recording(), 0, 5, Params()))
+    assert detector.stopped == 1
+    assert not any(notice.level == "error" for notice in engine.snapshot.notices)
+
+
+def test_the_warm_up_waits_until_the_hand_rests(start: Start, monkeypatch: pytest.MonkeyPatch):
+    engine, recording, _ = start()
+    monkeypatch.setattr(turn, "HAND_RESTS_S", 1e6)
+    engine.control.seek(20)
+    engine.wait_for(lambda s: s.index == 20, WAIT_S)
+    recording.reads.clear()
+    engine.control.change(loop=False)
+    shown = engine.wait_for(lambda s: not s.loop, WAIT_S)
+    assert shown.tick is not None
+    assert not shown.tick.whole
+    assert recording.reads == []
+    monkeypatch.setattr(turn, "HAND_RESTS_S", 0.0)
+    engine.control.seek(20)
+    engine.wait_for(at(20), WAIT_S)
 
 
 def test_a_seek_depends_on_nothing_before_it(start: Start):
@@ -206,6 +241,42 @@ def test_a_view_that_fails_takes_nothing_with_it(start: Start, caplog: pytest.Lo
     engine.stop()
     assert told[-1] == 3
     assert "broken view" in caplog.text
+
+
+def test_a_frame_wanted_at_once_does_not_wait_for_lanes_and_says_so():
+    lanes, known = CountingLanes(), []
+    detectors = Detectors(CountingDetector(), lanes, lanes_every=3)
+    line = Line(Recording(), detectors, DetectionCache(), "both", lambda index, params: State() if known else None)
+    hurried = line.seek(20, Params(), at_once=True)
+    assert hurried is not None
+    assert (lanes.calls, hurried.whole, hurried.exact) == (0, False, False)
+    assert hurried.frame.raw_lanes is None
+    known.append(20)
+    assert not line.can_be_exact(), "run again it would be without lanes again"
+    again = line.rerun(Params())
+    assert again is not None
+    assert (lanes.calls, again.whole, again.exact) == (0, False, False)
+    hurried = line.seek(21, Params(), at_once=True)
+    assert hurried is not None
+    assert (lanes.calls, hurried.whole, hurried.exact) == (0, False, False), "21 is one for lanes"
+    whole = line.seek(21, Params())
+    assert whole is not None
+    assert (lanes.calls, whole.whole, whole.exact) == (1, True, True)
+    assert whole.frame.raw_lanes is not None
+    known.clear()
+    for index, seen in ((22, 1), (21, 1)):
+        line.seek(index, Params(), at_once=True)
+        assert lanes.calls == seen
+    assert line.tick is not None
+    assert line.tick.frame.raw_lanes is not None, "known lanes are used"
+
+
+def test_the_first_frame_waits_for_lanes_so_that_what_plays_from_it_is_exact(start: Start):
+    lanes = CountingLanes()
+    engine, _, _ = start(open_lanes=lambda _: lanes)
+    shown = engine.snapshot.tick
+    assert shown is not None
+    assert (lanes.calls, shown.whole, shown.exact) == (1, True, True)
 
 
 def test_a_line_abandons_a_seek_and_keeps_its_tick():
