@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from hashlib import blake2b
 from pathlib import Path
@@ -46,7 +47,8 @@ Row = dict[str, Any]
 def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
     """The 13 tables in ``v1.0-cipv``, as the development kit opens them."""
     poses, is_known = _poses(drive)
-    annotations = _annotations(labels, drive, poses)
+    turns = _quaternions(poses)
+    annotations = _annotations(labels, drive, poses, turns)
     tables: dict[str, list[Row]] = {
         "attribute": [],
         "category": _categories(labels),
@@ -61,7 +63,12 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
         "scene": [_scene(drive)],
         "sample": [_sample(index, drive) for index in range(len(drive.shots))],
         "ego_pose": [
-            {"token": _token("pose", index), "timestamp": shot.t_ns // 1000, **_pose(poses[index])}
+            {
+                "token": _token("pose", index),
+                "timestamp": shot.t_ns // 1000,
+                "translation": poses[index][:3, 3].tolist(),
+                "rotation": turns[index],
+            }
             for index, shot in enumerate(drive.shots)
         ],
         "sensor": [
@@ -83,10 +90,9 @@ def _json(rows: list[Row]) -> str:
     return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
-def _annotations(labels: LabelSet, drive: Drive, poses: list[F64]) -> dict[int, list[Row]]:
-    """Rows by track."""
+def _annotations(labels: LabelSet, drive: Drive, poses: list[F64], turns: list[list[float]]) -> dict[int, list[Row]]:
+    """Rows by track. turns: of the poses, w x y z."""
     inside = points_inside(labels, drive)  # which the benchmark filters by
-    turns = [_quaternion(pose[:3, :3]) for pose in poses]
     samples = [_token("sample", index) for index in range(len(drive.shots))]
     rows: dict[int, list[Row]] = {}
     for track in labels.tracks:
@@ -167,6 +173,7 @@ def _sensor_tables(drive: Drive) -> dict[str, list[Row]]:
     """``sample_data`` and ``calibrated_sensor``: the LiDAR's points are in the ego frame already; a row for each
     calibration that the camera has in the drive."""
     calibrated: dict[str, Row] = {}
+    sensors: dict[tuple[str, int], Row] = {}
     data: list[Row] = []
     names = drive.file_names()
     for channel in (LIDAR, CAMERA):
@@ -174,8 +181,10 @@ def _sensor_tables(drive: Drive) -> dict[str, list[Row]]:
         tokens = [_token("data", channel, index) for index, _ in shots]
         folder, ending, kind = _FOLDERS[channel]
         for place, (index, shot) in enumerate(shots):
-            sensor = _calibrated(channel, shot)
-            calibrated.setdefault(sensor["token"], sensor)
+            key = channel, id(shot.camera)  # one calibration serves many frames
+            if key not in sensors:
+                sensors[key] = _calibrated(channel, shot)
+            sensor = calibrated.setdefault(sensors[key]["token"], sensors[key])
             data.append(
                 {
                     "token": tokens[place],
@@ -202,7 +211,9 @@ def _calibrated(channel: str, shot: Shot) -> Row:
         row |= {"translation": [0.0, 0.0, 0.0], "rotation": _NO_TURN}
     else:
         check_looks_ahead(camera, "the recording's calibration")
-        row |= _pose(inverse(camera.T_camera_ego)) | {"camera_intrinsic": camera.K.tolist()}
+        T_ego_camera = inverse(camera.T_camera_ego)
+        row |= {"translation": T_ego_camera[:3, 3].tolist(), "rotation": _quaternions([T_ego_camera])[0]}
+        row |= {"camera_intrinsic": camera.K.tolist()}
     return {"token": _token(json.dumps(row)), **row}
 
 
@@ -255,11 +266,7 @@ def _token(*parts: str | int) -> str:
     return blake2b("/".join(map(str, parts)).encode(), digest_size=16).hexdigest()
 
 
-def _pose(T: F64) -> Row:
-    return {"translation": T[:3, 3].tolist(), "rotation": _quaternion(T[:3, :3])}
-
-
-def _quaternion(turn: F64) -> list[float]:
-    """w x y z; SciPy has w last."""
-    x, y, z, w = Rotation.from_matrix(turn).as_quat().tolist()
-    return [w, x, y, z]
+def _quaternions(poses: Sequence[F64]) -> list[list[float]]:
+    """w x y z of each (4, 4); SciPy has w last."""
+    found = Rotation.from_matrix(np.reshape(poses, (-1, 4, 4))[:, :3, :3]).as_quat().tolist()
+    return [[w, x, y, z] for x, y, z, w in found]
