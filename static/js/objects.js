@@ -2,6 +2,7 @@
 import { cipvId } from "./colors.js";
 import { $, el, mark, text, within } from "./dom.js";
 import { DASH, kmh, num, side, signed } from "./format.js";
+import { LongList } from "./longlist.js";
 import { get, on, paintAfter, select, set } from "./store.js";
 
 /** @typedef {import("./types.js").FusedObject} FusedObject */
@@ -31,16 +32,16 @@ const TEXTS = new Set(["id", "source", "type"]);
 
 /** Null key: what matters first. @type {{key: string|null, down: boolean}} */
 let sort = { key: null, down: false };
-/** @typedef {{row: HTMLTableRowElement, cells: Record<string, HTMLElement>, reason: HTMLElement}} Row */
-/** @type {Map<number, Row>} */
-const rows = new Map();
-const body = $("#objects tbody");
+/** An object, and why it is the CIPV or why not. @typedef {{item: FusedObject, why: string}} Row */
+/** @type {WeakMap<HTMLElement, {cells: Record<string, HTMLElement>, reason: HTMLElement}>} */
+const parts = new WeakMap();
+const body = $("#objects tbody"), list = new LongList(body, (/** @type {Row} */ { item }) => item.id, create, fill);
 
 export function setUp() {
   const last = el("th", { scope: "col", class: "left reason" }, el("button", { type: "button", textContent: "Why, or why not", disabled: true }));
   $("#objects thead").append(el("tr", {}, ...COLUMNS.map(heading), last));
   paintAfter(["frame", "selection"], update);
-  on(["selection"], () => rows.get(get("selection") ?? -1)?.row.scrollIntoView({ block: "nearest" }));
+  on(["selection"], () => list.rowOf(get("selection") ?? -1)?.scrollIntoView({ block: "nearest" }));
   body.addEventListener("click", (event) => pick(within(event, "tr")));
   body.addEventListener("keydown", onKey);
   reflectSort();
@@ -93,16 +94,9 @@ function update() {
   if (cipv) reasons.set(cipv.id, cipv.reason);
   const by = COLUMNS.find(({ key }) => key === sort.key)?.by ?? ((/** @type {FusedObject} */ o) => relevance(o, cipv?.id));
   const order = [...objects].sort((a, b) => compare(by(a), by(b)) * (sort.down ? -1 : 1) || a.id - b.id);
-  const present = new Set(objects.map(({ id }) => id));
-  for (const [id, { row }] of rows) {
-    if (present.has(id)) continue;
-    row.remove();
-    rows.delete(id);
-  }
-  order.forEach((item, place) => {
-    const { row } = fill(item, reasons.get(item.id) ?? "");
-    if (body.children[place] !== row) body.insertBefore(row, body.children[place] ?? null);
-  });
+  const focused = body.contains(document.activeElement) ? Number(/** @type {HTMLElement} */ (document.activeElement).dataset.id) : null;
+  list.show(order.map((item) => ({ item, why: reasons.get(item.id) ?? "" })));
+  if (focused !== null) list.rowOf(focused)?.focus({ preventScroll: true });
   const count = (/** @type {string} */ source) => objects.filter((o) => o.source === source).length;
   text($("#object-facts"), `${objects.length}: ${count("VL")} VL · ${count("V")} V · ${count("L")} L`);
 }
@@ -116,10 +110,9 @@ function relevance(item, lead) {
 /** @param {string|number} a @param {string|number} b */
 const compare = (a, b) => (a < b ? -1 : a > b ? 1 : 0);
 
-/** @param {FusedObject} item @param {string} why */
-function fill(item, why) {
-  const held = rows.get(item.id) ?? create(item.id);
-  const { row, cells, reason } = held;
+/** @param {HTMLElement} row @param {Row} shown */
+function fill(row, { item, why }) {
+  const { cells, reason } = /** @type {NonNullable<ReturnType<typeof parts.get>>} */ (parts.get(row));
   row.classList.toggle("is-cipv", item.id === cipvId());
   row.classList.toggle("is-selected", item.id === get("selection"));
   row.classList.toggle("is-carried", item.carried);
@@ -128,25 +121,21 @@ function fill(item, why) {
   mark(cells.source, "source", item.source);
   cells.inPath.className = item.in_path ? "yes" : "no";
   const words = item.carried ? `carried, not seen in this frame · ${why}` : why;
-  if (reason.title !== words) {
-    text(reason, words);
-    reason.title = words;
-  }
-  return held;
+  if (reason.title === words) return;
+  text(reason, words);
+  reason.title = words;
 }
 
-/** @param {number} id @returns {Row} */
-function create(id) {
+function create() {
   /** @type {Record<string, HTMLElement>} */
   const cells = {};
   const reason = el("td", { class: "reason" });
-  const row = el("tr", { tabIndex: 0, data: { id } }, ...COLUMNS.map(({ key }) => {
+  const row = el("tr", { tabIndex: 0 }, ...COLUMNS.map(({ key }) => {
     if (key === "source") return el("td", { class: "left" }, (cells[key] = el("span", { class: "pill" })));
     return (cells[key] = el("td", { class: key === "id" ? "id" : TEXTS.has(key) ? "left" : "", data: { key } }));
   }), reason);
-  const held = { row, cells, reason };
-  rows.set(id, held);
-  return held;
+  parts.set(row, { cells, reason });
+  return row;
 }
 
 /** @param {HTMLElement|null} row */

@@ -79,10 +79,12 @@ export function paint(keys, draw) {
  * @param {Key[]} keys @param {() => void} draw
  */
 export function paintAfter(keys, draw) {
-  on(keys, () => {
+  const invalidate = () => {
     after.add(draw);
     ask();
-  });
+  };
+  on(keys, invalidate);
+  return invalidate;
 }
 
 /** A function that has `draw` run once before the next paint, however often it is called. @param {() => void} draw */

@@ -46,10 +46,24 @@ def go_to(page: Page, index: int) -> None:
     page.locator("#timeline-front").click(position={"x": on_timeline(page, index), "y": height - 16})
 
 
+_TWO_TURNS = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+"""Of the screen: what was due has been drawn, and the words that follow it."""
+
+
 def pixels(page: Page, canvas: str) -> str:
     """What is painted, once nothing more is to be painted."""
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    page.evaluate(_TWO_TURNS)
     return page.evaluate(f"document.querySelector('{canvas}').toDataURL()")
+
+
+def table(page: Page) -> str:
+    """What the table of objects says, once also the rows out of sight say the shown frame's."""
+    page.evaluate(_TWO_TURNS)
+    body = page.locator("#objects tbody")
+    expect(body).to_have_attribute("aria-busy", "false")
+    said = body.text_content()
+    assert said
+    return said
 
 
 def repainted(page: Page, canvas: str, old: str, *, like: bool = False) -> bool:

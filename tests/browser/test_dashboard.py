@@ -9,7 +9,7 @@ from app.engine import Engine
 from pipeline.params import Params
 from tests.app.recording import CountingDetector, Recording, opener
 from tests.browser.conftest import START, WAIT_MS, OpenPage, Site
-from tests.browser.looks import colours, frame_name, go_to, pixels, repainted, wait_for_frame, whole_drive
+from tests.browser.looks import colours, frame_name, go_to, pixels, repainted, table, wait_for_frame, whole_drive
 
 WAIT_S = WAIT_MS / 1e3
 
@@ -68,11 +68,10 @@ def test_a_slider_on_the_paused_frame_changes_picture_and_table_without_the_netw
     page = open_page()
     wait_for_frame(page, START)
     whole_drive(page, site)
-    runs, before, camera = site.network_runs, page.text_content("#objects tbody"), pixels(page, "#camera")
+    runs, before, camera = site.network_runs, table(page), pixels(page, "#camera")
     page.locator("[data-param='cluster.tolerance_m'] input[type=range]").fill("0.2")
     expect(page.locator("[data-section=cluster] .count")).to_have_text("1 changed")
     site.engine.wait_for(lambda s: s.params.cluster.tolerance_m == 0.2 and s.tick.params is s.params, WAIT_S)
-    assert before
     expect(page.locator("#objects tbody")).not_to_have_text(before)
     assert repainted(page, "#camera", camera)
     assert site.engine.snapshot.index == START
@@ -164,6 +163,36 @@ def test_the_plan_zooms_and_fits(open_page: OpenPage):
     assert repainted(page, "#bev", fitted, like=True)
 
 
+SAID = "rows => rows.map((row) => [row.dataset.id, row.cells[0].textContent, row.cells[3].textContent])"
+
+
+def test_every_row_of_the_table_follows_and_the_focus_stays_with_its_object(open_page: OpenPage, site: Site):
+    page = open_page()
+    rows = page.locator("#objects tbody tr")
+    said: dict[int, list[list[str]]] = {}
+    for index in (START, START + 1):
+        site.engine.control.seek(index)
+        wait_for_frame(page, index)
+        table(page)
+        tick = site.engine.snapshot.tick
+        assert tick is not None
+        objects = {str(item.id): item for item in tick.result.objects}
+        said[index] = rows.evaluate_all(SAID)
+        assert {number for number, *_ in said[index]} == set(objects)
+        assert len(said[index]) == len(objects)
+        for number, name, distance in said[index]:
+            assert name == f"#{number}"
+            distance_m = objects[number].distance_m
+            assert distance.startswith("–" if distance_m is None else f"{distance_m:.1f}")
+    before, now = ([number for number, *_ in said[index]] for index in (START, START + 1))
+    held = next(number for number in reversed(now) if number in before)
+    page.locator(f"#objects tr[data-id='{held}']").focus()
+    site.engine.control.seek(START)
+    wait_for_frame(page, START)
+    table(page)
+    assert page.evaluate("document.activeElement.dataset.id") == held
+
+
 def test_layers_can_be_switched_off_and_stay_off(open_page: OpenPage):
     page = open_page()
     wait_for_frame(page, START)
@@ -181,7 +210,7 @@ def test_whoever_joins_late_sees_the_same(open_page: OpenPage):
     wait_for_frame(first, 75)
     second = open_page()
     wait_for_frame(second, 75)
-    expect(second.locator("#objects tbody")).to_have_text(first.text_content("#objects tbody") or "")
+    expect(second.locator("#objects tbody")).to_have_text(table(first))
 
 
 @pytest.mark.parametrize(("width", "height"), [(1440, 900), (1024, 768), (800, 480)])

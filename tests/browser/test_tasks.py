@@ -11,7 +11,7 @@ from playwright.sync_api import Page, expect
 
 from pipeline.params import Params
 from tests.browser.conftest import START, WAIT_MS, OpenPage, Site
-from tests.browser.looks import COUNT, box_of, go_to, on_timeline, pixels, repainted, wait_for_frame
+from tests.browser.looks import COUNT, box_of, go_to, on_timeline, pixels, repainted, table, wait_for_frame
 
 WAIT_S = WAIT_MS / 1e3
 WIDE = {"path.half_width_m": 3.5}
@@ -65,12 +65,12 @@ def test_find_where_the_lead_changed_and_say_why(page: Page, site: Site):
 
 
 def test_a_changed_threshold_is_seen_at_once_and_over_the_whole_drive(page: Page, site: Site):
-    ribbon, lead = pixels(page, "#timeline-back"), page.text_content("#objects tbody")
+    ribbon, lead = pixels(page, "#timeline-back"), table(page)
     page.locator("[data-param='path.half_width_m'] input[type=range]").evaluate(
         "(range) => { range.closest('details').open = true; range.scrollIntoView() }"
     )
     page.locator("[data-param='path.half_width_m'] input[type=range]").fill(str(WIDE["path.half_width_m"]))
-    expect(page.locator("#objects tbody")).not_to_have_text(lead or "")
+    expect(page.locator("#objects tbody")).not_to_have_text(lead)
     expect(page.locator("#timeline-facts")).to_contain_text("frames differ")
     assert repainted(page, "#timeline-back", ribbon)
     expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")

@@ -1,7 +1,8 @@
 /** The list of labelled tracks: state, class, frames, and who made them. */
-import { el, keyed, memory, press, text, within } from "../dom.js";
+import { el, memory, press, text, within } from "../dom.js";
 import { seekTo } from "../drive/seek.js";
-import { get, paint, set } from "../store.js";
+import { LongList } from "../longlist.js";
+import { get, paintAfter, set } from "../store.js";
 import { mergeWith, propose } from "./commands.js";
 import { present } from "./draft.js";
 import { isKnown } from "./frames.js";
@@ -16,7 +17,10 @@ const MOST = 100;
 const WHICH = /** @type {[Which, string, string][]} */ ([["here", "Here", "Labels of this frame"], ["open", "To do", "Proposed, or sent back; in a review: not reviewed"], ["all", "All", "Every track of the drive"]]);
 
 const body = el("div", { class: "track-list", tabIndex: -1, aria: { role: "listbox", label: "Tracks" } });
+const nothing = el("p", { class: "facts pad", hidden: true });
+const begin = el("button", { type: "button", class: "begin", textContent: "Propose", title: "Take the pipeline's output as proposals (P)", hidden: true, onclick: propose });
 const count = el("span", { class: "facts" });
+const list = new LongList(body, (/** @type {LabelTrack} */ { id }) => id, create, update);
 /** @type {Which} */
 let which = memory.read("labelTracks", "here");
 
@@ -24,8 +28,9 @@ let which = memory.read("labelTracks", "here");
 export function setUp(parent) {
   const buttons = WHICH.map(([key, words, title]) => el("button", { type: "button", textContent: words, title, data: { which: key }, onclick: () => choose(key) }));
   parent.append(el("div", { class: "list-bar" }, el("div", { class: "joined", aria: { role: "group", label: "Which tracks" } }, ...buttons), el("span", { class: "spacer" }), count), body);
+  body.append(nothing, begin);
   body.addEventListener("click", (event) => pick(within(event, ".track-row")));
-  const reflect = paint(["labels", "labelFrames", "frame", "track", "labeling", "draft"], show);
+  const reflect = paintAfter(["labels", "labelFrames", "frame", "track", "labeling", "draft"], show);
   /** @param {Which} key */
   function choose(key) {
     which = key;
@@ -39,8 +44,10 @@ export function setUp(parent) {
     if (which === "here" && !isKnown(shown())) return;
     const found = fitting();
     text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
-    keyed(body, found.slice(0, MOST), ({ id }) => String(id), create, update);
-    if (!found.length) body.replaceChildren(el("p", { class: "facts pad", textContent: emptyWords() }), ...(get("labels")?.tracks.size ? [] : [el("button", { type: "button", class: "begin", textContent: "Propose", title: "Take the pipeline's output as proposals (P)", onclick: propose })]));
+    list.show(found.slice(0, MOST));
+    nothing.hidden = found.length > 0;
+    text(nothing, emptyWords());
+    begin.hidden = (get("labels")?.tracks.size ?? 0) > 0;
   }
 }
 
@@ -62,17 +69,17 @@ function emptyWords() {
   return which === "open" ? "Nothing is left to do." : "Nothing is labelled in this frame.";
 }
 
-/** @param {LabelTrack} track */
-function create({ id }) {
+function create() {
   const part = (/** @type {string} */ name) => el("span", { class: name });
-  return el("button", { type: "button", class: "track-row", data: { id }, aria: { role: "option" } }, part("mark"), el("b", { textContent: `#${id}` }), part("what"), part("frames"), part("who"));
+  return el("button", { type: "button", class: "track-row", aria: { role: "option" } }, part("mark"), el("b"), part("what"), part("frames"), part("who"));
 }
 
 /** @param {HTMLElement} row @param {LabelTrack} track */
 function update(row, { id, label, state, first, last, keyframes, origin, comment, reviewer }) {
   row.setAttribute("aria-selected", String(id === get("track")));
   row.dataset.state = comment && state === "proposed" ? "sent-back" : state;
-  const [mark, , what, frames, who] = [...row.children];
+  const [mark, name, what, frames, who] = [...row.children];
+  text(name, `#${id}`);
   text(mark, reviewer ? "✓✓" : { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state]);
   mark.setAttribute("aria-label", reviewer ? "reviewed" : state);
   text(what, label);

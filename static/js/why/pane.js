@@ -1,7 +1,9 @@
 /** Why the selected object, or else the CIPV, is what it is. For the CIPV: how all candidates rank. For another: the one
  * gate that stopped it. */
-import { $, el, keyed, mark, text } from "../dom.js";
+import { cipvId } from "../colors.js";
+import { $, el, keyed, mark, text, within } from "../dom.js";
 import { DASH, num } from "../format.js";
+import { LongList } from "../longlist.js";
 import { get, paintAfter, set } from "../store.js";
 import { gateRow, kindOf, quantity, showGate } from "./gates.js";
 
@@ -12,6 +14,7 @@ import { gateRow, kindOf, quantity, showGate } from "./gates.js";
 const number = el("b", { class: "id" }), source = el("span", { class: "pill" }), lead = el("span", { class: "pill cipv", textContent: "CIPV" });
 const type = el("span"), verdict = el("p", { class: "verdict", aria: { live: "polite" } });
 const gates = el("div", { class: "gates" }), ranking = el("div", { class: "ranking" });
+const candidates = new LongList(ranking, (/** @type {Ranked} */ { id }) => id, rankedRow, showRanked);
 const rankingTitle = el("h3", { textContent: "Ranking of candidates" });
 const content = el("div", { class: "why-content" }, el("div", { class: "line" }, number, source, lead, type), verdict, gates, rankingTitle, ranking);
 const nothing = el("p", { class: "facts pad", textContent: "Nothing is shown yet." });
@@ -19,6 +22,7 @@ const nothing = el("p", { class: "facts pad", textContent: "Nothing is shown yet
 export function setUp() {
   content.hidden = true;
   $("#why").append(nothing, content);
+  ranking.addEventListener("click", (event) => pick(within(event, ".ranked")));
   paintAfter(["frame", "selection"], update);
 }
 
@@ -37,7 +41,7 @@ function update() {
   const list = isLead || !item ? ranked : [];
   rankingTitle.hidden = list.length === 0;
   if (!item) content.hidden = list.length === 0;
-  keyed(ranking, list, (each) => String(each.id), rankedRow, (row, each) => showRanked(row, each, result));
+  candidates.show(list);
   if (!item) return void hideObject(true);
   hideObject(false);
   text(number, `#${item.id}`);
@@ -72,19 +76,24 @@ function measured({ stopped_by, value, limit }) {
   return ` (${kind.label.toLowerCase()} ${quantity(value, kind)}, limit ${quantity(limit, kind)})`;
 }
 
-/** @param {Ranked} ranked */
-function rankedRow({ id }) {
-  return el("button", { type: "button", class: "ranked", title: `Select #${id}`, onclick: () => set("selection", id) },
+function rankedRow() {
+  return el("button", { type: "button", class: "ranked" },
     el("span", { class: "order" }), el("b"), el("span", { class: "far" }), el("span", { class: "what" }));
 }
 
-/** @param {HTMLElement} row @param {Ranked} ranked @param {Result} result */
-function showRanked(row, { id, order, distance_m, stopped_by, reason }, { cipv }) {
+/** @param {HTMLElement} row @param {Ranked} ranked */
+function showRanked(row, { id, order, distance_m, stopped_by, reason }) {
   const [place, name, far, what] = row.children;
+  row.title = `Select #${id}`;
   text(place, stopped_by && stopped_by !== "behind" ? "✕" : String(order));
   text(name, `#${id}`);
   text(far, distance_m === null ? DASH : `${num(distance_m)} m`);
-  text(what, id === cipv?.id ? "the CIPV" : reason);
+  text(what, id === cipvId() ? "the CIPV" : reason);
   mark(row, "passed", stopped_by && stopped_by !== "behind" ? "no" : "yes");
   row.setAttribute("aria-current", String(id === get("selection")));
+}
+
+/** @param {HTMLElement|null} row */
+function pick(row) {
+  if (row) set("selection", Number(row.dataset.id));
 }
