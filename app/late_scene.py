@@ -7,6 +7,7 @@ from contextlib import ExitStack
 
 from app.engine import Engine
 from app.looks import Looks
+from pipeline.step import spare_what_is_loaded
 
 
 class LateScene:
@@ -26,6 +27,7 @@ class LateScene:
                 from app.scene_feed import SceneFeed
 
                 self._port = self._running.enter_context(SceneFeed(self._engine, self._looks)).port
+                spare_what_is_loaded()
             return self._port
 
     def __enter__(self) -> LateScene:

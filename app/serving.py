@@ -6,7 +6,6 @@ picture meanwhile.
 
 from __future__ import annotations
 
-import gc
 import socket
 import sys
 from collections.abc import Callable, Iterable
@@ -17,6 +16,7 @@ from app.listening import DEFAULT_PORT, is_loopback, listen_socket, reachable
 from app.looks import Looks
 from app.recording import SESSIONS
 from app.tokens import Tokens
+from pipeline.step import spare_what_is_loaded
 
 
 def serve(
@@ -47,7 +47,7 @@ def serve(
         from app.server import Server, create_app
 
         app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks, tokens)
-        gc.freeze()  # as ``warm_up`` does: what is loaded by now is not looked through in the middle of a frame
+        spare_what_is_loaded()
         Server(app, address, on_ready, tokens).run(sockets=[bound])
     except KeyboardInterrupt:
         pass  # uvicorn raises the signal again once it has shut down

@@ -25,6 +25,7 @@ from app.labels.tasks import Tasks
 from pipeline.errors import BadInput
 from pipeline.labels.formats.base import FormatName
 from pipeline.params import Params
+from pipeline.step import spare_what_is_loaded
 
 if TYPE_CHECKING:
     from app.labels.database import Database
@@ -316,6 +317,7 @@ class LabelDesk:
         with self._opening:
             if self._database is None:
                 self._database = (self._open_later or _temporary)()
+                spare_what_is_loaded()
             return self._database
 
     def _look(self) -> None:
