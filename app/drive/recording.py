@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from threading import Lock
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +21,9 @@ from pipeline.run import Detectors, Sensors, detect, only
 from pipeline.sources.base import Mark, Marked, Source, TruthObject, is_simulated
 from pipeline.step import State, step
 from pipeline.types import F64, I64, Frame
+
+if TYPE_CHECKING:
+    from pipeline.labels.formats.base import Drive
 
 RULE = LeadRule()
 Truth = tuple[TruthObject, ...] | None
@@ -57,6 +62,9 @@ class Recording:
         self.inputs = InputStore()
         self._ask = detections.asker(recipe.uri)
         self._truths: dict[int, Truth] = {}
+        self.describing = Lock()
+        self.described: Drive | None = None
+        """What files of labels must know of it, once somebody has asked; held by ``describing`` meanwhile."""
 
     def advance(self, run: DriveRun) -> None:
         """The next frame of a run. Whatever a source or a network raises."""

@@ -81,8 +81,12 @@ def importing_file(labels: DriveLabels, recording: Recording, person: str, file:
 
 
 def drive_for(recording: Recording, progress: Progress = to_nobody) -> Drive:
-    """What formats must know of the drive: read from its source only where no run has."""
-    return drive_of(recording.recipe.source, progress, recording.at_hand)
+    """What formats must know of the drive: looked for once while it is open, and read from its source only where no
+    run has."""
+    with recording.describing:
+        if recording.described is None:
+            recording.described = drive_of(recording.recipe.source, progress, recording.at_hand)
+        return recording.described
 
 
 def _zipped(folder: Path) -> Path:

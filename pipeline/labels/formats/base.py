@@ -13,6 +13,7 @@ from pipeline.errors import BadInput
 from pipeline.geometry import Cuboid, corners_of
 from pipeline.labels.formats.parts import Part
 from pipeline.labels.model import LabelSet, Origin
+from pipeline.progress import Progress, silent
 from pipeline.sources.base import InParts, Rectified, Source
 from pipeline.types import F32, F64, Box, CameraCalibration, EgoState, Frame
 
@@ -70,7 +71,7 @@ class Drive:
 
 def drive_of(
     source: Source,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = silent,
     frame_of: Callable[[int], Frame] | None = None,
 ) -> Drive:
     """What is known of every frame, without points and pictures where the source can tell it so. frame_of: who may

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Callable
 from http.client import HTTPConnection
 
 import httpx
 import pytest
 
 from app.engine import Engine
+from app.labels import files
 from app.limits import LARGEST_FILE
+from pipeline.labels.formats.base import Drive, drive_of
 from pipeline.labels.formats.native import from_json
+from pipeline.progress import Progress
+from pipeline.sources.base import Source
+from pipeline.types import Frame
 from tests.app.labels.site import act, drive, labels, move, ref, task
 from tests.app.serving import WAIT_S
 
@@ -45,6 +51,20 @@ def test_what_is_there_already_is_not_imported_twice(engine: Engine, client: htt
     for said in ("imported 1 tracks", "1 tracks are there already, place for place"):
         assert said in task(engine, act(client, kind="import", what="truth"))
     assert len(labels(client)["tracks"]) == 1
+
+
+def test_a_drive_is_looked_through_once_while_it_is_open(client: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    looked: list[str] = []
+
+    def look(source: Source, progress: Progress, frame_of: Callable[[int], Frame]) -> Drive:
+        looked.append(source.uri)
+        return drive_of(source, progress, frame_of)
+
+    monkeypatch.setattr(files, "drive_of", look)
+    answers = [client.get("/api/labels/export", params={"format": name}) for name in ("native", "coco", "native")]
+    assert [answer.status_code for answer in answers] == [200] * 3
+    assert answers[0].content == answers[2].content
+    assert len(looked) == 1
 
 
 @pytest.mark.parametrize("name", ["native", "openlabel", "kitti-tracking"])
