@@ -20,29 +20,35 @@ from pipeline.vision.labels import canonical
 _DECIMALS = 4
 
 
-def refitted(labels: DriveLabels, frame: Frame, act: Refit) -> tuple[SetSighting, str]:
-    """The track's cuboid in a frame laid on the points in and near it. ActRefused where it has none, BadInput where
-    there are too few points."""
+def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> tuple[SetSighting, str]:
+    """The track's cuboid in a frame laid on the points in and near it; where only the picture shows it, on those seen
+    in its box. ActRefused where it is not, or the picture alone would tell how far it is; BadInput where there are too
+    few points."""
     track = labels.track(act.track).value
     assert isinstance(track, LabelTrack)
     sighting = track.at(act.frame)
-    if sighting is None or sighting.cuboid is None:
-        raise ActRefused(f"#{act.track} has no cuboid in {frames_text(act.frame)}")
+    if sighting is None:
+        raise ActRefused(f"#{act.track} is not in {frames_text(act.frame)}")
     if frame.sweep is None:
         raise ActRefused(f"{frames_text(act.frame)} has no points")
-    found = refit(frame.sweep.points, sighting.cuboid)
-    note = f"laid on {found.points} points" + ("" if found.turned else "; they do not say how it is turned")
-    return (
-        SetSighting(
-            kind="set_sighting",
-            track=act.track,
-            revision=act.revision,
-            frame=act.frame,
-            cuboid=_given(found.cuboid),
-            bbox=sighting.bbox,
-        ),
-        note,
+    if sighting.cuboid is not None:
+        found = refit(frame.sweep.points, sighting.cuboid)
+        cuboid = found.cuboid
+        note = f"laid on {found.points} points" + ("" if found.turned else "; they do not say how it is turned")
+    else:
+        seen = lift(frame, params, track.label, sighting.bbox)
+        if not seen.points:
+            raise ActRefused(f"#{act.track}: {seen.how}; that is too rough for a label: draw it")
+        cuboid, note = seen.cuboid, seen.how
+    placed = SetSighting(
+        kind="set_sighting",
+        track=act.track,
+        revision=act.revision,
+        frame=act.frame,
+        cuboid=_given(cuboid),
+        bbox=sighting.bbox,
     )
+    return placed, note
 
 
 def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddMeasured, str]:

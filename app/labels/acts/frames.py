@@ -38,7 +38,8 @@ def add_event(draft: Draft, scope: Scope, act: AddEvent) -> str:
     for number in tracks:
         track_of(draft, number)
     draft.add("event", EventLabel(act.frame, act.event, tracks, "accepted", by_person(draft)))
-    return f"{act.event} in {frames_text(act.frame)}"
+    of = f" of {', '.join(f'#{number}' for number in tracks)}" if tracks else ""
+    return f"{act.event.replace('_', '-')}{of} in {frames_text(act.frame)}"
 
 
 def _path_at(draft: Draft, frame: int) -> int | None:

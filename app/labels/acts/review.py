@@ -108,4 +108,4 @@ def _name(value: Value) -> str:
         return f"lead {lead_text(value.lead)} of {frames_text(value.first, value.last)}"
     if isinstance(value, PathLabel):
         return f"the path of {frames_text(value.frame)}"
-    return f"{value.kind} in {frames_text(value.frame)}"
+    return f"{value.kind.replace('_', '-')} in {frames_text(value.frame)}"

@@ -155,8 +155,7 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
     own, places = _as_proposed(labels)
     if own:
         notes.append(
-            f"{own} of {places} labelled places are as the pipeline proposed them: there its errors are those against "
-            "itself."
+            f"{own} of {places} labelled places are as the pipeline proposed them: there it is compared with itself."
         )
     whole = sum(frame.whole for frame in frames.values())
     if whole == len(frames):

@@ -83,10 +83,10 @@ function reflect() {
   const here = present().map(({ track }) => trackOf(track)).filter((track) => track !== null && track.state !== "rejected");
   const numbers = here.map((track) => /** @type {import("./types.js").LabelTrack} */ (track).id).sort((a, b) => a - b);
   const shownLeads = /** @type {Lead[]} */ ([...(typeof range?.lead === "number" && !numbers.includes(range.lead) ? [range.lead] : []), ...numbers]).slice(0, MOST_LEADS);
-  keyed(leads, /** @type {Lead[]} */ ([...shownLeads, "none", "unknown"]), String, (lead) => el("button", { type: "button", textContent: leadName(lead), onclick: () => span.paint(lead) }), (button, lead) => {
+  keyed(leads, /** @type {Lead[]} */ ([...shownLeads, "none", "unknown"]), String, (lead) => el("button", { type: "button", textContent: leadName(lead), onclick: () => span.choose(lead) }), (button, lead) => {
     press(button, range?.lead === lead);
     button.classList.toggle("is-proposed", range?.lead === lead && range.state === "proposed");
-    button.title = lead === "none" ? "Nobody leads (0)" : lead === "unknown" ? "One can't tell who leads (U)" : `#${lead} leads (type its number)`;
+    button.title = range?.lead === lead && range.state === "proposed" && !marked ? `Accept it: ${leadName(lead)} in frames ${range.first + 1}–${range.last + 1}` : lead === "none" ? "Nobody leads (0)" : lead === "unknown" ? "One can't tell who leads (U)" : `#${lead} leads (type its number)`;
   });
   const { first, last } = span.span();
   text(where, marked ? `frames ${first + 1}–${last + 1}${marked.typed ? ` · #${marked.typed}…` : ""}` : range ? rangeWords(range) : "nobody has said");

@@ -123,8 +123,11 @@ export function mergeWith(other) {
   act({ kind: "merge", tracks: [a, b].map(({ id, revision }) => ({ id, revision })) });
 }
 
-/** An event of this frame, about the selected track. @param {string} event */
-export const addEvent = (event) => act({ kind: "add_event", frame: shown(), event, tracks: chosen() ? [chosen()?.id] : [] });
+/** An event of this frame, about the selected track or else who leads here. @param {string} event */
+export function addEvent(event) {
+  const track = chosen()?.id ?? leadAt(shown())?.lead;
+  return act({ kind: "add_event", frame: shown(), event, tracks: typeof track === "number" ? [track] : [] });
+}
 
 /** Go where there is something to do. @param {Wanted} what @param {1|-1} direction */
 export async function goTo(what, direction) {

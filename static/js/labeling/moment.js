@@ -22,7 +22,7 @@ export function setUp(parent) {
   const known = el("datalist", { id: "known-tags" }, ...KNOWN_TAGS.map((value) => el("option", { value })));
   word.setAttribute("list", "known-tags");
   const form = el("form", { class: "menu-row", onsubmit: addTag }, word, el("button", { textContent: "Add" }), whole);
-  const event = (/** @type {string} */ kind, /** @type {string} */ words) => el("button", { type: "button", textContent: words, title: "An event of this frame, about the selected track", onclick: () => addEvent(kind) });
+  const event = (/** @type {string} */ kind, /** @type {string} */ words) => el("button", { type: "button", textContent: words, title: "An event of this frame, about the selected track, or who leads here", onclick: () => addEvent(kind) });
   const draw = el("button", { type: "button", textContent: "Draw the path", title: "Drag along the middle of our path in the plan (Shift P)", onclick: () => setTool("path") });
   parent.append(title, el("div", { class: "moment-buttons" }, event("cut_in", "Cut-in"), event("cut_out", "Cut-out"), draw, noPath, pathWords), form, known, list, pastTitle, pasts);
   paint(["labels", "frame", "labeling", "marked"], show);

@@ -27,9 +27,10 @@ export function drawLabelRows(ctx, span, { leads, track, tags }, isLight) {
   for (const [place, { words }] of tagRows().slice(0, tags.length).entries()) for (const word of words) drawTag(ctx, span, tags[place], word);
 }
 
-/** What stands in each row of tags: a word, and in the last all that have no room. @returns {{name: string, words: string[]}[]} */
+/** What stands in each row of tags: a word, and in the last all that have no room; where there are none yet, a row to mark frames in. @returns {{name: string, words: string[]}[]} */
 export function tagRows() {
   const words = saidTags(), rest = words.slice(MOST_TAGS - 1);
+  if (!words.length) return [{ name: "tags", words: [] }];
   const rows = words.slice(0, MOST_TAGS - (rest.length > 1 ? 1 : 0)).map((word) => ({ name: word, words: [word] }));
   return rest.length > 1 ? [...rows, { name: `${rest.length} other tags`, words: rest }] : rows;
 }

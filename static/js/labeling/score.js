@@ -33,9 +33,10 @@ export function setUp(parent) {
 /** @param {Score} score */
 function found(score) {
   if (!score.metrics.length && !score.notes.length) return el("p", { class: "facts pad", textContent: "Nothing is accepted yet: accept tracks and leads, and the present run is judged against them." });
+  const runs = get("state")?.drive, isAlone = !runs?.base || runs.base === runs.run;
   const notes = el("ul", { class: "notes" }, ...score.notes.map((words) => el("li", { textContent: words })));
   return el("div", { class: "comparison" }, el("b", { textContent: "The present run against the labels" }), notes,
-    score.metrics.length ? metricsTable({ ...score, truth: "labels" }) : el("p", { class: "facts", textContent: "No frame can be judged yet." }),
+    score.metrics.length ? metricsTable({ ...score, truth: "labels" }, isAlone) : el("p", { class: "facts", textContent: "No frame can be judged yet." }),
     score.worst.length ? worstFrames(score.worst) : null, score.errors.length ? errorsTable(score.errors) : null);
 }
 

@@ -39,6 +39,12 @@ export function span() {
 /** Say who leads in the marked frames. @param {Lead} lead */
 export const paint = (lead) => over((frames) => act({ kind: "set_lead", ...frames, lead }));
 
+/** Say who leads in the marked frames or in this one; who is proposed here, and nothing is marked: in the whole range. @param {Lead} lead */
+export function choose(lead) {
+  const range = leadAt(shown()), isProposed = range?.lead === lead && range.state === "proposed";
+  return isProposed && !get("marked") ? judge("accept") : paint(lead);
+}
+
 /** Say that nobody has said who leads there. */
 export const clear = () => over((frames) => act({ kind: "clear_lead", ...frames }));
 

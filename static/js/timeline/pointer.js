@@ -88,15 +88,17 @@ function actionAt({ span, rows, zoomed }, event) {
   }
   const end = endUnder({ span, rows }, event);
   if (end) return dragEnd(span, end);
-  if (isIn(rows().labels?.leads ?? null, event.offsetY)) return marks(span, span.index(event.offsetX));
+  const labels = rows().labels, from = span.index(event.offsetX);
+  if (isIn(labels?.leads ?? null, event.offsetY)) return marks(span, from, true);
+  if (labels?.tags.some((row) => isIn(row, event.offsetY))) return marks(span, from, false);
   return (x) => seekTo(span.index(x));
 }
 
 /** The end of a lead range under the pointer. @param {Pick<Hand, "span"|"rows">} hand @param {PointerEvent} event */
 const endUnder = ({ span, rows }, event) => (isIn(rows().labels?.leads ?? null, event.offsetY) ? endAt(span, event.offsetX) : null);
 
-/** A drag along the labels' ribbon marks frames; the selected track leads there when the hand lets go. @param {Span} span @param {number} from @returns {Act} */
-function marks(span, from) {
+/** A drag along the labels' ribbon marks frames; the selected track leads there when the hand lets go, along their tags it only marks. @param {Span} span @param {number} from @param {boolean} isOfLead @returns {Act} */
+function marks(span, from, isOfLead) {
   let hasMoved = false;
   const along = (/** @type {number} */ x) => {
     const to = span.index(x);
@@ -104,7 +106,7 @@ function marks(span, from) {
     if (hasMoved) marking.markAll(from, to);
     seekTo(to);
   };
-  return Object.assign(along, { ended: (/** @type {boolean} */ isKept) => { if (isKept && hasMoved && get("track") !== null) marking.paint(/** @type {number} */ (get("track"))); } });
+  return Object.assign(along, { ended: (/** @type {boolean} */ isKept) => { if (isKept && isOfLead && hasMoved && get("track") !== null) marking.paint(/** @type {number} */ (get("track"))); } });
 }
 
 /** @param {{top: number, height: number}|null} row @param {number} y */

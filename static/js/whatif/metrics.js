@@ -6,19 +6,21 @@ import { DASH, num, signed } from "../format.js";
 
 const JUDGES = { labels: "what people labelled here", recording: "the labels that come with the recording", simulator: "the simulator's truth" };
 
-/** @param {Pick<import("../types.js").Comparison, "metrics"|"truth"|"judged">} comparison @returns {HTMLElement} */
-export function metricsTable({ metrics, truth, judged }) {
+/** @param {Pick<import("../types.js").Comparison, "metrics"|"truth"|"judged">} comparison @param {boolean} [isAlone] there is nothing to compare with: one column @returns {HTMLElement} */
+export function metricsTable({ metrics, truth, judged }, isAlone = false) {
   const judge = truth ? `Judged in ${judged} frames against ${JUDGES[truth]}` : "Without labels: what needs none";
-  const head = ["", "before", "after", "change"].map((words) => el("th", { scope: "col", textContent: words }));
-  return el("div", {}, el("table", { class: "metrics" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...metrics.map(row))), el("p", { class: "facts", textContent: judge }));
+  const head = (isAlone ? [] : ["", "before", "after", "change"]).map((words) => el("th", { scope: "col", textContent: words }));
+  return el("div", {}, el("table", { class: "metrics" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...metrics.map((metric) => row(metric, isAlone)))), el("p", { class: "facts", textContent: judge }));
 }
 
-/** @param {Metric} metric */
-function row(metric) {
+/** @param {Metric} metric @param {boolean} isAlone */
+function row(metric, isAlone) {
   const { name, unit, base, run } = metric;
   const digits = [base, run].every((value) => value === null || Number.isInteger(value)) ? 0 : 2;
   const change = base === null || run === null ? null : run - base;
-  return el("tr", { data: { change: verdict(metric, change) } }, el("th", { scope: "row", textContent: unit ? `${name}, ${unit}` : name }),
+  const title = el("th", { scope: "row", textContent: unit ? `${name}, ${unit}` : name });
+  if (isAlone) return el("tr", {}, title, el("td", { textContent: num(run, digits) }));
+  return el("tr", { data: { change: verdict(metric, change) } }, title,
     el("td", { textContent: num(base, digits) }), el("td", { textContent: num(run, digits) }), el("td", { textContent: change === null ? DASH : change === 0 ? "=" : signed(change, digits) }));
 }
 

@@ -148,7 +148,7 @@ def score_of(page: Page, labels: Labels) -> dict[str, str]:
     expect(page.locator(".label-score")).to_have_attribute("data-revision", str(labels.everything["revision"]))
     rows = page.locator(".label-score .comparison table:not(.errors) tbody tr")
     expect(rows.first).to_be_visible()
-    return {row.locator("th").inner_text(): row.locator("td").nth(1).inner_text() for row in rows.all()}
+    return {row.locator("th").inner_text(): row.locator("td").last.inner_text() for row in rows.all()}
 
 
 def exported_score(engine: Engine, labels: Labels) -> dict[str, str]:
