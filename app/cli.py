@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import tyro
@@ -72,7 +75,7 @@ def _parse(arguments: list[str]) -> Callable[[], int]:
         if name in COMMANDS:
             return tyro.cli(_command(name), args=arguments[words:], prog=f"cipv {name}", config=_CONFIG)
     return tyro.extras.subcommand_cli_from_dict(
-        {name: _command(name) for name in COMMANDS if " " not in name},
+        {name: _stand_in(name) for name in COMMANDS if " " not in name},
         args=arguments,
         prog="cipv",
         description="CIPV Studio: which vehicle ahead is the closest one in my path, how far, how fast, and why.",
@@ -83,3 +86,18 @@ def _parse(arguments: list[str]) -> Callable[[], int]:
 def _command(name: str) -> Any:
     module, _, attribute = COMMANDS[name].partition(":")
     return getattr(import_module(module), attribute)
+
+
+def _stand_in(name: str) -> Callable[[], Callable[[], int]]:
+    """What the list of commands shows of one: its help, read in its source, since importing all takes seconds."""
+
+    def command() -> Callable[[], int]:
+        return _parse([name])
+
+    module, _, attribute = COMMANDS[name].partition(":")
+    found = find_spec(module)
+    assert found is not None and found.origin is not None
+    source = ast.parse(Path(found.origin).read_text(encoding="utf-8"))
+    shown = next(node for node in source.body if isinstance(node, ast.ClassDef) and node.name == attribute)
+    command.__doc__ = ast.get_docstring(shown)
+    return command
