@@ -96,7 +96,8 @@ def _stand_in(name: str) -> Callable[[], Callable[[], int]]:
 
     module, _, attribute = COMMANDS[name].partition(":")
     found = find_spec(module)
-    assert found is not None and found.origin is not None
+    assert found is not None
+    assert found.origin is not None
     source = ast.parse(Path(found.origin).read_text(encoding="utf-8"))
     shown = next(node for node in source.body if isinstance(node, ast.ClassDef) and node.name == attribute)
     command.__doc__ = ast.get_docstring(shown)
