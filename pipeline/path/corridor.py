@@ -30,10 +30,13 @@ from pipeline.types import EgoState, GnssFix, Path, PathSource, Route
 
 _LOOK_AHEAD_M = (10, 30, 60)
 _CARRIES_ALONE = 0.7
+"""Share at 30 m from which a source gives the path its name."""
+_NO_SHARE = 0.005
+"""Smaller shares are not named."""
 _FASTEST_SHIFT_MPS = 3.0
 """No point of the corridor moves sideways faster than this, its own uncertainty apart: a lane change takes a second."""
-_USABLE_WITHOUT_SPEED_M = 20.0
-_USABLE_AT_STANDSTILL_M = 5.0
+_USABLE_WITHOUT_SPEED_M, _USABLE_AT_STANDSTILL_M = 20.0, 5.0
+"""How far ahead a path must be known where ``usable_s`` times the speed says nothing, or too little."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,38 +130,44 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
     sigma_m = np.hypot(path.sigma_m, path.behind_m)
     at = np.minimum(np.array(_LOOK_AHEAD_M) / STEP_M, len(path.center) - 1).astype(np.intp)
     shares = path.shares[at]
-    carried_by: dict[str, dict[str, float]] = {
-        f"{s}": {str(name): share for name, share in zip(SOURCES, row, strict=True) if share > 0.005}
-        for s, row in zip(_LOOK_AHEAD_M, shares.tolist(), strict=True)
-    }
-    overall = shares.mean(axis=0)
-    main = int(np.argmax(shares[1]))
-    source: PathSource = SOURCES[main] if shares[1, main] >= _CARRIES_ALONE else "fused"
-    too_vague = np.flatnonzero(~(sigma_m <= params.good_sigma_m))
-    reach_m = float(too_vague[0] - 1) * STEP_M if len(too_vague) else params.length_m
-    needed_m = _needed_m(ego, params)
-    sigma = float(sigma_m[min(int(needed_m / STEP_M), len(sigma_m) - 1)])
+    reach_m, needed_m = _reach_m(sigma_m, params), _needed_m(ego, params)
+    needed_sigma_m = float(sigma_m[min(int(needed_m / STEP_M), len(sigma_m) - 1)])
     usable = reach_m >= min(needed_m, params.length_m)
-    doubt = ""
     if not usable:
-        doubt = f"path known for {max(reach_m, 0.0):.0f} m only"
         notes = (*notes, f"the path is known well enough for {max(reach_m, 0.0):.0f} m only")
     return Path(
-        source=source,
+        source=_carrier(shares[1]),
         center=path.center,
         left=path.center + path.left_m[:, None] * normal,
         right=path.center - path.right_m[:, None] * normal,
         half_width_m=params.half_width_m,
         sigma_m={f"{s}": float(sigma) for s, sigma in zip(_LOOK_AHEAD_M, sigma_m[at].tolist(), strict=True)},
-        weights={name: float(share) for name, share in zip(SOURCES, overall.tolist(), strict=True) if share > 0.005},
+        weights=_by_source(shares.mean(axis=0)),
         profile_m=sigma_m,
-        carried_by=carried_by,
+        carried_by={f"{s}": _by_source(row) for s, row in zip(_LOOK_AHEAD_M, shares, strict=True)},
         reach_m=max(reach_m, 0.0),
         usable=usable,
-        doubt=doubt,
-        confidence=erf(params.half_width_m / sigma / sqrt(2.0)) if sigma > 0.0 else 1.0,
+        doubt="" if usable else f"path known for {max(reach_m, 0.0):.0f} m only",
+        confidence=erf(params.half_width_m / needed_sigma_m / sqrt(2.0)) if needed_sigma_m > 0.0 else 1.0,
         notes=notes,
     )
+
+
+def _by_source(shares: F64) -> dict[str, float]:
+    """(4,) shares of ``SOURCES`` by their names."""
+    return {str(name): share for name, share in zip(SOURCES, shares.tolist(), strict=True) if share > _NO_SHARE}
+
+
+def _carrier(shares: F64) -> PathSource:
+    """Who carries the path, by (4,) shares of ``SOURCES``."""
+    main = int(np.argmax(shares))
+    return SOURCES[main] if shares[main] >= _CARRIES_ALONE else "fused"
+
+
+def _reach_m(sigma_m: F64, params: PathParams) -> float:
+    """How far the path is good enough to drive after, by (K,) sigmas; negative where it nowhere is."""
+    too_vague = np.flatnonzero(~(sigma_m <= params.good_sigma_m))
+    return float(too_vague[0] - 1) * STEP_M if len(too_vague) else params.length_m
 
 
 def _needed_m(ego: EgoState | None, params: PathParams) -> float:

@@ -27,11 +27,15 @@ _ANEW_DOUBT_FADES_S = 60.0
 """After a jump that stayed: what moves a receiver by metres for good, a reflection or another correction service, lasts
 for minutes, and nothing tells yet whether the old place was wrong or the new one is."""
 _SMALLEST_DOUBT_M = 0.3
+"""Once a doubt has faded to this the car counts as placed again."""
 _OLDEST_FIX_S = 1.0
+"""An older fix is not moved on to the tick: where the car went since is guessed."""
 _LOST_SIGMA_M = 15.0
 """A pose less sure than this places nothing on a route."""
 _LARGEST_TURN_RAD = pi / 3
+"""A stretch of the route that runs more aslant to the car is not the one that it drives on."""
 _SEARCH_M = 60.0
+"""The car is looked for so far behind and ahead of its last place on the route."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,8 +219,10 @@ def _sideways_variance(pose: Pose) -> float:
 def _beyond_the_end(center: F64, s: F64, left_m: float) -> F64:
     """Where the route has ended the line goes straight on, so that its points stay apart; its sigma says not to."""
     over = np.maximum(s - left_m, 0.0)
-    if not over.any() or over[0] > 0.0:
-        return center if not over.any() else np.column_stack([s, np.zeros_like(s)])
+    if not over.any():
+        return center
+    if over[0] > 0.0:  # the car is beyond it already
+        return np.column_stack([s, np.zeros_like(s)])
     last = int(np.argmax(over > 0.0)) - 1
     back = max(last - 2, 0)
     way = center[last] - center[back] if last > back else np.array([1.0, 0.0])

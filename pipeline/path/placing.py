@@ -33,6 +33,8 @@ _SLANTED = 0.64
 _WIDEST_M, _LONGEST_M = 3.2, 6.0
 """A vehicle that drives along is no wider across the path, but for as much of its flank as can be seen."""
 _CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
+"""Of what moves over faster than that the nose is taken to lie a car's length on, by its sideways over its forward
+speed, this much at most."""
 _NO_SIDES = ((nan, nan), (nan, nan))
 SURE = 4.0
 """Log-odds beyond which nothing gets surer: the sigmas themselves are not known that well."""
@@ -184,18 +186,9 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
         k = min(max(int(ahead / step), 0), len(center) - 2)
         heading = headings[n]
         cos, sin = np.cos(heading), np.sin(heading)
-        # Of what drives along, the nearest face says where it is: how long it is and how it is turned are known poorly.
-        # What stands slantwise to the path, as one that turns across it does, reaches as far as its far corners, and as
-        # its box does: of a dark flank at 30 m a few points come back.
-        low, high = min(offsets[1], offsets[2]), max(offsets[1], offsets[2])
-        flank = _LONGEST_M * abs(near_y * cos - near_x * sin) / max(np.hypot(near_x, near_y), 0.1)
-        first, second = beside[2 * n], beside[2 * n + 1]
         has_sides = np.isfinite(rows[n, 14:18]).all()
-        too_wide = has_sides and abs(second - first) > _WIDEST_M + flank
-        if too_wide or abs(np.sin(2.0 * (rows[n, 8] - heading))) > _SLANTED:
-            low, high = min(low, offsets[3], offsets[4]), max(high, offsets[3], offsets[4])
-            if has_sides:
-                low, high = min(low, first, second), max(high, first, second)
+        flank = _LONGEST_M * abs(near_y * cos - near_x * sin) / max(np.hypot(near_x, near_y), 0.1)
+        low, high = _reach(offsets, has_sides, beside[2 * n], beside[2 * n + 1], flank, rows[n, 8] - heading)
         vx, vy = rows[n, 9], rows[n, 10]
         # the path lies still on the ground: over ground one that follows its bend does not move sideways; where the own
         # speed is not known, relative to ego and its x axis
@@ -215,6 +208,23 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
         out[n, 8], out[n, 9] = half_left + spare, half_right + spare
         out[n, 10] = np.hypot(profile[k], _sigma_m(near_x, near_y, cos, sin, rows[n, 11], rows[n, 12], rows[n, 13]))
     return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _reach(offsets, has_sides, first, second, flank, turn):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """From where to where an object reaches across the path. offsets: (5,) of its outline. first, second: of its box's
+    sides. flank: how much of one that drives along may show, m. turn: of the object against the path, rad.
+
+    Of what drives along, the nearest face says where it is: how long it is and how it is turned are known poorly. What
+    stands slantwise to the path, as one that turns across it does, reaches as far as its far corners, and as its box
+    does: of a dark flank at 30 m a few points come back."""
+    low, high = min(offsets[1], offsets[2]), max(offsets[1], offsets[2])
+    too_wide = has_sides and abs(second - first) > _WIDEST_M + flank
+    if too_wide or abs(np.sin(2.0 * turn)) > _SLANTED:
+        low, high = min(low, offsets[3], offsets[4]), max(high, offsets[3], offsets[4])
+        if has_sides:
+            low, high = min(low, first, second), max(high, first, second)
+    return low, high
 
 
 @numba.njit(cache=True, nogil=True)
