@@ -3,7 +3,7 @@ sit. Found by the recording's own name, or named by options."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from pipeline.complaint import reason_of
@@ -17,7 +17,7 @@ from pipeline.sources.live.own_motion import MotionFromGnss
 from pipeline.sources.nmea import NmeaReader
 from pipeline.sources.options import number_option
 from pipeline.sources.timeline import Timeline, nearest
-from pipeline.types import EgoState, Frame, GnssFix, Picture, Sweep
+from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Sweep
 
 OPTIONS = ("video", "video_offset_s", "nmea", "rig")
 _NMEA_SUFFIXES = (".nmea", ".nma", ".ubx.txt")
@@ -62,20 +62,23 @@ class Beside:
         if not found:
             self.notes.append("no ego speed recorded")
 
-    def frame(self, index: int, name: str, t_ns: int, sweep: Sweep | None, notes: list[str]) -> Frame:
+    def frame(self, index: int, t_ns: int, sweep: Sweep | None, notes: list[str]) -> Frame:
         """The frame at ``t_ns``: with the nearest picture within 0.1 s and the last fix within 1.5 s."""
         picture = self._picture(t_ns, notes)
-        return Frame(
-            index,
-            name,
-            t_ns,
-            sweep,
-            picture,
-            camera=rig_files.calibration_for(self._camera, picture, notes),
-            ego=self._ego(t_ns),
-            gnss=self._fixes.latest(t_ns, _FIX_WITHIN_NS),
-            notes=tuple(notes),
-        )
+        camera = rig_files.calibration_for(self._camera, picture, notes)
+        outline = self._outline(index, t_ns, camera)
+        return evolve(outline, sweep=sweep, picture=picture, notes=tuple(notes))
+
+    def outlines(self, times_ns: Sequence[int]) -> Iterator[Frame]:
+        """As ``frame`` without sweep and picture, one for each of these times. A video's pictures are of one size: the
+        first one tells whether the calibration is theirs."""
+        first = self._picture(self._video_begins_ns, []) if self._video is not None else None
+        camera = rig_files.calibration_for(self._camera, first, [])
+        return (self._outline(index, t_ns, camera) for index, t_ns in enumerate(times_ns))
+
+    def _outline(self, index: int, t_ns: int, camera: CameraCalibration | None) -> Frame:
+        ego, gnss = self._ego(t_ns), self._fixes.latest(t_ns, _FIX_WITHIN_NS)
+        return Frame(index, f"{index:06d}", t_ns, camera=camera, ego=ego, gnss=gnss)
 
     def _ego(self, t_ns: int) -> EgoState | None:
         return self._own.latest(t_ns, _FIX_WITHIN_NS)

@@ -70,7 +70,14 @@ class PcapSource:
     def frame(self, index: int) -> Frame:
         t_ns = self.t_ns(index)
         notes: list[str] = []
-        return self._beside.frame(index, f"{index:06d}", t_ns, self._sweep(index, notes), notes)
+        return self._beside.frame(index, t_ns, self._sweep(index, notes), notes)
+
+    def outlines(self) -> Iterator[Frame]:
+        return self._beside.outlines(self._index.times_ns)
+
+    def sweep(self, index: int) -> Sweep | None:
+        self.t_ns(index)
+        return self._sweep(index, [])
 
     def packets(self) -> Iterator[tuple[int, bytes]]:
         """Every data and position packet of the LiDAR as it was captured: when (unix ns), and its payload."""

@@ -7,6 +7,7 @@ A name that is a number of nanoseconds, microseconds or seconds since 1970 is th
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,15 @@ class PcdSource:
         picture = picture_of(self._pictures.get(name), None, self._size, notes) if self._pictures else None
         camera = rig_files.calibration_for(self._camera, picture, notes)
         return Frame(index, name, t_ns, sweep, picture, camera, notes=tuple(notes))
+
+    def outlines(self) -> Iterator[Frame]:
+        """A camera's pictures are of one size: the first one tells whether the calibration is theirs."""
+        first = picture_of(next(iter(self._pictures.values()), None), None, self._size, []) if self._pictures else None
+        camera = rig_files.calibration_for(self._camera, first, [])
+        return (Frame(index, name, self.t_ns(index), camera=camera) for index, name in enumerate(self._names))
+
+    def sweep(self, index: int) -> Sweep | None:
+        return self._sweep(self._names[index], self.t_ns(index), [])
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
         self.t_ns(index)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import closing
 from itertools import islice
 from threading import Lock
@@ -65,17 +66,25 @@ class RosbagSource:
         t_ns, notes = self.t_ns(index), list[str]()
         sweep = self._sweep(index, t_ns, notes)
         picture = self._picture(t_ns, notes)
-        return Frame(
-            index,
-            f"{index:06d}",
-            t_ns,
-            sweep,
-            picture,
-            camera=rig_files.calibration_for(self._camera, picture, notes),
-            ego=self._own.latest(t_ns, _OWN_WITHIN_NS),
-            gnss=self._fixes.latest(t_ns, _FIX_WITHIN_NS),
-            notes=tuple(notes),
+        camera = rig_files.calibration_for(self._camera, picture, notes)
+        return evolve(self._outline(index, camera), sweep=sweep, picture=picture, notes=tuple(notes))
+
+    def outlines(self) -> Iterator[Frame]:
+        """A camera's pictures are of one size: the first one tells whether the calibration is theirs."""
+        pictures = self._index.camera
+        first = (
+            self._picture(int(pictures.times_ns[0]), []) if pictures is not None and len(pictures.times_ns) else None
         )
+        camera = rig_files.calibration_for(self._camera, first, [])
+        return (self._outline(index, camera) for index in range(len(self)))
+
+    def sweep(self, index: int) -> Sweep | None:
+        return self._sweep(index, self.t_ns(index), [])
+
+    def _outline(self, index: int, camera: CameraCalibration | None) -> Frame:
+        t_ns = self.t_ns(index)
+        ego, gnss = self._own.latest(t_ns, _OWN_WITHIN_NS), self._fixes.latest(t_ns, _FIX_WITHIN_NS)
+        return Frame(index, f"{index:06d}", t_ns, camera=camera, ego=ego, gnss=gnss)
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
         self.t_ns(index)

@@ -12,10 +12,19 @@ from pipeline.sources import open_source
 from pipeline.sources.base import InParts, Source
 from pipeline.types import Frame
 from tests.pipeline.recording.frames import full, write
+from tests.pipeline.sources.bags import write_bag
+from tests.pipeline.sources.captures import write_capture
+from tests.pipeline.sources.clouds_on_disk import write_clouds
 
 
-@pytest.fixture(params=["session", "astyx", "kitti", "simulated"])
+@pytest.fixture(params=["session", "astyx", "kitti", "simulated", "rosbag", "pcap", "pcd"])
 def source(request: pytest.FixtureRequest, tmp_path: Path) -> Source:
+    if request.param == "rosbag":
+        return open_source(f"rosbag:{write_bag(tmp_path / 'drive')}")
+    if request.param == "pcap":
+        return open_source(f"pcap:{write_capture(tmp_path / 'drive') / 'drive.pcap'}")
+    if request.param == "pcd":
+        return open_source(f"pcd:{write_clouds(tmp_path / 'drive')}")
     if request.param == "session":
         return open_source(str(write(tmp_path / "drive.mcap", [full(index) for index in range(3)])))
     if request.param == "simulated":
