@@ -138,23 +138,25 @@ class Line:
         it. Either way the answer depends on nothing but the recording, the index and the parameters. Null, and nothing
         changed, when ``superseded`` said so on the way.
 
-        at_once: where the frames before are not at hand, the warm-up is cut to ``AT_ONCE_FRAMES``; and where nobody has
-        looked for lanes, which takes longer than all else, nobody does. The tick says so."""
+        at_once: where the frames before are not at hand, the warm-up is cut to ``AT_ONCE_FRAMES``; and where they would
+        have to be asked, detectors of lanes, which take longer than all else, are not, and others about the frame
+        itself alone. The tick says so."""
         known = self._known(index, params)
         first = whole_first = index if known is not None else max(0, index - WARM_UP_FRAMES)
         if at_once and not all(self._is_at_hand(i) for i in range(first, index)):
             first = max(0, index - AT_ONCE_FRAMES)
-        without_lanes = at_once and not all(self._lanes_are_known(i) for i in range(first, index + 1))
-        detectors = replace(self._detectors, lanes=None) if without_lanes else self._detectors
-        is_exact = (known is not None or first == 0) and not without_lanes
+        frames = range(first, index + 1)
+        asked = [self._asked_at_once(i, is_wanted=i == index) if at_once else self._detectors for i in frames]
+        is_whole = first == whole_first and all(each is self._detectors for each in asked)
+        is_exact = is_whole and (known is not None or first == 0)
         state, tick = known or State(), None
-        for i in range(first, index + 1):
+        for i, detectors in zip(frames, asked, strict=True):
             if superseded():
                 return None
             tick = self._run(state, i, params, detectors, exact=is_exact)
             state = tick.after
         assert tick is not None
-        self.tick = replace(tick, whole=first == whole_first and not without_lanes)
+        self.tick = replace(tick, whole=is_whole)
         return self.tick
 
     def advance(self, index: int, params: Params) -> Tick:
@@ -208,13 +210,20 @@ class Line:
         detect_ms = self._ask.spent_ms - spent_ms + (ahead_ms if ahead == index else 0.0)
         return Tick(state, frame, after, result, params, detect_ms, exact)
 
-    def _lanes_are_known(self, index: int) -> bool:
-        lanes = self._detectors.lanes
-        return lanes is None or not self._detectors.looks_for_lanes(index) or self._ask.knows(lanes, index)
+    def _asked_at_once(self, index: int, *, is_wanted: bool = False) -> Detectors:
+        """Whom to ask about a frame that is wanted at once, or on the way there; all when that takes no time."""
+        asked = self._detectors
+        if asked.boxes is not None and not is_wanted and not self._ask.knows(asked.boxes, index):
+            asked = replace(asked, boxes=None)
+        if asked.lanes is not None and asked.looks_for_lanes(index) and not self._ask.knows(asked.lanes, index):
+            asked = replace(asked, lanes=None)
+        return asked
 
     def _is_at_hand(self, index: int) -> bool:
+        """Whether a frame was read and looked at."""
         with self._reading:
-            return self._frames.get(index) is not None
+            is_read = self._frames.get(index) is not None
+        return is_read and self._asked_at_once(index) is self._detectors
 
     def _read(self, index: int) -> Frame:
         with self._reading:

@@ -31,12 +31,13 @@ def at(index: int) -> Callable[[Snapshot], bool]:
     return lambda s: s.tick is not None and s.index == index and s.tick.whole
 
 
-def played(recording: Recording, first: int, last: int, params: Params) -> Result:
-    """What the plain line says at ``last``, run from a fresh state at ``first``."""
+def played(recording: Recording, first: int, last: int, params: Params, looked_from: int = 0) -> Result:
+    """What the plain line says at ``last``, run from a fresh state at ``first``; nobody looked at the pictures before
+    ``looked_from``."""
     detector, state = CountingDetector(), State()
     for index in range(first, last + 1):
         frame = recording.frame(index)
         assert frame.picture is not None
-        boxes = detector.detect(frame.picture.bgr)
+        boxes = detector.detect(frame.picture.bgr) if index >= looked_from else None
         state, result = step(state, type(frame)(**{**vars(frame), "raw_boxes": boxes}), params)
     return result
