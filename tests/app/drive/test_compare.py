@@ -57,7 +57,7 @@ def test_figures_without_truth():
 def test_figures_against_truth():
     right = Judged("0", "correct", 30.0, 30.5, 0.0)
     missed = Judged("0", "missed", 30.0, None, None)
-    found = compare([row(0, 7, judged=right), row(1)], [row(0, judged=missed), row(1)])
+    found = compare([row(0, 7, judged=right), row(1), row(2)], [row(0, judged=missed), row(1), row(2)])
     assert found.judged == 1
     assert metric(found, "CIPV correct") == (1, 0)
     assert metric(found, "lead missed") == (0, 1)
