@@ -19,6 +19,7 @@ from pipeline.types import Frame
 
 FRAMES = 20
 """Frames that are looked at, over the whole drive or the last shown ones: one sweep of 16 rings has few borders."""
+_NOTHING = "No frame has both a picture and LiDAR points to lie on it"
 APART_NS = 500_000_000
 """Of live sensors, frames nearer to each other than this show the same once more."""
 
@@ -93,6 +94,9 @@ class _Scenes:
 
 
 def _json(found: EdgeScore, frames: int) -> Score:
+    """frames: how many were looked at."""
+    if not frames:
+        return Score(score=None, sigmas=None, borders=0, better={}, brief="nothing to match", text=_NOTHING)
     return Score(
         score=found.score,
         sigmas=found.sigmas,

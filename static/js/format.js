@@ -23,8 +23,8 @@ export const ttc = (seconds) => ((seconds ?? 0) > LONG_S ? `> ${LONG_S}` : num(s
 
 /** Seconds as m:ss.s @param {number} seconds */
 export function clock(seconds) {
-  const minutes = Math.floor(seconds / 60);
-  return `${minutes}:${(seconds - 60 * minutes).toFixed(1).padStart(4, "0")}`;
+  const tenths = Math.round(10 * seconds), minutes = Math.floor(tenths / 600); // rounded first: 59.97 s is 1:00.0
+  return `${minutes}:${((tenths - 600 * minutes) / 10).toFixed(1).padStart(4, "0")}`;
 }
 
 /** Left or right of the path's centre, in metres: "1.2 L". @param {number|null|undefined} offset */

@@ -154,6 +154,33 @@ def test_the_help_tells_every_key(open_page: OpenPage):
         assert len(told) == len(set(told))
         for key in keys:
             assert key in told
+    reach = """pairs => pairs.map(({ children: [key, words] }) =>
+      key.getBoundingClientRect().right - words.getBoundingClientRect().left)"""
+    assert max(page.locator("#help-dialog .pair:has(kbd)").evaluate_all(reach)) < 0, "no key lies over its words"
+
+
+def test_times_and_values_are_said_as_people_read_them(open_page: OpenPage):
+    told = open_page().evaluate(
+        """async () => {
+          const { clock } = await import("/js/format.js"), { CURVES, said } = await import("/js/timeline/curves.js");
+          const of = (key) => CURVES.find((curve) => curve.key === key);
+          return [clock(0), clock(59.94), clock(59.97), clock(3600), said(of("ttc_s"), 220.1), said(of("ttc_s"), 4.84),
+            said(of("closing_speed_mps"), -1.5)];
+        }"""
+    )
+    assert told == ["0:00.0", "0:59.9", "1:00.0", "60:00.0", "> 60 s", "4.8 s", "−5.4 km/h"]
+
+
+def test_an_address_that_could_not_be_opened_is_there_to_be_mended(open_page: OpenPage):
+    page = open_page()
+    page.route("**/api/source", lambda route: route.fulfill(status=202, body="{}"))
+    address = page.get_by_label("Address of a recording")
+    for typed, offered in (("sim:strait", "sim:straight"), ("sim:cut_in", "sim:strait")):
+        page.keyboard.press("f")
+        expect(address).to_have_value(offered)
+        address.fill(typed)
+        address.press("Enter")
+        expect(address).to_be_hidden()
 
 
 def test_the_3d_view_keeps_the_keys_that_fly_and_leaves_the_page_the_others(open_page: OpenPage, site: Site):

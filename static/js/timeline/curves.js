@@ -1,22 +1,26 @@
 /** The curves below the ribbon: what each shows, in which unit and on which scale, and how it is drawn. */
+import { num, ttc } from "../format.js";
 
 /** @typedef {import("../types.js").Columns} Columns */
 /** @typedef {import("./span.js").Span} Span */
 /** @typedef {{top: number, height: number}} Row */
 /** @typedef {{key: keyof Columns, unit: string, label: string, title: string, factor: number, low: number, high: number,
- *   most?: number, digits: number, role: string, also?: keyof Columns, isArea?: boolean, limit?: number}} Curve */
+ *   most?: number, digits: number, words?: (value: number) => string, role: string, also?: keyof Columns, isArea?: boolean, limit?: number}} Curve */
 
 /** The pixel column that a line is in: the rows it covers there, and where it stands. @typedef {{x: number, top: number, bottom: number, last: number}} Column */
 
-/** low and high: what the scale reaches at least; most: what is higher is drawn there. also: a second, fainter line. */
+/** low and high: what the scale reaches at least; most: what is higher is drawn there. words: how its value is said, else with so many digits. also: a second, fainter line. */
 export const CURVES = /** @type {Curve[]} */ ([
   { key: "distance_m", label: "Distance", unit: "m", title: "Distance to the CIPV's nearest point", factor: 1, low: 0, high: 20, digits: 1, role: "cipv" },
   { key: "closing_speed_mps", label: "Closing", unit: "km/h", title: "Closing speed of the CIPV: positive while the gap shrinks", factor: 3.6, low: -5, high: 5, digits: 1, role: "cipv" },
-  { key: "ttc_s", label: "TTC", unit: "s", title: "Time to collision with the CIPV, at most 15 s; the line is the 2.5 s limit", factor: 1, low: 0, high: 5, most: 15, digits: 1, role: "cipv", limit: 2.5 },
+  { key: "ttc_s", label: "TTC", unit: "s", title: "Time to collision with the CIPV, at most 15 s; the line is the 2.5 s limit", factor: 1, low: 0, high: 5, most: 15, digits: 1, words: ttc, role: "cipv", limit: 2.5 },
   { key: "path_offset_m", label: "Offset", unit: "m", title: "The CIPV's offset from the middle of the path, left is up", factor: 1, low: -1, high: 1, digits: 2, role: "cipv" },
   { key: "desired_speed_mps", label: "Desired", unit: "km/h", title: "Speed that ACC asks for, over our own speed", factor: 3.6, low: 0, high: 30, digits: 0, role: "path", also: "speed_mps" },
   { key: "brake", label: "Brake", unit: "%", title: "Brake pedal", factor: 100, low: 0, high: 100, digits: 0, role: "warning", isArea: true },
 ]);
+
+/** A value as it is said beside the curve. @param {Curve} curve @param {number} value in the column's own unit */
+export const said = ({ factor, digits, unit, words }, value) => `${words ? words(value * factor) : num(value * factor, digits)} ${unit}`;
 
 /**
  * The scale that all of these values fit on.

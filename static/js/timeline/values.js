@@ -1,10 +1,11 @@
 /** What of the timeline moves with the frame: the names of its rows with the values at a frame, and the cursor. They are small
  * and apart from the rest, so that ten times a second little is drawn and nothing large is put on the screen again. */
 import { ui } from "../colors.js";
-import { DASH, num } from "../format.js";
+import { DASH } from "../format.js";
 import { leadAt, leadName } from "../labeling/held.js";
 import { tagRows } from "../labeling/ribbon.js";
 import { get } from "../store.js";
+import { said } from "./curves.js";
 import { colorOf } from "./ribbon.js";
 
 /** @typedef {import("./rows.js").Rows} Rows */
@@ -27,7 +28,7 @@ export function drawValues(ctx, rows, index, isLight, edge) {
   }
   for (const { curve, row } of rows.lanes) {
     const value = /** @type {number|null} */ (columns?.[curve.key][index] ?? null);
-    label(ctx, curve.label, value === null ? DASH : `${num(value * curve.factor, curve.digits)} ${curve.unit}`, row, edge, ui("text"));
+    label(ctx, curve.label, value === null ? DASH : said(curve, value), row, edge, ui("text"));
   }
   ctx.textAlign = "start";
   ctx.textBaseline = "alphabetic";

@@ -29,3 +29,9 @@ def test_a_score_in_words(found: EdgeScore, brief: str, told: str):
     assert said.brief == brief
     assert told in said.text
     assert said.better == dict(found.better)
+
+
+def test_without_a_picture_there_is_nothing_to_match():
+    said = _json(EdgeScore(None, None, 0), 0)
+    assert (said.score, said.brief) == (None, "nothing to match")
+    assert "both a picture and LiDAR points" in said.text
