@@ -120,10 +120,11 @@ def playing(running: Browser, address: str, for_s: float) -> tuple[list[float], 
     return painted_ms, len(painted_ms) / spent_s, cpu
 
 
-def paused(running: Browser, address: str, count: int) -> tuple[list[Waits], list[Waits]]:
-    """On a recording of ``count`` frames that is paused: how long after each seek, and each of a slider's moves."""
+def paused(running: Browser, address: str, count: int, settle_s: float = _SETTLE_S) -> tuple[list[Waits], list[Waits]]:
+    """On a recording of ``count`` frames that is paused: how long after each seek, and each of a slider's moves, with a
+    page that was opened ``settle_s`` ago."""
     page = opened(running, address)
-    time.sleep(_SETTLE_S)
+    time.sleep(settle_s)
     seeks = [{"seek": (_FAR * (n + 1)) % count} for n in range(_SEEKS)] if count > 1 else []
     slides = [{"param": _PARAMETER, "value": str(0.6 + 0.02 * (n % 7))} for n in range(_SLIDES)]
     first, second = (page.call(_ACT, [acts, _ACT_PAUSE_MS, _PATIENCE_MS]) for acts in (seeks, slides))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,6 +63,25 @@ DEMANDS = (
 )
 
 
-def broken(figures: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
+PAGE_DEMANDS = tuple(
+    Demand(f"{what}{when}", "median_ms", at_most=at_most)
+    for when in ("", " while computed")
+    for what, at_most in (("seek", 150.0), ("first view", 2000.0))
+)
+"""Of the page in a browser that runs beside the server."""
+
+
+def page_rows(figures: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """What ``app.bench.page.figures`` gives, as stages."""
+    page, computed = figures["page"], figures["while_computed"]
+    return {
+        "seek": page["seek"],
+        "first view": page["first_view"],
+        "seek while computed": computed["seek"],
+        "first view while computed": computed["first_view"],
+    }
+
+
+def broken(figures: Mapping[str, Mapping[str, Any]], demands: Sequence[Demand] = DEMANDS) -> Iterator[str]:
     """A sentence for each demand that does not hold."""
-    return (sentence for demand in DEMANDS if (sentence := demand.broken(figures)) is not None)
+    return (sentence for demand in demands if (sentence := demand.broken(figures)) is not None)

@@ -23,6 +23,7 @@ from app.bench.labelled import labelled
 from pipeline.errors import BadInput
 
 _ALL_SEEN_WITHIN_S, _ASK_EVERY_S = 120.0, 0.5
+_SETTLE_BRIEFLY_S = 1.0
 _PARAMETER_EVERY_S = 0.23
 _PARAMETER_VALUES = (0.65, 0.75)
 _REVISION = re.compile(rb'"params_revision":([0-9]+)')
@@ -31,12 +32,17 @@ _REVISION = re.compile(rb'"params_revision":([0-9]+)')
 def figures(source: str, for_s: float) -> dict[str, Any]:
     """Milliseconds. ``page``: latency from result made to painted, and processor time a frame by kind of process; when
     paused, from a seek and from a slider's move to painted, the seek also with 100,000 labels in the labeling mode; and
-    from opening the address to the first frame painted.
+    from opening the address to the first frame painted. ``while_computed``: the same while the whole drive is computed
+    for the first time, with networks.
     ``parameter``: while it plays, from the request to the first message with its result. BadInput without a browser."""
-    with browser() as running, _dashboard(source) as address:
-        live = _playing(running, address, for_s)
-        parameter = _parameter(address, for_s)
-        return {"source": source, "page": {**live, **_still(running, address)}, "parameter": parameter}
+    with browser() as running:
+        with _dashboard(source) as address:
+            live = _playing(running, address, for_s)
+            parameter = _parameter(address, for_s)
+            page = {**live, **_still(running, address)}
+        with _dashboard(source) as address:
+            computed = _while_computed(running, address)
+        return {"source": source, "page": page, "while_computed": computed, "parameter": parameter}
 
 
 @contextmanager
@@ -95,6 +101,23 @@ def _still(running: Browser, address: str) -> dict[str, Any]:
     }
 
 
+def _while_computed(running: Browser, address: str) -> dict[str, Any]:
+    """From the start on. frames_hz: how many are computed meanwhile. to_the_end: there was something to compute all the
+    time; a drive that is too short is done before."""
+    _post(address, "POST", "/api/playback", {"playing": False})
+    before, start = _state(address), time.monotonic()
+    seeks, slides = paused(running, address, int(before["count"]), _SETTLE_BRIEFLY_S)
+    first_ms = first_views_ms(running, address)
+    after, spent_s = _state(address), time.monotonic() - start
+    return {
+        "seek": _waits(seeks),
+        "slider": _waits(slides),
+        "first_view": _spread(first_ms),
+        "frames_hz": round((after["drive"]["done"] - before["drive"]["done"]) / spent_s, 1),
+        "to_the_end": after["drive"]["running"],
+    }
+
+
 def _waits(waits: list[Waits]) -> dict[str, Any]:
     """To the frame painted, and to the whole page: table, reasons and parameters follow the frame."""
     whole = _spread([each.whole_ms for each in waits])
@@ -106,13 +129,16 @@ def _paused_with_all_seen(address: str) -> int:
     many frames there are."""
     deadline = time.monotonic() + _ALL_SEEN_WITHIN_S
     while time.monotonic() < deadline:
-        with urlopen(f"{address}/api/state") as answer:
-            state = json.load(answer)
-        if not state["drive"]["running"]:
+        if not _state(address)["drive"]["running"]:
             break
         time.sleep(_ASK_EVERY_S)
     _post(address, "POST", "/api/playback", {"playing": False})
-    return int(state["count"])
+    return int(_state(address)["count"])
+
+
+def _state(address: str) -> Any:
+    with urlopen(f"{address}/api/state") as answer:
+        return json.load(answer)
 
 
 def _parameter(address: str, for_s: float) -> dict[str, Any]:

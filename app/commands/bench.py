@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,7 +13,7 @@ from rich.table import Table
 
 from app.bench import clients as clients_bench
 from app.bench import page as page_bench
-from app.bench.demands import broken
+from app.bench.demands import PAGE_DEMANDS, broken, page_rows
 from app.bench.suite import run_all
 from app.options import LineOptions
 from pipeline.errors import BadInput
@@ -46,16 +47,22 @@ class Bench:
             if self.page is not None:
                 live["page"] = page_bench.figures(self.page, PAGE_S)
             print(json.dumps(live, indent=1))
-            return 0
+            return _judge(broken(page_rows(live["page"]), PAGE_DEMANDS) if "page" in live else ())
         figures = run_all(self.line.parameters(), self.line.detector)
         if self.json:
             print(json.dumps(figures, indent=1))
         else:
             Console().print(_table(figures))
-        failures = list(broken(figures))
-        for failure in failures:
-            print(f"cipv: {failure}", file=sys.stderr)
-        return 1 if failures else 0
+        return _judge(broken(figures))
+
+
+def _judge(failures: Iterable[str]) -> int:
+    """Say what does not hold. The exit status."""
+    status = 0
+    for failure in failures:
+        print(f"cipv: {failure}", file=sys.stderr)
+        status = 1
+    return status
 
 
 def _table(figures: dict[str, dict[str, Any]]) -> Table:
