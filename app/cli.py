@@ -22,7 +22,7 @@ COMMANDS = {
     "record": "app.commands.record:Record",
     "import": "app.commands.sessions:Import",
     "export": "app.commands.sessions:Export",
-    "info": "app.commands.sessions:ShowInfo",
+    "info": "app.commands.info:ShowInfo",
     "recover": "app.commands.sessions:Recover",
     "live": "app.commands.live:Live",
     "replay": "app.commands.replay:Replay",

@@ -1,28 +1,26 @@
-"""Options that several commands share, and how they become parameters, a source and a detector."""
+"""Options that several commands share, and how they become parameters, a source and a detector. What opens one is
+imported then: it takes a second, and help and parameters need none of it."""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar
 
 import tyro
 
-from app.progress import opened_recording
 from pipeline.complaint import parse_yaml
 from pipeline.errors import BadInput
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
-from pipeline.path.lane_detector import usual_every
-from pipeline.run import Detectors, Sensors, brings_detections, detector_for, lanes_for
-from pipeline.sources import is_live, open_live
-from pipeline.sources.along_route import along_route
-from pipeline.sources.base import AnySource, LiveSource, Source
-from pipeline.types import Route
-from pipeline.vision.detector import Detector
-from pipeline.vision.runtime import DetectorMissing
 
-S = TypeVar("S", Source, LiveSource)
+if TYPE_CHECKING:
+    from pipeline.run import Detectors, Sensors
+    from pipeline.sources.base import AnySource, LiveSource, Source
+    from pipeline.types import Route
+    from pipeline.vision.detector import Detector
+
+S = TypeVar("S", "Source", "LiveSource")
 
 
 def planned(file: Path | None) -> Route | None:
@@ -49,10 +47,16 @@ class SourceOptions:
 
     def open(self) -> Source:
         """A recording. SourceError says in one sentence what is wrong, RouteError the same of the route."""
+        from app.progress import opened_recording
+        from pipeline.sources.along_route import along_route
+
         return self._with_notes(along_route(opened_recording(self.source, self.rings), planned(self.route)))
 
     def open_live(self) -> LiveSource | None:
         """The sensors, if it names some; they are not started yet. SourceError as with ``open``."""
+        from pipeline.sources import is_live, open_live
+        from pipeline.sources.along_route import along_route
+
         if not is_live(self.source):
             return None
         return self._with_notes(along_route(open_live(self.source), planned(self.route)))
@@ -111,6 +115,9 @@ class LineOptions:
     def open_detectors(self, source: AnySource, sensors: Sensors = "both") -> Detectors:
         """Everything that looks at the source's pictures, with what there is to say about it. None for LiDAR alone, and
         where detections come with them."""
+        from pipeline.path.lane_detector import usual_every
+        from pipeline.run import Detectors, brings_detections, lanes_for
+
         every = self.every()
         if sensors == "lidar" or brings_detections(source):
             return Detectors()
@@ -122,6 +129,9 @@ class LineOptions:
     def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
         """The detector for the source's pictures, with what there is to say about it. A named one that is missing is
         an error, and so is none for a camera on its own; else a sentence says so and LiDAR goes on alone."""
+        from pipeline.run import detector_for
+        from pipeline.vision.runtime import DetectorMissing
+
         try:
             detector = detector_for(source, self.detector)
         except DetectorMissing as missing:

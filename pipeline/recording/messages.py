@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pipeline.geometry import inverse
 from pipeline.recording import topics
@@ -136,6 +135,8 @@ def transform_messages(camera: CameraCalibration | None, t_ns: int) -> list[byte
     """
     transforms = [("lidar", (0.0, 0.0, 0.0), _IDENTITY)]
     if camera is not None:
+        from scipy.spatial.transform import Rotation  # 0.2 s to import: only who writes a camera's place pays
+
         T_ego_camera = inverse(camera.T_camera_ego)
         x, y, z = (float(value) for value in T_ego_camera[:3, 3])
         turned = tuple(float(value) for value in Rotation.from_matrix(T_ego_camera[:3, :3]).as_quat())

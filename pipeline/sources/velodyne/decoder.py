@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numba
 import numpy as np
-from velodyne_decoder import Config, Model, PacketVector, ScanDecoder, VelodynePacket
 
 from pipeline.sources.velodyne import packet
 from pipeline.sources.velodyne.clock import SensorClock
@@ -29,6 +28,8 @@ class Vlp16Decoder:
         self._R, self._origin = T[:3, :3].astype(np.float32), T[:3, 3].astype(np.float32)
         self._is_moved = not np.array_equal(T, np.eye(4))
         _warm_up()
+        from velodyne_decoder import Config, Model, ScanDecoder  # 0.1 s to import: only who has packets pays
+
         self._library = ScanDecoder(Config(model=Model.VLP16, min_range=MIN_RANGE_M, max_range=MAX_RANGE_M))
 
     @property
@@ -51,6 +52,8 @@ class Vlp16Decoder:
 
     def _decode(self, rotation: Rotation) -> Sweep | None:
         """The sweep of a rotation; null when it holds no return."""
+        from velodyne_decoder import PacketVector, VelodynePacket
+
         packets = rotation.packets
         base_us = packets[0].time_us // HOUR_US * HOUR_US
         vector = PacketVector([VelodynePacket((it.time_us - base_us) * 1e-6, list(it.data)) for it in packets])

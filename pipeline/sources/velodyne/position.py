@@ -5,11 +5,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from velodyne_decoder import TELEMETRY_PACKET_SIZE, TelemetryPacket
-
 from pipeline.sources.velodyne.packet import HOUR_US, BadPacket
 
-POSITION_BYTES: int = TELEMETRY_PACKET_SIZE
+POSITION_BYTES = 512
 _PPS = {0: "absent", 1: "synchronising", 2: "locked", 3: "error"}
 
 
@@ -27,6 +25,8 @@ def read_position(data: bytes) -> Position:
     """The packet's fields. BadPacket when it is none."""
     if len(data) != POSITION_BYTES:
         raise BadPacket(f"not {POSITION_BYTES} bytes")
+    from velodyne_decoder import TelemetryPacket  # 0.1 s to import: only who has such packets pays
+
     try:
         telemetry = TelemetryPacket(list(data))
         pps, nmea = int(data[0xCA]), str(telemetry.nmea_sentence).strip()
