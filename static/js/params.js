@@ -1,6 +1,6 @@
 /** The panel of parameters, made from what the server declares. Every change is sent at once, the newest only. */
 import { newestOnly, request } from "./api.js";
-import { $, el, memory } from "./dom.js";
+import { $, el, memory, text } from "./dom.js";
 import { control } from "./control.js";
 import { knownName } from "./labeling/person.js";
 import { get, on, paintAfter, set } from "./store.js";
@@ -72,14 +72,14 @@ function show() {
   const answer = get("params");
   if (!answer) return;
   if (!controls.size) build(answer);
-  presets.value = answer.preset;
+  if (presets.value !== answer.preset) presets.value = answer.preset;
   for (const [name, one] of controls) {
     const needed = MODEL_OF[name];
     one.show(answer.values[name], answer.base[name], answer.effective[name] ?? null, Boolean(needed) && needed !== answer.values["alignment.model"]);
   }
   for (const [name, { count }] of sections) {
     const changed = Object.keys(answer.values).filter((key) => key.startsWith(`${name}.`) && answer.values[key] !== answer.base[key]).length;
-    count.textContent = changed ? `${changed} changed` : "";
+    text(count, changed ? `${changed} changed` : "");
   }
 }
 
