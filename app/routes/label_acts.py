@@ -11,7 +11,7 @@ from app.labels.answers import changes_json
 from app.labels.desk import Done, LabelDesk
 from app.labels.refusals import Stale
 from app.labels.requests import Import, Propose
-from app.routes.label_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
+from app.routes.label_act_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
 from app.routes.refusals import refusing
 
 if TYPE_CHECKING:

@@ -17,7 +17,8 @@ from starlette.requests import ClientDisconnect
 from app.labels.desk import LabelDesk
 from app.labels.requests import Person
 from app.labels.values import LONGEST_ITEM, LONGEST_NAME
-from app.routes.label_shapes import VERSION_NAME, LostJson, NativeFile, NewVersion, TaskBegun, VersionJson
+from app.routes.label_act_shapes import TaskBegun
+from app.routes.label_file_shapes import VERSION_NAME, LostJson, NativeFile, NewVersion, VersionJson
 from app.routes.refusals import refusing
 from app.routes.shapes import file_of
 from pipeline.labels.formats.base import FormatName

@@ -13,17 +13,8 @@ from app.labels.requests import MOST_FRAMES, Id, Index, PersonOrNobody
 from app.labels.values import ItemKind
 from app.labels.where_next import Asked, What, where_next
 from app.routes.drive import current
-from app.routes.label_shapes import (
-    BadFrameJson,
-    HistoryJson,
-    ItemKey,
-    LabelsOfPerson,
-    NextJson,
-    ScoreJson,
-    WholeTrack,
-    Window,
-    errors_json,
-)
+from app.routes.label_score_shapes import BadFrameJson, ScoreJson, errors_json
+from app.routes.label_shapes import HistoryJson, ItemKey, LabelsOfPerson, NextJson, WholeTrack, Window
 from app.routes.refusals import refusing
 from app.routes.shapes import MetricJson
 

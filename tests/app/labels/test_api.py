@@ -6,7 +6,8 @@ import httpx
 import pytest
 
 from app.engine import Engine
-from app.routes.label_shapes import ScoreJson, Window
+from app.routes.label_score_shapes import ScoreJson
+from app.routes.label_shapes import Window
 from app.server import create_app
 from app.tokens import Tokens
 from pipeline.labels.model import WHOLE_TAG
