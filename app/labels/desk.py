@@ -181,6 +181,8 @@ class LabelDesk:
             self._settling.finish()  # of what came in between
             acted = labels.log.sent_before(act_id, person)
             if acted is None and way == "undo" and self._forget_tried(act_id):
+                from app.labels.log import Acted
+
                 return Done(Acted(labels.revision, None, "what was being tried"), labels)
             if acted is None:
                 acted = labels.log.move(way, person, self._control.check, act_id=act_id)
