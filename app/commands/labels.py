@@ -1,4 +1,5 @@
-"""`cipv labels`: labels of recordings in the database, as files of other tools, and back."""
+"""`cipv labels`: labels of recordings in the database, as files of other tools, and back. The line and the database are
+imported by who uses them: they take two seconds."""
 
 from __future__ import annotations
 
@@ -12,14 +13,7 @@ import tyro
 
 from app.bars import frames_progress
 from app.commands.label_files import Database, ExportLabels, ImportLabels, Person, say
-from app.drive.run import calibration_digest, digest
-from app.labels.database import open_database
-from app.labels.drive import DriveLabels, info_of, known_drives
-from app.labels.long import put_proposals
 from app.options import LineOptions, SourceOptions
-from pipeline.labels.model import Origin
-from pipeline.labels.propose import Seen, propose
-from pipeline.run import run
 
 
 @dataclass(frozen=True)
@@ -38,6 +32,14 @@ class ProposeLabels:
     """Whose act it is, to be undone in the page"""
 
     def __call__(self) -> int:
+        from app.drive.run import calibration_digest, digest
+        from app.labels.database import open_database
+        from app.labels.drive import DriveLabels, info_of
+        from app.labels.long import put_proposals
+        from pipeline.labels.model import Origin
+        from pipeline.labels.propose import Seen, propose
+        from pipeline.run import run
+
         params, source = self.line.parameters(), self.source.open()
         detectors = self.line.open_detectors(source)
         frames: dict[int, list[Seen]] = {}
@@ -80,6 +82,9 @@ class ListLabels:
     """As JSON"""
 
     def __call__(self) -> int:
+        from app.labels.database import open_database
+        from app.labels.drive import known_drives
+
         database = open_database(self.database)
         try:
             drives = known_drives(database)

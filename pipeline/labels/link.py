@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from pipeline.params import TimeParams
 from pipeline.sources.base import TruthObject
@@ -53,6 +52,8 @@ def _links(
     if not before or not now:
         return {}
     cost = np.array([[_cost(a, b, speeds.get(a.id or 0), gap_s) for b in now] for a in before])
+    from scipy.optimize import linear_sum_assignment  # 0.2 s to import: most labels have tracks already
+
     rows, columns = linear_sum_assignment(cost)
     return {int(n): before[k].id for k, n in zip(rows, columns, strict=True) if cost[k, n] < _NEVER}  # type: ignore[misc]
 

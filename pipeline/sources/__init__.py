@@ -6,10 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.progress import Progress, silent
-from pipeline.sources.astyx import AstyxSource
 from pipeline.sources.base import LIVE, AnySource, LiveSource, Source, SourceError, TruthObject
-from pipeline.sources.kitti import KittiSource
-from pipeline.sources.simulated import SimulatedSource
 
 __all__ = [
     "LiveSource",
@@ -24,6 +21,24 @@ __all__ = [
 ]
 
 _SESSION_SUFFIX = ".mcap"
+
+
+def _open_astyx(uri: str, path: str, rings: int, progress: Progress) -> Source:
+    from pipeline.sources.astyx import AstyxSource
+
+    return AstyxSource(uri, path)
+
+
+def _open_kitti(uri: str, path: str, rings: int, progress: Progress) -> Source:
+    from pipeline.sources.kitti import KittiSource
+
+    return KittiSource(uri, path, rings)
+
+
+def _open_simulated(uri: str, name: str, rings: int, progress: Progress) -> Source:
+    from pipeline.sources.simulated import SimulatedSource  # the simulator's cameras and cars: only who drives one pays
+
+    return SimulatedSource(uri, name)
 
 
 def _open_session(uri: str, path: str, rings: int, progress: Progress) -> Source:
@@ -51,13 +66,13 @@ def _open_rosbag(uri: str, rest: str, rings: int, progress: Progress) -> Source:
 
 
 _OPENERS: dict[str, Callable[[str, str, int, Progress], Source]] = {
-    "astyx": lambda uri, rest, rings, progress: AstyxSource(uri, rest),
-    "kitti": lambda uri, rest, rings, progress: KittiSource(uri, rest, rings),
+    "astyx": _open_astyx,
+    "kitti": _open_kitti,
     "mcap": _open_session,
     "pcap": _open_pcap,
     "pcd": _open_pcd,
     "rosbag": _open_rosbag,
-    "sim": lambda uri, rest, rings, progress: SimulatedSource(uri, rest),
+    "sim": _open_simulated,
 }
 """Scheme → what opens it, given the whole URI, the part after the colon, how many LiDAR rings to keep, and whom to tell
 how far it is."""
