@@ -37,6 +37,14 @@ def parse_yaml(text: str, what: str, refuse: Callable[[str], BadInput] = BadInpu
         raise refuse(f"{what}: not YAML: {str(error).splitlines()[0]}") from None
 
 
+def given_path(text: str | Path, refuse: Callable[[str], BadInput] = BadInput) -> Path:
+    """A path as a person typed it, ``~`` resolved. Else what ``refuse`` makes of a sentence is raised."""
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:
+        raise refuse(f"{text}: nobody here has that home folder") from None
+
+
 def reason_of(error: Exception) -> str:
     """Why the system refused, in words."""
     return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__

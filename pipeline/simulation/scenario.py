@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
-from pipeline.complaint import first_complaint, parse_yaml, read_yaml
+from pipeline.complaint import first_complaint, given_path, parse_yaml, read_yaml
 from pipeline.errors import BadInput
 from pipeline.simulation.actors import Actor, Motion, Script, motion
 from pipeline.simulation.detection_model import Detections
@@ -127,7 +127,7 @@ def names() -> tuple[str, ...]:
 
 def load(name_or_path: str) -> Scenario:
     """A built-in scenario by its name, or any file that ends in .yaml. ScenarioError says what is wrong."""
-    path = Path(name_or_path).expanduser() if name_or_path.endswith((".yaml", ".yml")) else None
+    path = given_path(name_or_path, ScenarioError) if name_or_path.endswith((".yaml", ".yml")) else None
     if path is None:
         if name_or_path not in names():
             raise ScenarioError(f"no scenario named {name_or_path!r}; there are {', '.join(names())}")

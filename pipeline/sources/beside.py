@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from pipeline.complaint import reason_of
+from pipeline.complaint import given_path, reason_of
 from pipeline.progress import Progress, silent
 from pipeline.records import evolve
 from pipeline.sources import rig as rig_files
@@ -113,7 +113,7 @@ def rig_of(recording: Path, options: dict[str, str]) -> rig_files.Rig:
 def _named(recording: Path, options: dict[str, str], option: str, suffixes: tuple[str, ...]) -> Path | None:
     """The file that an option names, from the recording's folder; else the one with the recording's own name."""
     if option in options:
-        path = recording.parent / Path(options[option]).expanduser()
+        path = recording.parent / given_path(options[option], SourceError)
         if not path.is_file():
             raise SourceError(f"{option}={options[option]}: no such file")
         return path

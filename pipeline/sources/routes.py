@@ -14,7 +14,6 @@ import io
 import math
 import re
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from statistics import median
 from xml.etree import ElementTree
 
@@ -22,6 +21,7 @@ import numpy as np
 import pynmea2
 from pyproj import Transformer
 
+from pipeline.complaint import given_path
 from pipeline.errors import BadInput
 from pipeline.types import GnssFix, Route
 
@@ -48,7 +48,7 @@ def load_route(path: str) -> Route:
     """The route in a file, ``?epsg=32632`` behind its name where its places are of a UTM zone that it does not name.
     RouteError says in one sentence what is wrong."""
     path, _, zone = path.partition("?epsg=")
-    file = Path(path).expanduser()
+    file = given_path(path, RouteError)
     try:
         if file.suffix.lower() == ".mcap":
             return _from_session(path, file.stem)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from pipeline.complaint import given_path
 from pipeline.data import data_dir, file_sha256
 from pipeline.errors import BadInput
 from pipeline.progress import Progress, silent
@@ -142,7 +143,7 @@ def list_models() -> tuple[ModelEntry, ...]:
 
 def find(spec: str) -> Path | None:
     """The file of a path or a name; null when there is none."""
-    path = Path(spec).expanduser()
+    path = given_path(spec, ModelError)
     if path.is_file():
         return path
     return _located(spec) if _is_name(spec) else None

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from pipeline.complaint import first_complaint, parse_yaml
+from pipeline.complaint import first_complaint, given_path, parse_yaml
 from pipeline.geometry import inverse, rotation
 from pipeline.sources.base import SourceError
 from pipeline.sources.files import check_looks_ahead
@@ -203,9 +203,9 @@ def _resolved(config: LiveConfig, folder: Path) -> LiveConfig:
     """Paths taken from the file's own folder."""
     camera, ego = config.camera, config.ego
     if camera is not None and camera.file is not None:
-        camera = camera.model_copy(update={"file": folder / camera.file.expanduser()})
+        camera = camera.model_copy(update={"file": folder / given_path(camera.file, SourceError)})
     if ego is not None and ego.can is not None:
-        dbc = folder / ego.can.dbc.expanduser()
+        dbc = folder / given_path(ego.can.dbc, SourceError)
         ego = ego.model_copy(update={"can": ego.can.model_copy(update={"dbc": dbc})})
     return config.model_copy(update={"camera": camera, "ego": ego})
 

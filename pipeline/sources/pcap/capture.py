@@ -11,6 +11,7 @@ import os
 import struct
 from bisect import bisect_right
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
@@ -87,9 +88,11 @@ class Capture:
                 if found is not None:
                     yield Datagram(origin, t_ns, *found)
 
-    def _open(self) -> BinaryIO:
+    @contextmanager
+    def _open(self) -> Iterator[BinaryIO]:
         try:
-            return self.path.open("rb", buffering=1 << 20)
+            with self.path.open("rb", buffering=1 << 20) as file:
+                yield file
         except OSError as error:
             raise SourceError(f"{self.path.name}: cannot be read: {reason_of(error)}") from None
 

@@ -25,6 +25,7 @@ from pipeline.sources import SourceError, open_source
         ("sim:", "no scenario named ''; there are"),
         ("sim:nosuch", "no scenario named 'nosuch'; there are"),
         ("sim:nosuch.yaml", "nosuch.yaml: cannot be read"),
+        ("sim:~no_such_user_here/x.yaml", "~no_such_user_here/x.yaml: nobody here has that home folder"),
     ],
 )
 def test_a_wrong_uri_gives_one_sentence(uri: str, says: str) -> None:

@@ -120,6 +120,7 @@ WRONG = {
     "twice": ("pcap:{file}?port=1&port=2", "given twice"),
     "no number": ("pcap:{file}?port=many", "port=many: not a number"),
     "no video": ("pcap:{file}?video=other.mp4", "video=other.mp4: no such file"),
+    "nobody's rig": ("pcap:{file}?rig=~no_such_user_here/rig.yaml", "nobody here has that home folder"),
     "bad video": ("pcap:{file}?video=rig.yaml", "rig.yaml: not a readable video"),
     "bad rig": ("pcap:{file}?rig=bad.yaml", "bad.yaml: lidar.mount.z_m: Input should be less than or equal to 20"),
     "no rig": ("pcap:{file}?rig=drive.pcap", "drive.pcap: not YAML"),
@@ -138,6 +139,12 @@ def test_what_is_wrong_in_one_sentence(name: str, tmp_path: Path) -> None:
         open_source(uri.format(folder=tmp_path, file=tmp_path / "drive.pcap"))
     assert says in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.skipif(not Path("/proc/self/mem").exists(), reason="a file that opens and cannot be read is in /proc")
+def test_a_disc_that_fails_is_named() -> None:
+    with pytest.raises(SourceError, match="mem: cannot be read: Input/output error"):
+        open_source("pcap:/proc/self/mem")
 
 
 def test_another_velodyne_is_named(tmp_path: Path) -> None:
