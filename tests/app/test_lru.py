@@ -28,3 +28,11 @@ def test_never_costs_more_than_its_limit_or_one_entry(puts: list[tuple[int, int]
         assert present[key] == value
         assert sum(present.values()) <= 40 or len(present) == 1
         assert all(held[k] == v for k, v in present.items())
+
+
+def test_what_is_replaced_costs_nothing_any_more():
+    cache: BoundedCache[str, int] = BoundedCache(2, lambda _: 1)
+    cache.put("kept", 0)
+    for value in range(10):
+        cache.put("again", value)
+    assert (cache.get("kept"), cache.get("again"), len(cache)) == (0, 9, 2)
