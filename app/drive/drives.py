@@ -91,7 +91,7 @@ class Drives:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread; a network run in progress is finished first."""
+        """End the thread; a network that runs for it is stopped, a read in progress is finished first."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()
