@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.recording import topics
+from pipeline.recording.about import About
 from pipeline.recording.container import McapFile
 from pipeline.recording.session import SessionSource
-from pipeline.recording.writer import About
 from pipeline.sources.base import Source, SourceError
 
 _GAP_STEPS = 1.5

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from pipeline.params import Params
+from pipeline.recording.about import About
 from pipeline.recording.packets import RawLidar
 from pipeline.recording.segments import NEVER, Rotation, Segments
-from pipeline.recording.writer import About
 from pipeline.sources.shots import Shot
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
 

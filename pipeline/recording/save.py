@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.progress import Progress, silent
+from pipeline.recording.about import About
 from pipeline.recording.relabel import relabel
 from pipeline.recording.rewrite import clip
 from pipeline.recording.session import SessionSource
-from pipeline.recording.writer import About, SessionWriter
+from pipeline.recording.writer import SessionWriter
 from pipeline.sources.base import AnySource, Recorded, Source
 
 

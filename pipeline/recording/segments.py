@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.params import Params
+from pipeline.recording.about import About
 from pipeline.recording.clock import SessionClock
 from pipeline.recording.output import Compression
 from pipeline.recording.packets import RawLidar
-from pipeline.recording.writer import About, SessionWriter
+from pipeline.recording.writer import SessionWriter
 from pipeline.sources.base import TruthObject
 from pipeline.sources.shots import Shot
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep

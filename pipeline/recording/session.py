@@ -13,12 +13,12 @@ import numpy as np
 from pipeline.params import Params, ParamsError, with_changes
 from pipeline.progress import Progress, silent
 from pipeline.recording import topics
+from pipeline.recording.about import VERSION, About
 from pipeline.recording.container import McapFile, NotMcap
 from pipeline.recording.frames import I64, listed_ticks, listed_times
 from pipeline.recording.messages import Damaged, log_text, picture_from, sweep_from
 from pipeline.recording.packets import sweep_of_packets
 from pipeline.recording.tick import CameraRecord, PictureRef, Tick, route_from, tick_from
-from pipeline.recording.writer import VERSION, About
 from pipeline.sources.base import Mark, SourceError, TruthObject
 from pipeline.types import CameraCalibration, Frame, GnssFix, Picture, Route, Sweep
 

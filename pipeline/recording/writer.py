@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
-
 from pipeline.params import Params
 from pipeline.recording import topics
+from pipeline.recording.about import About
 from pipeline.recording.came import Came
 from pipeline.recording.clock import SessionClock
 from pipeline.recording.detections import given_of
@@ -43,36 +42,8 @@ from pipeline.sources.base import TruthObject
 from pipeline.sources.shots import Shot
 from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Result, Route, Sweep
 
-VERSION = 1
-
 _KEPT, _SWEEPS_KEPT = 256, 16
 """Of what came and a frame may refer to: a second of all that sensors send; of clouds, which are large, less."""
-
-
-@dataclass(frozen=True)
-class About:
-    """Where a session came from. origin: the URI that was recorded. notes: what to know about the whole."""
-
-    origin: str
-    title: str
-    rate_hz: float
-    notes: tuple[str, ...] = ()
-    version: int = VERSION
-
-    def to_metadata(self) -> dict[str, str]:
-        """As MCAP keeps it: text to text."""
-        return {key: json.dumps(value, ensure_ascii=False) for key, value in asdict(self).items()}
-
-    @staticmethod
-    def from_metadata(metadata: dict[str, str]) -> About:
-        """ValueError when it is no such metadata."""
-        try:
-            return _ABOUT.validate_python({key: json.loads(value) for key, value in metadata.items()})
-        except (ValidationError, RecursionError) as error:
-            raise ValueError(str(error).splitlines()[0]) from None
-
-
-_ABOUT = TypeAdapter(About)
 
 
 class SessionWriter:

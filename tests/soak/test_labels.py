@@ -26,7 +26,8 @@ from pipeline.geometry import Cuboid
 from pipeline.labels.formats.base import Drive, Shot, drive_of
 from pipeline.labels.formats.registry import FORMATS, export_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
-from pipeline.recording.writer import About, SessionWriter
+from pipeline.recording.about import About
+from pipeline.recording.writer import SessionWriter
 from pipeline.sources import open_source
 from tests.app.labels.conftest import info, postgres_url  # noqa: F401
 from tests.app.labels.kills import kill_again_and_again

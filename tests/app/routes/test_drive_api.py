@@ -17,7 +17,8 @@ from app.engine import Engine
 from app.server import create_app
 from pipeline.calibration.match import FEWEST
 from pipeline.params import Params, from_yaml, preset, with_changes
-from pipeline.recording.writer import About, SessionWriter
+from pipeline.recording.about import About
+from pipeline.recording.writer import SessionWriter
 from pipeline.run import Detectors, run
 from pipeline.sources import open_source
 from tests.app.recording import CountingDetector, Recording, opener

@@ -11,7 +11,8 @@ import numpy as np
 
 from pipeline.geometry import Cuboid
 from pipeline.params import Params
-from pipeline.recording.writer import About, SessionWriter
+from pipeline.recording.about import About
+from pipeline.recording.writer import SessionWriter
 from pipeline.sources.base import TruthObject
 from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Route, StreamHealth, Sweep
 

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 from pipeline.params import Params, with_changes
+from pipeline.recording.about import VERSION, About
 from pipeline.recording.detections import BoxesRecord, Given, LanesRecord
 from pipeline.recording.session import SessionSource
-from pipeline.recording.writer import VERSION, About, SessionWriter
+from pipeline.recording.writer import SessionWriter
 from pipeline.sources import SourceError, open_source
 from pipeline.sources.base import is_simulated
 from pipeline.types import (
