@@ -1,0 +1,119 @@
+"""What a person says of labels, and who reviews them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from app.labels.drive import DriveLabels
+from app.labels.refusals import ActRefused
+from app.labels.values import value_from_json
+from pipeline.labels.model import LeadRange, Origin
+from tests.app.labels.acts.conftest import PIPELINE
+from tests.app.labels.acts.doing import act, leads, track
+
+
+@pytest.mark.parametrize(("kind", "state"), [("accept", "accepted"), ("reject", "rejected")])
+def test_what_a_person_says_of_a_proposal_leaves_who_made_it(labels: DriveLabels, kind: str, state: str) -> None:
+    act(labels, kind=kind, items=[("track", 1), ("lead", 1)])
+    assert (track(labels).state, track(labels).origin) == (state, PIPELINE)
+    assert leads(labels) == [(10, 20, 1, state)]
+
+
+def test_a_correction_that_is_accepted_stays_one_until_a_second_person_reviews_it(labels: DriveLabels) -> None:
+    act(labels, kind="relabel", track=1, label="Truck")
+    assert (track(labels).label, track(labels).state, track(labels).origin.name) == ("truck", "corrected", "Ada")
+    assert act(labels, kind="accept", items=[("track", 1)]).act is None
+    with pytest.raises(ActRefused, match="you changed #1 last: a second person reviews it"):
+        act(labels, kind="review_ok", items=[("track", 1)])
+    act(labels, "Bob", kind="review_ok", items=[("track", 1)])
+    assert (track(labels).state, track(labels).origin.name, track(labels).reviewer) == ("accepted", "Ada", "Bob")
+    with pytest.raises(ActRefused, match="you have reviewed #1 already"):
+        act(labels, "Bob", kind="review_ok", items=[("track", 1)])
+    act(labels, "Cy", kind="relabel", track=1, label="Bus")
+    assert track(labels).reviewer == "", "what is changed is to be reviewed again"
+
+
+@pytest.mark.parametrize(
+    ("before", "refused"),
+    [
+        pytest.param([("Ada", "relabel", "bus"), ("Bob", "relabel", "van"), ("Bob", "undo", "")], "Ada", id="undone"),
+        pytest.param([("Ada", "relabel", "bus"), ("Ada", "undo", ""), ("Ada", "redo", "")], "Ada", id="done again"),
+        pytest.param([("Ada", "relabel", "bus"), ("Bob", "send_back", "no")], "Ada", id="sent back to its maker"),
+        pytest.param([("Ada", "relabel", "bus"), ("Bob", "relabel", "van")], "Bob", id="changed by the second"),
+    ],
+)
+def test_ones_own_work_is_reviewed_by_another(
+    labels: DriveLabels, before: list[tuple[str, Any, str]], refused: str
+) -> None:
+    for person, kind, more in before:
+        if kind == "relabel":
+            act(labels, person, kind=kind, track=1, label=more)
+        elif kind == "send_back":
+            act(labels, person, kind=kind, items=[("track", 1)], comment=more)
+        else:
+            labels.log.move(kind, person)
+    with pytest.raises(ActRefused, match="a second person reviews it"):
+        act(labels, refused, kind="review_ok", items=[("track", 1)])
+    act(labels, "Cy", kind="review_ok", items=[("track", 1)])
+    assert track(labels).state == "accepted"
+
+
+def test_what_is_sent_back_is_proposed_again_with_the_comment(labels: DriveLabels) -> None:
+    act(labels, kind="accept", items=[("track", 1)])
+    act(labels, "Bob", kind="send_back", items=[("track", 1)], comment="its rear\n is too low")
+    assert (track(labels).state, track(labels).comment) == ("proposed", "its rear is too low")
+    act(labels, kind="accept", items=[("track", 1)])
+    assert (track(labels).state, track(labels).comment) == ("accepted", "")
+
+
+def said_of(labels: DriveLabels, kind: Any) -> tuple[str, str, str]:
+    value: Any = labels.items(kind)[1].value
+    return value.state, value.comment, value.reviewer
+
+
+@pytest.mark.parametrize(
+    ("kind", "what"),
+    [("lead", "lead #1 of frames 11–21"), ("path", "the path of frame 13"), ("event", "cut-in in frame 12")],
+)
+def test_the_lead_paths_and_events_are_sent_back_and_reviewed(labels: DriveLabels, kind: str, what: str) -> None:
+    act(labels, kind="set_path", frame=12, left=[[0, 1], [5, 1]], right=None)
+    act(labels, kind="add_event", frame=11, event="cut_in", tracks=[1])
+    act(labels, kind="accept", items=[("lead", 1)])
+    with pytest.raises(ActRefused, match=f"you changed {what} last"):
+        act(labels, kind="review_ok", items=[(kind, 1)])
+    assert act(labels, "Bob", kind="send_back", items=[(kind, 1)], comment="no").what == f"sent back {what}: no"
+    assert said_of(labels, kind) == ("proposed", "no", "")
+    act(labels, kind="accept", items=[(kind, 1)])
+    assert act(labels, "Bob", kind="review_ok", items=[(kind, 1)]).what == f"reviewed and accepted {what}"
+    assert said_of(labels, kind) == ("accepted", "", "Bob")
+    labels.log.move("undo", "Bob")
+    assert said_of(labels, kind) == ("accepted", "", "")
+
+
+def test_what_was_reviewed_is_not_lengthened_by_what_was_not(labels: DriveLabels) -> None:
+    act(labels, kind="set_lead", first=30, last=40, lead=2)
+    number = max(labels.items("lead"))
+    act(labels, "Bob", kind="review_ok", items=[("lead", number)])
+    act(labels, kind="set_lead", first=41, last=45, lead=2)
+    ranges = [labels.items("lead")[each].value for each in (number, number + 1)]
+    assert [(each.first, each.last, each.reviewer) for each in ranges] == [(30, 40, "Bob"), (41, 45, "")]  # type: ignore[union-attr]
+    act(labels, kind="set_lead", first=35, last=36, lead="none")
+    assert [(first, last) for first, last, who, _ in leads(labels) if who == 2] == [(30, 34), (37, 40), (41, 45)]
+
+
+def test_what_names_a_removed_track_goes_with_it(labels: DriveLabels) -> None:
+    act(labels, kind="add_event", frame=15, event="cut_in", tracks=[1, 2])
+    act(labels, kind="remove", items=[("track", 1)])
+    assert leads(labels) == []
+    assert [item.value.tracks for item in labels.items("event").values()] == [(2,)]  # type: ignore[union-attr]
+    labels.log.move("undo", "Ada")
+    assert leads(labels) == [(10, 20, 1, "proposed")]
+    assert len(track(labels).sightings) == 11
+
+
+def test_labels_that_were_kept_before_there_were_reviews_are_read() -> None:
+    origin = {"maker": "person", "name": "Ada", "t_unix_ms": 5, "params": None, "calibration": None}
+    kept = {"first": 1, "last": 2, "lead": 3, "state": "accepted", "origin": origin}
+    assert value_from_json("lead", kept) == LeadRange(1, 2, 3, "accepted", Origin("person", "Ada", 5), "", "")
