@@ -17,6 +17,7 @@ from fastapi.staticfiles import StaticFiles
 from starlette.types import Scope
 
 from app.access import Access, Guard
+from app.api_description import REFUSALS, titled
 from app.clips.jobs import Jobs
 from app.drive.marks import Marks
 from app.engine import Engine
@@ -70,7 +71,10 @@ def create_app(
         await asyncio.to_thread(jobs.close)
         viewer.close()
 
-    app = FastAPI(title="CIPV Studio", version="1", docs_url=None, redoc_url=None, lifespan=listening)
+    app = FastAPI(
+        title="CIPV Studio", version="1", docs_url=None, redoc_url=None, lifespan=listening, responses=REFUSALS
+    )
+    app.openapi = titled(app)  # type: ignore[method-assign]
     app.add_middleware(BodyLimit, files={IMPORT: LARGEST_FILE})
     app.add_middleware(Guard, access=access, tokens=tokens)  # the last one added is the first to be asked
     app.add_exception_handler(RequestValidationError, _one_sentence)
@@ -160,5 +164,13 @@ async def _one_sentence(_: Request, error: Exception) -> JSONResponse:
     """422 with the first complaint: where, and what is wrong there."""
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
+    if first["type"] == "json_invalid":
+        return _not_understood(f"the body is no JSON: {first['ctx']['error']}")
+    if first["loc"] == ("body",) and first["type"] != "missing":
+        return _not_understood("the body has to be a JSON object, sent as application/json")
     place = ".".join(str(part) for part in first["loc"] if part != "body")
-    return JSONResponse({"detail": f"{place}: {first['msg']}" if place else first["msg"]}, status_code=422)
+    return _not_understood(f"{place}: {first['msg']}" if place else first["msg"])
+
+
+def _not_understood(detail: str) -> JSONResponse:
+    return JSONResponse({"detail": detail}, status_code=422)

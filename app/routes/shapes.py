@@ -33,6 +33,12 @@ class Done(_Exact):
     status: str
 
 
+class Refusal(_Exact):
+    """detail: why, in one sentence."""
+
+    detail: str
+
+
 class GateJson(_Exact):
     """One test of an object: its number, and the limit it was held against."""
 

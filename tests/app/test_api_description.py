@@ -104,6 +104,42 @@ def test_every_operation_says_what_it_does_and_what_it_answers(app: FastAPI):
     assert wrong == []
 
 
+def test_a_route_is_called_by_what_it_does(app: FastAPI):
+    titles = {name: operation["summary"] for name, operation in operations(app).items()}
+    assert titles["GET /api/result"] == "The shown frame's result"
+    assert titles["GET /api/jobs/{number}"] == "How far an export is"
+    assert [name for name, title in titles.items() if len(title.split()) < 2 or title.endswith(".")] == []
+
+
+def test_a_refusal_is_described_as_it_is_sent(client: httpx.Client, app: FastAPI):
+    refused = {
+        404: client.get("/api/jobs/987"),
+        409: client.post("/api/params/redo"),
+        422: client.patch("/api/params", json={"changes": {"cluster.tolerance_m": "far"}}),
+        413: client.post("/api/playback", content=b"{" + b" " * 5_000_000),
+        403: client.post("/api/playback", json={}, headers={"origin": "http://elsewhere.example"}),
+    }
+    assert [answer.status_code for answer in refused.values()] == list(refused)
+    for answer in refused.values():
+        assert shapes.Refusal.model_validate(answer.json()).detail
+    for name, operation in operations(app).items():
+        schema = operation["responses"]["4XX"]["content"]["application/json"]["schema"]
+        assert schema == {"$ref": "#/components/schemas/Refusal"}, name
+
+
+@pytest.mark.parametrize(
+    ("body", "kind", "said"),
+    [
+        (b"{playing: yes", "application/json", "the body is no JSON: "),
+        (b"[1, 2]", "application/json", "the body has to be a JSON object"),
+        (b"{}", "text/plain", "the body has to be a JSON object"),
+    ],
+)
+def test_a_body_that_is_none_is_said_in_words(client: httpx.Client, body: bytes, kind: str, said: str):
+    answer = client.post("/api/playback", content=body, headers={"content-type": kind})
+    assert (answer.status_code, answer.json()["detail"].startswith(said)) == (422, True), answer.text
+
+
 def _is_typed(schema: dict[str, Any]) -> bool:
     """A model of ours, a list of one, or null beside one."""
     return (
