@@ -83,6 +83,55 @@ def test_nobody_changes_parameters_between_an_undo_and_what_it_restores(
     assert (seen, control.peek().params.cipv.confirm_hits) == ([5], 7)
 
 
+# ------------------------------------------------------------ a database that may wait
+
+
+class Rounds(threading.Event):
+    """Lets the desk's thread look around all the time, and tells when it has."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.begun = threading.Semaphore(0)
+
+    def wait(self, timeout: float | None = None) -> bool:
+        self.begun.release()
+        return super().wait(0.005)
+
+    def let_one_pass(self) -> None:
+        for _ in range(2):
+            assert self.begun.acquire(timeout=WAIT_S)
+
+
+def test_it_is_opened_when_something_is_shown(control: Control, file: Path) -> None:
+    opened = threading.Event()
+
+    def open_it() -> Database:
+        opened.set()
+        return Database.in_file(file)
+
+    desk, rounds = LabelDesk(open_later=open_it), Rounds()
+    desk._wake = rounds
+    desk.start(control)
+    desk.open("live:a car", None)
+    rounds.let_one_pass()
+    assert not opened.is_set()
+    desk.shown()
+    assert opened.wait(WAIT_S)
+    desk.stop()
+
+
+def test_one_that_cannot_be_opened_is_said_and_keeps_nobody_from_driving(control: Control, file: Path) -> None:
+    file.write_bytes(b"no database at all" * 100)
+    desk = LabelDesk(open_later=lambda: Database.in_file(file))
+    desk.start(control)
+    desk.open("live:a car", None)
+    desk.shown()
+    until(desk, lambda: "not a database" in desk.state.trouble)
+    control.change_params({"cipv.confirm_hits": 5})
+    assert control.peek().params.cipv.confirm_hits == 5
+    desk.stop()
+
+
 # ------------------------------------------------------------ a database that somebody else holds
 
 
