@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from app.engine import Engine
+from app.late_scene import LateScene
 from app.looks import Looks
 from app.scene_feed import SceneFeed
 from pipeline.params import Params
@@ -104,3 +105,13 @@ def test_a_slider_of_the_3d_view_reaches_the_engine(engine: Engine, open_scene: 
 def _is_cloud(message: dict[str, Any]) -> bool:
     """A cloud made or a cloud changed."""
     return str(message.get("name", "")).startswith("/points")
+
+
+def test_it_is_started_when_somebody_first_asks_where_it_is(engine: Engine, open_scene: Any) -> None:
+    with LateScene(engine, Looks()) as late:
+        port = late.port()
+        assert late.port() == port
+        client = open_scene(port)
+        client.look()
+        client.read_until(_is_cloud)
+    assert late.port() is None
