@@ -129,11 +129,13 @@ export function addEvent(event) {
   return act({ kind: "add_event", frame: shown(), event, tracks: typeof track === "number" ? [track] : [] });
 }
 
-/** Go where there is something to do. @param {Wanted} what @param {1|-1} direction */
+/** Go where there is something to do; where that is one label, it is selected, and the next are first the others of its frame. @param {Wanted} what @param {1|-1} direction */
 export async function goTo(what, direction) {
-  const found = await ahead(what, get("scrub") ?? shown(), direction);
+  const isOfLabels = what === "proposed" || what === "sent_back", track = get("track");
+  const found = await ahead(what, get("scrub") ?? shown(), direction, isOfLabels && track !== null ? `&after_kind=track&after_id=${track}` : "");
   if (found instanceof Error) return say(found.message);
   if (found.frame === null) return say(`No ${what.replace("_", " ")} ${direction > 0 ? "after" : "before"} this frame`);
+  if (found.item) set("track", found.item.kind === "track" ? found.item.id : null);
   seekTo(found.frame);
   say(found.why);
 }

@@ -34,10 +34,13 @@ const HIDDEN = ["kind", "id", "track", "range", "items", "tracks", "revision", "
 /** Counted from 1 where people read them. */
 const FRAMES = ["frame", "first", "last"];
 
+/** What an act is about, where its kind does not say it to people. @type {Record<string, string>} */
+const ACTS = { set_sighting: "where it is", drop_keyframe: "no keyframe", drop_sightings: "not here", size_along: "its size", refit: "laid on points", relabel: "its class", trim_lead: "the range's end" };
+
 /** @param {string} title @param {Record<string, any>} item */
 function side(title, item) {
   const rows = Object.entries(item).filter(([key, value]) => !HIDDEN.includes(key) && value !== null && value !== undefined && value !== "");
-  return el("div", {}, el("h3", { textContent: item.kind ? `${title}: ${item.kind.replaceAll("_", " ")}` : title }), el("dl", { class: "facts-list" }, ...rows.flatMap(([key, value]) => [
+  return el("div", {}, el("h3", { textContent: item.kind ? `${title}: ${ACTS[item.kind] ?? item.kind.replaceAll("_", " ")}` : title }), el("dl", { class: "facts-list" }, ...rows.flatMap(([key, value]) => [
     el("dt", { textContent: ({ bbox: "box" })[key] ?? key.replaceAll("_", " ") }), el("dd", { textContent: words(FRAMES.includes(key) ? value + 1 : value) })])));
 }
 

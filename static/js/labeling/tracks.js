@@ -80,8 +80,8 @@ function update(row, { id, label, state, first, last, keyframes, origin, comment
   row.dataset.state = comment && state === "proposed" ? "sent-back" : state;
   const [mark, name, what, frames, who] = [...row.children];
   text(name, `#${id}`);
-  text(mark, reviewer ? "✓✓" : { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state]);
-  mark.setAttribute("aria-label", reviewer ? "reviewed" : state);
+  text(mark, reviewer ? "✓✓" : row.dataset.state === "sent-back" ? "↩" : { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state]);
+  mark.setAttribute("aria-label", reviewer ? "reviewed" : row.dataset.state === "sent-back" ? "sent back" : state);
   text(what, label);
   text(frames, first === null || last === null ? "nowhere" : `${first + 1}–${last + 1}${keyframes.length ? ` · ${keyframes.length} key` : ""}`);
   text(who, reviewer || (origin.maker === "person" ? origin.name : origin.maker));

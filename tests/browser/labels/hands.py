@@ -20,6 +20,8 @@ KEYSTROKE_S = {"key": 0.28, "press": 0.20, "point": 1.10, "decide": 1.35}
 something, and making up one's mind before an act. For a person's time, which no test can measure."""
 LEAD_X, LEAD_Y = 34.6, 0.0
 """Where the simulated lead's middle is in the shown frame."""
+LEADS_Y = 50
+"""The middle of the leads' row on the timeline, below one row of tags (static/js/timeline/rows.js)."""
 
 Spot = tuple[float, float]
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 import pytest
 from playwright.sync_api import expect
 
-from tests.browser.labels.hands import Hand, Labels, is_at
+from tests.browser.labels.hands import LEADS_Y, Hand, Labels, is_at
 from tests.browser.looks import box_of, go_to, on_timeline, pixels, repainted
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
-
-LEADS_Y = 37
-"""The middle of the labels' row on the timeline (static/js/timeline/rows.js)."""
 
 
 def border(hand: Hand, frame: int) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from playwright.sync_api import expect
 
 from pipeline.params import Params
 from tests.browser.conftest import START, Site
-from tests.browser.labels.hands import Hand, Labels, begin, draw, is_at, is_saved
+from tests.browser.labels.hands import LEADS_Y, Hand, Labels, begin, draw, is_at, is_saved
 from tests.browser.looks import box_of, go_to, on_timeline, pixels, repainted, wait_for_frame, whole_drive
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
@@ -78,7 +78,7 @@ def test_the_lead_is_painted_by_keys_by_number_and_by_a_drag(hand: Hand, labels:
     labels.wait_for(lambda now: now.leads[-1] == (START + 5, START + 5, "none"))
 
     front = box_of(page.locator("#timeline-front"))
-    y = front["y"] + 37
+    y = front["y"] + LEADS_Y
     hand.drag((front["x"] + on_timeline(page, 100), y), (front["x"] + on_timeline(page, 120), y), steps=8)
     labels.wait_for(lambda now: (100, 120, made) in now.leads)
     is_at(page, 120)
@@ -136,6 +136,7 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
     page.get_by_role("button", name="To do").click()
     hand.keys("b")
     expect(page.locator(".said")).not_to_be_empty()
+    expect(page.locator(".track-detail")).to_be_visible()
     with page.expect_download() as download:
         page.locator("#label-pane").get_by_role("button", name="Export").click()
         page.locator("#menu").get_by_text("CIPV Studio").click()
