@@ -13,8 +13,8 @@ install: .venv/.installed
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "uv>=0.5"
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python -r requirements.lock
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps -e .
-	@echo "compiling the kernels, once"
-	@$(BIN)/python -c "from pipeline.step import warm_up; warm_up()"
+	@echo "compiling what a first start would wait for, once"
+	@$(BIN)/python -m app.first_start
 	@touch $@
 
 demo: install
