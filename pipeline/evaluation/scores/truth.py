@@ -86,7 +86,7 @@ def _over_time(frames: Mapping[int, FrameTruth], followed: bool) -> tuple[dict[i
         jumps = frozenset((tick, key) for tick, key in jumps if _lead_of(moving[tick]) == key)
     tracks = len({key for _, key in jumps})
     told = f"{tracks} {'track jumps' if tracks == 1 else 'tracks jump'} in {len(jumps)}"
-    note = f"{told} places, as no vehicle moves: speed is not judged there."
+    note = f"{told} {'place' if len(jumps) == 1 else 'places'}, as no vehicle moves: speed is not judged there."
     return moving, (*(() if followed else (_NOT_FOLLOWED,)), *((note,) if jumps else ()))
 
 

@@ -8,7 +8,7 @@ const JUDGES = { labels: "what people labelled here", recording: "the labels tha
 
 /** @param {Pick<import("../types.js").Comparison, "metrics"|"truth"|"judged">} comparison @param {boolean} [isAlone] there is nothing to compare with: one column @returns {HTMLElement} */
 export function metricsTable({ metrics, truth, judged }, isAlone = false) {
-  const judge = truth ? `Judged in ${judged} frames against ${JUDGES[truth]}` : "Without labels: what needs none";
+  const judge = truth ? `Judged in ${judged} ${judged === 1 ? "frame" : "frames"} against ${JUDGES[truth]}` : "Without labels: what needs none";
   const head = (isAlone ? [] : ["", "before", "after", "change"]).map((words) => el("th", { scope: "col", textContent: words }));
   return el("div", {}, el("table", { class: "metrics" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...metrics.map((metric) => row(metric, isAlone)))), el("p", { class: "facts", textContent: judge }));
 }
