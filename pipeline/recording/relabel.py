@@ -7,6 +7,7 @@ import os
 import zlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO
 
@@ -23,7 +24,7 @@ from pipeline.recording.container import McapFile, Stored
 from pipeline.recording.directory import read_summary, summary_start
 from pipeline.recording.output import CHUNK_BYTES
 
-_PIECE_BYTES = 4 << 20
+_PIECE_BYTES = 1 << 20
 _CRC_BYTES = 4
 _LABELS = topics.channel(topics.LABELS)
 
@@ -70,11 +71,16 @@ def _is_in_order(file: McapFile, summary: Summary) -> bool:
     return known and all(sorted(each) == [*range(1, len(each) + 1)] for each in (summary.schemas, summary.channels))
 
 
-def _copy(source: BinaryIO, target: BinaryIO, end: int, progress: Progress) -> None:
+def _copy(source: BufferedReader, target: BinaryIO, end: int, progress: Progress) -> None:
+    piece, done = memoryview(bytearray(_PIECE_BYTES)), 0
     source.seek(0)
-    while (done := source.tell()) < end:
+    while done < end:
         progress(done, end)
-        target.write(source.read(min(_PIECE_BYTES, end - done)))
+        count = source.readinto(piece[: end - done])
+        if not count:
+            raise OSError(f"{source.name}: it became shorter while it was read")
+        target.write(piece[:count])
+        done += count
 
 
 def _write_rest(
