@@ -86,7 +86,7 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
 
 def _json(rows: list[Row]) -> str:
     """A row a line; row by row, which Python does in C, as it does not with an indent."""
-    lines = (json.dumps(row, ensure_ascii=False, allow_nan=False) for row in rows)
+    lines = map(json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode, rows)
     return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
