@@ -19,6 +19,13 @@ export function begin() {
 export function end() {
   const { first } = marked();
   set("marked", { first: first !== null && first <= shown() ? first : null, last: shown(), typed: "" });
+  tellMarked();
+}
+
+/** What can be said of what is marked. */
+export function tellMarked() {
+  const { first, last } = span();
+  set("said", `Frames ${first + 1}–${last + 1} are marked: say who leads there (C, its number), that all is labelled (Shift W), or a tag (Frame)`);
 }
 
 /** @param {number} first @param {number} last */

@@ -106,7 +106,11 @@ function marks(span, from, isOfLead) {
     if (hasMoved) marking.markAll(from, to);
     seekTo(to);
   };
-  return Object.assign(along, { ended: (/** @type {boolean} */ isKept) => { if (isKept && isOfLead && hasMoved && get("track") !== null) marking.paint(/** @type {number} */ (get("track"))); } });
+  return Object.assign(along, { ended: (/** @type {boolean} */ isKept) => {
+    if (!isKept || !hasMoved) return;
+    if (isOfLead && get("track") !== null) marking.paint(/** @type {number} */ (get("track")));
+    else marking.tellMarked();
+  } });
 }
 
 /** @param {{top: number, height: number}|null} row @param {number} y */
