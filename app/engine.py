@@ -33,6 +33,12 @@ logger = logging.getLogger("cipv.engine")
 
 _PATIENCE_S = 10.0
 _TELL_EVERY_S = 0.25
+_ABLATION: dict[Sensors, tuple[str, ...]] = {
+    "both": (),
+    "lidar": ("by the LiDAR alone: nothing looks at the pictures",),
+    "camera": ("by the camera alone: the LiDAR's points are left out",),
+}
+"""What people are told who see only a part of what is there."""
 
 
 class OpenSource(Protocol):
@@ -156,7 +162,7 @@ class Engine:
         except _Overtaken:
             self._showing.publish(replace(self.snapshot, busy=None))
             return False
-        notices = [Notice("info", text) for text in source.notes]
+        notices = [Notice("info", text) for text in (*source.notes, *_ABLATION[self._sensors])]
         detectors = self._detectors.both_for(source, notices)
         self.desk.stop()
         self._close()

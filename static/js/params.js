@@ -23,6 +23,7 @@ const error = el("p", { class: "params-error", aria: { role: "alert" }, hidden: 
 const list = el("div", { class: "params-list" });
 const presets = el("select", { aria: { label: "Preset" } });
 const search = el("input", { type: "search", placeholder: "Search parameters", aria: { label: "Search parameters" }, oninput: filter });
+const nothing = el("p", { class: "facts", aria: { role: "status" }, textContent: "No parameter is called or explained so.", hidden: true });
 /** @type {Map<string, ReturnType<typeof control>>} */
 const controls = new Map();
 /** @type {Map<string, {node: HTMLDetailsElement, count: HTMLElement, help: string}>} */
@@ -46,7 +47,7 @@ export function setUp() {
   presets.addEventListener("change", () => choosePreset(presets.value));
   $("#params").append(
     el("div", { class: "params-top" }, el("div", { class: "row" }, el("span", { class: "facts", textContent: "Preset" }), presets,
-      el("button", { type: "button", textContent: "Reset", title: "Every parameter back to the preset's value", onclick: () => choosePreset(presets.value) }), download), search, error),
+      el("button", { type: "button", textContent: "Reset", title: "Every parameter back to the preset's value", onclick: () => choosePreset(presets.value) }), download), search, error, nothing),
     list);
   on(["state"], refreshIfForeign);
   on(["params"], () => (knownRevision = Math.max(knownRevision, get("params")?.revision ?? -1)));
@@ -92,11 +93,10 @@ function refuse(problem) {
 /** @param {ParamsAnswer} answer */
 function build({ sections: described, presets: names }) {
   presets.append(...names.map((name) => el("option", { value: name, textContent: name })));
-  const open = new Set(memory.read("sections", OPEN_AT_FIRST));
   const order = [...described].sort((a, b) => Number(b.name === FIRST_SECTION) - Number(a.name === FIRST_SECTION));
   for (const section of order) {
     const count = el("span", { class: "count" });
-    const node = el("details", { class: "section", open: open.has(section.name), data: { section: section.name } },
+    const node = el("details", { class: "section", data: { section: section.name } },
       el("summary", { title: section.help }, section.name.replaceAll("_", " "), count));
     node.addEventListener("toggle", rememberOpen);
     sections.set(section.name, { node, count, help: section.help });
@@ -109,6 +109,7 @@ function build({ sections: described, presets: names }) {
     }
     list.append(node);
   }
+  filter();
 }
 
 /**
@@ -144,19 +145,23 @@ function rememberOpen() {
   memory.write("sections", [...sections].filter(([, { node }]) => node.open).map(([name]) => name));
 }
 
+/** As names and words are compared: `z_weight` is found by "z weight" and the other way round. @param {string} text */
+const plain = (text) => text.replaceAll("_", " ").toLowerCase();
+
 /** Show what matches the words, with its sections open. */
 function filter() {
-  const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
+  const words = plain(search.value).split(/\s+/).filter(Boolean);
   const remembered = new Set(memory.read("sections", OPEN_AT_FIRST));
   for (const [section, { node, help }] of sections) {
     let any = false;
     for (const [name, one] of controls) {
       if (!name.startsWith(`${section}.`)) continue;
-      const about = `${name} ${one.help} ${help}`.replaceAll("_", " ").toLowerCase();
+      const about = plain(`${name} ${one.help} ${help}`);
       one.node.hidden = !words.every((word) => about.includes(word));
       any ||= !one.node.hidden;
     }
     node.hidden = !any;
     node.open = words.length ? any : remembered.has(section);
   }
+  nothing.hidden = !words.length || [...sections.values()].some(({ node }) => !node.hidden);
 }

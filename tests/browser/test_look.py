@@ -171,6 +171,19 @@ def test_times_and_values_are_said_as_people_read_them(open_page: OpenPage):
     assert told == ["0:00.0", "0:59.9", "1:00.0", "60:00.0", "> 60 s", "4.8 s", "−5.4 km/h"]
 
 
+def test_a_parameter_is_found_by_its_name_and_by_words(open_page: OpenPage):
+    page = open_page()
+    weight, nothing = page.locator("[data-param='cluster.z_weight']"), page.get_by_text("No parameter is called")
+    for typed in ("cluster.z_weight", "z weight", "Z_Weight"):
+        page.get_by_label("Search parameters").fill(typed)
+        expect(weight).to_be_visible()
+        expect(page.locator("[data-param='sync.wait_ms']")).to_be_hidden()
+        expect(nothing).to_be_hidden()
+    page.get_by_label("Search parameters").fill("there is no such thing")
+    expect(weight).to_be_hidden()
+    expect(nothing).to_be_visible()
+
+
 def test_an_address_that_could_not_be_opened_is_there_to_be_mended(open_page: OpenPage):
     page = open_page()
     page.route("**/api/source", lambda route: route.fulfill(status=202, body="{}"))

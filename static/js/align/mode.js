@@ -17,7 +17,7 @@ const PAUSE_MS = 250;
 const OFF = { on: false, blend: 0.5, edges: true };
 
 const bar = $("#align-bar"), button = $("#align-button");
-const score = el("b", { class: "score", title: "How well the LiDAR's depth edges lie on the picture's edges" });
+const score = el("b", { class: "score", title: "How well the LiDAR's depth edges lie on the picture's edges", textContent: "looking …" });
 const how = el("span", { class: "facts" });
 
 const fetchScore = newestOnly(async () => {

@@ -163,6 +163,17 @@ def test_what_a_detector_has_to_say_is_said_on_the_page():
         engine.stop()
 
 
+@pytest.mark.parametrize(
+    ("sensors", "told"),
+    [("both", []), ("lidar", ["by the LiDAR alone"]), ("camera", ["by the camera alone"])],
+    ids=["both", "LiDAR", "camera"],
+)
+def test_a_car_with_only_one_sensor_is_told_on_the_page(start: Start, sensors: str, told: list[str]):
+    engine, recording, _ = start(sensors=sensors)
+    said = [n.text for n in engine.snapshot.notices]
+    assert [text.partition(":")[0] for text in said if text not in recording.notes] == told
+
+
 def test_the_detector_is_asked_for_again_where_pictures_are_drawn():
     """A network for real pictures is not the one for the simulator, even when the pictures are equally large."""
     asked: list[str] = []
