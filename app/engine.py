@@ -120,7 +120,6 @@ class Engine:
     # ------------------------------------------------------------ the worker
 
     def _work(self) -> None:
-        warm_up()
         while True:
             player = self._player
             wish = self.control.take(player.wait_s(self.snapshot.index) if player is not None else None)
@@ -139,6 +138,7 @@ class Engine:
             with turn.foreground():
                 if not self._open(wish.uri):
                     return
+                warm_up()  # as a rule ``drives`` has, beside the opening
         player = self._player
         if player is not None:
             player.wait(wish.params)
