@@ -4,6 +4,9 @@ process's CPU: what else the machine does is not counted, nor what a database se
 from __future__ import annotations
 
 import json
+import resource
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +15,6 @@ from typing import Any
 import cv2
 import pytest
 
-from app.cli import main
 from app.labels.acts import do
 from app.labels.acts.scope import Scope
 from app.labels.answers import changes_json, window_json
@@ -37,9 +39,9 @@ pytestmark = pytest.mark.soak
 KILLS = 100
 FRAMES, TRACKS, LIFE = 4000, 1000, 100
 SEEK_S, EXPORT_S = 0.15, 10.0
-COMMAND_S, WITH_POINTS_S = 15.0, 30.0
-"""Of the whole command: 4,000 frames of the session are looked up; for nuScenes, which counts points in cuboids, their
-sweeps are unpacked."""
+"""An export also as a whole command, from its first import to its end."""
+COUNTING_S = 15.0
+"""nuScenes: points are counted by two threads, so that the command takes less time than CPU."""
 BY = Origin("import", "made up", 1)
 REPORT = Path("build/soak_labels.json")
 
@@ -116,8 +118,8 @@ def test_a_hundred_thousand_labels_in_one_drive(kind: str, request: pytest.Fixtu
 
 @pytest.mark.timeout(3600)
 def test_a_hundred_thousand_labels_of_a_real_session_go_out_by_the_command_line(data_dir: Path, tmp_path: Path) -> None:
-    """Frames of a real drive, over and over: camera, points and calibration are there. Every format, from the command
-    to its end; a copy of the whole session is as long as the session and has no bound."""
+    """Frames of a real drive, over and over: camera, points and calibration are there. Every format, in a process of
+    its own; nuScenes counts the points in each cuboid, and a session is written whole."""
     session, labels = tmp_path / "drive.mcap", tmp_path / "labels.json"
     _write_session(session, data_dir / "kitti_0052")
     drive = drive_of(open_source(str(session)))
@@ -125,15 +127,19 @@ def test_a_hundred_thousand_labels_of_a_real_session_go_out_by_the_command_line(
     export_labels(_with_boxes(whole), drive, "native", labels)
     took: dict[str, float] = {}
     for name in FORMATS:
-        command = ["labels", "export", session, "--labels", labels, "--format", name, "--out", tmp_path / name]
-        began = time.process_time()
-        with pytest.raises(SystemExit) as ended:
-            main([str(each) for each in command])
-        assert ended.value.code in (0, None)
-        took[name] = round(time.process_time() - began, 2)
+        options = ["--labels", labels, "--format", name, "--out", tmp_path / name]
+        took[name] = _cpu_s(["labels", "export", session, *options])
     _report(command_line=took)
-    assert max(took[name] for name in took.keys() - {"mcap", "nuscenes"}) < COMMAND_S
-    assert took["nuscenes"] < WITH_POINTS_S
+    assert max(took[name] for name in took.keys() - {"nuscenes"}) < EXPORT_S
+    assert took["nuscenes"] < COUNTING_S
+
+
+def _cpu_s(command: list[Any]) -> float:
+    """Seconds of CPU that a command takes, of all its threads."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, "-c", "from app.cli import main; main()", *map(str, command)], check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return round(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, 2)
 
 
 def _write_session(path: Path, folder: Path) -> None:
