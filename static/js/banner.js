@@ -72,7 +72,7 @@ function updateAcc({ acc: command, ego }) {
     pedals[pedal].fill.style.setProperty("--part", `${100 * (value ?? 0)}%`);
     text(pedals[pedal].value, value === null ? DASH : `${Math.round(100 * value)} %`);
   }
-  say(note, command ? command.reason : "Own speed is unknown in this recording.");
+  say(note, command ? command.reason : "Own speed is unknown.");
 }
 
 /** Words that may be cut off, so they are the tooltip too. @param {HTMLElement} node @param {string} words */
