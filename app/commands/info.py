@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import tyro
 from rich.console import Console
 from rich.table import Table
 
+from pipeline.complaint import given_path
 from pipeline.recording.info import Info, Rhythm, info, info_of_source
 
 _WIDE = 120
@@ -33,7 +33,7 @@ class ShowInfo:
 
     def __call__(self) -> int:
         if self.source.lower().endswith(".mcap"):
-            found = info(Path(self.source.removeprefix("mcap:")).expanduser())
+            found = info(given_path(self.source.removeprefix("mcap:")))
             _print_json(asdict(found)) if self.json else _print_info(found)
             return 0
         from app.progress import (

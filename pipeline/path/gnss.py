@@ -221,8 +221,6 @@ def _beyond_the_end(center: F64, s: F64, left_m: float) -> F64:
     over = np.maximum(s - left_m, 0.0)
     if not over.any():
         return center
-    if over[0] > 0.0:  # the car is beyond it already
-        return np.column_stack([s, np.zeros_like(s)])
     last = int(np.argmax(over > 0.0)) - 1
     back = max(last - 2, 0)
     way = center[last] - center[back] if last > back else np.array([1.0, 0.0])

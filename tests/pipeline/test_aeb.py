@@ -89,6 +89,9 @@ def test_one_frame_is_not_enough() -> None:
         pytest.param(fused(1, 20.0, 0.0, "L", (-20.0, 0.0), hits=2), "cruise", id="one sensor, not confirmed"),
         pytest.param(fused(1, 20.0, 0.0, "L", (-20.0, 0.0), hits=3), "full_brake", id="one sensor, confirmed"),
         pytest.param(fused(1, 20.0, 0.0, "L", (-20.0, 0.0), height=0.2), "cruise", id="a kerb"),
+        pytest.param(
+            fused(1, 20.0, 0.0, "V", (-20.0, 0.0)), "partial_brake", id="a box height alone never brakes fully"
+        ),
     ],
 )
 def test_whom_it_brakes_for(other: FusedObject, state: str) -> None:

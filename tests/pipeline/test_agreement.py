@@ -51,6 +51,11 @@ def test_cars_that_come_apart_for_long(objects: tuple[FusedObject, ...], disagre
     assert (heeded is path) is not disagree
 
 
+def test_one_cluster_is_the_place_of_one_car_only() -> None:
+    one = (at(1, 0.0, "V"), at(2, 4.0, "L"), at(3, -9.0, "VL"))
+    assert after_s((*one, at(4, 1.0, "V"))) == after_s(one), "the second box has no cluster left to be apart from"
+
+
 def test_a_moment_says_nothing_and_an_empty_road_forgets_nothing() -> None:
     apart = (at(1, 0.0, "V"), at(2, 4.0, "L"))
     assert heed(corridor(None, PathParams()), after_s(apart, 0.4), PARAMS).usable
