@@ -13,7 +13,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import select, text
+from sqlalchemy import create_engine, select, text
 
 from app.labels import migrations
 from app.labels.database import Database, DatabaseError, open_database
@@ -170,10 +170,23 @@ def test_a_database_of_an_older_program_goes_on(file: Path, monkeypatch: pytest.
     new.close()
 
 
-def test_tags_of_single_frames_become_ranges(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(params=["sqlite", "postgres"])
+def nowhere(request: pytest.FixtureRequest, file: Path) -> str:
+    """The address of a database without tables."""
+    if request.param == "sqlite":
+        return f"sqlite:///{file}"
+    url: str = request.getfixturevalue("postgres_url")
+    engine = create_engine(url.replace("postgresql:", "postgresql+psycopg:"), isolation_level="AUTOCOMMIT")
+    with engine.connect() as connection:
+        connection.execute(text("CREATE DATABASE older"))
+    engine.dispose()
+    return url.replace("/postgres?", "/older?")
+
+
+def test_tags_of_single_frames_become_ranges(nowhere: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """What stands, and what can be taken back: the second was removed."""
     monkeypatch.setattr("app.labels.database.HEAD", "0002")
-    old = Database.in_file(file)
+    old = Database(nowhere)
     origin = {"maker": "person", "name": "Ada", "t_unix_ms": 5, "params": None, "calibration": None, "how": ""}
     tags = [{"frame": frame, "tag": tag, "origin": origin} for frame, tag in ((3, "night"), (4, "rain"))]
     night, rain = (pack({"value": each, "frames": [], "sightings": []}) for each in tags)
@@ -186,11 +199,12 @@ def test_tags_of_single_frames_become_ranges(file: Path, monkeypatch: pytest.Mon
             row = f"(1, {number}, 'tag', '{item}', :before, :after)"
             connection.execute(text(f"INSERT INTO change VALUES {row}"), body)
         for item, revision in ((1, 1), (2, 3)):
-            row = f"(1, 'tag', {item}, {revision}, {item - 1}, :value)"
-            connection.execute(text(f"INSERT INTO item VALUES {row}"), {"value": json.dumps(tags[item - 1])})
+            row = f"(1, 'tag', {item}, {revision}, :removed, :value)"
+            there = {"removed": item == 2, "value": json.dumps(tags[item - 1])}
+            connection.execute(text(f"INSERT INTO item VALUES {row}"), there)
     old.close()
     monkeypatch.undo()
-    new = Database.in_file(file)
+    new = Database(nowhere)
     labels = DriveLabels(new, info("drive"), station="here")
     assert [(each.first, each.last, each.tag) for each in labels.label_set().tags] == [(3, 3, "night")]
     labels.log.move("undo", "Ada")

@@ -16,7 +16,8 @@ revision = "0003"
 down_revision = "0002"
 
 _ITEM = sa.table("item", *map(sa.column, ("drive_id", "kind", "id", "value")))
-_CHANGE = sa.table("change", *map(sa.column, ("drive_id", "act", "kind", "item", "before", "after")))
+_BLOBS = (sa.column("before", sa.LargeBinary), sa.column("after", sa.LargeBinary))
+_CHANGE = sa.table("change", *map(sa.column, ("drive_id", "act", "kind", "item")), *_BLOBS)
 
 
 def upgrade() -> None:
