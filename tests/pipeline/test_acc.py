@@ -145,6 +145,11 @@ def test_where_nobody_knows_the_way_it_gets_no_faster() -> None:
         assert held is not None
         assert held.desired_speed_mps == wanted_mps
         assert held.reason == "path known for 12 m only: no faster than now"
+    eager = AccState(integral_m=50.0, error_mps=0.0)
+    assert control(eager, EgoState(0, 20.0), None, (), PATH, 0.1, PARAMS)[1].accelerator > 0.0  # type: ignore[union-attr]
+    _, held = control(eager, EgoState(0, 20.0), None, (), vague, 0.1, PARAMS)
+    assert held is not None
+    assert held.accelerator == 0.0, "whatever the integral has gathered"
     _, follows = control(AccState(), EgoState(0, 20.0), Cipv(1, 20.0, None, None, ""), (), vague, 0.1, PARAMS)
     assert follows is not None
     assert follows.state == "follow"

@@ -47,6 +47,14 @@ def test_over_ground(
     assert item.moving is moving
 
 
+def test_a_parked_car_aside_stands_still_while_we_turn() -> None:
+    """In a frame that turns by 0.1 rad/s what stands at (20, 8) seems to go 0.8 m/s ahead and 2 m/s to the right."""
+    (item,) = describe([fused(1, 20.0, 8.0, velocity=(-10.0 + 0.8, -2.0))], EgoState(0, 10.0, 0.1), PARAMS)
+    assert item.closest_point is not None
+    assert item.closest_point[:2] == (20.0, 8.0)
+    assert item.speed_over_ground_mps == pytest.approx(0.0, abs=1e-9)
+
+
 def test_an_object_without_a_place_has_no_ttc() -> None:
     (item,) = describe([fused(1, None, source="V")], EgoState(0, 20.0), PARAMS)
     assert (item.ttc_s, item.speed_over_ground_mps, item.moving) == (None, None, None)
