@@ -22,6 +22,7 @@ MAX_GAP_S = TimeParams().reset_gap_s
 _LINK_M, _LINK_MPS = 2.0, 10.0
 _FIRST_MPS, _FIRST_ASIDE_M = 50.0, 1.0
 _NEVER = 1e6
+_STILL = np.zeros(2)
 
 
 def linked(labelled: Mapping[int, tuple[TruthObject, ...]]) -> dict[int, tuple[TruthObject, ...]]:
@@ -51,23 +52,30 @@ def _links(
     """Places in ``now`` to the ids they go on with. speeds: (2,) m/s by id, of those whose is known."""
     if not before or not now:
         return {}
-    cost = np.array([[_cost(a, b, speeds.get(a.id or 0), gap_s) for b in now] for a in before])
+    cost = _costs(before, now, speeds, gap_s)
     from scipy.optimize import linear_sum_assignment  # 0.2 s to import: most labels have tracks already
 
     rows, columns = linear_sum_assignment(cost)
     return {int(n): before[k].id for k, n in zip(rows, columns, strict=True) if cost[k, n] < _NEVER}  # type: ignore[misc]
 
 
-def _cost(a: TruthObject, b: TruthObject, speed: F64 | None, gap_s: float) -> float:
-    """How far, metres, ``b`` is from where ``a`` should be."""
-    off = _place(b) - _place(a) - (speed * gap_s if speed is not None else 0.0)
-    apart_m = float(np.hypot(*off))
+def _costs(
+    before: tuple[TruthObject, ...], now: tuple[TruthObject, ...], speeds: Mapping[int, F64], gap_s: float
+) -> F64:
+    """(before, now) how far, metres, each is from where each should be; ``_NEVER`` where it cannot be that one."""
+    were, are = (np.array([_place(each) for each in items]) for items in (before, now))
+    moved = np.array([speeds.get(each.id or 0, _STILL) for each in before]) * gap_s
+    off = are[None] - were[:, None] - moved[:, None]
+    apart_m = np.hypot(off[..., 0], off[..., 1])
+    yaws_rad = np.array([[each.cuboid.yaw_rad] for each in before])
+    c, s = np.cos(yaws_rad), np.sin(yaws_rad)
+    along_m, aside_m = np.abs(c * off[..., 0] + s * off[..., 1]), np.abs(c * off[..., 1] - s * off[..., 0])
+    is_new = np.array([[(each.id or 0) not in speeds] for each in before])
     near = apart_m <= _LINK_M + _LINK_MPS * gap_s
-    if speed is None and not near:
-        c, s = np.cos(a.cuboid.yaw_rad), np.sin(a.cuboid.yaw_rad)
-        along, aside = abs(c * off[0] + s * off[1]), abs(c * off[1] - s * off[0])
-        near = bool(along <= _FIRST_MPS * gap_s and aside <= _FIRST_ASIDE_M)
-    return apart_m if near and a.label == b.label else _NEVER
+    near |= is_new & (along_m <= _FIRST_MPS * gap_s) & (aside_m <= _FIRST_ASIDE_M)
+    same = np.array([[a.label == b.label for b in now] for a in before])
+    costs: F64 = np.where(near & same, apart_m, _NEVER)
+    return costs
 
 
 def _place(item: TruthObject) -> F64:
