@@ -12,7 +12,12 @@ from pydantic import BaseModel, ValidationError
 
 from pipeline.errors import BadInput
 
-_IN_OUR_WORDS = {"extra_forbidden": "no such setting", "missing": "is missing"}
+_IN_OUR_WORDS = {
+    "extra_forbidden": "no such setting",
+    "missing": "is missing",
+    "list_type": "has to be a list",
+    "model_type": "has to be settings, each with its name",
+}
 
 
 def read_yaml(path: Path, what: str, refuse: Callable[[str], BadInput] = BadInput) -> Any:

@@ -55,6 +55,9 @@ class Car(Strict):
         ({"engine": {}}, "title: is missing"),
         ({"title": "a", "mass_kg": -1}, "mass_kg: Input should be greater than 0"),
         ({"title": "a", "wheels": []}, "a car without wheels"),
+        ({"title": "a", "wheels": {"radius_m": 1}}, "wheels: has to be a list"),
+        ({"title": "a", "wheels": [0.3]}, "wheels.0: has to be settings, each with its name"),
+        ([], "has to be settings, each with its name"),
     ],
 )
 def test_the_first_complaint(data: dict[str, Any], sentence: str) -> None:
