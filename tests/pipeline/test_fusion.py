@@ -185,6 +185,17 @@ def test_an_object_keeps_its_number_from_v_to_vl_to_l() -> None:
     assert len({f.objects[0].id for f in (first, second, third)}) == 1
 
 
+def test_a_fragment_does_not_take_the_number_of_the_whole() -> None:
+    """The box that the car had is a fragment now, and a new one has its cluster: the number goes with the cluster."""
+    track = lidar_track(1, 20.0)
+    state, first = joined([track], [vision_track(1, box_of(track))])
+    assert [item.source for item in first.objects] == ["VL"]
+    fragment = vision_track(1, (0.0, 0.0, 20.0, 20.0))
+    _, second = joined([track], [fragment, vision_track(2, box_of(track))], state=state)
+    by_box = {item.vision_track: item.id for item in second.objects}
+    assert by_box == {1: 2, 2: first.objects[0].id}
+
+
 def test_two_numbers_that_become_one_object_keep_the_older_and_part_again_without_a_clash() -> None:
     track = lidar_track(1, 20.0)
     apart = vision_track(1, (900.0, 300.0, 1000.0, 400.0), 20.0)
