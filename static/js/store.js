@@ -13,8 +13,8 @@
  * @property {{status: "live"|"lost", since: number}} link
  * @property {import("./types.js").ParamsAnswer} params
  * @property {string} theme
- * @property {import("./types.js").Drive} drive  the whole recording, as the timeline shows it
- * @property {import("./types.js").ObjectCurve} curve  the selected object over the recording
+ * @property {import("./drive/types.js").Drive} drive  the whole recording, as the timeline shows it
+ * @property {import("./drive/types.js").ObjectCurve} curve  the selected object over the recording
  * @property {number} scrub  the frame asked for and not shown yet
  * @property {{first: number, last: number}} clip  what is marked for export
  * @property {import("./workspace/panes.js").Layout} layout

@@ -1,4 +1,4 @@
-"""What types.js and labeling/types.js of the page say of a message is what is sent: no key more, no key less."""
+"""What types.js, drive/types.js and labeling/types.js say of a message is what is sent: no key more, no key less."""
 
 from __future__ import annotations
 
@@ -158,15 +158,13 @@ def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
 MADE_BY_THE_PAGE = {"Frame", "Series", "Drive"}
 """Put together in the page from messages."""
 
-LABEL_TYPES = TYPES.parent / "labeling" / "types.js"
-KNOWN = {
-    name: keys for file in (TYPES, LABEL_TYPES) for name, keys in typedefs(file.read_text(encoding="utf-8")).items()
-}
+ALL_TYPES = (TYPES, TYPES.parent / "drive" / "types.js", TYPES.parent / "labeling" / "types.js")
+KNOWN = {name: keys for file in ALL_TYPES for name, keys in typedefs(file.read_text(encoding="utf-8")).items()}
 
 
 @pytest.mark.parametrize("name", sorted(KNOWN.keys() - MADE_BY_THE_PAGE))
 def test_the_page_knows_every_key_and_no_other(sent: dict[str, Any], name: str):
-    assert KNOWN[name] == set(sent[name]), "say it in static/js/types.js or labeling/types.js"
+    assert KNOWN[name] == set(sent[name]), "say it in static/js/types.js, or its neighbour of drive/ or labeling/"
 
 
 def test_every_kind_of_message_is_looked_at(sent: dict[str, Any]):

@@ -2,8 +2,8 @@
 import { newestOnly, request } from "../api.js";
 import { get, on, set } from "../store.js";
 
-/** @typedef {import("../types.js").Series} Series */
-/** @typedef {import("../types.js").Drive} Drive */
+/** @typedef {import("./types.js").Series} Series */
+/** @typedef {import("./types.js").Drive} Drive */
 /** @typedef {Pick<Drive, "events"|"comparison">} Findings */
 
 /** While a run is under way, columns are fetched no more often than this, and what is found in them less often. */
@@ -52,12 +52,12 @@ async function fetchAll() {
  */
 async function fetchSeries(run, path) {
   const from = held[run]?.done ?? 0;
-  const answer = /** @type {import("../types.js").ColumnsAnswer} */ (await request(`${path}?from=${from}`));
+  const answer = /** @type {import("./types.js").ColumnsAnswer} */ (await request(`${path}?from=${from}`));
   const isMore = answer.run === run && from > 0;
   return [isMore ? extended(held[run], answer) : { run: answer.run, done: answer.done, columns: answer.columns }, answer.t_s];
 }
 
-/** @param {Series} series @param {import("../types.js").ColumnsAnswer} more @returns {Series} */
+/** @param {Series} series @param {import("./types.js").ColumnsAnswer} more @returns {Series} */
 function extended({ run, columns }, more) {
   const joined = Object.entries(more.columns).map(([name, values]) => [name, [...columns[/** @type {keyof typeof columns} */ (name)].slice(0, more.from), ...values]]);
   return { run, done: more.done, columns: Object.fromEntries(joined) };

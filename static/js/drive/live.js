@@ -3,9 +3,9 @@
 import { newestOnly, request } from "../api.js";
 import { get, on, set } from "../store.js";
 
-/** @typedef {import("../types.js").Columns} Columns */
+/** @typedef {import("./types.js").Columns} Columns */
 /** @typedef {import("../types.js").Frame} Frame */
-/** @typedef {import("../types.js").DriveEvent} DriveEvent */
+/** @typedef {import("./types.js").DriveEvent} DriveEvent */
 
 /** Why what asks for a recording is not to be had. */
 export const NO_DRIVE = "Live sensors have no whole drive: record them, then open the session.";

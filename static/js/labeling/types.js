@@ -141,7 +141,7 @@
  * @property {number} revision
  * @property {number} run
  * @property {number} judged  frames in which the labels say who leads
- * @property {import("../types.js").Metric[]} metrics
+ * @property {import("../drive/types.js").Metric[]} metrics
  * @property {string[]} notes  what does not count, and why
  * @property {ScoreErrors[]} errors  by range and by sensor
  * @property {BadFrame[]} worst  the worst first

@@ -10,8 +10,8 @@ import { MARKS_PX } from "./rows.js";
 
 /** @typedef {import("./span.js").Span} Span */
 /** @typedef {import("./rows.js").Rows} Rows */
-/** @typedef {import("../types.js").Series} Series */
-/** @typedef {import("../types.js").Columns} Columns */
+/** @typedef {import("../drive/types.js").Series} Series */
+/** @typedef {import("../drive/types.js").Columns} Columns */
 /** @typedef {import("./rows.js").Row} Row */
 
 const FONT = '10px system-ui, "DejaVu Sans", sans-serif';

@@ -1,7 +1,7 @@
 /** The curves below the ribbon: what each shows, in which unit and on which scale, and how it is drawn. */
 import { num, ttc } from "../format.js";
 
-/** @typedef {import("../types.js").Columns} Columns */
+/** @typedef {import("../drive/types.js").Columns} Columns */
 /** @typedef {import("./span.js").Span} Span */
 /** @typedef {{top: number, height: number}} Row */
 /** @typedef {{key: keyof Columns, unit: string, label: string, title: string, factor: number, low: number, high: number,

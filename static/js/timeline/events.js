@@ -6,7 +6,7 @@ import { clock } from "../format.js";
 import { get, on, paint, set } from "../store.js";
 import { nameOf, tintOf } from "./flags.js";
 
-/** @typedef {import("../types.js").DriveEvent} DriveEvent */
+/** @typedef {import("../drive/types.js").DriveEvent} DriveEvent */
 
 const list = $("#events-list");
 /** @type {{event: DriveEvent, row: HTMLElement}[]} */

@@ -4,7 +4,7 @@ import { $, el, text } from "../dom.js";
 import { attachMenu, refill } from "../workspace/menu.js";
 import { chosen } from "./clip.js";
 
-/** @typedef {import("../types.js").Job} Job */
+/** @typedef {import("../drive/types.js").Job} Job */
 
 const KINDS = [
   ["mcap", "MCAP", "what the sensors gave and what the line made of it"], ["rrd", "rerun .rrd", "for the rerun viewer"],

@@ -1,7 +1,7 @@
 /** Events on the timeline: a flag each, and what their kinds are called. */
 import { color, ui } from "../colors.js";
 
-/** @typedef {import("../types.js").DriveEvent} DriveEvent */
+/** @typedef {import("../drive/types.js").DriveEvent} DriveEvent */
 
 /** @type {Record<string, string>} */
 const NAMES = {

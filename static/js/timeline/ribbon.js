@@ -1,6 +1,6 @@
 /** The ribbon: who was the CIPV at each frame. Coloured by id; hatched by which sensors it was made of. */
 
-/** @typedef {import("../types.js").Series} Series */
+/** @typedef {import("../drive/types.js").Series} Series */
 /** @typedef {import("./span.js").Span} Span */
 /** @typedef {{top: number, height: number}} Row */
 /** @typedef {{first: number, end: number, id: number|null, source: string|null, carried: boolean}} Stretch */

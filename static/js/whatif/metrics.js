@@ -2,11 +2,11 @@
 import { el } from "../dom.js";
 import { DASH, num, signed } from "../format.js";
 
-/** @typedef {import("../types.js").Metric} Metric */
+/** @typedef {import("../drive/types.js").Metric} Metric */
 
 const JUDGES = { labels: "what people labelled here", recording: "the labels that come with the recording", simulator: "the simulator's truth" };
 
-/** @param {Pick<import("../types.js").Comparison, "metrics"|"truth"|"judged">} comparison @param {boolean} [isAlone] there is nothing to compare with: one column @returns {HTMLElement} */
+/** @param {Pick<import("../drive/types.js").Comparison, "metrics"|"truth"|"judged">} comparison @param {boolean} [isAlone] there is nothing to compare with: one column @returns {HTMLElement} */
 export function metricsTable({ metrics, truth, judged }, isAlone = false) {
   const judge = truth ? `Judged in ${judged} ${judged === 1 ? "frame" : "frames"} against ${JUDGES[truth]}` : "Without labels: what needs none";
   const head = (isAlone ? [] : ["", "before", "after", "change"]).map((words) => el("th", { scope: "col", textContent: words }));

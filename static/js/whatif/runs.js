@@ -6,7 +6,7 @@ import { NO_DRIVE } from "../drive/live.js";
 import { get, on, paint, set } from "../store.js";
 import { metricsTable } from "./metrics.js";
 
-/** @typedef {import("../types.js").Run} Run */
+/** @typedef {import("../drive/types.js").Run} Run */
 
 const list = el("div", { class: "run-list" }), comparison = el("div", { class: "comparison" });
 const problem = el("p", { class: "params-error", aria: { role: "alert" }, hidden: true });
