@@ -16,6 +16,7 @@ from app.bars import frames_progress
 from app.labels.words import WORKING
 from app.progress import opened_recording
 from pipeline.collection import uncollected
+from pipeline.complaint import given_path
 from pipeline.labels.formats.base import Drive, FormatName, drive_of
 from pipeline.labels.formats.native import from_json, onto
 from pipeline.labels.formats.reading import read_bytes
@@ -67,7 +68,7 @@ class ExportLabels:
         """The labels that are meant, with what there is to say of them."""
         if self.labels is not None:
             with uncollected():
-                found = from_json(read_bytes(self.labels.expanduser()), str(self.labels))
+                found = from_json(read_bytes(given_path(self.labels)), str(self.labels))
                 placed = onto(found, drive, str(self.labels))
             return placed.labels, placed.notes
         with _kept(source, drive, self.database) as kept:
@@ -100,7 +101,7 @@ class ImportLabels:
     def __call__(self) -> int:
         source = opened_recording(self.source)
         drive = _drive(source)
-        file = self.file.expanduser()
+        file = given_path(self.file)
         origin = Origin("import", file.name, file.stat().st_mtime_ns // 1_000_000)
         found = import_labels(file, drive, self.format, origin)
         if self.out is not None:

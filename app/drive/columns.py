@@ -88,7 +88,7 @@ COLUMNS = tuple(name for name in Row._fields if name not in ("t_ns", "judged"))
 def row_of(frame: Frame, result: Result, judged: Judged | None = None) -> Row:
     """What a timeline keeps of one frame."""
     lead, acc = result.cipv, result.acc
-    item = next((each for each in result.objects if lead is not None and each.id == lead.id), None)
+    item = result.chosen()
     gap = _vl_gap(item, _by_id(result)) if item is not None else None
     return Row(
         t_ns=frame.t_ns,

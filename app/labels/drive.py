@@ -26,12 +26,11 @@ from app.labels.log import Log
 from app.labels.refusals import ActRefused, NoSuchLabel
 from app.labels.tables import DriveRow, ItemRow, SightingRow, VersionRow
 from app.labels.values import KINDS, LONGEST_ITEM, Item, ItemKind, sighting_of
+from app.labels.words import WORKING
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
 from pipeline.sources.base import Source
 from pipeline.sources.fingerprint import content_key
-
-WORKING = "working"
 
 
 @dataclass(frozen=True)

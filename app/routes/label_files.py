@@ -17,6 +17,7 @@ from starlette.requests import ClientDisconnect
 from app.labels.desk import LabelDesk
 from app.labels.requests import Person
 from app.labels.values import LONGEST_ITEM, LONGEST_NAME
+from app.labels.words import WORKING
 from app.routes.label_act_shapes import TaskBegun
 from app.routes.label_file_shapes import VERSION_NAME, LostJson, NativeFile, NewVersion, VersionJson
 from app.routes.refusals import refusing
@@ -62,7 +63,7 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         return JSONResponse({"status": "begun", "what": "import", "task": number}, 202)
 
     @router.get("/export", response_class=FileResponse, responses=_FILE)
-    def export(format: FormatName = "native", version: VersionName = "working") -> FileResponse:
+    def export(format: FormatName = "native", version: VersionName = WORKING) -> FileResponse:
         """All labels as a file, of a format that is a folder as a .zip. The header X-Cipv-Lost says how many kinds of
         things the format has no place for; /api/labels/export/notes says which."""
         from app.labels.files import exported  # the formats' libraries: only who exchanges labels pays
@@ -78,7 +79,7 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         )
 
     @router.get("/export/notes")
-    def notes(format: FormatName = "native", version: VersionName = "working") -> LostJson:
+    def notes(format: FormatName = "native", version: VersionName = WORKING) -> LostJson:
         """What a format has no place for, a sentence each, before anything is written."""
         from pipeline.labels.formats.parts import reduce
         from pipeline.labels.formats.registry import FORMATS  # as above

@@ -73,7 +73,7 @@ def clip(
     first_ns = source.log_time_ns(first)
     # a frame's companions (marks, notes) come after it, so the clip goes on to the next frame
     last_ns = source.log_time_ns(last + 1) - 1 if last + 1 < len(source) else 2**63 - 1
-    earlier = _referred(source, first, last, first_ns)
+    earlier = _referred(source, last, first_ns)
     times = sorted({at_ns for at_ns, _ in earlier})
     to_ns = {at_ns: max(first_ns - len(times) + place, 0) for place, at_ns in enumerate(times)}
 
@@ -105,8 +105,9 @@ def _with_references_moved(stored: Stored, to_ns: Mapping[int, int]) -> Stored:
         return stored
 
 
-def _referred(source: SessionSource, first: int, last: int, first_ns: int) -> list[tuple[int, str]]:
-    """(log time, topic) of the messages from before the clip that its frames need, in order of time."""
+def _referred(source: SessionSource, last: int, first_ns: int) -> list[tuple[int, str]]:
+    """(log time, topic) of the messages from before the clip that its frames need, in order of time. first_ns: the
+    clip's first; last: its last frame."""
     found: set[tuple[int, str]] = set()
     for stored in source.file.messages((topics.FRAMES,), first_ns, source.log_time_ns(last)):
         try:

@@ -106,13 +106,17 @@ def test_what_the_pipeline_saw_is_proposed(drive: Path, tmp_path: Path, capsys: 
 BAD = {
     "no such format": ("labels", "export", "{drive}", "--format", "word", "--out", "{tmp}/x"),
     "no such file": ("labels", "import", "{drive}", "{tmp}/none", "--format", "csv", "--out", "{tmp}/x"),
+    "nobody's home": ("labels", "import", "{drive}", "~no_such_user_here/x", "--format", "csv", "--out", "{tmp}/x"),
+    "nobody's labels": (
+        "labels", "export", "{drive}", "--labels", "~no_such_user_here/x", "--format", "csv", "--out", "{tmp}/x",
+    ),
     "no such recording": ("labels", "export", "{tmp}/none.mcap", "--format", "csv", "--out", "{tmp}/x"),
     "the other way": ("labels", "import", "{drive}", "{drive}", "--format", "coco", "--out", "{tmp}/x"),
     "a file that is there": ("labels", "export", "{drive}", "--format", "csv", "--out", "{drive}"),
     "no such version": ("labels", "export", "{drive}", "--version", "v9", "--format", "csv", "--out", "{tmp}/x"),
     "no database": ("labels", "list", "--database", "mysql://nowhere"),
     "a session without labels": ("labels", "import", "{drive}", "{drive}", "--format", "mcap", "--out", "{tmp}/x"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", BAD)
