@@ -153,7 +153,7 @@ class Drives:
     def _advance(self, recording: Recording, run: DriveRun) -> None:
         """One frame. Stopped leaves the run as it was."""
         began = time.perf_counter()
-        self._phase = "run" if recording.inputs.get(run.done) is not None else "detect"
+        self._phase = "run" if recording.has_been_looked_at(run.done) else "detect"
         try:
             recording.advance(run)
         except Stopped:

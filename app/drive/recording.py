@@ -91,10 +91,17 @@ class Recording:
     def frame(self, index: int) -> Frame:
         """A frame as the line takes it, from the source, with its picture."""
         frame = self.as_read(index)
-        detectors = Detectors() if self.recipe.sensors == "lidar" else self.recipe.detectors
-        frame = only(detect(frame, detectors, self._ask), self.recipe.sensors)
+        frame = only(detect(frame, self._detectors, self._ask), self.recipe.sensors)
         self.inputs.offer(frame)
         return frame
+
+    def has_been_looked_at(self, index: int) -> bool:
+        """Whether no detector has to look at a frame any more before the line runs."""
+        return self._detectors == Detectors() or self.inputs.get(index) is not None
+
+    @property
+    def _detectors(self) -> Detectors:
+        return Detectors() if self.recipe.sensors == "lidar" else self.recipe.detectors
 
     def as_read(self, index: int) -> Frame:
         """A frame as its source gives it: no detector has looked at it."""

@@ -1,4 +1,5 @@
 /** What a person must know: a missing detector, degraded frames, a lost connection. */
+import { Refused } from "./api.js";
 import { $, el, text } from "./dom.js";
 import { get, on } from "./store.js";
 
@@ -6,11 +7,24 @@ import { get, on } from "./store.js";
 
 /** @type {Set<string>} */
 const dismissed = new Set();
+/** A refusal is read and gone. */
+const REFUSAL_MS = 10_000;
 let shown = "";
+/** @type {{words: string, until: number}|null} */
+let refusal = null;
 
 export function setUp() {
   on(["state", "frame", "link"], update);
   setInterval(update, 1000);
+}
+
+/** Say what the server refused of what a hand asked for. That it cannot be reached at all is said for as long as it holds.
+ * @param {unknown} error */
+export function refused(error) {
+  if (!(error instanceof Refused)) return;
+  refusal = { words: error.message, until: Date.now() + REFUSAL_MS };
+  dismissed.delete(error.message);
+  update();
 }
 
 function update() {
@@ -19,8 +33,9 @@ function update() {
   text($("#link"), { live: "live", lost: "connection lost", connecting: "connecting" }[link?.status ?? "connecting"]);
   const busy = get("state")?.busy;
   $("#busy").hidden = !busy;
+  document.documentElement.toggleAttribute("data-busy", Boolean(busy)); // what the other panes show is of before
   text($("#busy"), busy ?? "");
-  const notices = [...lost(link), ...standing(), ...ofFrame()].filter(({ text: words }) => !dismissed.has(words));
+  const notices = [...lost(link), ...ofHand(), ...standing(), ...ofFrame()].filter(({ text: words }) => !dismissed.has(words));
   const key = JSON.stringify(notices);
   if (key === shown) return;
   shown = key;
@@ -32,6 +47,12 @@ function lost(link) {
   if (link?.status !== "lost") return [];
   const seconds = Math.round((Date.now() - link.since) / 1000);
   return [{ level: "error", text: `Connection lost ${seconds} s ago. What you see is old; trying to reach the server again.`, fixed: true }];
+}
+
+/** @returns {Shown[]} */
+function ofHand() {
+  if (refusal && refusal.until < Date.now()) refusal = null;
+  return refusal ? [{ level: "error", text: refusal.words }] : [];
 }
 
 /** What holds for the whole recording; plain information shares one line. @returns {Shown[]} */

@@ -1,6 +1,7 @@
 /** The dialog that opens another recording. */
 import { request } from "./api.js";
 import { $, el, text } from "./dom.js";
+import { refused } from "./notices.js";
 import { get, on } from "./store.js";
 
 const dialog = $("#source-dialog", HTMLDialogElement);
@@ -39,5 +40,5 @@ export async function open() {
 function choose(uri) {
   dialog.close();
   wanted = uri.trim() || null;
-  if (uri.trim()) request("api/source", "POST", { uri }).catch(() => {});
+  if (uri.trim()) request("api/source", "POST", { uri }).catch(refused);
 }

@@ -269,6 +269,20 @@ def test_help_and_theme(open_page: OpenPage):
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") != dark
 
 
+def test_what_the_server_refuses_is_said_each_time_and_can_be_dismissed(open_page: OpenPage, site: Site):
+    page = open_page(expects=("422",))
+    before = site.engine.snapshot.uri
+    for _ in range(2):
+        page.locator("#source-button").click()
+        page.get_by_label("Address of a recording").fill("sim:" + "far" * 2000)
+        page.get_by_role("button", name="Open", exact=True).click()
+        said = page.locator(".notice[data-level=error]")
+        expect(said).to_contain_text("4096")
+        said.get_by_role("button", name="Dismiss").click()
+        expect(said).to_have_count(0)
+    assert site.engine.snapshot.uri == before
+
+
 def test_a_lost_connection_is_said_and_found_again(browser, site: Site):
     """Old data never looks fresh. The browser itself complains about refused connections here, so no quiet page."""
     recording = Recording()

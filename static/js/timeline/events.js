@@ -3,6 +3,7 @@ import { request } from "../api.js";
 import { $, el, text } from "../dom.js";
 import { seekTo } from "../drive/seek.js";
 import { clock } from "../format.js";
+import { refused } from "../notices.js";
 import { get, on, paint, set } from "../store.js";
 import { nameOf, tintOf } from "./flags.js";
 
@@ -22,7 +23,7 @@ export function setUp() {
 
 /** Mark the shown frame. */
 export function addMark() {
-  request("api/marks", "POST", { index: get("state")?.index ?? 0, text: "" }).catch(() => {});
+  request("api/marks", "POST", { index: get("state")?.index ?? 0, text: "" }).catch(refused);
 }
 
 function build() {
@@ -49,7 +50,7 @@ function rowOf(event) {
   go.disabled = get("state")?.live === true; // there is no way back
   if (event.mark === null) return go;
   const remove = el("button", { type: "button", class: "drop", textContent: "✕", aria: { label: `Remove the mark at ${clock(event.t_s)}` },
-    onclick: () => request(`api/marks/${event.mark}`, "DELETE").catch(() => {}) });
+    onclick: () => request(`api/marks/${event.mark}`, "DELETE").catch(refused) });
   return el("div", { class: "event-row" }, go, remove);
 }
 

@@ -5,6 +5,7 @@
 import { playback, request } from "../api.js";
 import { $, el } from "../dom.js";
 import { seekTo } from "../drive/seek.js";
+import { refused } from "../notices.js";
 import { get, on, set } from "../store.js";
 import * as layouts from "./layouts.js";
 
@@ -149,7 +150,10 @@ async function open(uri, shared) {
     isDone = true;
     apply(shared, true);
   });
-  await request("api/source", "POST", { uri }).catch(() => (isDone = true));
+  await request("api/source", "POST", { uri }).catch((problem) => {
+    isDone = true;
+    refused(problem);
+  });
 }
 
 /** @param {string} title @param {string} words */
