@@ -14,7 +14,7 @@ from app.bars import bytes_progress
 from pipeline.path.lane_network import open_lane_network
 from pipeline.types import REAL_VEHICLES
 from pipeline.vision.detector import open_detector
-from pipeline.vision.models import ModelEntry, known_model, list_models, pull, register, store
+from pipeline.vision.models import ModelEntry, known_model, list_models, own_file, pull, register, store
 
 
 @dataclass(frozen=True)
@@ -75,11 +75,12 @@ class RegisterModel:
     """Use it when no network is named"""
 
     def __call__(self) -> int:
+        file = own_file(self.path)
         if self.task == "detector":
-            open_detector(str(self.path), None)  # refuse here what no later run could use
+            open_detector(str(file), None)  # refuse here what no later run could use
         else:
-            open_lane_network(str(self.path))
-        print(f"{register(self.path, self.name, self.task, self.default)}: registered as {self.name}")
+            open_lane_network(str(file))
+        print(f"{register(file, self.name, self.task, self.default)}: registered as {self.name}")
         return 0
 
 

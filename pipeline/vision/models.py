@@ -159,6 +159,14 @@ def default_model(task: Task) -> Path | None:
     return next((path for path in found if path is not None), None)
 
 
+def own_file(path: Path) -> Path:
+    """A file that a person wants to register, ``~`` resolved. ModelError when it is not there."""
+    given = given_path(path, ModelError)
+    if not given.is_file():
+        raise ModelError(f"no file at {path}")
+    return given
+
+
 def register(path: Path, name: str, task: Task = "detector", default: bool = True) -> Path:
     """Copy a file, with the distance law beside it, into the folder under ``name`` and, unless told otherwise, make it
     its task's default."""
@@ -166,8 +174,7 @@ def register(path: Path, name: str, task: Task = "detector", default: bool = Tru
         raise ModelError(f"{name!r} cannot be a network's name: use letters, digits, '-', '_' and '.'")
     if name == EMBEDDED:
         raise ModelError(f"{EMBEDDED!r} is the detector that comes with the program: use another name")
-    if not path.is_file():
-        raise ModelError(f"no file at {path}")
+    path = own_file(path)
     target = store() / f"{name}.onnx"
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
-from app.commands.models import ListModels
+from app.commands.models import ListModels, RegisterModel
 from pipeline.vision import models
 
 
@@ -22,3 +23,11 @@ def test_the_printed_list_has_every_address_and_command_whole(
     assert "`cipv models pull yolox_tiny` (20.2 MB)" in said
     assert "`cipv models register PATH yolop --task lanes`" in said
     assert "● embedded  detector" in said, "the one that is used where no other is"
+
+
+@pytest.mark.parametrize("task", get_args(models.Task))
+@pytest.mark.parametrize("path", ["/nope.onnx", "embedded"], ids=["a path", "the name of another"])
+def test_a_missing_file_to_register_is_just_missing(task: models.Task, path: str) -> None:
+    with pytest.raises(models.ModelError) as refused:
+        RegisterModel(Path(path), "mine", task)()
+    assert str(refused.value) == f"no file at {path}"
