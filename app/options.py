@@ -16,11 +16,11 @@ from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
 
 if TYPE_CHECKING:
     from pipeline.run import Detectors, Sensors
-    from pipeline.sources.base import AnySource, LiveSource, Source
+    from pipeline.sources.base import AnySource, Source
     from pipeline.types import Route
     from pipeline.vision.detector import Detector
 
-S = TypeVar("S", "Source", "LiveSource")
+S = TypeVar("S", "Source", "AnySource")
 
 
 def planned(file: Path | None) -> Route | None:
@@ -52,14 +52,12 @@ class SourceOptions:
 
         return self._with_notes(along_route(opened_recording(self.source, self.rings), planned(self.route)))
 
-    def open_live(self) -> LiveSource | None:
-        """The sensors, if it names some; they are not started yet. SourceError as with ``open``."""
-        from pipeline.sources import is_live, open_live
+    def open_any(self) -> AnySource:
+        """A recording or sensors, whichever it names; sensors are not started yet. Errors as of ``open``."""
+        from app.progress import opened
         from pipeline.sources.along_route import along_route
 
-        if not is_live(self.source):
-            return None
-        return self._with_notes(along_route(open_live(self.source), planned(self.route)))
+        return self._with_notes(along_route(opened(self.source, self.rings), planned(self.route)))
 
     def _with_notes(self, source: S) -> S:
         """The source, after what there is to say about it."""

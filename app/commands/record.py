@@ -9,7 +9,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
-from typing import Annotated
+from typing import Annotated, cast
 
 import tyro
 
@@ -24,7 +24,8 @@ from pipeline.recording.recorder import Recorder
 from pipeline.recording.save import about
 from pipeline.recording.segments import Rotation, Segments
 from pipeline.run import run, run_live
-from pipeline.sources.base import LiveSource, Source
+from pipeline.sources import is_live
+from pipeline.sources.base import LiveSource, Source, is_live_source
 from pipeline.types import Frame, Result
 
 Ran = tuple[Frame, Result]
@@ -52,13 +53,13 @@ class Record:
 
     def __call__(self) -> int:
         params = self.line.parameters()
-        live = self.source.open_live()
+        if self.packets and not is_live(self.source.source):
+            raise BadInput("--packets is for live sensors; a recording has none")
         with _asked_to_stop() as asked:
-            if live is not None:
-                return self._live(live, params, asked)
-            if self.packets:
-                raise BadInput("--packets is for live sensors; a recording has none")
-            return self._offline(self.source.open(), params, asked)
+            source = self.source.open_any()
+            if is_live_source(source):
+                return self._live(source, params, asked)
+            return self._offline(cast("Source", source), params, asked)
 
     def _offline(self, source: Source, params: Params, asked: Event) -> int:
         """A recording waits for the disk, so nothing is dropped."""

@@ -45,8 +45,7 @@ class Run:
 
     def __call__(self) -> int:
         params = self.line.parameters()
-        live = self.source.open_live()
-        source: AnySource = live or self.source.open()
+        source = self.source.open_any()
         detectors = self.line.open_detectors(source, self.sensors)
         tally = _Tally()
         with ExitStack() as stack:
@@ -62,7 +61,7 @@ class Run:
             bar = stack.enter_context(frames_progress())
             total = self.frames if is_live_source(source) else len(cast("Source", source))
             task = bar.add_task(source.title, total=total)
-            for frame, result in _until_interrupted(self._results(source, params, detectors), live is not None):
+            for frame, result in _until_interrupted(self._results(source, params, detectors), is_live_source(source)):
                 if out is not None:
                     write_line(out, result)
                 elif replay is None:

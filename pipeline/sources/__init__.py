@@ -89,16 +89,21 @@ def open_source(uri: str, *, rings: int = 16, progress: Progress = silent) -> So
 
     SourceError, in one sentence, when the scheme is unknown or the recording cannot be opened.
     """
+    if is_live(uri):
+        raise SourceError(f"{uri}: live sensors have no frames to choose from; a recording is needed here")
+    return _open_recording(uri, rings, progress, tuple(_OPENERS))
+
+
+def _open_recording(uri: str, rings: int, progress: Progress, kinds: tuple[str, ...]) -> Source:
+    """kinds: what may be typed where this was."""
     scheme, colon, rest = uri.partition(":")
     is_drive_letter = len(scheme) == 1
     if not colon or is_drive_letter or not scheme.isalnum():
         if uri.lower().endswith(_SESSION_SUFFIX):
             return _open_session(uri, uri, rings, progress)
-        raise SourceError(_about_bare_path(uri))
-    if is_live(uri):
-        raise SourceError(f"{uri}: live sensors have no frames to choose from; a recording is needed here")
+        raise SourceError(_about_bare_path(uri, kinds))
     if scheme not in _OPENERS:
-        raise SourceError(f"{uri}: no kind of source named {scheme!r}; there are {', '.join(_OPENERS)}")
+        raise SourceError(f"{uri}: no kind of source named {scheme!r}; there are {', '.join(kinds)}")
     return _OPENERS[scheme](uri, rest, rings, progress)
 
 
@@ -117,10 +122,12 @@ def open_live(uri: str) -> LiveSource:
 
 def open_any(uri: str, *, rings: int = 16, progress: Progress = silent) -> AnySource:
     """Devices or a recording, whichever it names. SourceError as of the two."""
-    return open_live(uri) if is_live(uri) else open_source(uri, rings=rings, progress=progress)
+    if is_live(uri):
+        return open_live(uri)
+    return _open_recording(uri, rings, progress, (*_OPENERS, LIVE.removesuffix(":")))
 
 
-def _about_bare_path(path: str) -> str:
+def _about_bare_path(path: str, kinds: tuple[str, ...]) -> str:
     """What to type instead of a path without a scheme."""
     try:
         scheme = looks_like(Path(path).expanduser()) if path else None
@@ -128,7 +135,7 @@ def _about_bare_path(path: str) -> str:
         scheme = None
     if scheme is not None:
         return f"{path}: say what kind of recording it is; it looks like {scheme}:{path}"
-    return f"{path}: not a source; type one of {', '.join(f'{scheme}:…' for scheme in _OPENERS)}"
+    return f"{path}: not a source; type one of {', '.join(f'{kind}:…' for kind in kinds)}"
 
 
 def looks_like(path: Path) -> str | None:

@@ -43,7 +43,7 @@ class Unplugged(Sensors):
 
 def test_what_was_recorded_until_an_error_is_a_whole_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sensors = Unplugged()
-    monkeypatch.setattr(SourceOptions, "open_live", lambda self: sensors)
+    monkeypatch.setattr(SourceOptions, "open_any", lambda self: sensors)
     out = tmp_path / "drive.mcap"
     with pytest.raises(RuntimeError, match="unplugged"):
         Record(SourceOptions("live:test"), out, LineOptions(lanes="off"))()
@@ -71,7 +71,7 @@ def test_sensors_that_give_nothing_are_said_and_leave_no_file(
 ) -> None:
     sensors = Silent()
     sensors.state = "absent"
-    monkeypatch.setattr(SourceOptions, "open_live", lambda self: sensors)
+    monkeypatch.setattr(SourceOptions, "open_any", lambda self: sensors)
     assert Record(SourceOptions("live:test"), tmp_path, LineOptions(lanes="off"))() == 1
     said = capsys.readouterr().err
     assert said.count("cipv: waiting for sensors: lidar absent") == 1
@@ -97,7 +97,7 @@ class Overwhelming(Sensors):
 def test_ticks_that_the_line_was_too_slow_for_are_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(SourceOptions, "open_live", lambda self: Overwhelming())
+    monkeypatch.setattr(SourceOptions, "open_any", lambda self: Overwhelming())
     assert Record(SourceOptions("live:test"), tmp_path / "a.mcap", LineOptions(lanes="off"))() == 0
     said = capsys.readouterr().err
     assert "2 frames" in said

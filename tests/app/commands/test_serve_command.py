@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 import app.commands.serve as command
+from app.commands.record import Record
+from app.commands.run import Run
 from app.commands.serve import Serve
+from app.options import SourceOptions
 from pipeline.errors import BadInput
 from pipeline.progress import Progress
 from pipeline.sources.base import AnySource, SourceError
@@ -52,3 +57,12 @@ def test_a_recording_is_opened_once_for_all_who_read_it(opened: Opened) -> None:
 def test_what_cannot_be_opened_is_said_before_anything_starts(opened: Opened) -> None:
     with pytest.raises(BadInput, match="no such file"):
         Serve("test:nothing").engine()
+
+
+FOO = SourceOptions("foo")
+
+
+@pytest.mark.parametrize("begin", [Serve("foo").engine, Record(FOO), Run(FOO)], ids=["serve", "record", "run"])
+def test_who_takes_live_sensors_names_them_among_what_can_be_typed(begin: Callable[[], object]) -> None:
+    with pytest.raises(SourceError, match=r"foo: not a source; type one of .*, sim:…, live:…$"):
+        begin()

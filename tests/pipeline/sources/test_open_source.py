@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.sources import SourceError, open_source
+from pipeline.sources import SourceError, open_any, open_source
 
 
 @pytest.mark.parametrize(
@@ -33,6 +33,15 @@ def test_a_wrong_uri_gives_one_sentence(uri: str, says: str) -> None:
         open_source(uri)
     assert says in str(error.value)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(("uri", "listed"), [("foo", "sim:…, live:…"), ("nosuch:thing", "sim, live")])
+def test_live_sensors_are_named_where_they_are_taken_and_only_there(uri: str, listed: str) -> None:
+    with pytest.raises(SourceError, match=f"{listed}$"):
+        open_any(uri)
+    with pytest.raises(SourceError) as error:
+        open_source(uri)
+    assert "live" not in str(error.value)
 
 
 @pytest.mark.parametrize("scheme", ["astyx", "kitti"])
