@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -15,7 +16,7 @@ from app.drive.run import DriveRun, digest
 from app.line import DetectionCache
 from app.playing.playback import timeline_s
 from pipeline.params import Params, with_changes
-from pipeline.run import Detectors, run
+from pipeline.run import Detectors, Sensors, run
 from pipeline.step import State, step
 from tests.app.recording import CountingDetector, Recording, SlowDetector
 
@@ -67,6 +68,14 @@ def test_a_run_keeps_what_the_plain_line_says():
     assert [row.ttc_s for row in rows] == [lead.ttc_s if lead else None for lead in leads]
     assert [len(records) for _, records in of.objects()] == [len(result.objects) for result in results]
     assert of.rows(25) == rows[25:]
+
+
+@pytest.mark.parametrize(("sensors", "before"), [("both", False), ("camera", False), ("lidar", True)])
+def test_where_no_detector_is_asked_nothing_is_waited_for(sensors: Sensors, before: bool):
+    recording = DriveRecording(replace(recipe(Recording()), sensors=sensors), DetectionCache(), 1)
+    assert recording.has_been_looked_at(0) is before
+    recording.frame(0)
+    assert recording.has_been_looked_at(0)
 
 
 def test_states_are_those_of_the_pass_at_every_frame_also_when_few_are_kept():
