@@ -28,6 +28,7 @@ from app.sent_picture import MAX_WIDTH_PX, SentPicture, encode_picture
 from app.sent_points import point_arrays
 from app.snapshot import Snapshot
 from pipeline.alignment import Alignment, resolve
+from pipeline.geometry import corners_of
 from pipeline.path.lane_types import EgoLane
 from pipeline.path.lanes import in_picture, polylines
 from pipeline.results import to_json
@@ -100,7 +101,8 @@ def _cuboids_json(result: Result, aligned: Alignment | None, scale: float) -> di
     boxed = [(item.id, item.cuboid) for item in result.objects if item.cuboid is not None]
     if aligned is None or not boxed:
         return {}
-    pixels = _pixel_list(aligned.project(np.concatenate([cuboid.corners() for _, cuboid in boxed])) * scale)
+    corners = corners_of([cuboid for _, cuboid in boxed]).reshape(-1, 3)
+    pixels = _pixel_list(aligned.project(corners) * scale)
     return {str(number): pixels[8 * place : 8 * place + 8] for place, (number, _) in enumerate(boxed)}
 
 

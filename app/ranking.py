@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from pipeline.types import FusedObject, Gate, Result
@@ -59,7 +59,7 @@ def stopping_gate(item: FusedObject) -> Gate | None:
 
 def ranking_json(result: Result) -> list[dict[str, Any]]:
     """As the page reads it."""
-    return [{name: _plain(value) for name, value in asdict(each).items()} for each in ranking(result)]
+    return [{name: _plain(value) for name, value in vars(each).items()} for each in ranking(result)]
 
 
 def _stop(gate: Gate | None, leads: bool) -> tuple[str | None, float | None, float | None]:

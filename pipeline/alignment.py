@@ -80,8 +80,11 @@ class Pinhole:
         if self.distortion.size and len(in_camera):  # OpenCV gives None for no points
             uv = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), self.K, self.distortion)[0].reshape(-1, 2)
         else:
-            uv = in_camera[:, :2] / in_camera[:, 2:] * [self.K[0, 0], self.K[1, 1]] + self.K[:2, 2]
-        return np.where(behind[:, None], np.nan, uv)
+            uv = np.empty((len(in_camera), 2))  # a column at a time: rows of two cost numpy four times as much
+            for axis in (0, 1):
+                uv[:, axis] = in_camera[:, axis] / in_camera[:, 2] * self.K[axis, axis] + self.K[axis, 2]
+        uv[behind] = np.nan
+        return uv
 
     def unproject(self, pixels: F64, range_m: F64) -> F64:
         """The point on the pixel's ray whose horizontal range from the ego origin is ``range_m``."""

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated, Any, get_args, get_origin
 
+import msgspec
 import numpy as np
 from fastapi import APIRouter, HTTPException, Query, Response
-from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from pydantic.fields import FieldInfo
 
 from app.engine import Engine
-from app.labels.requests import PersonOrNobody
+from app.labels.fields import PersonOrNobody
 from app.routes.refusals import refusing
 from app.routes.shapes import ParamsJson, file_of
 from pipeline.alignment import angular_from_calibration
@@ -52,13 +53,13 @@ def params_router(engine: Engine) -> APIRouter:
     router = APIRouter(prefix="/api", tags=["parameters"])
 
     @router.get("/params", responses=_ANSWER)
-    def read(person: Annotated[PersonOrNobody, Query()] = "") -> JSONResponse:
+    def read(person: Annotated[PersonOrNobody, Query()] = "") -> Response:
         """Sections with every parameter's bounds, step, unit and help; values; what null means now. can_undo, can_redo:
         of the person, across labels and parameters."""
         return _params_json(engine, person)
 
     @router.patch("/params", responses=_ANSWER)
-    def change(body: Changes) -> JSONResponse:
+    def change(body: Changes) -> Response:
         """Change some parameters. The shown frame is run again at once. 422 with one sentence for a bad value."""
         try:
             engine.control.change_params(body.changes, final=body.final, person=body.person)
@@ -67,7 +68,7 @@ def params_router(engine: Engine) -> APIRouter:
         return _params_json(engine, body.person)
 
     @router.post("/params", responses=_ANSWER)
-    def replace_all(body: Replacement) -> JSONResponse:
+    def replace_all(body: Replacement) -> Response:
         """Replace every parameter: a preset's values, then those that are given."""
         try:
             params = with_changes(preset(body.preset), body.values)
@@ -77,7 +78,7 @@ def params_router(engine: Engine) -> APIRouter:
         return _params_json(engine, body.person)
 
     @router.post("/params/undo", responses=_ANSWER)
-    def undo() -> JSONResponse:
+    def undo() -> Response:
         """Back to the parameters before the last change that nobody put a name to. 409 when there is none. A page
         undoes by POST /api/labels/undo, which goes across labels and parameters."""
         with refusing():
@@ -85,14 +86,14 @@ def params_router(engine: Engine) -> APIRouter:
         return _params_json(engine)
 
     @router.post("/params/redo", responses=_ANSWER)
-    def redo() -> JSONResponse:
+    def redo() -> Response:
         """The change that was undone last, again. 409 when there is none."""
         with refusing():
             engine.labels.move("redo", "", engine.labels.drive)
         return _params_json(engine)
 
     @router.post("/params/preset", responses=_ANSWER)
-    def choose_preset(body: PresetChoice) -> JSONResponse:
+    def choose_preset(body: PresetChoice) -> Response:
         """Replace every parameter by a preset's."""
         try:
             engine.control.set_params(preset(body.name), body.name, person=body.person)
@@ -143,7 +144,9 @@ def effective(frame: Frame | None, params: Params) -> dict[str, float]:
     }
 
 
-def _params_json(engine: Engine, person: str = "") -> JSONResponse:
+def _params_json(engine: Engine, person: str = "") -> Response:
+    """It is made beside the frame that a change runs again, for which a person waits: what never changes is encoded
+    once."""
     wish, tick = engine.control.peek(), engine.snapshot.tick
     can_undo, can_redo = engine.labels.possible(person)
     answer = {
@@ -152,12 +155,22 @@ def _params_json(engine: Engine, person: str = "") -> JSONResponse:
         "revision": wish.params_revision,
         "can_undo": can_undo,
         "can_redo": can_redo,
-        "sections": describe(),
+        "sections": _sections(),
         "values": flat(wish.params),
-        "base": flat(preset(wish.preset)),
+        "base": _base(wish.preset),
         "effective": effective(tick.frame if tick else None, wish.params),
     }
-    return JSONResponse(answer)
+    return Response(msgspec.json.encode(answer), media_type="application/json")
+
+
+@cache
+def _sections() -> msgspec.Raw:
+    return msgspec.Raw(msgspec.json.encode(describe()))
+
+
+@cache
+def _base(name: str) -> msgspec.Raw:
+    return msgspec.Raw(msgspec.json.encode(flat(preset(name))))
 
 
 def _section_fields(field: FieldInfo) -> dict[str, FieldInfo]:

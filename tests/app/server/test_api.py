@@ -13,6 +13,7 @@ from websockets.sync.client import ClientConnection
 
 from app.engine import Engine
 from app.looks import Looks
+from app.routes import params
 from pipeline.params import Params, from_yaml
 from pipeline.results import to_json
 from pipeline.types import REAL_VEHICLES
@@ -38,6 +39,21 @@ def test_every_parameter_is_described_with_bounds_unit_and_help(client: httpx.Cl
     assert described["cluster.tolerance_m"]["unit"] == "m"
     assert described["alignment.model"]["choices"] == ["angular", "pinhole"]
     assert described["alignment.h_res_deg"]["nullable"]
+
+
+def test_what_never_changes_is_described_once(client: httpx.Client, monkeypatch: pytest.MonkeyPatch):
+    """A slider that is dragged asks ten times a second, while the frame that it changes is run again."""
+    first = client.get("/api/params").json()
+    described: list[str] = []
+    monkeypatch.setattr(params, "describe", lambda: described.append("sections"))
+    monkeypatch.setattr(params, "preset", described.append)
+    again = client.patch("/api/params", json={"changes": {"cluster.tolerance_m": 0.61}, "final": False}).json()
+    try:
+        assert described == []
+        assert again["values"]["cluster.tolerance_m"] == 0.61
+        assert (again["sections"], again["base"]) == (first["sections"], first["base"])
+    finally:
+        client.patch("/api/params", json={"changes": {"cluster.tolerance_m": first["values"]["cluster.tolerance_m"]}})
 
 
 def test_what_null_means_comes_from_the_calibration(client: httpx.Client):
