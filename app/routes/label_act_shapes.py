@@ -7,7 +7,8 @@ from uuid import UUID
 
 from pydantic import BaseModel, Field
 
-from app.labels.requests import Act, Person, PersonOrNobody, Strict
+from app.labels.fields import Person, PersonOrNobody, Strict
+from app.labels.requests import Act
 from app.labels.tasks import Kind
 from app.labels.values import LONGEST_ITEM
 from app.routes.label_shapes import ItemKey, LabelChanges

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
-from app.labels.requests import Person, Strict
+from app.labels.fields import Person, Strict
 from app.labels.values import LONGEST_NAME
 
 VERSION_NAME = r"^[A-Za-z0-9][A-Za-z0-9._ -]*$"

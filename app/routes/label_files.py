@@ -15,7 +15,7 @@ from starlette.background import BackgroundTask
 from starlette.requests import ClientDisconnect
 
 from app.labels.desk import LabelDesk
-from app.labels.requests import Person
+from app.labels.fields import Person
 from app.labels.values import LONGEST_ITEM, LONGEST_NAME
 from app.labels.words import WORKING
 from app.routes.label_act_shapes import TaskBegun

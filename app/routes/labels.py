@@ -9,7 +9,7 @@ from fastapi.responses import JSONResponse
 
 from app.labels.answers import changes_json, history_json, track_json, window_json
 from app.labels.desk import LabelDesk
-from app.labels.requests import MOST_FRAMES, Id, Index, PersonOrNobody
+from app.labels.fields import MOST_FRAMES, Id, Index, PersonOrNobody
 from app.labels.values import ItemKind
 from app.labels.where_next import Asked, What, where_next
 from app.routes.drive import current
