@@ -41,7 +41,7 @@ def serve(
     if port not in (0, number):
         print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
     address = f"http://{reachable(host)}:{number}"
-    engine.labels.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
+    engine.labels.kept.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
     engine.start()
     try:
         from app.server import Server, create_app

@@ -7,29 +7,27 @@ first picture does not wait for it.
 from __future__ import annotations
 
 import logging
-import socket
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.control import Control, Wish
 from app.drive.recording import Recording
-from app.labels.refusals import ActRefused, NoSuchLabel
-from app.labels.requests import AddMeasured, Import, Lift, Propose, Refit, SetSighting
+from app.labels.opened import KeptLabels, Opened
+from app.labels.requests import Import, Lift, Propose, Refit
 from app.labels.settling import SettlingQueue
 from app.labels.state import LabelState
 from app.labels.tasks import Tasks
 from pipeline.errors import BadInput
 from pipeline.labels.formats.base import FormatName
 from pipeline.params import Params
-from pipeline.step import spare_what_is_loaded
 
 if TYPE_CHECKING:
     from app.labels.database import Database
-    from app.labels.drive import DriveInfo, DriveLabels
+    from app.labels.drive import DriveLabels
     from app.labels.log import Acted
     from app.labels.scoring import LabelScores
     from app.labels.steps import Way
@@ -39,7 +37,6 @@ logger = logging.getLogger("cipv.labels")
 _LOOK_EVERY_S = 0.4
 """Others see within a second what was done through another server."""
 _PATIENCE_S = 10.0
-_NOTHING_OPEN = "no recording is open that could be labelled"
 
 
 @dataclass(frozen=True)
@@ -51,32 +48,17 @@ class Done:
     labels: DriveLabels
 
 
-@dataclass(eq=False)
-class _Open:
-    """What is open. recording: null for what has no frames to label."""
-
-    uri: str
-    recording: Recording | None
-    lock: threading.Lock = field(default_factory=threading.Lock)
-    labels: DriveLabels | None = None
-
-
 class LabelDesk:
-    """Any thread. database: where labels are kept. open_later: opens it when labels are first asked for, or what is
-    open is shown; without either it is gone at the end, and made only when somebody asks. It hears of parameters that
-    are settled from ``Control`` and gives them back when they are undone, and wakes it whenever ``state`` is another.
-    station: whose parameters are meant: of this server, and of the same one when it is started again; set before
-    anything is opened."""
+    """Any thread. database, open_later: as of ``KeptLabels``; it is opened too when what is open is shown. The desk
+    hears of parameters that are settled from ``Control`` and gives them back when they are undone, and wakes it
+    whenever ``state`` is another."""
 
     def __init__(self, database: Database | None = None, *, open_later: Callable[[], Database] | None = None) -> None:
-        self.station = socket.gethostname()
+        self.kept = KeptLabels(database, open_later)
         self._control = Control(Wish(Params()))
-        self._database = database
-        self._open_later = open_later
-        self._opening = threading.Lock()
         self._is_shown = False
         self._lock = threading.Lock()
-        self._open = _Open("", None)
+        self._open = Opened("", None, self.kept)
         self._state = LabelState()
         self._wake = threading.Event()
         self._ended = False
@@ -104,16 +86,14 @@ class LabelDesk:
         self._settling.stop()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
-        with self._opening:
-            if self._database is not None:
-                self._database.close()
+        self.kept.close()
 
     def open(self, uri: str, recording: Recording | None) -> None:
         """Something else was opened; null for what has no frames to label. Its labels are looked for a little later,
         when it is shown."""
         self.tasks.cancel()
         with self._lock:
-            self._open = _Open(uri, recording)
+            self._open = Opened(uri, recording, self.kept)
             self._state = LabelState(labelled=recording is not None)
 
     def shown(self) -> None:
@@ -127,24 +107,19 @@ class LabelDesk:
     @property
     def recording(self) -> Recording:
         """What can be labelled. NoSuchLabel when nothing can."""
-        recording = self._open.recording
-        if recording is None:
-            raise NoSuchLabel(_NOTHING_OPEN)
-        return recording
+        return self._open.framed()
 
     @property
     def labels(self) -> DriveLabels:
         """Of the open recording. NoSuchLabel when none is open."""
         opened = self._open
-        if opened.recording is None:
-            raise NoSuchLabel(_NOTHING_OPEN)
-        return self._labels_of(opened)
+        opened.framed()
+        return opened.labels
 
     @property
     def drive(self) -> str | None:
         """The key of the open recording; null for what has no frames to label."""
-        opened = self._open
-        return self._labels_of(opened).info.key if opened.recording is not None else None
+        return self._open.key
 
     @cached_property
     def scores(self) -> LabelScores:
@@ -158,13 +133,17 @@ class LabelDesk:
     def act(self, person: str, act: Any, drive: str, act_id: str | None = None) -> Done:
         """Do it; on disk when this returns. Whatever refuses it. drive: the key of the recording that is meant.
         act_id: of who sends it; what was sent before is not done again."""
-        recording, labels = self._named(drive)
+        recording, labels = self._open.named(drive)
         done = labels.log.sent_before(act_id, person)
         if done is None:
             from app.labels.acts import do
             from app.labels.acts.scope import Scope
 
-            doing, note = self._measured(recording, labels, act) if isinstance(act, Refit | Lift) else (act, "")
+            doing, note = act, ""
+            if isinstance(act, Refit | Lift):
+                from app.labels.measured import measured
+
+                doing, note = measured(labels, recording, self._control.peek().params, act)
             scope = Scope(labels.info.t_ns)
             self._settling.finish()
             done = labels.log.act(doing.kind, person, lambda draft: do(draft, scope, doing), act_id=act_id, note=note)
@@ -175,7 +154,7 @@ class LabelDesk:
         """Undo or redo, across labels and parameters; what is only being tried is undone first. ActRefused when there
         is nothing to, or somebody else is in the way. drive, act_id: as in ``act``; null for what has no frames to
         label."""
-        labels = self._meant(self._open, drive)
+        labels = self._open.meant(drive)
         self._settling.finish()
         with self._control.alone():  # a change that comes between would be lost to what is restored
             self._settling.finish()  # of what came in between
@@ -196,7 +175,7 @@ class LabelDesk:
         drive, act_id: as in ``act``."""
         from app.labels.long import importing_truth, proposing
 
-        recording, labels = self._named(drive)
+        recording, labels = self._open.named(drive)
         with self._beginning:
             if act_id is not None and self._begun[0] == act_id:
                 return self._begun[1]
@@ -211,7 +190,7 @@ class LabelDesk:
         """Labels of a file or folder that was handed in, as another tool made them; it is removed in the end."""
         from app.labels.files import importing_file
 
-        recording, labels = self._named(drive)
+        recording, labels = self._open.named(drive)
         return self.tasks.begin("import", importing_file(labels, recording, person, file, name))
 
     def possible(self, person: str) -> tuple[bool, bool]:
@@ -223,7 +202,7 @@ class LabelDesk:
         if self._trouble:
             return False, False
         try:
-            return self._labels_of(self._open).log.possible(person)
+            return self._open.labels.log.possible(person)
         except BadInput:
             return False, False
 
@@ -233,7 +212,7 @@ class LabelDesk:
         opened = self._open
         if not changes:
             return
-        self._settling.put(opened.uri, lambda: self._labels_of(opened).log, changes, person, merges=merges)
+        self._settling.put(opened.uri, lambda: opened.labels.log, changes, person, merges=merges)
         if self._settling.has(opened.uri, ""):
             self._show(opened, replace(self._state, can_undo=True, can_redo=False))
 
@@ -243,7 +222,7 @@ class LabelDesk:
         if not opened.uri:
             return
         try:
-            labels = self._labels_of(opened)
+            labels = opened.labels
             on_its_way = self._settling.has(opened.uri, "")
             can_undo, can_redo = (True, False) if on_its_way else labels.log.possible("")
             revision = labels.revision
@@ -258,7 +237,7 @@ class LabelDesk:
 
     # ------------------------------------------------------------ inside
 
-    def _show(self, opened: _Open, new: LabelState) -> None:
+    def _show(self, opened: Opened, new: LabelState) -> None:
         """To everybody, unless something else is open by now."""
         with self._lock:
             if opened is not self._open:
@@ -268,36 +247,6 @@ class LabelDesk:
         if changed:
             self._control.change()
 
-    def _named(self, drive: str) -> tuple[Recording, DriveLabels]:
-        """What is open. ActRefused when it is not the recording with that key, NoSuchLabel when it has no frames to
-        label."""
-        opened = self._open
-        if opened.recording is None:
-            raise NoSuchLabel(_NOTHING_OPEN)
-        return opened.recording, self._meant(opened, drive)
-
-    def _meant(self, opened: _Open, drive: str | None) -> DriveLabels:
-        """ActRefused when another recording is open, or one at all where none is meant."""
-        labels = self._labels_of(opened)
-        if drive != (labels.info.key if opened.recording is not None else None):
-            raise ActRefused("another recording is open now")
-        return labels
-
-    def _measured(
-        self, recording: Recording, labels: DriveLabels, act: Refit | Lift
-    ) -> tuple[SetSighting | AddMeasured, str]:
-        """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found.
-        BadInput where there is nothing to measure."""
-        from app.labels.acts.scope import Scope
-        from app.labels.measured import lifted, refitted
-
-        Scope(labels.info.t_ns).check(act.frame)
-        frame = recording.input(act.frame)
-        params = self._control.peek().params
-        if isinstance(act, Refit):
-            return refitted(labels, frame, params, act)
-        return lifted(frame, params, act)
-
     def _forget_tried(self, act_id: str | None) -> bool:
         """Whether this took back what was being tried, now or when it was sent before."""
         if act_id is not None and act_id == self._forgot:
@@ -306,39 +255,11 @@ class LabelDesk:
         self._forgot = act_id if forgot else self._forgot
         return forgot
 
-    def _labels_of(self, opened: _Open) -> DriveLabels:
-        """Found in the database when first asked for."""
-        with opened.lock:
-            if opened.labels is None:
-                from app.labels.drive import DriveLabels
-
-                opened.labels = DriveLabels(self._opened_database(), _info(opened.uri, opened.recording), self.station)
-            return opened.labels
-
-    def _opened_database(self) -> Database:
-        with self._opening:
-            if self._database is None:
-                self._database = (self._open_later or _temporary)()
-                spare_what_is_loaded()
-            return self._database
-
     def _look(self) -> None:
         """The thread: what others write to the same database is seen here too."""
         while not self._ended:
             self._wake.wait(_LOOK_EVERY_S)
             self._wake.clear()
-            is_time = self._database is not None or (self._open_later is not None and self._is_shown)
+            is_time = self.kept.is_open or (self.kept.outlast and self._is_shown)
             if is_time and not self._ended:
                 self.refresh()
-
-
-def _temporary() -> Database:
-    from app.labels.database import Database
-
-    return Database.temporary()
-
-
-def _info(uri: str, recording: Recording | None) -> DriveInfo:
-    from app.labels.drive import info_of, info_of_uri
-
-    return info_of_uri(uri) if recording is None else info_of(recording.recipe.source, recording.names)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pydantic import ValidationError
 
+from app.drive.recording import Recording
 from app.given import GivenCuboid
+from app.labels.acts.scope import Scope
 from app.labels.drive import DriveLabels
 from app.labels.refusals import ActRefused, BadAct
 from app.labels.requests import AddMeasured, Lift, Refit, SetSighting
@@ -18,6 +20,16 @@ from pipeline.types import Frame
 from pipeline.vision.labels import canonical
 
 _DECIMALS = 4
+
+
+def measured(
+    labels: DriveLabels, recording: Recording, params: Params, act: Refit | Lift
+) -> tuple[SetSighting | AddMeasured, str]:
+    """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found. BadInput
+    where there is nothing to measure."""
+    Scope(labels.info.t_ns).check(act.frame)
+    frame = recording.input(act.frame)
+    return refitted(labels, frame, params, act) if isinstance(act, Refit) else lifted(frame, params, act)
 
 
 def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> tuple[SetSighting, str]:

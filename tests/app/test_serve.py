@@ -47,7 +47,7 @@ def test_two_servers_of_one_machine_keep_their_parameters_apart(monkeypatch: pyt
     monkeypatch.setattr(Server, "run", lambda _, sockets: ports.append(sockets[0].getsockname()[1]))
     engine = Engine(opener(Recording()), None, Params())
     serve(engine, port=0)
-    assert engine.labels.station == f"{socket.gethostname()}:{ports[0]}"
+    assert engine.labels.kept.station == f"{socket.gethostname()}:{ports[0]}"
 
 
 def test_it_passes_over_a_taken_port_answers_and_ends_with_open_streams(taken_port: int):

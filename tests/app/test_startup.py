@@ -54,6 +54,6 @@ def test_the_list_of_commands_needs_none_of_them() -> None:
 
 
 def test_the_engine_opens_the_recording_before_the_server_is_imported() -> None:
-    engine = "class Engine:\n    class labels: pass\n    def start(self): raise SystemExit"
+    engine = "class Engine:\n    class labels:\n        class kept: pass\n    def start(self): raise SystemExit"
     serving = "from app.commands.serve import serve\ntry: serve(Engine(), port=0)\nexcept SystemExit: pass"
     assert (SERVING | DRAWING) & imported(f"{engine}\n{serving}") == set()
