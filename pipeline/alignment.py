@@ -77,11 +77,11 @@ class Pinhole:
         in_camera = transform(self.T_camera_ego, np.asarray(points, dtype=np.float64).reshape(-1, 3))
         behind = in_camera[:, 2] < self._NEAREST_M
         in_camera[behind] = (0.0, 0.0, 1.0)
+        uv: F64 = np.empty((len(in_camera), 2))
         if self.distortion.size and len(in_camera):  # OpenCV gives None for no points
-            uv = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), self.K, self.distortion)[0].reshape(-1, 2)
+            uv[:] = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), self.K, self.distortion)[0].reshape(-1, 2)
         else:
-            uv = np.empty((len(in_camera), 2))  # a column at a time: rows of two cost numpy four times as much
-            for axis in (0, 1):
+            for axis in (0, 1):  # numpy takes four times as long over rows of two
                 uv[:, axis] = in_camera[:, axis] / in_camera[:, 2] * self.K[axis, axis] + self.K[axis, 2]
         uv[behind] = np.nan
         return uv

@@ -156,10 +156,7 @@ class Log:
     def possible(self, person: str) -> tuple[bool, bool]:
         """(there is something to take back, something to do again) for a person."""
         with self._database.reading() as connection:
-            return (
-                self._steps.following(connection, "undo", person) is not None,
-                self._steps.following(connection, "redo", person) is not None,
-            )
+            return self._steps.possible(connection, person)
 
     # ------------------------------------------------------------ looking back
 

@@ -4,34 +4,56 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from sqlalchemy import ColumnElement, Connection, and_, func, or_, select, update
+from sqlalchemy import (
+    BindParameter,
+    ColumnElement,
+    Connection,
+    Select,
+    String,
+    and_,
+    bindparam,
+    func,
+    or_,
+    select,
+    update,
+)
 
 from app.labels.tables import ActRow, ChangeRow
 
 Way = Literal["undo", "redo"]
-WAYS = ("undo", "redo")
+WAYS: tuple[Way, Way] = ("undo", "redo")
 _OF_PARAMS = ("params", "nudge")
 
 
 class Steps:
-    """Of one drive, in whatever transaction is asked. station: whose parameters are meant."""
+    """Of one drive, in whatever transaction is asked. station: whose parameters are meant. What is asked with every
+    move of a slider is put into words once: that takes longer than the answer."""
 
     def __init__(self, drive_id: int, station: str) -> None:
         self._drive_id, self._station = drive_id, station
+        self._following = {way: self._select_following(way) for way in WAYS}
+        self._possible = select(*(self._following[way].scalar_subquery() for way in WAYS))
 
-    def _mine(self, person: str) -> ColumnElement[bool]:
+    def _mine(self, person: str | BindParameter[str]) -> ColumnElement[bool]:
         """The acts that a person can take back or do again."""
         of_params = and_(ActRow.kind.in_(_OF_PARAMS), ActRow.station == self._station, ActRow.person.in_(("", person)))
         of_labels = and_(ActRow.kind.not_in((*_OF_PARAMS, *WAYS)), ActRow.person == person)
         return and_(ActRow.drive_id == self._drive_id, or_(of_params, of_labels))
 
+    def _select_following(self, way: Way) -> Select[int]:
+        mine = self._mine(bindparam("person", type_=String))
+        if way == "undo":
+            return select(func.max(ActRow.step)).where(mine, ActRow.status == "done")
+        return select(func.min(ActRow.step)).where(mine, ActRow.status == "undone")
+
     def following(self, connection: Connection, way: Way, person: str) -> int | None:
         """The step that is next to be taken back or done again."""
-        if way == "undo":
-            wanted = select(func.max(ActRow.step)).where(self._mine(person), ActRow.status == "done")
-        else:
-            wanted = select(func.min(ActRow.step)).where(self._mine(person), ActRow.status == "undone")
-        return connection.scalar(wanted)
+        return connection.scalar(self._following[way], {"person": person})
+
+    def possible(self, connection: Connection, person: str) -> tuple[bool, bool]:
+        """(there is something to take back, something to do again) for a person: one question."""
+        undo, redo = connection.execute(self._possible, {"person": person}).one()
+        return undo is not None, redo is not None
 
     def acts_of(self, connection: Connection, step: int) -> list[tuple[int, str]]:
         found = connection.execute(

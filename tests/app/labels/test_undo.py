@@ -8,11 +8,13 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from sqlalchemy import event
 
 from app.labels.database import Database
 from app.labels.drive import DriveLabels
 from app.labels.refusals import ActRefused
 from app.labels.requests import SetLead
+from app.labels.steps import Steps
 from tests.app.labels.conftest import fresh, info
 from tests.app.labels.doing import ACT, act, add, cuboid, label_of, relabel, shown
 
@@ -49,6 +51,25 @@ def test_something_else_ends_what_could_be_redone(labels: DriveLabels) -> None:
     assert label_of(labels, number) == "car"
     labels.log.move("redo", "Ada")
     assert label_of(labels, number) == "truck"
+
+
+def test_whether_there_is_a_step_is_one_question_that_was_worded_before(
+    labels: DriveLabels, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each move of a slider asks it, beside the frame that is run again."""
+    add(labels)
+    monkeypatch.setattr(Steps, "_mine", None)
+    asked: list[str] = []
+
+    def hears(connection: Any, cursor: Any, statement: str, parameters: Any, context: Any, many: bool) -> None:
+        asked.extend([statement] if statement.startswith("SELECT") else [])
+
+    event.listen(database._engine, "before_cursor_execute", hears)
+    try:
+        assert labels.log.possible("Ada") == (True, False)
+    finally:
+        event.remove(database._engine, "before_cursor_execute", hears)
+    assert len(asked) == 1
 
 
 def test_each_takes_back_only_their_own(labels: DriveLabels) -> None:
