@@ -113,6 +113,15 @@ class Slot:
                 return list(ready.values())
 
 
+@dataclass(frozen=True)
+class _Encoded:
+    """A frame's message, and the snapshot whose state it carries. By default none."""
+
+    sequence: int = -1
+    message: bytes | None = None
+    of: Snapshot | None = None
+
+
 class Stream:
     """Between the engine's thread, which publishes, and the clients' slots on the event loop."""
 
@@ -125,7 +134,7 @@ class Stream:
         self._slots: list[Slot] = []
         self._encoder = Encoder()
         self._lock = threading.Lock()
-        self._frame: tuple[int, bytes | None] = (-1, None)
+        self._frame = _Encoded()
         self._width_px = MAX_WIDTH_PX
         self._snapshot: Snapshot | None = None
 
@@ -140,10 +149,9 @@ class Stream:
         loop = self._loop
         if loop is None or loop.is_closed() or not self._slots:
             return
-        is_new = snapshot.sequence > self._frame[0]
-        sequence, frame = self._encoded(snapshot) if is_new else (0, None)
+        frame = self._encoded(snapshot) if snapshot.sequence > self._frame.sequence else _Encoded()
         try:
-            loop.call_soon_threadsafe(self._distribute, state_message(snapshot), frame, sequence)
+            loop.call_soon_threadsafe(self._distribute, state_message(snapshot), frame, frame.of is snapshot)
         except RuntimeError:  # the server closed its loop in between
             return
 
@@ -157,9 +165,7 @@ class Stream:
         self._fit_width()
         try:
             if self._snapshot is not None:
-                shown = self._snapshot
-                await self._put_newest(slot, shown)
-                slot.put("state", state_message(shown))  # may be newer than the one in a frame made before
+                await self._put_newest(slot, self._snapshot)
             async with asyncio.TaskGroup() as both:
                 sender = both.create_task(_send(socket, slot))
                 await self._receive(socket, slot)
@@ -212,9 +218,11 @@ class Stream:
                 self._loop.call_soon_threadsafe(held.page.put, "held", message)
 
     async def _put_newest(self, slot: Slot, snapshot: Snapshot) -> None:
-        sequence, frame = await asyncio.to_thread(self._encoded, snapshot)
-        if frame is not None:
-            slot.put("frame", frame, sequence)
+        """The frame, and the state as it is now: the one in the frame may be older than what was told meanwhile."""
+        frame = await asyncio.to_thread(self._encoded, snapshot)
+        if frame.message is not None:
+            slot.put("frame", frame.message, frame.sequence)
+        slot.put("state", state_message(self._snapshot or snapshot))
 
     def _fit_width(self) -> bool:
         """Take the width that the widest client needs. True when it has grown: the newest frame is then too narrow."""
@@ -223,14 +231,15 @@ class Stream:
             has_grown = wanted > self._width_px
             self._width_px = wanted
             if has_grown:
-                self._frame = (-1, None)
+                self._frame = _Encoded()
         return has_grown
 
-    def _encoded(self, snapshot: Snapshot) -> tuple[int, bytes | None]:
-        """The message of this or a newer snapshot, and its sequence."""
+    def _encoded(self, snapshot: Snapshot) -> _Encoded:
+        """The frame of this snapshot, or a newer one."""
         with self._lock:
-            if self._frame[0] < snapshot.sequence and snapshot.tick is not None:
-                self._frame = (snapshot.sequence, self._encoder.message(snapshot, self._width_px))
+            if self._frame.sequence < snapshot.sequence and snapshot.tick is not None:
+                message = self._encoder.message(snapshot, self._width_px)
+                self._frame = _Encoded(snapshot.sequence, message, snapshot)
             return self._frame
 
     def _picked(self, number: int | None) -> None:
@@ -243,11 +252,14 @@ class Stream:
         for slot in self._slots:
             slot.put(kind, message)
 
-    def _distribute(self, state: str, frame: bytes | None, sequence: int) -> None:
+    def _distribute(self, state: str, frame: _Encoded, is_said: bool) -> None:
+        """is_said: the frame carries this state. One that was encoded anew for a wider page may carry an older one."""
         for slot in self._slots:
             slot.put("state", state)
-            if frame is not None:
-                slot.put("frame", frame, sequence)
+            if frame.message is not None:
+                slot.put("frame", frame.message, frame.sequence)
+                if not is_said:
+                    slot.put("state", state)
 
 
 def state_message(snapshot: Snapshot) -> str:

@@ -175,6 +175,43 @@ def test_the_picture_is_as_wide_as_the_widest_page_shows_it(site: Site):
         assert width(shown_next(site, small, 100)) == 320
 
 
+def test_a_pause_is_heard_while_the_picture_is_made_wider(site: Site, monkeypatch: pytest.MonkeyPatch):
+    """The frame, which says that it plays, comes late; a page must not believe it."""
+    encode, begun, gate = site.stream._encoder.message, threading.Event(), threading.Event()
+
+    def slowly(snapshot: Snapshot, width_px: int) -> bytes | None:
+        begun.set()
+        assert gate.wait(WAIT_S)
+        return encode(snapshot, width_px)
+
+    site.show(1, playing=True)
+    with site.connected() as client:
+        assert next_header(client)["state"]["playing"] is True
+        monkeypatch.setattr(site.stream._encoder, "message", slowly)
+        client.send(json.dumps({"picture_px": 1700}))
+        assert begun.wait(WAIT_S)
+        pausing = threading.Thread(target=lambda: site.show(1, playing=False))
+        pausing.start()
+        gate.set()
+        pausing.join()
+        client.send(json.dumps({"ping": 1}))
+        assert believed(client) is False
+
+
+def believed(client: ClientConnection) -> bool:
+    """Whether a page takes it to play, once its ping was answered: what came last holds."""
+    playing = True
+    while True:
+        message = client.recv(WAIT_S)
+        if isinstance(message, bytes):
+            (length,) = struct.unpack_from("<I", message)
+            playing = json.loads(message[4 : 4 + length])["state"]["playing"]
+        elif (said := json.loads(message))["type"] == "state":
+            playing = said["state"]["playing"]
+        elif said["type"] == "pong":
+            return playing
+
+
 def shown_next(site: Site, client: ClientConnection, sequence: int) -> dict[str, Any]:
     """Publish a frame, and what the client gets of it."""
     site.show(sequence)
