@@ -42,7 +42,7 @@ KINDS = (
 """Every fault of a replayed sensor; over UDP a receiver that is unplugged is one that is silent. What else can befall
 sensors is tested on a bench whose clock the tests move: own motion over CAN that stops or is damaged in
 ``test_own_motion.py``, PPS and GPS time against the host's in ``test_clock.py``, a camera of 60 Hz against a LiDAR of
-10 in ``test_faults.py``, receivers over TCP and serial lines in ``test_loopback.py``."""
+10 in ``test_faults.py``, receivers over TCP and serial lines in ``test_wires.py``."""
 FIRST_S, EVERY_S, LASTS_S = 6.0, 1.4, 1.2
 CORES = 2
 PATIENCE_S = 120.0

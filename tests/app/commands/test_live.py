@@ -10,8 +10,8 @@ import yaml
 
 from app.cli import main
 from pipeline.sources.live.config import load
+from tests.pipeline.sources.live.bench import endless
 from tests.pipeline.sources.live.rig import Replaying, loopback_config
-from tests.pipeline.sources.live.test_loopback import endless
 
 
 def ended(*arguments: str) -> int:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
-from itertools import count
 from pathlib import Path
 
 import pytest
@@ -16,17 +14,10 @@ from app.commands.record import Record
 from app.options import LineOptions, SourceOptions
 from pipeline.params import SyncParams
 from pipeline.recording.session import SessionSource
-from pipeline.replay.messages import Message
 from pipeline.types import Frame
 from tests.app.test_live_engine import Sensors
-from tests.pipeline.sources.live.bench import MS, messages
+from tests.pipeline.sources.live.bench import endless
 from tests.pipeline.sources.live.rig import Replaying, loopback_config
-
-
-def endless() -> Iterator[Message]:
-    for second in count():
-        for message in messages(1.0, 30.0):
-            yield message._replace(t_ns=message.t_ns + second * 1000 * MS)
 
 
 class Unplugged(Sensors):

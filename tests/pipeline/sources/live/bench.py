@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import count
 from typing import Any, cast
 
 import cv2
@@ -146,3 +147,10 @@ class Bench:
 def _stamped(event: WireEvent) -> bytes:
     stamp = (event.stamp_ns % _HOUR_NS // 1000).to_bytes(4, "little")
     return bytes(event.payload[:1200] + stamp + event.payload[1204:]) if len(event.payload) == 1206 else event.payload
+
+
+def endless() -> Iterator[Message]:
+    """As ``messages``, without end."""
+    for second in count():
+        for message in messages(1.0):
+            yield message._replace(t_ns=message.t_ns + second * 1000 * MS)

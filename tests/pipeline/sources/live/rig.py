@@ -95,3 +95,11 @@ def frames_until(source: LiveSensors, done: Callable[[Frame], bool], seen: list[
         if done(frame):
             return frame
     raise AssertionError(f"no such frame within {PATIENCE_S:g} s; sensors: {source.health()}")
+
+
+def opened(config: LiveConfig, sensors: list[LiveSensors]) -> LiveSensors:
+    """Started, and put where it is closed in the end (the fixture ``sensors``)."""
+    source = LiveSensors("live:loopback", config)
+    sensors.append(source)
+    source.start()
+    return source

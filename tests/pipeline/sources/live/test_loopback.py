@@ -2,70 +2,24 @@
 
 from __future__ import annotations
 
-import os
 import socket
-import threading
-import time
-import tty
-from collections.abc import Iterator
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from itertools import count
 from pathlib import Path
 
-import av
-import can
-import numpy as np
 import pytest
 
 from pipeline.params import Params
-from pipeline.replay.messages import Message, of_frame, of_recording
-from pipeline.replay.nmea_writer import sentences
+from pipeline.replay.messages import of_frame, of_recording
 from pipeline.run import Detectors, advance, detector_for
 from pipeline.sources import open_source
-from pipeline.sources.base import SourceError
 from pipeline.sources.live.check import check
-from pipeline.sources.live.config import LiveConfig
 from pipeline.sources.live.lidar import LidarInput
 from pipeline.sources.live.source import LiveSensors
 from pipeline.sources.pcap import PcapSource
 from pipeline.step import State
-from pipeline.types import EgoState, Frame, GnssFix, Result
+from pipeline.types import Frame, Result
 
-from .bench import MS, fix_at, messages, small_sweep
-from .rig import Replaying, frames_until, free_port, loopback_config
-
-DBC = """\
-VERSION ""
-BU_: CAR
-BO_ 256 SPEED: 8 CAR
- SG_ KMH : 0|16@1+ (0.01,0) [0|400] "km/h" CAR
-BO_ 257 GYRO: 8 CAR
- SG_ YAW : 0|16@1- (0.01,0) [-300|300] "deg/s" CAR
-"""
-
-
-def endless(camera_hz: float = 30.0) -> Iterator[Message]:
-    """The bench's sensors, without end."""
-    for second in count():
-        for message in messages(1.0, camera_hz):
-            yield message._replace(t_ns=message.t_ns + second * 1000 * MS)
-
-
-@pytest.fixture
-def sensors() -> Iterator[list[LiveSensors]]:
-    """What is put in here is closed."""
-    opened: list[LiveSensors] = []
-    yield opened
-    for each in opened:
-        each.close()
-
-
-def opened(config: LiveConfig, sensors: list[LiveSensors]) -> LiveSensors:
-    source = LiveSensors("live:loopback", config)
-    sensors.append(source)
-    source.start()
-    return source
+from .bench import MS, endless
+from .rig import Replaying, frames_until, free_port, loopback_config, opened
 
 
 def is_whole(frame: Frame) -> bool:
@@ -132,85 +86,6 @@ def test_a_camera_that_is_pulled_out_and_put_back_is_back(sensors: list[LiveSens
             assert any("camera" in note for note in alone.notes)
 
 
-def test_a_receiver_on_tcp_and_own_motion_by_can(sensors: list[LiveSensors], tmp_path: Path) -> None:
-    (tmp_path / "car.dbc").write_text(DBC, encoding="ascii")
-    channel = f"car-{free_port(socket.SOCK_STREAM)}"
-    by_can = {
-        "interface": "virtual",
-        "channel": channel,
-        "dbc": str(tmp_path / "car.dbc"),
-        "speed_mps": {"message": "SPEED", "signal": "KMH", "factor": 1 / 3.6},
-        "yaw_rate_radps": {"message": "GYRO", "signal": "YAW", "factor": np.pi / 180},
-    }
-    config = loopback_config(
-        camera=None,
-        gnss={"tcp": f"127.0.0.1:{free_port(socket.SOCK_STREAM)}"},
-        ego={"source": "can", "can": by_can},
-    )
-    source = opened(config, sensors)
-
-    def sent() -> Iterator[Message]:
-        for k in count():
-            yield Message(k * 100 * MS, "lidar", small_sweep(0))
-            yield Message((k * 100 + 1) * MS, "gnss", fix_at(0))
-            yield Message((k * 100 + 2) * MS, "ego", EgoState(0, 25.0, -0.1))
-
-    with Replaying(config, sent()):
-        frame = frames_until(source, lambda frame: frame.gnss is not None and _yaw_rate(frame) is not None)
-    assert frame.ego is not None
-    assert frame.ego.speed_mps == pytest.approx(25.0, abs=0.003)
-    assert frame.ego.yaw_rate_radps == pytest.approx(-0.1, abs=0.0002)
-    assert isinstance(frame.gnss, GnssFix)
-    assert frame.gnss.lat_deg == pytest.approx(48.0)
-
-
-def test_garbage_on_the_can_bus_is_counted_and_passes_by(sensors: list[LiveSensors], tmp_path: Path) -> None:
-    (tmp_path / "car.dbc").write_text(DBC, encoding="ascii")
-    channel = f"car-{free_port(socket.SOCK_STREAM)}"
-    speed = {"message": "SPEED", "signal": "KMH", "factor": 1 / 3.6}
-    by_can = {"interface": "virtual", "channel": channel, "dbc": str(tmp_path / "car.dbc"), "speed_mps": speed}
-    config = loopback_config(camera=None, gnss=None, ego={"source": "can", "can": by_can})
-    source = opened(config, sensors)
-
-    def sent() -> Iterator[Message]:
-        for k in count():
-            yield Message(k * 100 * MS, "lidar", small_sweep(0))
-            yield Message((k * 100 + 2) * MS, "ego", EgoState(0, 25.0))
-
-    with Replaying(config, sent()), can.Bus(interface="virtual", channel=channel) as bus:
-        frames_until(source, lambda frame: frame.ego is not None)
-        bus.send(can.Message(arbitration_id=256, data=b"\x01", is_extended_id=False))
-        bus.send(can.Message(arbitration_id=999, data=b"\xff" * 8, is_extended_id=False))
-        frames_until(source, lambda frame: next(s.lost for s in frame.streams if s.sensor == "ego") == 1)
-        frame = frames_until(source, lambda frame: frame.ego is not None)
-    assert frame.ego is not None
-    assert frame.ego.yaw_rate_radps is None
-
-
-def _yaw_rate(frame: Frame) -> float | None:
-    return frame.ego.yaw_rate_radps if frame.ego is not None else None
-
-
-@pytest.mark.parametrize(
-    ("case", "dbc", "complaint"),
-    [
-        ("not there", None, "No such file"),
-        ("no DBC", "hello", "not a DBC"),
-        ("no such signal", DBC, "no signal V"),
-    ],
-)
-def test_a_dbc_file_without_the_signals_is_said_at_once(
-    tmp_path: Path, case: str, dbc: str | None, complaint: str
-) -> None:
-    path = tmp_path / "car.dbc"
-    if dbc is not None:
-        path.write_text(dbc, encoding="ascii")
-    by_can = {"dbc": str(path), "speed_mps": {"message": "SPEED", "signal": "V"}}
-    config = LiveConfig.model_validate({"lidar": {}, "ego": {"source": "can", "can": by_can}})
-    with pytest.raises(SourceError, match=complaint):
-        LiveSensors("live:x", config)
-
-
 def test_a_multicast_group_is_joined(sensors: list[LiveSensors]) -> None:
     port = free_port(socket.SOCK_DGRAM)
     lidar = {"data_port": port, "position_port": None, "interface": "127.0.0.1", "multicast_group": "239.255.77.77"}
@@ -218,27 +93,6 @@ def test_a_multicast_group_is_joined(sensors: list[LiveSensors]) -> None:
     source = opened(config, sensors)
     with Replaying(config, endless()):
         frames_until(source, lambda frame: frame.sweep is not None)
-
-
-def test_a_video_file_is_a_camera(sensors: list[LiveSensors], tmp_path: Path) -> None:
-    path = tmp_path / "drive.mp4"
-    film(path, 5)
-    config = LiveConfig.model_validate({"camera": {"file": str(path)}})
-    source = opened(config, sensors)
-    seen: list[Frame] = []
-    frames_until(source, lambda frame: len(seen) > 7, seen)
-    shades = {round(float(each.picture.bgr.mean()) / 60) for each in seen if each.picture is not None}
-    assert len(shades) >= 3, "it plays, and begins again at its end"
-    assert "it sends none of its own" in seen[-1].streams[0].note
-
-
-def test_what_is_not_a_video_is_said_and_tried_again(sensors: list[LiveSensors], tmp_path: Path) -> None:
-    path = tmp_path / "drive.mp4"
-    path.write_bytes(b"no video")
-    source = opened(LiveConfig.model_validate({"camera": {"file": str(path)}}), sensors)
-    assert source.next(0.6) is None
-    assert "drive.mp4" in source.health()[0].note
-    assert source.health()[0].state == "absent"
 
 
 def test_check_says_rates_clock_offsets_and_skew() -> None:
@@ -295,66 +149,3 @@ def test_a_real_capture_sent_back_is_decoded_as_its_file_is(sensors: list[LiveSe
     assert replaying.sent is not None
     assert len(over_network & known) >= 0.7 * len(over_network), "whole sweeps are the file's own"
     assert lidar.pps is not None, "position packets come to their own port"
-
-
-def test_a_receiver_on_a_serial_line_comes_goes_and_comes(sensors: list[LiveSensors]) -> None:
-    """A pair of pseudo-terminals is a serial line; closing its other end pulls the plug."""
-    ours, theirs = os.openpty()
-    tty.setraw(theirs)
-    config = LiveConfig.model_validate({"lidar": {"data_port": free_port(socket.SOCK_DGRAM), "position_port": None},
-                                        "gnss": {"serial": os.ttyname(theirs)}})  # fmt: skip
-    source = opened(config, sensors)
-    for k in range(1000):
-        os.write(ours, b"garbage\n" + sentences(fix_at(0), time.time_ns()))
-        if k >= 4 and source.health()[1].state == "ok":
-            break
-        source.next(0.05)
-    health = source.health()[1]
-    assert health.state == "ok"
-    assert health.lost > 0, "the garbage"
-    os.close(ours)
-    os.close(theirs)
-    for _ in range(1000):
-        source.next(0.02)
-        if source.health()[1].note:
-            break
-    assert source.health()[1].note, "it says that the line is gone"
-
-
-def test_video_over_http_is_a_camera_too(sensors: list[LiveSensors], tmp_path: Path) -> None:
-    film(tmp_path / "drive.mp4", 12)
-    handler = partial(SimpleHTTPRequestHandler, directory=str(tmp_path))
-    handler.log_message = lambda *_: None  # type: ignore[attr-defined]
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever)
-        thread.start()
-        try:
-            url = f"http://127.0.0.1:{server.server_address[1]}/drive.mp4"
-            source = opened(LiveConfig.model_validate({"camera": {"url": url}}), sensors)
-            frame = frames_until(source, lambda frame: frame.picture is not None)
-            source.close()
-        finally:
-            server.shutdown()
-            thread.join()
-    assert frame.picture is not None
-    assert frame.picture.bgr.shape == (48, 64, 3)
-
-
-def test_a_camera_that_is_not_plugged_in_is_said(sensors: list[LiveSensors]) -> None:
-    source = opened(LiveConfig.model_validate({"camera": {"device": 63}}), sensors)
-    for _ in range(600):
-        source.next(0.05)
-        if source.health()[0].note:
-            break
-    assert "camera 63: not plugged in" in source.health()[0].note
-
-
-def film(path: Path, count: int) -> None:
-    """A video of grey pictures, each brighter than the one before."""
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("mpeg4", rate=25)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        for shade in np.linspace(0, 240, count).astype(np.uint8):
-            frame = av.VideoFrame.from_ndarray(np.full((48, 64, 3), shade, np.uint8), format="bgr24")
-            container.mux(stream.encode(frame))
-        container.mux(stream.encode())
