@@ -112,10 +112,14 @@ def test_check_says_rates_clock_offsets_and_skew() -> None:
 
 def test_two_programs_on_one_port_are_told_so(sensors: list[LiveSensors]) -> None:
     config = loopback_config(camera=None, gnss=None, ego=None)
-    opened(config, sensors)
-    second = opened(config, sensors)
-    assert second.next(0.5) is None
-    assert "is taken by another program" in second.health()[0].note
+    both = [opened(config, sensors) for _ in range(2)]
+    told: list[LiveSensors] = []
+    for _ in range(600):
+        both[0].next(0.05)
+        told = [each for each in both if "is taken by another program" in each.health()[0].note]
+        if told:
+            break
+    assert len(told) == 1, "whichever came second"
 
 
 def test_closing_twice_is_safe_and_gives_the_port_back(sensors: list[LiveSensors]) -> None:
