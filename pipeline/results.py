@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import fields
 from typing import Any, TextIO
 
-from pipeline.geometry import Cuboid
+from pipeline.geometry import F64, Cuboid
 from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Gate, Path, Result, SensorHealth, StreamHealth
 
 VERSION = 1
@@ -185,6 +185,6 @@ def _points(points: Iterable[Iterable[float]] | None) -> list[Any] | None:
     return None if None in corners else corners
 
 
-def _line(points: Iterable[Iterable[float]]) -> list[Any]:
+def _line(points: F64) -> list[Any]:
     """A polyline without its unknown points."""
-    return [point for point in map(_numbers, points) if point is not None]
+    return [point for point in map(_numbers, points.tolist()) if point is not None]
