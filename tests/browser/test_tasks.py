@@ -7,7 +7,7 @@ import re
 from urllib.parse import parse_qs, quote, urlsplit
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from pipeline.params import Params
 from tests.browser.conftest import START, WAIT_MS, OpenPage, Site
@@ -210,6 +210,30 @@ def test_the_ribbon_selects_who_was_the_lead(page: Page, site: Site):
     page.locator("#timeline-front").click(position={"x": on_timeline(page, at), "y": 36})
     wait_for_frame(page, at)
     expect(page.locator("tr.is-selected td").first).to_have_text(f"#{ids[at]}")
+
+
+def test_a_change_that_is_taken_back_while_its_figures_are_on_their_way_is_no_complaint(page: Page, site: Site):
+    """The run is gone when the server is asked about it; the fixture sees that nothing was refused."""
+    recording = site.engine.drives.recording
+    assert recording is not None
+    book = recording.book
+    base = book.base
+    assert base is not None
+    asked: list[Route] = []
+    page.route(re.compile("/api/compare"), lambda route: route.continue_() if asked else asked.append(route))
+    site.engine.control.change_params(WIDE)
+    while not asked:
+        page.evaluate("() => new Promise(requestAnimationFrame)")
+    gone = book.current
+    assert gone is not None
+    assert gone is not base
+    site.engine.control.set_params(Params(), "default")
+    site.engine.wait_for(lambda s: s.drive.run == base.number, WAIT_S)
+    if gone in book.all():
+        book.delete(gone.number)
+    with page.expect_response(re.compile("/api/compare")):
+        asked[0].continue_()
+    expect(page.locator("#timeline-facts")).not_to_contain_text("frames differ")
 
 
 def test_the_cloud_is_dragged_over_the_picture(page: Page, site: Site):

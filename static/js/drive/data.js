@@ -68,8 +68,8 @@ async function findings(before, now, base) {
   const isSame = before?.now?.run === now.run && before.base?.run === base?.run;
   if (isSame && get("state")?.drive.running && performance.now() - foundAt_ms < FINDINGS_PAUSE_MS) return before;
   foundAt_ms = performance.now();
-  const [{ events }, comparison] = await Promise.all([
-    request("api/drive/events"), base ? request(`api/compare?base=${base.run}&run=${now.run}`).catch(() => null) : null,
+  const [{ events }, compared] = await Promise.all([
+    request("api/drive/events"), base ? request("api/compare").catch(() => null) : null, // by numbers one may be gone by now
   ]);
-  return { events, comparison };
+  return { events, comparison: compared?.base === base?.run && compared?.run === now.run ? compared : null };
 }

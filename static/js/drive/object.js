@@ -5,8 +5,8 @@ import { get, on, set } from "../store.js";
 let known = "";
 
 const fetchCurve = newestOnly(async (/** @type {{id: number, run: number}} */ { id, run }) => {
-  const curve = await request(`api/drive/object/${id}?run=${run}`).catch(() => null);
-  if (get("selection") === id) set("curve", curve);
+  const curve = await request(`api/drive/object/${id}`).catch(() => null); // by its number the run may be gone by now
+  if (get("selection") === id) set("curve", curve?.run === run ? curve : null);
 });
 
 export function setUp() {
