@@ -198,8 +198,8 @@ def test_a_pause_is_heard_while_the_picture_is_made_wider(site: Site, monkeypatc
 
 
 def believed(client: ClientConnection) -> bool:
-    """Whether a page takes it to play: what came last holds. Asked twice: the first answer may stand before a state that
-    goes out with it."""
+    """Whether a page takes it to play: what came last holds. Asked twice: the first answer may stand before a state
+    that goes out with it."""
     playing, answers = True, 0
     client.send(json.dumps({"ping": 1}))
     while answers < 2:
