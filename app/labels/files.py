@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import lzma
 import shutil
 import tempfile
 import time
@@ -30,11 +31,13 @@ _SUFFIXES: dict[FormatName, str] = {
 """Of the file; the others are folders."""
 _LARGEST_UNPACKED = 512 << 20
 _MOST_PARTS = 100_000
+_ENCRYPTED = 1
+"""Of a file's flags in a .zip (PKWARE's APPNOTE, 4.4.4)."""
 _BROKEN_ZIP = (
     zipfile.BadZipFile,  # none at all, or a file in it is not what its checksum says
-    zlib.error,  # a damaged file in it
-    NotImplementedError,  # packed in a way that this Python does not know
-    RuntimeError,  # needs a password
+    zlib.error,  # a damaged file in it, packed in the usual way
+    lzma.LZMAError,  # the same, in another; of bzip2 it is an OSError
+    NotImplementedError,  # what zipfile raises for one that is packed in a way that it does not know
     EOFError,  # ends early
     ValueError,  # says something of a file that cannot be
     OSError,  # a file and a folder in it have the same name
@@ -105,6 +108,8 @@ def _unzipped(file: Path, folder: Path) -> Path:
             parts = [each for each in packed.infolist() if not each.is_dir()]
             if len(parts) > _MOST_PARTS or sum(each.file_size for each in parts) > _LARGEST_UNPACKED:
                 raise BadAct(f"the .zip unpacks to more than {_LARGEST_UNPACKED >> 20} MiB")
+            if any(each.flag_bits & _ENCRYPTED for each in parts):
+                raise BadAct("the .zip needs a password")
             for each in parts:
                 name = PurePosixPath(each.filename)
                 if name.is_absolute() or ".." in name.parts or "\\" in each.filename:

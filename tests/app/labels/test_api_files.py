@@ -93,17 +93,17 @@ def test_what_is_exported_can_be_imported(engine: Engine, client: httpx.Client, 
     assert labels(client)["tracks"] == []
 
 
-def packed(**files: str) -> bytes:
+def packed(method: int = zipfile.ZIP_DEFLATED, **files: str) -> bytes:
     out = io.BytesIO()
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as made:
+    with zipfile.ZipFile(out, "w", method) as made:
         for name, text in files.items():
             made.writestr(name.replace("__", "/"), text)
     return out.getvalue()
 
 
-def spoilt(at: int, in_directory: int | None, value: int) -> bytes:
+def spoilt(at: int, in_directory: int | None, value: int, method: int = zipfile.ZIP_DEFLATED) -> bytes:
     """A .zip of one file whose byte ``at`` of its header is another one; also in the directory at the end."""
-    body = bytearray(packed(**{"a.txt": "x"}))
+    body = bytearray(packed(method, **{"a.txt": "x"}))
     body[at] = value
     if in_directory is not None:
         body[body.index(b"PK\x01\x02") + in_directory] = value
@@ -120,9 +120,11 @@ FLAGS, METHOD, DATA = (6, 8), (8, 10), 30 + len("a.txt")
         ("native", b"these are no labels", "the file: no JSON"),
         ("kitti", b"these are no labels", "no .zip of a folder"),
         ("kitti", packed(**{"..__..__out.txt": "x"}), "leads out of it"),
-        ("kitti", spoilt(*FLAGS, 1), "encrypted"),
+        ("kitti", spoilt(*FLAGS, 1), "the .zip needs a password"),
         ("kitti", spoilt(*METHOD, 99), "compression method is not supported"),
         ("kitti", spoilt(DATA, None, 0xFF), "Error -3 while decompressing data"),
+        ("kitti", spoilt(DATA + 9, None, 0xFF, zipfile.ZIP_LZMA), "no .zip of a folder: Corrupt input data"),
+        ("kitti", spoilt(DATA + 1, None, 0xFF, zipfile.ZIP_BZIP2), "no .zip of a folder: Invalid data stream"),
         ("openlabel", b"{}", "the file: "),
     ],
 )
