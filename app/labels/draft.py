@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
 from typing import Any
 
 from sqlalchemy import Connection, and_, bindparam, delete, func, insert, select, tuple_
@@ -117,6 +117,15 @@ class Draft:
         self._after[(kind, number)] = value
         if kind == "track" and value is None:
             self.put_sightings(number, dict.fromkeys(self.sightings(number)))
+
+    def put_as_one(self, kind: ItemKind, numbers: Sequence[int], value: Value) -> None:
+        """One item instead of these, under the first one's number; a new one where there are none."""
+        if not numbers:
+            self.add(kind, value)
+            return
+        for number in numbers[1:]:
+            self.put(kind, number, None)
+        self.put(kind, numbers[0], value)
 
     def add(self, kind: ItemKind, value: Value) -> int:
         """Make an item; its number, which no other had before."""

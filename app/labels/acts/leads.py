@@ -55,12 +55,7 @@ def paint(draft: Draft, new: LeadRange, number: int | None = None) -> None:
         if _says(old) == _says(new) and (old.last + 1 == new.first or old.first == new.last + 1):
             new = replace(new, first=min(old.first, new.first), last=max(old.last, new.last))
             joined.append(other)
-    for other in joined[1:]:
-        draft.put("lead", other, None)
-    if joined:
-        draft.put("lead", joined[0], new)
-    else:
-        draft.add("lead", new)
+    draft.put_as_one("lead", joined, new)
 
 
 def clear(draft: Draft, first: int, last: int, *, but: int | None = None) -> bool:

@@ -34,12 +34,7 @@ def put_tag(draft: Draft, new: FrameTag) -> None:
             if _by(old) == _by(new) and (old.last + 1 == first or old.first == last + 1):
                 part = replace(part, first=min(old.first, part.first), last=max(old.last, part.last))
                 joined.append(number)
-        for number in joined[1:]:
-            draft.put("tag", number, None)
-        if joined:
-            draft.put("tag", joined[0], part)
-        else:
-            draft.add("tag", part)
+        draft.put_as_one("tag", joined, part)
 
 
 def _clear(draft: Draft, act: Tag) -> None:

@@ -53,13 +53,18 @@ def wait_done(drives: Drives) -> DriveRun:
     return run_
 
 
+def completed(recording: DriveRecording, params: Params) -> DriveRun:
+    """The run of these parameters, computed here to its end."""
+    recording.book.want(params, "default")
+    run_ = recording.book.current
+    assert run_ is not None
+    while not run_.is_complete:
+        recording.advance(run_)
+    return run_
+
+
 def test_a_run_keeps_what_the_plain_line_says():
-    recording = opened(Recording())
-    recording.book.want(Params(), "default")
-    of = recording.book.current
-    assert of is not None
-    while not of.is_complete:
-        recording.advance(of)
+    of = completed(opened(Recording()), Params())
     results = [result for _, result in run(Recording(), Params(), Detectors(CountingDetector()))]
     leads = [result.cipv for result in results]
     rows = of.rows()
@@ -100,11 +105,7 @@ def test_another_run_asks_neither_source_nor_network():
     source, detector = Recording(), CountingDetector()
     recording = opened(source, detector)
     for hits in (3, 4):
-        recording.book.want(with_hits(hits), "default")
-        of = recording.book.current
-        assert of is not None
-        while not of.is_complete:
-            recording.advance(of)
+        completed(recording, with_hits(hits))
         assert (len(source.reads), detector.calls) == (30, 30)
 
 
@@ -169,13 +170,8 @@ def test_a_network_that_is_stopped_for_who_asks_looks_again_and_nothing_is_lost(
     drives.turn.asked(rests=True)
     of = wait_done(drives)
     assert (of.is_complete, of.note, detector.stopped, detector.calls) == (True, "", 1, 31)
-    undisturbed = opened(Recording())
-    undisturbed.book.want(Params(), "default")
-    other = undisturbed.book.current
-    assert other is not None
-    while not other.is_complete:
-        undisturbed.advance(other)
-    assert repr(of.rows()) == repr(other.rows())
+    undisturbed = completed(opened(Recording()), Params())
+    assert repr(of.rows()) == repr(undisturbed.rows())
 
 
 def test_without_a_recording_there_is_nothing_to_say(drives: Drives):
