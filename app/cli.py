@@ -13,7 +13,7 @@ from typing import Any
 
 import tyro
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 COMMANDS = {
     "demo": "app.commands.serve:Demo",

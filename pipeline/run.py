@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, TypeVar, cast
 
+from pipeline.lanes.open_detector import LaneDetector, open_lanes
 from pipeline.params import Params
-from pipeline.path.lane_detector import LaneDetector, open_lanes
-from pipeline.sources.base import AnySource, LiveSource, Source, is_live_source, is_simulated
 from pipeline.step import State, step, warm_up
 from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result
+from pipeline.types.source import AnySource, LiveSource, Source, is_live_source, is_simulated
 from pipeline.vision.detector import Detector, open_detector
-from pipeline.vision.models import EMBEDDED
+from pipeline.vision.model_registry import EMBEDDED
 
 _SILENCE_S = 0.5
 
@@ -92,7 +92,7 @@ def detector_for(source: AnySource, spec: str | None = None) -> Detector:
 
 
 def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None:
-    """The lane detector for the source's pictures, as ``pipeline.path.lane_detector.open_lanes`` chooses it. None for a
+    """The lane detector for the source's pictures, as ``pipeline.lanes.open_detector.open_lanes`` chooses it. None for a
     source that has no pictures, unless one is named."""
     if spec is None and picture_size(source) is None:
         return None

@@ -19,13 +19,19 @@ from time import perf_counter_ns
 
 import numpy as np
 
-from pipeline import acc, aeb, agreement, alignment, cipv, fusion, kalman, motion, own_motion
-from pipeline.geometry import iou_matrix
+from pipeline.alignment import projection
+from pipeline.common import kalman
+from pipeline.common.geometry import iou_matrix
+from pipeline.decision import acc, aeb, cipv, object_motion, path_position
+from pipeline.ego_motion import coasting
+from pipeline.fusion import agreement
+from pipeline.fusion import fuse as fusion
+from pipeline.lanes import road_lines as lanes
 from pipeline.lidar import boxes, cluster, deskew, downsample, ground
 from pipeline.lidar import tracking as lidar_tracking
 from pipeline.lidar import warm_up as warm_up_lidar
 from pipeline.params import Params
-from pipeline.path import corridor, lanes, placing, yaw_rate
+from pipeline.path import corridor, yaw_rate
 from pipeline.types import (
     VEHICLES,
     CameraCalibration,
@@ -39,7 +45,7 @@ from pipeline.types import (
     Sweep,
     VisionMeasurement,
 )
-from pipeline.vision import distance, select
+from pipeline.vision import distance, nms
 from pipeline.vision import tracking as vision_tracking
 
 
@@ -64,10 +70,10 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     """Run every stage on one frame, whose ``raw_boxes`` the detector has filled already (``pipeline.run.detect``)."""
     state, dt_s = _continue_or_restart(state, frame, params)
     clock = _Stopwatch()
-    aligned = alignment.resolve(params.alignment, frame.camera)
+    aligned = projection.resolve(params.alignment, frame.camera)
     measured_ego = yaw_rate.believable(frame.ego)
-    own = own_motion.follow(state.own, measured_ego, dt_s, params.motion)
-    ego = own_motion.recent(own, params.motion)
+    own = coasting.follow(state.own, measured_ego, dt_s, params.motion)
+    ego = coasting.recent(own, params.motion)
 
     sweep = deskew.deskew(frame.sweep, ego, params.deskew)
     clock.lap("deskew")
@@ -88,7 +94,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         state.fusion, lidar_tracks, vision_tracks, aligned, _picture_size(frame), params.fusion
     )
     clock.lap("fusion")
-    objects = motion.describe(fused.objects, measured_ego, params.motion)
+    objects = object_motion.describe(fused.objects, measured_ego, params.motion)
     vehicles = [each.detection.bbox for each in measured or () if each.detection.label in VEHICLES]
     road_z_m = frame.camera.road_z_m if frame.camera is not None else None
     lane_state, lane = lanes.follow(
@@ -170,7 +176,7 @@ def _warm_up() -> None:
     iou_matrix(np.zeros((1, 4)), np.zeros((1, 4)))
     lanes.warm_up()
     corridor.warm_up()
-    placing.warm_up()
+    path_position.warm_up()
     _spare_the_frames()
 
 
@@ -219,12 +225,12 @@ def _perceive_lidar(sweep: Sweep | None, params: Params, clock: _Stopwatch) -> _
 
 
 def _perceive_picture(
-    frame: Frame, aligned: alignment.Alignment | None, params: Params
+    frame: Frame, aligned: projection.Alignment | None, params: Params
 ) -> tuple[VisionMeasurement, ...] | None:
     """Raw boxes → thresholds and suppression → distance. Null when the camera or the detector gave nothing."""
     if frame.raw_boxes is None:
         return None
-    detections = select.select(frame.raw_boxes, params.detection)
+    detections = nms.select(frame.raw_boxes, params.detection)
     return distance.measure(detections, aligned, frame.camera, params.distance, frame.raw_boxes.law)
 
 

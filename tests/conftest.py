@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from pipeline.data import data_dir as recordings
+from pipeline.common.data_dir import data_dir as recordings
 
 # A loaded machine must not fail an example for being slow; in CI the examples are the same in every run, at a desk new.
 settings.register_profile("desk", deadline=None)

@@ -18,10 +18,10 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
 
-from app.line import DetectionCache, Line, Tick
-from app.listening import listen_socket
-from app.snapshot import Snapshot
-from app.stream import Stream
+from app.core.line import DetectionCache, Line, Tick
+from app.core.server_address import listen_socket
+from app.engine.snapshot import Snapshot
+from app.streaming.stream import Stream
 from pipeline.params import Params
 from pipeline.run import Detectors
 from pipeline.sources import open_source

@@ -19,7 +19,7 @@ from typing import Any
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = (

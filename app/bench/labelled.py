@@ -11,8 +11,8 @@ from urllib.request import Request, urlopen
 
 from app.bench.browser import opened
 from app.bench.devtools import Browser
-from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
 

@@ -14,9 +14,9 @@ import numpy as np
 from app.bench.timing import figures
 from pipeline.params import Params
 from pipeline.run import Detectors, Detects, detect
-from pipeline.sources.base import Source
 from pipeline.step import State, step, warm_up
 from pipeline.types import Frame, RawBoxes
+from pipeline.types.source import Source
 
 _ROUNDS = 3
 """The step alone and the step beside the network take turns, so that what slows the machine slows both."""

@@ -12,11 +12,11 @@ import numpy as np
 from velodyne_decoder import Config, Model, StreamDecoder
 
 from app.bench.timing import figures, interleaved
-from pipeline.data import data_dir
+from pipeline.common.data_dir import data_dir
+from pipeline.formats.velodyne import PACKET_BYTES, RotationCutter, SensorClock, Vlp16Decoder
+from pipeline.formats.velodyne.encode import packets_of
+from pipeline.formats.velodyne.packet import BLOCK_US
 from pipeline.sources import open_source
-from pipeline.sources.velodyne import PACKET_BYTES, RotationCutter, SensorClock, Vlp16Decoder
-from pipeline.sources.velodyne.encode import packets_of
-from pipeline.sources.velodyne.packet import BLOCK_US
 
 OURS = "ours"
 _SIMULATED = 12

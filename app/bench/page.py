@@ -20,7 +20,7 @@ from websockets.sync.client import connect
 from app.bench.browser import Waits, first_views_ms, paused, playing
 from app.bench.devtools import FLAGS, Browser, browser
 from app.bench.labelled import labelled
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 _ALL_SEEN_WITHIN_S, _ASK_EVERY_S = 120.0, 0.5
 _SETTLE_BRIEFLY_S = 1.0

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from app.bench.timing import figures
-from pipeline.evaluation.experiments.seeing import embedded
+from pipeline.experiments.perception import embedded
 from pipeline.simulation import scenario
-from pipeline.simulation.loop import Eyes, NetworkEyes, Setup, TruthEyes, drive
+from pipeline.simulation.closed_loop import Eyes, NetworkEyes, Setup, TruthEyes, drive
 
 _SCENARIO = "straight"
 

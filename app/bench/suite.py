@@ -10,15 +10,15 @@ from app.bench import lidar as lidar_bench
 from app.bench import line as line_bench
 from app.bench import packets as packets_bench
 from app.bench import simulation as simulation_bench
-from app.catalog import recordings
+from app.web.source_catalog import recordings
+from pipeline.inference.runtime import DetectorMissing
+from pipeline.lanes.open_detector import usual_every
 from pipeline.params import Params
-from pipeline.path.lane_detector import usual_every
 from pipeline.run import Detectors, detector_for, lanes_for
 from pipeline.sources import open_source
-from pipeline.sources.base import Source
 from pipeline.types import Sweep
+from pipeline.types.source import Source
 from pipeline.vision.detector import Detector
-from pipeline.vision.runtime import DetectorMissing
 
 BUDGET_S = {"decode": 1.5, "lidar": 8.0, "lidar@kitti": 6.5, "line": 10.0, "detector": 3.0, "simulation": 3.0}
 """Wall time of each part; together with loading and compiling they stay below 45 s."""

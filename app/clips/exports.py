@@ -10,12 +10,12 @@ from typing import Literal
 
 from app.clips.frames import clip_frames, one_frame
 from app.clips.jobs import Job, Jobs, Report
-from app.drive.recording import Recording
-from app.drive.turn import Turn
-from app.views.opening import Opening
-from pipeline.errors import BadInput
+from app.drive.compute_scheduler import Turn
+from app.drive.open_recording import Recording
+from app.views.rerun_start_options import Opening
+from pipeline.common.errors import BadInput
 from pipeline.params import Params
-from pipeline.results import to_json
+from pipeline.types.result_json import to_json
 
 Kind = Literal["mcap", "rrd", "mp4", "csv", "html"]
 MOST_FRAMES = 6000
@@ -52,7 +52,7 @@ def _mcap(clip: Clip, path: Path, report: Report) -> None:
 
 
 def _rrd(clip: Clip, path: Path, report: Report) -> None:
-    from app.export import write_rrd
+    from app.clips.excerpt import write_rrd
 
     run = clip_frames(clip.recording, clip.params, clip.first, clip.last, report, clip.turn)
     write_rrd(clip.title, run, path, clip.params, clip.opening)
@@ -66,15 +66,15 @@ def _mp4(clip: Clip, path: Path, report: Report) -> None:
 
 
 def _csv(clip: Clip, path: Path, report: Report) -> None:
-    from app.export import write_csv
+    from app.clips.excerpt import write_csv
 
     run = clip_frames(clip.recording, clip.params, clip.first, clip.last, report, clip.turn, pictures=False)
     write_csv((to_json(result) for _, result in run), path)
 
 
 def _html(clip: Clip, path: Path, report: Report) -> None:
+    from app.clips.html_report import About, clip_page
     from app.clips.overlay import draw_frame
-    from app.clips.page import About, clip_page
 
     recording, params = clip.recording, clip.params
     recipe = recording.recipe

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from app.clips.jobs import Report
-from app.drive.recording import Recording
-from app.drive.turn import Turn
+from app.drive.compute_scheduler import Turn
+from app.drive.open_recording import Recording
 from pipeline.params import Params
 from pipeline.step import step
 from pipeline.types import Frame, Result

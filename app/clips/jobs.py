@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 logger = logging.getLogger("cipv.jobs")
 

@@ -7,10 +7,10 @@ from typing import Any
 import cv2
 import numpy as np
 
-from app.encode import display_json
+from app.streaming.encode import display_json
 from app.views.colors import Rgb, rgb, role_of
 from app.views.scene import cipv_id, object_text, stands_out
-from pipeline.alignment import resolve
+from pipeline.alignment.projection import resolve
 from pipeline.params import Params
 from pipeline.types import U8, Frame, FusedObject, Result
 

@@ -15,8 +15,8 @@ from app.bench import clients as clients_bench
 from app.bench import page as page_bench
 from app.bench.demands import PAGE_DEMANDS, broken, page_rows
 from app.bench.suite import run_all
-from app.options import LineOptions
-from pipeline.errors import BadInput
+from app.commands.support.options import LineOptions
+from pipeline.common.errors import BadInput
 
 CLIENTS_EACH_S, PAGE_S = 6.0, 12.0
 

@@ -14,13 +14,13 @@ import yaml
 from rich.console import Console
 from rich.table import Table
 
-from app.options import LineOptions, SourceOptions
+from app.commands.support.options import LineOptions, SourceOptions
 from pipeline.calibration.distance import LawFit, as_law, as_overrides, collect_pairs, fit_laws
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 from pipeline.run import detector_for
-from pipeline.sources.base import Source
-from pipeline.vision.laws import keep_law
-from pipeline.vision.models import EMBEDDED, find
+from pipeline.types.source import Source
+from pipeline.vision.distance_laws import keep_law
+from pipeline.vision.model_registry import EMBEDDED, find
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,12 @@ from urllib.parse import quote, urlsplit
 
 import tyro
 
-from app.bars import frames_progress
-from app.options import LineOptions, SourceOptions
-from app.report import html
-from app.tables import show
-from pipeline.errors import BadInput
-from pipeline.evaluation.lead import LeadRule
+from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.progress_bars import frames_progress
+from app.reports.html import html
+from app.reports.terminal_tables import show
+from pipeline.common.errors import BadInput
+from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
 from pipeline.evaluation.scores.report import as_json, sections
 from pipeline.evaluation.scores.results_file import EMPTY, read_results
@@ -27,9 +27,9 @@ from pipeline.labels.formats import native
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.params import Params, from_yaml, preset
 from pipeline.run import Detectors, Sensors, detect, only
-from pipeline.sources.base import Source
 from pipeline.step import State, step, warm_up
 from pipeline.types import Frame, Result
+from pipeline.types.source import Source
 
 DASHBOARD = "http://127.0.0.1:8420"
 """Where `cipv serve` listens unless told otherwise."""

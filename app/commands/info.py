@@ -10,7 +10,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.complaint import given_path
+from pipeline.common.user_file_errors import given_path
 from pipeline.recording.info import Info, Rhythm, info, info_of_source
 
 _WIDE = 120
@@ -36,9 +36,7 @@ class ShowInfo:
             found = info(given_path(self.source.removeprefix("mcap:")))
             _print_json(asdict(found)) if self.json else _print_info(found)
             return 0
-        from app.progress import (
-            opened_recording,  # what opens any source takes a second to import: a session needs none
-        )
+        from app.commands.support.open_with_progress import opened_recording
 
         source = opened_recording(self.source)
         frames = info_of_source(source)

@@ -12,21 +12,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from app.bars import frames_progress
-from app.labels.words import WORKING
-from app.progress import opened_recording
-from pipeline.collection import uncollected
-from pipeline.complaint import given_path
+from app.commands.support.open_with_progress import opened_recording
+from app.commands.support.progress_bars import frames_progress
+from app.labels.wording import WORKING
+from pipeline.common.gc_pause import uncollected
+from pipeline.common.user_file_errors import given_path
 from pipeline.labels.formats.base import Drive, FormatName, drive_of
 from pipeline.labels.formats.native import from_json, onto
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.labels.formats.registry import export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
-from pipeline.labels.truth import truth_labels
-from pipeline.sources.base import Source
+from pipeline.labels.recorded_truth import truth_labels
+from pipeline.types.source import Source
 
 if TYPE_CHECKING:
-    from app.labels.drive import DriveLabels
+    from app.labels.store.drive_labels import DriveLabels
 
 _NOBODY_KNOWS_WHEN = 0
 """The truth of a recording was made before it was opened; the same recording gives the same file."""
@@ -109,7 +109,7 @@ class ImportLabels:
             say(*found.notes, f"{self.out}: {_amount(found.labels)}")
             return 0
         with _kept(source, drive, self.database) as kept:
-            from app.labels.long import importing  # the database and the run: who writes a file needs neither
+            from app.labels.acts.bulk import importing  # the database and the run: who writes a file needs neither
 
             say(importing(kept, found.labels, self.person, found.notes))
         return 0
@@ -118,8 +118,8 @@ class ImportLabels:
 @contextmanager
 def _kept(source: Source, drive: Drive, url: str | None) -> Iterator[DriveLabels]:
     """The database's labels of a recording."""
-    from app.labels.database import open_database  # as above
-    from app.labels.drive import DriveLabels, info_of
+    from app.labels.store.database import open_database  # as above
+    from app.labels.store.drive_labels import DriveLabels, info_of
 
     database = open_database(url)
     try:

@@ -11,9 +11,9 @@ from typing import Annotated
 
 import tyro
 
-from app.bars import frames_progress
 from app.commands.label_files import Database, ExportLabels, ImportLabels, Person, say
-from app.options import LineOptions, SourceOptions
+from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.progress_bars import frames_progress
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class ProposeLabels:
     """Whose act it is, to be undone in the page"""
 
     def __call__(self) -> int:
-        from app.drive.run import calibration_digest, digest
-        from app.labels.database import open_database
-        from app.labels.drive import DriveLabels, info_of
-        from app.labels.long import put_proposals
+        from app.drive.full_run import calibration_digest, digest
+        from app.labels.acts.bulk import put_proposals
+        from app.labels.store.database import open_database
+        from app.labels.store.drive_labels import DriveLabels, info_of
         from pipeline.labels.model import Origin
         from pipeline.labels.propose import Seen, propose
         from pipeline.run import run
@@ -82,8 +82,8 @@ class ListLabels:
     """As JSON"""
 
     def __call__(self) -> int:
-        from app.labels.database import open_database
-        from app.labels.drive import known_drives
+        from app.labels.store.database import open_database
+        from app.labels.store.drive_labels import known_drives
 
         database = open_database(self.database)
         try:

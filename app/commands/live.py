@@ -11,7 +11,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 if TYPE_CHECKING:
     from pipeline.sources.live.check import SensorReport
@@ -39,7 +39,7 @@ class Live:
         return self._init() if self.what == "init" else self._check()
 
     def _init(self) -> int:
-        from pipeline.sources.live.init import TEMPLATE
+        from pipeline.sources.live.config_template import TEMPLATE
 
         try:
             with self.file.open("x", encoding="utf-8") as file:

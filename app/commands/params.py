@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from rich.console import Console
 from rich.table import Table
 
-from app.options import LineOptions
+from app.commands.support.options import LineOptions
 from pipeline.params import Params, to_yaml
 
 

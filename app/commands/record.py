@@ -13,20 +13,20 @@ from typing import Annotated, cast
 
 import tyro
 
-from app.bars import frames_progress
-from app.options import LineOptions, SourceOptions
-from app.recording import SESSIONS, new_session
-from app.waiting import Waiting
-from pipeline.errors import BadInput
+from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.progress_bars import frames_progress
+from app.commands.support.sensor_wait import Waiting
+from app.engine.session_recording import SESSIONS, new_session
+from pipeline.common.errors import BadInput
 from pipeline.params import Params
-from pipeline.recording.packets import RawLidar
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.save import about
 from pipeline.recording.segments import Rotation, Segments
+from pipeline.recording.velodyne_scan import RawLidar
 from pipeline.run import run, run_live
 from pipeline.sources import is_live
-from pipeline.sources.base import LiveSource, Source, is_live_source
 from pipeline.types import Frame, Result
+from pipeline.types.source import LiveSource, Source, is_live_source
 
 Ran = tuple[Frame, Result]
 

@@ -10,8 +10,8 @@ from typing import Annotated
 
 import tyro
 
-from app.options import SourceOptions
-from pipeline.errors import BadInput
+from app.commands.support.options import SourceOptions
+from pipeline.common.errors import BadInput
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,14 @@ from typing import Annotated, Literal, cast
 
 import tyro
 
-from app.bars import frames_progress
-from app.options import LineOptions, SourceOptions
-from app.waiting import Waiting
+from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.progress_bars import frames_progress
+from app.commands.support.sensor_wait import Waiting
 from pipeline.params import Params
-from pipeline.results import write_line
 from pipeline.run import Detectors, run, run_live
-from pipeline.sources.base import AnySource, Source, is_live_source
 from pipeline.types import Frame, Result
+from pipeline.types.result_json import write_line
+from pipeline.types.source import AnySource, Source, is_live_source
 
 Ran = tuple[Frame, Result]
 

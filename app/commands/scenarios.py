@@ -10,13 +10,13 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.bars import frames_progress
-from app.replays import ReplayFolder
-from app.report import html
-from app.tables import show
-from pipeline.errors import BadInput
-from pipeline.evaluation.experiments.runner import count_cases, of_suite, run_all
-from pipeline.evaluation.experiments.sections import as_json
+from app.commands.support.progress_bars import frames_progress
+from app.reports.experiment_drives import ReplayFolder
+from app.reports.html import html
+from app.reports.terminal_tables import show
+from pipeline.common.errors import BadInput
+from pipeline.evaluation.report_sections import as_json
+from pipeline.experiments.runner import count_cases, of_suite, run_all
 
 
 @dataclass(frozen=True)

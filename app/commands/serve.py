@@ -12,24 +12,24 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from app.engine import Engine
+from app.commands.support.open_with_progress import opened
+from app.commands.support.options import LineOptions, planned
+from app.core.server_address import DEFAULT_PORT
+from app.core.shared_view_state import Looks
+from app.engine.engine import Engine
 from app.labels import URL_VARIABLE
-from app.labels.desk import LabelDesk
-from app.late_scene import LateScene
-from app.listening import DEFAULT_PORT
-from app.looks import Looks
-from app.options import LineOptions, planned
-from app.progress import opened
-from app.serving import serve
-from pipeline.progress import Progress
+from app.labels.service.desk import LabelDesk
+from app.views.lazy_scene import LateScene
+from app.web.serve import serve
+from pipeline.common.progress import Progress
 from pipeline.run import detector_for, lanes_for
 from pipeline.sources import open_any
 from pipeline.sources.along_route import along_route
-from pipeline.sources.base import AnySource
+from pipeline.types.source import AnySource
 
 if TYPE_CHECKING:
-    from app.labels.database import Database
-    from app.rerun_feed import RerunFeed
+    from app.labels.store.database import Database
+    from app.views.rerun_feed import RerunFeed
 
 
 @dataclass(frozen=True)
@@ -78,13 +78,15 @@ class ServerOptions:
 
 
 def _open_labels(url: str | None) -> Database:
-    from app.labels.database import open_database  # SQLAlchemy takes most of a second to import: not before a picture
+    from app.labels.store.database import (
+        open_database,  # SQLAlchemy takes most of a second to import: not before a picture
+    )
 
     return open_database(url)
 
 
 def _rerun_feed(engine: Engine, url: str) -> RerunFeed:
-    from app.rerun_feed import RerunFeed  # half a second to import: only who asks pays
+    from app.views.rerun_feed import RerunFeed  # half a second to import: only who asks pays
 
     return RerunFeed(engine, url)
 

@@ -10,16 +10,16 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from app.bars import frames_progress
+from app.clips.excerpt import Kind, export_clip
 from app.commands.info import size_text
-from app.export import Kind, export_clip
-from app.options import LineOptions, SourceOptions
-from app.playing.playback import timeline_s
-from pipeline.errors import BadInput
+from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.progress_bars import frames_progress
+from app.core.playback_clock import timeline_s
+from pipeline.common.errors import BadInput
 from pipeline.recording.rewrite import recover
 from pipeline.recording.save import save
 from pipeline.run import Detectors
-from pipeline.sources.base import Source
+from pipeline.types.source import Source
 
 
 @dataclass(frozen=True)

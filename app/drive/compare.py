@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
-from app.drive.columns import Row
-from pipeline.evaluation.lead import score
+from app.drive.frame_rows import Row
+from pipeline.evaluation.lead_verdict import score
 
 SAME_PLACE_M = 0.5
 """Distances, or offsets from the path, that differ by less are one place."""
@@ -86,7 +86,7 @@ def _lead(row: Row) -> str:
 
 
 def _against_truth(base: Sequence[Row], run: Sequence[Row]) -> tuple[Metric, ...]:
-    """``pipeline.evaluation.lead``'s figures over the frames that have truth."""
+    """``pipeline.evaluation.lead_verdict``'s figures over the frames that have truth."""
     a, b = (score(row.judged for row in rows if row.judged is not None) for rows in (base, run))
     return (
         Metric("CIPV correct", "frames", a.correct, b.correct, "higher"),

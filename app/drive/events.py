@@ -11,11 +11,11 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from app.drive.columns import Objects, Row
+from app.drive.frame_rows import Objects, Row
 from app.drive.marks import Mark as Marked
 from pipeline.params import Params
-from pipeline.sources.base import Mark
 from pipeline.types import F64, I64
+from pipeline.types.source import Mark
 
 Kind = Literal[
     "first_acquisition",

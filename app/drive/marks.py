@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 MOST_MARKS = 10_000
 LONGEST_TEXT = 200

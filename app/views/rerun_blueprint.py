@@ -6,7 +6,7 @@ from typing import Any
 
 import rerun.blueprint as rrb
 
-from app.views.opening import PLAYING, Opening
+from app.views.rerun_start_options import PLAYING, Opening
 
 CAMERA = "world/camera"
 OVERLAYS = f"{CAMERA}/overlay"

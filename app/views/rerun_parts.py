@@ -10,7 +10,7 @@ import numpy.typing as npt
 import rerun as rr
 
 from app.views import scene
-from pipeline.geometry import F64
+from pipeline.common.geometry import F64
 from pipeline.types import Box, FusedObject, Path, Picture, Result
 
 FAINT, THIN, THICK, POINT = (rr.Radius.ui_points(size) for size in (0.5, 1.0, 2.5, 1.4))

@@ -16,11 +16,11 @@ import rerun as rr
 from app.views import rerun_parts as parts
 from app.views import scene
 from app.views.colors import rgb
-from app.views.opening import PLAYING, Opening
 from app.views.rerun_blueprint import BEV_AHEAD_M, BEV_ASIDE_M, CAMERA, OVERLAYS, blueprint
-from pipeline import alignment
-from pipeline.errors import BadInput
-from pipeline.geometry import inverse
+from app.views.rerun_start_options import PLAYING, Opening
+from pipeline.alignment import projection
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import inverse
 from pipeline.params import AlignmentParams
 from pipeline.types import Frame, Result
 
@@ -205,7 +205,7 @@ class RerunSink:
         self._put(f"{OVERLAYS}/cipv", parts.boxes(lead, {each: rgb("cipv") for each in lead}, {}, parts.THICK))
 
     def _projected(self, frame: Frame, result: Result) -> rr.Points2D | None:
-        model = alignment.resolve(self._params, frame.camera)
+        model = projection.resolve(self._params, frame.camera)
         points = result.layers.points
         if model is None or frame.picture is None or not len(points):
             return None

@@ -19,7 +19,7 @@ import urllib.request
 from pathlib import Path
 from typing import IO
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 FILES = ("re_viewer.js", "re_viewer_bg.wasm")
 _START_S = 20.0

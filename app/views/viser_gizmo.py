@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.looks import Held, OnDrag
+from app.core.shared_view_state import Held, OnDrag
 from app.views.scene import cuboid_edges
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.types import F64
 
 NODE = "/held"

@@ -13,7 +13,7 @@ import viser.transforms
 
 from app.views import scene as outlines
 from app.views.colors import Rgb, rgb
-from pipeline.geometry import F64, inverse, transform
+from pipeline.common.geometry import F64, inverse, transform
 from pipeline.types import Frame, FusedObject, Path, Point3
 
 _PICTURE_DISTANCE_M = 2.5

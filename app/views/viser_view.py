@@ -16,10 +16,10 @@ import numpy as np
 import rich
 import viser
 
-from app.looks import Held, OnDrag
+from app.core.shared_view_state import Held, OnDrag
 from app.views import scene, viser_nodes
 from app.views.colors import Role, rgb
-from app.views.picking import object_on_ray
+from app.views.ray_picking import object_on_ray
 from app.views.viser_gizmo import CuboidGizmo
 from app.views.viser_gui import OnChange, ParamsGui
 from app.views.viser_nodes import Strokes

@@ -12,16 +12,16 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.alignment import Alignment, project_cuboid, resolve
-from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid, closest_on_polygon, iou_matrix, transform
+from pipeline.alignment.projection import Alignment, project_cuboid, resolve
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid, closest_on_polygon, iou_matrix, transform
 from pipeline.lidar import boxes, cluster, downsample, ground
 from pipeline.params import Params
-from pipeline.sources.base import Source
 from pipeline.types import REAL_VEHICLES, VEHICLES, CameraCalibration, DistanceLaw, Frame
+from pipeline.types.source import Source
 from pipeline.vision.detector import Detector
 from pipeline.vision.distance import PowerLaw, fit_power_law, height_at_reference, is_cut
-from pipeline.vision.select import select
+from pipeline.vision.nms import select
 
 MIN_IOU = 0.4
 MIN_DEPTH_M = 3.0

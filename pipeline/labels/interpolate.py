@@ -19,8 +19,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.model import Sighting
 from pipeline.types import Box
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.types import Box, Point2
 
 State = Literal["proposed", "accepted", "corrected", "rejected"]

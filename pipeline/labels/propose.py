@@ -6,7 +6,7 @@ where it was last predicted to be; between two sightings a prediction stands in.
 is a vehicle and what stands beside it, or none at all: where it lies tells nothing, and its box alone is kept.
 
 What the camera alone sees is proposed as a box in the picture, without a cuboid. One from how tall it looks, as
-``pipeline.labels.lift`` makes where somebody points, was tried: on Astyx its middle was 14 m off (median of 55 that
+``pipeline.labels.cuboid_from_pixel`` makes where somebody points, was tried: on Astyx its middle was 14 m off (median of 55 that
 have truth, at 68 m), two in three did not even touch the vehicle; and a distance that nobody measured must not become
 the truth by which distances are scored.
 """
@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.geometry import Cuboid, iou_matrix
+from pipeline.common.geometry import Cuboid, iou_matrix
+from pipeline.fusion.vehicle_sizes import largest_size_m, usual_size_m
 from pipeline.labels.interpolate import resized
 from pipeline.labels.model import LabelTrack, Lead, LeadRange, Origin, Sighting
-from pipeline.sizes import largest_size_m, usual_size_m
 from pipeline.types import VEHICLES, Box
 
 ROAD_USERS = VEHICLES | {"person", "bicycle"}

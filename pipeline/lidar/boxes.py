@@ -11,7 +11,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.lidar.ground import Ground
 from pipeline.params import BoxParams
 from pipeline.types import F32, F64, I32, Obstacle

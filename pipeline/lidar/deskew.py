@@ -15,8 +15,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from pipeline.common.fast_replace import evolve
 from pipeline.params import DeskewParams
-from pipeline.records import evolve
 from pipeline.types import EgoState, Sweep
 
 

@@ -20,8 +20,8 @@ import numba
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pipeline import kalman
-from pipeline.geometry import Cuboid
+from pipeline.common import kalman
+from pipeline.common.geometry import Cuboid
 from pipeline.params import LidarTrackingParams
 from pipeline.types import F64, I64, LidarTrack, Obstacle, Point3
 

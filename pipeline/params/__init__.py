@@ -13,8 +13,8 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from pipeline.complaint import did_you_mean, read_yaml
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
+from pipeline.common.user_file_errors import did_you_mean, read_yaml
 from pipeline.params.declare import Section
 from pipeline.params.driving import (
     AccParams,

@@ -18,15 +18,16 @@ from math import erf, exp, isfinite, pi, sqrt
 import numba
 import numpy as np
 
-from pipeline.geometry import F64
+from pipeline.common.geometry import F64
 from pipeline.params import PathParams
-from pipeline.path import fusing, gnss, yaw_rate
+from pipeline.path import blend_estimates, yaw_rate
+from pipeline.path import route_following as gnss
+from pipeline.path.blend_estimates import FusedPath
 from pipeline.path.estimates import SOURCES, STEP_M, PathEstimate, between_lines, straight
-from pipeline.path.fusing import FusedPath
-from pipeline.path.gnss import GnssState
-from pipeline.path.lane_types import EgoLane
+from pipeline.path.route_following import GnssState
 from pipeline.path.yaw_rate import YawRate
 from pipeline.types import EgoState, GnssFix, Path, PathSource, Route
+from pipeline.types.lane import EgoLane
 
 _LOOK_AHEAD_M = (10, 30, 60)
 _CARRIES_ALONE = 0.7
@@ -73,11 +74,11 @@ def predict(
     if not estimates or _fades(ego, estimates):
         estimates.append(straight(ego, params))
     expected = _expected(state.last, yaw, ego, dt_s, len(estimates[0].center))
-    fresh, left_out = fusing.fuse(estimates, expected, params.half_width_m, params.outlier_sigmas)
+    fresh, left_out = blend_estimates.fuse(estimates, expected, params.half_width_m, params.outlier_sigmas)
     path = fresh
     if expected is not None and dt_s:
         keep = exp(-dt_s / params.smoothing_s) if params.smoothing_s > 0.0 else 0.0
-        path = fusing.blend(fresh, expected, keep, _FASTEST_SHIFT_MPS * dt_s)
+        path = blend_estimates.blend(fresh, expected, keep, _FASTEST_SHIFT_MPS * dt_s)
     notes = (*_about_own_motion(ego), *wrong_fix, *wrong_route, *left_out)
     return PathState(yaw, placed, path if ego is not None else None), _as_path(path, ego, notes, params)
 
@@ -109,7 +110,7 @@ def _expected(
         rate = yaw.rate_radps
     if rate is None:
         return None
-    return fusing.moved(last, max(ego.speed_mps, 0.0) * dt_s, rate * dt_s, dt_s, ego.coasting)
+    return blend_estimates.moved(last, max(ego.speed_mps, 0.0) * dt_s, rate * dt_s, dt_s, ego.coasting)
 
 
 def _fades(ego: EgoState | None, estimates: list[PathEstimate]) -> bool:
@@ -126,7 +127,7 @@ def _about_own_motion(ego: EgoState | None) -> tuple[str, ...]:
 
 
 def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], params: PathParams) -> Path:
-    normal = fusing.normals(path.center)
+    normal = blend_estimates.normals(path.center)
     sigma_m = np.hypot(path.sigma_m, path.behind_m)
     at = np.minimum(np.array(_LOOK_AHEAD_M) / STEP_M, len(path.center) - 1).astype(np.intp)
     shares = path.shares[at]

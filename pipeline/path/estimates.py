@@ -12,10 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.geometry import F64
+from pipeline.common.geometry import F64
 from pipeline.params import PathParams
-from pipeline.path.lane_types import EgoLane, LaneLine
 from pipeline.types import EgoState
+from pipeline.types.lane import EgoLane, LaneLine
 
 SourceName = Literal["lane", "gnss", "yaw_rate", "straight"]
 SOURCES: tuple[SourceName, ...] = ("lane", "gnss", "yaw_rate", "straight")

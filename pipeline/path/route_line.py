@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from pyproj import Transformer
 
-from pipeline.geometry import F64
+from pipeline.common.geometry import F64
 from pipeline.types import Route
 
 SPACING_M = 1.0

@@ -22,9 +22,9 @@ from math import isfinite
 
 import numpy as np
 
+from pipeline.common.fast_replace import evolve
 from pipeline.params import PathParams
 from pipeline.path.estimates import PathEstimate, arc, samples
-from pipeline.records import evolve
 from pipeline.types import EgoState
 
 _FASTEST_RADPS = 2.0

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.recording import topics
-from pipeline.recording.about import About
-from pipeline.recording.container import McapFile
-from pipeline.recording.session import SessionSource
-from pipeline.sources.base import Source, SourceError
+from pipeline.recording.mcap_reader import McapFile
+from pipeline.recording.provenance import About
+from pipeline.recording.session_source import SessionSource
+from pipeline.types.source import Source, SourceError
 
 _GAP_STEPS = 1.5
 """A gap is a step of more than so many usual ones."""

@@ -8,10 +8,10 @@ from typing import Any, Literal
 import cv2
 import numpy as np
 
-from pipeline.geometry import inverse
+from pipeline.common.geometry import inverse
 from pipeline.recording import topics
-from pipeline.sources.shots import Shot
 from pipeline.types import U8, CameraCalibration, GnssFix, Picture, Sweep
+from pipeline.types.camera_shot import Shot
 
 _XYZI = ("x", "y", "z", "intensity")
 _POINT: np.dtype[np.void] = np.dtype([*((name, "<f4") for name in _XYZI), ("ring", "<u2")])

@@ -20,11 +20,11 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from pipeline.params import Params
-from pipeline.recording.about import About
-from pipeline.recording.packets import RawLidar
+from pipeline.recording.provenance import About
 from pipeline.recording.segments import NEVER, Rotation, Segments
-from pipeline.sources.shots import Shot
+from pipeline.recording.velodyne_scan import RawLidar
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
+from pipeline.types.camera_shot import Shot
 
 logger = logging.getLogger("cipv.recording")
 

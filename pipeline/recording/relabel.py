@@ -17,12 +17,12 @@ from mcap.records import Footer, McapRecord, Statistics, SummaryOffset
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC, Writer
 
-from pipeline.errors import BadInput
-from pipeline.progress import Progress, silent
+from pipeline.common.errors import BadInput
+from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
-from pipeline.recording.container import McapFile, Stored
-from pipeline.recording.directory import read_summary, summary_start
-from pipeline.recording.output import CHUNK_BYTES
+from pipeline.recording.mcap_index import read_summary, summary_start
+from pipeline.recording.mcap_output import CHUNK_BYTES
+from pipeline.recording.mcap_reader import McapFile, Stored
 
 _PIECE_BYTES = 1 << 20
 _CRC_BYTES = 4

@@ -6,15 +6,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.progress import Progress, silent
+from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
-from pipeline.recording.container import McapFile, Stored
-from pipeline.recording.frames import FrameList
+from pipeline.recording.frame_list import FrameList
+from pipeline.recording.mcap_output import Output
+from pipeline.recording.mcap_reader import McapFile, Stored
 from pipeline.recording.messages import Damaged
-from pipeline.recording.output import Output
-from pipeline.recording.packets import PACKETS_BEFORE_NS
-from pipeline.recording.session import SessionSource
+from pipeline.recording.session_source import SessionSource
 from pipeline.recording.tick import Tick, tick_from, tick_message
+from pipeline.recording.velodyne_scan import PACKETS_BEFORE_NS
 
 
 @dataclass(frozen=True)

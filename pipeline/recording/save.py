@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.progress import Progress, silent
-from pipeline.recording.about import About
+from pipeline.common.progress import Progress, silent
+from pipeline.recording.provenance import About
 from pipeline.recording.relabel import relabel
 from pipeline.recording.rewrite import clip
-from pipeline.recording.session import SessionSource
-from pipeline.recording.writer import SessionWriter
-from pipeline.sources.base import AnySource, Recorded, Source
+from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session_writer import SessionWriter
+from pipeline.types.source import AnySource, Recorded, Source
 
 
 def save(

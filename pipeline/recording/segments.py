@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.params import Params
-from pipeline.recording.about import About
-from pipeline.recording.clock import SessionClock
-from pipeline.recording.output import Compression
-from pipeline.recording.packets import RawLidar
-from pipeline.recording.writer import SessionWriter
-from pipeline.sources.base import TruthObject
-from pipeline.sources.shots import Shot
+from pipeline.recording.log_time import SessionClock
+from pipeline.recording.mcap_output import Compression
+from pipeline.recording.provenance import About
+from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.velodyne_scan import RawLidar
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
+from pipeline.types.camera_shot import Shot
+from pipeline.types.source import TruthObject
 
 
 @dataclass(frozen=True)

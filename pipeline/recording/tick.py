@@ -14,12 +14,12 @@ from typing import Annotated, TypeVar
 import numpy as np
 from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
 
+from pipeline.formats.file_reading import camera_matrix, rigid_transform
 from pipeline.recording import topics
 from pipeline.recording.detections import Given
 from pipeline.recording.messages import Damaged
-from pipeline.sources.base import SourceError, TruthObject
-from pipeline.sources.files import camera_matrix, rigid_transform
 from pipeline.types import F64, CameraCalibration, EgoState, GnssFix, Route, StreamHealth
+from pipeline.types.source import SourceError, TruthObject
 
 _INT64 = 2**63
 Nanoseconds = Annotated[int, Field(ge=-_INT64, lt=_INT64)]

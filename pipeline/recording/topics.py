@@ -15,7 +15,7 @@ from typing import Any
 from foxglove import messages as foxglove
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory  # type: ignore[import-untyped]
 
-from pipeline.sources.velodyne.ros import PACKET_DEFINITION, SCAN, SCAN_DEFINITION
+from pipeline.formats.velodyne.ros import PACKET_DEFINITION, SCAN, SCAN_DEFINITION
 
 FRAMES = "/frames"
 POINTS = "/lidar/points"

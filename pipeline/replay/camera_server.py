@@ -7,7 +7,7 @@ import errno
 import socket
 import threading
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 _BOUNDARY = "picture"
 _HEAD = (

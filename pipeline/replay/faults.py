@@ -9,8 +9,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, model_validator
 
-from pipeline.complaint import first_complaint, read_yaml
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
+from pipeline.common.user_file_errors import first_complaint, read_yaml
 from pipeline.replay.messages import Sensor
 from pipeline.replay.wire import WireEvent
 

@@ -8,9 +8,9 @@ from typing import Literal, NamedTuple
 
 import cv2
 
-from pipeline.sources.base import Source
 from pipeline.sources.pcap import PcapSource
 from pipeline.types import EgoState, Frame, GnssFix, Picture, Sweep
+from pipeline.types.source import Source
 
 Sensor = Literal["lidar", "camera", "gnss", "ego"]
 _JPEG_QUALITY = 95

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+from pipeline.formats.velodyne.encode import PACKETS_A_ROTATION, packets_of
+from pipeline.formats.velodyne.packet import BLOCK_US, PACKET_BYTES
 from pipeline.replay.messages import Message, Sensor
-from pipeline.sources.velodyne.encode import PACKETS_A_ROTATION, packets_of
-from pipeline.sources.velodyne.packet import BLOCK_US, PACKET_BYTES
 from pipeline.types import F64, Sweep
 
 _PACKET_NS = round(12 * BLOCK_US * 1000)

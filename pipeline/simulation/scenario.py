@@ -9,15 +9,15 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
-from pipeline.complaint import first_complaint, given_path, parse_yaml, read_yaml
-from pipeline.errors import BadInput
-from pipeline.simulation.actors import Actor, Motion, Script, motion
-from pipeline.simulation.detection_model import Detections
-from pipeline.simulation.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
-from pipeline.simulation.lens import ORDINARY, CameraModel
-from pipeline.simulation.lidar_model import VLP16, LidarModel
-from pipeline.simulation.roads import Road, Strict
-from pipeline.simulation.routes import CrossingActor, Route, route
+from pipeline.common.errors import BadInput
+from pipeline.common.user_file_errors import first_complaint, given_path, parse_yaml, read_yaml
+from pipeline.simulation.drawing.lens import ORDINARY, CameraModel
+from pipeline.simulation.sensors.detection_model import Detections
+from pipeline.simulation.sensors.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
+from pipeline.simulation.sensors.lidar_model import VLP16, LidarModel
+from pipeline.simulation.world.actors import Actor, Motion, Script, motion
+from pipeline.simulation.world.intersection_ways import CrossingActor, Route, route
+from pipeline.simulation.world.roads import Road, Strict
 
 _FOLDER = Path(__file__).parent / "scenarios"
 _GAP_STEP_S, _GAP_HALVINGS = 0.25, 10

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from pipeline.progress import Progress, silent
-from pipeline.sources.base import LIVE, AnySource, LiveSource, Source, SourceError, TruthObject
+from pipeline.common.progress import Progress, silent
+from pipeline.types.source import LIVE, AnySource, LiveSource, Source, SourceError, TruthObject
 
 __all__ = [
     "LiveSource",
@@ -42,7 +42,7 @@ def _open_simulated(uri: str, name: str, rings: int, progress: Progress) -> Sour
 
 
 def _open_session(uri: str, path: str, rings: int, progress: Progress) -> Source:
-    from pipeline.recording.session import SessionSource  # half a second of imports: only who opens one pays
+    from pipeline.recording.session_source import SessionSource  # half a second of imports: only who opens one pays
 
     return SessionSource(uri, path, progress)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, TypeVar, cast
 
-from pipeline.sources.base import AnySource, LiveSource, Source
 from pipeline.types import Frame, Route
+from pipeline.types.source import AnySource, LiveSource, Source
 
 S = TypeVar("S", Source, LiveSource, AnySource)
 

@@ -17,9 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.geometry import Cuboid, inverse, transform
-from pipeline.sources.base import SourceError, TruthObject
-from pipeline.sources.files import (
+from pipeline.common.geometry import Cuboid, inverse, transform
+from pipeline.formats.file_reading import (
     camera_matrix,
     check_looks_ahead,
     files_by_name,
@@ -30,8 +29,9 @@ from pipeline.sources.files import (
     recording_folder,
     rigid_transform,
 )
-from pipeline.sources.text_rows import parse_rows
+from pipeline.formats.text_rows import parse_rows
 from pipeline.types import F64, CameraCalibration, Frame, Sweep
+from pipeline.types.source import SourceError, TruthObject
 
 _CHANNELS = 16
 _HALF_ROTATION_NS = 50_000_000

@@ -15,12 +15,19 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.sources.base import SourceError, TruthObject
-from pipeline.sources.files import decode_picture, files_by_name, in_order, picture_of, read_bytes, recording_folder
-from pipeline.sources.hdl64 import keep_rings, match_vlp16, ring_elevations_deg, turns
-from pipeline.sources.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
-from pipeline.sources.kitti_records import parse_labels, parse_oxts, parse_timestamps
+from pipeline.formats.file_reading import (
+    decode_picture,
+    files_by_name,
+    in_order,
+    picture_of,
+    read_bytes,
+    recording_folder,
+)
+from pipeline.formats.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
+from pipeline.formats.kitti_records import parse_labels, parse_oxts, parse_timestamps
+from pipeline.sources.hdl64_rings import keep_rings, match_vlp16, ring_elevations_deg, turns
 from pipeline.types import F32, F64, EgoState, Frame, GnssFix, Sweep
+from pipeline.types.source import SourceError, TruthObject
 
 _STEP_NS = 100_000_000
 _RINGS = 64

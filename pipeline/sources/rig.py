@@ -7,11 +7,11 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from pipeline.complaint import first_complaint, read_yaml
-from pipeline.sources.base import SourceError
-from pipeline.sources.files import check_looks_ahead
+from pipeline.common.user_file_errors import first_complaint, read_yaml
+from pipeline.formats.file_reading import check_looks_ahead
 from pipeline.sources.live.config import CalibrationConfig, Mount, OffsetMs, Strict
 from pipeline.types import CameraCalibration, Picture
+from pipeline.types.source import SourceError
 
 SUFFIXES = (".yaml", ".yml")
 

@@ -10,12 +10,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.records import evolve
-from pipeline.simulation import scenario, truth_boxes, world
-from pipeline.simulation.sensors import Sensors
-from pipeline.simulation.truth_lanes import lane_points
-from pipeline.sources.base import SourceError, TruthObject
+from pipeline.common.fast_replace import evolve
+from pipeline.simulation import scenario
+from pipeline.simulation.sensors import truth_boxes
+from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.sensors.truth_lanes import lane_points
+from pipeline.simulation.world import world
 from pipeline.types import Frame, Sweep
+from pipeline.types.source import SourceError, TruthObject
 
 _TRUTH_RANGE_M = 120.0
 

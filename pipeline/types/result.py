@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.path.lane_types import EgoLane
 from pipeline.types.arrays import F32, F64, I32, Box
 from pipeline.types.frame import EgoState, StreamHealth
+from pipeline.types.lane import EgoLane
 from pipeline.types.objects import FusedObject, Ground, LidarTrack, Obstacle, VisionTrack
 
 PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "fused"]
@@ -112,7 +112,7 @@ class Layers:
 
 @dataclass(frozen=True)
 class Result:
-    """What the line believes at one tick. ``pipeline.results.to_json`` writes it in the contract's form."""
+    """What the line believes at one tick. ``pipeline.types.result_json.to_json`` writes it in the contract's form."""
 
     frame: str
     t_ns: int

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pipeline.geometry import F64
+from pipeline.common.geometry import F64
 from pipeline.params import VisionTrackingParams
 from pipeline.types import VEHICLES, VisionMeasurement, VisionTrack
 

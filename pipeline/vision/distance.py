@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.alignment import Alignment, Angular
-from pipeline.geometry import F64
+from pipeline.alignment.projection import Alignment, Angular
+from pipeline.common.geometry import F64
 from pipeline.params import DistanceParams
 from pipeline.types import REAL_VEHICLES, Box, CameraCalibration, Detection, DistanceLaw, VisionMeasurement
 

@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline import kalman
-from pipeline.geometry import F64, iou_matrix
-from pipeline.kalman import CvState
+from pipeline.common import kalman
+from pipeline.common.fast_replace import evolve
+from pipeline.common.geometry import F64, iou_matrix
+from pipeline.common.kalman import CvState
 from pipeline.params import VisionTrackingParams
-from pipeline.records import evolve
 from pipeline.types import Box, VisionMeasurement, VisionTrack
 from pipeline.vision.association import match, same_kind
 

@@ -4,7 +4,7 @@ import { drawNow, get, set } from "./store.js";
 
 const PING_MS = 2000;
 const RETRY_MS = [300, 600, 1200, 2500, 5000];
-/** The server makes pictures in steps of this width (app/sent_picture.py): within one there is nothing to tell. */
+/** The server makes pictures in steps of this width (app/streaming/picture.py): within one there is nothing to tell. */
 const WIDTH_STEP_PX = 160;
 
 /** Nothing at all for this long, not even an answer to a ping: the connection is gone, whatever the system still says. */

@@ -5,7 +5,7 @@ const utf8 = new TextDecoder();
 const pad4 = (n) => (n + 3) & ~3;
 
 /**
- * Take one binary message apart (layout: app/encode.py). Arrays are views into the message, not copies.
+ * Take one binary message apart (layout: app/streaming/encode.py). Arrays are views into the message, not copies.
  * @param {ArrayBuffer} buffer @returns {{frame: Frame, jpeg: Uint8Array<ArrayBuffer>}}
  */
 export function decode(buffer) {

@@ -1,6 +1,6 @@
 /**
- * Shapes of what the server sends. `tests/app/test_page_types.py` holds every key here against real messages.
- * The message is laid out in app/encode.py, the result in the contract, the drive in app/routes/.
+ * Shapes of what the server sends. `tests/app/page/test_page_types.py` holds every key here against real messages.
+ * The message is laid out in app/streaming/encode.py, the result in the contract, the drive in app/routes/.
  *
  * @typedef {[number, number]} Point2
  * @typedef {(Point2|null)[]} Pixels

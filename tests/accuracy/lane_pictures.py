@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from pipeline.alignment import Alignment, Pinhole
-from pipeline.geometry import F64
+from pipeline.alignment.projection import Alignment, Pinhole
+from pipeline.common.geometry import F64
+from pipeline.lanes.road_lines import LaneState, follow, in_picture
 from pipeline.params import LaneParams
-from pipeline.path.lane_types import EgoLane
-from pipeline.path.lanes import LaneState, follow, in_picture
 from pipeline.types import U8, CameraCalibration, RawLanes
+from pipeline.types.lane import EgoLane
 
 EYE_HEIGHT_M = 1.4
 _FOCAL_SHARE, _HORIZON_SHARE = 0.9, 0.57

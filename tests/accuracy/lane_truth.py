@@ -10,18 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.geometry import F64
+from pipeline.common.geometry import F64
 from pipeline.params import Params
-from pipeline.path.lane_types import EgoLane, LaneLine
 from pipeline.run import Detectors, Detects, advance
-from pipeline.simulation import scenario, world
-from pipeline.simulation.roads import Road
+from pipeline.simulation import scenario
+from pipeline.simulation.drawing.road_markings import edge_paint_m
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.scenery import edge_paint_m
-from pipeline.simulation.sensors import Sensors
-from pipeline.simulation.world import World
+from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.world import world
+from pipeline.simulation.world.roads import Road
+from pipeline.simulation.world.world import World
 from pipeline.step import State
 from pipeline.types import RawLanes
+from pipeline.types.lane import EgoLane, LaneLine
 
 AHEAD_M = (10.0, 20.0, 30.0)
 _BEHIND_M, _BEYOND_M, _STEP_M = 10.0, 60.0, 0.5

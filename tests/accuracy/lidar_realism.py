@@ -13,16 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.geometry import Cuboid
-from pipeline.simulation.actors import Kind, Vehicle
-from pipeline.simulation.lidar import Lidar
-from pipeline.simulation.lidar_model import LidarModel
-from pipeline.simulation.lidar_rays import BOX_FIELDS
-from pipeline.simulation.lidar_scene import vehicle_boxes
-from pipeline.simulation.world import ActorState
+from pipeline.common.geometry import Cuboid
+from pipeline.simulation.sensors.lidar import Lidar
+from pipeline.simulation.sensors.lidar_model import LidarModel
+from pipeline.simulation.sensors.lidar_rays import BOX_FIELDS
+from pipeline.simulation.sensors.lidar_scene import vehicle_boxes
+from pipeline.simulation.world.actors import Kind, Vehicle
+from pipeline.simulation.world.world import ActorState
 from pipeline.sources.astyx import AstyxSource, parse_calibration
-from pipeline.sources.base import TruthObject
 from pipeline.types import F64, Sweep
+from pipeline.types.source import TruthObject
 
 BIN_M = 10.0
 _KINDS: dict[str, Kind] = {"car": "car", "truck": "truck", "trailer": "truck", "bus": "bus", "motorcycle": "motorcycle"}

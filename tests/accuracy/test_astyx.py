@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.evaluation.lead import score
+from pipeline.evaluation.lead_verdict import score
 from pipeline.run import Sensors
 from tests.accuracy.drives import all_scored, camera_alone_without_own_clip, drive, made_up_leads
 

@@ -15,10 +15,10 @@ import pytest
 from scipy.signal import savgol_filter
 
 from pipeline.params import PathParams
-from pipeline.path import gnss, pose, yaw_rate
-from pipeline.path.gnss import GnssState
+from pipeline.path import map_pose, route_following, yaw_rate
+from pipeline.path.route_following import GnssState
 from pipeline.path.route_line import lay_out, to_grid
-from pipeline.simulation.gnss_model import MEASURED, RTK
+from pipeline.simulation.sensors.gnss_model import MEASURED, RTK
 from pipeline.types import F64, EgoState, GnssFix, Route
 
 LATENCY_S = 0.2
@@ -78,7 +78,7 @@ def predicted(drive: Drive) -> tuple[F64, F64, F64]:
     for k, fix in enumerate(drive.fixes):
         dt_s = float(drive.t_s[k] - drive.t_s[k - 1]) if k else None
         ego = EgoState(round(drive.t_s[k] * 1e9), float(drive.speed_mps[k]), float(drive.yaw_rate_radps[k]))
-        state, _ = gnss.follow(state, route, fix, ego, ego.t_ns, dt_s, PARAMS)
+        state, _ = route_following.follow(state, route, fix, ego, ego.t_ns, dt_s, PARAMS)
         yaw = yaw_rate.follow(yaw, ego, dt_s, PARAMS)
         path = yaw_rate.ahead(yaw, ego, PARAMS)
         if drive.t_s[k] - drive.t_s[0] < SETTLED_S or drive.t_s[-1] - drive.t_s[k] < 3.3:
@@ -123,8 +123,8 @@ def test_the_simulators_noise_is_what_was_measured(drive: Drive) -> None:
     assert white_yaw.std() == pytest.approx(MEASURED.sigma_yaw_rate_radps, rel=0.1)
     assert abs(bias) == pytest.approx(MEASURED.bias_yaw_rate_radps, abs=0.0002)
     assert np.degrees(white_course.std()) == pytest.approx(RTK.sigma_course_deg, rel=0.1)
-    assert east.std() < pose.WHITE_FLOOR_M < pose.white_sigma_m(SIGMA_M)
-    assert white_course.std() * drive.speed_mps.mean() == pytest.approx(pose.COURSE_SIGMA_MPS, rel=0.15)
+    assert east.std() < map_pose.WHITE_FLOOR_M < map_pose.white_sigma_m(SIGMA_M)
+    assert white_course.std() * drive.speed_mps.mean() == pytest.approx(map_pose.COURSE_SIGMA_MPS, rel=0.15)
 
 
 def test_a_jump_of_five_metres_is_not_believed(drive: Drive) -> None:
@@ -136,11 +136,11 @@ def test_a_jump_of_five_metres_is_not_believed(drive: Drive) -> None:
         dt_s = float(drive.t_s[k] - drive.t_s[k - 1]) if k else None
         ego = EgoState(round(drive.t_s[k] * 1e9), float(drive.speed_mps[k]), float(drive.yaw_rate_radps[k]))
         before = state
-        state, notes = gnss.follow(state, route, fix, ego, ego.t_ns, dt_s, PARAMS)
+        state, notes = route_following.follow(state, route, fix, ego, ego.t_ns, dt_s, PARAMS)
         said += notes
     assert not said
     jumped = dataclasses.replace(fix, lon_deg=fix.lon_deg + 5.0 / 88_000.0)
-    moved, notes = gnss.follow(before, route, jumped, ego, ego.t_ns, dt_s, PARAMS)
+    moved, notes = route_following.follow(before, route, jumped, ego, ego.t_ns, dt_s, PARAMS)
     assert notes == ("GNSS jumped by 5.0 m: not believed",)
     assert moved.pose is not None
     assert state.pose is not None

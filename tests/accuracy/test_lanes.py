@@ -12,19 +12,19 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.alignment import Pinhole
-from pipeline.evaluation.lead import judge
+from pipeline.alignment.projection import Pinhole
+from pipeline.common.fast_replace import evolve
+from pipeline.evaluation.lead_verdict import judge
+from pipeline.lanes.classical import open_classical
+from pipeline.lanes.network import open_lane_network
+from pipeline.lanes.road_lines import LaneState, follow, road_plane
 from pipeline.params import Params
-from pipeline.path.lane_classical import open_classical
-from pipeline.path.lane_network import open_lane_network
-from pipeline.path.lane_types import EgoLane
-from pipeline.path.lanes import LaneState, follow, road_plane
-from pipeline.records import evolve
 from pipeline.run import Detectors, Detects, lanes_for, run, through
-from pipeline.simulation.camera import calibration
+from pipeline.simulation.sensors.camera import calibration
 from pipeline.sources import open_source
 from pipeline.step import warm_up
 from pipeline.types import F64, GROUND, U8, Frame, RawLanes, Result
+from pipeline.types.lane import EgoLane
 from pipeline.vision.detector import open_detector
 from tests.accuracy import lane_pictures, lane_truth
 from tests.accuracy.drives import FOLDERS, RULE, SCORED_CLIPS, all_scored, drive

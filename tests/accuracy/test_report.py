@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.alignment import Alignment, angular_from_calibration, resolve
-from pipeline.evaluation.lead import LeadScore, score
+from pipeline.alignment.projection import Alignment, angular_from_calibration, resolve
+from pipeline.evaluation.lead_verdict import LeadScore, score
 from pipeline.params import Params
 from pipeline.run import Sensors
 from pipeline.sources import open_source

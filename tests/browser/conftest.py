@@ -14,16 +14,16 @@ import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
 from app.bench.devtools import CHROMIUM, FLAGS
-from app.engine import Engine
-from app.listening import listen_socket
-from app.recording import RecordingDesk
-from app.server import Server, create_app
+from app.core.server_address import listen_socket
+from app.engine.engine import Engine
+from app.engine.session_recording import RecordingDesk
+from app.web.server import Server, create_app
+from pipeline.inference.runtime import DetectorMissing
 from pipeline.params import Params
 from pipeline.run import detector_for
 from pipeline.sources import Source, open_source
 from pipeline.types import U8, RawBoxes
 from pipeline.vision.detector import Detector
-from pipeline.vision.runtime import DetectorMissing
 
 WAIT_MS = 60_000
 START = 60

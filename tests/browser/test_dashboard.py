@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from playwright.sync_api import expect
 
-from app.engine import Engine
+from app.engine.engine import Engine
 from pipeline.params import Params
-from tests.app.recording import CountingDetector, Recording, opener
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.browser.conftest import START, WAIT_MS, OpenPage, Site
 from tests.browser.looks import colours, frame_name, go_to, pixels, repainted, table, wait_for_frame, whole_drive
 

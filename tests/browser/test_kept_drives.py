@@ -8,10 +8,10 @@ from urllib.parse import parse_qs, urlsplit
 
 from playwright.sync_api import Browser
 
-from app.replays import ReplayFolder
-from pipeline.evaluation.experiments.iso import ISO
-from pipeline.evaluation.experiments.sections import Replay
-from pipeline.evaluation.experiments.track import parameters
+from app.reports.experiment_drives import ReplayFolder
+from pipeline.evaluation.report_sections import Replay
+from pipeline.experiments.iso15622.experiment import ISO
+from pipeline.experiments.straight_track import parameters
 from pipeline.simulation import scenario
 from pipeline.sources import open_source
 

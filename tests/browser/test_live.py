@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.engine import Engine
+from app.engine.engine import Engine
 from pipeline.params import Params
 from pipeline.sources import open_any
-from pipeline.sources.base import is_live_source
 from pipeline.sources.live.config import load
-from tests.app.recording import CountingDetector
+from pipeline.types.source import is_live_source
+from tests.app.engine.recording_helpers import CountingDetector
 from tests.browser.conftest import WAIT_MS, OpenPage, Site
 from tests.browser.display.conftest import keep
 from tests.pipeline.sources.live.rig import Replaying

@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 
 from pipeline.params import preset
-from pipeline.results import to_json
 from pipeline.run import Detectors, detector_for, through
 from pipeline.sources import open_source
+from pipeline.types.result_json import to_json
 
 FOLDER = Path(__file__).parent
 EVERY = 5

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.types import Box, FusedObject, LidarTrack, Obstacle, SourceKind, VisionTrack
 
 

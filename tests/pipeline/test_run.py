@@ -15,7 +15,7 @@ from pipeline.run import Detectors, LiveDetectors, advance, detect, detector_for
 from pipeline.sources import open_source
 from pipeline.step import State
 from pipeline.types import U8, Frame, Picture, RawBoxes, RawLanes
-from pipeline.vision.models import EMBEDDED, find, register
+from pipeline.vision.model_registry import EMBEDDED, find, register
 from tests.pipeline.vision import networks
 
 

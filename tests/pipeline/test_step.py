@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pipeline.params import Params, preset, with_changes
-from pipeline.results import write_line
 from pipeline.sources import open_source
 from pipeline.step import State, step
 from pipeline.types import Frame, RawBoxes, Result
+from pipeline.types.result_json import write_line
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def frames() -> list[Frame]:
 
 
 def _perfect_boxes(source: object, index: int) -> RawBoxes:
-    from pipeline.alignment import project_cuboid, resolve
+    from pipeline.alignment.projection import project_cuboid, resolve
 
     frame, truth = source.frame(index), source.truth(index)  # type: ignore[attr-defined]
     aligned = resolve(Params().alignment, frame.camera)

@@ -19,8 +19,9 @@ from pipeline.replay.faults import load as load_faults
 from pipeline.replay.messages import Message
 from pipeline.replay.replayer import replay
 from pipeline.replay.senders import open_senders
-from pipeline.simulation import scenario, world
-from pipeline.simulation.sensors import Sensors
+from pipeline.simulation import scenario
+from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.world import world
 from pipeline.sources.live.config import load
 from pipeline.types import CameraCalibration, Frame
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from app.encode import Encoder
-from app.snapshot import Snapshot
+from app.engine.snapshot import Snapshot
+from app.streaming.encode import Encoder
 from pipeline.types import Frame
 
 PAGE = os.sysconf("SC_PAGE_SIZE")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats.base import Drive, FormatName, Shot
 from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Sighting

@@ -16,20 +16,20 @@ import cv2
 import pytest
 
 from app.labels.acts import do
+from app.labels.acts.bulk import importing
+from app.labels.acts.requests import SetSighting
 from app.labels.acts.scope import Scope
-from app.labels.answers import changes_json, window_json
-from app.labels.database import Database
-from app.labels.drive import DriveLabels
-from app.labels.long import importing
-from app.labels.requests import SetSighting
-from pipeline.evaluation.lead import LeadRule
+from app.labels.service.answers import changes_json, window_json
+from app.labels.store.database import Database
+from app.labels.store.drive_labels import DriveLabels
+from pipeline.common.geometry import Cuboid
+from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.evaluation.scores.truth import of_labels
-from pipeline.geometry import Cuboid
 from pipeline.labels.formats.base import Drive, Shot, drive_of
 from pipeline.labels.formats.registry import FORMATS, export_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
-from pipeline.recording.about import About
-from pipeline.recording.writer import SessionWriter
+from pipeline.recording.provenance import About
+from pipeline.recording.session_writer import SessionWriter
 from pipeline.sources import open_source
 from tests.app.labels.conftest import info, postgres_url  # noqa: F401
 from tests.app.labels.kills import kill_again_and_again

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from app.encode import Encoder
-from app.line import DetectionCache, Line
-from app.snapshot import Snapshot
+from app.core.line import DetectionCache, Line
+from app.engine.snapshot import Snapshot
+from app.streaming.encode import Encoder
 from pipeline.params import Params
 from pipeline.run import Detectors
 from pipeline.sources import open_source

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from tests.conftest import ROOT
-from tests.pipeline.sources.velodyne.damage import survives
+from tests.pipeline.formats.velodyne.damage import survives
 
 
 @pytest.mark.soak

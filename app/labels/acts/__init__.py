@@ -6,9 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from app.labels.acts import frames, leads, review, shape, tags, tracks
-from app.labels.acts.scope import Scope
-from app.labels.draft import Draft
-from app.labels.requests import (
+from app.labels.acts.requests import (
     Accept,
     AddEvent,
     AddMeasured,
@@ -31,6 +29,8 @@ from app.labels.requests import (
     Tag,
     TrimLead,
 )
+from app.labels.acts.scope import Scope
+from app.labels.store.draft import Draft
 
 _ACTS: dict[type, Callable[[Draft, Scope, Any], str]] = {
     Accept: review.accept,

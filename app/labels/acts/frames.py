@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import cast
 
+from app.labels.acts.requests import AddEvent, RemovePath, SetPath
 from app.labels.acts.scope import Scope, by_person, track_of
-from app.labels.draft import Draft
-from app.labels.refusals import NoSuchLabel
-from app.labels.requests import AddEvent, RemovePath, SetPath
-from app.labels.words import frames_text
+from app.labels.errors import NoSuchLabel
+from app.labels.store.draft import Draft
+from app.labels.wording import frames_text
 from pipeline.labels.model import EventLabel, PathLabel
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
+from app.labels.acts.requests import ClearLead, SetLead, TrimLead
 from app.labels.acts.scope import Scope, by_person, track_of
-from app.labels.draft import Draft
-from app.labels.refusals import ActRefused
-from app.labels.requests import ClearLead, SetLead, TrimLead
-from app.labels.spans import outside
-from app.labels.words import frames_text, lead_text
+from app.labels.errors import ActRefused
+from app.labels.store.draft import Draft
+from app.labels.store.frame_ranges import outside
+from app.labels.wording import frames_text, lead_text
 from pipeline.labels.model import LeadRange
 
 

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import cast
 
+from app.labels.acts.requests import Accept, Reject, Remove, ReviewOk, SendBack
 from app.labels.acts.scope import Scope, Stated, stated, track_of
-from app.labels.draft import Draft
-from app.labels.refusals import ActRefused
-from app.labels.requests import Accept, Reject, Remove, ReviewOk, SendBack
-from app.labels.values import Value
-from app.labels.words import frames_text, lead_text
+from app.labels.errors import ActRefused
+from app.labels.store.draft import Draft
+from app.labels.store.values import Value
+from app.labels.wording import frames_text, lead_text
 from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
 
 

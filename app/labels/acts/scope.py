@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TypeVar, cast
 
-from app.labels.draft import Draft
-from app.labels.refusals import BadAct
-from app.labels.values import Item
-from app.labels.words import outside_text
+from app.labels.errors import BadAct
+from app.labels.store.draft import Draft
+from app.labels.store.values import Item
+from app.labels.wording import outside_text
 from pipeline.labels.model import EventLabel, LabelTrack, LeadRange, Origin, PathLabel
 
 Stated = LabelTrack | LeadRange | PathLabel | EventLabel

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from app.labels.acts.requests import DropKeyframe, DropSightings, SetSighting, SizeAlong
 from app.labels.acts.scope import Scope, corrected, track_of
-from app.labels.draft import Draft
-from app.labels.refusals import ActRefused
-from app.labels.requests import DropKeyframe, DropSightings, SetSighting, SizeAlong
-from app.labels.words import frames_text
+from app.labels.errors import ActRefused
+from app.labels.store.draft import Draft
+from app.labels.wording import frames_text
 from pipeline.labels import interpolate
 from pipeline.labels.model import Sighting
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
+from app.labels.acts.requests import Tag
 from app.labels.acts.scope import Scope, by_person
-from app.labels.draft import Draft
-from app.labels.requests import Tag
-from app.labels.spans import free_spans, outside
-from app.labels.words import frames_text
+from app.labels.store.draft import Draft
+from app.labels.store.frame_ranges import free_spans, outside
+from app.labels.wording import frames_text
 from pipeline.labels.model import FrameTag
 
 

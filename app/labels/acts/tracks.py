@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
+from app.labels.acts.requests import AddMeasured, AddTrack, Merge, Relabel, Split
 from app.labels.acts.scope import Scope, by_person, corrected, track_of
-from app.labels.draft import Draft
-from app.labels.refusals import ActRefused
-from app.labels.requests import AddMeasured, AddTrack, Merge, Relabel, Split
-from app.labels.values import Frames
-from app.labels.words import frames_text
+from app.labels.errors import ActRefused
+from app.labels.store.draft import Draft
+from app.labels.store.values import Frames
+from app.labels.wording import frames_text
 from pipeline.labels.model import EventLabel, LabelTrack, LeadRange
-from pipeline.vision.labels import canonical
+from pipeline.vision.classes import canonical
 
 
 def add_track(draft: Draft, scope: Scope, act: AddTrack) -> str:

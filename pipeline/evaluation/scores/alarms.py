@@ -12,12 +12,12 @@ from itertools import pairwise
 from math import hypot, inf
 from typing import Literal
 
-from pipeline.aeb import required_decel_mps2
-from pipeline.evaluation.lead import nearest_face_m
+from pipeline.common.geometry import closest_on_polygon
+from pipeline.decision.aeb import required_decel_mps2
+from pipeline.decision.object_motion import SMALLEST_CLOSING_MPS
+from pipeline.evaluation.lead_verdict import nearest_face_m
 from pipeline.evaluation.scores.truth import FrameTruth
-from pipeline.geometry import closest_on_polygon
-from pipeline.labels.link import MAX_GAP_S
-from pipeline.motion import SMALLEST_CLOSING_MPS
+from pipeline.labels.link_identities import MAX_GAP_S
 from pipeline.params import AebParams
 from pipeline.types import AccCommand, Result
 

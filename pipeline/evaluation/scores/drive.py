@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from pipeline.errors import BadInput
-from pipeline.evaluation.lead import Judged, LeadRule, judge_lead, judge_lead_box
+from pipeline.common.errors import BadInput
+from pipeline.evaluation.lead_verdict import Judged, LeadRule, judge_lead, judge_lead_box
 from pipeline.evaluation.scores import tracking
 from pipeline.evaluation.scores.alarms import Alarm, alarms
 from pipeline.evaluation.scores.episodes import (

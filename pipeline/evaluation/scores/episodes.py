@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from pipeline.evaluation.lead import Judged, nearest_face_m, switches
+from pipeline.evaluation.lead_verdict import Judged, nearest_face_m, switches
 from pipeline.evaluation.scores.truth import FrameTruth
-from pipeline.labels.link import MAX_GAP_S
+from pipeline.labels.link_identities import MAX_GAP_S
 
 
 @dataclass(frozen=True)

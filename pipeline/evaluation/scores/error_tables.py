@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from pipeline.evaluation.experiments.sections import Cell, Chart, Section, Series, Table
+from pipeline.evaluation.report_sections import Cell, Chart, Section, Series, Table
 from pipeline.evaluation.scores.figures import Drives
 from pipeline.evaluation.scores.matching import MAX_RANGE_M, Error
 

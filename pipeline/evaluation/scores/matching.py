@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from pipeline.evaluation.lead import LABELLED_VEHICLES, SAME_BOX_IOU, nearest_face_m
+from pipeline.common.geometry import F64, iou_matrix
+from pipeline.decision.path_position import near_face_middle
+from pipeline.evaluation.lead_verdict import LABELLED_VEHICLES, SAME_BOX_IOU, nearest_face_m
 from pipeline.evaluation.scores.truth import FrameTruth
-from pipeline.geometry import F64, iou_matrix
 from pipeline.params import CipvParams
-from pipeline.path.placing import near_face_middle
-from pipeline.sources.base import TruthObject
 from pipeline.types import VEHICLES, Box, FusedObject, Point2, Result, SourceKind
+from pipeline.types.source import TruthObject
 
 MAX_RANGE_M = 60.0
 HALF_ANGLE_RAD = np.radians(35.0)

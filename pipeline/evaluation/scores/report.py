@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from pipeline.evaluation.experiments.sections import Linked, Section, Table
-from pipeline.evaluation.lead import LeadRule
+from pipeline.evaluation.lead_verdict import LeadRule
+from pipeline.evaluation.report_sections import Linked, Section, Table
 from pipeline.evaluation.scores import tracking
 from pipeline.evaluation.scores.drive import DriveScore
 from pipeline.evaluation.scores.error_tables import COLUMNS, error_rows, errors_section

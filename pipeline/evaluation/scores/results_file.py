@@ -10,10 +10,10 @@ from typing import Any, get_args, get_type_hints
 
 import numpy as np
 
-from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid
-from pipeline.results import VERSION
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid
 from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth
+from pipeline.types.result_json import VERSION
 
 EMPTY = Layers(np.zeros((0, 4), np.float32), np.zeros(0, np.int32))
 NO_HEALTH = SensorHealth(None, None, None, None, None)

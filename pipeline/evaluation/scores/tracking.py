@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.decision.path_position import near_face_middle
 from pipeline.evaluation.scores.matching import claims, face_of, vehicles
 from pipeline.evaluation.scores.truth import FrameTruth
-from pipeline.path.placing import near_face_middle
 from pipeline.types import I64, Point2, Result
 
 ZERO_M = 4.0

@@ -11,13 +11,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from pipeline.errors import BadInput
-from pipeline.evaluation.lead import LABELLED_VEHICLES, LeadRule, true_lead
+from pipeline.common.errors import BadInput
+from pipeline.evaluation.lead_verdict import LABELLED_VEHICLES, LeadRule, true_lead
 from pipeline.evaluation.scores.velocities import velocities
-from pipeline.labels.link import linked
+from pipeline.labels.link_identities import linked
 from pipeline.labels.model import WHOLE_TAG, LabelSet, LabelTrack, LeadRange
-from pipeline.sources.base import Source, TruthObject
 from pipeline.types import Box, Point2
+from pipeline.types.source import Source, TruthObject
 
 _NOT_FOLLOWED = (
     "The labels follow no identity over time: vehicles are linked from frame to frame by nearness. Figures of identity "

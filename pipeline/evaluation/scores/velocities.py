@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.labels.link import MAX_GAP_S
+from pipeline.labels.link_identities import MAX_GAP_S
 from pipeline.types import F64, I64, Mask, Point2
 
 _HALF_S = 0.3

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from pipeline.evaluation.lead import Verdict
+from pipeline.evaluation.lead_verdict import Verdict
 from pipeline.evaluation.scores.drive import DriveScore, FrameScore
 
 _WEIGHT: dict[Verdict, int] = {"none": 0, "correct": 0, "missed": 1, "wrong": 2, "false": 3}

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from pipeline.alignment import Pinhole, project_cuboids
-from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid, corners_of
+from pipeline.alignment.projection import Pinhole, project_cuboids
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid, corners_of
+from pipeline.common.progress import Progress, silent
 from pipeline.labels.formats.parts import Part
 from pipeline.labels.model import LabelSet, Origin
-from pipeline.progress import Progress, silent
-from pipeline.sources.base import InParts, Rectified, Source
 from pipeline.types import F32, F64, Box, CameraCalibration, EgoState, Frame
+from pipeline.types.source import InParts, Rectified, Source
 
 FormatName = Literal["native", "mcap", "openlabel", "kitti", "kitti-tracking", "nuscenes", "coco", "csv"]
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")

@@ -12,12 +12,12 @@ from pathlib import Path
 
 from pydantic import BaseModel, Field, TypeAdapter
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 from pipeline.labels.formats.base import Drive, Imported, write_file
 from pipeline.labels.formats.reading import parse_as, read_bytes
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
 from pipeline.types import Box
-from pipeline.vision.labels import canonical
+from pipeline.vision.classes import canonical
 
 _VIDEO = 1
 

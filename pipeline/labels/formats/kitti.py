@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
+from pipeline.formats.file_reading import check_looks_ahead, files_by_name
+from pipeline.formats.kitti_calibration import parse_object_calibration
+from pipeline.formats.kitti_records import DONT_CARE, LabelRow, kind_of, truth_of
 from pipeline.labels.formats import kitti_rows
 from pipeline.labels.formats.base import Drive, Imported, Shot, make_folder
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
-from pipeline.labels.truth import LINKED, renamed, tracks_of
-from pipeline.sources.files import check_looks_ahead, files_by_name
-from pipeline.sources.kitti_calibration import parse_object_calibration
-from pipeline.sources.kitti_records import DONT_CARE, LabelRow, kind_of, truth_of
+from pipeline.labels.recorded_truth import LINKED, renamed, tracks_of
 from pipeline.types import F64, CameraCalibration
 
 _OBJECT, _TRACKING, _CALIBRATION = "label_2", "label_02", "calib"

@@ -14,11 +14,9 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.errors import BadInput
-from pipeline.geometry import inverse
-from pipeline.labels.model import Sighting
-from pipeline.sources.base import SourceError
-from pipeline.sources.kitti_records import (
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import inverse
+from pipeline.formats.kitti_records import (
     DONT_CARE,
     NO_BOX,
     NO_CUBOID,
@@ -28,7 +26,9 @@ from pipeline.sources.kitti_records import (
     label_name,
     parse_row,
 )
+from pipeline.labels.model import Sighting
 from pipeline.types import F64, Box, CameraCalibration
+from pipeline.types.source import SourceError
 
 _ENOUGH = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
 

@@ -16,8 +16,8 @@ from typing import Literal
 
 from pydantic import TypeAdapter
 
-from pipeline.errors import BadInput
-from pipeline.geometry import closest_on_polygon
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import closest_on_polygon
 from pipeline.labels.formats.base import Drive, Imported, write_file
 from pipeline.labels.formats.reading import fit, read_bytes
 from pipeline.labels.model import LabelSet, Lead, LeadRange, Origin, State

@@ -13,11 +13,11 @@ from typing import Any, TypeVar
 
 from pydantic import TypeAdapter
 
-from pipeline.errors import BadInput
-from pipeline.labels.check import check
+from pipeline.common.errors import BadInput
 from pipeline.labels.formats.base import Drive, Imported, write_file
 from pipeline.labels.formats.reading import fit, parse_json, read_bytes
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel
+from pipeline.labels.validate import check
 
 KIND = "cipv-labels"
 VERSION = 2

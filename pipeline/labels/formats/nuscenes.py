@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from pipeline.geometry import inverse, rotation
+from pipeline.common.geometry import inverse, rotation
+from pipeline.formats.file_reading import check_looks_ahead
 from pipeline.labels.formats.base import Drive, Shot, make_folder
 from pipeline.labels.formats.points import points_inside
 from pipeline.labels.model import LabelSet, LabelTrack, Sighting
-from pipeline.sources.files import check_looks_ahead
 from pipeline.types import F64
 
 VERSION_FOLDER = "v1.0-cipv"

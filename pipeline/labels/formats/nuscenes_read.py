@@ -10,15 +10,15 @@ import numpy as np
 from pydantic import BaseModel, TypeAdapter
 from scipy.spatial.transform import Rotation
 
-from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid, inverse, transform
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid, inverse, transform
+from pipeline.formats.file_reading import camera_matrix, check_looks_ahead
 from pipeline.labels.formats.base import Drive, Imported
 from pipeline.labels.formats.nuscenes import CAMERA, CATEGORIES, LIDAR, instance_token
 from pipeline.labels.formats.reading import parse_as, read_bytes
 from pipeline.labels.model import LabelTrack, Origin, Sighting
-from pipeline.sources.files import camera_matrix, check_looks_ahead
 from pipeline.types import F64, CameraCalibration
-from pipeline.vision.labels import canonical
+from pipeline.vision.classes import canonical
 
 _USUAL_SIZE = (1600, 900)
 _LARGEST_M = 1e7

@@ -13,10 +13,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from pipeline.geometry import inverse
+from pipeline.common.geometry import inverse
+from pipeline.formats.file_reading import check_looks_ahead
 from pipeline.labels.formats.base import Drive, write_file
 from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
-from pipeline.sources.files import check_looks_ahead
 from pipeline.types import Point2
 
 EGO_UID = "00000000-0000-0000-0000-000000000000"

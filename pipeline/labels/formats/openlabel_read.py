@@ -11,16 +11,16 @@ from typing import Literal
 import numpy as np
 from pydantic import TypeAdapter
 
-from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid, transform
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid, transform
+from pipeline.formats.file_reading import rigid_transform
 from pipeline.labels.formats import openlabel as ol
 from pipeline.labels.formats.base import Drive, Imported
 from pipeline.labels.formats.openlabel_form import Agent, Content, Data, Element, File, Shape
 from pipeline.labels.formats.reading import fit, parse_as, read_bytes
 from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, Lead, LeadRange, Origin, PathLabel, Sighting, State
-from pipeline.sources.files import rigid_transform
 from pipeline.types import F64, Point2
-from pipeline.vision.labels import canonical
+from pipeline.vision.classes import canonical
 
 _STATE: TypeAdapter[State] = TypeAdapter(State)
 _MAKER: TypeAdapter[Literal["pipeline", "person", "import"]] = TypeAdapter(Literal["pipeline", "person", "import"])

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numba
 import numpy as np
 
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats.base import Drive
 from pipeline.labels.model import LabelSet
 from pipeline.types import F32, F64, I64

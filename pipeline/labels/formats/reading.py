@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 _LARGEST_BYTES = 1 << 30
 T = TypeVar("T")

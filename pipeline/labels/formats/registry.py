@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from pipeline.collection import uncollected
-from pipeline.errors import BadInput
-from pipeline.labels.check import check
+from pipeline.common.errors import BadInput
+from pipeline.common.gc_pause import uncollected
 from pipeline.labels.formats import (
     coco,
     kitti,
@@ -22,6 +21,7 @@ from pipeline.labels.formats import (
 from pipeline.labels.formats.base import Drive, Format, FormatName, Imported, check_extrinsic
 from pipeline.labels.formats.parts import EVERYTHING, Part, reduce
 from pipeline.labels.model import LabelSet, Origin
+from pipeline.labels.validate import check
 
 _SHAPES: frozenset[Part] = frozenset(("cuboids", "boxes"))
 _TRACKED: frozenset[Part] = frozenset(("cuboids", "identities"))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 from pipeline.labels.formats.base import Drive, Imported
 from pipeline.labels.formats.native import from_json, onto, to_json
 from pipeline.labels.model import LabelSet, Origin
@@ -22,7 +22,7 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
 
 def read(path: Path, drive: Drive, origin: Origin) -> Imported:
     """Of this session, a clip of it, or one that it is a clip of. BadInput when there are no labels in it."""
-    from pipeline.recording.session import SessionSource
+    from pipeline.recording.session_source import SessionSource
 
     session = SessionSource(str(path), str(path))
     try:

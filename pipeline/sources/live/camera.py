@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from pipeline.sources.live import mjpeg, video
+from pipeline.sources.live import mjpeg, video_stream
 from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.config import CameraConfig
+from pipeline.sources.live.device_reader import Read, Reader, Stop
 from pipeline.sources.live.health import StreamStats
-from pipeline.sources.live.inputs import Deliver
-from pipeline.sources.live.reader import Read, Reader, Stop
-from pipeline.sources.shots import Shot, is_whole_jpeg
+from pipeline.sources.live.sensor_input import Deliver
+from pipeline.types.camera_shot import Shot, is_whole_jpeg
 
 _ARRIVAL = "times are when its pictures arrive: it sends none of its own"
 
@@ -31,10 +31,10 @@ class CameraInput:
             return _HttpOrVideo(config.url, self.receive, self._shot)
         if config.file is not None:
             path = config.file
-            return lambda stop: video.play_file(path, self._shot, stop)
+            return lambda stop: video_stream.play_file(path, self._shot, stop)
         device = config.device
         assert device is not None
-        return lambda stop: video.read_device(device, self._shot, stop)
+        return lambda stop: video_stream.read_device(device, self._shot, stop)
 
     def receive(self, data: bytes, stamp_us: int | None) -> None:
         """Take a JPEG and its own stamp, µs since 1970, if it has one. One that is cut off is counted as lost."""
@@ -63,7 +63,7 @@ class CameraInput:
 class _HttpOrVideo:
     """An address: MJPEG where it gives that, else video. What it gave once it is taken to give again."""
 
-    def __init__(self, url: str, jpeg: mjpeg.Receive, shot: video.Receive) -> None:
+    def __init__(self, url: str, jpeg: mjpeg.Receive, shot: video_stream.Receive) -> None:
         self._url, self._jpeg, self._shot = url, jpeg, shot
         self._is_video = not url.startswith("http")
 
@@ -73,4 +73,4 @@ class _HttpOrVideo:
                 return mjpeg.read_mjpeg(self._url, self._jpeg, stop)
             except mjpeg.NotMjpeg:
                 self._is_video = True
-        video.read_stream(self._url, self._shot, stop)
+        video_stream.read_stream(self._url, self._shot, stop)

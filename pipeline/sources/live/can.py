@@ -10,13 +10,13 @@ from typing import Any
 import can
 import cantools
 
-from pipeline.sources.base import SourceError
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import CanConfig, SignalConfig
+from pipeline.sources.live.device_reader import POLL_S, DeviceLost, Reader, Stop
 from pipeline.sources.live.health import StreamStats
-from pipeline.sources.live.inputs import Deliver
-from pipeline.sources.live.reader import POLL_S, DeviceLost, Reader, Stop
+from pipeline.sources.live.sensor_input import Deliver
 from pipeline.types import EgoState
+from pipeline.types.source import SourceError
 
 _YAW_RATE_KEPT_NS = 500_000_000
 _FASTEST_MPS, _FASTEST_RADPS = 120.0, 5.0

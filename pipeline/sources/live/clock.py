@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 
-from pipeline.sources.velodyne import SensorClock
+from pipeline.formats.velodyne import SensorClock
 
 _LONGEST_AGE_NS = 1_000_000_000
 _EARLIEST_NS, _LATEST_NS = 50_000_000, 100_000_000

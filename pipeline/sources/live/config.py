@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from pipeline.complaint import first_complaint, given_path, parse_yaml
-from pipeline.geometry import inverse, rotation
-from pipeline.sources.base import SourceError
-from pipeline.sources.files import check_looks_ahead
+from pipeline.common.geometry import inverse, rotation
+from pipeline.common.user_file_errors import first_complaint, given_path, parse_yaml
+from pipeline.formats.file_reading import check_looks_ahead
 from pipeline.types import F64, CameraCalibration
+from pipeline.types.source import SourceError
 
 Port = Annotated[int, Field(ge=1, le=65535)]
 Metres = Annotated[float, Field(ge=-20.0, le=20.0)]

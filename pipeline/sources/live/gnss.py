@@ -10,13 +10,13 @@ from dataclasses import replace
 
 import serial
 
+from pipeline.formats.nmea import NmeaReader
 from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.config import GnssConfig
+from pipeline.sources.live.device_reader import CONNECT_S, POLL_S, DeviceLost, Read, Reader, Stop
 from pipeline.sources.live.health import StreamStats
-from pipeline.sources.live.inputs import Deliver
-from pipeline.sources.live.reader import CONNECT_S, POLL_S, DeviceLost, Read, Reader, Stop
+from pipeline.sources.live.sensor_input import Deliver
 from pipeline.sources.live.udp import read_datagrams
-from pipeline.sources.nmea import NmeaReader
 from pipeline.types import GnssFix
 
 _SILENT_POLLS = 10

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.sources.velodyne import say_refused
+from pipeline.formats.velodyne import say_refused
 from pipeline.types import StreamHealth
 
 _SILENT_NS, _STALE_NS, _MISSED = 1_000_000_000, 250_000_000, 3

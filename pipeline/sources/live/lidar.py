@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
+from pipeline.formats.velodyne import BadPacket, Vlp16Decoder, read_position
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LidarConfig
+from pipeline.sources.live.device_reader import Read, Reader
 from pipeline.sources.live.health import StreamStats
-from pipeline.sources.live.inputs import Deliver, whole_hours_off
-from pipeline.sources.live.reader import Read, Reader
+from pipeline.sources.live.sensor_input import Deliver, whole_hours_off
 from pipeline.sources.live.udp import read_datagrams
-from pipeline.sources.velodyne import BadPacket, Vlp16Decoder, read_position
 from pipeline.types import Sweep
 
 

@@ -7,7 +7,7 @@ import http.client
 from collections.abc import Callable, Mapping
 from urllib.parse import urlsplit
 
-from pipeline.sources.live.reader import CONNECT_S, SILENCE_S, DeviceLost, Stop
+from pipeline.sources.live.device_reader import CONNECT_S, SILENCE_S, DeviceLost, Stop
 
 _LARGEST = 32 << 20
 _LONGEST_LINE = 8192

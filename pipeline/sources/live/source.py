@@ -12,20 +12,20 @@ from dataclasses import replace
 from typing import TypeVar
 
 from pipeline.params import SyncParams
-from pipeline.sources.base import Tap
 from pipeline.sources.live.camera import CameraInput
 from pipeline.sources.live.can import CanInput
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LiveConfig
 from pipeline.sources.live.gnss import GnssInput
+from pipeline.sources.live.gnss_motion import MotionFromGnss
 from pipeline.sources.live.health import StreamStats, not_delivering
-from pipeline.sources.live.inputs import Input
 from pipeline.sources.live.lidar import LidarInput
-from pipeline.sources.live.own_motion import MotionFromGnss
+from pipeline.sources.live.sensor_input import Input
 from pipeline.sources.live.sync import Stream, Synchroniser, Together
 from pipeline.sources.rig import calibration_for
-from pipeline.sources.shots import Shot
 from pipeline.types import F64, EgoState, Frame, GnssFix, Picture, StreamHealth, Sweep
+from pipeline.types.camera_shot import Shot
+from pipeline.types.source import Tap
 
 T = TypeVar("T")
 
@@ -34,7 +34,7 @@ _LOOK_AGAIN_S = 0.005
 
 
 class LiveSensors:
-    """See ``pipeline.sources.base.LiveSource``. SourceError when a DBC file does not hold what the config names.
+    """See ``pipeline.types.source.LiveSource``. SourceError when a DBC file does not hold what the config names.
 
     A frame's index counts the ticks, those that nobody took in time too, so a gap in it is a drop."""
 

@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Callable
 
-from pipeline.sources.live.reader import POLL_S, DeviceLost, Stop
+from pipeline.sources.live.device_reader import POLL_S, DeviceLost, Stop
 
 _SO_TIMESTAMPNS = 35
 """Linux: receive times with every datagram (socket(7)); Python has no name for it."""

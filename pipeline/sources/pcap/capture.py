@@ -15,8 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from pipeline.complaint import reason_of
-from pipeline.sources.base import SourceError
+from pipeline.common.user_file_errors import reason_of
+from pipeline.types.source import SourceError
 
 _MAX_RECORD = 1 << 18
 """libpcap's own limit; a longer record is damage."""

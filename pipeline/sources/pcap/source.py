@@ -12,15 +12,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.progress import Progress, silent
-from pipeline.records import evolve
-from pipeline.sources.base import SourceError, TruthObject
-from pipeline.sources.beside import OPTIONS, Beside, rig_of
-from pipeline.sources.files import recording_file
-from pipeline.sources.nmea import NmeaReader
-from pipeline.sources.options import number_option, split_options
-from pipeline.sources.pcap.capture import Capture, Datagram
-from pipeline.sources.velodyne import (
+from pipeline.common.fast_replace import evolve
+from pipeline.common.progress import Progress, silent
+from pipeline.formats.file_reading import recording_file
+from pipeline.formats.nmea import NmeaReader
+from pipeline.formats.velodyne import (
     PACKET_BYTES,
     POSITION_BYTES,
     BadPacket,
@@ -30,7 +26,11 @@ from pipeline.sources.velodyne import (
     Vlp16Decoder,
     read_position,
 )
+from pipeline.sources.pcap.capture import Capture, Datagram
+from pipeline.sources.sidecar_files import OPTIONS, Beside, rig_of
+from pipeline.sources.uri_options import number_option, split_options
 from pipeline.types import F64, Frame, GnssFix, Sweep
+from pipeline.types.source import SourceError, TruthObject
 
 _DATA_PORT = 2368
 _LOOK_AT = 2000

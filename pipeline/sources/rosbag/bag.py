@@ -10,8 +10,8 @@ from weakref import finalize
 
 from rosbags.highlevel import AnyReader
 
-from pipeline.sources.base import SourceError
-from pipeline.sources.velodyne.ros import typestore
+from pipeline.formats.velodyne.ros import typestore
+from pipeline.types.source import SourceError
 
 _SUFFIXES = (".bag", ".db3", ".mcap")
 

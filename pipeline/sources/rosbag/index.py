@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.progress import Progress, silent
+from pipeline.common.nearest_in_time import Times
+from pipeline.common.progress import Progress, silent
+from pipeline.formats.velodyne import DecoderCounts, Rotation, RotationCutter, SensorClock
 from pipeline.sources.rosbag import messages
 from pipeline.sources.rosbag.bag import Bag, BagError
 from pipeline.sources.rosbag.rig import TF_STATIC, TransformTree
 from pipeline.sources.rosbag.topics import TopicMap
-from pipeline.sources.timeline import Times
-from pipeline.sources.velodyne import DecoderCounts, Rotation, RotationCutter, SensorClock
 from pipeline.types import EgoState, GnssFix
 
 _TELL_EVERY = 64

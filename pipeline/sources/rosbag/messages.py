@@ -9,10 +9,10 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.sources.base import SourceError
-from pipeline.sources.clouds import Cloud, cloud_of
-from pipeline.sources.files import decode_image
+from pipeline.formats.file_reading import decode_image
+from pipeline.formats.point_cloud_fields import Cloud, cloud_of
 from pipeline.types import U8, EgoState, GnssFix, GnssQuality, Picture
+from pipeline.types.source import SourceError
 
 _TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}
 """sensor_msgs/PointField's datatypes."""

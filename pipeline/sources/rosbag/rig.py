@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.geometry import inverse
-from pipeline.sources.base import SourceError
-from pipeline.sources.files import camera_matrix, check_looks_ahead, rigid_transform
+from pipeline.common.geometry import inverse
+from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
+from pipeline.types.source import SourceError
 
 TF_STATIC = "/tf_static"
 _BASES = ("base_link", "base_footprint", "vehicle", "ego_vehicle", "rear_axle")

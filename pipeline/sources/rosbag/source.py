@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.progress import Progress, silent
-from pipeline.records import evolve
+from pipeline.common.fast_replace import evolve
+from pipeline.common.nearest_in_time import Timeline, nearest
+from pipeline.common.progress import Progress, silent
+from pipeline.formats.velodyne import Vlp16Decoder
 from pipeline.sources import rig as rig_files
-from pipeline.sources.base import SourceError, TruthObject
-from pipeline.sources.beside import rig_of
-from pipeline.sources.live.own_motion import MotionFromGnss
-from pipeline.sources.options import split_options
+from pipeline.sources.live.gnss_motion import MotionFromGnss
 from pipeline.sources.rosbag import messages
 from pipeline.sources.rosbag.bag import Bag, BagError, bag_path
 from pipeline.sources.rosbag.index import BagIndex, Stream
 from pipeline.sources.rosbag.rig import calibration
 from pipeline.sources.rosbag.topics import ROLES, map_topics
-from pipeline.sources.timeline import Timeline, nearest
-from pipeline.sources.velodyne import Vlp16Decoder
+from pipeline.sources.sidecar_files import rig_of
+from pipeline.sources.uri_options import split_options
 from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Sweep
+from pipeline.types.source import SourceError, TruthObject
 
 _PICTURE_WITHIN_NS = 100_000_000
 _OWN_WITHIN_NS, _FIX_WITHIN_NS = 500_000_000, 1_500_000_000

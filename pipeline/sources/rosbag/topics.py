@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from pipeline.sources.base import SourceError
 from pipeline.sources.rosbag.bag import Topic
+from pipeline.types.source import SourceError
 
 NONE = "none"
 ROLES: dict[str, tuple[str, ...]] = {

@@ -1,6 +1,6 @@
 /**
  * Shapes of a whole drive as the server sends it (app/routes/): its columns, events, runs and what is exported of it.
- * `tests/app/test_page_types.py` holds every key here against real messages.
+ * `tests/app/page/test_page_types.py` holds every key here against real messages.
  *
  * @typedef {import("../types.js").AccState} AccState
  * @typedef {import("../types.js").ParamValue} ParamValue

@@ -8,7 +8,7 @@
 /** Half lengths and half widths to the corners: front left, front right, rear right, rear left. */
 const CORNERS = [[0.5, 0.5], [0.5, -0.5], [-0.5, -0.5], [-0.5, 0.5]];
 const SMALLEST_M = 0.2;
-/** What a new cuboid of a class is, where a hand says no more: length, width, height, as in pipeline/sizes.py. @type {Record<string, [number, number, number]>} */
+/** What a new cuboid of a class is, where a hand says no more: length, width, height, as in pipeline/fusion/vehicle_sizes.py. @type {Record<string, [number, number, number]>} */
 const TYPICAL_M = {
   car: [4.5, 1.8, 1.5], truck: [8, 2.5, 3.2], bus: [11, 2.55, 3.2], motorcycle: [2.1, 0.8, 1.5], bicycle: [1.8, 0.6, 1.7], person: [0.6, 0.6, 1.75],
 };

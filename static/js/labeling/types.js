@@ -1,5 +1,5 @@
 /**
- * Shapes of labels as the server sends them (app/routes/, pipeline/labels/model.py). `tests/app/test_page_types.py` holds
+ * Shapes of labels as the server sends them (app/routes/, pipeline/labels/model.py). `tests/app/page/test_page_types.py` holds
  * every key here against real messages.
  *
  * @typedef {"proposed"|"accepted"|"corrected"|"rejected"} LabelState

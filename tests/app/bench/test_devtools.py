@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from app.bench.devtools import CHROMIUM, browser
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no {CHROMIUM}")
 

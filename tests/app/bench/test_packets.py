@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from app.bench import packets
-from pipeline.sources.velodyne import Vlp16Decoder
-from pipeline.sources.velodyne.encode import PACKETS_A_ROTATION
-from tests.pipeline.sources.velodyne.streams import drive
+from pipeline.formats.velodyne import Vlp16Decoder
+from pipeline.formats.velodyne.encode import PACKETS_A_ROTATION
+from tests.pipeline.formats.velodyne.streams import drive
 
 
 def test_decode_has_its_figures_also_without_recordings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

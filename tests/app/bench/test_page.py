@@ -9,9 +9,9 @@ import pytest
 from app.bench import devtools
 from app.bench.labelled import many
 from app.bench.page import _revision_of, _spread, figures
-from pipeline.errors import BadInput
-from pipeline.labels.check import check
+from pipeline.common.errors import BadInput
 from pipeline.labels.model import LabelSet
+from pipeline.labels.validate import check
 
 
 def test_without_a_browser_it_says_what_it_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):

@@ -14,24 +14,24 @@ import numpy as np
 import pytest
 
 from app.clips.exports import MOST_FRAMES, WRITERS, Clip, Kind, submit
+from app.clips.html_report import worth_a_picture
 from app.clips.jobs import Jobs
 from app.clips.overlay import WIDTH_PX, draw_frame
-from app.clips.page import worth_a_picture
+from app.core.line import DetectionCache
+from app.core.playback_clock import timeline_s
+from app.drive.compute_scheduler import Turn
 from app.drive.events import Event
-from app.drive.recording import Recipe
-from app.drive.recording import Recording as DriveRecording
-from app.drive.turn import Turn
-from app.line import DetectionCache
-from app.playing.playback import timeline_s
+from app.drive.open_recording import Recipe
+from app.drive.open_recording import Recording as DriveRecording
 from app.views.colors import rgb
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 from pipeline.params import Params
-from pipeline.results import to_json
 from pipeline.run import Detectors, detector_for, run
 from pipeline.sources import open_source
 from pipeline.step import State, step
 from pipeline.types import Frame, Picture, Result
-from tests.app.recording import HEIGHT, WIDTH, CountingDetector, Recording
+from pipeline.types.result_json import to_json
+from tests.app.engine.recording_helpers import HEIGHT, WIDTH, CountingDetector, Recording
 
 FIRST, LAST = 12, 19
 Results = list[tuple[Frame, Result]]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from app.clips.jobs import MOST_JOBS, Job, JobRefused, Jobs, Report
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 
 WAIT_S = 60.0
 

@@ -14,7 +14,7 @@ from app.commands.evaluate import dashboard_link
 from pipeline.labels.formats import native
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
 from pipeline.sources import open_source
-from pipeline.sources.base import Source
+from pipeline.types.source import Source
 
 SOURCE = "sim:ccrb_50"
 FRAMES = 12
@@ -98,7 +98,9 @@ def test_the_line_with_two_sets_of_parameters(
     results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The base is what the results above came from, so it must score the same."""
-    monkeypatch.setattr("app.options.SourceOptions.open", lambda options: _Short(open_source(options.source)))
+    monkeypatch.setattr(
+        "app.commands.support.options.SourceOptions.open", lambda options: _Short(open_source(options.source))
+    )
     far = ("--set", "cipv.confirm_hits=20")
     assert evaluate(SOURCE, "--sensors", "lidar", *far, "--against", "default", "--json") == 0
     told = json.loads(capsys.readouterr().out)

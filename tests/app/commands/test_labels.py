@@ -10,7 +10,7 @@ import pytest
 
 from app.cli import main
 from pipeline.labels.formats.base import FormatName
-from pipeline.recording import session
+from pipeline.recording import session_source
 from tests.pipeline.recording.frames import full, write
 
 
@@ -56,9 +56,9 @@ def test_what_a_format_does_not_need_is_not_read(
 ) -> None:
     labels = tmp_path / "labels.json"
     assert cipv("labels", "export", drive, "--format", "native", "--out", labels) == 0
-    sweeps, pictures = Mock(wraps=session.sweep_from), Mock(wraps=session.picture_from)
-    monkeypatch.setattr(session, "sweep_from", sweeps)
-    monkeypatch.setattr(session, "picture_from", pictures)
+    sweeps, pictures = Mock(wraps=session_source.sweep_from), Mock(wraps=session_source.picture_from)
+    monkeypatch.setattr(session_source, "sweep_from", sweeps)
+    monkeypatch.setattr(session_source, "picture_from", pictures)
     assert cipv("labels", "export", drive, "--labels", labels, "--format", name, "--out", tmp_path / "out") == 0
     assert (sweeps.call_count, pictures.call_count) == READ[name]
 

@@ -8,7 +8,7 @@ from typing import get_args
 import pytest
 
 from app.commands.models import ListModels, RegisterModel
-from pipeline.vision import models
+from pipeline.vision import model_registry
 
 
 def test_the_printed_list_has_every_address_and_command_whole(
@@ -18,16 +18,16 @@ def test_the_printed_list_has_every_address_and_command_whole(
     monkeypatch.setenv("CIPV_DATA", str(tmp_path))
     assert ListModels()() == 0
     said = capsys.readouterr().out
-    for known in models.KNOWN:
+    for known in model_registry.KNOWN:
         assert f"\n    {known.url}\n" in said
     assert "`cipv models pull yolox_tiny` (20.2 MB)" in said
     assert "`cipv models register PATH yolop --task lanes`" in said
     assert "● embedded  detector" in said, "the one that is used where no other is"
 
 
-@pytest.mark.parametrize("task", get_args(models.Task))
+@pytest.mark.parametrize("task", get_args(model_registry.Task))
 @pytest.mark.parametrize("path", ["/nope.onnx", "embedded"], ids=["a path", "the name of another"])
-def test_a_missing_file_to_register_is_just_missing(task: models.Task, path: str) -> None:
-    with pytest.raises(models.ModelError) as refused:
+def test_a_missing_file_to_register_is_just_missing(task: model_registry.Task, path: str) -> None:
+    with pytest.raises(model_registry.ModelError) as refused:
         RegisterModel(Path(path), "mine", task)()
     assert str(refused.value) == f"no file at {path}"

@@ -11,11 +11,11 @@ import yaml
 
 from app.cli import main
 from app.commands.record import Record
-from app.options import LineOptions, SourceOptions
+from app.commands.support.options import LineOptions, SourceOptions
 from pipeline.params import SyncParams
-from pipeline.recording.session import SessionSource
+from pipeline.recording.session_source import SessionSource
 from pipeline.types import Frame
-from tests.app.test_live_engine import Sensors
+from tests.app.engine.test_live_engine import Sensors
 from tests.pipeline.sources.live.bench import endless
 from tests.pipeline.sources.live.rig import Replaying, loopback_config
 

@@ -12,13 +12,13 @@ import pytest
 
 from app.cli import main
 from app.commands import scenarios
-from app.report import html
-from pipeline.evaluation.experiments import braking
-from pipeline.evaluation.experiments.ncap import NCAP
-from pipeline.evaluation.experiments.sections import Section
-from pipeline.evaluation.experiments.track import Drive
+from app.reports.html import html
+from pipeline.common.fast_replace import evolve
+from pipeline.evaluation.report_sections import Section
+from pipeline.experiments.euro_ncap.experiment import NCAP
+from pipeline.experiments.paper import braking
+from pipeline.experiments.straight_track import Drive
 from pipeline.params import Params, from_yaml
-from pipeline.records import evolve
 from pipeline.sources import open_source
 
 

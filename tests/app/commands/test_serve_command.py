@@ -10,11 +10,11 @@ import app.commands.serve as command
 from app.commands.record import Record
 from app.commands.run import Run
 from app.commands.serve import Serve
-from app.options import SourceOptions
-from pipeline.errors import BadInput
-from pipeline.progress import Progress
-from pipeline.sources.base import AnySource, SourceError
-from tests.app.recording import CountingDetector, Recording
+from app.commands.support.options import SourceOptions
+from pipeline.common.errors import BadInput
+from pipeline.common.progress import Progress
+from pipeline.types.source import AnySource, SourceError
+from tests.app.engine.recording_helpers import CountingDetector, Recording
 
 WAIT_S = 60.0
 Opened = list[str]
@@ -32,7 +32,7 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> Opened:
         return Recording(uri)
 
     monkeypatch.setattr(command, "open_any", open_any)
-    monkeypatch.setattr("app.progress.open_any", open_any)
+    monkeypatch.setattr("app.commands.support.open_with_progress.open_any", open_any)
     monkeypatch.setattr(command, "detector_for", lambda source, name: CountingDetector())
     monkeypatch.setattr(command, "lanes_for", lambda source, name: None)
     return uris

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from app.drive.columns import OBJECT, SOURCES, Objects, Row
+from app.drive.frame_rows import OBJECT, SOURCES, Objects, Row
 
 PERIOD_NS = 100_000_000
 

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from app.engine import Engine
-from app.snapshot import Snapshot
+from app.engine.engine import Engine
+from app.engine.snapshot import Snapshot
 from pipeline.params import Params, with_changes
-from pipeline.results import to_json
 from pipeline.run import Detectors, Detects, detector_for, run
 from pipeline.sources import open_source
-from pipeline.sources.base import Source, TruthObject
 from pipeline.types import Frame, RawBoxes, Result
-from tests.app.recording import CountingDetector, Recording
+from pipeline.types.result_json import to_json
+from pipeline.types.source import Source, TruthObject
+from tests.app.engine.recording_helpers import CountingDetector, Recording
 from tests.looking import yolox_nano
 
 WAIT_S = 60.0

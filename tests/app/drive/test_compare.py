@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from app.drive.compare import Comparison, compare
-from pipeline.evaluation.lead import Judged
+from pipeline.evaluation.lead_verdict import Judged
 from tests.app.drive.rows import drive, row
 
 

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.drive.columns import Objects, Row, objects_of, row_of
 from app.drive.events import DISAGREEMENT_FRAMES, Event, find_events, recorded_marks
+from app.drive.frame_rows import Objects, Row, objects_of, row_of
 from pipeline.params import Params
 from pipeline.run import Detectors, detector_for, run
 from pipeline.sources import open_source
-from pipeline.sources.base import Mark
+from pipeline.types.source import Mark
 from tests.app.drive.rows import beside, drive, inside, objects, row
 
 NO_OBJECTS = objects()

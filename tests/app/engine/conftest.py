@@ -7,17 +7,17 @@ from contextlib import ExitStack
 
 import pytest
 
-from app.drive import turn
-from app.engine import Engine
+from app.drive import compute_scheduler
+from app.engine.engine import Engine
 from pipeline.params import Params
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.app.engine.running import WAIT_S, Start
-from tests.app.recording import CountingDetector, Recording, opener
 
 
 @pytest.fixture
 def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
     """An engine on a recording, showing its first frame, paused. Hands rest at once."""
-    monkeypatch.setattr(turn, "HAND_RESTS_S", 0.0)
+    monkeypatch.setattr(compute_scheduler, "HAND_RESTS_S", 0.0)
     with ExitStack() as stack:
 
         def begin(

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from app.engine import Engine
-from app.snapshot import Snapshot
+from app.engine.engine import Engine
+from app.engine.snapshot import Snapshot
 from pipeline.params import Params
-from pipeline.results import to_json
 from pipeline.step import State, step
 from pipeline.types import Result
-from tests.app.recording import CountingDetector, Recording
+from pipeline.types.result_json import to_json
+from tests.app.engine.recording_helpers import CountingDetector, Recording
 
 WAIT_S = 60.0
 

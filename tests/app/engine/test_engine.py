@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from app.drive import turn
-from app.line import WARM_UP_FRAMES, DetectionCache, Line
-from app.snapshot import Snapshot
+from app.core.line import WARM_UP_FRAMES, DetectionCache, Line
+from app.drive import compute_scheduler
+from app.engine.snapshot import Snapshot
 from pipeline.params import Params, with_changes
 from pipeline.run import Detectors
 from pipeline.step import State
+from tests.app.engine.recording_helpers import CountingDetector, CountingLanes, Recording, SlowDetector
 from tests.app.engine.running import WAIT_S, Start, at, body, played
-from tests.app.recording import CountingDetector, CountingLanes, Recording, SlowDetector
 
 
 def test_opens_paused_on_the_first_frame_and_finds_the_car(start: Start):
@@ -86,7 +86,7 @@ def test_a_warm_up_gives_way_to_a_seek_also_while_a_network_runs_for_it(start: S
 
 def test_the_warm_up_waits_until_the_hand_rests(start: Start, monkeypatch: pytest.MonkeyPatch):
     engine, recording, _ = start()
-    monkeypatch.setattr(turn, "HAND_RESTS_S", 1e6)
+    monkeypatch.setattr(compute_scheduler, "HAND_RESTS_S", 1e6)
     engine.control.seek(20)
     engine.wait_for(lambda s: s.index == 20, WAIT_S)
     recording.reads.clear()
@@ -95,7 +95,7 @@ def test_the_warm_up_waits_until_the_hand_rests(start: Start, monkeypatch: pytes
     assert shown.tick is not None
     assert not shown.tick.whole
     assert recording.reads == []
-    monkeypatch.setattr(turn, "HAND_RESTS_S", 0.0)
+    monkeypatch.setattr(compute_scheduler, "HAND_RESTS_S", 0.0)
     engine.control.seek(20)
     engine.wait_for(at(20), WAIT_S)
 

@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-import app.engine as engine_module
-from app.engine import Engine
-from app.line import DetectionCache, Line
-from app.snapshot import Snapshot
+import app.engine.engine as engine_module
+from app.core.line import DetectionCache, Line
+from app.engine.engine import Engine
+from app.engine.snapshot import Snapshot
+from pipeline.common.progress import Progress
+from pipeline.inference.runtime import DetectorMissing
 from pipeline.params import Params
-from pipeline.progress import Progress
 from pipeline.run import Detectors
-from pipeline.sources.base import Source
-from pipeline.vision.runtime import DetectorMissing
+from pipeline.types.source import Source
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.app.engine.running import WAIT_S, Start, at
-from tests.app.recording import CountingDetector, Recording, opener
 
 
 class Slowly:

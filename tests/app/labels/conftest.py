@@ -10,9 +10,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from app.engine import Engine
-from app.labels.database import Database
-from app.labels.drive import DriveInfo, DriveLabels
+from app.engine.engine import Engine
+from app.labels.store.database import Database
+from app.labels.store.drive_labels import DriveInfo, DriveLabels
 from tests.app.labels import postgres
 from tests.app.labels.site import act, team
 

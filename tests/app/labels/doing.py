@@ -6,12 +6,12 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from app.given import GivenCuboid
+from app.core.request_shapes import GivenCuboid
 from app.labels.acts import do
+from app.labels.acts.requests import Act, AddTrack, Relabel
 from app.labels.acts.scope import Scope
-from app.labels.drive import DriveLabels
-from app.labels.log import Acted
-from app.labels.requests import Act, AddTrack, Relabel
+from app.labels.store.act_log import Acted
+from app.labels.store.drive_labels import DriveLabels
 from pipeline.labels.model import LabelSet
 
 ACT: TypeAdapter[Any] = TypeAdapter(Act)

@@ -9,12 +9,12 @@ from pathlib import Path
 import httpx
 from sqlalchemy import select
 
-from app.labels.database import Database
-from app.labels.drive import DriveLabels
-from app.labels.tables import DriveRow
+from app.labels.store.database import Database
+from app.labels.store.drive_labels import DriveLabels
+from app.labels.store.tables import DriveRow
 from tests.app.labels.conftest import info
 from tests.app.labels.server_process import forking, started
-from tests.app.serving import WAIT_S
+from tests.app.web.serving import WAIT_S
 
 CUBOID = {"center": [20.0, 0.0, 0.7], "size": [4.0, 1.8, 1.5], "yaw_rad": 0.0}
 _LONGEST_S = 0.05

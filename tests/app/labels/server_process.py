@@ -11,15 +11,15 @@ from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from app.engine import Engine
-from app.labels.database import Database
-from app.labels.desk import LabelDesk
-from app.listening import listen_socket
-from app.server import Server, create_app
+from app.core.server_address import listen_socket
+from app.engine.engine import Engine
+from app.labels.service.desk import LabelDesk
+from app.labels.store.database import Database
+from app.web.server import Server, create_app
 from pipeline.params import Params
 from pipeline.step import warm_up
-from tests.app.recording import Recording, opener
-from tests.app.serving import WAIT_S
+from tests.app.engine.recording_helpers import Recording, opener
+from tests.app.web.serving import WAIT_S
 
 warm_up()
 

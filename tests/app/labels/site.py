@@ -8,16 +8,16 @@ from typing import Any
 
 import httpx
 
-from app.engine import Engine
-from app.labels.database import Database
-from app.labels.desk import LabelDesk
-from app.routes.label_shapes import LabelsOfPerson
-from app.server import create_app
-from app.snapshot import Snapshot
+from app.engine.engine import Engine
+from app.engine.snapshot import Snapshot
+from app.labels.service.desk import LabelDesk
+from app.labels.store.database import Database
+from app.web.routes.label_shapes import LabelsOfPerson
+from app.web.server import create_app
 from pipeline.params import Params
-from pipeline.sources.base import TruthObject
-from tests.app.recording import CountingDetector, Recording, opener
-from tests.app.serving import WAIT_S, serving
+from pipeline.types.source import TruthObject
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
+from tests.app.web.serving import WAIT_S, serving
 
 COUNT = 30
 
@@ -26,7 +26,7 @@ class Labelled(Recording):
     """The car is labelled too, 0.2 m nearer than it is, in the first twenty frames."""
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
-        from pipeline.geometry import Cuboid
+        from pipeline.common.geometry import Cuboid
 
         if index >= 20:
             return None

@@ -5,16 +5,16 @@ from __future__ import annotations
 import httpx
 import pytest
 
-from app.engine import Engine
-from app.routes.label_score_shapes import ScoreJson
-from app.routes.label_shapes import Window
-from app.server import create_app
-from app.tokens import Tokens
+from app.engine.engine import Engine
+from app.web.routes.label_score_shapes import ScoreJson
+from app.web.routes.label_shapes import Window
+from app.web.server import create_app
+from app.web.tokens import Tokens
 from pipeline.labels.model import WHOLE_TAG
 from pipeline.params import Params
+from tests.app.engine.recording_helpers import Recording, opener
 from tests.app.labels.site import COUNT, CUBOID, act, labels, move, proposed, ref, task
-from tests.app.recording import Recording, opener
-from tests.app.serving import WAIT_S, serving
+from tests.app.web.serving import WAIT_S, serving
 
 TOKENS = Tokens("a" * 20, "b" * 20)
 

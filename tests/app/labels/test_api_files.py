@@ -10,16 +10,16 @@ from http.client import HTTPConnection
 import httpx
 import pytest
 
-from app.engine import Engine
-from app.labels import files
-from app.limits import LARGEST_FILE
+from app.engine.engine import Engine
+from app.labels.transfer import files
+from app.web.limits import LARGEST_FILE
+from pipeline.common.progress import Progress
 from pipeline.labels.formats.base import Drive, drive_of
 from pipeline.labels.formats.native import from_json
-from pipeline.progress import Progress
-from pipeline.sources.base import Source
 from pipeline.types import Frame
+from pipeline.types.source import Source
 from tests.app.labels.site import act, drive, labels, move, ref, task
-from tests.app.serving import WAIT_S
+from tests.app.web.serving import WAIT_S
 
 
 def test_truth_is_imported_and_points_out_where_the_pipeline_says_otherwise(

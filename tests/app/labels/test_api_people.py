@@ -10,11 +10,11 @@ from uuid import UUID
 import httpx
 import pytest
 
-from app.engine import Engine
-from app.labels.database import Database, DatabaseError
-from app.labels.log import Log
+from app.engine.engine import Engine
+from app.labels.store.act_log import Log
+from app.labels.store.database import Database, DatabaseError
 from tests.app.labels.site import CUBOID, act, labels, move, proposed, team
-from tests.app.serving import WAIT_S
+from tests.app.web.serving import WAIT_S
 
 
 def test_what_is_sent_again_is_answered_as_before_and_done_once(engine: Engine, client: httpx.Client) -> None:

@@ -10,11 +10,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from sqlalchemy import event
 
-from app.labels.database import Database
-from app.labels.drive import DriveLabels
-from app.labels.refusals import ActRefused
-from app.labels.requests import SetLead
-from app.labels.steps import Steps
+from app.labels.acts.requests import SetLead
+from app.labels.errors import ActRefused
+from app.labels.store.database import Database
+from app.labels.store.drive_labels import DriveLabels
+from app.labels.store.undo_order import Steps
 from tests.app.labels.conftest import fresh, info
 from tests.app.labels.doing import ACT, act, add, cuboid, label_of, relabel, shown
 

@@ -16,7 +16,7 @@ import zstandard
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.types import (
     GROUND,
     UNCLUSTERED,

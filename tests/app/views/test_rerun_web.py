@@ -10,9 +10,9 @@ from pathlib import Path
 import httpx
 import pytest
 
-from app.server import create_app
 from app.views.rerun_web import FILES, NoViewer, ViewerFiles
-from tests.app.serving import WAIT_S, running, serving
+from app.web.server import create_app
+from tests.app.web.serving import WAIT_S, running, serving
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from app.views import scene
 from app.views.colors import PALETTE, palette_css, rgb, role_of, shade_of
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.types import GROUND, UNCLUSTERED, Layers, Result
 
 BACKGROUNDS = {"dark": (13, 17, 23), "light": (255, 255, 255)}

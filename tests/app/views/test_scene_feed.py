@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from app.engine import Engine
-from app.late_scene import LateScene
-from app.looks import Looks
-from app.scene_feed import SceneFeed
+from app.core.shared_view_state import Looks
+from app.engine.engine import Engine
+from app.views.lazy_scene import LateScene
+from app.views.scene_feed import SceneFeed
 from pipeline.params import Params
-from tests.app.recording import CountingDetector, Recording, opener
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 
 WAIT_S = 60.0
 

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.looks import Held
+from app.core.shared_view_state import Held
 from app.views.viser_gizmo import FACES, NODE, moved
 from app.views.viser_view import ViserView
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.params import Params
 
 CAR = Cuboid((20.0, 1.0, 0.8), (4.0, 2.0, 1.5), 0.4)

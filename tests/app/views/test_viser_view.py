@@ -14,8 +14,8 @@ import pytest
 from app.views.viser_gui import ParamsGui
 from app.views.viser_view import POSES, ViserView
 from pipeline.params import Params, with_changes
-from pipeline.path.lane_types import EgoLane, LaneLine
 from pipeline.types import Cipv, Frame, Layers, Result
+from pipeline.types.lane import EgoLane, LaneLine
 
 Ticks = list[tuple[Frame, Result]]
 Changes = queue.Queue[tuple[str, Any]]

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from app.engine import Engine
-from app.recording import RecordingDesk
+from app.engine.engine import Engine
+from app.engine.session_recording import RecordingDesk
 from pipeline.params import Params
-from tests.app.recording import CountingDetector, Recording, opener
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.browser.conftest import WAIT_MS, Site
 
 WAIT_S = WAIT_MS / 1e3

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, CDPSession, Page
 
-from tests.app.recording import Recording
+from tests.app.engine.recording_helpers import Recording
 from tests.browser.conftest import Site
 from tests.browser.display.conftest import WAIT_S, is_now
 

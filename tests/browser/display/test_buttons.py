@@ -9,13 +9,13 @@ import httpx
 import pytest
 from playwright.sync_api import expect
 
-from app.engine import Engine
-from app.recording import RecordingDesk
-from app.server import create_app
-from app.tokens import Tokens
+from app.engine.engine import Engine
+from app.engine.session_recording import RecordingDesk
+from app.web.server import create_app
+from app.web.tokens import Tokens
 from pipeline.params import Params
-from tests.app.recording import Recording, opener
-from tests.app.serving import serving
+from tests.app.engine.recording_helpers import Recording, opener
+from tests.app.web.serving import serving
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.display.conftest import WAIT_S, OpenDisplay, is_now, keep
 

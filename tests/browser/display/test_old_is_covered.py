@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from playwright.sync_api import Browser, WebSocketRoute, expect
 
-from tests.app.recording import Recording
+from tests.app.engine.recording_helpers import Recording
 from tests.browser.conftest import Site
 from tests.browser.display.conftest import OpenDisplay, is_now, keep
 

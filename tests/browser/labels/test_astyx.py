@@ -14,20 +14,20 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.drive.kept import results_of
-from app.drive.recording import RULE
-from app.engine import Engine
-from app.recording import RecordingDesk
+from app.drive.open_recording import RULE
+from app.drive.run_results import results_of
+from app.engine.engine import Engine
+from app.engine.session_recording import RecordingDesk
+from pipeline.common.geometry import Cuboid, closest_on_polygon
 from pipeline.evaluation.scores.drive import Rules, score_drive
 from pipeline.evaluation.scores.figures import FIGURES
 from pipeline.evaluation.scores.truth import of_labels
-from pipeline.geometry import Cuboid, closest_on_polygon
+from pipeline.fusion.vehicle_sizes import largest_size_m
 from pipeline.labels.formats.native import from_json
 from pipeline.params import Params
 from pipeline.run import detector_for
-from pipeline.sizes import largest_size_m
 from pipeline.sources import open_source
-from pipeline.sources.base import TruthObject
+from pipeline.types.source import TruthObject
 from tests.browser.conftest import OpenPage, Site
 from tests.browser.labels.hands import KEYSTROKE_S, Hand, Labels, begin, is_at, is_saved
 from tests.browser.looks import pixels, repainted

@@ -46,7 +46,7 @@ def test_a_cuboid_is_drawn_moved_turned_and_resized_in_the_plan(hand: Hand, labe
 
 
 def test_a_hand_in_the_3d_view_moves_it_in_every_view(hand: Hand, labels: Labels):
-    """What the server says of a drag there, as ``app/stream.py`` sends it."""
+    """What the server says of a drag there, as ``app/streaming/stream.py`` sends it."""
     page = hand.page
     made = draw(hand, labels)
     is_saved(page)

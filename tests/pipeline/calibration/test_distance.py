@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.alignment import project_cuboid, resolve
+from pipeline.alignment.projection import project_cuboid, resolve
 from pipeline.calibration.distance import Pair, TooFewPairs, as_overrides, collect_pairs, fit_laws
-from pipeline.evaluation.lead import LeadRule, nearest_face_m, true_lead
-from pipeline.geometry import iou_matrix
+from pipeline.common.geometry import iou_matrix
+from pipeline.evaluation.lead_verdict import LeadRule, nearest_face_m, true_lead
 from pipeline.params import Params, with_changes
 from pipeline.sources import open_source
-from pipeline.sources.base import Source
 from pipeline.types import REAL_VEHICLES, RawBoxes
-from pipeline.vision import distance, select, tracking
+from pipeline.types.source import Source
+from pipeline.vision import distance, nms, tracking
 from tests.looking import LooksOnce, yolox_nano
 
 DRIVES = {"047": (47, 51), "057": (57, 68), "183": (183, 192), "414": (414, 425)}
@@ -87,7 +87,7 @@ def _lead_errors(recording: Recording, frames: tuple[int, int], params: Params) 
         assert frame.picture is not None
         assert frame.camera is not None
         assert alignment is not None
-        detections = select.select(recording.detector.detect(frame.picture.bgr), params.detection)
+        detections = nms.select(recording.detector.detect(frame.picture.bgr), params.detection)
         measured = distance.measure(detections, alignment, frame.camera, params.distance)
         dt_s = (frame.t_ns - before_ns) / 1e9 if before_ns is not None else None
         state, tracks = tracking.track(state, measured, dt_s, params.vision_tracking)

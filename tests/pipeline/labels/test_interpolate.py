@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.interpolate import drop_keyframe, put_keyframe, resized
 from pipeline.labels.model import Sighting
 

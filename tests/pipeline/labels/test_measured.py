@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.alignment import project_cuboid, resolve
-from pipeline.geometry import Cuboid
-from pipeline.labels.lift import NothingThere, lift
-from pipeline.labels.refit import TooFewPoints, refit
+from pipeline.alignment.projection import project_cuboid, resolve
+from pipeline.common.geometry import Cuboid
+from pipeline.labels.cuboid_from_pixel import NothingThere, lift
+from pipeline.labels.snap import TooFewPoints, refit
 from pipeline.params import Params
 from pipeline.sources import open_source
 from pipeline.types import F32, Box, Frame, RawBoxes
-from tests.app.recording import Recording
+from tests.app.engine.recording_helpers import Recording
 
 GROUND_M = -0.6
 

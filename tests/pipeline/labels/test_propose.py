@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.geometry import Cuboid
-from pipeline.labels.check import check
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
 from pipeline.labels.propose import Seen, known_as, propose
+from pipeline.labels.validate import check
 
 PERSON = Cuboid((20.0, 0.0, 0.85), (0.6, 0.6, 1.7), 0.0)
 BY = Origin("pipeline", "run 1", 5, "params", "camera")

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.geometry import rotation
+from pipeline.common.geometry import rotation
 from pipeline.sources import open_source
-from pipeline.sources.base import TruthObject
 from pipeline.types import F32, F64, Frame
+from pipeline.types.source import TruthObject
 
 Block = tuple[float, float, float, float, float, float]
 """x, y, z from; x, y, z to."""

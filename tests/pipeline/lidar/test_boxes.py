@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from pipeline.geometry import rotation
+from pipeline.common.geometry import rotation
 from pipeline.lidar.boxes import MIN_AREA_M2, fit_obstacles
 from pipeline.lidar.ground import Ground
 from pipeline.params import BoxParams

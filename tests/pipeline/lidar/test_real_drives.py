@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.geometry import Cuboid, closest_on_polygon
+from pipeline.common.geometry import Cuboid, closest_on_polygon
 from pipeline.lidar.boxes import fit_obstacles
 from pipeline.lidar.cluster import candidates, cluster
 from pipeline.lidar.ground import Ground, fit_ground
 from pipeline.lidar.tracking import LidarTrackerState, track
 from pipeline.params import Params
 from pipeline.sources import open_source
-from pipeline.sources.base import TruthObject
 from pipeline.types import F32, I32, LidarTrack, Obstacle
+from pipeline.types.source import TruthObject
 from tests.pipeline.lidar.scenes import real_frames
 
 VEHICLES = {"car", "van", "truck", "bus"}

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.lidar.tracking import LidarTrackerState, looks, track
 from pipeline.params import LidarTrackingParams
 from pipeline.types import LidarTrack, Obstacle

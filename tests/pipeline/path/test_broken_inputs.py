@@ -15,10 +15,10 @@ from itertools import takewhile
 import numpy as np
 import pytest
 
-from pipeline.evaluation.experiments import bends
-from pipeline.evaluation.experiments.curve_drives import Moment, judge, moments, seen
+from pipeline.common.fast_replace import evolve
+from pipeline.experiments.curves import scenarios
+from pipeline.experiments.curves.drives import Moment, judge, moments, seen
 from pipeline.params import Params, with_changes
-from pipeline.records import evolve
 from pipeline.step import State, step, warm_up
 from pipeline.types import CameraCalibration, Frame, Result
 
@@ -31,7 +31,7 @@ Break = Callable[[Frame], Frame]
 @cache
 def drive(layout: str = "r250", ends_s: float = ENDS_S) -> list[Moment]:
     warm_up()
-    scene, reach_m = bends.scenario(bends.LAYOUTS[layout], 0), bends.LAYOUTS[layout].reach_m
+    scene, reach_m = scenarios.scenario(scenarios.LAYOUTS[layout], 0), scenarios.LAYOUTS[layout].reach_m
     return list(takewhile(lambda moment: moment.now.t_s < ends_s, moments(scene, seen(scene), reach_m)))
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.params import PathParams
 from pipeline.path.estimates import PathEstimate, between_lines
-from pipeline.path.lane_types import EgoLane, LaneLine, Side
+from pipeline.types.lane import EgoLane, LaneLine, Side
 
 COVARIANCE = np.diag(np.square([0.05, 5e-3, 3e-4, 5e-6]))
 

@@ -9,12 +9,12 @@ from typing import Any
 import cv2
 import numpy as np
 
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.params import Params
-from pipeline.recording.about import About
-from pipeline.recording.writer import SessionWriter
-from pipeline.sources.base import TruthObject
+from pipeline.recording.provenance import About
+from pipeline.recording.session_writer import SessionWriter
 from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Route, StreamHealth, Sweep
+from pipeline.types.source import TruthObject
 
 PERIOD_NS = 100_000_000
 ABOUT = About("test:drive", "A test drive", 10.0, ("made for a test",))

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.recording import output, topics
-from pipeline.recording.container import McapFile
-from pipeline.recording.writer import SessionWriter
+from pipeline.recording import mcap_output, topics
+from pipeline.recording.mcap_reader import McapFile
+from pipeline.recording.session_writer import SessionWriter
 from tests.pipeline.recording.frames import ABOUT, full, picture, sweep, write
 
 
@@ -31,7 +31,7 @@ def test_frames_said_to_be_kept_are_in_the_file(
     chunk_bytes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Wherever a chunk begins, between the messages of a frame too."""
-    monkeypatch.setattr(output, "CHUNK_BYTES", chunk_bytes)
+    monkeypatch.setattr(mcap_output, "CHUNK_BYTES", chunk_bytes)
     writer = SessionWriter(tmp_path / "a.mcap", ABOUT)
     for index in range(12):
         writer.write(full(index), {"frame": index})

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.errors import BadInput
-from pipeline.recording import output
+from pipeline.common.errors import BadInput
+from pipeline.recording import mcap_output
 from pipeline.recording.info import info
 from pipeline.recording.rewrite import recover
-from pipeline.recording.session import SessionSource
+from pipeline.recording.session_source import SessionSource
 from pipeline.sources import SourceError
 from tests.pipeline.recording.frames import full, same, sweep, write
 
@@ -26,7 +26,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     """A session of several chunks."""
     frames = [replace(full(index), sweep=sweep(index, points=1500)) for index in range(FRAMES)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(output, "CHUNK_BYTES", 64 * 1024)
+        patch.setattr(mcap_output, "CHUNK_BYTES", 64 * 1024)
         path = write(tmp_path_factory.mktemp("whole") / "a.mcap", frames)
     assert len(SessionSource("a", str(path)).file.directory.chunks) >= 5
     return path.read_bytes()

@@ -20,9 +20,9 @@ from pipeline.params import Params
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.rewrite import recover
 from pipeline.recording.topics import protobuf_class
-from pipeline.results import to_json
-from pipeline.sources.shots import Shot
 from pipeline.step import State, step
+from pipeline.types.camera_shot import Shot
+from pipeline.types.result_json import to_json
 from tests.pipeline.recording.frames import ABOUT, full, picture
 
 FRAMES = 12

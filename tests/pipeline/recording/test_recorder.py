@@ -18,15 +18,15 @@ import pytest
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 from pipeline.params import Params, with_changes
 from pipeline.recording import recorder as recorder_module
-from pipeline.recording.packets import RawLidar
 from pipeline.recording.recorder import Recorder, RecordingState
 from pipeline.recording.rewrite import recover
 from pipeline.recording.segments import Rotation, Segments
-from pipeline.recording.session import Mark, SessionSource
-from pipeline.sources.shots import Shot
+from pipeline.recording.session_source import Mark, SessionSource
+from pipeline.recording.velodyne_scan import RawLidar
+from pipeline.types.camera_shot import Shot
 from tests.conftest import ROOT
 from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, picture, same, sweep
 

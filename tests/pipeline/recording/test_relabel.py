@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from pipeline.errors import BadInput
-from pipeline.recording import output, topics
-from pipeline.recording.container import McapFile, Stored
+from pipeline.common.errors import BadInput
+from pipeline.recording import mcap_output, topics
+from pipeline.recording.mcap_reader import McapFile, Stored
 from pipeline.recording.relabel import relabel
 from pipeline.recording.rewrite import clip
 from pipeline.recording.save import save
-from pipeline.recording.session import SessionSource
-from pipeline.recording.writer import SessionWriter
+from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session_writer import SessionWriter
 from tests.pipeline.recording.frames import ABOUT, full, same
 
 FRAMES = 12
@@ -34,7 +34,7 @@ def drive(path: Path, labels_at: int | None = None) -> Path:
 
 @pytest.fixture(autouse=True)
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(output, "CHUNK_BYTES", 5_000)
+    monkeypatch.setattr(mcap_output, "CHUNK_BYTES", 5_000)
 
 
 def messages(path: Path) -> list[Stored]:

@@ -10,10 +10,10 @@ import pytest
 
 from pipeline.params import Params
 from pipeline.recording.save import save
-from pipeline.results import to_json
 from pipeline.run import Detectors, detector_for, run
 from pipeline.sources import open_source
-from pipeline.sources.base import Source
+from pipeline.types.result_json import to_json
+from pipeline.types.source import Source
 from pipeline.vision.detector import open_detector
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
+from pipeline.formats.velodyne import Vlp16Decoder
 from pipeline.replay.faults import Fault, disconnected, disturb, load
 from pipeline.replay.messages import Message, of_recording
 from pipeline.replay.wire import ROTATION_NS, WireEvent, to_wire
 from pipeline.sources import open_source
-from pipeline.sources.velodyne import Vlp16Decoder
 from pipeline.types import Sweep
 
 MS = 1_000_000

@@ -7,9 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from pipeline.geometry import Cuboid
-from pipeline.simulation import scenario, world
-from pipeline.simulation.world import ActorState, World
+from pipeline.common.geometry import Cuboid
+from pipeline.simulation import scenario
+from pipeline.simulation.world import world
+from pipeline.simulation.world.world import ActorState, World
 from pipeline.types import F64
 
 NAMES = scenario.names()

@@ -10,14 +10,14 @@ import yaml
 from pydantic import BaseModel
 
 from pipeline.simulation import scenario
-from pipeline.simulation.actors import Actor, Brake
-from pipeline.simulation.detection_model import BoxNoise, Detections, LineNoise
-from pipeline.simulation.gnss_model import GnssModel, OdometryModel
-from pipeline.simulation.lens import CameraModel
-from pipeline.simulation.lidar_model import LidarModel
-from pipeline.simulation.roads import Crossing, Road, Segment
-from pipeline.simulation.routes import CrossingActor
+from pipeline.simulation.drawing.lens import CameraModel
 from pipeline.simulation.scenario import Ego, Scenario
+from pipeline.simulation.sensors.detection_model import BoxNoise, Detections, LineNoise
+from pipeline.simulation.sensors.gnss_model import GnssModel, OdometryModel
+from pipeline.simulation.sensors.lidar_model import LidarModel
+from pipeline.simulation.world.actors import Actor, Brake
+from pipeline.simulation.world.intersection_ways import CrossingActor
+from pipeline.simulation.world.roads import Crossing, Road, Segment
 
 TEXT = (Path(scenario.__file__).parent / "scenarios" / "README.md").read_text(encoding="utf-8")
 PARTS: dict[str, type[BaseModel]] = {

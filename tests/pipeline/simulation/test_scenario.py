@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.simulation import scenario, world
+from pipeline.simulation import scenario
 from pipeline.simulation.scenario import Scenario, ScenarioError
-from pipeline.simulation.world import ActorState, World
+from pipeline.simulation.world import world
+from pipeline.simulation.world.world import ActorState, World
 
 FILES = {
     name: (Path(scenario.__file__).parent / "scenarios" / f"{name}.yaml").read_text(encoding="utf-8")

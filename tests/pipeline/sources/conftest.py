@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.geometry import inverse, rotation
+from pipeline.common.geometry import inverse, rotation
 
 LIDAR_ROWS = [
     "10.00 0.00 -1.00 7 0 1000000",

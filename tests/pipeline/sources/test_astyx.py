@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.alignment import resolve
-from pipeline.geometry import inverse, rotation, transform
+from pipeline.alignment.projection import resolve
+from pipeline.common.geometry import inverse, rotation, transform
 from pipeline.params import AlignmentParams
 from pipeline.sources import SourceError, open_source
-from pipeline.sources.base import Source
+from pipeline.types.source import Source
 
 from .conftest import LIDAR_ROWS, astyx_calibration
 

@@ -14,7 +14,7 @@ from pipeline.recording.save import save
 from pipeline.sources import open_source
 from pipeline.sources.fingerprint import content_key, fingerprint
 from pipeline.types import Frame, Picture
-from tests.app.recording import Recording
+from tests.app.engine.recording_helpers import Recording
 
 
 def _edit(path: Path) -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.recording.tick import CameraRecord
 from pipeline.sources import open_source
-from pipeline.sources.base import InParts, Source
 from pipeline.types import Frame
+from pipeline.types.source import InParts, Source
 from tests.pipeline.recording.frames import full, write
 from tests.pipeline.sources.bags import write_bag
 from tests.pipeline.sources.captures import write_capture

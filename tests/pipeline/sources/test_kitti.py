@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.alignment import project_cuboid, resolve
-from pipeline.geometry import iou_matrix
+from pipeline.alignment.projection import project_cuboid, resolve
+from pipeline.common.geometry import iou_matrix
+from pipeline.formats.kitti_records import parse_labels, parse_oxts, parse_timestamps
 from pipeline.params import AlignmentParams
 from pipeline.sources import SourceError, open_source
-from pipeline.sources.kitti_records import parse_labels, parse_oxts, parse_timestamps
 
 from .conftest import KITTI_BASELINE_M, KITTI_LABEL, T_ego_rect, object_calibration, rings_file
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.alignment import project_cuboid, resolve
+from pipeline.alignment.projection import project_cuboid, resolve
 from pipeline.params import AlignmentParams
 from pipeline.sources import SourceError, open_source
 from pipeline.types import Frame

@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
+from pipeline.inference.graph import fitting_size
+from pipeline.inference.runtime import DetectorError, DetectorMissing
 from pipeline.params import DetectionParams
 from pipeline.vision.detector import FLOOR_SCORE, open_detector
-from pipeline.vision.graph import fitting_size
-from pipeline.vision.models import register
-from pipeline.vision.runtime import DetectorError, DetectorMissing
-from pipeline.vision.select import select
+from pipeline.vision.model_registry import register
+from pipeline.vision.nms import select
 from tests.pipeline.vision import networks
 
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.alignment import Angular, Pinhole
-from pipeline.geometry import transform
+from pipeline.alignment.projection import Angular, Pinhole
+from pipeline.common.geometry import transform
 from pipeline.params import DistanceParams, preset
 from pipeline.types import CameraCalibration, Detection
 from pipeline.vision.distance import PowerLaw, binned, fit_power_law, measure

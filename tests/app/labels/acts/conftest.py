@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from app.labels.database import Database
-from app.labels.drive import DriveLabels
-from pipeline.geometry import Cuboid
+from app.labels.store.database import Database
+from app.labels.store.drive_labels import DriveLabels
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.model import LabelTrack, LeadRange, Origin, Sighting
 from tests.app.labels.conftest import fresh
 

@@ -7,10 +7,10 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from app.labels.acts import do
+from app.labels.acts.requests import Act
 from app.labels.acts.scope import Scope
-from app.labels.drive import DriveLabels
-from app.labels.log import Acted
-from app.labels.requests import Act
+from app.labels.store.act_log import Acted
+from app.labels.store.drive_labels import DriveLabels
 from pipeline.labels.model import LabelTrack
 
 ACT: TypeAdapter[Any] = TypeAdapter(Act)

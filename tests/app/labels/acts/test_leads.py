@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from app.labels.drive import DriveLabels
-from app.labels.refusals import ActRefused, Stale
+from app.labels.errors import ActRefused, Stale
+from app.labels.store.drive_labels import DriveLabels
 from tests.app.labels.acts.doing import act, leads
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from app.labels.drive import DriveLabels
-from app.labels.refusals import ActRefused
+from app.labels.errors import ActRefused
+from app.labels.store.drive_labels import DriveLabels
 from tests.app.labels.acts.doing import BOX, act, track
 
 

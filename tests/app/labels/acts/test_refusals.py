@@ -9,8 +9,8 @@ from pydantic import ValidationError
 
 from app.labels.acts import do
 from app.labels.acts.scope import Scope
-from app.labels.drive import DriveLabels
-from app.labels.refusals import BadAct, NoSuchLabel
+from app.labels.errors import BadAct, NoSuchLabel
+from app.labels.store.drive_labels import DriveLabels
 from tests.app.labels.acts.doing import ACT, BOX, act
 from tests.app.labels.conftest import COUNT
 

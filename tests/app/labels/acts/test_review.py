@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from app.labels.drive import DriveLabels
-from app.labels.refusals import ActRefused
-from app.labels.values import value_from_json
+from app.labels.errors import ActRefused
+from app.labels.store.drive_labels import DriveLabels
+from app.labels.store.values import value_from_json
 from pipeline.labels.model import LeadRange, Origin
 from tests.app.labels.acts.conftest import PIPELINE
 from tests.app.labels.acts.doing import act, leads, track

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from pipeline.evaluation.lead import LeadRule, true_lead
+from pipeline.evaluation.lead_verdict import LeadRule, true_lead
 from pipeline.evaluation.scores.truth import DriveTruth, FrameTruth, with_velocities
 from pipeline.params import Params
-from pipeline.sources.base import TruthObject
 from pipeline.step import State, step
 from pipeline.types import AccCommand, Cipv, EgoState, Frame, FusedObject, Result
+from pipeline.types.source import TruthObject
 from tests.pipeline.build import cuboid
 
 TICK_NS = 100_000_000

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.errors import BadInput
+from pipeline.common.errors import BadInput
 from pipeline.evaluation.scores.drive import Rules, score_drive
 from pipeline.evaluation.scores.results_file import read_results
-from pipeline.results import to_line
 from pipeline.types import Result
+from pipeline.types.result_json import to_line
 from tests.pipeline.build import fused
 from tests.pipeline.evaluation.scores.drives import believed, truth
 

@@ -7,7 +7,7 @@ from typing import get_args
 
 import pytest
 
-from pipeline.evaluation.lead import LeadRule
+from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.evaluation.scores.drive import Rules, score_drive
 from pipeline.evaluation.scores.figures import FIGURES
 from pipeline.evaluation.scores.truth import (
@@ -18,7 +18,7 @@ from pipeline.evaluation.scores.truth import (
     of_source,
     with_velocities,
 )
-from pipeline.labels.link import linked
+from pipeline.labels.link_identities import linked
 from pipeline.labels.model import (
     WHOLE_TAG,
     EventLabel,
@@ -32,8 +32,8 @@ from pipeline.labels.model import (
     State,
 )
 from pipeline.sources import open_source
-from pipeline.sources.base import TruthObject
 from pipeline.types import FusedObject
+from pipeline.types.source import TruthObject
 from tests.pipeline.build import cuboid, fused
 from tests.pipeline.evaluation.scores.drives import TICK_NS, believed, labelled
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 
-from pipeline.geometry import Cuboid, inverse, rotation
+from pipeline.common.geometry import Cuboid, inverse, rotation
 from pipeline.labels.formats.base import Drive, Shot
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.types import CameraCalibration, EgoState

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats.base import FormatName
 from pipeline.labels.formats.registry import export_labels, import_labels
 from pipeline.labels.model import LabelTrack, LeadRange, Origin, Sighting

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from pipeline.alignment import Pinhole, project_cuboid
-from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid, inverse
-from pipeline.labels.check import check
+from pipeline.alignment.projection import Pinhole, project_cuboid
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid, inverse
 from pipeline.labels.formats.base import Drive, FormatName
 from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
+from pipeline.labels.validate import check
 from tests.pipeline.sources.test_fuzz import EDITS, damaged
 
 from .sets import IMPORT, camera, drive

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.geometry import Cuboid
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats.base import Drive, Shot
 from pipeline.labels.formats.points import count_inside, points_inside
 from pipeline.labels.model import LabelSet, LabelTrack, Sighting

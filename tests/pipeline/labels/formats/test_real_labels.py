@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.labels.formats.base import Drive, drive_of
 from pipeline.labels.formats.registry import export_labels, import_labels
-from pipeline.labels.truth import LINKED, truth_labels
+from pipeline.labels.recorded_truth import LINKED, truth_labels
 from pipeline.recording.save import save
 from pipeline.sources import open_source
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 
-from pipeline.errors import BadInput
-from pipeline.geometry import Cuboid
+from pipeline.common.errors import BadInput
+from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats import base, native
 from pipeline.labels.formats.base import Drive, FormatName
 from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.recording.rewrite import clip
-from pipeline.recording.session import SessionSource
+from pipeline.recording.session_source import SessionSource
 from pipeline.sources import open_source
 from tests.pipeline.recording.frames import full, write
 

@@ -9,7 +9,7 @@ import pytest
 from pipeline.replay.wire import WireEvent
 from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.lidar import LidarInput
-from tests.pipeline.sources.velodyne.test_position import position
+from tests.pipeline.formats.velodyne.test_position import position
 
 from .bench import MS, SECOND, START, Bench, Taken, sent
 

@@ -11,10 +11,10 @@ import yaml
 from pydantic import BaseModel
 
 from pipeline.sources import is_live, open_live, open_source
-from pipeline.sources.base import SourceError
 from pipeline.sources.live import config as live_config
 from pipeline.sources.live.config import CalibrationConfig, LiveConfig, load
-from pipeline.sources.live.init import TEMPLATE
+from pipeline.sources.live.config_template import TEMPLATE
+from pipeline.types.source import SourceError
 
 SMALLEST = "lidar: {}\n"
 

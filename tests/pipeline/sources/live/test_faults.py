@@ -11,7 +11,7 @@ from pipeline.params import SyncParams
 from pipeline.replay.faults import Fault
 from pipeline.sources.live.gnss import GnssInput
 from pipeline.sources.live.lidar import LidarInput
-from tests.pipeline.sources.test_nmea import whole
+from tests.pipeline.formats.test_nmea import whole
 
 from .bench import START, Bench, Taken, sent, small_sweep
 

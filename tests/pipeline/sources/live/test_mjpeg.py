@@ -9,8 +9,8 @@ from contextlib import contextmanager, suppress
 
 import pytest
 
+from pipeline.sources.live.device_reader import DeviceLost, Stop
 from pipeline.sources.live.mjpeg import NotMjpeg, read_mjpeg
-from pipeline.sources.live.reader import DeviceLost, Stop
 
 from .bench import small_jpeg
 

@@ -16,10 +16,10 @@ import pytest
 
 from pipeline.replay.messages import Message
 from pipeline.replay.nmea_writer import sentences
-from pipeline.sources.base import SourceError
 from pipeline.sources.live.config import LiveConfig
 from pipeline.sources.live.source import LiveSensors
 from pipeline.types import EgoState, Frame, GnssFix
+from pipeline.types.source import SourceError
 
 from .bench import MS, fix_at, small_sweep
 from .rig import Replaying, frames_until, free_port, loopback_config, opened

@@ -12,8 +12,8 @@ import pytest
 from pipeline.params import Params
 from pipeline.run import Detectors, run
 from pipeline.sources import Source, SourceError, open_source
+from tests.pipeline.formats.velodyne.streams import PRODUCT, START_NS, STEP_NS, mrpt, with_byte
 from tests.pipeline.sources.captures import RIG, lidar, pcap, pcapng, sentences, write_capture, write_video
-from tests.pipeline.sources.velodyne.streams import PRODUCT, START_NS, STEP_NS, mrpt, with_byte
 
 
 def opened(folder: Path, data: bytes, options: str = "") -> Source:

@@ -12,6 +12,7 @@ import pytest
 from pipeline.params import Params
 from pipeline.run import Detectors, run
 from pipeline.sources import SourceError, open_source
+from tests.pipeline.formats.velodyne.streams import PRODUCT, START_NS, ring_wall, with_byte
 from tests.pipeline.sources.bags import (
     HEADER_NS,
     HEIGHT,
@@ -24,7 +25,6 @@ from tests.pipeline.sources.bags import (
     write_bag,
     write_packet_bag,
 )
-from tests.pipeline.sources.velodyne.streams import PRODUCT, START_NS, ring_wall, with_byte
 
 KINDS: tuple[Kind, ...] = ("ros1", "db3", "mcap")
 
@@ -222,7 +222,7 @@ def test_what_is_wrong_in_one_sentence(name: str, tmp_path: Path) -> None:
 
 
 def test_another_velodyne_is_named(tmp_path: Path) -> None:
-    from tests.pipeline.sources.velodyne.streams import drive
+    from tests.pipeline.formats.velodyne.streams import drive
 
     with BagWriter(tmp_path / "drive", "db3") as bag:
         bag.write("/velodyne_packets", bag.scan([(with_byte(p, PRODUCT, 0x28), t) for p, t in drive(1)]), HEADER_NS)

@@ -1,5 +1,5 @@
 """The detector that comes with the program, on pictures it was not trained on: a few of each of the seeds of which
-``python -m pipeline.simulation.training.evaluate`` draws many more. The lead's floor is what the card claims."""
+``python -m pipeline.training.evaluate`` draws many more. The lead's floor is what the card claims."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from itertools import chain, islice
 
 import pytest
 
-from pipeline.simulation.camera import HEIGHT, WIDTH
-from pipeline.simulation.training.evaluate import JUDGE_SEEDS, LEAD_M, Bin, evaluate, within
-from pipeline.simulation.training.scenes import drive, moments
-from pipeline.simulation.world import World
+from pipeline.simulation.sensors.camera import HEIGHT, WIDTH
+from pipeline.simulation.world.world import World
+from pipeline.training.evaluate import JUDGE_SEEDS, LEAD_M, Bin, evaluate, within
+from pipeline.training.scenes import drive, moments
 from pipeline.vision.detector import Detector, open_detector
-from pipeline.vision.models import EMBEDDED
+from pipeline.vision.model_registry import EMBEDDED
 
 OF_EACH_SEED = 7
 

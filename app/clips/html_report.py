@@ -1,0 +1,129 @@
+"""A clip as one HTML file: what happened, curves, pictures of the moments that matter, and what it was made with."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+import cv2
+
+from app.drive.events import Event, find_events
+from app.drive.frame_rows import Objects, Row, objects_of, row_of
+from app.reports.html import page, section_html
+from pipeline.evaluation.report_sections import Chart, Section, Series, Table
+from pipeline.params import Params, to_yaml
+from pipeline.types import F64, U8, Frame, Result
+
+MOST_PICTURES = 6
+_JPEG_QUALITY = 82
+_CURVES = (
+    ("Distance to the CIPV", "m", ("distance_m",)),
+    ("Closing speed", "m/s", ("closing_speed_mps",)),
+    ("Time to collision", "s", ("ttc_s",)),
+    ("Path offset of the CIPV", "m", ("path_offset_m",)),
+    ("Own and desired speed", "m/s", ("speed_mps", "desired_speed_mps")),
+    ("Brake", "share of the pedal", ("brake",)),
+)
+_LONGEST_TTC_S = 20.0
+_WEIGHT = {"alarm": 0, "warning": 1, "notice": 2, "info": 3}
+
+
+@dataclass(frozen=True)
+class About:
+    """What the clip is of. timeline_s: (N,) of the whole drive. digest: what the run was made from, in short."""
+
+    title: str
+    uri: str
+    first: int
+    last: int
+    timeline_s: F64
+    digest: str
+
+
+def clip_page(run: Iterable[tuple[Frame, Result]], draw: Callable[[int], U8], params: Params, about: About) -> str:
+    """The whole file; it loads nothing. ``draw`` gives the picture of a frame of the drive with the overlay, BGR; it is
+    asked for the first frame and for those of the weightiest events."""
+    rows: list[Row] = []
+    objects: list[Objects] = []
+    names: list[str] = []
+    for frame, result in run:
+        rows.append(row_of(frame, result))
+        objects.append(objects_of(result))
+        names.append(frame.name)
+    events = find_events(rows, objects, params)
+    times = about.timeline_s[about.first : about.first + len(rows)].tolist()
+    sections = [
+        _summary(rows, names, about),
+        _events(events, names, times),
+        Section("curves", "Curves", charts=tuple(_charts(rows, times))),
+    ]
+    said = worth_a_picture(events)
+    pictures = {place: (_jpeg(draw(about.first + place)), text) for place, text in said.items()}
+    body = "".join(map(section_html, sections)) + _pictures(pictures, names) + _made_with(params)
+    return page(f"{about.title}: frames {names[0]} to {names[-1]}", body)
+
+
+def worth_a_picture(events: Sequence[Event]) -> dict[int, str]:
+    """Place in the clip and what to say below, in order: the beginning, and the weightiest events."""
+    weighty = sorted(events, key=lambda event: (_WEIGHT[event.severity], event.index))
+    said: dict[int, str] = {}
+    for event in weighty:
+        if len(said) < MOST_PICTURES - 1:
+            said.setdefault(event.index, event.text)
+    return dict(sorted({0: "the clip begins", **said}.items()))
+
+
+def _jpeg(drawn: U8) -> bytes:
+    return cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()
+
+
+def _summary(rows: Sequence[Row], names: Sequence[str], about: About) -> Section:
+    with_lead = sum(row.cipv_id is not None for row in rows)
+    leads = {row.cipv_id for row in rows} - {None}
+    text = (
+        f"Frames {names[0]} to {names[-1]} ({len(rows)}) of {about.uri}.",
+        f"{with_lead} frames with a CIPV, {len(leads)} vehicle{'s' if len(leads) != 1 else ''} in turn. "
+        f"Made from the same input and parameters, a run has the digest {about.digest}.",
+    )
+    return Section("clip", "Clip", text)
+
+
+def _events(events: Sequence[Event], names: Sequence[str], times: Sequence[float]) -> Section:
+    rows = tuple((names[each.index], round(times[each.index], 2), each.kind, each.text) for each in events)
+    table = Table("What happened", ("frame", "at s", "kind", "event"), rows)
+    return Section("events", "Events", tables=(table,) if rows else (), text=() if rows else ("Nothing.",))
+
+
+def _charts(rows: Sequence[Row], times: Sequence[float]) -> Iterable[Chart]:
+    for title, unit, names in _CURVES:
+        lines = []
+        for name in names:
+            known = [(t, getattr(row, name)) for t, row in zip(times, rows, strict=True)]
+            points = [(t, value) for t, value in known if value is not None and _is_drawn(name, value)]
+            lines.append(Series(name, tuple(t for t, _ in points), tuple(value for _, value in points)))
+        if any(line.x for line in lines):
+            yield Chart(title, "s", unit, tuple(lines))
+
+
+def _is_drawn(name: str, value: float) -> bool:
+    return name != "ttc_s" or value <= _LONGEST_TTC_S
+
+
+def _pictures(pictures: dict[int, tuple[bytes, str]], names: Sequence[str]) -> str:
+    figures = "".join(
+        f"<figure><figcaption>{escape(names[place])}: {escape(text)}</figcaption>"
+        f'<img style="width:100%" alt="Camera at frame {escape(names[place])} with what the line believes" '
+        f'src="data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"></figure>'
+        for place, (jpeg, text) in pictures.items()
+    )
+    return f'<section id="pictures"><h2>Pictures</h2>{figures}</section>'
+
+
+def _made_with(params: Params) -> str:
+    text = "These parameters, as a file for <code>cipv run --params</code>."
+    return (
+        f'<section id="parameters"><h2>Parameters</h2><p>{text}</p>'
+        f"<details><summary>Show</summary><pre>{escape(to_yaml(params))}</pre></details></section>"
+    )

@@ -1,0 +1,22 @@
+"""What live sensors are waited for, said on standard error."""
+
+from __future__ import annotations
+
+import sys
+
+from pipeline.sources.live.health import not_delivering
+from pipeline.types.source import LiveSource
+
+
+class Waiting:
+    """Says it whenever that has changed. Called while no sensor ticks."""
+
+    def __init__(self, live: LiveSource) -> None:
+        self._live = live
+        self._said = ""
+
+    def __call__(self) -> None:
+        text = f"cipv: waiting for sensors: {not_delivering(self._live.health())}"
+        if text != self._said:
+            print(text, file=sys.stderr)
+        self._said = text

@@ -1,0 +1,26 @@
+"""Shapes as a page sends them: nothing passes that a label could not be."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from pipeline.common.geometry import Cuboid
+from pipeline.labels.validate import FARTHEST_M, LARGEST_SIDE_M, LARGEST_YAW_RAD
+
+Finite = Annotated[float, Field(gt=-FARTHEST_M, lt=FARTHEST_M, allow_inf_nan=False)]
+Meters = Annotated[float, Field(gt=0.0, le=LARGEST_SIDE_M, allow_inf_nan=False)]
+
+
+class GivenCuboid(BaseModel):
+    """Ego frame, metres: centre x y z, length width height, turn of the length axis in radians."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    center: tuple[Finite, Finite, Finite]
+    size: tuple[Meters, Meters, Meters]
+    yaw_rad: Annotated[float, Field(gt=-LARGEST_YAW_RAD, lt=LARGEST_YAW_RAD, allow_inf_nan=False)]
+
+    def value(self) -> Cuboid:
+        return Cuboid(self.center, self.size, self.yaw_rad)

@@ -1,0 +1,169 @@
+"""Whole drives computed in the background: the newest wish first, and never in the way of the frame that is shown."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from app.core.line import DetectionCache
+from app.drive.compute_scheduler import Turn
+from app.drive.full_run import DriveRun
+from app.drive.open_recording import Recipe, Recording
+from pipeline.common.errors import BadInput
+from pipeline.inference.cancellation import Stopped
+from pipeline.params import Params
+from pipeline.step import State, warm_up
+from pipeline.types import Frame
+
+logger = logging.getLogger("cipv.drive")
+
+_TELL_EVERY_S = 0.25
+_PATIENCE_S = 10.0
+Phase = Literal["detect", "run", "done", "failed"]
+
+
+@dataclass(frozen=True)
+class DriveState:
+    """How far the run of the present parameters is; run and base are ids, null without one. revision grows whenever
+    there is something new to fetch. phase detect: networks still look at pictures for the first time."""
+
+    revision: int = 0
+    run: int | None = None
+    base: int | None = None
+    done: int = 0
+    total: int = 0
+    running: bool = False
+    phase: Phase = "done"
+    note: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+class Drives:
+    """``open`` a recording, ``want`` parameters; read ``recording``. on_change is called on any thread when ``state``
+    changed, at most every 0.25 s while a run goes on."""
+
+    def __init__(self, detections: DetectionCache) -> None:
+        self.turn = Turn()
+        self.on_change: Callable[[], object] = lambda: None
+        self._detections = detections
+        self._condition = threading.Condition(threading.RLock())
+        self._recording: Recording | None = None
+        self._ended = False
+        self._revision = 0
+        self._told_s = 0.0
+        self._phase: Phase = "run"
+        self._thread = threading.Thread(target=self._work, name="cipv-drives", daemon=True)
+
+    @property
+    def recording(self) -> Recording | None:
+        """The open recording; null when there is none whose whole drive can be known."""
+        return self._recording
+
+    @property
+    def state(self) -> DriveState:
+        with self._condition:
+            recording = self._recording
+            if recording is None or recording.book.current is None:
+                return DriveState(self._revision)
+            run, base = recording.book.current, recording.book.base
+            phase: Phase = "failed" if run.note else "done" if run.is_complete else self._phase
+            return DriveState(
+                self._revision,
+                run.number,
+                base.number if base else None,
+                run.done,
+                run.total,
+                not run.is_complete and not run.note,
+                phase,
+                run.note,
+            )
+
+    # ------------------------------------------------------------ wishes
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread; a network that runs for it is stopped, a read in progress is finished first."""
+        with self._condition:
+            self._ended = True
+            self._condition.notify_all()
+        self.turn.end()
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join(_PATIENCE_S)
+
+    def open(self, recipe: Recipe | None) -> None:
+        """Another recording, or none."""
+        with self._condition:
+            number = self._recording.book.next_number if self._recording else 1
+            self._recording = Recording(recipe, self._detections, number) if recipe is not None else None
+            self.changed()
+
+    def want(self, params: Params, preset: str) -> None:
+        """Compute the drive with these parameters, if it is not yet. What was being computed gives way."""
+        recording = self._recording
+        if recording is not None and recording.book.want(params, preset):
+            self.changed()
+
+    def offer(self, frame: Frame) -> None:
+        """A frame that the line has just taken: it need not be read and looked at once more."""
+        if self._recording is not None:
+            self._recording.inputs.offer(frame)
+
+    def state_before(self, index: int, params: Params) -> State | None:
+        """The state in which the whole-drive run comes to a frame; null where it has not come that far."""
+        recording = self._recording
+        return recording.state_before(index, params) if recording is not None else None
+
+    def changed(self) -> None:
+        """There is something new to fetch or to compute."""
+        with self._condition:
+            self._revision += 1
+            self._told_s = time.monotonic()
+            self._condition.notify_all()
+        self.on_change()
+
+    # ------------------------------------------------------------ the worker
+
+    def _work(self) -> None:
+        warm_up()
+        while (work := self._next()) is not None:
+            with suppress(Stopped), self.turn.background():
+                self._advance(*work)
+            del work  # a recording that is open no more is not kept while there is nothing to do
+
+    def _next(self) -> tuple[Recording, DriveRun] | None:
+        """Wait for a run that is not finished; null at the end."""
+        with self._condition:
+            while not self._ended:
+                recording = self._recording
+                run = recording.book.unfinished() if recording is not None else None
+                if recording is not None and run is not None:
+                    return recording, run
+                self._condition.wait()
+            return None
+
+    def _advance(self, recording: Recording, run: DriveRun) -> None:
+        """One frame. Stopped leaves the run as it was."""
+        began = time.perf_counter()
+        self._phase = "run" if recording.has_been_looked_at(run.done) else "detect"
+        try:
+            recording.advance(run)
+        except Stopped:
+            raise
+        except BadInput as error:
+            run.note = str(error)
+        except Exception as error:  # whatever a recording or a network does, other runs go on
+            logger.exception("frame %s of %s", run.done, recording.recipe.uri)
+            run.note = f"frame {run.done + 1}: {type(error).__name__}: {error}"
+        finally:
+            run.seconds += time.perf_counter() - began
+        if run.is_complete or run.note or time.monotonic() - self._told_s > _TELL_EVERY_S:
+            self.changed()

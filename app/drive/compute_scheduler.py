@@ -1,0 +1,157 @@
+"""Who may compute now: what a person waits for comes first, whole drives get the rest.
+
+All share the processor with the page that is drawn, and Python. So the background asks here before each piece of work
+(one frame: some 5 ms, with networks 200). It waits while the foreground is at work, and while a hand moves: who asked
+for a frame a moment ago asks for the next one soon. What it has begun then is stopped where it can be. While a drive
+plays it gets a share of the time, right after a shown frame, when the next one is farthest.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from pipeline.inference.cancellation import Stop
+
+HAND_RESTS_S = 0.3
+"""So long after what a person asked for was served nobody is taken to wait for anything: the page has drawn it, and
+somebody who drags has asked again."""
+_SHARE = 0.3
+"""Of the time, while a drive plays."""
+_CREDIT_S = 0.03
+"""Work at a time, while a drive plays; a piece that was begun is finished, and paid for with waiting."""
+_LONGEST_WAIT_S = 0.3
+"""For a frame that is shown, while a drive plays."""
+_LONGEST_FRONT_S = 2.0
+"""Work in front that never ends, as of sensors that tick faster than the line runs, and hands that never rest slow the
+background down; they do not stop it."""
+
+
+class Turn:
+    """Shared by the threads in front, those in the background, and whoever asks for something."""
+
+    def __init__(self) -> None:
+        self._condition = threading.Condition()
+        self._in_front = 0
+        self._served = 0
+        self._playing = False
+        self._ended = False
+        self._has_asked = False
+        self._rests_at_s = time.monotonic()
+        self._stops: set[Stop] = set()
+        self._credit_s, self._credited_at_s = _CREDIT_S, time.monotonic()
+        self._overdue_at_s: float | None = None
+
+    # ------------------------------------------------------------ in front
+
+    def asked(self, *, rests: bool = False) -> None:
+        """A person asks for something: what can be stopped gives way at once. rests: it is not the kind of thing that
+        is soon asked for again. Any thread; waits for nobody."""
+        with self._condition:
+            if not rests:
+                self._has_asked = True
+                self._rests_at_s = time.monotonic() + HAND_RESTS_S
+            for stop in self._stops:
+                stop.set()
+
+    @property
+    def rest_s(self) -> float:
+        """Seconds until the hand is taken to rest."""
+        return max(0.0, self._rests_at_s - time.monotonic())
+
+    @contextmanager
+    def foreground(self) -> Iterator[None]:
+        """Work that goes first. Not for waiting: nobody else works meanwhile."""
+        with self._condition:
+            self._in_front += 1
+        try:
+            yield
+        finally:
+            with self._condition:
+                self._in_front -= 1
+                self._served += 1
+                if self._has_asked:
+                    self._has_asked = False
+                    self._rests_at_s = time.monotonic() + HAND_RESTS_S
+                self._condition.notify_all()
+
+    @contextmanager
+    def stoppable(self) -> Iterator[None]:
+        """Networks asked in the block end with Stopped when a person asks for something."""
+        stop = Stop()
+        with self._condition:
+            self._stops.add(stop)
+        with self._until_done(stop):
+            yield
+
+    def playing(self, playing: bool) -> None:
+        """Whether frames are being played now."""
+        with self._condition:
+            self._playing = playing
+            self._condition.notify_all()
+
+    def end(self) -> None:
+        """Nobody waits here any more."""
+        with self._condition:
+            self._ended = True
+            for stop in self._stops:
+                stop.set()
+            self._condition.notify_all()
+
+    # ------------------------------------------------------------ in the background
+
+    @contextmanager
+    def background(self, *, to_the_end: bool = False) -> Iterator[None]:
+        """One piece of work, once it may begin. Its networks can be stopped, unless it has waited for too long: for one
+        thread, which then begins the piece again. to_the_end: they are not, for any other."""
+        stop = self._let_begin(to_the_end)
+        began_s = time.monotonic()
+        try:
+            with self._until_done(stop):
+                yield
+            if not to_the_end:
+                self._overdue_at_s = None  # what was stopped has waited since it was first begun
+        finally:
+            with self._condition:
+                if self._playing:
+                    self._credit_s -= time.monotonic() - began_s
+
+    def _let_begin(self, to_the_end: bool) -> Stop:
+        """Wait for it. What is to stop the work is known to ``asked`` before anybody can ask."""
+        stop = Stop()
+        with self._condition:
+            overdue_at_s = time.monotonic() + _LONGEST_FRONT_S
+            if not to_the_end:
+                overdue_at_s = self._overdue_at_s = self._overdue_at_s or overdue_at_s
+            while not self._ended and (left_s := overdue_at_s - time.monotonic()) > 0:
+                if self._in_front:
+                    self._condition.wait(left_s)
+                elif self.rest_s > 0:
+                    self._condition.wait(min(self.rest_s, left_s))
+                elif self._playing and not self._has_credit():
+                    self._condition.wait_for(self._is_next_frame(), _LONGEST_WAIT_S)
+                else:
+                    self._stops |= set() if to_the_end else {stop}
+                    break
+        return stop
+
+    def _is_next_frame(self) -> Callable[[], bool]:
+        served = self._served
+        return lambda: self._ended or not self._playing or self._served > served
+
+    def _has_credit(self) -> bool:
+        now_s = time.monotonic()
+        self._credit_s = min(_CREDIT_S, self._credit_s + _SHARE * (now_s - self._credited_at_s))
+        self._credited_at_s = now_s
+        return self._credit_s > 0
+
+    @contextmanager
+    def _until_done(self, stop: Stop) -> Iterator[None]:
+        try:
+            with stop.here():
+                yield
+        finally:
+            with self._condition:
+                self._stops.discard(stop)

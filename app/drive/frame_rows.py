@@ -1,0 +1,191 @@
+"""One frame of a drive as a row of plain values, and one object in it as a record: what timelines and events need.
+
+A row is some 200 bytes and an object 130, so that a whole drive fits where its results would not. Null in a row, NaN
+and 0 in a record (``source``) stand for what is not known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.decision.object_motion import closing_speed_mps
+from pipeline.evaluation.lead_verdict import Judged
+from pipeline.fusion.rows import LIDAR_RANGE_SIGMA_M
+from pipeline.types import VEHICLES, Frame, FusedObject, Result, VisionTrack
+from pipeline.vision.classes import COCO_80
+
+SOURCES = ("", "V", "L", "VL")
+LABELS = ("", *COCO_80)
+"""A class that is none of these is kept as nameless."""
+_DECIMALS = 4
+_PLACE = {name: place for place, name in enumerate(LABELS)}
+_NOWHERE = (math.nan,) * 7
+_UNBOXED = (math.nan,) * 4
+_FLAT = (math.nan,) * 8
+_STILL = (math.nan,) * 2
+
+OBJECT = np.dtype(
+    [
+        ("id", "i4"),
+        ("source", "u1"),
+        ("carried", "?"),
+        ("in_path", "?"),
+        ("vehicle", "?"),
+        ("distance_m", "f4"),
+        ("closing_speed_mps", "f4"),
+        ("ttc_s", "f4"),
+        ("path_offset_m", "f4"),
+        ("vl_gap_m", "f4"),
+        ("vl_gap_sigmas", "f4"),
+        ("label", "i1"),
+        ("cuboid", "f4", 7),
+        ("bbox", "f4", 4),
+        ("bev", "f4", 8),
+        ("velocity_mps", "f4", 2),
+        ("hits", "i4"),
+    ]
+)
+"""``source`` is a place in ``SOURCES``; ``vehicle``: of a vehicle's class, or nameless; ``vl_gap``: camera's minus
+LiDAR's distance of a VL object, also in standard deviations of both. ``label`` is a place in ``LABELS``. ``cuboid``:
+center x y z, length, width, height, yaw; ``bev``: x y of four corners."""
+Objects = npt.NDArray[np.void]
+
+
+class Row(NamedTuple):
+    """One frame. What belongs to the CIPV is null without one. gaps: the sensors that gave nothing, comma-joined.
+    ``judged`` is the verdict against truth, null where there is none."""
+
+    t_ns: int
+    cipv_id: int | None
+    source: str | None
+    carried: bool | None
+    distance_m: float | None
+    closing_speed_mps: float | None
+    ttc_s: float | None
+    path_offset_m: float | None
+    speed_mps: float | None
+    desired_speed_mps: float | None
+    accel_mps2: float | None
+    brake: float | None
+    acc_state: str | None
+    next_cipv_id: int | None
+    objects: int
+    gaps: str
+    vl_disagreement_m: float | None
+    notes: int
+    judged: Judged | None
+
+
+COLUMNS = tuple(name for name in Row._fields if name not in ("t_ns", "judged"))
+"""The names that a page gets, in their order."""
+
+
+def row_of(frame: Frame, result: Result, judged: Judged | None = None) -> Row:
+    """What a timeline keeps of one frame."""
+    lead, acc = result.cipv, result.acc
+    item = result.chosen()
+    gap = _vl_gap(item, _by_id(result)) if item is not None else None
+    return Row(
+        t_ns=frame.t_ns,
+        cipv_id=lead.id if lead else None,
+        source=item.source if item else None,
+        carried=item.carried if item else None,
+        distance_m=lead.distance_m if lead else None,
+        closing_speed_mps=lead.closing_speed_mps if lead else None,
+        ttc_s=lead.ttc_s if lead else None,
+        path_offset_m=item.path_offset_m if item else None,
+        speed_mps=result.ego.speed_mps if result.ego else None,
+        desired_speed_mps=acc.desired_speed_mps if acc else None,
+        accel_mps2=acc.accel_mps2 if acc else None,
+        brake=acc.brake if acc else None,
+        acc_state=acc.state if acc else None,
+        next_cipv_id=result.next_cipv.id if result.next_cipv else None,
+        objects=len(result.objects),
+        gaps=",".join(_missing(frame)),
+        vl_disagreement_m=abs(gap[0]) if gap else None,
+        notes=len(result.notes),
+        judged=judged,
+    )
+
+
+def objects_of(result: Result) -> Objects:
+    """(N,) ``OBJECT`` records of one frame, in the result's order."""
+    tracks = _by_id(result)
+    records = np.zeros(len(result.objects), OBJECT)
+    for place, item in enumerate(result.objects):
+        gap, sigmas = _vl_gap(item, tracks) or (math.nan, math.nan)
+        records[place] = (
+            item.id,
+            SOURCES.index(item.source),
+            item.carried,
+            item.in_path,
+            item.label is None or item.label in VEHICLES,
+            _float(item.distance_m),
+            _float(closing_speed_mps(item)),
+            _float(item.ttc_s),
+            _float(item.path_offset_m),
+            gap,
+            sigmas,
+            _PLACE.get(item.label or "", 0),
+            (*item.cuboid.center, *item.cuboid.size, item.cuboid.yaw_rad) if item.cuboid is not None else _NOWHERE,
+            item.bbox if item.bbox is not None else _UNBOXED,
+            [value for corner in item.bev for value in corner] if item.bev is not None else _FLAT,
+            item.velocity_mps if item.velocity_mps is not None else _STILL,
+            item.hits,
+        )
+    return records
+
+
+def columns_json(rows: Sequence[Row]) -> dict[str, list[Any]]:
+    """``{"cipv_id": […], …}``, numbers rounded as results are."""
+    return {name: [_plain(getattr(row, name)) for row in rows] for name in COLUMNS}
+
+
+def object_json(frames: Iterable[tuple[int, Objects]], object_id: int) -> dict[str, list[Any]]:
+    """One object's curve over the frames, each with its index, in which it was."""
+    found = [(index, records[records["id"] == object_id]) for index, records in frames]
+    present = [(index, match[0]) for index, match in found if len(match)]
+    curve: dict[str, list[Any]] = {
+        "index": [index for index, _ in present],
+        "source": [SOURCES[int(record["source"])] for _, record in present],
+    }
+    for name in ("carried", "in_path"):
+        curve[name] = [bool(record[name]) for _, record in present]
+    for name in ("distance_m", "closing_speed_mps", "ttc_s", "path_offset_m", "vl_gap_m"):
+        curve[name] = [_plain(float(record[name])) for _, record in present]
+    return curve
+
+
+def _missing(frame: Frame) -> list[str]:
+    sensors = {"lidar": frame.sweep, "camera": frame.picture, "ego": frame.ego}
+    return [name for name, gave in sensors.items() if gave is None]
+
+
+def _by_id(result: Result) -> dict[int, VisionTrack]:
+    return {track.id: track for track in result.layers.vision_tracks}
+
+
+def _vl_gap(item: FusedObject, tracks: dict[int, VisionTrack]) -> tuple[float, float] | None:
+    """Camera's minus LiDAR's distance of an object that both see now, in metres and in standard deviations of both."""
+    track = tracks.get(item.vision_track) if item.vision_track is not None else None
+    if item.seen_by != "VL" or track is None or not track.measured or item.distance_m is None:
+        return None
+    if track.distance_m is None or track.sigma_m is None:
+        return None
+    gap = track.distance_m - item.distance_m
+    return gap, abs(gap) / math.hypot(track.sigma_m, item.distance_sigma_m or LIDAR_RANGE_SIGMA_M)
+
+
+def _float(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _plain(value: Any) -> Any:
+    if not isinstance(value, float):
+        return value
+    return round(value, _DECIMALS) + 0.0 if math.isfinite(value) else None

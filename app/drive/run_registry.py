@@ -1,0 +1,119 @@
+"""The runs of one recording: which is shown, which is compared against, which a person keeps."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from app.drive.full_run import DriveRun
+from pipeline.common.errors import BadInput
+from pipeline.params import Params
+
+MOST_UNKEPT = 4
+MOST_KEPT = 12
+LONGEST_NAME = 80
+
+
+class NoSuchRun(BadInput):
+    """A run that is not, or no longer, there."""
+
+
+class RunRefused(BadInput):
+    """Something that cannot be done to a run; the text says why."""
+
+
+class RunBook:
+    """Any thread. current: of the present parameters. base: what others are compared against, at first the first one.
+    Runs that nobody kept go when newer ones come."""
+
+    def __init__(self, new_run: Callable[[int, Params, str], DriveRun], next_number: int = 1) -> None:
+        self._new_run = new_run
+        self._next = next_number
+        self._lock = threading.RLock()
+        self._runs: list[DriveRun] = []
+        self._current: DriveRun | None = None
+        self._base: DriveRun | None = None
+
+    @property
+    def current(self) -> DriveRun | None:
+        return self._current
+
+    @property
+    def base(self) -> DriveRun | None:
+        return self._base
+
+    @property
+    def next_number(self) -> int:
+        """What the next run will be called: a number is given once, also over several recordings."""
+        return self._next
+
+    def all(self) -> list[DriveRun]:
+        """Every run, the oldest first."""
+        with self._lock:
+            return list(self._runs)
+
+    def get(self, number: int) -> DriveRun:
+        """NoSuchRun when it is not there."""
+        with self._lock:
+            found = next((run for run in self._runs if run.number == number), None)
+        if found is None:
+            raise NoSuchRun(f"there is no run {number}")
+        return found
+
+    def of(self, params: Params) -> DriveRun | None:
+        """The run with these parameters; null when there is none."""
+        with self._lock:
+            return next((run for run in reversed(self._runs) if run.params == params), None)
+
+    def want(self, params: Params, preset: str) -> bool:
+        """Make the run of these parameters the current one; true when it was another before."""
+        with self._lock:
+            if self._current is not None and self._current.params == params:
+                return False
+            run = self.of(params)
+            if run is None:
+                run = self._new_run(self._next, params, preset)
+                self._next += 1
+                self._runs.append(run)
+            if self._current is not None:
+                self._current.thin()
+            self._current = run
+            self._base = self._base or run
+            self._let_go()
+            return True
+
+    def unfinished(self) -> DriveRun | None:
+        """What to compute next: the newest wish before all else, then what it is compared against, then kept ones."""
+        with self._lock:
+            wanted = [self._current, self._base, *(run for run in self._runs if run.kept)]
+        return next((run for run in wanted if run is not None and not run.is_complete and not run.note), None)
+
+    def keep(self, number: int, name: str) -> DriveRun:
+        """Keep a run under a name, or rename it. RunRefused when too many are kept."""
+        with self._lock:
+            run = self.get(number)
+            if not run.kept and sum(each.kept for each in self._runs) >= MOST_KEPT:
+                raise RunRefused(f"{MOST_KEPT} runs are kept already; delete one first")
+            run.kept, run.name = True, " ".join(name.split())[:LONGEST_NAME]
+            return run
+
+    def compare_with(self, number: int) -> None:
+        """Make a run the base."""
+        with self._lock:
+            self._base = self.get(number)
+            self._let_go()
+
+    def delete(self, number: int) -> None:
+        """RunRefused for the current run and the base."""
+        with self._lock:
+            run = self.get(number)
+            if run is self._current or run is self._base:
+                raise RunRefused("the present run and the one it is compared against stay")
+            self._runs.remove(run)
+
+    def _let_go(self) -> None:
+        loose = [run for run in self._runs if not run.kept and run is not self._current and run is not self._base]
+        started = [run for run in loose if run.done]
+        spare = {id(run) for run in loose if not run.done}
+        spare |= {id(run) for run in started[: max(0, len(started) - MOST_UNKEPT)]}
+        self._runs = [run for run in self._runs if id(run) not in spare]

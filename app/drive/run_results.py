@@ -1,0 +1,103 @@
+"""What was kept of a run as results again, as far as labels and scores need them.
+
+Numbers were kept in 32 bits, which is some micrometres; the path, gates, health and pedals were not kept.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, cast
+
+from app.drive.frame_rows import LABELS, SOURCES, Objects, Row
+from app.drive.full_run import DriveRun
+from pipeline.common.geometry import Cuboid
+from pipeline.evaluation.scores.results_file import EMPTY, NO_HEALTH, NO_PATH
+from pipeline.labels.propose import Seen
+from pipeline.types import AccCommand, Box, Cipv, EgoState, FusedObject, Result
+
+_DECIMALS = 4
+
+
+def seen_of(records: Objects) -> list[Seen]:
+    """The objects of one frame as labels are proposed from."""
+    return [
+        Seen(
+            int(record["id"]),
+            LABELS[record["label"]] or None,
+            _cuboid(record),
+            _bbox(record),
+            bool(record["in_path"]),
+            bool(record["carried"]),
+        )
+        for record in records
+    ]
+
+
+def results_of(run: DriveRun, *, leads_only: bool = False) -> Iterator[Result]:
+    """Every frame that is there, named by its index. leads_only: of its objects only the CIPV, which is quicker."""
+    for (index, records), row in zip(run.objects(), run.rows(), strict=False):
+        yield _result(index, row, records[records["id"] == row.cipv_id] if leads_only else records)
+
+
+def _result(index: int, row: Row, records: Objects) -> Result:
+    cipv = None
+    if row.cipv_id is not None and row.distance_m is not None:
+        cipv = Cipv(row.cipv_id, row.distance_m, row.closing_speed_mps, row.ttc_s, "")
+    acc = None
+    if row.acc_state is not None:
+        acc = AccCommand(cast("Any", row.acc_state), 0.0, row.accel_mps2 or 0.0, 0.0, row.brake or 0.0, "")
+    return Result(
+        frame=str(index),
+        t_ns=row.t_ns,
+        sensors=NO_HEALTH,
+        ego=EgoState(row.t_ns, row.speed_mps, None) if row.speed_mps is not None else None,
+        objects=tuple(map(_object, records)),
+        path=NO_PATH,
+        cipv=cipv,
+        rejected=(),
+        acc=acc,
+        notes=(),
+        timing_ms={},
+        layers=EMPTY,
+    )
+
+
+def _object(record: Any) -> FusedObject:
+    source = cast("Any", SOURCES[record["source"]])
+    corners = record["bev"].reshape(4, 2)
+    vx, vy = (float(value) for value in record["velocity_mps"])
+    return FusedObject(
+        id=int(record["id"]),
+        source=source,
+        label=LABELS[record["label"]] or None,
+        score=None,
+        bbox=_bbox(record),
+        bev=cast("Any", tuple((float(x), float(y)) for x, y in corners)) if math.isfinite(corners[0, 0]) else None,
+        cuboid=_cuboid(record),
+        closest_point=None,
+        distance_m=_known(record["distance_m"]),
+        distance_sigma_m=None,
+        velocity_mps=(vx, vy) if math.isfinite(vx) else None,
+        seen_by="" if record["carried"] else source,
+        hits=int(record["hits"]),
+        lidar_points=0,
+        lidar_track=None,
+        vision_track=None,
+        in_path=bool(record["in_path"]),
+    )
+
+
+def _cuboid(record: Any) -> Cuboid | None:
+    x, y, z, length, width, height, yaw = (round(float(value), _DECIMALS) for value in record["cuboid"])
+    return Cuboid((x, y, z), (length, width, height), yaw) if math.isfinite(x) else None
+
+
+def _bbox(record: Any) -> Box | None:
+    x1, y1, x2, y2 = (round(float(value), _DECIMALS) for value in record["bbox"])
+    return (x1, y1, x2, y2) if math.isfinite(x1) else None
+
+
+def _known(value: Any) -> float | None:
+    number = float(value)
+    return number if math.isfinite(number) else None

@@ -1,0 +1,72 @@
+"""The detectors for a source's pictures: opened once for each kind of picture, and what there is to say about them.
+
+Lane detectors are opened anew for each source, because the classical one knows the camera; that takes a moment only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from app.engine.snapshot import Notice
+from pipeline.inference.runtime import DetectorError, DetectorMissing
+from pipeline.lanes.open_detector import usual_every
+from pipeline.run import Detectors, Detects, Sensors, brings_detections, picture_size
+from pipeline.types import RawBoxes, RawLanes
+from pipeline.types.source import AnySource, is_simulated
+
+OpenDetector = Callable[[AnySource], Detects[RawBoxes]]
+OpenLanes = Callable[[AnySource], Detects[RawLanes] | None]
+
+
+class DetectorPool:
+    """``open_detector`` and ``open_lanes`` give those for a source's pictures; null: none, and nothing is said about
+    it. lanes_every: lanes are looked for in every n-th frame; null: as the lane detector is quick."""
+
+    def __init__(
+        self,
+        open_detector: OpenDetector | None,
+        sensors: Sensors,
+        open_lanes: OpenLanes | None = None,
+        lanes_every: int | None = None,
+    ) -> None:
+        self._open_lanes = open_lanes if sensors != "lidar" else None
+        self._lanes_every = lanes_every
+        self._open = open_detector if sensors != "lidar" else None
+        self._without = "LiDAR goes on alone." if sensors == "both" else "Without one the camera finds nothing."
+        self._opened: dict[tuple[bool, tuple[int, int] | None], Detects[RawBoxes]] = {}
+
+    def both_for(self, source: AnySource, notices: list[Notice]) -> Detectors:
+        """What looks at the source's pictures; what is missing is null, and a notice says so. Nothing where detections
+        come with them."""
+        if brings_detections(source):
+            return Detectors()
+        lanes = self.lanes_for(source, notices)
+        return Detectors(
+            self.boxes_for(source, notices), lanes, self._lanes_every or usual_every(lanes, source.rate_hz)
+        )
+
+    def lanes_for(self, source: AnySource, notices: list[Notice]) -> Detects[RawLanes] | None:
+        """The lane detector, which a notice names."""
+        if self._open_lanes is None:
+            return None
+        try:
+            lanes = self._open_lanes(source)
+        except (DetectorMissing, DetectorError) as error:
+            notices.append(Notice("warning", f"{error} Lane lines are not looked for."))
+            return None
+        notices += [Notice("info", note) for note in lanes.notes] if lanes is not None else []
+        return lanes
+
+    def boxes_for(self, source: AnySource, notices: list[Notice]) -> Detects[RawBoxes] | None:
+        """The detector of vehicles; where there is none, LiDAR goes on alone and a notice says so."""
+        if self._open is None:
+            return None
+        kind = (is_simulated(source), picture_size(source))
+        try:
+            if kind not in self._opened:
+                self._opened[kind] = self._open(source)
+        except (DetectorMissing, DetectorError) as error:
+            notices.append(Notice("warning", f"{error} {self._without}"))
+            return None
+        detector = self._opened[kind]
+        notices += [Notice("warning", note) for note in detector.notes]
+        return detector

@@ -1,0 +1,282 @@
+"""The one worker: it owns what is open, and shows a ``Snapshot`` after everything it does.
+
+Callers say what they want through ``control``; the newest wish wins. What a wish makes of a recording or of sensors is
+its player's: ``app/playing/``.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from dataclasses import replace
+from typing import Protocol, cast
+
+from app.core.control import Control, Wish
+from app.core.line import DetectionCache, Line, Tick
+from app.drive.background_runs import Drives
+from app.drive.open_recording import Recipe
+from app.engine.detector_pool import DetectorPool, OpenDetector, OpenLanes
+from app.engine.player import Player
+from app.engine.recorded_player import RecordedPlayer
+from app.engine.session_recording import RecordingDesk
+from app.engine.shown import Showing
+from app.engine.snapshot import Notice, Snapshot
+from app.labels.service.desk import LabelDesk
+from pipeline.common.progress import Progress
+from pipeline.params import Params
+from pipeline.run import Detectors, Sensors
+from pipeline.step import warm_up
+from pipeline.types.source import AnySource, Source, SourceError, is_live_source
+
+logger = logging.getLogger("cipv.engine")
+
+_PATIENCE_S = 10.0
+_TELL_EVERY_S = 0.25
+_ABLATION: dict[Sensors, tuple[str, ...]] = {
+    "both": (),
+    "lidar": ("by the LiDAR alone: nothing looks at the pictures",),
+    "camera": ("by the camera alone: the LiDAR's points are left out",),
+}
+"""What people are told who see only a part of what is there."""
+
+
+class OpenSource(Protocol):
+    """As ``pipeline.sources.open_any``."""
+
+    def __call__(self, uri: str, /, *, progress: Progress) -> AnySource: ...
+
+
+class Engine:
+    """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
+    one for a source's pictures; null runs without a camera's detector and says nothing about it; ``open_lanes`` gives
+    the lane detector, which looks at every ``lanes_every``-th frame. ``whole_drives``: a recording's whole drive is
+    computed in the background (``drives``), so that any frame is shown as it is in it. ``desk``: where what is shown
+    can be recorded; by default into the folder of this machine's sessions. ``labels``: what people say of it, and the
+    steps they can take back; by default gone at the end."""
+
+    def __init__(
+        self,
+        open_source: OpenSource,
+        open_detector: OpenDetector | None,
+        params: Params,
+        *,
+        preset: str = "default",
+        uri: str | None = None,
+        sensors: Sensors = "both",
+        playing: bool = False,
+        whole_drives: bool = False,
+        open_lanes: OpenLanes | None = None,
+        lanes_every: int | None = None,
+        desk: RecordingDesk | None = None,
+        labels: LabelDesk | None = None,
+    ) -> None:
+        self.control = Control(Wish(params, preset, uri=uri, playing=playing))
+        self._showing = Showing(Snapshot(params, preset))
+        self.listen, self.wait_for = self._showing.listen, self._showing.wait_for
+        self._open_source = open_source
+        self._sensors: Sensors = sensors
+        self._detections = DetectionCache()
+        self.drives = Drives(self._detections)
+        self.control.on_ask = self.drives.turn.asked
+        self.desk = desk or RecordingDesk()
+        self.labels = labels or LabelDesk()
+        self._whole_drives = whole_drives
+        self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every)
+        self._player: Player | None = None
+        self._thread = threading.Thread(target=self._work, name="cipv-engine", daemon=True)
+
+    def start(self) -> None:
+        self.drives.on_change = self.control.change
+        self.drives.start()
+        self.labels.start(self.control)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the worker. A network run or a read in progress is finished first."""
+        self.control.change(stop=True)
+        self.drives.stop()
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join(_PATIENCE_S)
+        self.desk.stop()
+        self.labels.stop()
+
+    @property
+    def source(self) -> AnySource | None:
+        """What is open."""
+        player = self._player
+        return player.source if player is not None else None
+
+    @property
+    def alive(self) -> bool:
+        """False when the worker has ended."""
+        return self._thread.is_alive()
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """What is shown now. ``listen`` and ``wait_for`` tell what is shown next."""
+        return self._showing.snapshot
+
+    # ------------------------------------------------------------ the worker
+
+    def _work(self) -> None:
+        while True:
+            player = self._player
+            wish = self.control.take(player.wait_s(self.snapshot.index) if player is not None else None)
+            if wish.stop:
+                return self._close()
+            try:
+                self._serve(wish)
+            except Exception as error:  # the worker outlives whatever a recording or a network does
+                logger.exception("while serving %s", self.snapshot.uri)
+                self._fail(f"{type(error).__name__}: {_first_line(error)}")
+
+    def _serve(self, wish: Wish) -> None:
+        """All in front, but for the wait for sensors: others may work then."""
+        turn = self.drives.turn
+        if wish.uri is not None:
+            with turn.foreground():
+                if not self._open(wish.uri):
+                    return
+                warm_up()  # as a rule ``drives`` has, beside the opening
+        player = self._player
+        if player is not None:
+            player.wait(wish.params)
+        with turn.foreground():
+            tick = player.serve(wish, self.snapshot) if player is not None else None
+            self._show(wish, tick)
+
+    # ------------------------------------------------------------ opening
+
+    def _open(self, uri: str) -> bool:
+        """Replace what is open; when it cannot be opened the old one stays, a notice says why, and this is false. One
+        that takes long is given up for a newer wish."""
+        self._showing.publish(replace(self.snapshot, busy=f"Opening {uri} …"))
+        try:
+            source = self._open_source(uri, progress=self._opening(uri))
+            if not is_live_source(source) and len(cast("Source", source)) == 0:
+                raise SourceError(f"{uri}: holds no frames")
+        except SourceError as error:
+            self._fail(str(error))
+            return False
+        except _Overtaken:
+            self._showing.publish(replace(self.snapshot, busy=None))
+            return False
+        notices = [Notice("info", text) for text in (*source.notes, *_ABLATION[self._sensors])]
+        detectors = self._detectors.both_for(source, notices)
+        self.desk.stop()
+        self._close()
+        player = self._player_of(source, detectors)
+        player.open()
+        self._player = player
+        self.labels.open(uri, self.drives.recording)
+        self._showing.publish(
+            replace(
+                self.snapshot,
+                uri=uri,
+                title=source.title,
+                rate_hz=source.rate_hz,
+                live=player.live,
+                streams=(),
+                count=player.count,
+                duration_s=player.duration_s,
+                index=0,
+                time_s=0.0,
+                drive=self.drives.state,
+                recording=self.desk.state,
+                labels=self.labels.state,
+                detector=detectors.boxes.name if detectors.boxes else None,
+                lane_detector=detectors.lanes.name if detectors.lanes else None,
+                notices=tuple(notices),
+                tick=None,
+                busy=None,
+            )
+        )
+        return True
+
+    def _opening(self, uri: str) -> Progress:
+        """Says how far it is, as often as people can read."""
+        told_s = 0.0
+
+        def progress(done: int, total: int) -> None:
+            nonlocal told_s
+            if self.control.superseded():
+                raise _Overtaken
+            now_s = time.monotonic()
+            if now_s - told_s >= _TELL_EVERY_S:
+                told_s = now_s
+                self._showing.publish(replace(self.snapshot, busy=f"Opening {uri} … {100 * done // max(1, total)} %"))
+
+        return progress
+
+    def _player_of(self, source: AnySource, detectors: Detectors) -> Player:
+        if is_live_source(source):
+            # what decodes sensors' packets takes 0.1 s to import: only who has sensors pays
+            from app.engine.live_line import LiveLine
+            from app.engine.live_player import LivePlayer
+
+            return LivePlayer(LiveLine(source, detectors, self._sensors), self.control, self.drives, self.desk)
+        recording = cast("Source", source)
+        line = Line(recording, detectors, self._detections, self._sensors, self.drives.state_before)
+        recipe = Recipe(recording, line.timeline_s, detectors, self._sensors) if self._whole_drives else None
+        return RecordedPlayer(line, self.control, self.drives, recipe, self.desk)
+
+    def _close(self) -> None:
+        player, self._player = self._player, None
+        if player is not None:
+            player.close()
+
+    # ------------------------------------------------------------ showing
+
+    def _fail(self, text: str) -> None:
+        """Say what went wrong, and stop playing into it."""
+        player = self._player
+        playing = player is not None and player.goes_on_after_failing() and self.snapshot.playing
+        if not playing:
+            self.control.change(playing=False)
+        notices = tuple(n for n in self.snapshot.notices if n.level != "error")
+        self._showing.publish(
+            replace(self.snapshot, busy=None, playing=playing, notices=(*notices, Notice("error", text)))
+        )
+
+    def _show(self, wish: Wish, tick: Tick | None) -> None:
+        """The next snapshot: the new tick if there is one, and the wishes as they stand."""
+        shown, player, standing = self.snapshot, self._player, self.control.peek()
+        if player is not None:
+            player.go_on(standing, tick.frame.index if tick is not None else shown.index)
+        shown = replace(
+            shown,
+            drive=self.drives.state,
+            recording=self.desk.state,
+            labels=self.labels.state,
+            params=wish.params,
+            preset=wish.preset,
+            params_revision=wish.params_revision,
+            playing=standing.playing,
+            speed=standing.speed,
+            loop=standing.loop,
+        )
+        if player is not None:
+            shown = player.health(shown)
+        if tick is not None and player is not None:
+            shown = replace(
+                shown,
+                tick=tick,
+                index=tick.frame.index,
+                time_s=player.time_s(tick),
+                sequence=shown.sequence + 1,
+                skipped=player.skipped,
+                made_unix_s=time.time(),
+                notices=tuple(n for n in shown.notices if n.level != "error"),
+            )
+        self._showing.publish(shown)
+        if tick is not None:
+            self.labels.shown()
+
+
+class _Overtaken(Exception):
+    """Something else is wished for."""
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).splitlines() or ["no reason given"])[0]

@@ -1,0 +1,66 @@
+"""What the engine's worker asks of whatever is open."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from app.core.control import Wish
+from app.core.line import Tick
+from app.engine.snapshot import Snapshot
+from pipeline.params import Params
+from pipeline.types.source import AnySource
+
+
+class Player(Protocol):
+    """A recording or sensors on the line. Used by the worker alone.
+
+    live: sensors. count, duration_s: frames and length of a recording, 0 of sensors. skipped: frames since the opening
+    that came and were not shown.
+    """
+
+    @property
+    def source(self) -> AnySource: ...
+    @property
+    def live(self) -> bool: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def duration_s(self) -> float: ...
+    @property
+    def skipped(self) -> int: ...
+
+    def open(self) -> None:
+        """Begin, once what was open before is closed."""
+        ...
+
+    def wait_s(self, index: int) -> float | None:
+        """Seconds until it needs the worker, with this frame shown; null while only a wish or its own call does."""
+        ...
+
+    def wait(self, params: Params) -> None:
+        """For what the line goes on with, but not long. Others may work meanwhile."""
+        ...
+
+    def serve(self, wish: Wish, shown: Snapshot) -> Tick | None:
+        """What a wish makes of it; null when what is shown stays."""
+        ...
+
+    def go_on(self, standing: Wish, index: int) -> None:
+        """Make ready for what comes after the frame that is shown from now on."""
+        ...
+
+    def time_s(self, tick: Tick) -> float:
+        """Where a tick is on the timeline."""
+        ...
+
+    def health(self, shown: Snapshot) -> Snapshot:
+        """The snapshot with how its sensors do, when that is due."""
+        ...
+
+    def goes_on_after_failing(self) -> bool:
+        """Something went wrong: whether it plays on all the same."""
+        ...
+
+    def close(self) -> None:
+        """Give everything back. Safe to call twice."""
+        ...

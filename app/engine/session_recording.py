@@ -1,0 +1,144 @@
+"""Recording what is shown: begun and ended by whoever asks, fed by the engine."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.core.line import Tick
+from pipeline.common.errors import BadInput
+from pipeline.types.source import AnySource, LiveSource, is_live_source
+
+if TYPE_CHECKING:
+    from pipeline.recording.recorder import Recorder, RecordingState
+
+SESSIONS = Path(__file__).resolve().parents[2] / "sessions"
+"""What this machine keeps: recordings, marks."""
+
+_LONGEST_NAME = 60
+
+
+class RecordingDesk:
+    """At most one recording at a time, of one source, into ``folder``. Any thread; ``take`` on the engine's.
+
+    A recording holds what was shown: playing a drive at double speed or seeking leaves out what was skipped. Of live
+    sensors it holds every tick that the line ran, also while the page is paused, and every sweep, picture, fix and own
+    motion that came in between. A frame whose result is not exact yet
+    waits, with its marks, for the exact one, until the next frame comes or recording ends.
+    """
+
+    def __init__(self, folder: Path = SESSIONS) -> None:
+        self._folder = folder
+        self._lock = threading.Lock()
+        self._recorder: Recorder | None = None
+        self._live: LiveSource | None = None
+        self._feeding = threading.RLock()
+        self._last: Tick | None = None
+        self._waits = False
+        self._marks: list[str] = []
+
+    @property
+    def state(self) -> RecordingState | None:
+        """Null while nothing is recorded. One that ended by itself stays, with its error, until it is stopped."""
+        recorder = self._recorder
+        return recorder.state if recorder is not None else None
+
+    def start(self, source: AnySource | None) -> RecordingState:
+        """Record from the next frame on; a recording that goes on already just goes on.
+
+        BadInput when nothing is open, or no file can be made.
+        """
+        with self._lock:
+            if self._recorder is not None and self._recorder.state.error is None:
+                return self._recorder.state
+            self._end()
+            if source is None:
+                raise BadInput("nothing is open that could be recorded")
+            # what MCAP and its schemas need takes 0.2 s to import: only who records pays
+            from pipeline.recording.recorder import Recorder
+            from pipeline.recording.save import about
+
+            try:
+                recorder = Recorder(new_session(self._folder, source.title), about(source))
+            except OSError as error:
+                raise BadInput(f"{self._folder}: no recording can be made: {error.strerror}") from None
+            with self._feeding:
+                self._live = source if is_live_source(source) else None
+                self._last, self._recorder = None, recorder
+            if self._live is not None:
+                self._live.tap(recorder)
+            return recorder.state
+
+    def stop(self) -> RecordingState | None:
+        """End the recording, wait until it is written, and say how it went; null (and no file) when it is empty."""
+        with self._lock:
+            return self._end()
+
+    def mark(self, text: str) -> bool:
+        """A mark right after the newest frame; false when nothing is recorded, or no more."""
+        with self._feeding:
+            if self._recorder is None:
+                return False
+            if not self._waits:
+                return self._recorder.mark(text)
+            self._marks.append(text)
+            return self._recorder.state.error is None
+
+    def take(self, tick: Tick) -> None:
+        """A tick that the line ran. The same frame again, with other parameters, is not recorded twice."""
+        with self._feeding:
+            recorder, last = self._recorder, self._last
+            if recorder is None:
+                return
+            if last is not None and last.frame.t_ns == tick.frame.t_ns:
+                if not self._waits or tick.params != last.params:
+                    return
+            else:
+                self._write_waiting(recorder)
+            self._last, self._waits = tick, True
+            if tick.exact:
+                self._write_waiting(recorder)
+
+    def _write_waiting(self, recorder: Recorder) -> None:
+        """The frame that waits, if one does, as it is known now."""
+        if not self._waits or self._last is None:
+            return
+        tick, self._waits = self._last, False
+        received_ns = self._live.now_ns() if self._live is not None else None
+        recorder.put(tick.frame, tick.result, tick.params, received_ns=received_ns)
+        marks, self._marks = self._marks, []
+        for text in marks:
+            recorder.mark(text)
+
+    def _end(self) -> RecordingState | None:
+        if self._live is not None:
+            self._live.tap(None)
+        with self._feeding:
+            recorder, self._recorder = self._recorder, None
+            if recorder is not None:
+                self._write_waiting(recorder)
+            self._last = self._live = None
+        if recorder is None:
+            return None
+        state = recorder.stop()
+        if state.frames == 0 and not recorder.hangs:
+            state.file.unlink(missing_ok=True)
+            return None
+        return state
+
+
+def new_session(out: Path, title: str) -> Path:
+    """``out`` itself when it names an MCAP file, else a file in that folder, named by title and local time."""
+    if out.suffix.lower() == ".mcap":
+        return out
+    out.mkdir(parents=True, exist_ok=True)
+    words = re.sub(r"\W+", "-", title, flags=re.ASCII).strip("-").lower()[:_LONGEST_NAME] or "session"
+    name = f"{words}_{time.strftime('%Y%m%d-%H%M%S')}"
+    path, number = out / f"{name}.mcap", 1
+    while path.exists():
+        number += 1
+        path = out / f"{name}_{number}.mcap"
+    return path

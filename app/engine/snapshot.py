@@ -1,0 +1,96 @@
+"""What the engine shows: one immutable picture of everything a view may want at one moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from app.core.line import Tick
+from app.drive.background_runs import DriveState
+from app.labels.service.state import LabelState
+from pipeline.params import Params
+from pipeline.types import StreamHealth
+from pipeline.types.result_json import streams_json
+
+if TYPE_CHECKING:
+    from pipeline.recording.recorder import RecordingState
+
+
+@dataclass(frozen=True)
+class Notice:
+    """A sentence for the person at the page, with the remedy where there is one."""
+
+    level: Literal["info", "warning", "error"]
+    text: str
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Playback, source and the newest tick.
+
+    sequence grows whenever a new result was made; time_s is the shown frame's place on the playback timeline.
+    made_unix_s is the wall clock when the result was ready. live: devices, not a recording; streams: how each of them
+    does, now and then, also while none ticks. busy is a sentence while the engine cannot answer.
+    """
+
+    params: Params
+    preset: str = "default"
+    params_revision: int = 0
+    uri: str | None = None
+    title: str = ""
+    rate_hz: float = 0.0
+    count: int = 0
+    index: int = 0
+    time_s: float = 0.0
+    duration_s: float = 0.0
+    playing: bool = False
+    speed: float = 1.0
+    loop: bool = True
+    busy: str | None = None
+    detector: str | None = None
+    lane_detector: str | None = None
+    notices: tuple[Notice, ...] = ()
+    sequence: int = 0
+    skipped: int = 0
+    made_unix_s: float = 0.0
+    tick: Tick | None = None
+    drive: DriveState = DriveState()
+    labels: LabelState = LabelState()
+    live: bool = False
+    streams: tuple[StreamHealth, ...] = ()
+    recording: RecordingState | None = None
+
+    def state_json(self) -> dict[str, Any]:
+        """The state without the result, as the page and ``/api/state`` read it."""
+        return {
+            "uri": self.uri,
+            "title": self.title,
+            "rate_hz": self.rate_hz,
+            "count": self.count,
+            "index": self.index,
+            "frame": self.tick.frame.name if self.tick else None,
+            "time_s": self.time_s,
+            "duration_s": self.duration_s,
+            "playing": self.playing,
+            "speed": self.speed,
+            "loop": self.loop,
+            "busy": self.busy,
+            "detector": self.detector,
+            "lane_detector": self.lane_detector,
+            "preset": self.preset,
+            "params_revision": self.params_revision,
+            "sequence": self.sequence,
+            "skipped": self.skipped,
+            "provisional": self.tick is not None and not self.tick.exact,
+            "drive": self.drive.to_json(),
+            "can_undo": self.labels.can_undo,
+            "can_redo": self.labels.can_redo,
+            "labels": self.labels.to_json(),
+            "live": self.live,
+            "streams": streams_json(self.streams),
+            "recording": self.recording.to_json() if self.recording is not None else None,
+            "notices": [{"level": n.level, "text": n.text} for n in (*self.notices, *self._of_labels())],
+        }
+
+    def _of_labels(self) -> tuple[Notice, ...]:
+        return (Notice("warning", self.labels.trouble),) if self.labels.trouble else ()

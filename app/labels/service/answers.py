@@ -1,0 +1,88 @@
+"""Labels as the API answers them. A cuboid is an object as in results; everything else is as in the native file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from app.labels.store.values import Item, ItemKind, value_to_json
+from pipeline.labels.model import LabelTrack, Sighting
+
+if TYPE_CHECKING:
+    from app.labels.store.act_log import HistoryEntry
+    from app.labels.store.drive_labels import Changes, DriveInfo, DriveLabels
+
+_LISTS: dict[ItemKind, str] = {"track": "tracks", "lead": "leads", "path": "paths", "event": "events", "tag": "tags"}
+
+
+def changes_json(info: DriveInfo, changes: Changes) -> dict[str, Any]:
+    """What changed, by kind; tracks are without their sightings."""
+    lists: dict[str, list[dict[str, Any]]] = {name: [] for name in _LISTS.values()}
+    for item in changes.items:
+        body = item_json(item)
+        if item.kind == "track":
+            first, last, count, keyframes = changes.extents.get(item.id, (None, None, 0, []))
+            body |= {"first": first, "last": last, "keyframes": keyframes, "sightings": count}
+        lists[_LISTS[item.kind]].append(body)
+    return {
+        "revision": changes.revision,
+        "drive": {"id": info.key, "uri": info.uri, "count": len(info.t_ns)},
+        **lists,
+        "removed": [{"kind": kind, "id": number} for kind, number in changes.removed],
+    }
+
+
+def window_json(labels: DriveLabels, first: int, last: int) -> dict[str, Any]:
+    """The tracks of every frame from first to last that has one."""
+    revision, found = labels.window(first, last)
+    return {
+        "revision": revision,
+        "sightings": {
+            str(frame): [{"track": track, **placed_json(sighting)} for track, sighting in tracks]
+            for frame, tracks in found.items()
+        },
+    }
+
+
+def track_json(item: Item) -> dict[str, Any]:
+    """A whole track."""
+    assert isinstance(item.value, LabelTrack)
+    sightings = [{"frame": each.frame, **placed_json(each)} for each in item.value.sightings]
+    return {**item_json(item), "sightings": sightings}
+
+
+def item_json(item: Item) -> dict[str, Any]:
+    return {"id": item.id, **value_to_json(item.kind, item.value), "revision": item.revision}
+
+
+def placed_json(sighting: Sighting) -> dict[str, Any]:
+    cuboid = sighting.cuboid
+    return {
+        "cuboid": cuboid._asdict() if cuboid is not None else None,
+        "bbox": sighting.bbox,
+        "keyframe": sighting.keyframe,
+    }
+
+
+def history_json(entry: HistoryEntry) -> dict[str, Any]:
+    return {
+        "act": entry.act,
+        "what": entry.what,
+        "note": entry.note,
+        "person": entry.person,
+        "t_unix_ms": entry.t_unix_ms,
+        "before": _content_json(entry.before),
+        "after": _content_json(entry.after),
+        "undone": entry.undone,
+    }
+
+
+def _content_json(content: dict[str, Any] | None) -> dict[str, Any] | None:
+    """The item as it was, with the sightings that the act touched."""
+    if content is None:
+        return None
+    sightings = []
+    for each in content["sightings"]:
+        cuboid = each["cuboid"]
+        named = dict(zip(("center", "size", "yaw_rad"), cuboid, strict=True)) if cuboid is not None else None
+        sightings.append({**each, "cuboid": named})
+    return {**(content["value"] or {}), "sightings": sightings}

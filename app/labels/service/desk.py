@@ -1,0 +1,265 @@
+"""The labels of what is open: acts on them, how far they are, and what others do to them meanwhile.
+
+Whatever speaks with a database is imported when labels are first asked for: SQLAlchemy takes most of a second, and the
+first picture does not wait for it.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from app.core.control import Control, Wish
+from app.drive.open_recording import Recording
+from app.labels.acts.requests import Import, Lift, Propose, Refit
+from app.labels.service.opened import KeptLabels, Opened
+from app.labels.service.param_write_queue import SettlingQueue
+from app.labels.service.state import LabelState
+from app.labels.service.tasks import Tasks
+from pipeline.common.errors import BadInput
+from pipeline.labels.formats.base import FormatName
+from pipeline.params import Params
+
+if TYPE_CHECKING:
+    from app.labels.service.scoring import LabelScores
+    from app.labels.store.act_log import Acted
+    from app.labels.store.database import Database
+    from app.labels.store.drive_labels import DriveLabels
+    from app.labels.store.undo_order import Way
+
+logger = logging.getLogger("cipv.labels")
+
+_LOOK_EVERY_S = 0.4
+"""Others see within a second what was done through another server."""
+_PATIENCE_S = 10.0
+
+
+@dataclass(frozen=True)
+class Done:
+    """An act that is on disk, or changed nothing, and the labels that it was done to: those stay what they are when
+    something else is opened meanwhile."""
+
+    acted: Acted
+    labels: DriveLabels
+
+
+class LabelDesk:
+    """Any thread. database, open_later: as of ``KeptLabels``; it is opened too when what is open is shown. The desk
+    hears of parameters that are settled from ``Control`` and gives them back when they are undone, and wakes it
+    whenever ``state`` is another."""
+
+    def __init__(self, database: Database | None = None, *, open_later: Callable[[], Database] | None = None) -> None:
+        self.kept = KeptLabels(database, open_later)
+        self._control = Control(Wish(Params()))
+        self._is_shown = False
+        self._lock = threading.Lock()
+        self._open = Opened("", None, self.kept)
+        self._state = LabelState()
+        self._wake = threading.Event()
+        self._ended = False
+        self._trouble = ""
+        self._thread = threading.Thread(target=self._look, name="cipv-labels", daemon=True)
+        self._beginning = threading.Lock()
+        self._begun: tuple[str | None, int] = (None, 0)
+        self._forgot: str | None = None
+        self._settling = SettlingQueue(self.refresh)
+        self.tasks = Tasks(self.refresh)
+
+    # ------------------------------------------------------------ what is open
+
+    def start(self, control: Control) -> None:
+        """control: whose parameters are meant."""
+        self._control = control
+        control.on_settle = self.settle
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the thread and the tasks, and close the database."""
+        self._ended = True
+        self._wake.set()
+        self.tasks.stop()
+        self._settling.stop()
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join(_PATIENCE_S)
+        self.kept.close()
+
+    def open(self, uri: str, recording: Recording | None) -> None:
+        """Something else was opened; null for what has no frames to label. Its labels are looked for a little later,
+        when it is shown."""
+        self.tasks.cancel()
+        with self._lock:
+            self._open = Opened(uri, recording, self.kept)
+            self._state = LabelState(labelled=recording is not None)
+
+    def shown(self) -> None:
+        """What is open is shown: now is the time for its labels."""
+        self._is_shown = True
+
+    @property
+    def state(self) -> LabelState:
+        return self._state
+
+    @property
+    def recording(self) -> Recording:
+        """What can be labelled. NoSuchLabel when nothing can."""
+        return self._open.framed()
+
+    @property
+    def labels(self) -> DriveLabels:
+        """Of the open recording. NoSuchLabel when none is open."""
+        opened = self._open
+        opened.framed()
+        return opened.labels
+
+    @property
+    def drive(self) -> str | None:
+        """The key of the open recording; null for what has no frames to label."""
+        return self._open.key
+
+    @cached_property
+    def scores(self) -> LabelScores:
+        """Runs against labels."""
+        from app.labels.service.scoring import LabelScores
+
+        return LabelScores()
+
+    # ------------------------------------------------------------ acts
+
+    def act(self, person: str, act: Any, drive: str, act_id: str | None = None) -> Done:
+        """Do it; on disk when this returns. Whatever refuses it. drive: the key of the recording that is meant.
+        act_id: of who sends it; what was sent before is not done again."""
+        recording, labels = self._open.named(drive)
+        done = labels.log.sent_before(act_id, person)
+        if done is None:
+            from app.labels.acts import do
+            from app.labels.acts.scope import Scope
+
+            doing, note = act, ""
+            if isinstance(act, Refit | Lift):
+                from app.labels.acts.measured import measured
+
+                doing, note = measured(labels, recording, self._control.peek().params, act)
+            scope = Scope(labels.info.t_ns)
+            self._settling.finish()
+            done = labels.log.act(doing.kind, person, lambda draft: do(draft, scope, doing), act_id=act_id, note=note)
+            self.refresh()
+        return Done(done, labels)
+
+    def move(self, way: Way, person: str, drive: str | None, act_id: str | None = None) -> Done:
+        """Undo or redo, across labels and parameters; what is only being tried is undone first. ActRefused when there
+        is nothing to, or somebody else is in the way. drive, act_id: as in ``act``; null for what has no frames to
+        label."""
+        labels = self._open.meant(drive)
+        self._settling.finish()
+        with self._control.alone():  # a change that comes between would be lost to what is restored
+            self._settling.finish()  # of what came in between
+            acted = labels.log.sent_before(act_id, person)
+            if acted is None and way == "undo" and self._forget_tried(act_id):
+                from app.labels.store.act_log import Acted
+
+                return Done(Acted(labels.revision, None, "what was being tried"), labels)
+            if acted is None:
+                acted = labels.log.move(way, person, self._control.check, act_id=act_id)
+            if acted.params:
+                self._control.restore(acted.params)
+        self.refresh()
+        return Done(acted, labels)
+
+    def begin(self, person: str, act: Propose | Import, drive: str, act_id: str | None = None) -> int:
+        """Something that takes a while; its number. ActRefused while another one goes on, or when it cannot be done.
+        drive, act_id: as in ``act``."""
+        from app.labels.acts.bulk import importing_truth, proposing
+
+        recording, labels = self._open.named(drive)
+        with self._beginning:
+            if act_id is not None and self._begun[0] == act_id:
+                return self._begun[1]
+            if isinstance(act, Propose):
+                number = self.tasks.begin("propose", proposing(labels, recording, person, act.first, act.last))
+            else:
+                number = self.tasks.begin("import", importing_truth(labels, recording, person))
+            self._begun = (act_id, number)
+            return number
+
+    def begin_import(self, person: str, file: Path, name: FormatName, drive: str) -> int:
+        """Labels of a file or folder that was handed in, as another tool made them; it is removed in the end."""
+        from app.labels.transfer.files import importing_file
+
+        recording, labels = self._open.named(drive)
+        return self.tasks.begin("import", importing_file(labels, recording, person, file, name))
+
+    def possible(self, person: str) -> tuple[bool, bool]:
+        """(there is something to take back, something to do again) for a person; nothing while the database fails:
+        nobody who changes parameters waits for one that is known to be away. What is on its way there can be taken
+        back: that waits for it."""
+        if self._settling.has(self._open.uri, person):
+            return True, False
+        if self._trouble:
+            return False, False
+        try:
+            return self._open.labels.log.possible(person)
+        except BadInput:
+            return False, False
+
+    def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
+        """Parameters were changed. A database that is held or fails does not keep anybody from driving: the change is
+        written later, or it is said that it cannot be undone."""
+        opened = self._open
+        if not changes:
+            return
+        self._settling.put(opened.uri, lambda: opened.labels.log, changes, person, merges=merges)
+        if self._settling.has(opened.uri, ""):
+            self._show(opened, replace(self._state, can_undo=True, can_redo=False))
+
+    def refresh(self) -> None:
+        """Look at the database now. What goes wrong there is said once, until it goes right again."""
+        opened = self._open
+        if not opened.uri:
+            return
+        try:
+            labels = opened.labels
+            on_its_way = self._settling.has(opened.uri, "")
+            can_undo, can_redo = (True, False) if on_its_way else labels.log.possible("")
+            revision = labels.revision
+        except Exception as error:  # whatever a database or a recording does, people go on driving
+            if str(error) != self._trouble:
+                logger.warning("labels: %s", error)
+            self._trouble = str(error)
+            self._show(opened, self._state)
+            return
+        self._trouble = ""
+        self._show(opened, LabelState(revision, can_undo, can_redo, opened.recording is not None, self.tasks.state))
+
+    # ------------------------------------------------------------ inside
+
+    def _show(self, opened: Opened, new: LabelState) -> None:
+        """To everybody, unless something else is open by now."""
+        with self._lock:
+            if opened is not self._open:
+                return
+            new = replace(new, trouble=self._settling.trouble or self._trouble)
+            changed, self._state = new != self._state, new
+        if changed:
+            self._control.change()
+
+    def _forget_tried(self, act_id: str | None) -> bool:
+        """Whether this took back what was being tried, now or when it was sent before."""
+        if act_id is not None and act_id == self._forgot:
+            return True
+        forgot = self._control.forget_tried()
+        self._forgot = act_id if forgot else self._forgot
+        return forgot
+
+    def _look(self) -> None:
+        """The thread: what others write to the same database is seen here too."""
+        while not self._ended:
+            self._wake.wait(_LOOK_EVERY_S)
+            self._wake.clear()
+            is_time = self.kept.is_open or (self.kept.outlast and self._is_shown)
+            if is_time and not self._ended:
+                self.refresh()

@@ -1,0 +1,174 @@
+"""Where there is something to do: the next frame without a lead, with a proposal, sent back, not reviewed, or judged
+otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal, cast
+
+from app.drive.full_run import DriveRun
+from app.labels.store.values import KINDS, Item, ItemKind
+from app.labels.wording import lead_text
+from pipeline.evaluation.lead_verdict import Judged
+from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel
+
+if TYPE_CHECKING:
+    from app.labels.service.scoring import LabelScores
+    from app.labels.store.drive_labels import DriveLabels
+
+What = Literal["unlabelled", "disagreement", "proposed", "sent_back", "unreviewed"]
+Key = tuple[ItemKind, int]
+"""Kind and number of a label."""
+_NOTHING: dict[What, str] = {
+    "unlabelled": "who leads is said in every frame there",
+    "disagreement": "the pipeline and the accepted labels agree there",
+    "proposed": "no proposal is waiting there",
+    "sent_back": "nothing was sent back there",
+    "unreviewed": "nothing of others is waiting for a review there",
+}
+
+
+@dataclass(frozen=True)
+class Place:
+    """item: what it is about, where that is one label."""
+
+    frame: int
+    why: str
+    item: Key | None = None
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is looked for, beyond which frame, which way. after: of several labels in that frame, the one that was
+    looked at; null to go beyond the frame. person: who asks."""
+
+    what: What
+    frame: int
+    direction: int
+    person: str = ""
+    after: Key | None = None
+
+
+def where_next(
+    labels: DriveLabels, scores: LabelScores, run: DriveRun | None, asked: Asked
+) -> tuple[Place | None, str, int]:
+    """(the nearest such place, why it is one or why there is none, how many there are in the drive)."""
+    places = _places(labels, scores, run, asked)
+    here, way = _order(Place(asked.frame, "", asked.after)), 1 if asked.direction > 0 else -1
+    ahead = [
+        each
+        for each in places
+        if (each.frame != asked.frame or asked.after is not None)
+        and (_order(each) > here if way > 0 else _order(each) < here)
+    ]
+    if not ahead:
+        blind = _unjudged(labels, scores, run) if asked.what == "disagreement" and not places else ""
+        return None, blind or _NOTHING[asked.what], len(places)
+    found = min(ahead, key=_order) if way > 0 else max(ahead, key=_order)
+    return found, found.why, len(places)
+
+
+def _order(place: Place) -> tuple[int, int, int]:
+    kind, number = place.item if place.item is not None else (None, 0)
+    return place.frame, KINDS.index(kind) if kind is not None else 0, number
+
+
+def _places(labels: DriveLabels, scores: LabelScores, run: DriveRun | None, asked: Asked) -> Sequence[Place]:
+    if asked.what == "unlabelled":
+        return _unlabelled(labels)
+    if asked.what == "disagreement":
+        return _disagreements(labels, scores, run)
+    if asked.what == "unreviewed":
+        return _unreviewed(labels, asked.person)
+    return _waiting(labels, sent_back=asked.what == "sent_back")
+
+
+def _unlabelled(labels: DriveLabels) -> list[Place]:
+    said: set[int] = set()
+    for lead in _leads(labels):
+        if lead.state != "rejected":
+            said.update(range(lead.first, lead.last + 1))
+    return [Place(index, "nobody has said who leads") for index in range(len(labels.info.t_ns)) if index not in said]
+
+
+def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[Place]:
+    """Where what is proposed, or was sent back, begins."""
+    places = []
+    for frame, item in _begun(labels):
+        value = item.value
+        if isinstance(value, FrameTag) or value.state != "proposed" or (sent_back and not value.comment):
+            continue
+        why = f"{_name(item)}: {value.comment}" if value.comment else f"{_name(item)} is proposed"
+        places.append(Place(frame, why, (item.kind, item.id)))
+    return places
+
+
+def _unreviewed(labels: DriveLabels, person: str) -> list[Place]:
+    """Where what somebody else stands behind begins, and no second person has looked at it. What this person made or
+    changed last is for another."""
+    changed_by = labels.changed_by()
+    places = []
+    for frame, item in _begun(labels):
+        value = item.value
+        if isinstance(value, FrameTag) or value.state not in ("accepted", "corrected") or value.reviewer:
+            continue
+        made = value.origin.name if value.origin.maker == "person" else ""
+        last = changed_by.get((item.kind, item.id), made)
+        if person not in (made, last):
+            places.append(Place(frame, f"{_name(item)} of {last or value.origin.name}", (item.kind, item.id)))
+    return places
+
+
+def _begun(labels: DriveLabels) -> Iterable[tuple[int, Item]]:
+    """Every label that is in a frame, with the first one."""
+    found = labels.changes()
+    for item in found.items:
+        value = item.value
+        if isinstance(value, LabelTrack):
+            if item.id in found.extents:
+                yield found.extents[item.id][0], item
+        elif isinstance(value, LeadRange | FrameTag):
+            yield value.first, item
+        else:
+            yield value.frame, item
+
+
+def _name(item: Item) -> str:
+    value = item.value
+    if isinstance(value, LeadRange):
+        return f"the lead {lead_text(value.lead)}"
+    if isinstance(value, PathLabel):
+        return "the path"
+    return value.kind if isinstance(value, EventLabel) else f"#{item.id}"
+
+
+def _disagreements(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> list[Place]:
+    from app.labels.service.scoring import disagreements  # what scores is imported with the first question
+
+    score = scores.score(labels, run) if run is not None else None
+    if run is None or score is None:
+        return []
+    rows, leads = run.rows(), list(_leads(labels))
+    return [Place(index, _otherwise(each, rows[index].cipv_id, leads, index)) for index, each in disagreements(score)]
+
+
+def _unjudged(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) -> str:
+    """Why nothing can disagree; empty where something can."""
+    score = scores.score(labels, run) if run is not None else None
+    if score is not None and any(frame.judged is not None for frame in score.frames):
+        return ""
+    _, truth = scores.truth(labels)
+    return " ".join(("no frame is judged:", *(truth.notes[:1] if truth is not None else ("nothing is accepted yet",))))
+
+
+def _otherwise(judged: Judged, cipv: int | None, leads: Iterable[LeadRange], index: int) -> str:
+    lead = next((each.lead for each in leads if each.first <= index <= each.last and each.state != "rejected"), None)
+    says = f"#{lead}" if isinstance(lead, int) else "none" if judged.verdict == "false" else "another"
+    ours = f"#{cipv}" if cipv is not None else "none"
+    beside = f", {judged.error_m:+.1f} m off" if judged.error_m is not None else ""
+    return f"the pipeline says {ours}{beside}, the labels say {says}"
+
+
+def _leads(labels: DriveLabels) -> Iterable[LeadRange]:
+    return (cast("LeadRange", item.value) for item in labels.items("lead").values())

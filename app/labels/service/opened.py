@@ -1,0 +1,109 @@
+"""What is open, and its labels in the database, which is opened when somebody first asks for any."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from app.drive.open_recording import Recording
+from app.labels.errors import ActRefused, NoSuchLabel
+from pipeline.step import spare_what_is_loaded
+
+if TYPE_CHECKING:
+    from app.labels.store.database import Database
+    from app.labels.store.drive_labels import DriveInfo, DriveLabels
+
+
+class KeptLabels:
+    """Any thread. database: where labels are kept. open_later: opens it when they are first asked for; without either
+    it is gone at the end, and made only when somebody asks. station: whose parameters are meant: of this server, and of
+    the same one when it is started again; set before anything is opened."""
+
+    def __init__(self, database: Database | None, open_later: Callable[[], Database] | None) -> None:
+        self.station = socket.gethostname()
+        self._database = database
+        self._open_later = open_later
+        self._opening = threading.Lock()
+
+    @property
+    def is_open(self) -> bool:
+        return self._database is not None
+
+    @property
+    def outlast(self) -> bool:
+        """Whether there may be some from before, and others may change them."""
+        return self.is_open or self._open_later is not None
+
+    def of(self, uri: str, recording: Recording | None) -> DriveLabels:
+        """Of a recording, or of what has no frames to label. BadInput when the database cannot be opened."""
+        from app.labels.store.drive_labels import DriveLabels
+
+        return DriveLabels(self._opened(), _info(uri, recording), self.station)
+
+    def close(self) -> None:
+        with self._opening:
+            if self._database is not None:
+                self._database.close()
+
+    def _opened(self) -> Database:
+        with self._opening:
+            if self._database is None:
+                self._database = (self._open_later or _temporary)()
+                spare_what_is_loaded()
+            return self._database
+
+
+@dataclass(eq=False)
+class Opened:
+    """What is open. recording: null for what has no frames to label. kept: where its labels are."""
+
+    uri: str
+    recording: Recording | None
+    kept: KeptLabels
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _labels: DriveLabels | None = None
+
+    @property
+    def labels(self) -> DriveLabels:
+        """Found in the database when first asked for."""
+        with self._lock:
+            if self._labels is None:
+                self._labels = self.kept.of(self.uri, self.recording)
+            return self._labels
+
+    @property
+    def key(self) -> str | None:
+        """Of the recording; null for what has no frames to label."""
+        return self.labels.info.key if self.recording is not None else None
+
+    def framed(self) -> Recording:
+        """What can be labelled. NoSuchLabel when nothing can."""
+        if self.recording is None:
+            raise NoSuchLabel("no recording is open that could be labelled")
+        return self.recording
+
+    def meant(self, drive: str | None) -> DriveLabels:
+        """The labels of what has this key. ActRefused when another recording is open, or one at all where none is
+        meant."""
+        if drive != self.key:
+            raise ActRefused("another recording is open now")
+        return self.labels
+
+    def named(self, drive: str) -> tuple[Recording, DriveLabels]:
+        """ActRefused when it is not the recording with this key, NoSuchLabel when it has no frames to label."""
+        return self.framed(), self.meant(drive)
+
+
+def _temporary() -> Database:
+    from app.labels.store.database import Database
+
+    return Database.temporary()
+
+
+def _info(uri: str, recording: Recording | None) -> DriveInfo:
+    from app.labels.store.drive_labels import info_of, info_of_uri
+
+    return info_of_uri(uri) if recording is None else info_of(recording.recipe.source, recording.names)

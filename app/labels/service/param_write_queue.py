@@ -1,0 +1,118 @@
+"""Changes of parameters on their way into the log: nobody who drives waits for a database that is held elsewhere."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from app.labels.errors import ActRefused
+from pipeline.common.errors import BadInput
+
+if TYPE_CHECKING:
+    from app.labels.store.act_log import Log
+
+logger = logging.getLogger("cipv.labels")
+
+_MOMENT_S = 0.1
+"""A database that nobody holds takes some milliseconds: who changes a parameter then hears of it when it is on disk."""
+_PATIENCE_S = 30.0
+_MOST = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class _Change:
+    uri: str
+    log: Callable[[], Log]
+    changes: Mapping[str, tuple[Any, Any]]
+    person: str
+    merges: bool
+    over: threading.Event = field(default_factory=threading.Event)
+
+
+class SettlingQueue:
+    """Writes them one after the other, on a thread of its own. Any thread. written: called after each, and after a
+    failure. What was not written is not kept: ``trouble`` says so until a change is written again."""
+
+    def __init__(self, written: Callable[[], object]) -> None:
+        self.trouble = ""
+        self._written = written
+        self._waiting: deque[_Change] = deque()
+        self._changed = threading.Condition()
+        self._ended = False
+        self._thread: threading.Thread | None = None
+
+    def put(
+        self, uri: str, log: Callable[[], Log], changes: Mapping[str, tuple[Any, Any]], person: str, *, merges: bool
+    ) -> None:
+        """On disk when this returns, if that takes a moment only; else later. uri, log: of what is open."""
+        change = _Change(uri, log, changes, person, merges)
+        with self._changed:
+            if len(self._waiting) >= _MOST:
+                return self._failed(1, f"{_MOST} before it wait for the database")
+            self._waiting.append(change)
+            if self._thread is None:
+                self._thread = threading.Thread(target=self._write_all, name="cipv-settling", daemon=True)
+                self._thread.start()
+            self._changed.notify_all()
+        change.over.wait(_MOMENT_S)
+
+    def has(self, uri: str, person: str) -> bool:
+        """Whether a change there that this person could take back is on its way."""
+        with self._changed:
+            return any(change.uri == uri and change.person in ("", person) for change in self._waiting)
+
+    def finish(self) -> None:
+        """Wait until all are written, so that what comes next comes after them. ActRefused when that takes too long."""
+        with self._changed:
+            if not self._changed.wait_for(lambda: not self._waiting, _PATIENCE_S):
+                raise ActRefused("a change of parameters before this is still on its way to the database")
+
+    def stop(self) -> None:
+        """What is on its way is written first, if the database lets it."""
+        with self._changed:
+            self._ended = True
+            self._changed.notify_all()
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(_PATIENCE_S)
+
+    def _write_all(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._waiting or self._ended)
+                if not self._waiting:
+                    return
+                change = self._waiting[0]
+            trouble = _written(change)
+            with self._changed:
+                over = [change] if trouble is None else list(self._waiting)
+                if trouble is None:
+                    self._waiting.popleft()
+                    self.trouble = ""
+                else:  # each of the others would wait as long, to be refused as well
+                    self._waiting.clear()
+                    self._failed(len(over), trouble)
+                self._changed.notify_all()
+            self._written()
+            for each in over:
+                each.over.set()
+
+    def _failed(self, count: int, why: str) -> None:
+        many = "A change of parameters" if count == 1 else f"{count} changes of parameters"
+        self.trouble = f"{many} cannot be undone: {why}"
+        logger.warning(self.trouble)
+
+
+def _written(change: _Change) -> str | None:
+    """Why it was not; null when it was."""
+    try:
+        change.log().settle(change.changes, change.person, merges=change.merges)
+    except BadInput as error:
+        return str(error)
+    except Exception as error:  # a person goes on driving whatever a database does, and hears of it
+        logger.exception("a change of parameters")
+        return str(error)
+    return None

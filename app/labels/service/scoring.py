@@ -1,0 +1,129 @@
+"""The runs of a drive against what people labelled in it: the figures of ``cipv evaluate``, at once."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from app.drive.compare import Metric
+from app.drive.frame_rows import Row
+from app.drive.full_run import DriveRun
+from app.drive.open_recording import RULE
+from app.drive.run_results import results_of
+from pipeline.common.errors import BadInput
+from pipeline.evaluation.lead_verdict import Judged
+from pipeline.evaluation.report_sections import Cell
+from pipeline.evaluation.scores.drive import DriveScore, Rules, judged, score_drive
+from pipeline.evaluation.scores.error_tables import error_rows
+from pipeline.evaluation.scores.figures import FIGURES
+from pipeline.evaluation.scores.report import MOST
+from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels
+from pipeline.evaluation.scores.worst import Bad, worst
+
+if TYPE_CHECKING:
+    from app.labels.store.drive_labels import DriveLabels
+
+_MOST_HELD = 8
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A run against the labels. judged: frames in which they say who leads. metrics: every figure that it or the other
+    run has. notes: what does not count, and why. errors: rows of ``error_rows``. worst: frames to look at first."""
+
+    judged: int
+    metrics: tuple[Metric, ...]
+    notes: tuple[str, ...]
+    errors: tuple[tuple[Cell, ...], ...]
+    worst: tuple[Bad, ...]
+
+
+class LabelScores:
+    """Any thread. What was judged is kept until labels or runs are others."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._of: tuple[DriveLabels, int] | None = None
+        self._truth: DriveTruth | None = None
+        self._scores: dict[tuple[int, int], DriveScore | None] = {}
+
+    def truth(self, labels: DriveLabels) -> tuple[int, DriveTruth | None]:
+        """(revision, what people stand behind; null while that is nothing)."""
+        with self._lock:
+            revision = labels.revision
+            if self._of is None or self._of[0] is not labels or self._of[1] != revision:
+                try:
+                    self._truth = of_labels(labels.unnamed_set(), RULE)
+                except NoTruth:
+                    self._truth = None
+                self._of, self._scores = (labels, revision), {}
+            return revision, self._truth
+
+    def score(self, labels: DriveLabels, run: DriveRun) -> DriveScore | None:
+        """One run's; null where no labelled frame has a result yet."""
+        revision, truth = self.truth(labels)
+        key = (run.number, run.done)
+        with self._lock:
+            if truth is None or self._of != (labels, revision):
+                return None
+            if key not in self._scores:
+                if len(self._scores) >= _MOST_HELD:
+                    self._scores.clear()
+                self._scores[key] = _scored(run, truth)
+            return self._scores[key]
+
+    def standing(self, labels: DriveLabels, base: DriveRun, run: DriveRun) -> Standing:
+        """A run beside another, and what does not count; without figures where nothing is judged."""
+        _, truth = self.truth(labels)
+        old, new = self.score(labels, base), self.score(labels, run)
+        if new is None:
+            return Standing(0, (), truth.notes if truth is not None else (), (), ())
+        found = [
+            Metric(figure.title, figure.unit, figure.of([old]) if old else None, figure.of([new]), figure.better)
+            for figure in FIGURES
+        ]
+        return Standing(
+            sum(frame.judged is not None for frame in new.frames),
+            tuple(each for each in found if each.base is not None or each.run is not None),
+            new.notes,
+            error_rows([new]),
+            tuple(worst([new], MOST)),
+        )
+
+    def judged_rows(self, labels: DriveLabels, run: DriveRun) -> list[Row] | None:
+        """A run's rows, judged by labels instead of what the recording came with; null where they judge nothing. Asked
+        for while a run goes on: only who leads is looked at."""
+        _, truth = self.truth(labels)
+        rows = run.rows()
+        found = _judged(run, truth) if truth is not None else {}
+        return [row._replace(judged=found.get(row.t_ns)) for row in rows] if found else None
+
+
+def judged_by_index(score: DriveScore) -> dict[int, Judged]:
+    """The frames in which it is known who leads."""
+    return {frame.index: frame.judged for frame in score.frames if frame.judged is not None}
+
+
+def disagreements(score: DriveScore) -> Sequence[tuple[int, Judged]]:
+    """Frames in which the CIPV is not who leads, in order."""
+    return [(index, each) for index, each in judged_by_index(score).items() if each.verdict not in ("correct", "none")]
+
+
+def _judged(run: DriveRun, truth: DriveTruth) -> dict[int, Judged]:
+    """By tick."""
+    rules, found = Rules(RULE), {}
+    for result in results_of(run, leads_only=True):
+        known = truth.frames.get(result.t_ns)
+        verdict = judged(result, known, rules) if known is not None else None
+        if verdict is not None:
+            found[result.t_ns] = verdict
+    return found
+
+
+def _scored(run: DriveRun, truth: DriveTruth) -> DriveScore | None:
+    try:
+        return score_drive(results_of(run), truth, Rules(RULE))
+    except BadInput:
+        return None

@@ -1,0 +1,274 @@
+"""The acts on one drive: each is one transaction and one row, and can be taken back and done again.
+
+A person takes back what that person did, newest first, and no other's: not even when both changed the same label, where
+it is refused instead. Parameters belong to the server they were changed on (``station``); who changes them without
+a name there does it for everybody there. An act may come with an id of who sends it: sent again, it is not done again.
+"""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from sqlalchemy import Connection, and_, insert, select, update
+
+from app.labels.errors import ActRefused
+from app.labels.store.database import Database
+from app.labels.store.draft import Draft, name_of
+from app.labels.store.invariants import check_whole
+from app.labels.store.tables import ActRow, ChangeRow, DriveRow
+from app.labels.store.undo_order import Steps, Way
+from app.labels.store.values import ItemKind, unpack, unpack_pair
+
+_LONGEST_HISTORY = 200
+
+
+@dataclass(frozen=True)
+class Acted:
+    """What was done. revision: the drive's; act: its number, null when nothing changed. note: what there is to say
+    of it besides. params: what parameters of this program are to be now, by name."""
+
+    revision: int
+    act: int | None
+    what: str
+    note: str = ""
+    params: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class HistoryEntry:
+    """One act in the life of an item; contents as plain values, null where it was not there. note: as of ``Acted``."""
+
+    act: int
+    what: str
+    note: str
+    person: str
+    t_unix_ms: int
+    before: dict[str, Any] | None
+    after: dict[str, Any] | None
+    undone: bool
+
+
+@dataclass
+class _Turn:
+    """An act under way. is_logged: its row is written."""
+
+    connection: Connection
+    draft: Draft
+    is_logged: bool = False
+
+
+Apply = Callable[[Draft], str]
+"""Changes labels in a draft and says in a few words what it did: ``moved #7 in frame 12``."""
+
+
+class Log:
+    """Of one drive. Any thread."""
+
+    def __init__(self, database: Database, drive_id: int, station: str | None = None) -> None:
+        self._database, self._drive_id = database, drive_id
+        self._station = socket.gethostname() if station is None else station
+        self._steps = Steps(drive_id, self._station)
+
+    # ------------------------------------------------------------ doing
+
+    def act(self, kind: str, person: str, apply: Apply, *, act_id: str | None = None, note: str = "") -> Acted:
+        """Do it; on disk when this returns. What ``apply`` raises leaves everything as it was. With the ``act_id`` of
+        one that is done already, that one is answered."""
+        with self._turn(person) as turn:
+            connection, draft = turn.connection, turn.draft
+            done = self._sent_before(connection, act_id, person)
+            if done is not None:
+                return done
+            what = apply(draft)
+            check_whole(draft)
+            if not draft.write():
+                return Acted(draft.number - 1, None, "nothing changed", note)
+            self._steps.drop_redo(connection, person)
+            self._write(turn, kind, what, act_id=act_id, note=note)
+            return Acted(draft.number, draft.number, what, note)
+
+    def sent_before(self, act_id: str | None, person: str) -> Acted | None:
+        """What was answered to the act that was sent with this id; null when there is none. ActRefused when it is
+        another person's."""
+        with self._database.reading() as connection:
+            return self._sent_before(connection, act_id, person)
+
+    def settle(self, changes: Mapping[str, tuple[Any, Any]], person: str = "", *, merges: bool = False) -> None:
+        """Parameters that were changed, by name: before and after. merges: one step with the change before it, when
+        that was of the same parameters, and merged too."""
+        if not changes:
+            return
+        with self._turn(person) as turn:
+            connection, draft = turn.connection, turn.draft
+            for name, (before, after) in changes.items():
+                draft.put_param(name, before, after)
+            if not draft.write():
+                return
+            step = self._steps.before(connection, draft.number - 1, person, set(changes)) if merges else None
+            self._steps.drop_redo(connection, person)
+            named = ", ".join(f"{name} {_short(old)} → {_short(new)}" for name, (old, new) in list(changes.items())[:3])
+            more = f" and {len(changes) - 3} more" if len(changes) > 3 else ""
+            self._write(turn, "nudge" if merges else "params", named + more, step=step)
+
+    # ------------------------------------------------------------ going back and forth
+
+    def move(
+        self,
+        way: Way,
+        person: str,
+        check: Callable[[Mapping[str, Any]], object] = lambda _: None,
+        *,
+        act_id: str | None = None,
+    ) -> Acted:
+        """Take back the person's newest act, or do again the one taken back last. ActRefused when there is none, or
+        when somebody else changed the same label or parameter since. check: raises for parameters that cannot be.
+        act_id: as in ``act``."""
+        with self._turn(person) as turn:
+            connection, draft = turn.connection, turn.draft
+            done = self._sent_before(connection, act_id, person)
+            if done is not None:
+                return done
+            step = self._steps.following(connection, way, person)
+            if step is None:
+                raise ActRefused(f"there is nothing to {way}")
+            acts = self._steps.acts_of(connection, step)
+            for number, _ in reversed(acts) if way == "undo" else acts:
+                self._put(connection, draft, number, way)
+            check(draft.params)
+            check_whole(draft)
+            draft.write()
+            what = acts[-1][1]
+            status = "undone" if way == "undo" else "done"
+            connection.execute(
+                update(ActRow)
+                .where(ActRow.drive_id == self._drive_id, ActRow.number.in_([number for number, _ in acts]))
+                .values(status=status)
+            )
+            said = f"took back: {what}" if way == "undo" else f"did again: {what}"
+            self._write(turn, way, said, target=step, act_id=act_id)
+            return Acted(draft.number, draft.number, what, params=draft.params)
+
+    def possible(self, person: str) -> tuple[bool, bool]:
+        """(there is something to take back, something to do again) for a person."""
+        with self._database.reading() as connection:
+            return self._steps.possible(connection, person)
+
+    # ------------------------------------------------------------ looking back
+
+    def history(self, kind: ItemKind, number: int) -> list[HistoryEntry]:
+        """The acts that changed an item, newest first."""
+        with self._database.reading() as connection:
+            found = connection.execute(
+                select(ActRow, ChangeRow.before, ChangeRow.after)
+                .join(ActRow, and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act))
+                .where(ChangeRow.drive_id == self._drive_id, ChangeRow.kind == kind, ChangeRow.item == str(number))
+                .order_by(ActRow.number.desc())
+                .limit(_LONGEST_HISTORY)
+            ).all()
+        return [
+            HistoryEntry(
+                row.number,
+                row.what,
+                row.note,
+                row.person,
+                row.t_unix_ms,
+                unpack(row.before) if row.before is not None else None,
+                unpack(row.after) if row.after is not None else None,
+                row.status != "done",
+            )
+            for row in found
+        ]
+
+    # ------------------------------------------------------------ the transaction
+
+    @contextmanager
+    def _turn(self, person: str) -> Iterator[_Turn]:
+        """The transaction of an act. Its first statement makes acts of one drive wait for each other; nothing stays of
+        one whose row was not written."""
+        with self._database.writing() as connection:
+            number = connection.execute(
+                update(DriveRow)
+                .where(DriveRow.id == self._drive_id)
+                .values(revision=DriveRow.revision + 1)
+                .returning(DriveRow.revision)
+            ).scalar_one()
+            turn = _Turn(connection, Draft(connection, self._drive_id, number, person, int(time.time() * 1000)))
+            yield turn
+            if not turn.is_logged:
+                connection.get_transaction().rollback()  # type: ignore[union-attr]
+
+    def _write(
+        self,
+        turn: _Turn,
+        kind: str,
+        what: str,
+        *,
+        step: int | None = None,
+        target: int | None = None,
+        act_id: str | None = None,
+        note: str = "",
+    ) -> None:
+        draft, turn.is_logged = turn.draft, True
+        turn.connection.execute(
+            insert(ActRow).values(
+                drive_id=self._drive_id,
+                number=draft.number,
+                kind=kind,
+                what=what,
+                person=draft.person,
+                station=self._station,
+                t_unix_ms=draft.t_unix_ms,
+                step=step or draft.number,
+                status="done",
+                target=target,
+                act_id=act_id,
+                note=note,
+            )
+        )
+
+    def _sent_before(self, connection: Connection, act_id: str | None, person: str) -> Acted | None:
+        if act_id is None:
+            return None
+        row = connection.execute(
+            select(ActRow.number, ActRow.what, ActRow.note, ActRow.person, ActRow.target).where(
+                ActRow.drive_id == self._drive_id, ActRow.act_id == act_id
+            )
+        ).first()
+        if row is None:
+            return None
+        if row.person != person:
+            raise ActRefused("an act of somebody else has that id")
+        what = row.what if row.target is None else self._steps.acts_of(connection, row.target)[-1][1]
+        return Acted(row.number, row.number, what, row.note)
+
+    def _put(self, connection: Connection, draft: Draft, act: int, way: Way) -> None:
+        """What an act found (undo) or left (redo), again. ActRefused when anything does not stand as the act left it
+        (undo) or found it (redo): that would take back what somebody else did since."""
+        rows = connection.execute(
+            select(ChangeRow).where(ChangeRow.drive_id == self._drive_id, ChangeRow.act == act)
+        ).all()
+        for row in rows:
+            here, there = (row.after, row.before) if way == "undo" else (row.before, row.after)
+            if row.kind == "param":
+                if (other := self._steps.changed_since(connection, row, draft.person)) is not None:
+                    raise ActRefused(f"{other} changed {row.item} since; {way} would take that back too")
+                draft.put_param(row.item, unpack(here), unpack(there))
+                continue
+            kind: ItemKind = row.kind
+            number = int(row.item)
+            was, to = unpack_pair(kind, here, there)
+            if not draft.stands(kind, number, was):
+                other = self._steps.changed_since(connection, row, draft.person) or "somebody"
+                raise ActRefused(f"{other} changed {name_of(kind, number)} since; {way} would take that back too")
+            draft.put(kind, number, to.value)
+            if kind == "track":
+                draft.put_sightings(number, to.frames)
+
+
+def _short(value: Any) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)

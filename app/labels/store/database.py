@@ -1,0 +1,173 @@
+"""The database that labels are kept in: SQLite in a file of this machine, or a team's PostgreSQL.
+
+What a transaction has committed is on disk: SQLite writes its log through to it (``synchronous=FULL``), and so does
+PostgreSQL as it comes. Writers come one after the other: SQLite takes its one lock at the beginning, PostgreSQL
+locks the drive that an act is on.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import Connection, create_engine, event, inspect, text
+from sqlalchemy.dialects import postgresql, sqlite
+from sqlalchemy.engine import URL, Engine, make_url
+from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
+
+from app.engine.session_recording import SESSIONS
+from app.labels import URL_VARIABLE
+from app.labels.errors import DatabaseError
+from app.labels.store.migrations import HEAD
+from app.labels.store.tables import Base
+
+logger = logging.getLogger("cipv.labels")
+
+FILE = SESSIONS / "labels.db"
+_BUSY_S = 30.0
+_CONNECT_S = 3
+"""A server that is away must not keep anybody waiting: parameters are changed while driving."""
+_MIGRATION_LOCK = 0x63697076
+"""Any number that only this program takes in PostgreSQL."""
+
+
+class Database:
+    """Open, and at the newest schema. Any thread, any number of processes."""
+
+    def __init__(self, url: str | URL) -> None:
+        """DatabaseError when it cannot be opened or is newer than this program."""
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        try:
+            self.url = make_url(url)
+            self._engine = _engine(self.url)
+        except ImportError as error:
+            brought = ", which `make install` brings" if error.name == "psycopg" else ""
+            raise DatabaseError(f"labels: {error.name or error} is not installed{brought}") from None
+        except (ArgumentError, NoSuchModuleError) as error:
+            raise DatabaseError(f"labels: no database address that is understood: {_first_line(error)}") from None
+        self.is_sqlite = self._engine.dialect.name == "sqlite"
+        with self.writing() as connection:
+            if not self.is_sqlite:
+                connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": _MIGRATION_LOCK})
+            self._migrate(connection)
+
+    @staticmethod
+    def in_file(file: Path) -> Database:
+        """SQLite; the folder is made. DatabaseError when it cannot be."""
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise DatabaseError(f"{file}: labels cannot be kept there: {error.strerror}") from None
+        return Database(URL.create("sqlite", database=str(file)))
+
+    @staticmethod
+    def temporary() -> Database:
+        """One that is gone when it is closed."""
+        folder = tempfile.TemporaryDirectory(prefix="cipv-labels-", ignore_cleanup_errors=True)
+        database = Database.in_file(Path(folder.name) / "labels.db")
+        database._folder = folder
+        return database
+
+    @property
+    def name(self) -> str:
+        """For people: the file, or the address without its password."""
+        return str(self.url.database) if self.is_sqlite else self.url.render_as_string(hide_password=True)
+
+    @contextmanager
+    def reading(self) -> Iterator[Connection]:
+        """One view, from the first question to the last, whatever others write meanwhile. DatabaseError for whatever
+        the database says."""
+        with self._speaking(), self._engine.connect() as connection:
+            if not self.is_sqlite:  # SQLite's readers have it
+                connection.execution_options(isolation_level="REPEATABLE READ")
+            with connection.begin():
+                yield connection
+
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
+        """A transaction: on disk when the block has ended, and not at all when it raised."""
+        with self._speaking(), self._engine.connect().execution_options(writes=True) as connection, connection.begin():
+            yield connection
+
+    def insert_new(self, connection: Connection, table: type[Base], values: Mapping[str, Any]) -> bool:
+        """A row, unless one with its key is there already; whether it was written."""
+        insert = sqlite.insert if self.is_sqlite else postgresql.insert
+        made = insert(table).values(values).on_conflict_do_nothing().returning(*table.__table__.primary_key)
+        return connection.execute(made).first() is not None
+
+    def close(self) -> None:
+        """Safe to call twice."""
+        self._engine.dispose()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    @contextmanager
+    def _speaking(self) -> Iterator[None]:
+        try:
+            yield
+        except DBAPIError as error:
+            raise DatabaseError(f"labels, {self.name}: {_first_line(error.orig or error)}") from None
+
+    def _migrate(self, connection: Connection) -> None:
+        """To the newest schema, in the transaction."""
+        at = None
+        if inspect(connection).has_table("alembic_version"):
+            at = connection.scalar(text("SELECT version_num FROM alembic_version"))
+        if at != HEAD:
+            migrate(connection, at, self.name)
+
+
+def open_database(url: str | None = None) -> Database:
+    """The one at ``url`` (or of the environment), else the file of this machine. DatabaseError when it cannot be."""
+    wanted = url or os.environ.get(URL_VARIABLE)
+    return Database(wanted) if wanted else Database.in_file(FILE)
+
+
+def migrate(connection: Connection, at: str | None, name: str) -> None:
+    """From revision ``at``, null for an empty database. DatabaseError when nobody here knows that revision."""
+    from alembic import command  # half a second to import, which only the first start pays
+    from alembic.config import Config
+    from alembic.script import ScriptDirectory
+
+    config = Config()
+    config.set_main_option("script_location", str(Path(__file__).parent / "migrations").replace("%", "%%"))
+    config.attributes["connection"] = connection
+    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
+    if at is not None and at not in known:
+        raise DatabaseError(f"labels, {name}: written by a newer program; this one does not know its form")
+    command.upgrade(config, HEAD)
+
+
+def _engine(url: URL) -> Engine:
+    if url.get_backend_name() == "sqlite":
+        engine = create_engine(url, connect_args={"timeout": _BUSY_S, "check_same_thread": False})
+        event.listen(engine, "connect", _as_sqlite)
+        event.listen(engine, "begin", _begin_sqlite)
+        return engine
+    if url.get_backend_name() == "postgresql":
+        if url.drivername == "postgresql":
+            url = url.set(drivername="postgresql+psycopg")
+        patience = f"-c lock_timeout={int(_BUSY_S * 1e3)}ms"
+        return create_engine(url, pool_pre_ping=True, connect_args={"connect_timeout": _CONNECT_S, "options": patience})
+    raise ArgumentError(f"{url.get_backend_name()}: sqlite or postgresql is kept labels in")
+
+
+def _as_sqlite(connection: Any, _: Any) -> None:
+    connection.isolation_level = None  # we say BEGIN ourselves: the driver would let a transaction begin too late
+    connection.execute("PRAGMA journal_mode=WAL")
+    connection.execute("PRAGMA synchronous=FULL")
+    connection.execute("PRAGMA foreign_keys=ON")
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    writes = connection.get_execution_options().get("writes", False)
+    connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).strip().splitlines() or ["no reason given"])[0]

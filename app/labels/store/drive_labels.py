@@ -1,0 +1,247 @@
+"""The labels of one recording in a database: as a whole, in parts, and frozen under names."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+from sqlalchemy import and_, func, select
+
+from app.labels.errors import ActRefused, NoSuchLabel
+from app.labels.store.act_log import Log
+from app.labels.store.database import Database
+from app.labels.store.items import (
+    SIGHTINGS,
+    read_changed,
+    read_changers,
+    read_extents,
+    read_item,
+    read_items,
+    read_track,
+    read_window,
+)
+from app.labels.store.tables import DriveRow, ItemRow, SightingRow, VersionRow
+from app.labels.store.values import KINDS, LONGEST_ITEM, Item, ItemKind, sighting_of
+from app.labels.wording import WORKING
+from pipeline.labels.formats.native import from_json, to_json
+from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
+from pipeline.sources.fingerprint import content_key
+from pipeline.types.source import Source
+
+
+@dataclass(frozen=True)
+class DriveInfo:
+    """A recording that labels belong to. key: of its content. t_ns: the ticks of its frames. names: gives their names,
+    which may mean to read them all."""
+
+    key: str
+    uri: str
+    title: str
+    t_ns: tuple[int, ...]
+    names: Callable[[], tuple[str, ...]]
+
+
+def info_of(source: Source, names: Callable[[], tuple[str, ...]]) -> DriveInfo:
+    """What a recording is, wherever it lies: three of its frames are read."""
+    t_ns = tuple(source.t_ns(index) for index in range(len(source)))
+    return DriveInfo(content_key(t_ns, source.frame), source.uri, source.title, t_ns, names)
+
+
+def info_of_uri(uri: str) -> DriveInfo:
+    """Of what has no frames, as live sensors, and no content to know it by. The key is short enough for the database;
+    two addresses never share one."""
+    key = f"uri {uri}"
+    short = key if len(key) <= LONGEST_ITEM else f"uri sha256 {hashlib.sha256(uri.encode()).hexdigest()}"
+    return DriveInfo(short, uri, uri, (), tuple)
+
+
+@dataclass(frozen=True)
+class Version:
+    """A frozen label set. frames: that have a label."""
+
+    name: str
+    person: str
+    t_unix_ms: int
+    tracks: int
+    frames: int
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What acts after ``since`` changed. extents: of tracks, first and last frame, sightings, keyframes."""
+
+    revision: int
+    items: list[Item]
+    removed: list[tuple[ItemKind, int]]
+    extents: dict[int, tuple[int, int, int, list[int]]]
+
+
+class DriveLabels:
+    """Any thread. Everything is read from the database at the moment of asking: others write there too."""
+
+    def __init__(self, database: Database, info: DriveInfo, station: str | None = None) -> None:
+        """Finds the recording by its content, or begins with no labels."""
+        self.info, self._database = info, database
+        self._id = _drive_row(database, info)
+        self.log = Log(database, self._id, station)
+
+    @property
+    def revision(self) -> int:
+        """The number of the newest act."""
+        with self._database.reading() as connection:
+            return connection.scalars(select(DriveRow.revision).where(DriveRow.id == self._id)).one()
+
+    def changes(self, since: int = 0) -> Changes:
+        with self._database.reading() as connection:
+            revision = connection.scalars(select(DriveRow.revision).where(DriveRow.id == self._id)).one()
+            items, removed = read_changed(connection, self._id, since)
+            tracks = [item.id for item in items if item.kind == "track"]
+            extents = read_extents(connection, self._id, tracks) if tracks else {}
+        return Changes(revision, items, removed if since else [], extents)
+
+    def window(self, first: int, last: int) -> tuple[int, dict[int, list[tuple[int, Sighting]]]]:
+        """(revision, by frame the tracks in it and where they are)."""
+        found: dict[int, list[tuple[int, Sighting]]] = {}
+        with self._database.reading() as connection:
+            revision = connection.scalars(select(DriveRow.revision).where(DriveRow.id == self._id)).one()
+            for track, sighting in read_window(connection, self._id, first, last):
+                found.setdefault(sighting.frame, []).append((track, sighting))
+        return revision, found
+
+    def items(self, kind: ItemKind) -> dict[int, Item]:
+        with self._database.reading() as connection:
+            return read_items(connection, self._id, kind)
+
+    def changed_by(self) -> dict[tuple[ItemKind, int], str]:
+        """Who changed each item last, by kind and number."""
+        with self._database.reading() as connection:
+            return read_changers(connection, self._id)
+
+    def track(self, number: int) -> Item:
+        """With its sightings. NoSuchLabel when it is not there."""
+        with self._database.reading() as connection:
+            found = read_item(connection, self._id, "track", number)
+            if found is None:
+                raise NoSuchLabel(f"there is no track {number}")
+            sightings = tuple(read_track(connection, self._id, number).values())
+        return replace(found, value=replace(cast("LabelTrack", found.value), sightings=sightings))
+
+    def label_set(self, version: str = WORKING) -> LabelSet:
+        """All labels, as they are now or were frozen. NoSuchLabel for a version that is not there."""
+        if version != WORKING:
+            return from_json(self.version_json(version), f"version {version}")
+        return self._now(self.info.names())
+
+    def unnamed_set(self) -> LabelSet:
+        """The same as they are now, frames called by their numbers: no frame is read for it."""
+        return self._now(tuple(map(str, range(len(self.info.t_ns)))))
+
+    def has_labels(self) -> bool:
+        """Whether anything was ever labelled here and is there still."""
+        return any(self.items(kind) for kind in KINDS)
+
+    # ------------------------------------------------------------ versions
+
+    def versions(self) -> list[Version]:
+        """The oldest first."""
+        with self._database.reading() as connection:
+            found = connection.execute(
+                select(VersionRow.name, VersionRow.person, VersionRow.t_unix_ms, VersionRow.tracks, VersionRow.frames)
+                .where(VersionRow.drive_id == self._id)
+                .order_by(VersionRow.t_unix_ms, VersionRow.name)
+            ).all()
+        return [Version(*row) for row in found]
+
+    def freeze(self, name: str, person: str) -> Version:
+        """Keep all labels as they are now under a name. ActRefused when it is taken."""
+        taken = f"there is a version {name!r} already; versions are never overwritten"
+        if name == WORKING or any(version.name == name for version in self.versions()):
+            raise ActRefused(taken)
+        labels = replace(self.label_set(), name=name)
+        covered = {each.frame for track in labels.tracks for each in track.sightings}
+        covered |= {frame for lead in labels.leads for frame in range(lead.first, lead.last + 1)}
+        version = Version(name, person, int(time.time() * 1000), len(labels.tracks), len(covered))
+        values = {
+            "drive_id": self._id,
+            "name": name,
+            "person": person,
+            "t_unix_ms": version.t_unix_ms,
+            "tracks": version.tracks,
+            "frames": version.frames,
+            "labels": zlib.compress(to_json(labels), 1),
+        }
+        with self._database.writing() as connection:
+            if not self._database.insert_new(connection, VersionRow, values):
+                raise ActRefused(taken)  # somebody else froze under it at the same moment
+        return version
+
+    def version_json(self, name: str) -> bytes:
+        """The native file of a frozen version. NoSuchLabel when it is not there."""
+        with self._database.reading() as connection:
+            data = connection.scalars(
+                select(VersionRow.labels).where(VersionRow.drive_id == self._id, VersionRow.name == name)
+            ).first()
+        if data is None:
+            raise NoSuchLabel(f"there is no version {name!r} of these labels")
+        return zlib.decompress(data)
+
+    # ------------------------------------------------------------ inside
+
+    def _now(self, names: tuple[str, ...]) -> LabelSet:
+        by_track: dict[int, list[Sighting]] = {}
+        with self._database.reading() as connection:
+            rows = connection.execute(
+                select(*SIGHTINGS).where(SightingRow.drive_id == self._id).order_by(SightingRow.frame)
+            )
+            for row in rows:
+                by_track.setdefault(row[2], []).append(sighting_of(row))
+            items = {kind: [each.value for each in read_items(connection, self._id, kind).values()] for kind in KINDS}
+        tracks = cast("list[LabelTrack]", items["track"])
+        leads = sorted(cast("list[LeadRange]", items["lead"]), key=lambda lead: (lead.first, lead.last))
+        return LabelSet(
+            self.info.uri,
+            names,
+            self.info.t_ns,
+            tuple(replace(track, sightings=tuple(by_track.get(track.id, ()))) for track in tracks),
+            tuple(leads),
+            tuple(sorted(cast("list[PathLabel]", items["path"]), key=lambda path: path.frame)),
+            tuple(sorted(cast("list[EventLabel]", items["event"]), key=lambda event: event.frame)),
+            tuple(sorted(cast("list[FrameTag]", items["tag"]), key=lambda tag: (tag.first, tag.last))),
+        )
+
+
+def known_drives(database: Database) -> list[dict[str, Any]]:
+    """Every recording that has labels: its uri, title, count of frames and of tracks, and newest act."""
+    tracks = func.count(ItemRow.id).filter(ItemRow.kind == "track")
+    with database.reading() as connection:
+        found = connection.execute(
+            select(DriveRow.uri, DriveRow.title, DriveRow.count, tracks.label("tracks"), DriveRow.revision)
+            .join(ItemRow, and_(ItemRow.drive_id == DriveRow.id, ItemRow.removed.is_(False)))
+            .where(DriveRow.count > 0)
+            .group_by(DriveRow.id)
+            .order_by(DriveRow.title, DriveRow.id)
+        ).all()
+    return [dict(row._mapping) for row in found]
+
+
+def _drive_row(database: Database, info: DriveInfo) -> int:
+    """Its id; made when there is none. Two at once make one."""
+    values = {
+        "key": info.key,
+        "uri": info.uri,
+        "title": info.title,
+        "count": len(info.t_ns),
+        "revision": 0,
+    }
+    wanted = select(DriveRow.id).where(DriveRow.key == info.key)
+    with database.reading() as connection:
+        found = connection.scalars(wanted).first()
+    if found is not None:
+        return found
+    with database.writing() as connection:
+        database.insert_new(connection, DriveRow, values)
+        return connection.scalars(wanted).one()

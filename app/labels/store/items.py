@@ -1,0 +1,119 @@
+"""Labels of one drive read from the database."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from typing import Any, cast
+
+from sqlalchemy import Connection, and_, func, select
+
+from app.labels.store.tables import ActRow, ChangeRow, ItemRow, SightingRow
+from app.labels.store.undo_order import WAYS
+from app.labels.store.values import KINDS, Item, ItemKind, sighting_of, value_from_json
+from pipeline.labels.model import Sighting
+
+SIGHTINGS = tuple(SightingRow.__table__.columns)
+"""In the table's order, which is that of ``values.row_of``."""
+_MOST_NAMED = 500
+"""Numbers in one question: databases have limits on that."""
+
+
+def read_items(connection: Connection, drive_id: int, kind: ItemKind) -> dict[int, Item]:
+    """Every item of a kind that is there, by its number."""
+    found = connection.execute(
+        select(ItemRow.id, ItemRow.revision, ItemRow.value)
+        .where(ItemRow.drive_id == drive_id, ItemRow.kind == kind, ItemRow.removed.is_(False))
+        .order_by(ItemRow.id)
+    )
+    return {row.id: _item(kind, row) for row in found}
+
+
+def read_item(connection: Connection, drive_id: int, kind: ItemKind, number: int) -> Item | None:
+    """Null when it is not, or no longer, there."""
+    row = connection.execute(
+        select(ItemRow.id, ItemRow.revision, ItemRow.value).where(
+            ItemRow.drive_id == drive_id, ItemRow.kind == kind, ItemRow.id == number, ItemRow.removed.is_(False)
+        )
+    ).first()
+    return _item(kind, row) if row is not None else None
+
+
+def read_changed(connection: Connection, drive_id: int, since: int) -> tuple[list[Item], list[tuple[ItemKind, int]]]:
+    """(items that are there, kinds and numbers of removed ones) of all that acts after ``since`` changed."""
+    found = connection.execute(
+        select(ItemRow.kind, ItemRow.id, ItemRow.revision, ItemRow.removed, ItemRow.value)
+        .where(ItemRow.drive_id == drive_id, ItemRow.revision > since)
+        .order_by(ItemRow.kind, ItemRow.id)
+    ).all()
+    items = [_item(cast("ItemKind", row.kind), row) for row in found if not row.removed]
+    return items, [(cast("ItemKind", row.kind), row.id) for row in found if row.removed]
+
+
+def read_track(
+    connection: Connection, drive_id: int, track: int, first: int | None = None, last: int | None = None
+) -> dict[int, Sighting]:
+    """A track's sightings by ascending frame, from ``first`` to ``last`` where they are given."""
+    wanted = select(*SIGHTINGS).where(SightingRow.drive_id == drive_id, SightingRow.track == track)
+    if first is not None:
+        wanted = wanted.where(SightingRow.frame >= first)
+    if last is not None:
+        wanted = wanted.where(SightingRow.frame <= last)
+    found = connection.execute(wanted.order_by(SightingRow.frame))
+    return {sighting.frame: sighting for sighting in map(sighting_of, found)}
+
+
+def read_window(connection: Connection, drive_id: int, first: int, last: int) -> Iterator[tuple[int, Sighting]]:
+    """(track, sighting) of every track in frames first … last, by frame."""
+    found = connection.execute(
+        select(*SIGHTINGS)
+        .where(SightingRow.drive_id == drive_id, SightingRow.frame.between(first, last))
+        .order_by(SightingRow.frame, SightingRow.track)
+    )
+    for row in found:
+        yield row[2], sighting_of(row)
+
+
+def read_extents(
+    connection: Connection, drive_id: int, tracks: Iterable[int]
+) -> dict[int, tuple[int, int, int, list[int]]]:
+    """Of each track that has sightings: first frame, last frame, how many, and its keyframes."""
+    wanted = list(tracks)
+    whole = len(wanted) > _MOST_NAMED
+    extent = select(SightingRow.track, func.min(SightingRow.frame), func.max(SightingRow.frame), func.count()).where(
+        SightingRow.drive_id == drive_id
+    )
+    keys = select(SightingRow.track, SightingRow.frame).where(
+        SightingRow.drive_id == drive_id, SightingRow.keyframe.is_(True)
+    )
+    if not whole:
+        extent, keys = extent.where(SightingRow.track.in_(wanted)), keys.where(SightingRow.track.in_(wanted))
+    found: dict[int, tuple[int, int, int, list[int]]] = {
+        track: (first, last, count, []) for track, first, last, count in connection.execute(extent.group_by("track"))
+    }
+    for track, frame in connection.execute(keys.order_by(SightingRow.track, SightingRow.frame)):
+        found[track][3].append(frame)
+    return found
+
+
+def read_changers(connection: Connection, drive_id: int) -> dict[tuple[ItemKind, int], str]:
+    """Who did the last act in force on each item, by kind and number: what was taken back, and taking back, are not."""
+    of_act = and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act)
+    last = (
+        select(ChangeRow.kind, ChangeRow.item, func.max(ChangeRow.act).label("act"))
+        .join(ActRow, of_act)
+        .where(ChangeRow.drive_id == drive_id, ActRow.status == "done", ActRow.kind.not_in(WAYS))
+        .where(ChangeRow.kind.in_(KINDS))
+        .group_by(ChangeRow.kind, ChangeRow.item)
+        .subquery()
+    )
+    found = connection.execute(
+        select(last.c.kind, last.c.item, ActRow.person).join(
+            ActRow, and_(ActRow.drive_id == drive_id, ActRow.number == last.c.act)
+        )
+    )
+    return {(cast("ItemKind", row.kind), int(row.item)): row.person for row in found}
+
+
+def _item(kind: ItemKind, row: Any) -> Item:
+    return Item(kind, row.id, row.revision, value_from_json(kind, json.loads(row.value)))

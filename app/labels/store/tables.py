@@ -1,0 +1,117 @@
+"""How labels lie in a database: drives, the acts on them, what each act changed, and how everything is now.
+
+``item`` and ``sighting`` are the labels as they stand. ``act`` is the log, one row an act; ``change`` holds each item
+that an act changed, before and after it, so that every act can be taken back and every item has a history.
+"""
+
+from __future__ import annotations
+
+from sqlalchemy import BigInteger, Boolean, Double, ForeignKey, Index, Integer, LargeBinary, String, Text
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+
+from app.labels.store.values import LONGEST_ITEM, LONGEST_NAME
+
+
+class Base(DeclarativeBase):
+    """Every table."""
+
+
+class DriveRow(Base):
+    """A recording that was labelled, or driven with. key: its content's. count: of its frames, 0 for what has none, as
+    live sensors. revision: the number of its newest act."""
+
+    __tablename__ = "drive"
+    id: Mapped[int] = mapped_column(Integer, primary_key=True)
+    key: Mapped[str] = mapped_column(String(LONGEST_ITEM), unique=True)
+    uri: Mapped[str] = mapped_column(Text)
+    title: Mapped[str] = mapped_column(Text)
+    count: Mapped[int] = mapped_column(Integer)
+    revision: Mapped[int] = mapped_column(BigInteger, default=0)
+
+
+class ItemRow(Base):
+    """A track (without its sightings), range of the lead, path, event or range of a tag. revision: the act that changed
+    it last. removed ones stay, so that others hear of it and their number is not given again."""
+
+    __tablename__ = "item"
+    drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
+    kind: Mapped[str] = mapped_column(String(16), primary_key=True)
+    id: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    revision: Mapped[int] = mapped_column(BigInteger)
+    removed: Mapped[bool] = mapped_column(Boolean)
+    value: Mapped[str] = mapped_column(Text)
+    __table_args__ = (Index("item_by_revision", "drive_id", "revision"),)
+
+
+class SightingRow(Base):
+    """A track in one frame. Ego frame, metres, radians; box in pixels; null where there is none."""
+
+    __tablename__ = "sighting"
+    drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
+    frame: Mapped[int] = mapped_column(Integer, primary_key=True, autoincrement=False)
+    track: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    keyframe: Mapped[bool] = mapped_column(Boolean)
+    x_m: Mapped[float | None] = mapped_column(Double)
+    y_m: Mapped[float | None] = mapped_column(Double)
+    z_m: Mapped[float | None] = mapped_column(Double)
+    length_m: Mapped[float | None] = mapped_column(Double)
+    width_m: Mapped[float | None] = mapped_column(Double)
+    height_m: Mapped[float | None] = mapped_column(Double)
+    yaw_rad: Mapped[float | None] = mapped_column(Double)
+    x1_px: Mapped[float | None] = mapped_column(Double)
+    y1_px: Mapped[float | None] = mapped_column(Double)
+    x2_px: Mapped[float | None] = mapped_column(Double)
+    y2_px: Mapped[float | None] = mapped_column(Double)
+    __table_args__ = (Index("sighting_by_track", "drive_id", "track", "frame", "keyframe"),)
+
+
+class ActRow(Base):
+    """What a person did. number: from 1, by drive. step: the act that this one goes on with, else itself; they are
+    taken back together. station: the server whose parameters it changed. status: done, undone (can be redone) or
+    dropped (was undone, and something else was done since). target: of an undo or redo, the step that it is about.
+    act_id: who sent it made it, so that what is sent again is not done again. note: what was said of it besides."""
+
+    __tablename__ = "act"
+    drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
+    number: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    kind: Mapped[str] = mapped_column(String(24))
+    what: Mapped[str] = mapped_column(Text)
+    person: Mapped[str] = mapped_column(String(LONGEST_NAME))
+    station: Mapped[str] = mapped_column(Text)
+    t_unix_ms: Mapped[int] = mapped_column(BigInteger)
+    step: Mapped[int] = mapped_column(BigInteger)
+    status: Mapped[str] = mapped_column(String(8))
+    target: Mapped[int | None] = mapped_column(BigInteger)
+    act_id: Mapped[str | None] = mapped_column(String(36))
+    note: Mapped[str] = mapped_column(Text, server_default="")
+    __table_args__ = (
+        Index("act_by_status", "drive_id", "status", "person", "step"),
+        Index("act_by_id", "drive_id", "act_id", unique=True),
+    )
+
+
+class ChangeRow(Base):
+    """One item in one act: compressed JSON before and after, null where it was not there. item: the number of an item,
+    or a parameter's name."""
+
+    __tablename__ = "change"
+    drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
+    act: Mapped[int] = mapped_column(BigInteger, primary_key=True, autoincrement=False)
+    kind: Mapped[str] = mapped_column(String(16), primary_key=True)
+    item: Mapped[str] = mapped_column(String(LONGEST_ITEM), primary_key=True)
+    before: Mapped[bytes | None] = mapped_column(LargeBinary)
+    after: Mapped[bytes | None] = mapped_column(LargeBinary)
+    __table_args__ = (Index("change_by_item", "drive_id", "kind", "item", "act"),)
+
+
+class VersionRow(Base):
+    """A label set that was frozen under a name: the native file, compressed."""
+
+    __tablename__ = "version"
+    drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
+    name: Mapped[str] = mapped_column(String(LONGEST_NAME), primary_key=True)
+    person: Mapped[str] = mapped_column(String(LONGEST_NAME))
+    t_unix_ms: Mapped[int] = mapped_column(BigInteger)
+    tracks: Mapped[int] = mapped_column(Integer)
+    frames: Mapped[int] = mapped_column(Integer)
+    labels: Mapped[bytes] = mapped_column(LargeBinary)

@@ -1,0 +1,107 @@
+"""Whose acts of a drive are whose: what a person takes back or does again next, and what stands in the way."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from sqlalchemy import (
+    BindParameter,
+    ColumnElement,
+    Connection,
+    Select,
+    String,
+    and_,
+    bindparam,
+    func,
+    or_,
+    select,
+    update,
+)
+
+from app.labels.store.tables import ActRow, ChangeRow
+
+Way = Literal["undo", "redo"]
+WAYS: tuple[Way, Way] = ("undo", "redo")
+_OF_PARAMS = ("params", "nudge")
+
+
+class Steps:
+    """Of one drive, in whatever transaction is asked. station: whose parameters are meant. What is asked with every
+    move of a slider is put into words once: that takes longer than the answer."""
+
+    def __init__(self, drive_id: int, station: str) -> None:
+        self._drive_id, self._station = drive_id, station
+        self._following = {way: self._select_following(way) for way in WAYS}
+        self._possible = select(*(self._following[way].scalar_subquery() for way in WAYS))
+
+    def _mine(self, person: str | BindParameter[str]) -> ColumnElement[bool]:
+        """The acts that a person can take back or do again."""
+        of_params = and_(ActRow.kind.in_(_OF_PARAMS), ActRow.station == self._station, ActRow.person.in_(("", person)))
+        of_labels = and_(ActRow.kind.not_in((*_OF_PARAMS, *WAYS)), ActRow.person == person)
+        return and_(ActRow.drive_id == self._drive_id, or_(of_params, of_labels))
+
+    def _select_following(self, way: Way) -> Select[int]:
+        mine = self._mine(bindparam("person", type_=String))
+        if way == "undo":
+            return select(func.max(ActRow.step)).where(mine, ActRow.status == "done")
+        return select(func.min(ActRow.step)).where(mine, ActRow.status == "undone")
+
+    def following(self, connection: Connection, way: Way, person: str) -> int | None:
+        """The step that is next to be taken back or done again."""
+        return connection.scalar(self._following[way], {"person": person})
+
+    def possible(self, connection: Connection, person: str) -> tuple[bool, bool]:
+        """(there is something to take back, something to do again) for a person: one question."""
+        undo, redo = connection.execute(self._possible, {"person": person}).one()
+        return undo is not None, redo is not None
+
+    def acts_of(self, connection: Connection, step: int) -> list[tuple[int, str]]:
+        found = connection.execute(
+            select(ActRow.number, ActRow.what)
+            .where(ActRow.drive_id == self._drive_id, ActRow.step == step, ActRow.kind.not_in(WAYS))
+            .order_by(ActRow.number)
+        )
+        return [(row.number, row.what) for row in found]
+
+    def drop_redo(self, connection: Connection, person: str) -> None:
+        """Who does something else does not do again what was taken back."""
+        connection.execute(update(ActRow).where(self._mine(person), ActRow.status == "undone").values(status="dropped"))
+
+    def before(self, connection: Connection, number: int, person: str, names: set[str]) -> int | None:
+        """The step of act ``number``, when it nudged the same parameters; else null."""
+        row = connection.execute(
+            select(ActRow.step, ActRow.kind, ActRow.person, ActRow.station, ActRow.status).where(
+                ActRow.drive_id == self._drive_id, ActRow.number == number
+            )
+        ).first()
+        if row is None or tuple(row[1:]) != ("nudge", person, self._station, "done"):
+            return None
+        before = connection.scalars(
+            select(ChangeRow.item).where(ChangeRow.drive_id == self._drive_id, ChangeRow.act == number)
+        )
+        return row.step if set(before) == names else None
+
+    def changed_since(self, connection: Connection, change: Any, person: str) -> str | None:
+        """Who else changed the same thing after ``change``, the last one; null when nobody did. A parameter is changed
+        by acts in force on this station alone, and by who has a name."""
+        wanted = [
+            ChangeRow.drive_id == self._drive_id,
+            ChangeRow.kind == change.kind,
+            ChangeRow.item == change.item,
+            ChangeRow.act > change.act,
+            ActRow.person != person,
+        ]
+        if change.kind == "param":
+            wanted += [
+                ActRow.status == "done",
+                ActRow.kind.not_in(WAYS),
+                ActRow.station == self._station,
+                ActRow.person != "",
+            ]
+        return connection.scalars(
+            select(ActRow.person)
+            .join(ChangeRow, and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act))
+            .where(*wanted)
+            .order_by(ActRow.number.desc())
+            .limit(1)
+        ).first()

@@ -1,0 +1,132 @@
+"""Labels as the database holds them, and back: items as JSON, sightings as rows, changes as compressed JSON."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args
+
+from pydantic import TypeAdapter
+
+from pipeline.common.geometry import Cuboid
+from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, LeadRange, PathLabel, Sighting
+
+LONGEST_NAME = 80
+"""Of a person, and of a version."""
+LONGEST_ITEM = 120
+"""Of a parameter, and of a recording's key."""
+ItemKind = Literal["track", "lead", "path", "event", "tag"]
+KINDS: tuple[ItemKind, ...] = get_args(ItemKind)
+Value = LabelTrack | LeadRange | PathLabel | EventLabel | FrameTag
+Frames = Mapping[int, Sighting | None]
+"""Sightings of one track by frame; null where there is none (any more)."""
+
+_ADAPTERS: dict[ItemKind, TypeAdapter[Any]] = {
+    "track": TypeAdapter(LabelTrack),
+    "lead": TypeAdapter(LeadRange),
+    "path": TypeAdapter(PathLabel),
+    "event": TypeAdapter(EventLabel),
+    "tag": TypeAdapter(FrameTag),
+}
+_SIGHTINGS = TypeAdapter(tuple[Sighting, ...])
+_QUICK = 1
+"""Compression of large changes: a third of the size at once, little more with patience."""
+
+
+@dataclass(frozen=True)
+class Item:
+    """One label as it stands. value: a track is without its sightings. revision: the act that changed it last."""
+
+    kind: ItemKind
+    id: int
+    revision: int
+    value: Value
+
+
+@dataclass(frozen=True)
+class Content:
+    """What an act found or left of an item. value: null where it was not there. frames: of a track, those that the act
+    changed."""
+
+    value: Value | None
+    frames: Frames
+
+
+def value_to_json(kind: ItemKind, value: Value) -> dict[str, Any]:
+    """Plain values, as the native file has them; a track without its sightings."""
+    if isinstance(value, LabelTrack):
+        value = replace(value, sightings=())
+    found: dict[str, Any] = _ADAPTERS[kind].dump_python(value, mode="json")
+    found.pop("sightings", None)
+    return found
+
+
+def value_from_json(kind: ItemKind, body: Mapping[str, Any]) -> Value:
+    return _ADAPTERS[kind].validate_python({**body, "sightings": ()} if kind == "track" else body)
+
+
+def sighting_to_json(sighting: Sighting) -> dict[str, Any]:
+    """As the native file has it."""
+    cuboid = sighting.cuboid
+    return {
+        "frame": sighting.frame,
+        "cuboid": list(cuboid) if cuboid is not None else None,
+        "bbox": list(sighting.bbox) if sighting.bbox is not None else None,
+        "keyframe": sighting.keyframe,
+    }
+
+
+def row_of(drive_id: int, track: int, sighting: Sighting) -> tuple[Any, ...]:
+    """In the order of the table's columns."""
+    cuboid, bbox = sighting.cuboid, sighting.bbox
+    place = (*cuboid.center, *cuboid.size, cuboid.yaw_rad) if cuboid is not None else (None,) * 7
+    return (drive_id, sighting.frame, track, sighting.keyframe, *place, *(bbox if bbox is not None else (None,) * 4))
+
+
+def sighting_of(row: Any) -> Sighting:
+    """row: as ``row_of`` makes it."""
+    _, frame, _, keyframe, x, y, z, length, width, height, yaw, x1, y1, x2, y2 = row
+    cuboid = Cuboid((x, y, z), (length, width, height), yaw) if x is not None else None
+    return Sighting(frame, cuboid, (x1, y1, x2, y2) if x1 is not None else None, bool(keyframe))
+
+
+def pack_content(kind: ItemKind, content: Content) -> bytes | None:
+    """Null for an item that is not there, and has no frames."""
+    if content.value is None and not any(content.frames.values()):
+        return None
+    return pack(
+        {
+            "value": value_to_json(kind, content.value) if content.value is not None else None,
+            "frames": sorted(content.frames),
+            "sightings": [sighting_to_json(each) for each in content.frames.values() if each is not None],
+        }
+    )
+
+
+def unpack_content(kind: ItemKind, data: bytes | None, frames: Iterable[int] = ()) -> Content:
+    """frames: what else the act touched, that was not there."""
+    if data is None:
+        return Content(None, dict.fromkeys(frames))
+    body = unpack(data)
+    found: dict[int, Sighting | None] = dict.fromkeys([*body["frames"], *frames])
+    for each in _SIGHTINGS.validate_python(body["sightings"]):
+        found[each.frame] = each
+    value = value_from_json(kind, body["value"]) if body["value"] is not None else None
+    return Content(value, found)
+
+
+def unpack_pair(kind: ItemKind, here: bytes | None, there: bytes | None) -> tuple[Content, Content]:
+    """Both sides of a change, each with every frame that it touched."""
+    found = unpack_content(kind, here)
+    other = unpack_content(kind, there, found.frames)
+    return (Content(None, dict.fromkeys(other.frames)) if here is None else found), other
+
+
+def pack(body: Any) -> bytes:
+    return zlib.compress(json.dumps(body, separators=(",", ":"), ensure_ascii=False).encode(), _QUICK)
+
+
+def unpack(data: bytes) -> Any:
+    return json.loads(zlib.decompress(data))

@@ -1,0 +1,140 @@
+"""Labels of a drive as files of other tools, made for a download and taken from an upload."""
+
+from __future__ import annotations
+
+import lzma
+import shutil
+import tempfile
+import time
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import IO
+
+from app.drive.open_recording import Recording
+from app.labels.acts.bulk import importing
+from app.labels.errors import ActRefused, BadAct
+from app.labels.service.tasks import Progress, Work, to_nobody
+from app.labels.store.drive_labels import DriveLabels
+from pipeline.common.errors import BadInput
+from pipeline.labels.formats.base import Drive, FormatName, drive_of
+from pipeline.labels.formats.registry import export_labels, import_labels
+from pipeline.labels.model import LabelSet, Origin
+
+_SUFFIXES: dict[FormatName, str] = {
+    "native": ".json", "mcap": ".mcap", "openlabel": ".json", "coco": ".json", "csv": ".csv",
+    "kitti": "", "kitti-tracking": "", "nuscenes": "",
+}  # fmt: skip
+"""Of the file; the others are folders."""
+_LARGEST_UNPACKED = 512 << 20
+_MOST_PARTS = 100_000
+_ENCRYPTED = 1
+"""Of a file's flags in a .zip (PKWARE's APPNOTE, 4.4.4)."""
+_BROKEN_ZIP = (
+    zipfile.BadZipFile,  # none at all, or a file in it is not what its checksum says
+    zlib.error,  # a damaged file in it, packed in the usual way
+    lzma.LZMAError,  # the same, in another; of bzip2 it is an OSError
+    NotImplementedError,  # what zipfile raises for one that is packed in a way that it does not know
+    EOFError,  # ends early
+    ValueError,  # says something of a file that cannot be
+    OSError,  # a file and a folder in it have the same name
+)
+
+
+@dataclass(frozen=True)
+class Exported:
+    """file: to be handed out; it lies in ``folder``, which goes with it. lost: what the format has no place for."""
+
+    file: Path
+    folder: Path
+    lost: tuple[str, ...]
+
+
+def exported(recording: Recording, labels: LabelSet, name: FormatName) -> Exported:
+    """A file, of a format that makes a folder a .zip of it. BadInput when it cannot be."""
+    folder = Path(tempfile.mkdtemp(prefix="cipv-export-"))
+    try:
+        out = folder / f"labels-{name}{_SUFFIXES[name]}"
+        lost = export_labels(labels, drive_for(recording), name, out)
+        file = _zipped(out) if out.is_dir() else out
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return Exported(file, folder, lost)
+
+
+def importing_file(labels: DriveLabels, recording: Recording, person: str, file: Path, name: FormatName) -> Work:
+    """Labels of an uploaded file; a format that is a folder comes as a .zip of it."""
+
+    def work(progress: Progress) -> str:
+        with _removed(file), tempfile.TemporaryDirectory(prefix="cipv-import-") as folder:
+            path = file if _SUFFIXES[name] else _unzipped(file, Path(folder))
+            drive = drive_for(recording, progress)
+            origin = Origin("import", f"{name} file of {person}", int(time.time() * 1000))
+            try:
+                found = import_labels(path, drive, name, origin)
+            except BadInput as error:  # where it lies here is nobody's business
+                raise ActRefused(str(error).replace(str(path), "the file")) from None
+            return importing(labels, found.labels, person, found.notes, progress)
+
+    return work
+
+
+def drive_for(recording: Recording, progress: Progress = to_nobody) -> Drive:
+    """What formats must know of the drive: looked for once while it is open, and read from its source only where no
+    run has."""
+    with recording.describing:
+        if recording.described is None:
+            recording.described = drive_of(recording.recipe.source, progress, recording.at_hand)
+        return recording.described
+
+
+def _zipped(folder: Path) -> Path:
+    out = folder.with_suffix(".zip")
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as made:
+        for path in sorted(folder.rglob("*")):
+            if path.is_file():
+                made.write(path, path.relative_to(folder))
+    return out
+
+
+def _unzipped(file: Path, folder: Path) -> Path:
+    """The folder that was packed. BadAct for what is no .zip, or one that leads out of its folder or swells up."""
+    try:
+        with zipfile.ZipFile(file) as packed:
+            parts = [each for each in packed.infolist() if not each.is_dir()]
+            if len(parts) > _MOST_PARTS or sum(each.file_size for each in parts) > _LARGEST_UNPACKED:
+                raise BadAct(f"the .zip unpacks to more than {_LARGEST_UNPACKED >> 20} MiB")
+            if any(each.flag_bits & _ENCRYPTED for each in parts):
+                raise BadAct("the .zip needs a password")
+            for each in parts:
+                name = PurePosixPath(each.filename)
+                if name.is_absolute() or ".." in name.parts or "\\" in each.filename:
+                    raise BadAct(f"the .zip holds a file that leads out of it: {each.filename!r}")
+                target = folder / name
+                target.parent.mkdir(parents=True, exist_ok=True)
+                with packed.open(each) as source, target.open("xb") as out:
+                    _copied(source, out, each.file_size)
+    except _BROKEN_ZIP as error:
+        raise ActRefused(f"no .zip of a folder: {error}") from None
+    inside = list(folder.iterdir())
+    return inside[0] if len(inside) == 1 and inside[0].is_dir() and inside[0].name.startswith("labels") else folder
+
+
+def _copied(source: IO[bytes], out: IO[bytes], size: int) -> None:
+    """Never more than the .zip says it holds."""
+    data = source.read(size + 1)
+    if len(data) > size:
+        raise ValueError("a file in it is longer than it says")
+    out.write(data)
+
+
+@contextmanager
+def _removed(file: Path) -> Iterator[None]:
+    try:
+        yield
+    finally:
+        file.unlink(missing_ok=True)

@@ -1,0 +1,165 @@
+"""One binary message per frame, made once for every client.
+
+    u32 little-endian   length of the header
+    header              JSON, UTF-8, padded with spaces to a multiple of 4
+    picture             JPEG, ``picture.bytes`` long, padded to a multiple of 4
+    points              ``points`` × int16 x y z   centimetres, ego frame
+                        ``points`` × int16 u v     pixels of the sent picture; -32768 where the camera cannot see it
+                        ``points`` × uint16        1 + place in ``result.objects``; 0 belongs to none
+                        ``points`` × uint8         0 ground, 1 unclustered, 2 cluster, 3 dropped
+                        ``points`` × uint8         intensity
+                        ``points`` × uint8         ring, 0 = lowest beam
+                        ``points`` × uint8         ms before the sweep's newest point; 255 unknown
+
+The header holds ``state`` (playback), ``result`` (the contract's object) and ``display``: geometry projected by the
+alignment in use, in pixels of the sent picture, so that no view projects anything.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from app.engine.snapshot import Snapshot
+from app.streaming.picture import MAX_WIDTH_PX, SentPicture, encode_picture
+from app.streaming.points import point_arrays
+from app.streaming.ranking import ranking_json
+from pipeline.alignment.projection import Alignment, resolve
+from pipeline.common.geometry import corners_of
+from pipeline.lanes.road_lines import in_picture, polylines
+from pipeline.types import F64, Box, Frame, Ground, Picture, Result
+from pipeline.types.lane import EgoLane
+from pipeline.types.result_json import to_json
+
+
+class Encoder:
+    """Keeps the JPEG of the last picture: while a slider moves on a paused frame, the picture is not encoded again."""
+
+    def __init__(self) -> None:
+        self._last: tuple[Picture, int, SentPicture] | None = None
+
+    def message(self, snapshot: Snapshot, width_px: int = MAX_WIDTH_PX) -> bytes | None:
+        """The message for the snapshot's tick, its picture at most ``width_px`` wide; null when there is no tick."""
+        if snapshot.tick is None:
+            return None
+        frame, result = snapshot.tick.frame, snapshot.tick.result
+        picture = self._picture(frame, width_px)
+        scale = picture.scale if picture else 1.0
+        aligned = resolve(snapshot.params.alignment, frame.camera)
+        header = {
+            "type": "frame",
+            "made_unix_ms": snapshot.made_unix_s * 1e3,
+            "detect_ms": snapshot.tick.detect_ms,
+            "state": snapshot.state_json(),
+            "picture": _picture_json(picture, frame),
+            "points": len(result.layers.points),
+            "result": to_json(result),
+            "display": display_json(result, aligned, scale),
+        }
+        return pack(header, picture.jpeg if picture else b"", point_arrays(frame, result, aligned, scale))
+
+    def _picture(self, frame: Frame, width_px: int) -> SentPicture | None:
+        if frame.picture is None:
+            return None
+        if self._last is None or self._last[0] is not frame.picture or self._last[1] != width_px:
+            self._last = (frame.picture, width_px, encode_picture(frame.picture, width_px))
+        return self._last[2]
+
+
+def pack(header: dict[str, Any], jpeg: bytes, arrays: bytes) -> bytes:
+    """The message as this module's first lines lay it out."""
+    text = msgspec.json.encode(header)
+    text += b" " * (-len(text) % 4)
+    return b"".join([struct.pack("<I", len(text)), text, jpeg, b"\0" * (-len(jpeg) % 4), arrays])
+
+
+def display_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, Any]:
+    """What is drawn over the picture. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom first;
+    ``path`` is the corridor laid on the ground that the sweep shows, null where there is none. ``lanes`` are the ego
+    lane's lines where the camera saw them, null without a lane detector; ``plan_lanes`` the same in the plan, x y in
+    metres; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x that they hold in; ``ranking``
+    every object in the order in which it could have led."""
+    layers = result.layers
+    path = {"center": result.path.center, "left": result.path.left, "right": result.path.right}
+    return {
+        "lidar_boxes": _boxes_json(layers.lidar_boxes, scale),
+        "vision_boxes": _boxes_json(layers.vision_boxes, scale),
+        "cuboids": _cuboids_json(result, aligned, scale),
+        "path": _on_ground(path, layers.ground, aligned, scale),
+        **_lanes_json(layers.lanes, aligned, scale),
+        "ground": _ground_json(layers.ground),
+        "vision_ranges": _vision_ranges(result),
+        "ranking": ranking_json(result),
+    }
+
+
+def _cuboids_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, list[list[float] | None]]:
+    """By object, the pixels of its cuboid's corners; all are projected at once, a sweep has dozens."""
+    boxed = [(item.id, item.cuboid) for item in result.objects if item.cuboid is not None]
+    if aligned is None or not boxed:
+        return {}
+    corners = corners_of([cuboid for _, cuboid in boxed]).reshape(-1, 3)
+    pixels = _pixel_list(aligned.project(corners) * scale)
+    return {str(number): pixels[8 * place : 8 * place + 8] for place, (number, _) in enumerate(boxed)}
+
+
+def _on_ground(
+    lines: dict[str, F64], ground: Ground | None, aligned: Alignment | None, scale: float
+) -> dict[str, list[list[float] | None]] | None:
+    """Each (K, 2) ego line as pixels, one a point; null as a whole where no ground or no camera is known."""
+    if ground is None or aligned is None or not ground.fitted.any():
+        return None
+    return {
+        name: _pixel_list(aligned.project(np.column_stack([line, ground.height(line)])) * scale)
+        for name, line in lines.items()
+    }
+
+
+def _lanes_json(lane: EgoLane | None, aligned: Alignment | None, scale: float) -> dict[str, Any]:
+    """The ego lane's lines where the camera saw them, and in the plan."""
+    if lane is None:
+        return {"lanes": None, "plan_lanes": None}
+    seen = in_picture(lane, aligned) if aligned is not None else None
+    return {
+        "lanes": {side: _pixel_list(uv * scale) for side, uv in seen.items()} if seen is not None else None,
+        "plan_lanes": {side: np.round(line, 3).tolist() for side, line in polylines(lane).items()},
+    }
+
+
+def _ground_json(ground: Ground | None) -> dict[str, Any] | None:
+    if ground is None or not ground.fitted.any():
+        return None
+    return {"edges": np.round(ground.edges, 2).tolist(), "planes": np.round(ground.planes, 5).tolist()}
+
+
+def _vision_ranges(result: Result) -> dict[str, dict[str, float]]:
+    tracks = {track.id: track for track in result.layers.vision_tracks}
+    seen = ((item.id, tracks.get(item.vision_track)) for item in result.objects if item.vision_track is not None)
+    return {
+        str(number): {"distance_m": round(track.distance_m, 3), "sigma_m": round(track.sigma_m, 3)}
+        for number, track in seen
+        if track is not None and track.distance_m is not None and track.sigma_m is not None
+    }
+
+
+def _pixel_list(uv: F64) -> list[list[float] | None]:
+    return [None if u != u else [u, v] for u, v in np.round(uv, 1).tolist()]
+
+
+def _boxes_json(boxes: dict[int, Box], scale: float) -> dict[str, list[float]]:
+    return {str(number): [round(value * scale, 1) for value in box] for number, box in sorted(boxes.items())}
+
+
+def _picture_json(picture: SentPicture | None, frame: Frame) -> dict[str, Any] | None:
+    if picture is None or frame.picture is None:
+        return None
+    return {
+        "width": picture.width,
+        "height": picture.height,
+        "scale": picture.scale,
+        "bytes": len(picture.jpeg),
+        "full_width": frame.picture.bgr.shape[1],
+    }

@@ -1,0 +1,39 @@
+"""The 3D view, started when somebody first looks at it: viser takes half a second to import."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import ExitStack
+
+from app.core.shared_view_state import Looks
+from app.engine.engine import Engine
+from pipeline.step import spare_what_is_loaded
+
+
+class LateScene:
+    """A ``SceneFeed`` from the first time its port is asked for. Use it in a ``with`` block."""
+
+    def __init__(self, engine: Engine, looks: Looks) -> None:
+        self._engine, self._looks = engine, looks
+        self._lock = threading.Lock()
+        self._port: int | None = None
+        self._running = ExitStack()
+        self._ended = False
+
+    def port(self) -> int | None:
+        """Where viser listens, on loopback; null at the end. The first to ask waits until it does. Any thread."""
+        with self._lock:
+            if self._port is None and not self._ended:
+                from app.views.scene_feed import SceneFeed
+
+                self._port = self._running.enter_context(SceneFeed(self._engine, self._looks)).port
+                spare_what_is_loaded()
+            return self._port
+
+    def __enter__(self) -> LateScene:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._ended, self._port = True, None
+            self._running.close()

@@ -1,0 +1,207 @@
+"""Who may talk to the server, and what its pages may do.
+
+The server listens on loopback, but every web page that a person visits can send requests there too. So the Host header
+must name this machine (a rebound DNS name does not), and what changes anything, and every WebSocket, must come from a
+page of the same origin. Nor may another page have us work: browsers say for whom they ask (Sec-Fetch-Site), and the API
+answers them only for our own pages and for a person who typed the address. Programs send neither and are let through.
+
+Where other machines can reach the server, all that does not help: there everybody, from loopback too, needs a token.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterable
+from html import escape
+from urllib.parse import quote, urlencode, urlsplit
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import HTTPConnection
+from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket
+
+from app.core.server_address import LOOPBACK_HOSTS, WILDCARDS, is_address
+from app.web.tokens import Role, Tokens
+
+_READING = frozenset({"GET", "HEAD", "OPTIONS"})
+_OWN_SITES = (None, "same-origin", "none")
+"""Whom a browser may ask the API for: Sec-Fetch-Site of W3C Fetch Metadata. ``same-site`` is another port of ours."""
+_API = "/api/"
+_OPEN_TO_ALL = "/healthz"
+"""Says that the server lives and nothing else, to whoever watches over it."""
+_DISPLAY_MAY = frozenset({("POST", "/api/marks"), ("POST", "/api/recording")})
+"""What a display may change."""
+_DISPLAY_STREAM = "/api/stream"
+_COOKIE_DAYS = 400
+"""The longest that browsers keep one: a display in a car has no keyboard to type a link again."""
+
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; "
+    "frame-src 'self'; font-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+_SECURITY_HEADERS = {
+    "content-security-policy": _POLICY,
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "SAMEORIGIN",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "permissions-policy": "camera=(), microphone=(), geolocation=()",
+}
+
+
+class Access:
+    """The rule of names and origins, for requests and WebSockets alike.
+
+    ``hosts``: further names this server may be called by; a wildcard among them means every address of this machine
+    and its own name. An address in figures cannot be rebound: only names can.
+    """
+
+    def __init__(self, hosts: Iterable[str] = ()) -> None:
+        names = {host.lower() for host in hosts}
+        self._any_address = not names.isdisjoint(WILDCARDS)
+        if self._any_address:
+            own = socket.gethostname().lower()
+            names |= {own, f"{own}.local"}
+        self._hosts = frozenset((*LOOPBACK_HOSTS, *names)) - frozenset(WILDCARDS)
+
+    def refusal(self, headers: Headers, *, changes: bool, path: str = _API) -> str | None:
+        """Why the request for a path is refused, in one sentence; null when it is welcome."""
+        host = headers.get("host", "")
+        if not self._knows(_host_name(host)):
+            return f"this server does not answer to the name {host!r}; allow it with --allow-host"
+        origin = headers.get("origin")
+        if changes and origin is not None and urlsplit(origin).netloc.lower() != host.lower():
+            return f"a page of {origin} may not do this"
+        if path.startswith(_API) and headers.get("sec-fetch-site") not in _OWN_SITES:
+            return "a page of another origin may not ask for this"
+        return None
+
+    def allowed(self, connection: HTTPConnection) -> bool:
+        """True for a request or WebSocket that may change things."""
+        return self.refusal(connection.headers, changes=True) is None
+
+    def _knows(self, name: str | None) -> bool:
+        return name in self._hosts or (self._any_address and is_address(name))
+
+
+class Guard:
+    """ASGI middleware: refuses by ``Access`` and, where there are ``tokens``, by role; adds the security headers that a
+    response does not set itself. Everything is behind it: pages, API, streams, viser and rerun."""
+
+    def __init__(self, app: ASGIApp, access: Access, tokens: Tokens | None = None) -> None:
+        self._app = app
+        self._access = access
+        self._tokens = tokens
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            return await self._app(scope, receive, send)
+        is_socket = scope["type"] == "websocket"
+        answer = self._refused(HTTPConnection(scope), is_socket or scope["method"] not in _READING)
+        if answer is None:
+            return await self._app(scope, receive, send if is_socket else _with_headers(send))
+        if is_socket:
+            return await WebSocket(scope, receive, send).close(code=1008)
+        await answer(scope, receive, _with_headers(send))
+
+    def _refused(self, connection: HTTPConnection, changes: bool) -> Response | None:
+        """What is answered instead; null for who is welcome."""
+        refusal = self._access.refusal(connection.headers, changes=changes, path=connection.scope["path"])
+        if refusal is not None:
+            return JSONResponse({"detail": refusal}, 403)
+        if self._tokens is None or (connection.scope["path"] == _OPEN_TO_ALL and not changes):
+            return None
+        by_link = connection.query_params.get("token") if not changes else None
+        if by_link is not None and self._tokens.role_of(by_link) is not None:
+            return _signed_in(connection, by_link)
+        role = self._tokens.role_of(_bearer(connection.headers) or connection.cookies.get(cookie_name(connection)))
+        if role is None:
+            return _who_are_you(connection)
+        if role == "display" and not _display_may(connection.scope):
+            return JSONResponse({"detail": "the display in the car may not do this"}, 403)
+        set_role(connection, role)
+        return None
+
+
+def set_role(connection: HTTPConnection, role: Role) -> None:
+    connection.scope.setdefault("state", {})["role"] = role
+
+
+def is_display(connection: HTTPConnection) -> bool:
+    """True for who came with the display's token."""
+    return connection.scope.get("state", {}).get("role") == "display"
+
+
+def cookie_name(connection: HTTPConnection) -> str:
+    """Cookies know no ports: two servers of one machine would take each other's."""
+    try:
+        port = urlsplit(f"//{connection.headers.get('host', '')}").port
+    except ValueError:
+        port = None
+    return f"cipv_token_{port or 0}"
+
+
+def _display_may(scope: Scope) -> bool:
+    path: str = scope["path"]
+    if scope["type"] == "websocket":
+        return path == _DISPLAY_STREAM
+    if path == "/viser" or path.startswith("/viser/"):
+        return False  # its controls change what all see
+    return scope["method"] in _READING or (scope["method"], path) in _DISPLAY_MAY
+
+
+def _bearer(headers: Headers) -> str | None:
+    """The token that a program sends."""
+    kind, _, token = headers.get("authorization", "").partition(" ")
+    return token.strip() if kind.lower() == "bearer" else None
+
+
+def _signed_in(connection: HTTPConnection, token: str) -> Response:
+    """The cookie, and on to the same page without the token. It goes on from a page of ours: a redirect would belong to
+    whoever made the link, and the browser would keep a strict cookie back from it."""
+    left = [(name, value) for name, value in connection.query_params.multi_items() if name != "token"]
+    path = "/" + quote(connection.scope["path"].lstrip("/"))
+    target = escape(f"{path}?{urlencode(left)}" if left else path, quote=True)
+    page = (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>CIPV Studio</title>'
+        f'<meta http-equiv="refresh" content="0; url={target}"></head>'
+        f'<body><p><a href="{target}">CIPV Studio</a></p></body></html>'
+    )
+    answer = HTMLResponse(page, headers={"cache-control": "no-store"})
+    answer.set_cookie(
+        cookie_name(connection), token, max_age=_COOKIE_DAYS * 86400, path="/", httponly=True, samesite="strict"
+    )
+    return answer
+
+
+def _who_are_you(connection: HTTPConnection) -> Response:
+    sentence = "Open the link with a token that the server showed in its terminal when it started."
+    headers = {"www-authenticate": "Bearer", "cache-control": "no-store"}
+    if "text/html" not in connection.headers.get("accept", ""):
+        return JSONResponse({"detail": sentence}, 401, headers)
+    page = (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>CIPV Studio</title></head>'
+        f'<body><h1>CIPV Studio</h1><p>{sentence}</p><p><a href="">Try again</a></p></body></html>'
+    )
+    return HTMLResponse(page, 401, headers)
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in _SECURITY_HEADERS.items():
+                headers.setdefault(name, value)
+        await send(message)
+
+    return sending
+
+
+def _host_name(host: str) -> str | None:
+    """The name in a Host header, without port and brackets; null when it is malformed."""
+    try:
+        return urlsplit(f"//{host}").hostname
+    except ValueError:
+        return None

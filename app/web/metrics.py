@@ -1,0 +1,97 @@
+"""Figures for Prometheus: how many frames, how fast, how late, for whom, and how recording does."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+
+from prometheus_client import CollectorRegistry, Counter, Histogram, ProcessCollector, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from app.engine.engine import Engine
+from app.engine.snapshot import Snapshot
+from app.streaming.stream import Stream
+
+_WINDOW_S = 5.0
+_MOST_FRAMES = 1024
+_BUCKETS_S = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.075, 0.1, 0.15, 0.25, 0.5, 1.0, 2.5)
+
+
+class Metrics:
+    """One registry for one engine, so that two servers of a process do not count each other's."""
+
+    def __init__(self, engine: Engine, stream: Stream) -> None:
+        self._registry = CollectorRegistry()
+        self._sequence = 0
+        self._shown_at: deque[float] = deque(maxlen=_MOST_FRAMES)
+        to = self._registry
+        self._frames = Counter("cipv_frames", "Results made", registry=to)
+        self._line = Histogram(
+            "cipv_line_seconds", "Of one frame, all stages without the networks", buckets=_BUCKETS_S, registry=to
+        )
+        self._detector = Histogram(
+            "cipv_detector_seconds",
+            "Of one picture that no cache knew",
+            buckets=_BUCKETS_S,
+            registry=to,
+        )
+        self._latency = Histogram(
+            "cipv_result_to_sent_seconds",
+            "From a result to its message for all",
+            buckets=_BUCKETS_S,
+            registry=to,
+        )
+        self._registry.register(_Now(engine, stream, self._rate_hz))
+        ProcessCollector(registry=self._registry)
+
+    def saw(self, snapshot: Snapshot) -> None:
+        """Called by the engine after the stream has taken the snapshot: what is not a new result is not counted."""
+        tick = snapshot.tick
+        if tick is None or snapshot.sequence <= self._sequence:
+            return
+        self._frames.inc(snapshot.sequence - self._sequence)
+        self._sequence = snapshot.sequence
+        self._shown_at.append(time.monotonic())
+        total_ms = tick.result.timing_ms.get("total")
+        if total_ms is not None:
+            self._line.observe(total_ms / 1e3)
+        if tick.detect_ms > 0:
+            self._detector.observe(tick.detect_ms / 1e3)
+        self._latency.observe(max(0.0, time.time() - snapshot.made_unix_s))
+
+    def render(self) -> bytes:
+        """In Prometheus' text format."""
+        return generate_latest(self._registry)
+
+    def _rate_hz(self) -> float:
+        """Results a second, over the last seconds."""
+        now = time.monotonic()
+        return sum(now - t <= _WINDOW_S for t in list(self._shown_at)) / _WINDOW_S
+
+
+class _Now(Collector):
+    """What is read at the moment of asking."""
+
+    def __init__(self, engine: Engine, stream: Stream, rate_hz: Callable[[], float]) -> None:
+        self._engine = engine
+        self._stream = stream
+        self._rate_hz = rate_hz
+
+    def collect(self) -> Iterator[Metric]:
+        shown, recording, traffic = self._engine.snapshot, self._engine.desk.state, self._stream.traffic
+        yield GaugeMetricFamily("cipv_engine_up", "1 while the worker lives", self._engine.alive)
+        yield GaugeMetricFamily("cipv_frames_per_second", "Results a second, last seconds", self._rate_hz())
+        yield GaugeMetricFamily(
+            "cipv_frames_skipped", "Frames of the open source that came too fast to be shown", shown.skipped
+        )
+        yield GaugeMetricFamily("cipv_clients", "Streams that are open", self._stream.clients)
+        yield CounterMetricFamily("cipv_client_frames_sent", "Frames sent, over all clients", traffic.sent)
+        yield CounterMetricFamily("cipv_client_frames_dropped", "Frames that a slow client was spared", traffic.dropped)
+        yield GaugeMetricFamily("cipv_recording", "1 while it records", recording is not None and not recording.error)
+        yield GaugeMetricFamily("cipv_recording_bytes", "Of this recording", recording.bytes if recording else 0)
+        yield GaugeMetricFamily("cipv_recording_frames", "Of this recording", recording.frames if recording else 0)
+        yield GaugeMetricFamily(
+            "cipv_recording_frames_dropped", "That the disk was too slow for", recording.dropped if recording else 0
+        )

@@ -1,0 +1,93 @@
+"""/api/clip and /api/jobs: a part of the drive as a file, made in the background."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, HTTPException
+from fastapi.responses import FileResponse
+from pydantic import BaseModel, Field
+
+from app.clips.exports import Clip, Kind, submit
+from app.clips.jobs import Job, Jobs, JobState
+from app.engine.engine import Engine
+from app.web.routes.refusals import open_recording, refusing
+from app.web.routes.shapes import Done, file_of
+
+
+class ClipChoice(BaseModel):
+    """Frames ``first`` to ``last``, both included."""
+
+    first: int = Field(ge=0)
+    last: int = Field(ge=0)
+    kind: Kind
+
+
+class JobJson(BaseModel):
+    """progress is 0–1. file and bytes: the download's name and size, null until it is done."""
+
+    id: str
+    kind: str
+    first: int
+    last: int
+    state: JobState
+    progress: float
+    note: str
+    file: str | None
+    bytes: int | None
+
+
+class JobList(BaseModel):
+    """Exports, the oldest first."""
+
+    jobs: list[JobJson]
+
+
+def clips_router(engine: Engine, jobs: Jobs) -> APIRouter:
+    """Routes over exports."""
+    router = APIRouter(prefix="/api", tags=["clips"])
+
+    @router.post("/clip", status_code=202)
+    def export(body: ClipChoice) -> JobJson:
+        """Begin to write a clip with the present parameters. 409 when it is none."""
+        with refusing():
+            return _json(submit(jobs, clip_of(engine, body.first, body.last), body.kind))
+
+    @router.get("/jobs")
+    def every() -> JobList:
+        """Exports, the oldest first."""
+        return JobList(jobs=[_json(job) for job in jobs.all()])
+
+    @router.get("/jobs/{number}")
+    def one(number: str) -> JobJson:
+        """How far an export is."""
+        job = jobs.get(number)
+        if job is None:
+            raise HTTPException(404, "there is no such export")
+        return _json(job)
+
+    @router.delete("/jobs/{number}")
+    def cancel(number: str) -> Done:
+        """Stop an export, or forget one that has ended."""
+        if not jobs.cancel(number):
+            raise HTTPException(404, "there is no such export")
+        return Done(status="removed")
+
+    @router.get("/jobs/{number}/file", response_class=FileResponse, responses=file_of("application/octet-stream"))
+    def download(number: str) -> FileResponse:
+        """The file of an export that is done."""
+        job, path = jobs.get(number), jobs.path(number)
+        if job is None or path is None:
+            raise HTTPException(404, "there is no such file")
+        return FileResponse(path, filename=job.file, media_type="application/octet-stream")
+
+    return router
+
+
+def clip_of(engine: Engine, first: int, last: int) -> Clip:
+    """A part of the open recording with the parameters as they stand."""
+    shown = engine.snapshot
+    recording = open_recording(engine.drives)
+    return Clip(recording, engine.control.peek().params, first, last, engine.drives.turn, shown.title, shown.rate_hz)
+
+
+def _json(job: Job) -> JobJson:
+    return JobJson(**vars(job))

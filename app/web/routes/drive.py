@@ -1,0 +1,217 @@
+"""/api/drive: the whole drive as columns, one object's curve, events and marks."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from fastapi import APIRouter, HTTPException, Query
+from pydantic import BaseModel, Field
+
+from app.drive.background_runs import Drives
+from app.drive.events import Event, Kind, Severity, find_events, marks_by_time, recorded_marks
+from app.drive.frame_rows import columns_json, object_json
+from app.drive.full_run import DriveRun
+from app.drive.marks import LIVE, LONGEST_TEXT, MarkRefused, Marks
+from app.drive.open_recording import Recording
+from app.engine.engine import Engine
+from app.engine.snapshot import Snapshot
+from app.web.routes.refusals import open_recording, refusing
+from app.web.routes.shapes import Done
+
+
+class Columns(BaseModel):
+    """Each column is a list for frames ``from`` … done−1; t_s has every frame of the drive, when ``from`` is 0."""
+
+    run: int
+    uri: str
+    count: int
+    first: int = Field(serialization_alias="from")
+    done: int
+    t_s: list[float]
+    columns: dict[str, list[Any]]
+
+
+class Curve(BaseModel):
+    """One object's values at the frames in which it was, whose numbers are in ``index``."""
+
+    id: int
+    run: int
+    index: list[int]
+    source: list[Literal["V", "L", "VL"]]
+    carried: list[bool]
+    in_path: list[bool]
+    distance_m: list[float | None]
+    closing_speed_mps: list[float | None]
+    ttc_s: list[float | None]
+    path_offset_m: list[float | None]
+    vl_gap_m: list[float | None]
+
+
+class EventJson(BaseModel):
+    """Something that happened. ids: of the objects it is about. mark: its number, when a person made it."""
+
+    kind: Kind
+    index: int
+    t_s: float
+    text: str
+    ids: list[int]
+    severity: Severity
+    mark: int | None
+
+
+class Events(BaseModel):
+    """Events of a run, by frame."""
+
+    run: int | None
+    events: list[EventJson]
+
+
+class NewMark(BaseModel):
+    """``index`` absent: the shown frame."""
+
+    index: int | None = Field(None, ge=0)
+    text: str = Field("", max_length=LONGEST_TEXT)
+
+
+class MarkJson(BaseModel):
+    """A marked moment. t_s: its place on the timeline. in_session: whether a session that is being recorded has it."""
+
+    id: int
+    index: int
+    t_s: float
+    text: str
+    in_session: bool
+
+
+def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
+    """Routes over the whole-drive runs."""
+    router = APIRouter(prefix="/api", tags=["drive"])
+    known = _EventsOnce()
+
+    @router.get("/drive")
+    def drive(first: int = Query(0, alias="from", ge=0)) -> Columns:
+        """The run of the present parameters, from a frame on; ask again from ``done`` while ``run`` stays the same."""
+        recording = open_recording(drives)
+        return columns_of(recording, current(recording), first)
+
+    @router.get("/drive/object/{object_id}")
+    def curve(object_id: int, run: int | None = None) -> Curve:
+        """One object over the drive; numbers of objects are those of the run."""
+        recording = open_recording(drives)
+        with refusing():
+            of = current(recording) if run is None else recording.book.get(run)
+        return Curve(id=object_id, run=of.number, **object_json(of.objects(), object_id))
+
+    @router.get("/drive/events")
+    def events() -> Events:
+        """What happened, by frame, marks among it. While a run goes on, only what it has come to. Of live sensors there
+        are marks alone, those made since they were opened: ``t_s`` is theirs, ``index`` the count of ticks."""
+        recording = drives.recording
+        run = recording.book.current if recording is not None else None
+        if recording is None or run is None:
+            return Events(run=None, events=_live_marks(engine.snapshot, marks))
+        marked = [
+            Event("mark", mark.index, mark.text or "marked", mark=mark.id) for mark in marks.of(recording.recipe.uri)
+        ]
+        marked += recorded_marks(run.rows(), recording.marks)
+        marked += marks_by_time(marks.of(LIVE), recording.stamps_ns, round(1e9 / recording.recipe.source.rate_hz))
+        times = recording.recipe.timeline_s
+        found = sorted([*known.of(run), *marked], key=lambda event: event.index)
+        return Events(
+            run=run.number,
+            events=[
+                EventJson(**event.to_json(float(times[event.index]))) for event in found if event.index < len(times)
+            ],
+        )
+
+    @router.post("/marks", status_code=201)
+    def mark(body: NewMark) -> MarkJson:
+        """Mark a moment; it is kept with the recording, and lands in the session that is being recorded. Of live
+        sensors the shown moment is marked; the mark is kept by its time, and is on every recording of that time."""
+        shown = engine.snapshot
+        if shown.uri is None:
+            raise HTTPException(409, "no recording is open")
+        if shown.live and shown.tick is None:
+            raise HTTPException(409, "the sensors have shown nothing yet")
+        index = shown.index if body.index is None or shown.live else body.index
+        if not shown.live and index >= max(shown.count, 1):
+            raise HTTPException(422, f"index: the recording has {shown.count} frames")
+        in_session = index == shown.index and engine.desk.mark(body.text or "marked")
+        t_ns = shown.tick.frame.t_ns if shown.live and shown.tick is not None else None
+        try:
+            made = marks.add(_marks_of(shown), index, body.text, t_ns=t_ns, in_session=in_session)
+        except MarkRefused as error:
+            raise HTTPException(409, str(error)) from None
+        drives.changed()
+        t_s = shown.time_s if index == shown.index else _time_s(drives, index)
+        return MarkJson(id=made.id, index=made.index, t_s=t_s, text=made.text, in_session=in_session)
+
+    @router.delete("/marks/{number}")
+    def unmark(number: int) -> Done:
+        """Take a mark away."""
+        shown = engine.snapshot
+        if shown.uri is None or not marks.remove(_marks_of(shown), number):
+            raise HTTPException(404, f"there is no mark {number}")
+        drives.changed()
+        return Done(status="removed")
+
+    return router
+
+
+def _marks_of(shown: Snapshot) -> str:
+    """Under which name what is shown has its marks."""
+    return LIVE if shown.live else shown.uri or ""
+
+
+def _time_s(drives: Drives, index: int) -> float:
+    recording = drives.recording
+    return float(recording.recipe.timeline_s[index]) if recording is not None else 0.0
+
+
+def _live_marks(shown: Snapshot, marks: Marks) -> list[EventJson]:
+    """Those made since the sensors were opened, by time."""
+    if not shown.live or shown.tick is None:
+        return []
+    opened_ns = shown.tick.frame.t_ns - round(shown.time_s * 1e9)
+    made = [(mark.t_ns, mark) for mark in marks.of(LIVE) if mark.t_ns is not None and mark.t_ns >= opened_ns]
+    return [
+        EventJson(**Event("mark", mark.index, mark.text or "marked", mark=mark.id).to_json((t_ns - opened_ns) / 1e9))
+        for t_ns, mark in sorted(made, key=lambda one: one[0])
+    ]
+
+
+def current(recording: Recording) -> DriveRun:
+    """The run of the present parameters; 404 while there is none."""
+    run = recording.book.current
+    if run is None:
+        raise HTTPException(404, "no run has begun yet")
+    return run
+
+
+def columns_of(recording: Recording, run: DriveRun, first: int) -> Columns:
+    """A run's columns from a frame on."""
+    rows = run.rows(first)
+    return Columns(
+        run=run.number,
+        uri=recording.recipe.uri,
+        count=run.total,
+        first=min(first, run.done),
+        done=first + len(rows) if rows else min(first, run.done),
+        t_s=[round(float(t), 4) for t in recording.recipe.timeline_s] if first == 0 else [],
+        columns=columns_json(rows),
+    )
+
+
+class _EventsOnce:
+    """The events of the run that was asked for last, found again only when it has come further."""
+
+    def __init__(self) -> None:
+        self._held: tuple[DriveRun, int, list[Event]] | None = None
+
+    def of(self, run: DriveRun) -> list[Event]:
+        rows, held = run.rows(), self._held
+        if held is not None and held[0] is run and held[1] == len(rows):
+            return held[2]
+        found = find_events(rows, [records for _, records in run.objects()[: len(rows)]], run.params)
+        self._held = (run, len(rows), found)
+        return found

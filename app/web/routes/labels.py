@@ -1,0 +1,99 @@
+"""/api/labels: what people say is true of the open recording, read."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from fastapi import APIRouter, HTTPException, Query, Response
+from fastapi.responses import JSONResponse
+
+from app.labels.acts.request_fields import MOST_FRAMES, Id, Index, PersonOrNobody
+from app.labels.service.answers import changes_json, history_json, track_json, window_json
+from app.labels.service.desk import LabelDesk
+from app.labels.service.next_work import Asked, What, where_next
+from app.labels.store.values import ItemKind
+from app.web.routes.drive import current
+from app.web.routes.label_score_shapes import BadFrameJson, ScoreJson, errors_json
+from app.web.routes.label_shapes import HistoryJson, ItemKey, LabelsOfPerson, NextJson, WholeTrack, Window
+from app.web.routes.refusals import refusing
+from app.web.routes.shapes import MetricJson
+
+LONGEST_WINDOW = 200
+
+
+def labels_router(desk: LabelDesk) -> APIRouter:
+    """Routes that read labels."""
+    router = APIRouter(prefix="/api/labels", tags=["labels"])
+
+    @router.get("", responses={200: {"model": LabelsOfPerson}})
+    def changes(since: Annotated[Id, Query()] = 0, person: Annotated[PersonOrNobody, Query()] = "") -> Response:
+        """What changed after act ``since``; 0 for everything. Ask again whenever ``state.labels.revision`` is
+        another. can_undo, can_redo: of the person."""
+        with refusing():
+            labels = desk.labels
+            body = changes_json(labels.info, labels.changes(since))
+            can_undo, can_redo = desk.possible(person)
+        return JSONResponse(body | {"can_undo": can_undo, "can_redo": can_redo})
+
+    @router.get("/frames", responses={200: {"model": Window}})
+    def frames(first: Annotated[Index, Query()], last: Annotated[Index, Query()]) -> Response:
+        """Where tracks are, frame by frame; at most 200 frames."""
+        if not first <= last < first + LONGEST_WINDOW:
+            raise HTTPException(422, f"first to last: at least one frame, and {LONGEST_WINDOW} at most")
+        with refusing():
+            return JSONResponse(window_json(desk.labels, first, last))
+
+    @router.get("/tracks/{number}", responses={200: {"model": WholeTrack}})
+    def track(number: Id) -> Response:
+        """A whole track."""
+        with refusing():
+            return JSONResponse(track_json(desk.labels.track(number)))
+
+    @router.get("/next")
+    def following(
+        what: What,
+        frame: Annotated[int, Query(ge=-1, le=MOST_FRAMES)],
+        direction: Annotated[int, Query(ge=-1, le=1)] = 1,
+        person: Annotated[PersonOrNobody, Query()] = "",
+        after_kind: Annotated[ItemKind | None, Query()] = None,
+        after_id: Annotated[Id, Query()] = 0,
+    ) -> NextJson:
+        """The nearest frame after ``frame``, or with a negative direction before it, where there is something to do.
+        after_kind, after_id: a label of that frame that was looked at; the others of the frame come first then.
+        person: who asks: what one has made oneself, another reviews."""
+        after = (after_kind, after_id) if after_kind is not None else None
+        with refusing():
+            run = desk.recording.book.current
+            asked = Asked(what, frame, direction, person, after)
+            found, why, left = where_next(desk.labels, desk.scores, run, asked)
+        item = ItemKey(kind=found.item[0], id=found.item[1]) if found is not None and found.item is not None else None
+        return NextJson(frame=found.frame if found is not None else None, why=why, item=item, left=left)
+
+    @router.get("/score")
+    def score() -> ScoreJson:
+        """The present run, and the one it is compared with, against the labels that people stand behind: the figures of
+        `cipv evaluate`, at once."""
+        with refusing():
+            book, labels = desk.recording.book, desk.labels
+            run = current(desk.recording)
+            found = desk.scores.standing(labels, book.base or run, run)
+            return ScoreJson(
+                revision=labels.revision,
+                run=run.number,
+                judged=found.judged,
+                metrics=[MetricJson(**vars(metric)) for metric in found.metrics],
+                notes=list(found.notes),
+                errors=[errors_json(row) for row in found.errors],
+                worst=[
+                    BadFrameJson(frame=each.index, verdict=each.verdict, truth_m=each.truth_m, error_m=each.error_m)
+                    for each in found.worst
+                ],
+            )
+
+    @router.get("/history", responses={200: {"model": list[HistoryJson]}})
+    def history(kind: ItemKind, number: Annotated[Id, Query(alias="id")]) -> Response:
+        """The acts that changed a label, newest first, at most 200."""
+        with refusing():
+            return JSONResponse([history_json(entry) for entry in desk.labels.log.history(kind, number)])
+
+    return router

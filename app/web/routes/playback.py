@@ -1,0 +1,79 @@
+"""/api: state, result of the shown frame, playback and the source."""
+
+from __future__ import annotations
+
+from fastapi import APIRouter, HTTPException, WebSocket
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.engine.engine import Engine
+from app.streaming.stream import Stream
+from app.web.routes.shapes import Done, ResultJson, SourceJson, SourcesJson, StateJson
+from app.web.source_catalog import catalog
+from pipeline.types.result_json import to_json
+
+
+class PlaybackChange(BaseModel):
+    """What to change; absent fields stay as they are. ``step`` pauses and moves by that many frames."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    playing: bool | None = None
+    seek: int | None = Field(None, ge=0, description="Frame index; beyond the end is the last frame")
+    step: int | None = Field(None, ge=-1000, le=1000)
+    speed: float | None = Field(None, ge=0.1, le=10.0, description="1 is real time")
+    loop: bool | None = None
+
+
+class SourceChoice(BaseModel):
+    """What to open: a path or a URI."""
+
+    uri: str = Field(min_length=1, max_length=4096, examples=["sim:straight"])
+
+
+def playback_router(engine: Engine, stream: Stream) -> APIRouter:
+    """Routes over the engine's playback."""
+    router = APIRouter(prefix="/api", tags=["playback"])
+
+    @router.get("/state", responses={200: {"model": StateJson}})
+    def state() -> JSONResponse:
+        """Source, position, playback, notices."""
+        return JSONResponse(engine.snapshot.state_json())
+
+    @router.get("/result", responses={200: {"model": ResultJson}})
+    def result() -> JSONResponse:
+        """The shown frame's result; 404 before there is one."""
+        tick = engine.snapshot.tick
+        if tick is None:
+            raise HTTPException(404, "no frame is shown yet")
+        return JSONResponse(to_json(tick.result))
+
+    @router.post("/playback", status_code=202)
+    def playback(body: PlaybackChange) -> Done:
+        """Ask for a change; the stream brings what comes of it."""
+        standing = body.model_dump(include={"playing", "speed", "loop"}, exclude_none=True)
+        if standing:
+            engine.control.change(**standing)
+        if body.seek is not None:
+            engine.control.seek(body.seek)
+        if body.step is not None:
+            engine.control.step(body.step)
+        return Done(status="accepted")
+
+    @router.get("/sources")
+    def sources() -> SourcesJson:
+        """What can be opened without typing, and what is open."""
+        offered = [SourceJson(uri=uri, title=title) for uri, title in catalog()]
+        return SourcesJson(open=engine.snapshot.uri, sources=offered)
+
+    @router.post("/source", status_code=202)
+    def open_source(body: SourceChoice) -> Done:
+        """Open another recording. One that cannot be opened leaves the old one, with a notice."""
+        engine.control.change(uri=body.uri.strip(), target=None, steps=0)
+        return Done(status="accepted")
+
+    @router.websocket("/stream")
+    async def stream_frames(socket: WebSocket) -> None:
+        await stream.serve(socket)
+
+    return router

@@ -1,0 +1,80 @@
+"""/api/project: where cuboids lie in the shown picture, and where a pixel of it looks. The page that draws a
+cuboid under a hand asks here."""
+
+from __future__ import annotations
+
+import numpy as np
+from fastapi import APIRouter
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.core.request_shapes import Finite, GivenCuboid
+from app.engine.engine import Engine
+from pipeline.alignment.projection import resolve
+from pipeline.common.geometry import corners_of
+
+MOST_CUBOIDS = 500
+
+Pixel = tuple[float, float]
+
+
+class Given(BaseModel):
+    """Cuboids of one frame."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    cuboids: list[GivenCuboid] = Field(max_length=MOST_CUBOIDS)
+
+
+class Projected(BaseModel):
+    """For each cuboid the pixels of its 8 corners in the camera's own picture, the four at the bottom first; null where
+    a corner lies behind the camera. pixels is null where nothing says how LiDAR and camera lie to each other."""
+
+    pixels: list[list[Pixel | None]] | None
+
+
+class GivenPixel(BaseModel):
+    """A pixel of the camera's own picture."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    pixel: tuple[Finite, Finite]
+
+
+class Ray(BaseModel):
+    """Where a pixel looks: from a point, in a direction, ego frame. Null where nothing says how LiDAR and camera lie to
+    each other."""
+
+    start: tuple[float, float, float] | None
+    toward: tuple[float, float, float] | None
+
+
+def project_router(engine: Engine) -> APIRouter:
+    """The route over the shown frame's camera and the present alignment."""
+    router = APIRouter(prefix="/api", tags=["alignment"])
+
+    @router.post("/project")
+    def project(body: Given) -> Projected:
+        """Cuboids as the shown frame's camera sees them with the present parameters."""
+        shown = engine.snapshot
+        tick = shown.tick
+        aligned = resolve(shown.params.alignment, tick.frame.camera) if tick is not None else None
+        if aligned is None:
+            return Projected(pixels=None)
+        if not body.cuboids:
+            return Projected(pixels=[])
+        corners = corners_of([each.value() for each in body.cuboids])
+        pixels = np.round(aligned.project(corners.reshape(-1, 3)), 2).tolist()
+        seen = [(u, v) if np.isfinite((u, v)).all() else None for u, v in pixels]
+        return Projected(pixels=[seen[start : start + 8] for start in range(0, len(seen), 8)])
+
+    @router.post("/project/ray")
+    def ray(body: GivenPixel) -> Ray:
+        """What a pixel of the shown frame looks along with the present parameters."""
+        shown = engine.snapshot
+        aligned = resolve(shown.params.alignment, shown.tick.frame.camera) if shown.tick is not None else None
+        if aligned is None:
+            return Ray(start=None, toward=None)
+        start, (toward,) = aligned.rays(np.array([body.pixel]))
+        return Ray(start=tuple(start.tolist()), toward=tuple(toward.tolist()))
+
+    return router

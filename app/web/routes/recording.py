@@ -1,0 +1,49 @@
+"""/api/recording: recording what is shown into a session."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fastapi import APIRouter
+from pydantic import BaseModel
+
+from app.engine.engine import Engine
+from app.web.routes.refusals import refusing
+from app.web.routes.shapes import RecordingJson
+
+if TYPE_CHECKING:
+    from pipeline.recording.recorder import RecordingState
+
+
+class RecordingChoice(BaseModel):
+    """on: begin, or end."""
+
+    on: bool
+
+
+def recording_router(engine: Engine) -> APIRouter:
+    """Routes over the engine's recording."""
+    router = APIRouter(prefix="/api", tags=["recording"])
+
+    @router.get("/recording")
+    def read() -> RecordingJson | None:
+        """How the recording does; null while there is none. ``state.recording`` of the stream and of /api/state is the
+        same."""
+        return _json(engine.desk.state)
+
+    @router.post("/recording")
+    def record(body: RecordingChoice) -> RecordingJson | None:
+        """Begin or end recording. Beginning answers with the new recording (with the present one, where one goes on
+        already), ending with the finished one, null where there was none. The file is a session: open it with
+        POST /api/source {"uri": file}. Marks made meanwhile (POST /api/marks) are in it. 409 with a sentence when
+        nothing is open or no file can be made. Opening another source ends the recording."""
+        with refusing():
+            state = engine.desk.start(engine.source) if body.on else engine.desk.stop()
+        engine.control.change()
+        return _json(state)
+
+    return router
+
+
+def _json(state: RecordingState | None) -> RecordingJson | None:
+    return RecordingJson(**state.to_json()) if state is not None else None

@@ -1,0 +1,39 @@
+"""How what cannot be done becomes an HTTP answer of one sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from fastapi import HTTPException
+
+from app.drive.background_runs import Drives
+from app.drive.open_recording import Recording
+from app.drive.run_registry import NoSuchRun
+from app.labels.errors import BadAct, DatabaseError, NoSuchLabel, Stale
+from pipeline.common.errors import BadInput
+
+
+@contextmanager
+def refusing() -> Iterator[None]:
+    """404 for what is not there, 409 for what is refused, 422 for what makes no sense, 503 for a database that fails.
+    Stale goes through: who asks is to get both versions."""
+    try:
+        yield
+    except Stale:
+        raise
+    except (NoSuchRun, NoSuchLabel) as error:
+        raise HTTPException(404, str(error)) from None
+    except BadAct as error:
+        raise HTTPException(422, str(error)) from None
+    except DatabaseError as error:
+        raise HTTPException(503, str(error)) from None
+    except BadInput as error:
+        raise HTTPException(409, str(error)) from None
+
+
+def open_recording(drives: Drives) -> Recording:
+    """The recording whose whole drive is computed; 404 when there is none, as with live sensors."""
+    if drives.recording is None:
+        raise HTTPException(404, "no recording is open; live sensors are to be recorded first, and the session opened")
+    return drives.recording

@@ -1,0 +1,117 @@
+"""/rerun and /api/rerun: the drive in rerun's web viewer, every file of which comes from here."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from urllib.parse import urlencode
+
+from fastapi import APIRouter, HTTPException, Query
+from fastapi.responses import FileResponse
+from pydantic import BaseModel
+from starlette.background import BackgroundTask
+
+from app.clips.exports import WRITERS
+from app.engine.engine import Engine
+from app.views.rerun_start_options import Opening
+from app.views.rerun_web import FILES, ViewerFiles
+from app.web.routes.clips import clip_of
+from app.web.routes.refusals import open_recording, refusing
+from app.web.routes.shapes import file_of
+
+AROUND = 50
+"""Frames before and behind the shown one that are opened by default."""
+MOST_FRAMES = 600
+
+_POLICY = (
+    "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; img-src 'self' blob: "
+    "data:; font-src 'self' data:; connect-src 'self' blob: data:; worker-src 'self' blob:; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'self'"
+)
+"""What the viewer needs: WebAssembly, and styles that it sets itself. It may talk to nobody but us."""
+_TYPES = {"re_viewer.js": "text/javascript", "re_viewer_bg.wasm": "application/wasm"}
+_PAGE = Path(__file__).resolve().parents[3] / "static" / "rerun" / "index.html"
+
+
+class Address(BaseModel):
+    """Where this drive is open in the viewer, at this moment."""
+
+    url: str
+    first: int
+    last: int
+
+
+def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
+    """Routes to the viewer and what it shows."""
+    router = APIRouter(tags=["rerun"])
+
+    @router.get("/api/rerun/open")
+    def address(
+        first: int | None = Query(None, ge=0, description="From this frame on; else from the shown one"),
+        compact: bool = Query(False, description="Laid out for a narrow pane"),
+    ) -> Address:
+        """The address for a frame or a tab: the drive from the shown frame on, standing still there (a recording cannot
+        say where the viewer's cursor is). 409 in one sentence when there is no web viewer here."""
+        with refusing():
+            open_recording(engine.drives)
+            for name in FILES:
+                viewer.path(name)
+        begin, end = _span(engine, engine.snapshot.index if first is None else first, None)
+        query = urlencode({"first": begin, "last": end, "paused": 1, "compact": int(compact)})
+        return Address(url=f"/rerun/?{query}", first=begin, last=end)
+
+    @router.get("/api/rerun.rrd", response_class=FileResponse, responses=file_of("application/octet-stream"))
+    def replay(
+        first: int | None = Query(None, ge=0),
+        last: int | None = Query(None, ge=0),
+        paused: bool = Query(False, description="The viewer opens it standing still"),
+        compact: bool = Query(False, description="Laid out for a narrow pane"),
+    ) -> FileResponse:
+        """The drive as a rerun recording, with the present parameters: by default what is around the shown frame, at
+        most 600 frames."""
+        span = _span(engine, first, last)
+        clip = replace(clip_of(engine, *span), opening=Opening(paused, compact))
+        file = tempfile.NamedTemporaryFile(prefix="cipv-", suffix=".rrd", delete=False)  # noqa: SIM115
+        path = Path(file.name)
+        file.close()
+        try:
+            with refusing():
+                WRITERS["rrd"](clip, path, lambda done, total: None)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
+        name = f"drive-{span[0]:06d}-{span[1]:06d}.rrd"
+        gone = BackgroundTask(path.unlink, missing_ok=True)
+        return FileResponse(path, filename=name, media_type="application/octet-stream", background=gone)
+
+    def file(name: str) -> Callable[[], FileResponse]:
+        def send() -> FileResponse:
+            with refusing():
+                path = viewer.path(name)
+            return FileResponse(path, media_type=_TYPES[name], headers={"cache-control": "no-cache"})
+
+        return send
+
+    for name in FILES:
+        router.add_api_route(f"/rerun/{name}", file(name), include_in_schema=False, response_class=FileResponse)
+
+    @router.get("/rerun/", response_class=FileResponse, include_in_schema=False)
+    def page() -> FileResponse:
+        """The page that the viewer is in."""
+        headers = {"content-security-policy": _POLICY, "cache-control": "no-cache"}
+        return FileResponse(_PAGE, headers=headers)
+
+    return router
+
+
+def _span(engine: Engine, first: int | None, last: int | None) -> tuple[int, int]:
+    """The frames to open; 422 when they are none."""
+    shown = engine.snapshot
+    end = max(shown.count - 1, 0)
+    start = max(0, shown.index - AROUND) if first is None else first
+    stop = min(end, start + 2 * AROUND if last is None else last)
+    if start > stop:
+        raise HTTPException(422, f"first: the recording has {shown.count} frames")
+    return start, min(stop, start + MOST_FRAMES - 1)

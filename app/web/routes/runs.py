@@ -1,0 +1,211 @@
+"""/api/runs: what other parameters would have made of the drive. Keep, name, compare, take, delete."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any, Literal
+
+from fastapi import APIRouter, Query, Response
+from pydantic import BaseModel, Field
+
+from app.drive.background_runs import Drives, Phase
+from app.drive.compare import compare
+from app.drive.frame_rows import Row
+from app.drive.full_run import DriveRun
+from app.drive.open_recording import Recording
+from app.drive.run_registry import LONGEST_NAME
+from app.engine.engine import Engine
+from app.labels.errors import DatabaseError
+from app.labels.service.desk import LabelDesk
+from app.web.routes.drive import Columns, columns_of, current
+from app.web.routes.refusals import open_recording, refusing
+from app.web.routes.shapes import MetricJson, file_of
+from pipeline.params import changes_of, to_yaml
+
+logger = logging.getLogger("cipv.runs")
+
+_MOST_SENTENCES = 100
+_NAMED_CHANGES = 3
+
+
+class Run(BaseModel):
+    """name: a person's. label: what it changes against the base. digest: equal when it is made from the same."""
+
+    id: int
+    name: str
+    label: str
+    digest: str
+    preset: str
+    changes: dict[str, tuple[Any, Any]]
+    done: int
+    total: int
+    phase: Phase
+    note: str
+    kept: bool
+    seconds: float
+
+
+class Runs(BaseModel):
+    """run: of the present parameters. base: what it is compared against."""
+
+    base: int | None
+    run: int | None
+    runs: list[Run]
+
+
+class Name(BaseModel):
+    """A person's name for a run."""
+
+    name: str = Field("", max_length=LONGEST_NAME)
+
+
+class ComparisonJson(BaseModel):
+    """differing: first and last frame of ranges whose lead differs; first: what differs where a range begins. truth:
+    who judges: what people labelled here, else the labels that come with the recording, or the simulator."""
+
+    base: int
+    run: int
+    done: int
+    differing: list[tuple[int, int]]
+    frames_differing: int
+    first: dict[int, str]
+    metrics: list[MetricJson]
+    truth: Literal["labels", "recording", "simulator"] | None
+    judged: int
+
+
+def runs_router(engine: Engine, drives: Drives) -> APIRouter:
+    """Routes over the runs of the open recording."""
+    router = APIRouter(prefix="/api", tags=["what if"])
+
+    @router.get("/runs")
+    def runs() -> Runs:
+        """Every run of the open recording, the oldest first."""
+        return _runs_json(drives.recording)
+
+    @router.get("/runs/{number}/columns")
+    def columns(number: int, first: int = Query(0, alias="from", ge=0)) -> Columns:
+        """A run's columns from a frame on."""
+        recording = open_recording(drives)
+        with refusing():
+            return columns_of(recording, recording.book.get(number), first)
+
+    @router.post("/runs/{number}/keep")
+    def keep(number: int, body: Name) -> Runs:
+        """Keep a run under a name, or rename it. Others go when newer ones come."""
+        recording = open_recording(drives)
+        with refusing():
+            recording.book.keep(number, body.name)
+        drives.changed()
+        return _runs_json(recording)
+
+    @router.post("/runs/{number}/base")
+    def base(number: int) -> Runs:
+        """Compare against this one from now on."""
+        recording = open_recording(drives)
+        with refusing():
+            recording.book.compare_with(number)
+        drives.changed()
+        return _runs_json(recording)
+
+    @router.post("/runs/{number}/use")
+    def use(number: int) -> Runs:
+        """Take a run's parameters: a change that can be undone."""
+        recording = open_recording(drives)
+        with refusing():
+            run = recording.book.get(number)
+        engine.control.set_params(run.params, run.preset)
+        drives.want(run.params, run.preset)
+        return _runs_json(recording)
+
+    @router.delete("/runs/{number}")
+    def delete(number: int) -> Runs:
+        """Forget a run. The present one and the base stay."""
+        recording = open_recording(drives)
+        with refusing():
+            recording.book.delete(number)
+        drives.changed()
+        return _runs_json(recording)
+
+    @router.get("/runs/{number}/params.yaml", response_class=Response, responses=file_of("application/yaml"))
+    def preset_file(number: int) -> Response:
+        """A run's parameters as a file for `cipv run --params`."""
+        with refusing():
+            params = open_recording(drives).book.get(number).params
+        headers = {"content-disposition": f'attachment; filename="cipv-run-{number}.yaml"'}
+        return Response(to_yaml(params), media_type="application/yaml", headers=headers)
+
+    @router.get("/compare")
+    def comparison(base: int | None = None, run: int | None = None) -> ComparisonJson:
+        """Two runs side by side; without numbers the base and the present one."""
+        recording = open_recording(drives)
+        with refusing():
+            new = recording.book.get(run) if run is not None else current(recording)
+            old = recording.book.get(base) if base is not None else recording.book.base or new
+        judged = _judged_by_labels(engine.labels, old, new)
+        found = compare(*(judged or (old.rows(), new.rows())))
+        truth: Literal["labels", "recording", "simulator"] = "simulator" if recording.recipe.simulated else "recording"
+        return ComparisonJson(
+            base=old.number,
+            run=new.number,
+            done=found.frames,
+            differing=list(found.differing),
+            frames_differing=found.frames_differing,
+            first=dict(list(found.sentences.items())[:_MOST_SENTENCES]),
+            metrics=[MetricJson(**vars(metric)) for metric in found.metrics],
+            truth=None if not found.judged else "labels" if judged is not None else truth,
+            judged=found.judged,
+        )
+
+    return router
+
+
+def _judged_by_labels(desk: LabelDesk, base: DriveRun, run: DriveRun) -> tuple[list[Row], list[Row]] | None:
+    """The rows of both, judged by what people labelled here; null where they stand behind nothing, and the truth that
+    comes with the recording judges; also while their database is away."""
+    try:
+        labels = desk.labels
+        first, second = desk.scores.judged_rows(labels, base), desk.scores.judged_rows(labels, run)
+    except DatabaseError as error:  # two runs are compared without labels as well
+        logger.warning("compared without labels: %s", error)
+        return None
+    return (first, second) if first is not None and second is not None else None
+
+
+def label_of(changes: dict[str, tuple[Any, Any]], preset: str) -> str:
+    """A run's name by itself: what it changes, or where it started."""
+    if not changes:
+        return f"preset {preset}"
+    named = [f"{name} {old} → {new}" for name, (old, new) in list(changes.items())[:_NAMED_CHANGES]]
+    rest = len(changes) - len(named)
+    return ", ".join(named) + (f" and {rest} more" if rest else "")
+
+
+def _runs_json(recording: Recording | None) -> Runs:
+    if recording is None:
+        return Runs(base=None, run=None, runs=[])
+    book = recording.book
+    base, run = book.base, book.current
+    return Runs(
+        base=base.number if base else None,
+        run=run.number if run else None,
+        runs=[_run_json(recording, each, base or each) for each in book.all()],
+    )
+
+
+def _run_json(recording: Recording, run: DriveRun, base: DriveRun) -> Run:
+    changes = changes_of(base.params, run.params)
+    return Run(
+        id=run.number,
+        name=run.name,
+        label=label_of(changes, run.preset),
+        digest=recording.digest(run.params),
+        preset=run.preset,
+        changes=changes,
+        done=run.done,
+        total=run.total,
+        phase="failed" if run.note else "done" if run.is_complete else "run",
+        note=run.note,
+        kept=run.kept,
+        seconds=round(run.seconds, 3),
+    )

@@ -1,0 +1,56 @@
+"""The server and the engine as one program, until Ctrl-C.
+
+The engine starts before FastAPI is imported, which takes half a second: it opens the recording and makes the first
+picture meanwhile.
+"""
+
+from __future__ import annotations
+
+import socket
+import sys
+from collections.abc import Callable, Iterable
+
+from app.core.server_address import DEFAULT_PORT, is_loopback, listen_socket, reachable
+from app.core.shared_view_state import Looks
+from app.drive.marks import Marks
+from app.engine.engine import Engine
+from app.engine.session_recording import SESSIONS
+from app.web.tokens import Tokens
+from pipeline.step import spare_what_is_loaded
+
+
+def serve(
+    engine: Engine,
+    *,
+    host: str = "127.0.0.1",
+    port: int = DEFAULT_PORT,
+    strict_port: bool = False,
+    hosts: Iterable[str] = (),
+    viser_port: Callable[[], int | None] = lambda: None,
+    looks: Looks | None = None,
+    on_ready: Callable[[str], None] | None = None,
+) -> None:
+    """Serve until Ctrl-C. Starts and stops the engine; prints the page's address on a line of its own when it answers,
+    and links with tokens where other machines can come.
+
+    PortTaken and BadInput (a weak token) before anything is started.
+    """
+    tokens = None if is_loopback(host) and not tuple(hosts) else Tokens.from_environment()
+    bound = listen_socket(host, port, strict=strict_port)
+    number = bound.getsockname()[1]
+    if port not in (0, number):
+        print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
+    address = f"http://{reachable(host)}:{number}"
+    engine.labels.kept.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
+    engine.start()
+    try:
+        from app.web.server import Server, create_app
+
+        app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks, tokens)
+        spare_what_is_loaded()
+        Server(app, address, on_ready, tokens).run(sockets=[bound])
+    except KeyboardInterrupt:
+        pass  # uvicorn raises the signal again once it has shut down
+    finally:
+        engine.stop()
+        bound.close()

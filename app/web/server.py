@@ -1,0 +1,176 @@
+"""The one web server: page, API, stream and 3D view on one port."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+from collections.abc import AsyncIterator, Callable, Iterable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response
+from fastapi.staticfiles import StaticFiles
+from starlette.types import Scope
+
+from app.clips.jobs import Jobs
+from app.core.shared_view_state import Looks
+from app.drive.marks import Marks
+from app.engine.engine import Engine
+from app.streaming.stream import Stream
+from app.views.colors import palette_css
+from app.views.rerun_web import ViewerFiles
+from app.views.viser_proxy import viser_router
+from app.web.access import Access, Guard
+from app.web.api_description import REFUSALS, titled
+from app.web.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
+from app.web.metrics import Metrics
+from app.web.routes.alignment import alignment_router
+from app.web.routes.clips import clips_router
+from app.web.routes.drive import drive_router
+from app.web.routes.health import health_router
+from app.web.routes.label_acts import label_acts_router
+from app.web.routes.label_files import IMPORT, label_files_router
+from app.web.routes.labels import labels_router
+from app.web.routes.params import params_router
+from app.web.routes.playback import playback_router
+from app.web.routes.project import project_router
+from app.web.routes.recording import recording_router
+from app.web.routes.rerun import rerun_router
+from app.web.routes.runs import runs_router
+from app.web.tokens import Tokens
+
+STATIC = Path(__file__).resolve().parents[2] / "static"
+
+
+def create_app(
+    engine: Engine,
+    viser_port: Callable[[], int | None] = lambda: None,
+    hosts: Iterable[str] = (),
+    marks: Marks | None = None,
+    looks: Looks | None = None,
+    tokens: Tokens | None = None,
+) -> FastAPI:
+    """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
+    marked moments are kept; null forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
+    comes must have; null where only this machine can come."""
+    access = Access(hosts)
+    stream = Stream(looks)
+    jobs, viewer, metrics = Jobs(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
+
+    @asynccontextmanager
+    async def listening(_: FastAPI) -> AsyncIterator[None]:
+        stream.publish(engine.snapshot)
+        ends = [engine.listen(stream.publish), engine.listen(metrics.saw)]
+        yield
+        for end in ends:
+            end()
+        await asyncio.to_thread(jobs.close)
+        viewer.close()
+
+    app = FastAPI(
+        title="CIPV Studio", version="1", docs_url=None, redoc_url=None, lifespan=listening, responses=REFUSALS
+    )
+    app.openapi = titled(app)  # type: ignore[method-assign]
+    app.add_middleware(BodyLimit, files={IMPORT: LARGEST_FILE})
+    app.add_middleware(Guard, access=access, tokens=tokens)  # the last one added is the first to be asked
+    app.add_exception_handler(RequestValidationError, _one_sentence)
+    app.include_router(health_router(engine, metrics))
+    app.include_router(playback_router(engine, stream))
+    app.include_router(params_router(engine))
+    app.include_router(recording_router(engine))
+    app.include_router(drive_router(engine, engine.drives, marks or Marks()))
+    app.include_router(runs_router(engine, engine.drives))
+    app.include_router(labels_router(engine.labels))
+    app.include_router(label_acts_router(engine.labels))
+    app.include_router(label_files_router(engine.labels))
+    app.include_router(clips_router(engine, jobs))
+    app.include_router(alignment_router(engine))
+    app.include_router(project_router(engine))
+    app.include_router(rerun_router(engine, viewer))
+    app.include_router(viser_router(viser_port, access.allowed))
+    app.add_api_route("/palette.css", _palette, include_in_schema=False)
+    app.mount("/", _Pages(engine.drives.turn.asked), name="pages")
+    return app
+
+
+class Server(uvicorn.Server):
+    """Says where it is as soon as it answers. Compressing the stream would cost more than sending it."""
+
+    def __init__(
+        self, app: FastAPI, address: str, on_ready: Callable[[str], None] | None, tokens: Tokens | None = None
+    ) -> None:
+        super().__init__(
+            uvicorn.Config(
+                app,
+                log_level="warning",
+                access_log=False,
+                ws_per_message_deflate=False,
+                ws_max_size=LARGEST_MESSAGE,
+                timeout_graceful_shutdown=1,
+            )
+        )
+        self._address = address
+        self._tokens = tokens
+        self._on_ready = on_ready
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        if self.started:
+            print(self._address, flush=True)
+            link = self._address
+            if self._tokens is not None:
+                link = f"{self._address}/?token={self._tokens.person}"
+                print(f"everything:         {link}", flush=True)
+                print(f"display in the car: {self._address}/drive/?token={self._tokens.display}", flush=True)
+            if self._on_ready is not None:
+                await asyncio.to_thread(self._on_ready, link)
+
+
+class _Pages(StaticFiles):
+    """Static files that the browser always asks about again, so that an update is never half old. on_ask: called for
+    each of them: somebody waits for a page."""
+
+    def __init__(self, on_ask: Callable[[], object]) -> None:
+        super().__init__(directory=STATIC, html=True)
+        self._on_ask = on_ask
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        self._on_ask()
+        return await super().get_response(path, scope)
+
+    def file_response(self, *args: Any, **kwargs: Any) -> Response:
+        response = super().file_response(*args, **kwargs)
+        response.headers["cache-control"] = "no-cache"
+        return response
+
+
+def _palette() -> Response:
+    """The palette that all views share, as CSS custom properties for either theme. --picture-… are the shades to draw
+    over a photograph with, the same in both."""
+    dark, light = palette_css("dark"), palette_css("light")
+    text = (
+        f":root {{\n{dark}\n{dark.replace('--cipv-', '--picture-')}\n}}\n"
+        f"@media (prefers-color-scheme: light) {{ :root:not([data-theme=dark]) {{\n{light}\n}} }}\n"
+        f":root[data-theme=light] {{\n{light}\n}}\n"
+    )
+    return Response(text, media_type="text/css", headers={"cache-control": "no-cache"})
+
+
+async def _one_sentence(_: Request, error: Exception) -> JSONResponse:
+    """422 with the first complaint: where, and what is wrong there."""
+    assert isinstance(error, RequestValidationError)
+    first = error.errors()[0]
+    if first["type"] == "json_invalid":
+        return _not_understood(f"the body is no JSON: {first['ctx']['error']}")
+    if first["loc"] == ("body",) and first["type"] != "missing":
+        return _not_understood("the body has to be a JSON object, sent as application/json")
+    place = ".".join(str(part) for part in first["loc"] if part != "body")
+    return _not_understood(f"{place}: {first['msg']}" if place else first["msg"])
+
+
+def _not_understood(detail: str) -> JSONResponse:
+    return JSONResponse({"detail": detail}, status_code=422)

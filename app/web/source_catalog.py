@@ -1,0 +1,42 @@
+"""Recordings that the page can offer without a path being typed: the simulator's scenarios, sessions and known data
+folders."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+from app.engine.session_recording import SESSIONS
+from pipeline.common.data_dir import data_dir
+from pipeline.sources import looks_like
+
+
+def catalog() -> list[tuple[str, str]]:
+    """(uri, title) pairs: scenarios, then sessions, then the recordings right below ``CIPV_DATA`` and ``sessions``."""
+    return [*scenarios(), *sessions(), *recordings()]
+
+
+def scenarios() -> list[tuple[str, str]]:
+    """(uri, title) of the simulator's built-in scenarios, by name."""
+    folder = resources.files("pipeline.simulation") / "scenarios"
+    names = sorted(file.name.removesuffix(".yaml") for file in folder.iterdir() if file.name.endswith(".yaml"))
+    return [(f"sim:{name}", f"Simulation · {name.replace('_', ' ')}") for name in names]
+
+
+def sessions(folder: Path = SESSIONS) -> list[tuple[str, str]]:
+    """(uri, title) of the sessions of this machine, the newest first."""
+    files = (
+        sorted(folder.glob("*.mcap"), key=lambda file: (-file.stat().st_mtime, file.name)) if folder.is_dir() else ()
+    )
+    return [(str(file), f"session · {file.stem}") for file in files]
+
+
+def recordings() -> list[tuple[str, str]]:
+    """(uri, title) of what lies right below the data folder and ``sessions`` and looks like a known recording."""
+    found = []
+    for root in (data_dir(), SESSIONS):
+        for path in sorted(root.iterdir()) if root.is_dir() else ():
+            scheme = looks_like(path)
+            if scheme is not None:
+                found.append((f"{scheme}:{path}", f"{scheme} · {path.name}"))
+    return found

@@ -1,0 +1,160 @@
+"""Where an ego point falls in the picture, and back: the paper's ``angular`` model and ``pinhole`` beside it.
+
+Both answer the same two questions, so that every stage and view works with either:
+
+``project``    (N, 3) ego points → (N, 2) pixels u, v; NaN for points that the camera cannot see (behind it).
+``unproject``  (N, 2) pixels and (N,) horizontal ranges from the ego origin → (N, 3) ego points.
+``rays``       (N, 2) pixels → the (3,) place they are seen from, and (N, 3) directions, not normalised.
+
+Paper: section "The Alignment Method of the Camera and LiDAR point cloud" and "Transform the Image pixel to the BEV".
+The printed inverse y = x_img·tan(x_img·h_res) has the wrong dimension; from the forward equation
+y = −d·sin(x_img·h_res). The printed arctan(−y/x) is an atan2 here, and the pixel origin is explicit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import cv2
+import numpy as np
+
+from pipeline.common.geometry import F64, inverse, rotation, transform
+from pipeline.params import AlignmentParams
+from pipeline.types import Box, CameraCalibration
+
+
+class Alignment(Protocol):
+    """The one interface to either model."""
+
+    def project(self, points: F64) -> F64: ...
+
+    def unproject(self, pixels: F64, range_m: F64) -> F64: ...
+
+    def rays(self, pixels: F64) -> tuple[F64, F64]: ...
+
+
+@dataclass(frozen=True)
+class Angular:
+    """Pixels proportional to angles (paper, Eq. alignment). h_res, v_res are radians per pixel; (cx, cy) is the
+    pixel that looks along ego +x. Exact only for an equirectangular picture taken at the ego origin."""
+
+    h_res_rad: float
+    v_res_rad: float
+    cx: float
+    cy: float
+
+    def project(self, points: F64) -> F64:
+        points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        x, y, z = points.T
+        azimuth = np.arctan2(-y, x)
+        u = self.cx + azimuth / self.h_res_rad
+        v = self.cy - np.arctan2(z, np.hypot(x, y)) / self.v_res_rad
+        behind = np.abs(azimuth) >= np.pi / 2
+        return np.where(behind[:, None], np.nan, np.column_stack([u, v]))
+
+    def unproject(self, pixels: F64, range_m: F64) -> F64:
+        pixels = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        azimuth = (pixels[:, 0] - self.cx) * self.h_res_rad
+        elevation = (self.cy - pixels[:, 1]) * self.v_res_rad
+        return np.column_stack([range_m * np.cos(azimuth), -range_m * np.sin(azimuth), range_m * np.tan(elevation)])
+
+    def rays(self, pixels: F64) -> tuple[F64, F64]:
+        return np.zeros(3), self.unproject(pixels, np.ones(len(pixels)))
+
+
+@dataclass(frozen=True)
+class Pinhole:
+    """K, distortion and T_camera_ego; parallax between the two mounts is handled."""
+
+    K: F64
+    distortion: F64
+    T_camera_ego: F64
+
+    _NEAREST_M = 0.3
+
+    def project(self, points: F64) -> F64:
+        in_camera = transform(self.T_camera_ego, np.asarray(points, dtype=np.float64).reshape(-1, 3))
+        behind = in_camera[:, 2] < self._NEAREST_M
+        in_camera[behind] = (0.0, 0.0, 1.0)
+        uv: F64 = np.empty((len(in_camera), 2))
+        if self.distortion.size and len(in_camera):  # OpenCV gives None for no points
+            uv[:] = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), self.K, self.distortion)[0].reshape(-1, 2)
+        else:
+            for axis in (0, 1):  # numpy takes four times as long over rows of two
+                uv[:, axis] = in_camera[:, axis] / in_camera[:, 2] * self.K[axis, axis] + self.K[axis, 2]
+        uv[behind] = np.nan
+        return uv
+
+    def unproject(self, pixels: F64, range_m: F64) -> F64:
+        """The point on the pixel's ray whose horizontal range from the ego origin is ``range_m``."""
+        start, ray = self.rays(pixels)
+        # |start_xy + t ray_xy| = range: the larger root is the one ahead of the camera
+        a = np.sum(ray[:, :2] ** 2, axis=1)
+        b = ray[:, :2] @ start[:2]
+        c = float(start[:2] @ start[:2]) - np.asarray(range_m, dtype=np.float64) ** 2
+        t = (-b + np.sqrt(np.maximum(b * b - a * c, 0.0))) / a
+        return start + t[:, None] * ray
+
+    def rays(self, pixels: F64) -> tuple[F64, F64]:
+        pixels = np.asarray(pixels, dtype=np.float64).reshape(-1, 2)
+        if self.distortion.size and len(pixels):
+            flat = cv2.undistortPoints(pixels.reshape(-1, 1, 2), self.K, self.distortion).reshape(-1, 2)
+        else:
+            flat = (pixels - self.K[:2, 2]) / [self.K[0, 0], self.K[1, 1]]
+        rotation, offset = self.T_camera_ego[:3, :3], self.T_camera_ego[:3, 3]
+        return -offset @ rotation, flat @ rotation[:2] + rotation[2]
+
+
+def angular_from_calibration(camera: CameraCalibration) -> Angular:
+    """The angular model that agrees with a calibrated camera at its centre: pixels per radian there are fx and fy, and
+    the origin is where ego +x points (at infinity, since the model has no mount of its own)."""
+    forward = camera.T_camera_ego[:3, :3] @ np.array([1.0, 0.0, 0.0])
+    u, v = (camera.K @ (forward / forward[2]))[:2]
+    return Angular(1.0 / camera.K[0, 0], 1.0 / camera.K[1, 1], float(u), float(v))
+
+
+def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignment | None:
+    """The alignment in use: parameters where a person set them, the recording's calibration for the rest. Null when
+    neither is known, in which case nothing can be projected. Pinhole needs a calibration; angular needs none."""
+    if params.model == "pinhole" and camera is not None:
+        return Pinhole(camera.K, camera.distortion, camera.T_camera_ego @ inverse(_correction(params, camera)))
+    measured = angular_from_calibration(camera) if camera is not None else None
+    typed = (params.h_res_deg, params.v_res_deg, params.cx_px, params.cy_px)
+    if measured is None and any(value is None for value in typed):
+        return None
+    base = (
+        (np.degrees(measured.h_res_rad), np.degrees(measured.v_res_rad), measured.cx, measured.cy)
+        if measured is not None
+        else typed
+    )
+    h_deg, v_deg, cx, cy = (b if t is None else t for t, b in zip(typed, base, strict=True))
+    return Angular(float(np.radians(h_deg)), float(np.radians(v_deg)), float(cx), float(cy))
+
+
+def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
+    """(4, 4) turn of the camera where it is mounted, in ego axes: its place stays."""
+    turn = rotation(*(np.radians(angle) for angle in (params.roll_deg, params.pitch_deg, params.yaw_deg)))
+    place = inverse(camera.T_camera_ego)[:3, 3]
+    correction = np.eye(4)
+    correction[:3, :3], correction[:3, 3] = turn, place - turn @ place
+    return correction
+
+
+def project_cuboids(alignment: Alignment, corners: F64, width: int, height: int) -> list[Box | None]:
+    """The image boxes around cuboids' (M, 8, 3) corners, clipped to the picture; null for one outside it or behind.
+
+    Paper: "the cuboid of the bounding box … is projected onto the image". All at once: a sweep has dozens."""
+    uv = alignment.project(corners.reshape(-1, 3)).reshape(-1, 8, 2)
+    behind = np.isnan(uv)
+    enough = np.sum(~behind[..., 0], axis=1) >= 4
+    low = np.clip(np.where(behind, np.inf, uv).min(axis=1), 0.0, [width, height])
+    high = np.clip(np.where(behind, -np.inf, uv).max(axis=1), 0.0, [width, height])
+    inside = enough & np.all(high > low, axis=1)
+    boxes = np.hstack([low, high]).tolist()
+    return [(x1, y1, x2, y2) if ok else None for ok, (x1, y1, x2, y2) in zip(inside, boxes, strict=True)]
+
+
+def project_cuboid(alignment: Alignment, corners: F64, width: int, height: int) -> Box | None:
+    """The image box around one cuboid's (8, 3) corners; see ``project_cuboids``."""
+    return project_cuboids(alignment, corners[None], width, height)[0]

@@ -1,0 +1,144 @@
+"""Adaptive cruise control: a desired speed from the lead's distance, and pedals from a PID (paper, section ACC).
+
+Algorithm 3 prints the gap law under d ≤ d_min, where it is negative, keeps v_current for ever once the lead is gone and
+lets the last object of its loop win. Built here is what it means: the law holds when d ≤ d_desired, clipped to
+[0, set speed]; with nothing ahead the car returns to the set speed; the smallest demand wins. Where the path is not
+known well enough to say who leads, the car gets no faster.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from pipeline.decision.object_motion import closing_speed_mps
+from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
+from pipeline.params import AccParams
+from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Path
+
+STANDSTILL_MPS = 0.1
+CREEP_MPS = 3.0
+"""Slower than this no curve shows in the own motion: a car that might not creep would never learn its path."""
+State = Literal["cruise", "follow", "stop", "warn"]
+
+
+@dataclass(frozen=True)
+class AccState:
+    """The PID's memory. integral_m: of the speed error over time. error_mps: of the frame before; null at first."""
+
+    integral_m: float = 0.0
+    error_mps: float | None = None
+
+
+@dataclass(frozen=True)
+class Demand:
+    """One wish for a speed, what asks for it, and the object it slows down for. no_faster: than now, whatever the PID
+    remembers."""
+
+    speed_mps: float
+    state: State
+    reason: str
+    object_id: int | None = None
+    no_faster: bool = False
+
+
+def control(
+    state: AccState,
+    ego: EgoState | None,
+    cipv: Cipv | None,
+    objects: tuple[FusedObject, ...],
+    path: Path,
+    dt_s: float | None,
+    params: AccParams,
+) -> tuple[AccState, AccCommand | None]:
+    """Pedals for this frame; null, with the memory cleared, where ego speed is not known, nor was a moment ago
+    (``own_motion.recent``)."""
+    if ego is None:
+        return AccState(), None
+    demand = min(
+        (follow(ego, cipv, params), *avoid(ego, cipv, objects, path, params), *hold(ego, path, params)),
+        key=lambda wish: wish.speed_mps,
+    )
+    state, accel = pid(state, demand.speed_mps - ego.speed_mps, dt_s, params)
+    accel = min(accel, 0.0) if demand.no_faster else accel
+    return state, AccCommand(
+        state=demand.state,
+        desired_speed_mps=demand.speed_mps,
+        accel_mps2=accel,
+        accelerator=max(accel, 0.0) / params.max_accel_mps2,
+        brake=max(-accel, 0.0) / params.max_decel_mps2,
+        reason=demand.reason,
+        object_id=demand.object_id,
+    )
+
+
+def cruise(params: AccParams) -> Demand:
+    """The speed a person set."""
+    return Demand(params.set_speed_kmh / 3.6, "cruise", "nothing to slow down for")
+
+
+def desired_gap_m(speed_mps: float, params: AccParams) -> float:
+    """d_desired: a time gap on top of the gap at standstill."""
+    return params.min_gap_m + params.time_gap_s * speed_mps
+
+
+def follow(ego: EgoState, cipv: Cipv | None, params: AccParams) -> Demand:
+    """v_desired = v_current · (d − d_min) / (d_desired − d_min) (paper, Eq. acc), clipped to [0, set speed]. With the
+    lead farther than d_desired the law is not defined: the set speed."""
+    set_speed = params.set_speed_kmh / 3.6
+    if cipv is None:
+        return cruise(params)
+    wanted = desired_gap_m(ego.speed_mps, params)
+    if cipv.distance_m > wanted:
+        return Demand(set_speed, "cruise", f"lead #{cipv.id} beyond the desired gap of {wanted:.1f} m")
+    if cipv.distance_m <= params.min_gap_m:
+        return Demand(0.0, "stop", f"lead #{cipv.id} inside the smallest gap of {params.min_gap_m:.1f} m", cipv.id)
+    speed = ego.speed_mps * (cipv.distance_m - params.min_gap_m) / (wanted - params.min_gap_m)
+    return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} inside the desired gap of {wanted:.1f} m", cipv.id)
+
+
+def avoid(
+    ego: EgoState, cipv: Cipv | None, objects: tuple[FusedObject, ...], path: Path, params: AccParams
+) -> list[Demand]:
+    """Slow down for objects that are not the CIPV while their TTC is below the limit (paper, Algorithm 3; "slow down
+    until TTC goes below" means above). Only those whose course leads into the corridor by then: an oncoming car in its
+    own lane has a short TTC too, and passes."""
+    return [
+        Demand(
+            ego.speed_mps * item.ttc_s / params.ttc_limit_s,
+            "warn",
+            f"#{item.id} would be hit in {item.ttc_s:.1f} s",
+            item.id,
+        )
+        for item in objects
+        if (cipv is None or item.id != cipv.id)
+        and item.ttc_s is not None
+        and item.ttc_s < params.ttc_limit_s
+        and (closing_speed_mps(item) or 0.0) > STANDSTILL_MPS
+        and is_dependable(item)
+        and enters_corridor(item, path)
+    ]
+
+
+def hold(ego: EgoState, path: Path, params: AccParams) -> list[Demand]:
+    """No faster than now where nobody knows well enough where the car is going: a lead could be anywhere. Slower than
+    the speed at which a curve shows at all, the car may creep on. Nor where the own speed is one of a while ago."""
+    coasts = ego.coasting is not None
+    if path.usable and not coasts:
+        return []
+    allowed = ego.speed_mps if coasts else max(ego.speed_mps, CREEP_MPS)
+    if allowed >= params.set_speed_kmh / 3.6:
+        return []
+    why = f"own speed not measured for {ego.coasting.age_s:.1f} s" if ego.coasting is not None else path.doubt
+    return [Demand(allowed, "cruise", f"{why}: no faster than now", no_faster=allowed <= ego.speed_mps)]
+
+
+def pid(state: AccState, error_mps: float, dt_s: float | None, params: AccParams) -> tuple[AccState, float]:
+    """Acceleration in m/s² from a speed error, with anti-windup: while the pedals are at their end the integral only
+    moves back. Without dt (first frame) only the proportional part acts."""
+    slope = (error_mps - state.error_mps) / dt_s if dt_s and state.error_mps is not None else 0.0
+    integral = state.integral_m + (error_mps * dt_s if dt_s else 0.0)
+    wanted = params.kp * error_mps + params.ki * integral + params.kd * slope
+    accel = min(max(wanted, -min(params.brake_limit_mps2, params.max_decel_mps2)), params.max_accel_mps2)
+    winds_up = (wanted != accel) and (error_mps > 0) == (wanted > 0)
+    return AccState(state.integral_m if winds_up else integral, error_mps), accel

@@ -1,0 +1,150 @@
+"""Autonomous emergency braking beside ACC: warning, partial braking, full braking.
+
+The paper brakes with its cruise control alone, a speed law that knows the distance but neither how fast the gap closes
+nor what braking is still possible. Here each vehicle in the path is asked two questions: when would it be hit (TTC),
+and how hard must we brake from now on so as not to hit it (required deceleration, brake build-up counted in). A stage
+comes in when either answer passes its limit, and stays until the danger is over. Terms as in UN Regulation 152 and
+Euro NCAP's AEB car-to-car protocol.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Literal, NamedTuple
+
+from pipeline.common.fast_replace import evolve
+from pipeline.decision.acc import STANDSTILL_MPS
+from pipeline.decision.object_motion import closing_speed_mps
+from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
+from pipeline.params import AccParams, AebParams
+from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Path
+
+Stage = Literal["warn", "partial_brake", "full_brake"]
+STAGES: tuple[Stage, ...] = ("warn", "partial_brake", "full_brake")
+_NONE, _WARN, _PARTIAL, _FULL = range(4)
+_SMALLEST_GAP_M = 0.1
+
+
+@dataclass(frozen=True)
+class AebState:
+    """level: the stage that acts, 0 none to 3 full. streak: for how many frames in a row each of the three was asked
+    for. calm_s: for how long nothing has asked while a braking stage acted. cause: what it acts for, in words, and the
+    id of that object."""
+
+    level: int = _NONE
+    streak: tuple[int, ...] = (0, 0, 0)
+    calm_s: float = 0.0
+    cause: str = ""
+    object_id: int | None = None
+
+
+class Threat(NamedTuple):
+    """Something on our way that we close in on. measured: by the LiDAR; else its speed comes from box heights."""
+
+    id: int
+    ttc_s: float
+    required_mps2: float
+    measured: bool
+
+
+def guard(
+    state: AebState,
+    command: AccCommand | None,
+    ego: EgoState | None,
+    lead: Cipv | None,
+    objects: tuple[FusedObject, ...],
+    path: Path,
+    dt_s: float | None,
+    params: AebParams,
+    pedals: AccParams,
+) -> tuple[AebState, AccCommand | None]:
+    """ACC's command, or the stage's own where that brakes harder. A warning leaves the pedals to ACC. Null and calm
+    where ego speed is not known, since then nothing is known about braking."""
+    if ego is None or command is None or not params.enabled:
+        return AebState(), command
+    threats = find_threats(lead, objects, path, params)
+    worst = max(threats, key=lambda threat: (_level(threat, params), threat.required_mps2), default=None)
+    state = _next(state, worst, ego, dt_s or 0.0, params)
+    return state, _stronger(command, state, params, pedals)
+
+
+def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams) -> float:
+    """The constant deceleration that ends the approach ``margin_m`` before contact: Δv² / (2·d), where d is what is
+    left after the brakes have built up. It is against the *relative* speed: a lead that moves needs less than a
+    standing one. Infinite when no distance is left."""
+    if closing_mps <= 0.0:
+        return 0.0
+    left_m = distance_m - params.margin_m - closing_mps * params.build_up_s
+    return closing_mps**2 / (2.0 * left_m) if left_m > _SMALLEST_GAP_M else inf
+
+
+def find_threats(
+    lead: Cipv | None, objects: tuple[FusedObject, ...], path: Path, params: AebParams
+) -> tuple[Threat, ...]:
+    """The CIPV, and what else is dependable and heads into the corridor: nothing brakes fully for a single blob."""
+    found = []
+    for item in objects:
+        closing = closing_speed_mps(item)
+        if closing is None or closing <= STANDSTILL_MPS or not item.distance_m or item.ttc_s is None:
+            continue
+        is_lead = lead is not None and item.id == lead.id
+        if (is_lead and not item.carried) or (is_dependable(item) and enters_corridor(item, path)):
+            required = required_decel_mps2(item.distance_m, closing, params)
+            found.append(Threat(item.id, item.ttc_s, required, item.source != "V"))
+    return tuple(found)
+
+
+def _level(threat: Threat, params: AebParams) -> int:
+    """The stage asked for. Without a measured distance never the full one: a box height errs by a tenth."""
+    if threat.ttc_s < params.full_ttc_s or threat.required_mps2 > params.full_when_mps2:
+        return _FULL if threat.measured else _PARTIAL
+    if threat.ttc_s < params.partial_ttc_s or threat.required_mps2 > params.partial_when_mps2:
+        return _PARTIAL
+    return _WARN if threat.ttc_s < params.warn_ttc_s else _NONE
+
+
+def _next(state: AebState, worst: Threat | None, ego: EgoState, dt_s: float, params: AebParams) -> AebState:
+    """The stage that acts now: one that has been asked for long enough, or a braking one that is not over yet."""
+    fast = ego.speed_mps * 3.6 >= params.min_speed_kmh
+    asked = _level(worst, params) if worst is not None and fast else _NONE
+    streak = tuple(count + 1 if asked > level else 0 for level, count in enumerate(state.streak))
+    confirmed = sum(count >= params.confirm_frames for count in streak)
+    moving = ego.speed_mps > STANDSTILL_MPS
+    pressing = moving and worst is not None and worst.ttc_s < params.release_ttc_s
+    calm_s = 0.0 if pressing else state.calm_s + dt_s
+    over = calm_s >= (params.release_s if moving else params.standstill_s)
+    held = state.level if state.level >= _PARTIAL and not over else _NONE
+    level = max(confirmed, held)
+    if not level:
+        return AebState(level, streak, calm_s)
+    if worst is not None and confirmed >= held:
+        return AebState(level, streak, calm_s, _cause(worst), worst.id)
+    return AebState(level, streak, calm_s, state.cause, state.object_id)
+
+
+def _cause(threat: Threat) -> str:
+    if threat.required_mps2 == inf:
+        return f"#{threat.id} in {threat.ttc_s:.1f} s, nearer than any braking"
+    return f"#{threat.id} in {threat.ttc_s:.1f} s, {threat.required_mps2:.1f} m/s² needed"
+
+
+def _stronger(command: AccCommand, state: AebState, params: AebParams, pedals: AccParams) -> AccCommand:
+    if state.level == _NONE:
+        return command
+    stage = STAGES[state.level - 1]
+    if stage == "warn":
+        return evolve(command, state=stage, reason=f"warning: {state.cause}", object_id=state.object_id)
+    decel = params.full_decel_mps2 if stage == "full_brake" else params.partial_decel_mps2
+    if -command.accel_mps2 > decel:
+        return command
+    return evolve(
+        command,
+        state=stage,
+        desired_speed_mps=0.0,
+        accel_mps2=-decel,
+        accelerator=0.0,
+        brake=min(decel / pedals.max_decel_mps2, 1.0),
+        reason=f"emergency braking: {state.cause}",
+        object_id=state.object_id,
+    )

@@ -1,0 +1,212 @@
+"""Which vehicle ahead is the closest one in the path, why this one, and why not each other (paper, section CIPV).
+
+The rule: among the objects that may be a lead at all (``pipeline.decision.gates``), the one in the path with the smallest
+distance. Each test leaves its number and limit on the object; the first that fails is the reason given.
+
+Being in the path is decided over time: every sighting gives log-odds, a running mean of them decides, so that neither a
+swaying distance nor one bad box makes the lead flicker. Which one will be next is said as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from math import exp, hypot
+from typing import NamedTuple
+
+from pipeline.common.fast_replace import evolve
+from pipeline.decision.gates import BESIDE_PLACE, QUESTIONS, Candidate
+from pipeline.decision.object_motion import closing_speed_mps
+from pipeline.decision.path_position import Place, believed_mps, place
+from pipeline.params import CipvParams
+from pipeline.types import Cipv, EgoState, FusedObject, Path, Rejection
+
+AGREEMENT_SIGMAS = 3.0
+_BLUR_M = 0.2
+"""What moves sideways is weighed over no longer than it takes to move this far: older sightings were elsewhere."""
+_HOVERS_MPS = 1.0
+_HALF_WAY = 0.7
+"""A running mean has turned half way after 0.7 of its time: what moves sideways is judged where it will be by then."""
+
+
+@dataclass(frozen=True)
+class CipvState:
+    """What one frame leaves to the next. lead_id: the CIPV. odds: of each object, the running mean of its log-odds."""
+
+    lead_id: int | None = None
+    odds: dict[int, float] = field(default_factory=dict)
+
+
+class Choice(NamedTuple):
+    """objects: with their place against the path and every gate. lead: the CIPV with its reason. next_lead: who will be
+    it next. rejected: a reason for each other object."""
+
+    objects: tuple[FusedObject, ...]
+    lead: Cipv | None
+    next_lead: Cipv | None
+    rejected: tuple[Rejection, ...]
+
+
+class _Judged(NamedTuple):
+    """An object with its place against the path and every gate. odds: the running mean of its log-odds, null without a
+    place. why_not: the reason why it cannot be the lead; null for one that can."""
+
+    item: FusedObject
+    odds: float | None
+    why_not: str | None
+
+
+def choose(
+    state: CipvState,
+    objects: tuple[FusedObject, ...],
+    path: Path,
+    ego: EgoState | None,
+    dt_s: float | None,
+    params: CipvParams,
+) -> tuple[CipvState, Choice]:
+    """The CIPV of this frame, the next one, and a reason for each other object."""
+    places = place(objects, path, ego, params)
+    judged = [_judge(state, item, placed, path, dt_s, params) for item, placed in zip(objects, places, strict=True)]
+    able = [each.item for each in judged if each.why_not is None]
+    nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
+    lead = _surer(nearest, able) if nearest is not None else None
+    choice = Choice(
+        objects=tuple(each.item for each in judged),
+        lead=_named(lead, _why(lead, len(able))) if lead is not None else None,
+        next_lead=_next_lead([each.item for each in judged], able, lead, params),
+        rejected=tuple(_rejections(judged, lead)),
+    )
+    odds = {each.item.id: each.odds for each in judged if each.odds is not None}
+    return CipvState(lead.id if lead is not None else None, odds), choice
+
+
+def _judge(
+    state: CipvState,
+    item: FusedObject,
+    placed: tuple[Place, float | None] | None,
+    path: Path,
+    dt_s: float | None,
+    params: CipvParams,
+) -> _Judged:
+    """One object. placed: where it is against the path, and when it will be over its edge."""
+    where, crossing_s = placed if placed is not None else (None, None)
+    leads, widening_m, odds = item.id == state.lead_id, 0.0, None
+    if where is not None:
+        moving_mps = believed_mps(where.sideways_mps, item)
+        decide_s = min(params.decide_s, _BLUR_M / max(abs(moving_mps), 1e-3))
+        widening_m = _widening_m(leads, moving_mps, params)
+        now = where.log_odds(widening_m, moving_mps * decide_s * _HALF_WAY)
+        before = state.odds.get(item.id, now)
+        odds = before + _fresh(dt_s, decide_s) * (now - before)
+    is_ahead = where is not None and where.ahead_m > 0.0
+    probability = 1.0 / (1.0 + exp(-odds)) if is_ahead and odds is not None else 0.0
+    is_in = probability > 0.5
+    if where is not None and where.margin_m() >= 0.0 and is_ahead and not is_in:
+        crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
+    candidate = Candidate(item, where, odds or 0.0, leads, widening_m, path, params)
+    gates = [question.ask(candidate) for question in QUESTIONS]
+    failed = next((question for question, gate in zip(QUESTIONS, gates, strict=True) if not gate.passed), None)
+    item = evolve(
+        item,
+        gates=(*item.gates, *gates),
+        path_offset_m=where.offset_m if where is not None else None,
+        in_path=is_in,
+        in_path_probability=probability if where is not None else None,
+        lateral_mps=where.sideways_mps if where is not None else None,
+        crossing_s=crossing_s,
+    )
+    return _Judged(item, odds, failed.why_not(candidate) if failed is not None else None)
+
+
+def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rejection]:
+    for item, _, why_not in judged:
+        if why_not is not None:
+            yield Rejection(item.id, why_not)
+        elif lead is not None and item.id != lead.id:
+            yield Rejection(item.id, _why_after(item, lead))
+
+
+def _fresh(dt_s: float | None, decide_s: float) -> float:
+    """The share that a new sighting has in the running mean."""
+    return 1.0 - exp(-dt_s / decide_s) if dt_s and decide_s > 0.0 else 1.0
+
+
+def _widening_m(leads: bool, moving_mps: float, params: CipvParams) -> float:
+    """The last lead leaves the path only this far outside it, so that a lead at the edge does not flicker. One that
+    moves sideways is on its way."""
+    return params.hysteresis_m * max(0.0, 1.0 - abs(moving_mps) / _HOVERS_MPS) if leads else 0.0
+
+
+def _surer(nearest: FusedObject, able: list[FusedObject]) -> FusedObject:
+    """The nearest candidate, or the surer one that it may be a doubtful view of: one car can have two rows when its box
+    and its cluster were not joined, or when it was lost and found again under another number. A row that is carried
+    yields to one seen now, one that only the camera has to one the LiDAR measures, when the two distances agree."""
+    rank = _surety(nearest)
+    same_place = [item for item in able if _surety(item) > rank and _agree(nearest, item)]
+    return min(same_place, key=lambda item: (item.distance_m or 0.0, item.id), default=nearest)
+
+
+def _surety(item: FusedObject) -> int:
+    return 0 if item.carried else 1 if item.source == "V" else 2
+
+
+def _agree(a: FusedObject, b: FusedObject) -> bool:
+    """Whether two distances are the same within three standard deviations of both."""
+    if a.distance_m is None or b.distance_m is None:
+        return False
+    sigma = hypot(a.distance_sigma_m or 0.0, b.distance_sigma_m or 0.0)
+    return abs(a.distance_m - b.distance_m) <= AGREEMENT_SIGMAS * sigma
+
+
+def _why_after(item: FusedObject, lead: FusedObject) -> str:
+    doubtful = (item.distance_m or 0.0) < (lead.distance_m or 0.0)
+    return f"taken for #{lead.id}, which is surer" if doubtful else f"behind #{lead.id}"
+
+
+# ---------------------------------------------------------------- who will be next
+
+
+def _next_lead(
+    judged: list[FusedObject], able: list[FusedObject], lead: FusedObject | None, params: CipvParams
+) -> Cipv | None:
+    """The next-to-be CIPV: the vehicle that will be first over the edge of the path, nearer than the lead; else the one
+    behind a lead that leaves, or simply behind it."""
+    lead_m = lead.distance_m if lead is not None and lead.distance_m is not None else float("inf")
+    cutting_in = [
+        item
+        for item in judged
+        if not item.in_path
+        and item.crossing_s is not None
+        and item.crossing_s <= params.cut_in_s
+        and (item.distance_m or 0.0) < lead_m
+        and not item.carried
+        and all(gate.passed for gate in item.gates if gate.name in BESIDE_PLACE)
+    ]
+    if cutting_in:
+        first = min(cutting_in, key=lambda item: (item.crossing_s or 0.0, item.id))
+        return _named(first, f"cuts in: over the edge of the path in {first.crossing_s:.1f} s")
+    behind = [item for item in able if lead is not None and item.id != lead.id and (item.distance_m or 0.0) > lead_m]
+    if lead is None or not behind:
+        return None
+    second = min(behind, key=lambda item: (item.distance_m or 0.0, item.id))
+    if lead.crossing_s is not None and lead.crossing_s <= params.cut_in_s:
+        return _named(second, f"#{lead.id} leaves the path in {lead.crossing_s:.1f} s")
+    return _named(second, f"next behind #{lead.id}")
+
+
+def _why(lead: FusedObject, candidates: int) -> str:
+    seen_by = {"V": "camera only", "L": "LiDAR only", "VL": "both sensors"}[lead.source]
+    what = f"{lead.label or 'obstacle'} seen by {seen_by}"
+    others = f", nearest of {candidates} in path" if candidates > 1 else ", alone in path"
+    offset = lead.path_offset_m or 0.0
+    side = (
+        f"{abs(offset):.1f} m {'left' if offset > 0 else 'right'} of its centre"
+        if abs(offset) >= 0.05
+        else "on its centre"
+    )
+    return f"{what}{others}, {side}"
+
+
+def _named(item: FusedObject, reason: str) -> Cipv:
+    assert item.distance_m is not None
+    return Cipv(item.id, item.distance_m, closing_speed_mps(item), item.ttc_s, reason)

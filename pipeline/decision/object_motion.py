@@ -1,0 +1,47 @@
+"""How objects move against the ego car and over the ground: closing speed, time to collision, moving or not.
+
+Signs, in words: a lead that is slower than ego closes the gap, its closing speed is positive and its TTC finite; a lead
+that pulls away has a negative closing speed and no TTC.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import hypot
+
+from pipeline.common.fast_replace import evolve
+from pipeline.params import MotionParams
+from pipeline.path.yaw_rate import usable_rate
+from pipeline.types import EgoState, FusedObject
+
+SMALLEST_CLOSING_MPS = 0.1
+"""A gap that shrinks more slowly does not measurably shrink, and has no TTC."""
+
+
+def closing_speed_mps(item: FusedObject) -> float | None:
+    """How fast the gap to the object's nearest point shrinks; null where place or velocity are unknown."""
+    if item.velocity_mps is None or item.closest_point is None or not item.distance_m:
+        return None
+    x, y, _ = item.closest_point
+    return -(x * item.velocity_mps[0] + y * item.velocity_mps[1]) / item.distance_m
+
+
+def describe(objects: Iterable[FusedObject], ego: EgoState | None, params: MotionParams) -> tuple[FusedObject, ...]:
+    """Each object with its TTC, and, where ego speed is known, its speed over ground and whether it moves.
+
+    The relative velocity is measured in the turning ego frame: over the ground add the ego's own speed and ω × r."""
+    return tuple(_described(item, ego, params) for item in objects)
+
+
+def _described(item: FusedObject, ego: EgoState | None, params: MotionParams) -> FusedObject:
+    closing = closing_speed_mps(item)
+    shrinks = closing is not None and closing >= SMALLEST_CLOSING_MPS and item.distance_m is not None
+    ttc = item.distance_m / closing if shrinks else None  # type: ignore[operator]
+    if ego is None or item.velocity_mps is None or item.closest_point is None:
+        return item if ttc == item.ttc_s else evolve(item, ttc_s=ttc)
+    yaw_rate = usable_rate(ego) or 0.0
+    x, y, _ = item.closest_point
+    vx = item.velocity_mps[0] + ego.speed_mps - yaw_rate * y
+    vy = item.velocity_mps[1] + yaw_rate * x
+    speed = hypot(vx, vy)
+    return evolve(item, ttc_s=ttc, speed_over_ground_mps=speed, moving=speed > params.moving_mps)

@@ -1,0 +1,38 @@
+"""Which objects beside the CIPV deserve a reaction, for ACC's TTC rule and for emergency braking alike.
+
+A wrong brake is a danger of its own, so an object must be dependable (the LiDAR measures it in this frame, it is
+confirmed and no kerb or post) and its course must really lead into the corridor.
+"""
+
+from __future__ import annotations
+
+from pipeline.decision.path_position import believed_mps
+from pipeline.types import FusedObject, Path
+
+ABREAST_M = 1.0
+_VELOCITY_HITS = 3
+"""From two sightings the LiDAR knows no more than the difference of two noisy places, which may point across the road,
+and the camera's having followed the object for long does not make it better."""
+_MUST_PASS = frozenset({"distance_known", "hits", "seen", "size"})
+
+
+def is_dependable(item: FusedObject) -> bool:
+    """Seen now, by the LiDAR, and every test for a lead passed but class and place. A box height alone says too little
+    about speed to brake for what is not even the lead."""
+    tests = [gate for gate in item.gates if gate.name in _MUST_PASS]
+    by_lidar = item.source == "L" or (item.source == "VL" and item.lidar_hits >= _VELOCITY_HITS)
+    return by_lidar and not item.carried and bool(tests) and all(gate.passed for gate in tests)
+
+
+def enters_corridor(item: FusedObject, path: Path) -> bool:
+    """Whether the object is in the corridor, or its sideways motion carries it there before it is reached. What stands
+    still beside the road does not swerve: its sideways speed is noise."""
+    if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None:
+        return False
+    if item.in_path or item.moving is False:
+        return item.in_path
+    if item.closest_point is None or item.closest_point[0] < ABREAST_M:
+        return False  # beside us already: braking no longer parts the two
+    sideways = believed_mps(item.lateral_mps, item)
+    toward = -sideways if item.path_offset_m > 0 else sideways
+    return abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s <= path.half_width_m

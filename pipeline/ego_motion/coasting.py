@@ -1,0 +1,33 @@
+"""The car's own motion while nobody measures it: it goes on at its last speed and yaw rate, less surely each moment.
+
+Where speed comes from GNSS, a lost fix takes away place and speed at once. What was known then is worth something for
+seconds: the speed may change by ``coast_accel_mps2`` and the yaw rate by ``coast_turn_radps2`` all the while, so that
+their errors grow with age, and those of the way driven and of the heading with its square. Each consumer adds what a
+tick adds. The path goes on until its own sigma ends it; what drives by it does so for ``coast_s`` at most.
+"""
+
+from __future__ import annotations
+
+from pipeline.common.fast_replace import evolve
+from pipeline.params import MotionParams
+from pipeline.types import Coasting, EgoState
+
+
+def follow(
+    before: EgoState | None, measured: EgoState | None, dt_s: float | None, params: MotionParams
+) -> EgoState | None:
+    """What was measured; without it the motion of the frame before, older by ``dt_s``. Null before the first one."""
+    if measured is not None or before is None:
+        return measured
+    since_s = before.coasting.age_s if before.coasting is not None else 0.0
+    age_s = since_s + (dt_s or 0.0)
+    accel, turn = params.coast_accel_mps2, params.coast_turn_radps2
+    squares, fourths = age_s**2 - since_s**2, 0.25 * (age_s**4 - since_s**4)
+    return evolve(before, coasting=Coasting(age_s, accel**2 * fourths, turn**2 * fourths, turn**2 * squares))
+
+
+def recent(own: EgoState | None, params: MotionParams) -> EgoState | None:
+    """The own motion while it is good enough to drive by; null once it has not been measured for ``coast_s``."""
+    if own is None or own.coasting is None:
+        return own
+    return own if own.coasting.age_s <= params.coast_s else None

@@ -1,0 +1,157 @@
+"""Is the CIPV the right vehicle, and how far off is its distance? Judged frame by frame against labelled cuboids."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from pipeline.common.geometry import closest_on_polygon, iou_matrix
+from pipeline.decision.path_position import near_face_middle
+from pipeline.types import VEHICLES, Box, Point2, Result
+from pipeline.types.source import TruthObject
+
+Verdict = Literal["correct", "none", "missed", "false", "wrong"]
+"""correct: the right vehicle · none: rightly nothing · missed: a lead, not found · false: a CIPV, no lead · wrong:
+a CIPV that is not where the lead is: another vehicle, or the lead at a distance too far off (`LeadRule`)."""
+
+LABELLED_VEHICLES = VEHICLES | {"van", "tram", "trailer", "other vehicle", "motorcyclist"}
+"""Label names of the recordings that may be a lead, lower case."""
+
+SAME_BOX_IOU = 0.5
+
+
+@dataclass(frozen=True)
+class LeadRule:
+    """Which labelled vehicle is the lead, and when a CIPV is on it.
+
+    half_lane_m: a vehicle whose centre is nearer to the car's axis is in the lane. max_range_m: farther leads are not
+    asked for. lateral_slack_m: how far beside the label a CIPV may lie. range_slack: how far before or behind it, as a
+    share of its range, and never under ``range_slack_m``.
+    """
+
+    half_lane_m: float = 1.5
+    max_range_m: float = 60.0
+    lateral_slack_m: float = 0.3
+    range_slack: float = 0.15
+    range_slack_m: float = 2.0
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One frame's verdict. Distances are horizontal ranges to the nearest face, lateral_error_m how far the CIPV lies
+    beside the lead (0: on it), metres; null where there is none."""
+
+    frame: str
+    verdict: Verdict
+    truth_m: float | None
+    distance_m: float | None
+    lateral_error_m: float | None
+
+    @property
+    def error_m(self) -> float | None:
+        """Estimated minus true distance, of every CIPV that lies where the lead is from side to side: also of one whose
+        distance is too far off to be called correct. Null otherwise."""
+        beside = self.lateral_error_m is None or self.lateral_error_m > 0.0
+        if beside or self.truth_m is None or self.distance_m is None:
+            return None
+        return self.distance_m - self.truth_m
+
+
+def true_lead(truth: Iterable[TruthObject], rule: LeadRule) -> TruthObject | None:
+    """The labelled vehicle nearest in the lane, the lane taken as straight."""
+    ahead = [
+        item
+        for item in truth
+        if item.label.lower() in LABELLED_VEHICLES
+        and item.cuboid.center[0] > 0.0
+        and abs(item.cuboid.center[1]) < rule.half_lane_m
+        and nearest_face_m(item) <= rule.max_range_m
+    ]
+    return min(ahead, key=nearest_face_m, default=None)
+
+
+def nearest_face_m(item: TruthObject) -> float:
+    """Horizontal range from the ego origin to the nearest point of the labelled cuboid."""
+    return float(np.hypot(*closest_on_polygon(item.cuboid.footprint())))
+
+
+def judge(result: Result, truth: Iterable[TruthObject], rule: LeadRule) -> Judged:
+    """One frame's CIPV against its labels, the lead being the nearest in the lane."""
+    return judge_lead(result, true_lead(truth, rule), rule)
+
+
+def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judged:
+    """One frame's CIPV against the vehicle that is known to lead; null: none does. A lead beyond the range asked for
+    counts as none."""
+    if lead is not None and nearest_face_m(lead) > rule.max_range_m:
+        lead = None
+    chosen = result.chosen()
+    in_reach = chosen is not None and chosen.distance_m is not None and chosen.distance_m <= rule.max_range_m
+    if lead is None:
+        distance = chosen.distance_m if chosen is not None and in_reach else None
+        return Judged(result.frame, "false" if in_reach else "none", None, distance, None)
+    truth_m = nearest_face_m(lead)
+    if chosen is None or chosen.distance_m is None or chosen.bev is None:
+        return Judged(result.frame, "missed", truth_m, None, None)
+    lateral = max(_lateral_error(chosen.bev, lead) - rule.lateral_slack_m, 0.0)
+    lengthwise = abs(chosen.distance_m - truth_m) <= max(rule.range_slack_m, rule.range_slack * truth_m)
+    on_it = lateral == 0.0 and lengthwise
+    return Judged(result.frame, "correct" if on_it else "wrong", truth_m, chosen.distance_m, lateral)
+
+
+def judge_lead_box(result: Result, bbox: Box) -> Judged:
+    """One frame's CIPV against a lead that only the picture shows: correct when half of their boxes' union is common.
+    Nobody knows how far off it is."""
+    chosen = result.chosen()
+    if chosen is None:
+        return Judged(result.frame, "missed", None, None, None)
+    on_it = chosen.bbox is not None and iou_matrix(np.array([chosen.bbox]), np.array([bbox]))[0, 0] >= SAME_BOX_IOU
+    return Judged(result.frame, "correct" if on_it else "wrong", None, chosen.distance_m, None)
+
+
+def _lateral_error(bev: tuple[Point2, Point2, Point2, Point2], lead: TruthObject) -> float:
+    """How far the middle of the object's nearest face lies beside the label's side-to-side extent; 0 inside it."""
+    y = near_face_middle(bev)[1]
+    sides = lead.cuboid.footprint()[:, 1]
+    return float(max(sides.min() - y, y - sides.max(), 0.0))
+
+
+def switches(pairs: Iterable[tuple[int | None, int | None]]) -> int:
+    """How often the chosen object's number changed while the true lead stayed the same. pairs: of each frame the true
+    lead and the chosen object; frames without either are passed over."""
+    both = [(lead, chosen) for lead, chosen in pairs if lead is not None and chosen is not None]
+    return sum(before[0] == after[0] and before[1] != after[1] for before, after in pairwise(both))
+
+
+@dataclass(frozen=True)
+class LeadScore:
+    """A drive's figures. Errors: metres, and share of the true distance; over the frames that have one."""
+
+    frames: int
+    correct: int
+    missed: int
+    false: int
+    wrong: int
+    mean_error_m: float | None
+    max_error_m: float | None
+    mean_relative_error: float | None
+
+
+def score(judged: Iterable[Judged]) -> LeadScore:
+    """Sum up the frames."""
+    rows = list(judged)
+    pairs = [(abs(row.error_m), row.truth_m) for row in rows if row.error_m is not None and row.truth_m]
+    errors = [error for error, _ in pairs]
+    count = {verdict: sum(row.verdict == verdict for row in rows) for verdict in ("missed", "false", "wrong")}
+    return LeadScore(
+        frames=len(rows),
+        correct=sum(row.verdict in ("correct", "none") for row in rows),
+        **count,
+        mean_error_m=float(np.mean(errors)) if errors else None,
+        max_error_m=max(errors) if errors else None,
+        mean_relative_error=float(np.mean([error / true for error, true in pairs])) if pairs else None,
+    )

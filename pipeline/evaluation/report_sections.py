@@ -1,0 +1,178 @@
+"""What an experiment reports: text, tables and charts as plain values, for a page or a script to show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeVar
+
+from pipeline.experiments.perception import GIVEN
+from pipeline.params import Params
+from pipeline.run import Sensors
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.sensors.detection_model import Detections
+
+Suite = Literal["paper", "curves", "euroncap", "iso"]
+Tone = Literal["green", "yellow", "orange", "brown", "red", "grey"]
+Cell = str | float | int | None
+
+
+@dataclass(frozen=True)
+class Coloured:
+    """A cell with a colour that means something; the table's caption says what. replay: name of the drive behind it,
+    where one is kept."""
+
+    value: Cell
+    tone: Tone
+    replay: str = ""
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A cell with the drive behind it, by the name of its ``Replay``."""
+
+    value: Cell
+    replay: str
+
+
+@dataclass(frozen=True)
+class Linked:
+    """A cell that leads somewhere: href is a whole address."""
+
+    value: Cell
+    href: str
+
+
+AnyCell = Cell | Coloured | Driven | Linked
+
+
+@dataclass(frozen=True)
+class Table:
+    """Numbers keep their full precision here; null is shown as a dash. decimals: for people."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[AnyCell, ...], ...]
+    caption: str = ""
+    decimals: int = 2
+
+
+@dataclass(frozen=True)
+class Series:
+    """One line (or its points) of a chart."""
+
+    name: str
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    points_only: bool = False
+
+    @staticmethod
+    def of_points(name: str, points: Iterable[tuple[float, float]]) -> Series:
+        """Points that no line joins, each x and y."""
+        found = list(points)
+        return Series(name, tuple(x for x, _ in found), tuple(y for _, y in found), points_only=True)
+
+
+@dataclass(frozen=True)
+class Chart:
+    title: str
+    x_label: str
+    y_label: str
+    series: tuple[Series, ...]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A moment of a scenario, to be drawn."""
+
+    title: str
+    scenario: Scenario
+    t_s: float
+
+
+@dataclass(frozen=True)
+class Section:
+    """One experiment's report. text: paragraphs, what was done and what it shows. failures: a sentence for each demand
+    that does not hold. scenes: what was driven through."""
+
+    name: str
+    title: str
+    text: tuple[str, ...] = ()
+    tables: tuple[Table, ...] = ()
+    charts: tuple[Chart, ...] = ()
+    failures: tuple[str, ...] = ()
+    scenes: tuple[Scene, ...] = ()
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A drive that can be seen again. name: fit for a file. scenario: with the ego vehicle as driven, or its script.
+    text: what came of it. detections: what was seen in its pictures; null: what the embedded network saw there."""
+
+    name: str
+    title: str
+    text: tuple[str, ...]
+    scenario: Scenario
+    params: Params
+    sensors: Sensors
+    charts: tuple[Chart, ...]
+    detections: Detections | None = GIVEN
+
+    def as_seen(self) -> Scenario:
+        """The scenario with what the line was given in that drive, so that it believes the same again."""
+        return self.scenario.model_copy(update={"sensors": self.sensors, "detections": self.detections})
+
+
+Case = TypeVar("Case")
+Outcome = TypeVar("Outcome")
+
+
+@dataclass(frozen=True)
+class Experiment(Generic[Case, Outcome]):
+    """cases: what is to be driven, in short or in full; each can be sent to another process. run: one case to its
+    outcome, a pure function at a module's top level. report: all of them, in order, to a section. replay: the drive
+    behind an outcome."""
+
+    name: str
+    suite: Suite
+    title: str
+    cases: Callable[[bool], Sequence[Case]]
+    run: Callable[[Case], Outcome]
+    report: Callable[[Sequence[Case], Sequence[Outcome]], Section]
+    replay: Callable[[Case, Outcome], Replay]
+
+
+def as_json(section: Section) -> dict[str, Any]:
+    """The section as plain dicts, lists, strings and numbers."""
+    return {
+        "name": section.name,
+        "title": section.title,
+        "text": list(section.text),
+        "tables": [
+            {
+                "title": table.title,
+                "columns": list(table.columns),
+                "rows": [[_plain(cell) for cell in row] for row in table.rows],
+                "caption": table.caption,
+            }
+            for table in section.tables
+        ],
+        "charts": [
+            {
+                "title": chart.title,
+                "x": chart.x_label,
+                "y": chart.y_label,
+                "series": [{"name": line.name, "x": list(line.x), "y": list(line.y)} for line in chart.series],
+            }
+            for chart in section.charts
+        ],
+        "failures": list(section.failures),
+    }
+
+
+def _plain(cell: AnyCell) -> Any:
+    if isinstance(cell, Linked):
+        return {"value": cell.value, "href": cell.href}
+    if isinstance(cell, Driven):
+        return cell.value
+    return {"value": cell.value, "tone": cell.tone} if isinstance(cell, Coloured) else cell

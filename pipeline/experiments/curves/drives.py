@@ -1,0 +1,177 @@
+"""The drives of the experiment on curves: every frame through the line once for each source of the path, and judged.
+
+Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge and no nearer
+vehicle hides it. Missing one that has just come into sight is not counted before confirmation can be through
+(``true_lead.InSight``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.common.fast_replace import evolve
+from pipeline.decision.path_position import near_face_middle
+from pipeline.experiments.true_lead import InSight, Way, same_place, true_lead
+from pipeline.params import Params, with_changes
+from pipeline.path.corridor import nearest_on_path
+from pipeline.run import only
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.sensors import truth_boxes
+from pipeline.simulation.sensors.detection_model import BoxNoise, LineNoise
+from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.sensors.truth_lanes import lane_points
+from pipeline.simulation.world import world
+from pipeline.simulation.world.world import ActorState, World
+from pipeline.step import State, step, warm_up
+from pipeline.types import Frame, Path, Result
+
+LIDAR_ALONE = "LiDAR alone"
+SOURCES: Mapping[str, Mapping[str, bool]] = {
+    "lane lines": {"path.use_gnss": False, "path.use_yaw_rate": False},
+    "GNSS route": {"path.use_lanes": False, "path.use_yaw_rate": False},
+    "yaw rate": {"path.use_lanes": False, "path.use_gnss": False},
+    "lane lines and yaw rate": {"path.use_gnss": False},
+    "straight guess": {"path.use_lanes": False, "path.use_gnss": False, "path.use_yaw_rate": False},
+    "fused": {},
+    LIDAR_ALONE: {},
+}
+"""Which parameters leave each source of the path; the last has all of them but no camera, so no boxes and no lines."""
+BOXES = BoxNoise(reach_m=105.0)
+"""As measured of the embedded detector (``truth_boxes``), its reach included."""
+LINES = LineNoise()
+LOOK_AHEAD_M = (10, 30, 60, 100)
+_TRUE_WAY_M = 130.0
+_BEYOND = 1.3
+
+Verdict = Literal["right", "missed", "decoy", "none", "false", "undecided"]
+
+
+@dataclass(frozen=True)
+class Frames:
+    """One drive with one set of sources, an entry a frame: verdicts, range of the true lead (null without), whether the
+    car that cuts in is known by then, and (N, 4) the path's errors at 10, 30, 60, 100 m (NaN where the true way ends)
+    with its sigmas there."""
+
+    t_s: tuple[float, ...]
+    verdicts: tuple[Verdict, ...]
+    lead_m: tuple[float | None, ...]
+    told: tuple[bool, ...]
+    errors_m: tuple[tuple[float, ...], ...]
+    sigmas_m: tuple[tuple[float, ...], ...]
+    over_line_s: float | None = None
+
+
+def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[World, Frame]]:
+    """Each moment of a drive along its script, with given detections. lines null: the road has none."""
+    sensors = Sensors(scene, scene.ego.start_m + scene.ego.travelled_m(scene.duration_s))
+    for index in range(scene.frame_count()):
+        now = world.at(scene, index / scene.rate_hz)
+        frame = sensors.frame(now, index, round(now.t_s * 1e9), picture=False)
+        assert frame.camera is not None
+        found = truth_boxes.boxes(now, frame.camera, BOXES, scene.seed, index)
+        lanes = None if lines is None else lane_points(now, scene.road, frame.camera, lines, scene.seed, index)
+        yield now, evolve(frame, raw_boxes=found, raw_lanes=lanes)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A frame and what is true then, whatever the line believes. lead: the first vehicle in the lane within reach, null
+    without one; doubtful: nobody can say. beyond: the first within a third more than the reach."""
+
+    now: World
+    frame: Frame
+    true_path: Path | None
+    lead: ActorState | None
+    is_doubtful: bool
+    is_confirmable: bool
+    beyond: ActorState | None
+
+    @property
+    def lead_m(self) -> float | None:
+        """The range of the lead's rear, null without a decidable lead."""
+        if self.lead is None or self.is_doubtful:
+            return None
+        return float(np.hypot(*self.lead.cuboid.center[:2]) - self.lead.cuboid.size[0] / 2)
+
+
+def moments(scene: Scenario, frames: Iterable[tuple[World, Frame]], reach_m: float) -> Iterator[Moment]:
+    """The truth of each frame of a drive, from its first one on. reach_m: how far a lead counts."""
+    way, in_sight = Way.of(scene), InSight()
+    for now, frame in frames:
+        assert frame.camera is not None
+        in_sight = in_sight.then(now, frame.camera)
+        path = way.ahead(now, _TRUE_WAY_M)
+        lead, at_the_edge = true_lead(now, path, reach_m)
+        beyond, _ = true_lead(now, path, _BEYOND * reach_m)
+        hidden = lead is not None and in_sight.is_hidden(lead.actor.id)
+        confirmable = lead is not None and in_sight.is_confirmable(lead.actor.id)
+        yield Moment(now, frame, path, lead, at_the_edge or hidden, confirmable, beyond)
+
+
+def driven(
+    scene: Scenario, reach_m: float, names: Sequence[str] = tuple(SOURCES), over_line_s: float | None = None
+) -> dict[str, Frames]:
+    """Every frame once through the sensors, and through the line once for each set of sources, by their names.
+    over_line_s: when a wheel of vehicle 2 is over the line, where it cuts in."""
+    warm_up()
+    settings = {name: with_changes(Params(), SOURCES[name]) for name in names}
+    states = dict.fromkeys(names, State())
+    rows: dict[str, list[tuple[Moment, Result]]] = {name: [] for name in names}
+    for moment in moments(scene, seen(scene), reach_m):
+        for name, params in settings.items():
+            given = only(moment.frame, "lidar") if name == LIDAR_ALONE else moment.frame
+            states[name], result = step(states[name], given, params)
+            rows[name].append((moment, result))
+    return {name: _frames(each, over_line_s) for name, each in rows.items()}
+
+
+def _frames(rows: Sequence[tuple[Moment, Result]], over_line_s: float | None) -> Frames:
+    return Frames(
+        tuple(moment.now.t_s for moment, _ in rows),
+        tuple(judge(moment, result) for moment, result in rows),
+        tuple(moment.lead_m for moment, _ in rows),
+        tuple(over_line_s is not None and _is_told(moment.now, result, 2) for moment, result in rows),
+        tuple(_errors_m(result.path, moment.true_path) for moment, result in rows),
+        tuple(_sigmas_m(result.path) for _, result in rows),
+        over_line_s,
+    )
+
+
+def judge(moment: Moment, result: Result) -> Verdict:
+    """The frame's CIPV against the vehicle that really is the first in the lane."""
+    chosen = result.chosen()
+    place = near_face_middle(chosen.bev) if chosen is not None and chosen.bev is not None else None
+    if moment.is_doubtful:
+        return "undecided"
+    if moment.lead is None:
+        is_beyond = place is not None and moment.beyond is not None and same_place(place, moment.beyond)
+        return "none" if place is None else "undecided" if is_beyond else "false"
+    if place is None:
+        return "missed" if moment.is_confirmable else "undecided"
+    return "right" if same_place(place, moment.lead) else "decoy"
+
+
+def _is_told(now: World, result: Result, actor: int) -> bool:
+    """Whether the car that cuts in is the CIPV or said to be the next."""
+    state = next(each for each in now.actors if each.actor.id == actor)
+    known = {lead.id for lead in (result.cipv, result.next_cipv) if lead is not None}
+    places = [near_face_middle(item.bev) for item in result.objects if item.id in known and item.bev is not None]
+    return any(same_place(place, state) for place in places)
+
+
+def _errors_m(path: Path, true_path: Path | None) -> tuple[float, ...]:
+    """Sideways distance of the path's points at 10, 30, 60, 100 m from the way really driven."""
+    if true_path is None:
+        return (np.nan,) * len(LOOK_AHEAD_M)
+    points = path.center[[min(s, len(path.center) - 1) for s in LOOK_AHEAD_M]]
+    off, along = nearest_on_path(true_path, points)
+    length = float(np.hypot(*np.diff(true_path.center, axis=0).T).sum())
+    return tuple(float(o) if a < length else np.nan for o, a in zip(off, along, strict=True))
+
+
+def _sigmas_m(path: Path) -> tuple[float, ...]:
+    return tuple(float(path.profile_m[min(s, len(path.profile_m) - 1)]) for s in LOOK_AHEAD_M)

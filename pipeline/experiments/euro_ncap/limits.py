@@ -1,0 +1,33 @@
+"""The limits of the tests of automatic emergency braking: Euro NCAP's colours and UN Regulation 152.
+
+Euro NCAP: protocol of 2026 (Crash Avoidance, Frontal Collisions, section 5.2, as the rating calculator that Euro NCAP
+publishes, euroncap-rating-2026 5.4.9, has them).
+"""
+
+from __future__ import annotations
+
+from pipeline.evaluation.report_sections import Tone
+
+BANDS: tuple[tuple[float, tuple[tuple[float, Tone], ...]], ...] = (
+    (50.0, ((10.0, "yellow"), (20.0, "orange"), (30.0, "brown"))),
+    (40.0, ((10.0, "orange"), (20.0, "brown"))),
+    (30.0, ((10.0, "brown"),)),
+    (0.0, ()),
+)
+"""From which speed of the ego car, km/h, which relative impact speeds, km/h, have a colour: each those below. Green is
+an impact avoided, red all others. The protocol tests every 10 km/h; in between, the bands of the speed below hold."""
+R152_LIMITS: tuple[tuple[float, float], ...] = ((42.0, 0.0), (45.0, 15.0), (50.0, 25.0), (55.0, 30.0), (60.0, 35.0))
+"""UN R152, 5.2.1.4, category M1 unladen: up to this relative speed, km/h, the impact may be no faster than that."""
+
+
+def impact_tone(speed_kmh: float, impact_kmh: float) -> Tone:
+    """Euro NCAP's colour of a relative impact speed at this speed of the ego car; 0 is an impact avoided."""
+    if impact_kmh <= 0.0:
+        return "green"
+    bands = next(bands for from_kmh, bands in BANDS if speed_kmh >= from_kmh)
+    return next((colour for limit, colour in bands if impact_kmh < limit), "red")
+
+
+def r152_limit_kmh(relative_kmh: float) -> float | None:
+    """The impact speed that the Regulation permits; null beyond the speeds that it covers."""
+    return next((limit for up_to, limit in R152_LIMITS if relative_kmh <= up_to), None)

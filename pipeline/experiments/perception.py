@@ -1,0 +1,47 @@
+"""What the line sees with in an experiment: which sensors, and whose the camera's boxes are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Literal
+
+from pipeline.run import Sensors
+from pipeline.simulation.closed_loop import Eyes, NetworkEyes, TruthEyes
+from pipeline.simulation.sensors.camera import HEIGHT, WIDTH
+from pipeline.simulation.sensors.detection_model import BoxNoise, Detections
+from pipeline.vision.detector import Detector, open_detector
+from pipeline.vision.model_registry import EMBEDDED
+
+Boxes = Literal["truth", "network"]
+"""Whose the camera's boxes are: projected truth with a detector's errors, or the embedded network's on drawn
+pictures."""
+SENSORS: Mapping[Sensors, str] = {"lidar": "LiDAR", "camera": "camera", "both": "fused"}
+"""Their names in reports."""
+COMPARED: tuple[Sensors, ...] = ("lidar", "both")
+"""What most experiments drive with: the LiDAR alone, and both sensors."""
+GIVEN = Detections(boxes=BoxNoise())
+GIVEN_SAID = (
+    "The camera's boxes are given: projected truth with assumed errors, near those measured of the embedded detector. "
+    "No network looked at pictures."
+)
+
+
+@cache
+def embedded() -> Detector:
+    """The embedded network for drawn pictures. One a process; it is ready only after a while."""
+    return open_detector(EMBEDDED, (WIDTH, HEIGHT))
+
+
+def eyes_for(boxes: Boxes) -> Eyes:
+    return TruthEyes() if boxes == "truth" else NetworkEyes(embedded())
+
+
+def detections_for(boxes: Boxes) -> Detections | None:
+    """What a replay is given to see in its pictures; null: what the embedded network sees there."""
+    return GIVEN if boxes == "truth" else None
+
+
+def boxes_said(boxes: Boxes) -> str:
+    """What a title adds to what was driven."""
+    return "" if boxes == "truth" else ", network"

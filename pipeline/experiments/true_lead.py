@@ -1,0 +1,113 @@
+"""The vehicle that the car will really meet first, by the simulator's truth: what a chosen CIPV is judged against."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.decision.path_position import near_face_middle
+from pipeline.params import CipvParams, PathParams
+from pipeline.path.corridor import nearest_on_path
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.sensors.truth_boxes import in_picture
+from pipeline.simulation.world import world
+from pipeline.simulation.world.world import ActorState, World
+from pipeline.types import F64, CameraCalibration, Path, Point2
+
+MAX_M = 60.0
+OVERLAP_M = 0.9
+"""In the path: as much of the vehicle as this reaches into the corridor, or half of what is narrower."""
+VISIBLE_SHARE = 0.35
+"""A vehicle of which nearer ones leave less than this in sight is hidden."""
+_EDGE_M = 0.3
+"""So near to the overlap that decides, either answer is right."""
+_AHEAD_M, _STEP_S, _LONGEST_S, _SMALLEST_MOVE_M = 90.0, 0.25, 15.0, 0.2
+_SAME_PLACE_M, _SAME_SHARE = 2.5, 0.2
+
+
+@dataclass(frozen=True)
+class Way:
+    """Where the ego vehicle's script takes it. t_s: (M,). places: (M, 2) world x, y."""
+
+    t_s: F64
+    places: F64
+
+    @staticmethod
+    def of(scene: Scenario) -> Way:
+        """The whole drive and 15 s more."""
+        alone = scene.model_copy(update={"actors": (), "crossing_actors": ()})
+        t_s = np.arange(0.0, scene.duration_s + _LONGEST_S, _STEP_S)
+        return Way(t_s, np.array([world.at(alone, float(t)).pose[:2] for t in t_s]))
+
+    def ahead(self, now: World, at_most_m: float = _AHEAD_M) -> Path | None:
+        """What is left of it, 90 m at most, in the ego frame of now; null while the car stands."""
+        coming = np.vstack([now.pose[:2], self.places[self.t_s > now.t_s]])
+        moved = np.hypot(*np.diff(coming, axis=0).T)
+        keep = np.concatenate([[True], (moved > _SMALLEST_MOVE_M) & (np.cumsum(moved) < at_most_m)])
+        if keep.sum() < 2:
+            return None
+        center = now.to_ego(coming[keep])
+        return Path("gnss", center, center, center, PathParams().half_width_m, {}, {})
+
+
+def true_lead(now: World, path: Path | None, max_m: float = MAX_M) -> tuple[ActorState | None, bool]:
+    """The first vehicle on the driven path within ``max_m``, and whether one at the path's edge makes that doubtful."""
+    found: list[tuple[float, ActorState]] = []
+    doubtful_m = np.inf
+    for state in now.actors:
+        if path is None or range_m(state) > max_m:
+            continue
+        offsets, along = nearest_on_path(path, state.cuboid.footprint())
+        low, high, nearest = float(offsets.min()), float(offsets.max()), float(along.min())
+        if nearest <= 0.0:
+            continue
+        half = path.half_width_m
+        too_little = min(high, half) - max(low, -half) - min(OVERLAP_M, 0.5 * (high - low))
+        if abs(too_little) < _EDGE_M:
+            doubtful_m = min(doubtful_m, nearest)
+        elif too_little > 0.0:
+            found.append((nearest, state))
+    nearest_m, lead = min(found, key=lambda pair: pair[0], default=(np.inf, None))
+    return lead, bool(doubtful_m < nearest_m)
+
+
+@dataclass(frozen=True)
+class InSight:
+    """For how many frames in a row each vehicle has been in sight, by number. A hidden one is not among them."""
+
+    frames: Mapping[int, int] = field(default_factory=dict)
+
+    def then(self, now: World, camera: CameraCalibration) -> InSight:
+        """One frame later."""
+        covered = _covered(now, camera)
+        ids = [state.actor.id for state in now.actors if state.actor.id not in covered]
+        return InSight({each: self.frames.get(each, 0) + 1 for each in ids})
+
+    def is_hidden(self, actor: int) -> bool:
+        """Whether nearer vehicles cover so much of it that neither sensor can see it."""
+        return actor not in self.frames
+
+    def is_confirmable(self, actor: int) -> bool:
+        """Whether it could have been seen as often as an object must be that one sensor sees."""
+        return self.frames.get(actor, 0) >= CipvParams().confirm_hits
+
+
+def _covered(now: World, camera: CameraCalibration) -> frozenset[int]:
+    return frozenset(seen.actor.actor.id for seen in in_picture(now, camera) if seen.visible < VISIBLE_SHARE)
+
+
+def near_face(state: ActorState) -> Point2:
+    a, b, c, d = ((float(x), float(y)) for x, y in state.cuboid.footprint())
+    return near_face_middle((a, b, c, d))
+
+
+def range_m(state: ActorState) -> float:
+    return float(np.hypot(*near_face(state)))
+
+
+def same_place(point: Point2, lead: ActorState) -> bool:
+    """Whether a point is where a vehicle's nearest face is, give or take a fifth of its range."""
+    x, y = near_face(lead)
+    return float(np.hypot(point[0] - x, point[1] - y)) <= max(_SAME_PLACE_M, _SAME_SHARE * range_m(lead))

@@ -1,0 +1,177 @@
+"""What every recording kept as a folder of files needs: listing, reading, decoding and calibration checks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from decimal import Decimal
+from pathlib import Path
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.common.user_file_errors import reason_of
+from pipeline.types import F64, U8, CameraCalibration, Picture
+from pipeline.types.source import SourceError
+
+_JPEG_START = b"\xff\xd8"
+_MARKERS = ((_JPEG_START, b"\xff\xd9"), (b"\x89PNG", b"IEND"))
+_END_BYTES = 64
+_NUMBER = re.compile(r"\d+(\.\d+)?")
+
+
+def recording_folder(path: str) -> Path:
+    """The folder a person typed, ``~`` resolved. SourceError when it is none, or an empty one."""
+    if not path:
+        raise SourceError("no folder given after the colon")
+    try:
+        folder = Path(path).expanduser()
+        if not folder.exists():
+            raise SourceError(f"{path}: no such folder")
+        if not folder.is_dir():
+            raise SourceError(f"{path}: not a folder")
+        if not any(folder.iterdir()):
+            raise SourceError(f"{path}: the folder is empty")
+    except (OSError, RuntimeError, ValueError) as error:
+        raise SourceError(f"{path}: cannot be opened: {reason_of(error)}") from None
+    return folder
+
+
+def recording_file(path: str) -> Path:
+    """The file a person typed, ``~`` resolved. SourceError when there is none."""
+    if not path:
+        raise SourceError("no file given after the colon")
+    try:
+        file = Path(path).expanduser()
+        if not file.exists():
+            raise SourceError(f"{path}: no such file")
+        if not file.is_file():
+            raise SourceError(f"{path}: not a file")
+    except (OSError, RuntimeError, ValueError) as error:
+        raise SourceError(f"{path}: cannot be opened: {reason_of(error)}") from None
+    return file
+
+
+def files_by_name(folder: Path, suffixes: tuple[str, ...]) -> dict[str, Path]:
+    """Files of a folder by their name without suffix, ``in_order``; empty when there is no such folder."""
+    try:
+        found = {path.stem: path for path in sorted(folder.iterdir()) if path.suffix.lower() in suffixes}
+    except OSError:
+        return {}
+    return {name: found[name] for name in in_order(found)}
+
+
+def in_order(names: Iterable[str]) -> list[str]:
+    """Names of frames, by number where all of them are numbers (``2`` before ``10``), else by letter."""
+    by_letter = sorted(names)
+    return sorted(by_letter, key=Decimal) if all(map(_NUMBER.fullmatch, by_letter)) else by_letter
+
+
+def read_bytes(path: Path) -> bytes:
+    """The whole file. SourceError names it when it cannot be read."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise SourceError(f"{path.name}: cannot be read: {reason_of(error)}") from None
+
+
+def decode_picture(path: Path) -> tuple[U8, bytes | None]:
+    """As ``decode_image``, of a file. SourceError too when it cannot be read."""
+    return decode_image(read_bytes(path), path.name)
+
+
+def picture_size(paths: Iterable[Path]) -> tuple[int, int] | None:
+    """Width and height of the first readable picture; null where there is none."""
+    for path in paths:
+        try:
+            bgr, _ = decode_picture(path)
+        except SourceError:
+            continue
+        return bgr.shape[1], bgr.shape[0]
+    return None
+
+
+def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
+    """(H, W, 3) uint8 blue green red, and the data itself where it is a JPEG. SourceError when it is no whole picture.
+
+    A JPEG or PNG without its end marker is refused: its lower part would be a flat grey that a detector takes for road.
+    """
+    is_jpeg = data.startswith(_JPEG_START)
+    for start, end in _MARKERS:
+        if data.startswith(start) and end not in data[-_END_BYTES:]:
+            raise SourceError(f"{name}: the picture is cut off")
+    try:
+        picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR) if data else None
+    except cv2.error:
+        picture = None
+    if picture is None:
+        raise SourceError(f"{name}: not a readable picture")
+    return np.ascontiguousarray(picture, dtype=np.uint8), data if is_jpeg else None
+
+
+def picture_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: list[str]) -> Picture | None:
+    """The picture of a frame; null, and ``notes`` says why, when there is no file, when it is damaged or when it is not
+    of the size (width, height) of the recording's others."""
+    if path is None:
+        notes.append("no picture for this frame")
+        return None
+    try:
+        bgr, encoded = decode_picture(path)
+    except SourceError as error:
+        notes.append(str(error))
+        return None
+    if (bgr.shape[1], bgr.shape[0]) != size:
+        notes.append(f"{path.name}: {bgr.shape[1]}×{bgr.shape[0]}, the others are {size[0]}×{size[1]}")
+        return None
+    return Picture(t_ns, bgr, encoded)
+
+
+def rigid_transform(values: npt.ArrayLike, what: str) -> F64:
+    """(4, 4) float64 of a (3, 4) or (4, 4) rigid transform. SourceError "… is not a rigid transform" when the numbers
+    are anything else: a wrong shape, not finite, a scaled or mirrored rotation, a last row other than 0 0 0 1."""
+    try:
+        given = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        given = np.empty(0)
+    T = np.eye(4)
+    if given.shape in ((3, 4), (4, 4)) and bool(np.all(np.isfinite(given))) and float(np.abs(given).max()) < 1e6:
+        T[: given.shape[0]] = given
+        R = T[:3, :3]
+        orthonormal = np.allclose(R @ R.T, np.eye(3), atol=1e-3) and float(np.linalg.det(R)) > 0.0
+        if orthonormal and np.allclose(T[3], [0.0, 0.0, 0.0, 1.0]):
+            return T
+    raise SourceError(f"{what} is not a rigid transform")
+
+
+def camera_matrix(values: npt.ArrayLike, what: str) -> F64:
+    """(3, 3) float64 pinhole matrix. SourceError unless focal lengths are positive, what is below the diagonal is zero
+    and the last element one."""
+    try:
+        K = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        K = np.empty(0)
+    if (
+        K.shape == (3, 3)
+        and bool(np.all(np.isfinite(K)))
+        and float(np.abs(K).max()) < 1e6
+        and min(K[0, 0], K[1, 1]) > 1.0
+        and np.allclose(np.tril(K, -1), 0.0)
+        and np.isclose(K[2, 2], 1.0)
+    ):
+        return K
+    raise SourceError(f"{what} is not a camera matrix")
+
+
+def check_looks_ahead(camera: CameraCalibration, what: str) -> None:
+    """SourceError unless ego +x falls inside the picture widened by half its size on every side.
+
+    A front camera sees where the car drives. The usual mistake, an extrinsic given the wrong way round, throws ego +x
+    far to the side or behind.
+    """
+    forward = camera.T_camera_ego[:3, 0]
+    if forward[2] > 1e-3:
+        u, v = (camera.K @ (forward / forward[2]))[:2]
+        if -0.5 <= u / camera.width <= 1.5 and -0.5 <= v / camera.height <= 1.5:
+            return
+    raise SourceError(f"{what}: the camera does not look ahead; is its extrinsic given the wrong way round?")

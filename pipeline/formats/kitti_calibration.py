@@ -1,0 +1,80 @@
+"""KITTI's calibration files, both kinds: one file a frame (object benchmark) and two a day (raw data).
+
+Geiger et al. 2013, "Vision meets Robotics: The KITTI Dataset", section 3 and Eq. 3–6: a Velodyne point goes to the
+rectified camera 0 by R0_rect · Tr_velo_to_cam, and to the picture of camera 2 by P2, whose last column carries the
+baseline from camera 0 to camera 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
+from pipeline.types import F64, CameraCalibration
+from pipeline.types.source import SourceError
+
+_VELODYNE_HEIGHT_M = 1.73
+"""Above the road (Geiger et al. 2013, figure 3)."""
+
+
+@dataclass(frozen=True)
+class KittiCalibration:
+    """T_rect_ego: (4, 4) takes Velodyne points to the rectified camera 0, where labels are. camera: camera 2."""
+
+    T_rect_ego: F64
+    camera: CameraCalibration
+
+
+def parse_object_calibration(data: bytes, file: str, size: tuple[int, int]) -> KittiCalibration:
+    """``calib/NNNNNN.txt`` with P2, R0_rect and Tr_velo_to_cam. SourceError names the file and what is wrong."""
+    table = parse_key_values(data)
+    projection = _values(table, "P2", (3, 4), file)
+    rectify = _values(table, "R0_rect", (3, 3), file)
+    return _calibration(projection, rectify, _values(table, "Tr_velo_to_cam", (3, 4), file), file, size)
+
+
+def parse_raw_calibration(
+    cam_to_cam: bytes, velo_to_cam: bytes, files: tuple[str, str], size: tuple[int, int]
+) -> KittiCalibration:
+    """``calib_cam_to_cam.txt`` (P_rect_02, R_rect_00) and ``calib_velo_to_cam.txt`` (R, T); ``files`` are their names.
+    SourceError names the file and what is wrong."""
+    cameras, velodyne = parse_key_values(cam_to_cam), parse_key_values(velo_to_cam)
+    projection = _values(cameras, "P_rect_02", (3, 4), files[0])
+    rectify = _values(cameras, "R_rect_00", (3, 3), files[0])
+    to_camera = np.hstack([_values(velodyne, "R", (3, 3), files[1]), _values(velodyne, "T", (3, 1), files[1])])
+    return _calibration(projection, rectify, to_camera, files[1], size)
+
+
+def parse_key_values(data: bytes) -> dict[str, list[float]]:
+    """Lines ``name: number number …``; lines of anything else (dates, text) are passed over."""
+    table: dict[str, list[float]] = {}
+    for line in data.decode("utf-8", "replace").splitlines():
+        name, colon, rest = line.partition(":")
+        try:
+            numbers = [float(word) for word in rest.split()]
+        except ValueError:
+            continue
+        if colon and numbers:
+            table[name.strip()] = numbers
+    return table
+
+
+def _values(table: dict[str, list[float]], name: str, shape: tuple[int, int], file: str) -> F64:
+    numbers = table.get(name)
+    if numbers is None or len(numbers) != shape[0] * shape[1]:
+        raise SourceError(f"calibration {file}: no {name} of {shape[0]}×{shape[1]} numbers")
+    return np.array(numbers, dtype=np.float64).reshape(shape)
+
+
+def _calibration(projection: F64, rectify: F64, velo_to_cam: F64, file: str, size: tuple[int, int]) -> KittiCalibration:
+    K = camera_matrix(projection[:, :3], f"calibration {file}: the projection of camera 2")
+    T_rect_cam = rigid_transform(np.hstack([rectify, np.zeros((3, 1))]), f"calibration {file}: the rectification")
+    T_cam_ego = rigid_transform(velo_to_cam, f"calibration {file}: Velodyne to camera")
+    baseline = np.hstack([np.eye(3), np.linalg.solve(K, projection[:, 3:])])
+    T_camera2_rect = rigid_transform(baseline, f"calibration {file}: the baseline of camera 2")
+    T_rect_ego = T_rect_cam @ T_cam_ego
+    camera = CameraCalibration(K, np.empty(0), T_camera2_rect @ T_rect_ego, *size, road_z_m=-_VELODYNE_HEIGHT_M)
+    check_looks_ahead(camera, f"calibration {file}")
+    return KittiCalibration(T_rect_ego, camera)

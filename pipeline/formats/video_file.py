@@ -1,0 +1,125 @@
+"""A video file whose pictures can be had by their time, anywhere, without keeping any."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from threading import Lock
+
+import av
+import numpy as np
+
+from pipeline.common.nearest_in_time import Times
+from pipeline.common.progress import Progress, silent
+from pipeline.common.user_file_errors import reason_of
+from pipeline.types import U8
+from pipeline.types.source import SourceError
+
+SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".mjpeg", ".ts")
+_NS = 1_000_000_000
+_DECODE_ON_NS = 2 * _NS
+"""A picture this little later is reached sooner by decoding on than by seeking."""
+_TELL_EVERY = 256
+"""Pictures between two words of progress."""
+_PLACES = 2
+"""What is shown, and what is computed beside it."""
+
+
+class VideoFile:
+    """times_ns: (N,) int64, ascending, of every picture since the first. Times come from the container; where it has
+    none, the pictures are evenly spaced at its rate. Any thread: two that read on at different places do not make each
+    other seek."""
+
+    def __init__(self, path: Path, progress: Progress = silent) -> None:
+        self.path = path
+        try:
+            with av.open(str(path)) as container:
+                stamps, tick_ns = _stamps(container, progress)
+        except (av.FFmpegError, OSError, ValueError) as error:
+            raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
+        if not len(stamps):
+            raise SourceError(f"{path.name}: no pictures in it")
+        first = int(stamps[0])
+        self.times_ns: Times = np.rint((stamps - first) * tick_ns).astype(np.int64)
+        self._lock = Lock()
+        self._places = [_Place(path, first, tick_ns) for _ in range(_PLACES)]  # the one used last stands last
+
+    def picture(self, index: int) -> U8:
+        """(H, W, 3) uint8 blue green red of one of ``times_ns``. SourceError when it cannot be decoded."""
+        wanted_ns = int(self.times_ns[index])
+        with self._lock:
+            place = next((each for each in self._places if each.is_near(wanted_ns)), self._places[0])
+            self._places.remove(place)
+            self._places.append(place)
+        try:
+            return place.picture(wanted_ns)
+        except (av.FFmpegError, OSError, ValueError, StopIteration) as error:
+            raise SourceError(f"{self.path.name}: picture {index} cannot be decoded: {reason_of(error)}") from None
+
+
+class _Place:
+    """Where one reader is in the file. seeks: how often it had to go somewhere else."""
+
+    def __init__(self, path: Path, first_stamp: int, tick_ns: float) -> None:
+        self.seeks = 0
+        self._path, self._first_stamp, self._tick_ns = path, first_stamp, tick_ns
+        self._lock = Lock()
+        self._frames: Iterator[av.VideoFrame] | None = None
+        self._container: av.container.InputContainer | None = None
+        self._at_ns = 0
+
+    def is_near(self, wanted_ns: int) -> bool:
+        """Whether decoding on leads there soon."""
+        return self._frames is not None and self._at_ns < wanted_ns <= self._at_ns + _DECODE_ON_NS
+
+    def picture(self, wanted_ns: int) -> U8:
+        """The picture of a time. Whatever the library raises; the next one is then read from the file anew."""
+        with self._lock:
+            try:
+                return self._decode(wanted_ns)
+            except BaseException:
+                self._close()
+                raise
+
+    def _decode(self, wanted_ns: int) -> U8:
+        if not self.is_near(wanted_ns):
+            self._seek(wanted_ns)
+        assert self._frames is not None
+        half_tick_ns = self._tick_ns / 2
+        for frame in self._frames:
+            if frame.pts is None:
+                continue
+            self._at_ns = round((frame.pts - self._first_stamp) * self._tick_ns)
+            if self._at_ns >= wanted_ns - half_tick_ns:
+                return np.ascontiguousarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
+        raise ValueError("the video ends before it")
+
+    def _seek(self, wanted_ns: int) -> None:
+        self.seeks += 1
+        if self._container is None:
+            self._container = av.open(str(self._path))
+        stream = self._container.streams.video[0]
+        self._container.seek(self._first_stamp + int(wanted_ns / self._tick_ns), stream=stream)
+        self._frames = self._container.decode(stream)
+
+    def _close(self) -> None:
+        if self._container is not None:
+            self._container.close()
+        self._container = self._frames = None
+
+
+def _stamps(container: av.container.InputContainer, progress: Progress) -> tuple[np.ndarray, float]:
+    """Presentation stamps of every picture, ascending, and nanoseconds a tick; nothing is decoded. progress: of the
+    file's bytes."""
+    if not container.streams.video:
+        raise ValueError("no video in it")
+    stream = container.streams.video[0]
+    if stream.time_base is None:
+        raise ValueError("its pictures have no times")
+    stamps = []
+    for count, packet in enumerate(container.demux(stream)):
+        if packet.pts is not None:
+            stamps.append(packet.pts)
+        if count % _TELL_EVERY == 0 and packet.pos is not None:
+            progress(packet.pos, container.size)
+    return np.unique(np.array(stamps, dtype=np.int64)), float(stream.time_base) * _NS

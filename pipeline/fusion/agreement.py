@@ -1,0 +1,87 @@
+"""Do camera and LiDAR see the same world? If they disagree for long, one of them is not where it is taken to be.
+
+A wrong mount or a wrong calibration shows in no single object: each is a plausible car. It shows in pairs: a car that
+the camera alone has, and beside it, as far away, a cluster as wide as a car that only the LiDAR has. How many of the
+vehicles near enough for both come apart so, against those that they share, is averaged over time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, exp, hypot, radians
+
+from pipeline.common.fast_replace import evolve
+from pipeline.params import FusionParams
+from pipeline.types import VEHICLES, FusedObject, Path
+
+_REACH_M = 35.0
+"""Farther away a sweep may have too little of a car to make a cluster of it."""
+_CONFIRMED = 3
+_NARROWEST_M, _WIDEST_M = 1.2, 6.0
+_SAME_RANGE_SIGMAS, _APART_RAD = 1.5, radians(8.0)
+
+
+@dataclass(frozen=True)
+class AgreementState:
+    """share: of the vehicles that both sensors should see, how many come apart; a running mean, 0–1."""
+
+    share: float = 0.0
+
+
+def follow(
+    state: AgreementState, objects: tuple[FusedObject, ...], dt_s: float | None, params: FusionParams
+) -> AgreementState:
+    """The share after this frame; as it was where nothing near is seen by either."""
+    near = [item for item in objects if item.distance_m is not None and item.distance_m <= _REACH_M]
+    joined = sum(item.seen_by == "VL" for item in near)
+    apart = _come_apart(near)
+    if not dt_s or not joined + apart:
+        return state
+    fresh = 1.0 - exp(-dt_s / params.disagree_s)
+    return AgreementState(state.share + fresh * (apart / (joined + apart) - state.share))
+
+
+def heed(path: Path, state: AgreementState, params: FusionParams) -> Path:
+    """The path, not to be driven after while the sensors disagree: a lead may be where it is not looked for."""
+    if state.share < params.disagree_share:
+        return path
+    doubt = "camera and LiDAR disagree about where cars are"
+    return evolve(
+        path,
+        usable=False,
+        doubt=doubt,
+        confidence=path.confidence * (1.0 - state.share),
+        notes=(*path.notes, f"{doubt}: check the calibration"),
+    )
+
+
+def _come_apart(near: list[FusedObject]) -> int:
+    """Pairs of a car that only the camera has and a cluster that only the LiDAR has, as far away and a little aside;
+    each cluster is taken once."""
+    clusters = [item for item in near if item.source == "L" and item.seen_by and _is_a_car_wide(item)]
+    count = 0
+    for box in near:
+        if box.source == "V" and box.seen_by and box.label in VEHICLES and box.hits >= _CONFIRMED:
+            partner = next((each for each in clusters if _are_apart(box, each)), None)
+            if partner is not None:
+                clusters.remove(partner)
+                count += 1
+    return count
+
+
+def _is_a_car_wide(item: FusedObject) -> bool:
+    if item.cuboid is None or item.hits < _CONFIRMED:
+        return False
+    length, width, _ = item.cuboid.size
+    return _NARROWEST_M <= max(length, width) <= _WIDEST_M
+
+
+def _are_apart(box: FusedObject, cluster: FusedObject) -> bool:
+    """As far away as each other, in another direction than fusion joins."""
+    if box.closest_point is None or cluster.closest_point is None:
+        return False
+    sigma_m = hypot(box.distance_sigma_m or 0.0, cluster.distance_sigma_m or 0.0)
+    if abs((box.distance_m or 0.0) - (cluster.distance_m or 0.0)) > _SAME_RANGE_SIGMAS * sigma_m:
+        return False
+    turn = atan2(box.closest_point[1], box.closest_point[0]) - atan2(cluster.closest_point[1], cluster.closest_point[0])
+    return abs(turn) <= _APART_RAD

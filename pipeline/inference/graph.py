@@ -1,0 +1,68 @@
+"""A detector's ONNX graph, given another input size than the one it was exported with.
+
+A fully convolutional network works at any size its strides divide. An export fixes one all the same, usually a square
+one, on which a wide road picture is mostly padding. Rewriting the declared shapes, in memory, lets the same weights
+see the picture at its own aspect.
+"""
+
+from __future__ import annotations
+
+import math
+
+import onnx
+
+from pipeline.vision.heads import Size
+
+MULTIPLE = 32
+"""Coarsest stride of the YOLO family: input sides are multiples of it."""
+MIN_BUDGET = 640 * 384
+"""Network pixels always allowed: a small square export (416×416) is otherwise too coarse for a car at 60 m."""
+
+
+def fitting_size(picture_size: tuple[int, int], own: Size | None) -> Size:
+    """Input (height, width) for a picture (width, height): its aspect, sides multiples of 32, as large as the budget
+    (the export's own number of pixels, at least 640×384) and the picture itself allow.
+
+    2048×618 → 256×832, 1242×375 → 256×832, 1280×720 → 384×640 (height × width) for a 416×416 export.
+    """
+    picture_w, picture_h = picture_size
+    budget = max(MIN_BUDGET, own[0] * own[1] if own else 0)
+    best = (MULTIPLE, MULTIPLE)
+    for width in range(MULTIPLE, _up(picture_w) + 1, MULTIPLE):
+        height = _up(width * picture_h / picture_w)
+        if height * width <= budget:
+            best = (height, width)
+    return best
+
+
+def input_size(model: onnx.ModelProto) -> Size | None:
+    """The graph's fixed input (height, width), null when it is free. ValueError when it takes no 1×3×H×W picture."""
+    weights = {tensor.name for tensor in model.graph.initializer}
+    inputs = [value for value in model.graph.input if value.name not in weights]
+    dims = inputs[0].type.tensor_type.shape.dim if len(inputs) == 1 else []
+    if len(dims) != 4 or dims[0].dim_value > 1 or dims[1].dim_value not in (0, 3):
+        raise ValueError("it does not take one picture of 1×3×height×width")
+    if inputs[0].type.tensor_type.elem_type != onnx.TensorProto.FLOAT:
+        raise ValueError("its input is not float32")
+    height, width = dims[2].dim_value, dims[3].dim_value
+    return (height, width) if height and width else None
+
+
+def with_input_size(model: onnx.ModelProto, size: Size) -> onnx.ModelProto:
+    """A copy that takes 1×3×size. Every declared shape after the input is dropped and inferred anew; where the graph
+    holds its old size in constants that leaves contradictions, which the runtime then reports."""
+    changed = onnx.ModelProto()
+    changed.CopyFrom(model)
+    weights = {tensor.name for tensor in changed.graph.initializer}
+    for value in changed.graph.input:
+        if value.name not in weights:
+            for dim, length in zip(value.type.tensor_type.shape.dim, (1, 3, *size), strict=True):
+                dim.dim_value = length
+    del changed.graph.value_info[:]
+    for value in changed.graph.output:
+        value.type.tensor_type.ClearField("shape")
+    return onnx.shape_inference.infer_shapes(changed)
+
+
+def _up(length: float) -> int:
+    return max(1, math.ceil(length / MULTIPLE)) * MULTIPLE

@@ -1,0 +1,121 @@
+"""Lane lines without a network: paint is brighter or yellower than the road on both of its sides.
+
+Bertozzi and Broggi, "GOLD" (IEEE Trans. Image Processing 7(1), 1998): in a row of the picture a marking is a bright
+band of the width that perspective gives it there, darker to the left and to the right. What is no line among the
+answers (a car's edge, a kerb) is left to the robust fit in ground coordinates (``pipeline.lanes.line_fit``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from pipeline.common.geometry import F64
+from pipeline.types import U8, CameraCalibration, RawLanes
+
+NAME = "classical"
+_NOTE = "lane lines by colour and gradient (classical), without a network"
+_UNCALIBRATED_HORIZON = 0.57
+"""Share of the picture's height at which a dashboard camera sees the horizon, where no calibration says it."""
+_CAMERA_HEIGHT_M = 1.4
+"""Of a camera behind a windshield; a tenth more or less changes the expected width of paint by as much."""
+_PAINT_WIDTH_M = 0.15
+_ROWS = 90
+_BELOW_HORIZON, _ABOVE_EDGE = 0.03, 0.02
+"""Shares of the picture's height left out below the horizon and above the lower edge."""
+_MIN_CONTRAST, _FULL_CONTRAST = 9.0, 60.0
+"""Grey levels by which paint must be brighter than both sides, and by which it is surely paint."""
+_PER_ROW = 12
+
+
+@dataclass(frozen=True)
+class ClassicalLanes:
+    """The detector for pictures of one camera. horizon: row of the horizon as a share of the picture's height."""
+
+    name: str
+    horizon: float
+    notes: tuple[str, ...] = (_NOTE,)
+
+    def detect(self, bgr: U8) -> RawLanes:
+        """Centres of what may be paint, in some ninety rows of a picture (H, W, 3) uint8; not grouped to lines."""
+        height, width = bgr.shape[:2]
+        horizon_px = self.horizon * height
+        rows = np.linspace(horizon_px + _BELOW_HORIZON * height, (1.0 - _ABOVE_EDGE) * height - 2, _ROWS)
+        rows = np.unique(rows[(rows >= 1) & (rows < height - 1)].astype(np.int64))
+        paint_px = np.maximum((rows - horizon_px) * _PAINT_WIDTH_M / _CAMERA_HEIGHT_M, 2.0)
+        if width < 64 or not len(rows):
+            return RawLanes(self.name, np.zeros((0, 2), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int32))
+        points, scores = _paint(np.ascontiguousarray(bgr), rows, paint_px, _MIN_CONTRAST, _FULL_CONTRAST)
+        return RawLanes(self.name, points, scores, np.full(len(points), -1, np.int32))
+
+
+def open_classical(camera: CameraCalibration | None) -> ClassicalLanes:
+    """For the pictures of a calibrated camera, or of an unknown one on a dashboard."""
+    if camera is None:
+        return ClassicalLanes(NAME, _UNCALIBRATED_HORIZON)
+    horizon = horizon_row(camera) / camera.height
+    return ClassicalLanes(f"{NAME}-{horizon:.3f}", horizon)
+
+
+def horizon_row(camera: CameraCalibration) -> float:
+    """The row in which ego +x vanishes, pixels; lens distortion is small there and left out."""
+    forward: F64 = camera.T_camera_ego[:3, :3] @ np.array([1.0, 0.0, 0.0])
+    return float(camera.K[1, 1] * forward[1] / forward[2] + camera.K[1, 2])
+
+
+@numba.njit(cache=True, nogil=True)
+def _paint(bgr, rows, paint_px, min_contrast, full_contrast):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """For each row, the places whose band of paint's width is brighter (or yellower) than the bands beside it."""
+    columns = bgr.shape[1]
+    points, scores = np.empty((len(rows) * _PER_ROW, 2), np.float32), np.empty(len(rows) * _PER_ROW, np.float32)
+    bright, yellow = np.zeros(columns + 1), np.zeros(columns + 1)
+    contrast = np.zeros(columns)
+    count = 0
+    for k in range(len(rows)):
+        for u in range(columns):  # sums along the row, of three rows together: less noise, any band's mean at once
+            light = colour = 0.0
+            for v in range(rows[k] - 1, rows[k] + 2):
+                blue, green, red = float(bgr[v, u, 0]), float(bgr[v, u, 1]), float(bgr[v, u, 2])
+                light += 0.5 * (red + green)
+                colour += 0.5 * (red + green) - blue
+            bright[u + 1] = bright[u] + light / 3.0
+            yellow[u + 1] = yellow[u] + colour / 3.0
+        half = max(1, int(paint_px[k] / 2))
+        band, gap = 2 * half + 1, half
+        reach = half + gap + band
+        for u in range(columns):
+            contrast[u] = 0.0
+        for u in range(reach, columns - reach):
+            best = 0.0
+            for total in (bright, yellow):
+                middle = (total[u + half + 1] - total[u - half]) / band
+                left = (total[u - half - gap] - total[u - half - gap - band]) / band
+                right = (total[u + half + gap + band + 1] - total[u + half + gap + 1]) / band
+                over = middle - max(left, right)
+                if over > abs(left - right):  # a step, such as a shadow's edge, is no band
+                    best = max(best, over)
+            contrast[u] = best
+        found = 0
+        u = reach
+        while u < columns - reach and found < _PER_ROW:
+            if contrast[u] < min_contrast:
+                u += 1
+                continue
+            peak, weight, moment = contrast[u], 0.0, 0.0
+            while u < columns - reach and contrast[u] >= min_contrast:
+                peak = max(peak, contrast[u])
+                weight += contrast[u]
+                moment += contrast[u] * u
+                u += 1
+            points[count, 0], points[count, 1] = moment / weight, rows[k]
+            scores[count] = min(1.0, peak / full_contrast)
+            count += 1
+            found += 1
+    return points[:count].copy(), scores[:count].copy()
+
+
+def warm_up() -> None:
+    """Compile the kernel before the first picture."""
+    open_classical(None).detect(np.zeros((72, 128, 3), np.uint8))

@@ -1,0 +1,124 @@
+"""A lane network in an ONNX file as one function: picture in, points on painted lines out.
+
+The paper takes ENet-SAD; any network whose outputs ``pipeline.lanes.heads`` knows will do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+import onnxruntime as ort
+
+from pipeline.common.data_dir import file_sha256
+from pipeline.inference.graph import input_size, with_input_size
+from pipeline.inference.runtime import DetectorError, DetectorMissing, find_graph, open_session, read_graph, run_session
+from pipeline.lanes.heads import Head, Size, UnknownLaneHead, pick_head
+from pipeline.types import F32, U8, RawLanes
+
+_FREE_SIZE: Size = (360, 640)
+"""Input (height, width) of a graph of free size: that of the BDD100K networks."""
+_PADDING = 114
+_MIN_SCORE = 0.3
+
+
+@dataclass(frozen=True)
+class LaneNetwork:
+    """A loaded lane network.
+
+    name: file and digest, so that equal names give equal points: the key of caches. input_size: (height, width).
+    """
+
+    name: str
+    providers: tuple[str, ...]
+    input_size: Size
+    head: Head
+    notes: tuple[str, ...]
+    threads: int
+    _session: ort.InferenceSession = field(repr=False, compare=False)
+
+    def detect(self, bgr: U8) -> RawLanes:
+        """Points on lines in a picture (H, W, 3) uint8, in its pixels.
+
+        DetectorError for an array that is no such picture or a network that fails on it.
+        """
+        if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
+            raise DetectorError(f"a picture is (H, W, 3) uint8, this is {bgr.shape} {bgr.dtype}")
+        placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head)
+        found = self.head.points(run_session(self._session, self._blob(bgr, placed)))
+        keep = found.score >= _MIN_SCORE
+        uv = found.uv[keep] * (self.input_size[1], self.input_size[0])
+        uv = (uv - placed.shift) / placed.scale + (0.0, placed.top) - 0.5  # whole numbers are the middles of pixels
+        inside = np.all((uv >= 0.0) & (uv <= (bgr.shape[1] - 1, bgr.shape[0] - 1)), axis=1)
+        return RawLanes(self.name, uv[inside].astype(np.float32), found.score[keep][inside], found.line[keep][inside])
+
+    def _blob(self, bgr: U8, placed: _Placed) -> F32:
+        """(1, 3, h, w) float32 as the network takes it."""
+        height, width = placed.size
+        resized = cv2.resize(bgr[placed.top :], (width, height), interpolation=cv2.INTER_LINEAR)
+        if (height, width) != self.input_size:
+            x, y = placed.shift
+            filled = np.full((*self.input_size, 3), _PADDING, np.uint8)
+            filled[int(y) : int(y) + height, int(x) : int(x) + width] = resized
+            resized = filled
+        blob = np.asarray(cv2.dnn.blobFromImage(resized, scalefactor=1.0 / 255.0, swapRB=True), np.float32)
+        mean, spread = (np.array(each, np.float32).reshape(1, 3, 1, 1) for each in (self.head.mean, self.head.spread))
+        return np.asarray((blob - mean) / spread, np.float32)
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """Where a picture lies in the input: its rows from ``top`` on, scaled (x, y), its corner at ``shift`` (x, y)."""
+
+    top: int
+    size: Size
+    scale: tuple[float, float]
+    shift: tuple[float, float]
+
+
+def open_lane_network(spec: str | None, threads: int = 2) -> LaneNetwork:
+    """Load a lane network by name or path; null: the default one (``pipeline.vision.model_registry``).
+
+    DetectorMissing when there is no file, DetectorError when the file is no lane network that can be run.
+    """
+    path = find_graph(spec, "lanes")
+    if path is None:
+        what = f"No lane network {spec!r}" if spec else "No lane network is installed"
+        raise DetectorMissing(
+            f"{what}: run `cipv models pull twinlitenet`, or give an ONNX file with `--lanes PATH`, "
+            "or use `--lanes classical`, which needs none."
+        )
+    return _loaded(path, threads)
+
+
+def _loaded(path: Path, threads: int) -> LaneNetwork:
+    """The network, proven by a run on a grey picture."""
+    model = read_graph(path)
+    try:
+        own = input_size(model)
+    except ValueError as error:
+        raise DetectorError(f"{path.name} is no lane network: {error}") from None
+    size = own or _FREE_SIZE
+    graph = (model if own else with_input_size(model, size)).SerializeToString()
+    session = open_session(graph, path, threads)
+    probe = run_session(session, np.full((1, 3, *size), 0.45, np.float32))
+    try:
+        head = pick_head(probe, [output.name for output in session.get_outputs()])
+    except UnknownLaneHead as error:
+        raise DetectorError(f"{path.name}: {error}") from None
+    name = f"{path.stem}-{file_sha256(path)[:12]}"
+    notes = (f"lane lines by the network {path.stem}",)
+    return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, threads, session)
+
+
+def _placed(picture: Size, size: Size, head: Head) -> _Placed:
+    (height, width), (rows, columns) = picture, size
+    if head.fit == "letterbox":
+        scale = min(rows / height, columns / width)
+        fitted = (max(1, round(height * scale)), max(1, round(width * scale)))
+        shift = (float((columns - fitted[1]) // 2), float((rows - fitted[0]) // 2))
+        return _Placed(0, fitted, (fitted[1] / width, fitted[0] / height), shift)
+    top = max(0, height - round(width * rows / columns)) if head.fit == "lower" else 0
+    return _Placed(top, size, (columns / width, rows / (height - top)), (0.0, 0.0))

@@ -1,0 +1,289 @@
+"""What a lane detector saw in the picture, as lines on the road in metres.
+
+``measure``    points of one picture → ground → lines, with the pitch that makes them parallel
+``follow``     the same, and the lines tracked from frame to frame: what the rest of the line calls
+``polylines``  an ``EgoLane`` as points on the road, and ``in_picture`` as pixels, for views
+
+The road is a plane: the one that the LiDAR's ground points show, else as far below the ego origin as the calibration
+or the parameter says. Lines of a road are parallel, so the pitch of the camera against its calibration shows in how
+their distance seems to change with range, and is tracked as a slow state.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.alignment.projection import Alignment
+from pipeline.common.fast_replace import evolve
+from pipeline.common.geometry import F64
+from pipeline.lanes import line_fit, tracking
+from pipeline.lanes.line_fit import FittedLine, Shape, Sightings
+from pipeline.lidar.ground import Ground
+from pipeline.params import LaneParams
+from pipeline.types import I32, Box, EgoState, RawLanes
+from pipeline.types.lane import EgoLane, LaneLine, powers
+
+Seed = tuple[float, Sightings]
+
+_MIN_POINTS = 12
+_NEAR_M, _FAR_M = 5.0, 12.0
+"""Where the LiDAR's ground is asked for the road's height: its rings lie dense there."""
+_PLANE_GAIN = 0.1
+"""Share by which one sweep moves the road's plane: one fit errs by centimetres, the car's stance changes slowly."""
+_UNPARALLEL = 0.004
+"""Real lines of one road differ this much in heading, radians."""
+_HEADING_AT_M = 15.0
+_HEADING = np.array([0.0, 1.0, 2.0 * _HEADING_AT_M, 3.0 * _HEADING_AT_M**2])
+"""A line's slope dy/dx there, of its coefficients."""
+_FLATNESS_RAD = 0.003
+"""A road that bends up or down ahead looks like this much pitch."""
+_STRAY_M = 9.0
+"""Farther aside no line concerns the car."""
+_HOPELESS = 0.05
+_BEYOND = 0.6
+"""Points that seem farther than ``max_range_m`` may be nearer under another pitch: this much of the inverse."""
+_COMPARED = powers(10.0)
+_APART_M = 0.6
+_POLYLINE_STEP_M = 1.0
+_DRAWN_FROM_M = 1.0
+
+
+@dataclass(frozen=True)
+class Pitch:
+    """The camera's pitch against its calibration, positive downwards, radians."""
+
+    rad: float
+    sigma_rad: float
+
+
+@dataclass(frozen=True, eq=False)
+class LaneMeasurement:
+    """The lines of one picture in the ego frame, strongest first, and the pitch under which they were mapped."""
+
+    source: str
+    lines: tuple[FittedLine, ...]
+    pitch: Pitch
+
+
+@dataclass(frozen=True, eq=False)
+class LaneState:
+    """What one frame leaves to the next. plane: (3,) a, b, c of the road z = a·x + b·y + c, a running mean over the
+    sweeps that showed it; null before one did. sweeps: how many those are."""
+
+    tracks: tracking.LaneTracks = tracking.LaneTracks()
+    pitch: Pitch | None = None
+    plane: F64 | None = None
+    sweeps: int = 0
+
+
+def follow(
+    state: LaneState,
+    raw: RawLanes | None,
+    aligned: Alignment | None,
+    ground: Ground | None,
+    ego: EgoState | None,
+    dt_s: float | None,
+    params: LaneParams,
+    vehicles: Sequence[Box] = (),
+    road_z_m: float | None = None,
+) -> tuple[LaneState, EgoLane | None]:
+    """One frame: measure if a lane detector has looked at it, and track. Null until one has. ground: of this frame's
+    sweep, if any. dt_s: since the frame before; null at the start. vehicles: boxes in the picture that hide it.
+    road_z_m: of the road in the ego frame, as the calibration has it; null: as the parameter has it."""
+    plane, sweeps = _settled(state, road_plane(ground))
+    level_m = road_z_m if road_z_m is not None else -params.mount_height_m
+    road = plane if plane is not None else np.array([0.0, 0.0, level_m])
+    pitch = _drifted(state.pitch, dt_s, params)
+    measured = None
+    if raw is not None and aligned is not None:
+        measured = measure(_beside(raw, vehicles), aligned, road, pitch, params, tracking.expected_shape(state.tracks))
+        pitch = measured.pitch
+    tracks = tracking.predict(state.tracks, ego, dt_s, params)
+    if measured is not None:
+        tracks = tracking.update(tracks, measured.source, measured.lines, params)
+    lane = tracking.ego_lane(tracks, pitch.rad, road, params)
+    return LaneState(tracks, pitch, plane, sweeps), lane
+
+
+def measure(
+    raw: RawLanes, aligned: Alignment, plane: F64, pitch: Pitch, params: LaneParams, expected: Shape | None = None
+) -> LaneMeasurement:
+    """Lines on the road from points in the picture; none where too few points lie on it.
+
+    plane: (3,) as in ``LaneState``. pitch: as believed before this picture. expected: the shape of the tracked lines,
+    around which the search is then narrow; null searches wide.
+    """
+    nothing = LaneMeasurement(raw.model, (), pitch)
+    eye, rays = aligned.rays(np.asarray(raw.points, np.float64))
+    height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))
+    if height_m <= 0.1:
+        return nothing
+    seen, line = _on_road(raw, rays, plane, height_m, params.max_range_m)
+    if len(line) < _MIN_POINTS:
+        return nothing
+    reach = float(min(2.5 * pitch.sigma_rad, 0.045))
+    around = evolve(expected or Shape(), pitch_rad=pitch.rad, pitch_reach_rad=reach)
+    shape, histogram = line_fit.shared_shape(seen, around)
+    sigma = float(np.radians(params.bearing_sigma_deg))
+    first = _fitted(_seeds(line, seen, shape, histogram), shape, sigma)
+    pitch = _parallel([found for found, _ in first], height_m, shape.pitch_rad, pitch)
+    shape = evolve(shape, pitch_rad=pitch.rad)
+    again = [(float(found.coefficients[0]), points) for found, points in first]
+    lines = [found for found, _ in _fitted(again, shape, sigma)]
+    to_ego = tracking.shifted(-float(eye[0]))
+    lines = [_in_ego(found, eye, to_ego, height_m, pitch) for found in _distinct(lines) if _plausible(found, params)]
+    return LaneMeasurement(raw.model, tuple(lines), pitch)
+
+
+def _beside(raw: RawLanes, vehicles: Sequence[Box]) -> RawLanes:
+    """Without the points on vehicles: their edges and reflections look like paint."""
+    if not vehicles or not len(raw.points):
+        return raw
+    u, v = raw.points.T[:, :, None]
+    x1, y1, x2, y2 = np.array(vehicles).T
+    free = ~np.any((u > x1) & (u < x2) & (v > y1) & (v < y2), axis=1)
+    return RawLanes(raw.model, raw.points[free], raw.scores[free], raw.line[free])
+
+
+def road_plane(ground: Ground | None) -> F64 | None:
+    """(3,) a, b, c of the road's height z = a·x + b·y + c ahead, from the LiDAR's ground; null without one."""
+    if ground is None:
+        return None
+    z = ground.height(np.array([[_NEAR_M, 0.0], [_FAR_M, 0.0], [_NEAR_M, 2.0], [_NEAR_M, -2.0]]))
+    if not np.all(np.isfinite(z)):
+        return None
+    along = (z[1] - z[0]) / (_FAR_M - _NEAR_M)
+    return np.array([along, (z[2] - z[3]) / 4.0, z[0] - along * _NEAR_M])
+
+
+def _settled(state: LaneState, seen: F64 | None) -> tuple[F64 | None, int]:
+    """The plane after one more sweep, and of how many it is."""
+    if seen is None or state.plane is None:
+        return (state.plane, state.sweeps) if seen is None else (seen, 1)
+    gain = max(_PLANE_GAIN, 1.0 / (state.sweeps + 1))
+    return state.plane + gain * (seen - state.plane), state.sweeps + 1
+
+
+def polylines(lane: EgoLane) -> dict[str, F64]:
+    """``left`` and ``right`` as (K, 2) ego x, y every metre as far as paint supports them; (0, 2) without a line."""
+    return {"left": _polyline(lane.left), "right": _polyline(lane.right)}
+
+
+def in_picture(lane: EgoLane, aligned: Alignment) -> dict[str, F64]:
+    """``left`` and ``right`` as (K, 2) pixels u, v where the lines were seen, NaN behind the camera. The alignment does
+    not know of the pitch, so each point is put where the pitch made it seem to be."""
+    plane = lane.plane
+    eye, _ = aligned.rays(np.zeros((0, 2)))
+    height_m = float(eye[2] - (plane[0] * eye[0] + plane[1] * eye[1] + plane[2]))
+    drawn = {}
+    for side, line in polylines(lane).items():
+        ahead = line[line[:, 0] > eye[0] + _DRAWN_FROM_M] - eye[:2]
+        seemed = ahead / (1.0 - ahead[:, :1] * lane.pitch_rad / height_m) + eye[:2]
+        drawn[side] = aligned.project(np.column_stack([seemed, seemed @ plane[:2] + plane[2]]))
+    return drawn
+
+
+def _polyline(line: LaneLine | None) -> F64:
+    if line is None:
+        return np.zeros((0, 2))
+    x = np.append(np.arange(line.x_min_m, line.x_max_m, _POLYLINE_STEP_M), line.x_max_m)
+    return np.column_stack([x, line.y_m(x)])
+
+
+def warm_up() -> None:
+    """Compile the kernels before the first picture."""
+    seen = Sightings(np.zeros(20), np.linspace(0.05, 0.2, 20), np.ones(20), 1.0)
+    shape, _ = line_fit.shared_shape(seen, Shape())
+    line_fit.fit_line(seen, 0.0, shape, 1e-3)
+
+
+def _drifted(pitch: Pitch | None, dt_s: float | None, params: LaneParams) -> Pitch:
+    """The pitch as believed now: towards its calibration and less sure as time passes."""
+    start = float(np.radians(params.pitch_sigma_deg))
+    if pitch is None or dt_s is None:
+        return Pitch(0.0, start)
+    grown = float(np.hypot(pitch.sigma_rad, np.radians(params.pitch_drift_deg) * np.sqrt(dt_s)))
+    return Pitch(pitch.rad, min(grown, start))
+
+
+def _on_road(raw: RawLanes, rays: F64, plane: F64, height_m: float, max_range_m: float) -> tuple[Sightings, I32]:
+    """Where each ray meets the road ahead, and which line its point belongs to; rays that do not are left out. In
+    inverse distance a ray near the horizon is no special case."""
+    forward = np.maximum(rays[:, 0], 1e-6)
+    slope = rays[:, 1] / forward
+    inverse = (plane[0] + plane[1] * slope - rays[:, 2] / forward) / height_m
+    ahead = (rays[:, 0] > 0) & (inverse > _BEYOND / max_range_m)
+    return Sightings(slope[ahead], inverse[ahead], raw.scores[ahead].astype(np.float64), height_m), raw.line[ahead]
+
+
+def _seeds(line: I32, seen: Sightings, shape: Shape, histogram: F64) -> list[Seed]:
+    """Where each line lies at x = 0, and which points it may be made of: those that the detector says are one line, or,
+    where it does not say, any that are near a peak of the histogram."""
+    groups = sorted(set(line[line >= 0].tolist()))
+    if not groups:
+        return [(y0, seen) for y0 in line_fit.peaks(histogram)]
+    x = seen.x_m(shape.pitch_rad)
+    y0 = x * (seen.slope - shape.heading_rad - 0.5 * shape.curvature_per_m * x)
+    return [(float(np.median(y0[line == group])), seen.only(line == group)) for group in groups]
+
+
+def _fitted(seeds: list[Seed], shape: Shape, bearing_sigma_rad: float) -> list[tuple[FittedLine, Sightings]]:
+    """The line through each seed's points, with those points; without the hopeless ones."""
+    fits = [(line_fit.fit_line(points, y0, shape, bearing_sigma_rad), points) for y0, points in seeds]
+    return [(found, points) for found, points in fits if found is not None and found.quality > _HOPELESS]
+
+
+def _parallel(lines: list[FittedLine], height_m: float, tried_rad: float, before: Pitch) -> Pitch:
+    """The pitch under which the lines are parallel, joined with what was believed before.
+
+    Under a pitch error p a line at lateral place c0 seems turned by c0·p/h, so p/h is the slope of heading over place.
+    The heading is taken where it is known best, in the middle of what is seen. Parallels of curvature κ are concentric:
+    at x they differ in heading by κ²·x for each metre between them.
+    """
+    if len(lines) < 2:
+        return before
+    place = np.array([line.coefficients[0] for line in lines])
+    heading = np.array([_HEADING @ line.coefficients for line in lines])
+    variance_of = np.array([_HEADING @ line.covariance @ _HEADING for line in lines])
+    trust = np.array([line.quality for line in lines]) / (variance_of + _UNPARALLEL**2)
+    bend = float(trust @ [2.0 * line.coefficients[2] for line in lines]) / float(trust.sum())
+    place = place - float(trust @ place) / float(trust.sum())
+    heading = heading - bend * bend * _HEADING_AT_M * place
+    spread = float(trust @ place**2)
+    if spread <= 0.0:
+        return before
+    measured = tried_rad + height_m * float((trust * place) @ heading) / spread
+    variance = height_m**2 / spread + _FLATNESS_RAD**2
+    gain = before.sigma_rad**2 / (before.sigma_rad**2 + variance)
+    return Pitch(before.rad + gain * (measured - before.rad), float(np.sqrt((1.0 - gain) * before.sigma_rad**2)))
+
+
+def _distinct(lines: list[FittedLine]) -> list[FittedLine]:
+    """Without those that slid onto a better one while they were fitted."""
+    kept: list[FittedLine] = []
+    places: list[float] = []
+    for line in sorted(lines, key=lambda each: -each.quality):
+        place = float(_COMPARED @ line.coefficients)
+        if all(abs(place - other) > _APART_M for other in places):
+            kept.append(line)
+            places.append(place)
+    return kept
+
+
+def _plausible(line: FittedLine, params: LaneParams) -> bool:
+    place, slope = float(line.coefficients[0]), float(line.coefficients[1])
+    return abs(slope) <= math.tan(math.radians(params.max_heading_deg)) and abs(place) <= _STRAY_M
+
+
+def _in_ego(line: FittedLine, eye: F64, to_ego: F64, height_m: float, pitch: Pitch) -> FittedLine:
+    """From the foot of the camera to the ego origin; what the pitch leaves open goes into the covariance."""
+    c0, _, c2, _ = line.coefficients
+    by_pitch = np.array([0.0, -c0, 0.0, c2]) / height_m * pitch.sigma_rad
+    mean = to_ego @ line.coefficients
+    mean[0] += eye[1]
+    cov = to_ego @ (line.covariance + by_pitch[:, None] * by_pitch) @ to_ego.T
+    return FittedLine(mean, cov, line.x_min_m + float(eye[0]), line.x_max_m + float(eye[0]), line.quality)

@@ -1,0 +1,245 @@
+"""Lane lines from frame to frame: a Kalman filter on each line's polynomial, moved by the car's own motion.
+
+A line y(x) seen from a car that has driven Δs and turned by Δψ is y(x + Δs) − x·Δψ − Δs·Δψ/2: linear in the
+coefficients, so prediction is exact for small turns. Every line near the car is tracked, not only the two of the ego
+lane, so that in a lane change the lines pass through and the ego lane is simply another pair of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.common.fast_replace import evolve
+from pipeline.common.geometry import F64
+from pipeline.lanes.line_fit import FittedLine, Shape
+from pipeline.params import LaneParams
+from pipeline.types import EgoState
+from pipeline.types.lane import EgoLane, LaneLine, Side, powers
+
+_COMPARE_AT = powers([5.0, 15.0])
+_SIDE_AT_M = 4.0
+"""Which side of the car a line is on is judged here: where the front wheels will be."""
+_OVER_M = 20.0
+_PLACES = powers([_SIDE_AT_M, 0.0, _OVER_M / 2, _OVER_M])
+_CAR_HALF_M = 0.9
+"""A line of a lane that the car is in with all its width is no farther than the widest lane less this."""
+_MOST_UNPARALLEL, _USUALLY_UNPARALLEL = 0.05, 0.02
+"""How much the slopes of a lane's two lines may and usually do differ."""
+_FURTHEST_M = 5.0
+_USUAL_WIDTH_M = 3.5
+_USUALLY_OFF_MIDDLE_M = 0.7
+_SEEN_GAIN = 0.35
+"""Share by which a sighting moves a line's quality."""
+_FADE_S = 0.8
+"""The quality of a line that is not seen falls to a third in this time."""
+_FORGOTTEN = 0.1
+_UNKNOWN_DRIFT_MPS = 0.5
+"""How fast lines may move sideways where the car's own motion is not known."""
+_YAW_RATE_SIGMA_RADPS = 0.01
+_UNKNOWN_YAW_RATE_RADPS = 0.06
+_UNKNOWN_SPEED_MPS = 20.0
+_NOT_CUBIC = np.diag(np.square([0.03, 1e-3, 1e-4, 4e-6]))
+"""What a line keeps of error however often it is seen, as a covariance: a road that is no cubic and no plane. Set so
+that in the simulator's S-curve 95 % of the lines lie within 2.5 sigma at 30 m."""
+_CLOTHOID_PER_M2 = 1.0 / 150.0**2
+"""How fast roads change their curvature: a clothoid of parameter A = 150 m, that of a road for 80 km/h."""
+
+
+@dataclass(frozen=True, eq=False)
+class LineTrack:
+    """One painted line. coefficients (4,), covariance (4, 4); seen: how often; unseen_s: since it was last seen."""
+
+    coefficients: F64
+    covariance: F64
+    x_min_m: float
+    x_max_m: float
+    quality: float
+    seen: int = 1
+    unseen_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class LaneTracks:
+    """Every line that is followed. source: the detector's name, null before it first delivered; age_s: since then."""
+
+    lines: tuple[LineTrack, ...] = ()
+    source: str | None = None
+    age_s: float = 0.0
+
+
+def predict(tracks: LaneTracks, ego: EgoState | None, dt_s: float | None, params: LaneParams) -> LaneTracks:
+    """The lines ``dt_s`` later, seen from the moved car; those not seen for too long end."""
+    if dt_s is None:
+        return tracks
+    speed = ego.speed_mps if ego is not None else 0.0
+    yaw_rate = ego.yaw_rate_radps if ego is not None else None
+    way, turn = speed * dt_s, (yaw_rate or 0.0) * dt_s
+    move, offset = shifted(way), np.array([-0.5 * way * turn, -turn, 0.0, 0.0])
+    noise = _noise(ego, dt_s)
+    moved = [
+        evolve(
+            line,
+            coefficients=move @ line.coefficients + offset,
+            covariance=move @ line.covariance @ move.T + noise,
+            x_min_m=line.x_min_m - way,
+            x_max_m=line.x_max_m - way,
+            unseen_s=line.unseen_s + dt_s,
+        )
+        for line in tracks.lines
+    ]
+    kept = tuple(line for line in moved if line.unseen_s <= params.max_age_s and line.x_max_m > 0.0)
+    return LaneTracks(kept, tracks.source, tracks.age_s + dt_s)
+
+
+def update(tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], params: LaneParams) -> LaneTracks:
+    """The lines after a picture. One that was not found in it fades; one that is new is born with its own quality."""
+    pairs = _pairs(tracks.lines, measured, params.gate_m)
+    lines = [_joined(line, measured[pairs[i]]) if i in pairs else _faded(line) for i, line in enumerate(tracks.lines)]
+    new = [found for j, found in enumerate(measured) if j not in pairs.values()]
+    lines += [LineTrack(f.coefficients, f.covariance, f.x_min_m, f.x_max_m, f.quality) for f in new]
+    return LaneTracks(tuple(line for line in lines if line.quality >= _FORGOTTEN), source, 0.0)
+
+
+def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParams) -> EgoLane | None:
+    """The pair of lines that the car is most likely between; null before a detector ever delivered.
+
+    Each side takes a believed line or none. A pair whose width is no lane's is not taken: one of the two is wrong, or
+    the calibration is, and if no other line says which, the better supported one stands alone.
+    """
+    if tracks.source is None:
+        return None
+    believed = [_Candidate.of(line) for line in tracks.lines if _quality_now(line) >= params.min_quality]
+    left = [each for each in believed if 0.0 < each.beside_m < _FURTHEST_M]
+    right = [each for each in believed if -_FURTHEST_M < each.beside_m <= 0.0]
+    pairs = [(a, b) for a in [*left, None] for b in [*right, None]]
+    a, b = max(pairs, key=lambda pair: _worth(pair[0], pair[1], params))
+    width = _width_m(a, b) if a is not None and b is not None else None
+    return EgoLane(_as_line("left", a), _as_line("right", b), tracks.source, tracks.age_s, pitch_rad, width, plane)
+
+
+def expected_shape(tracks: LaneTracks) -> Shape | None:
+    """Heading and curvature of the best line, to search around; null when none is sure."""
+    best = max(tracks.lines, key=lambda line: line.quality, default=None)
+    if best is None or best.quality < 0.5 or best.seen < 3:
+        return None
+    return Shape(
+        float(best.coefficients[1]),
+        float(2.0 * best.coefficients[2]),
+        heading_reach_rad=0.045,
+        curvature_reach_per_m=0.003,
+    )
+
+
+def shifted(way_m: float) -> F64:
+    """(4, 4) that takes the coefficients of y(x) to those of y(x + way)."""
+    w = way_m
+    return np.array(
+        [[1.0, w, w * w, w**3], [0.0, 1.0, 2.0 * w, 3.0 * w * w], [0.0, 0.0, 1.0, 3.0 * w], [0.0, 0.0, 0.0, 1.0]]
+    )
+
+
+def _noise(ego: EgoState | None, dt_s: float) -> F64:
+    """What the car's motion and the road's bending leave open in a step: place, heading, half
+    a curvature, its change."""
+    knows_turn = ego is not None and ego.yaw_rate_radps is not None
+    way = (ego.speed_mps if ego is not None else _UNKNOWN_SPEED_MPS) * dt_s
+    turn = (_YAW_RATE_SIGMA_RADPS if knows_turn else _UNKNOWN_YAW_RATE_RADPS) * dt_s
+    place = 0.1 * dt_s + 0.5 * way * turn if ego is not None else _UNKNOWN_DRIFT_MPS * dt_s
+    bend = 0.5 * _CLOTHOID_PER_M2 * way
+    return np.diag(np.square([place, turn, bend, bend / 60.0]))
+
+
+def _pairs(lines: tuple[LineTrack, ...], measured: tuple[FittedLine, ...], gate_m: float) -> dict[int, int]:
+    """Which track is which measured line: nearest first, one-to-one, within the gate at 5 and 15 m."""
+    if not lines or not measured:
+        return {}
+    old = np.array([_COMPARE_AT @ line.coefficients for line in lines])
+    new = np.array([_COMPARE_AT @ line.coefficients for line in measured])
+    gaps = np.abs(old[:, None] - new[None]) @ np.array([0.6, 0.4])
+    pairs: dict[int, int] = {}
+    for i, j in np.argwhere(gaps < gate_m)[np.argsort(gaps[gaps < gate_m], kind="stable")].tolist():
+        if i not in pairs and j not in pairs.values():
+            pairs[i] = j
+    return pairs
+
+
+def _joined(line: LineTrack, found: FittedLine) -> LineTrack:
+    gain = np.linalg.solve(line.covariance + found.covariance, line.covariance).T
+    keep = np.eye(4) - gain
+    mean = line.coefficients + gain @ (found.coefficients - line.coefficients)
+    cov = keep @ line.covariance @ keep.T + gain @ found.covariance @ gain.T
+    return LineTrack(
+        mean,
+        (cov + cov.T) / 2.0,
+        min(line.x_min_m, found.x_min_m) if line.seen > 1 else found.x_min_m,
+        max(line.x_max_m, found.x_max_m),
+        line.quality + _SEEN_GAIN * (found.quality - line.quality),
+        line.seen + 1,
+    )
+
+
+def _faded(line: LineTrack) -> LineTrack:
+    return evolve(line, quality=line.quality * (1.0 - _SEEN_GAIN))
+
+
+def _quality_now(line: LineTrack) -> float:
+    return line.quality * math.exp(-line.unseen_s / _FADE_S)
+
+
+@dataclass(frozen=True, eq=False)
+class _Candidate:
+    """A line that may be one of the ego lane's. beside_m: where it passes the front wheels; ahead_m: mean place over
+    the first 20 m; heading: its mean slope there."""
+
+    line: LineTrack
+    quality: float
+    beside_m: float
+    ahead_m: float
+    heading: float
+
+    @staticmethod
+    def of(line: LineTrack) -> _Candidate:
+        beside, *ahead = (_PLACES @ line.coefficients).tolist()
+        heading = (ahead[-1] - ahead[0]) / _OVER_M
+        return _Candidate(line, _quality_now(line), beside, sum(ahead) / len(ahead), heading)
+
+
+def _worth(left: _Candidate | None, right: _Candidate | None, params: LaneParams) -> float:
+    """How good a pair is: well supported and long known, as wide as a lane, the car near its middle. A line alone must
+    not lie under the car: so do shadows and tracks in snow, and to which side of it the lane is nobody can say."""
+    both = [each for each in (left, right) if each is not None]
+    worth = sum(each.quality * each.line.seen / (each.line.seen + 1.0) for each in both)
+    places = sum(each.beside_m for each in both)
+    if not both:
+        return 0.0
+    if left is None or right is None:
+        return worth if _CAR_HALF_M < abs(places) < params.max_width_m - _CAR_HALF_M else -1.0
+    width, unparallel = _width_m(left, right), left.heading - right.heading
+    if not params.min_width_m <= width <= params.max_width_m or abs(unparallel) > _MOST_UNPARALLEL:
+        return -1.0
+    usual = ((width - _USUAL_WIDTH_M) / 0.5) ** 2 + (places / 2.0 / _USUALLY_OFF_MIDDLE_M) ** 2
+    usual += (unparallel / _USUALLY_UNPARALLEL) ** 2
+    return worth + 0.5 * math.exp(-0.5 * usual)
+
+
+def _width_m(left: _Candidate, right: _Candidate) -> float:
+    """Mean over the first 20 m, square to the lines."""
+    return (left.ahead_m - right.ahead_m) * math.cos(math.atan((left.heading + right.heading) / 2.0))
+
+
+def _as_line(side: Side, chosen: _Candidate | None) -> LaneLine | None:
+    if chosen is None:
+        return None
+    line = chosen.line
+    return LaneLine(
+        side,
+        line.coefficients,
+        line.covariance + _NOT_CUBIC,
+        max(line.x_min_m, 0.0),
+        line.x_max_m,
+        chosen.quality,
+        line.unseen_s,
+    )

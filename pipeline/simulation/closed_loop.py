@@ -1,0 +1,147 @@
+"""The closed loop: the world as the sensors see it → the line → pedals → the vehicle → the next world.
+
+    world.at ─► Sensors ─► boxes (truth or network) ─► step ─► AccCommand ─► vehicle, in 5 ms steps ─┐
+       └──────────────────────────────────────────────────────────────────────────────────────────◄┘
+
+Deterministic: the same scenario, parameters and seed give the same drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from pipeline.common.fast_replace import evolve
+from pipeline.params import Params
+from pipeline.run import Detectors, detect, only
+from pipeline.run import Sensors as Sensed
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.sensors import truth_boxes
+from pipeline.simulation.sensors.detection_model import BoxNoise
+from pipeline.simulation.sensors.rig import Sensors
+from pipeline.simulation.world import actors, world
+from pipeline.simulation.world import ego_vehicle as vehicle
+from pipeline.simulation.world.ego_vehicle import Pedals, VehicleModel, VehicleState
+from pipeline.simulation.world.world import World
+from pipeline.step import State, step, warm_up
+from pipeline.types import AccCommand, Frame, Result
+from pipeline.vision.detector import Detector
+
+STEP_S = 0.005
+
+
+class Eyes(Protocol):
+    """What finds vehicles in the picture."""
+
+    @property
+    def needs_picture(self) -> bool: ...
+
+    def look(self, frame: Frame, now: World, seed: int) -> Frame:
+        """The frame with ``raw_boxes`` in it."""
+        ...
+
+
+@dataclass(frozen=True)
+class TruthEyes:
+    """Projected truth with a detector's errors: no picture, no network."""
+
+    noise: BoxNoise = BoxNoise()
+    needs_picture: bool = False
+
+    def look(self, frame: Frame, now: World, seed: int) -> Frame:
+        assert frame.camera is not None
+        return evolve(frame, raw_boxes=truth_boxes.boxes(now, frame.camera, self.noise, seed, frame.index))
+
+
+@dataclass(frozen=True)
+class NetworkEyes:
+    """The real network on the drawn picture."""
+
+    detector: Detector
+    needs_picture: bool = True
+
+    def look(self, frame: Frame, now: World, seed: int) -> Frame:
+        return detect(frame, Detectors(self.detector))
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What drives: parameters, sensors in use, eyes, and the car. closed: its pedals move the car; otherwise the car
+    follows its script, and what the line would do is only noted."""
+
+    params: Params = field(default_factory=Params)
+    sensors: Sensed = "both"
+    eyes: Eyes = TruthEyes()
+    model: VehicleModel = VehicleModel()
+    closed: bool = True
+
+
+@dataclass(frozen=True)
+class Tick:
+    """One moment of a drive. vehicle: as it was when the sensors looked; ``result`` is what came of it."""
+
+    index: int
+    world: World
+    frame: Frame
+    result: Result
+    vehicle: VehicleState
+
+    @property
+    def t_s(self) -> float:
+        return self.world.t_s
+
+
+def drive(scenario: Scenario, setup: Setup) -> Iterator[Tick]:
+    """Every tick of the scenario, until its end or for as long as the caller wants more."""
+    warm_up()
+    period_s = 1.0 / scenario.rate_hz
+    sensors = Sensors(scenario, _furthest_m(scenario))
+    car = _at_start(scenario)
+    state = State()
+    for index in range(scenario.frame_count()):
+        t_s = index * period_s
+        if not setup.closed:
+            car = _scripted(scenario, t_s)
+        now = world.at(scenario, t_s, car.motion())
+        frame = _look(sensors, setup, scenario, now, index)
+        state, result = step(state, frame, setup.params)
+        yield Tick(index, now, frame, result, car)
+        if setup.closed:
+            car = _drive_on(vehicle.command(car, _pedals(result.acc), setup.model), scenario, period_s, setup.model)
+
+
+def _look(sensors: Sensors, setup: Setup, scenario: Scenario, now: World, index: int) -> Frame:
+    wants_boxes = setup.sensors != "lidar"
+    frame = sensors.frame(now, index, round(now.t_s * 1e9), picture=wants_boxes and setup.eyes.needs_picture)
+    if wants_boxes:
+        frame = setup.eyes.look(frame, now, scenario.seed)
+    return only(frame, setup.sensors)
+
+
+def _pedals(command: AccCommand | None) -> Pedals:
+    return Pedals() if command is None else Pedals(command.accelerator, command.brake)
+
+
+def _drive_on(car: VehicleState, scenario: Scenario, seconds: float, model: VehicleModel) -> VehicleState:
+    """The dynamics from one tick to the next."""
+    steps = max(1, round(seconds / STEP_S))
+    curvature = scenario.road.curvature_per_m(scenario.ego.start_m + car.travelled_m)
+    for _ in range(steps):
+        lane = actors.motion(scenario.ego, scenario.road, car.t_s)
+        car = vehicle.advance(car, lane, curvature, seconds / steps, model)
+    return car
+
+
+def _at_start(scenario: Scenario) -> VehicleState:
+    return _scripted(scenario, 0.0)
+
+
+def _scripted(scenario: Scenario, t_s: float) -> VehicleState:
+    own = scenario.own_motion(t_s)
+    return VehicleState(t_s, own.travelled_m, own.speed_mps, own.accel_mps2, own.d_m, own.d_rate_mps, own.d_accel_mps2)
+
+
+def _furthest_m(scenario: Scenario) -> float:
+    """A place on the road that the car cannot pass: its fastest scripted speed and a little, all the way."""
+    return scenario.ego.start_m + 1.2 * max(scenario.ego.speed_mps.values()) * scenario.duration_s

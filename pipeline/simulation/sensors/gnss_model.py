@@ -1,0 +1,42 @@
+"""Where in the world a scenario lies and how good its GNSS receiver is: the ``gnss`` part of a scenario file. How well
+the car measures its own motion: the ``odometry`` part.
+
+What the noises are was measured on 60 s of a real drive (comma2k19: u-blox receiver, phone gyroscope, speed from the
+car's bus; tests/accuracy/test_comma2k19.py measures them anew): course 0.31° at 17 m/s; yaw rate 0.0024 rad/s white
+when averaged over 0.1 s, with a bias of 0.0005 rad/s; speed 0.08 m/s against the receiver's. The place is RTK's, as in
+the paper: that drive's receiver was off by metres, but from fix to fix scattered by 0.02 m sideways.
+"""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from pipeline.simulation.world.roads import Strict
+
+
+class GnssModel(Strict):
+    """Where the world's origin is, which way its x axis points (degrees clockwise from north), and how good the
+    receiver is: standard deviations of place (each way), height, speed and course."""
+
+    lat_deg: float = Field(default=35.6506, ge=-85.0, le=85.0)
+    lon_deg: float = Field(default=128.4022, ge=-180.0, le=180.0)
+    alt_m: float = Field(default=40.0, ge=-400.0, le=6000.0)
+    x_axis_deg: float = Field(default=90.0, ge=0.0, lt=360.0)
+    sigma_m: float = Field(default=0.01, ge=0.0, le=20.0)
+    sigma_up_m: float = Field(default=0.02, ge=0.0, le=20.0)
+    sigma_speed_mps: float = Field(default=0.02, ge=0.0, le=5.0)
+    sigma_course_deg: float = Field(default=0.3, ge=0.0, le=45.0)
+
+
+class OdometryModel(Strict):
+    """Standard deviation and bias of the yaw rate, standard deviation of the speed."""
+
+    sigma_yaw_rate_radps: float = Field(default=0.0024, ge=0.0, le=0.5)
+    bias_yaw_rate_radps: float = Field(default=0.0005, ge=-0.5, le=0.5)
+    sigma_speed_mps: float = Field(default=0.02, ge=0.0, le=5.0)
+
+
+RTK = GnssModel()
+"""An RTK fix, near the proving ground of the paper (Daegu)."""
+MEASURED = OdometryModel()
+"""As measured on a real drive."""

@@ -1,0 +1,34 @@
+"""How the simulated LiDAR is mounted and how well it measures: the ``lidar`` part of a scenario file."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import Field
+
+from pipeline.common.geometry import rotation
+from pipeline.simulation.world.roads import Strict
+from pipeline.types import F64
+
+
+class LidarModel(Strict):
+    """motion: rays are cast each at its own time, so what moves is distorted as in a raw sweep. range_sigma_m: noise of
+    the range. dropout: share of returns lost for no reason. up_m, roll_deg, pitch_deg, yaw_deg: how the sensor sits off
+    the ego origin; points are given in the level ego frame all the same. Positive pitch looks down."""
+
+    motion: bool = True
+    range_sigma_m: float = Field(default=0.015, ge=0.0, le=0.5)
+    dropout: float = Field(default=0.01, ge=0.0, le=1.0)
+    up_m: float = Field(default=0.0, ge=-0.3, le=3.0)
+    roll_deg: float = Field(default=0.0, ge=-10.0, le=10.0)
+    pitch_deg: float = Field(default=0.0, ge=-10.0, le=10.0)
+    yaw_deg: float = Field(default=0.0, ge=-10.0, le=10.0)
+
+    def mount(self) -> F64:
+        """T_ego_lidar (4, 4)."""
+        T = np.eye(4)
+        T[:3, :3] = rotation(*(float(np.radians(angle)) for angle in (self.roll_deg, self.pitch_deg, self.yaw_deg)))
+        T[2, 3] = self.up_m
+        return T
+
+
+VLP16 = LidarModel()

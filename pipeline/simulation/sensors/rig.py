@@ -1,0 +1,78 @@
+"""The ego vehicle's sensors in one scenario: any moment of the world as the ``Frame`` that the line takes.
+
+Recorded drives and closed loops see the world through this one place, so both see the same.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from pipeline.common.fast_replace import evolve
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.sensors import gnss
+from pipeline.simulation.sensors.camera import DrawnCamera, calibration
+from pipeline.simulation.sensors.lidar import Lidar
+from pipeline.simulation.world.planned_route import planned_route
+from pipeline.simulation.world.roadside import Roadside
+from pipeline.simulation.world.world import World
+from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Route, Sweep
+
+_BEFORE_M, _BEYOND_M = 100.0, 600.0
+
+
+class Sensors:
+    """LiDAR, camera, speedometer and GNSS. end_m: how far along the road the ego vehicle gets; the roadside ends 600 m
+    later. The same world and index give the same frame."""
+
+    def __init__(self, scenario: Scenario, end_m: float) -> None:
+        self._scenario = scenario
+        self._lidar = Lidar(scenario.lidar)
+        self._roadside = Roadside.build(
+            scenario.road, scenario.seed, scenario.ego.start_m - _BEFORE_M, end_m + _BEYOND_M
+        )
+
+    def frame(self, now: World, index: int, t_ns: int, picture: bool = True) -> Frame:
+        """What the sensors give at one tick. picture: draw the camera's picture; without it the frame is made ten times
+        faster, and still says how the camera is mounted."""
+        return evolve(
+            self.outline(now, index, t_ns),
+            sweep=self.sweep(now, index, t_ns),
+            picture=Picture(t_ns, self._camera.picture(now)) if picture else None,
+            route=self._route,
+        )
+
+    def outline(self, now: World, index: int, t_ns: int) -> Frame:
+        """The same without sweep, picture and route, which take nearly all of the time."""
+        return Frame(
+            index,
+            f"{index:06d}",
+            t_ns,
+            camera=self.camera,
+            ego=self._odometry(now, index, t_ns),
+            gnss=gnss.fix(now, self._scenario.gnss, self._scenario.seed, index, t_ns),
+        )
+
+    def sweep(self, now: World, index: int, t_ns: int) -> Sweep:
+        """The LiDAR's alone."""
+        return self._lidar.sweep(now, self._roadside, self._scenario.seed, index, t_ns)
+
+    def _odometry(self, now: World, index: int, t_ns: int) -> EgoState:
+        model = self._scenario.odometry
+        noise = np.random.default_rng([self._scenario.seed, 9, index]).standard_normal(2)
+        speed_mps = now.speed_mps + model.sigma_speed_mps * float(noise[0]) if now.speed_mps > 0.0 else 0.0
+        turning = model.bias_yaw_rate_radps + model.sigma_yaw_rate_radps * float(noise[1])
+        return EgoState(t_ns, max(speed_mps, 0.0), now.yaw_rate_radps + turning)
+
+    @cached_property
+    def _route(self) -> Route:
+        return planned_route(self._scenario)
+
+    @cached_property
+    def camera(self) -> CameraCalibration:
+        return calibration(self._scenario.camera)
+
+    @cached_property
+    def _camera(self) -> DrawnCamera:
+        return DrawnCamera(self._scenario.road, self._roadside, self._scenario.seed, self._scenario.camera)

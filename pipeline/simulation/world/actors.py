@@ -1,0 +1,199 @@
+"""Actors on the road: what they are, and where their script has them at any time.
+
+Speed is piecewise linear in time, so the way driven is piecewise quadratic and exact. A lane change is a smooth step
+(quintic, no jump in sideways acceleration) between two lanes' middles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from pipeline.simulation.world.roads import Road, Strict
+
+Extent = Annotated[float, Field(ge=0.3, le=30.0)]
+Kind = Literal["car", "van", "truck", "bus", "motorcycle"]
+SIZES_M: dict[str, tuple[float, float, float]] = {
+    "car": (4.5, 1.82, 1.48),
+    "van": (5.3, 2.0, 2.05),
+    "truck": (12.0, 2.5, 3.8),
+    "bus": (11.5, 2.5, 3.1),
+    "motorcycle": (2.2, 0.8, 1.45),
+}
+"""Length, width and height of each kind as it is simulated. These are not ``pipeline.fusion.vehicle_sizes``, which the line takes for
+what it has not measured: a drive in which the two were equal would flatter it."""
+
+
+_SLOPE_S = 0.05
+
+
+class Brake(Strict):
+    """Braking at a constant deceleration down to a speed, which is then kept. It starts at a time, or when the gap
+    between the ego origin and the vehicle's nearest face has first shrunk to ``at_gap_m``: that is the gap of the drive
+    as scripted, so a closed loop meets the same traffic whatever its ego vehicle does."""
+
+    at_s: float | None = Field(default=None, ge=0.0, le=3600.0)
+    at_gap_m: float | None = Field(default=None, gt=0.0, le=1000.0)
+    decel_mps2: float = Field(gt=0.0, le=12.0)
+    to_mps: float = Field(default=0.0, ge=0.0, le=100.0)
+
+    @model_validator(mode="after")
+    def _one_start(self) -> Brake:
+        if (self.at_s is None) == (self.at_gap_m is None):
+            raise ValueError("braking starts either at_s or at_gap_m: give one of the two")
+        return self
+
+
+class Speeds(Strict):
+    """speed_mps: time in seconds → speed, linear in between, constant outside. brake: takes over from there on."""
+
+    speed_mps: dict[float, float] = Field(min_length=1)
+    brake: Brake | None = None
+
+    @field_validator("speed_mps")
+    @classmethod
+    def _in_order(cls, speeds: dict[float, float]) -> dict[float, float]:
+        if min(speeds.values()) < 0.0 or max(speeds.values()) > 100.0:
+            raise ValueError("speeds must lie between 0 and 100 m/s")
+        return dict(sorted(speeds.items()))
+
+    @property
+    def corners(self) -> list[tuple[float, float]]:
+        """(time, speed) between which the speed is linear, braking included. A brake whose gap is not yet turned into
+        a time does nothing."""
+        planned = list(self.speed_mps.items())
+        if self.brake is None or self.brake.at_s is None:
+            return planned
+        at_s = self.brake.at_s
+        speed = _speed_mps(planned, at_s)
+        slower = min(self.brake.to_mps, speed)
+        end = (at_s + (speed - slower) / self.brake.decel_mps2, slower)
+        return [*(corner for corner in planned if corner[0] < at_s), (at_s, speed), end]
+
+    def travelled_m(self, t_s: float) -> float:
+        """Way driven from time 0 to t."""
+        return _travelled_m(self.corners, t_s)
+
+    def speed_and_accel(self, t_s: float) -> tuple[float, float]:
+        """m/s and m/s² at time t."""
+        slope = (_speed_mps(self.corners, t_s + _SLOPE_S) - _speed_mps(self.corners, t_s - _SLOPE_S)) / (2 * _SLOPE_S)
+        return _speed_mps(self.corners, t_s), slope
+
+
+class LaneChange(Strict):
+    start_s: float = Field(ge=0.0)
+    duration_s: float = Field(gt=0.2, le=30.0)
+    lane: int
+
+
+class Script(Speeds):
+    """How something drives along the road. offset_m: metres to the road's left of the middle of its lane."""
+
+    lane: int
+    offset_m: float = Field(default=0.0, ge=-20.0, le=20.0)
+    lane_changes: tuple[LaneChange, ...] = ()
+
+    @model_validator(mode="after")
+    def _one_change_at_a_time(self) -> Script:
+        free_at = 0.0
+        lane = self.lane
+        for change in self.lane_changes:
+            if change.start_s < free_at:
+                raise ValueError(f"the lane change at {change.start_s:g} s starts before the one before it ends")
+            if (change.lane > 0) != (lane > 0):
+                raise ValueError(f"the lane change at {change.start_s:g} s leads to the other carriageway")
+            free_at, lane = change.start_s + change.duration_s, change.lane
+        return self
+
+
+class Vehicle(Strict):
+    """What a vehicle is. size_m: length, width, height; null takes the kind's usual size."""
+
+    id: int = Field(ge=1)
+    kind: Kind
+    colour: str = Field(default="#8090a0", pattern="^#[0-9a-fA-F]{6}$")
+    size_m: tuple[Extent, Extent, Extent] | None = None
+
+    def size(self) -> tuple[float, float, float]:
+        return self.size_m or SIZES_M[self.kind]
+
+
+class Actor(Vehicle, Script):
+    """A vehicle on the road. ahead_m: from the ego origin to its nearest face along the road at time 0, negative when
+    its nearest face is behind."""
+
+    ahead_m: float = Field(ge=-1000.0, le=5000.0)
+
+    def direction(self) -> float:
+        """+1 along the road, −1 against it."""
+        return -1.0 if self.lane > 0 else 1.0
+
+    def place_m(self, road: Road, ego_start_m: float, travelled_m: float) -> float:
+        """s of its middle after a way driven."""
+        half = self.size()[0] / 2 if self.ahead_m >= 0.0 else -self.size()[0] / 2
+        d_m = road.lane_offset_m(self.lane) + self.offset_m
+        return road.line.advance(ego_start_m + self.ahead_m + half, self.direction() * travelled_m, d_m)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A moment of a script. travelled_m: way driven since time 0. heading_rad: turn from the lane's own direction.
+    d_rate_mps and d_accel_mps2: of the offset d, metres to the left of the reference line."""
+
+    travelled_m: float
+    d_m: float
+    speed_mps: float
+    accel_mps2: float
+    d_rate_mps: float
+    d_accel_mps2: float
+
+
+def motion(script: Script, road: Road, t_s: float) -> Motion:
+    """Where a script is at time t."""
+    speed, accel = script.speed_and_accel(t_s)
+    d_m, d_rate, d_accel = _offset(script, road, t_s)
+    return Motion(
+        travelled_m=script.travelled_m(t_s),
+        d_m=d_m,
+        speed_mps=speed,
+        accel_mps2=accel,
+        d_rate_mps=d_rate,
+        d_accel_mps2=d_accel,
+    )
+
+
+def _speed_mps(corners: list[tuple[float, float]], t_s: float) -> float:
+    """Speed at time t, linear between (time, speed) corners in order, constant outside them."""
+    before_s, before = corners[0]
+    for after_s, after in corners:
+        if t_s <= after_s:
+            share = (t_s - before_s) / (after_s - before_s) if after_s > before_s else 1.0
+            return before + (after - before) * share
+        before_s, before = after_s, after
+    return before
+
+
+def _travelled_m(corners: list[tuple[float, float]], t_s: float) -> float:
+    """Integral of the speed from 0 to t, by trapezoids over the corners in between: exact for linear pieces."""
+    stops = [0.0, *(time for time, _ in corners if 0.0 < time < t_s), t_s]
+    speeds = [_speed_mps(corners, stop) for stop in stops]
+    return sum((stops[i + 1] - stops[i]) * (speeds[i] + speeds[i + 1]) / 2 for i in range(len(stops) - 1))
+
+
+def _offset(script: Script, road: Road, t_s: float) -> tuple[float, float, float]:
+    """d in metres, its rate and its acceleration."""
+    here = road.lane_offset_m(script.lane) + script.offset_m
+    for change in script.lane_changes:
+        there = road.lane_offset_m(change.lane) + script.offset_m
+        p = (t_s - change.start_s) / change.duration_s
+        if p <= 0.0:
+            break
+        if p < 1.0:
+            step = p**3 * (10.0 - 15.0 * p + 6.0 * p * p)
+            rate = 30.0 * p * p * (1.0 - p) ** 2 / change.duration_s
+            accel = 60.0 * p * (1.0 - p) * (1.0 - 2.0 * p) / change.duration_s**2
+            return here + (there - here) * step, (there - here) * rate, (there - here) * accel
+        here = there
+    return here, 0.0, 0.0

@@ -1,0 +1,139 @@
+"""The ego vehicle: what a pedal command does to its motion, and how it keeps to its lane.
+
+Longitudinal: drive-by-wire with a dead time, pedals scaled to accelerations (paper, section ACC), a first-order lag and
+a limited jerk while the brakes build up pressure, and tyres that share μ·g between braking and cornering (friction
+circle). It neither rolls backwards nor slows down by itself: a pedal at 0 holds the speed. Lateral: a driver who steers
+after the lane's own course, no harder than the tyres allow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import copysign, exp, sqrt
+
+from pipeline.common.fast_replace import evolve
+from pipeline.simulation.world.actors import Motion
+
+GRAVITY_MPS2 = 9.81
+_LANE_STIFFNESS_PER_S2, _LANE_DAMPING_PER_S = 2.0, 2.8
+"""A critically damped return to the lane's course within about two seconds."""
+_MAX_DRIFT_RAD = 0.3
+
+
+@dataclass(frozen=True)
+class Pedals:
+    """0–1 each, as ``AccCommand`` gives them."""
+
+    accelerator: float = 0.0
+    brake: float = 0.0
+
+
+@dataclass(frozen=True)
+class VehicleModel:
+    """A passenger car on a dry road. full_accel_mps2 and full_brake_mps2: what the pedals give at 1; they are the scale
+    that ``AccParams`` assumes. dead_time_s: from the command to the first change at the wheels. The lags are first
+    order. brake_jerk_mps3: how fast brake pressure builds up (0 to 8 m/s² in 0.32 s). friction: μ of tyre on road."""
+
+    full_accel_mps2: float = 2.0
+    full_brake_mps2: float = 8.0
+    dead_time_s: float = 0.1
+    drive_lag_s: float = 0.3
+    brake_lag_s: float = 0.08
+    drive_jerk_mps3: float = 5.0
+    brake_jerk_mps3: float = 25.0
+    friction: float = 0.9
+
+
+@dataclass(frozen=True)
+class VehicleState:
+    """travelled_m: way driven since time 0. d_m: left of the road's reference line. pending: (time it acts, pedals) of
+    commands still on their way, oldest first; pedals: the command that acts now."""
+
+    t_s: float
+    travelled_m: float
+    speed_mps: float
+    accel_mps2: float
+    d_m: float
+    d_rate_mps: float = 0.0
+    d_accel_mps2: float = 0.0
+    pedals: Pedals = Pedals()
+    pending: tuple[tuple[float, Pedals], ...] = ()
+
+    def motion(self) -> Motion:
+        """As the world takes it."""
+        return Motion(self.travelled_m, self.d_m, self.speed_mps, self.accel_mps2, self.d_rate_mps, self.d_accel_mps2)
+
+
+def command(state: VehicleState, pedals: Pedals, model: VehicleModel) -> VehicleState:
+    """Send pedals by wire; they act after the dead time."""
+    return evolve(state, pending=(*state.pending, (state.t_s + model.dead_time_s, pedals)))
+
+
+def advance(
+    state: VehicleState, lane: Motion, curvature_per_m: float, dt_s: float, model: VehicleModel
+) -> VehicleState:
+    """The vehicle ``dt_s`` later. lane: where the driver wants to be from side to side, of which only d and its
+    derivatives count. curvature_per_m: of the road here. dt_s should be a few milliseconds."""
+    state = _receive(state)
+    wanted = _pedal_accel(state.pedals, model)
+    braking = wanted < 0.0 or state.accel_mps2 < 0.0
+    lag_s, jerk = (model.brake_lag_s, model.brake_jerk_mps3) if braking else (model.drive_lag_s, model.drive_jerk_mps3)
+    change = (wanted - state.accel_mps2) * (1.0 - exp(-dt_s / lag_s))
+    grip = model.friction * GRAVITY_MPS2
+    d_accel = _steer(state, lane, grip)
+    cornering = state.speed_mps**2 * curvature_per_m + d_accel
+    along = sqrt(max(grip**2 - cornering**2, 0.0))
+    accel = _clip(state.accel_mps2 + _clip(change, jerk * dt_s), along)
+    return _move(state, accel, d_accel, dt_s)
+
+
+def _receive(state: VehicleState) -> VehicleState:
+    """The newest command that has arrived takes over."""
+    arrived = [pedals for time_s, pedals in state.pending if time_s <= state.t_s]
+    if not arrived:
+        return state
+    return evolve(state, pedals=arrived[-1], pending=state.pending[len(arrived) :])
+
+
+def _pedal_accel(pedals: Pedals, model: VehicleModel) -> float:
+    """Pedal scaling: the brake wins over the accelerator."""
+    if pedals.brake > 0.0:
+        return -min(pedals.brake, 1.0) * model.full_brake_mps2
+    return min(max(pedals.accelerator, 0.0), 1.0) * model.full_accel_mps2
+
+
+def _steer(state: VehicleState, lane: Motion, grip_mps2: float) -> float:
+    """Sideways acceleration towards the lane's course, within the tyres' grip; none at standstill."""
+    if state.speed_mps <= 0.0:
+        return 0.0
+    wanted = (
+        lane.d_accel_mps2
+        + _LANE_DAMPING_PER_S * (lane.d_rate_mps - state.d_rate_mps)
+        + _LANE_STIFFNESS_PER_S2 * (lane.d_m - state.d_m)
+    )
+    return _clip(wanted, grip_mps2)
+
+
+def _move(state: VehicleState, accel: float, d_accel: float, dt_s: float) -> VehicleState:
+    """Exact for a constant acceleration; the moment of standstill falls inside the step."""
+    speed = state.speed_mps + accel * dt_s
+    if speed <= 0.0 and accel <= 0.0:
+        moving_s = state.speed_mps / -accel if accel < 0.0 else 0.0
+        travelled, speed = state.travelled_m + state.speed_mps * moving_s / 2, 0.0
+    else:
+        travelled = state.travelled_m + (state.speed_mps + speed) / 2 * dt_s
+    d_rate = _clip(state.d_rate_mps + d_accel * dt_s, _MAX_DRIFT_RAD * speed)
+    return evolve(
+        state,
+        t_s=state.t_s + dt_s,
+        travelled_m=travelled,
+        speed_mps=speed,
+        accel_mps2=accel if speed > 0.0 else min(accel, 0.0),
+        d_m=state.d_m + d_rate * dt_s,
+        d_rate_mps=d_rate,
+        d_accel_mps2=d_accel,
+    )
+
+
+def _clip(value: float, limit: float) -> float:
+    return copysign(min(abs(value), limit), value)

@@ -1,0 +1,150 @@
+"""Roads: a reference line of straights, arcs and transitions, with lanes beside it, named as ASAM OpenDRIVE names them.
+
+The reference line runs in the middle of the median. Lanes −1, −2, … lie to its right and run along it, −1 the
+innermost; +1, +2, … lie to its left and run against it. A place on the road is (s, d): metres along the reference
+line, metres to its left. World: x, y metres, heading counter-clockwise from x; the road is flat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from math import ceil
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from pipeline.simulation.world.lines import Line
+from pipeline.types import F64
+
+_TRANSITION_STEP_M = 0.5
+_CROSSING_REACH_M = 250.0
+
+
+class Strict(BaseModel):
+    """A part of a scenario file: unknown keys and infinite numbers are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A changed copy, validated anew, into which nothing worked out from the old values is carried."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self).model_validate({**fields, **(update or {})})
+
+
+class Segment(Strict):
+    """A stretch of road, straight unless it says otherwise; curvature is positive to the left. ``radius_m`` may stand
+    for ``curvature_per_m``. With ``end_curvature_per_m`` the curvature changes evenly along the segment: a transition
+    (clothoid) between a straight and a bend."""
+
+    length_m: float = Field(gt=0.0, le=100_000.0)
+    curvature_per_m: float = Field(default=0.0, ge=-0.2, le=0.2)
+    end_curvature_per_m: float | None = Field(default=None, ge=-0.2, le=0.2)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _radius(cls, given: Any) -> Any:
+        if not isinstance(given, dict) or "radius_m" not in given:
+            return given
+        rest = {key: value for key, value in given.items() if key != "radius_m"}
+        radius = given["radius_m"]
+        if "curvature_per_m" in rest:
+            raise ValueError("radius_m and curvature_per_m say the same thing; keep one")
+        if not isinstance(radius, int | float) or isinstance(radius, bool) or not abs(radius) >= 5.0:
+            raise ValueError("radius_m must be a number of at least 5 (to the left) or at most −5 (to the right)")
+        return {**rest, "curvature_per_m": 1.0 / radius}
+
+    @model_validator(mode="after")
+    def _short_transition(self) -> Segment:
+        if self.end_curvature_per_m is not None and self.length_m > 2000.0:
+            raise ValueError("a transition may be 2000 m long at most")
+        return self
+
+    def arcs(self) -> list[tuple[float, float]]:
+        """(length, curvature) of the arcs that make it up. A transition is cut into arcs of at most half a metre, each
+        of the curvature at its middle: headings at the joints are exact, places are within a millimetre or so."""
+        if self.end_curvature_per_m is None:
+            return [(self.length_m, self.curvature_per_m)]
+        count = ceil(self.length_m / _TRANSITION_STEP_M)
+        shares = (np.arange(count) + 0.5) / count
+        bends = self.curvature_per_m + shares * (self.end_curvature_per_m - self.curvature_per_m)
+        return [(self.length_m / count, bend) for bend in bends.tolist()]
+
+
+class Crossing(Strict):
+    """Another road, straight and level, across this one. s_m: where the two middle lines meet. angle_deg: by how much
+    its own direction is turned to the left of this road's there; 90 runs from right to left."""
+
+    s_m: float = Field(ge=0.0, le=100_000.0)
+    angle_deg: float = Field(default=90.0, ge=40.0, le=140.0)
+    lanes_each_way: int = Field(default=1, ge=1, le=3)
+    lane_width_m: float = Field(default=3.5, ge=2.5, le=5.0)
+
+    def half_width_m(self) -> float:
+        return self.lanes_each_way * self.lane_width_m
+
+
+class Road(Strict):
+    segments: tuple[Segment, ...] = Field(min_length=1)
+    crossings: tuple[Crossing, ...] = ()
+    lane_width_m: float = Field(default=3.6, ge=2.0, le=6.0)
+    lanes_forward: int = Field(default=3, ge=1, le=6)
+    lanes_oncoming: int = Field(default=2, ge=0, le=6)
+    median_m: float = Field(default=4.0, ge=0.0, le=30.0)
+    shoulder_m: float = Field(default=2.5, ge=0.0, le=10.0)
+
+    @model_validator(mode="after")
+    def _wide_enough_bends(self) -> Road:
+        """A lane inside a bend that is tighter than its offset would run backwards."""
+        widest = max(abs(edge) for pair in self.edges_m() for edge in pair)
+        for segment in self.segments:
+            for bend in (segment.curvature_per_m, segment.end_curvature_per_m or 0.0):
+                if abs(bend) * widest > 0.9:
+                    raise ValueError(
+                        f"a bend of {1 / abs(bend):.3g} m radius is too tight for a road {2 * widest:.3g} m wide"
+                    )
+        return self
+
+    def lane_offset_m(self, lane: int) -> float:
+        """d of a lane's middle. ValueError for a lane that the road does not have."""
+        if lane == 0 or not -self.lanes_forward <= lane <= self.lanes_oncoming:
+            raise ValueError(f"no lane {lane}: there are −{self.lanes_forward}…−1 and 1…{self.lanes_oncoming}")
+        side = 1.0 if lane > 0 else -1.0
+        return side * (self.median_m / 2 + (abs(lane) - 0.5) * self.lane_width_m)
+
+    def edges_m(self) -> tuple[tuple[float, float], ...]:
+        """d of the (right, left) edges of each carriageway, without shoulders: forward first."""
+        inner = self.median_m / 2
+        forward = (-inner - self.lanes_forward * self.lane_width_m, -inner)
+        oncoming = (inner, inner + self.lanes_oncoming * self.lane_width_m)
+        return (forward, oncoming) if self.lanes_oncoming else (forward,)
+
+    def curvature_per_m(self, s_m: float) -> float:
+        """Curvature of the reference line at s; the first and last segment go on for ever."""
+        ends = np.cumsum([segment.length_m for segment in self.segments])
+        index = min(int(np.searchsorted(ends, s_m, side="right")), len(ends) - 1)
+        segment = self.segments[index]
+        if segment.end_curvature_per_m is None:
+            return segment.curvature_per_m
+        share = min(max(1.0 - (ends[index] - s_m) / segment.length_m, 0.0), 1.0)
+        return segment.curvature_per_m + float(share) * (segment.end_curvature_per_m - segment.curvature_per_m)
+
+    def to_world(self, s_m: npt.ArrayLike, d_m: npt.ArrayLike) -> F64:
+        """(N, 3) x, y, heading of places (s, d), each (N,) or a number."""
+        return self.line.to_world(s_m, d_m)
+
+    @cached_property
+    def line(self) -> Line:
+        """The reference line."""
+        return Line([arc for segment in self.segments for arc in segment.arcs()])
+
+    @cached_property
+    def crossing_lines(self) -> tuple[Line, ...]:
+        """The middle line of each crossing road; s = 0 is where it meets this road's."""
+        lines = []
+        for crossing in self.crossings:
+            x, y, heading = self.to_world(crossing.s_m, 0.0)[0].tolist()
+            lines.append(Line([(_CROSSING_REACH_M, 0.0)], (x, y, heading + float(np.radians(crossing.angle_deg)))))
+        return tuple(lines)

@@ -1,0 +1,160 @@
+"""What stands beside a road: guard rails, delineator posts, trees, buildings and sign gantries, placed by seed.
+
+Everything is placed in (s, d) once per scenario and looked up by s, so both sensors see the same things.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.simulation.world.roads import Road
+from pipeline.simulation.world.world import World
+from pipeline.types import F64
+
+ThingKind = Literal["rail", "post", "tree", "building", "gantry_leg", "gantry_sign"]
+
+RAIL_LENGTH_M = 12.0
+RAIL_LOW_M, RAIL_HIGH_M = 0.42, 0.75
+_POST_STEP_M = 25.0
+_GANTRY_STEP_M = 450.0
+SIGN_LOW_M, SIGN_HIGH_M = 5.3, 7.6
+_BY_THE_ROAD = frozenset({"rail", "post", "gantry_leg", "gantry_sign"})
+"""These stand where they do because the road is there; they only make way for crossings."""
+_COURSE_STEP_M = 4.0
+_CORNER_M = 5.0
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An upright box beside the road: its middle (s, d), length along the road, width across, from low to high above
+    the road. variant: a number from 0 to 1 for what differs between two of a kind (colour, shape)."""
+
+    kind: ThingKind
+    s_m: float
+    d_m: float
+    length_m: float
+    width_m: float
+    low_m: float
+    high_m: float
+    variant: float
+
+
+def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, ...]:
+    """Everything beside the road from s = start to end, in order of s. What stands at a place depends on the seed and
+    the start, not on the end: each kind has dice of its own."""
+    right = road.edges_m()[0][0] - road.shoulder_m
+    left = road.edges_m()[-1][1] + road.shoulder_m
+    things = [
+        *_rails(road, start_m, end_m),
+        *_posts(start_m, end_m, right, left),
+        *_gantries(start_m, end_m, right),
+        *_trees(np.random.default_rng([seed, 1]), start_m, end_m, right, left),
+        *_buildings(np.random.default_rng([seed, 1, 1]), start_m, end_m, right, left),
+    ]
+    return tuple(sorted(_off_the_road(things, road, start_m, end_m), key=lambda thing: thing.s_m))
+
+
+def _off_the_road(things: list[Thing], road: Road, start_m: float, end_m: float) -> list[Thing]:
+    """Without what a crossing road or another stretch of the same, winding road runs through."""
+    s_m, d_m = np.array([thing.s_m for thing in things]), np.array([thing.d_m for thing in things])
+    places = road.to_world(s_m, d_m)[:, :2]
+    reach_m = np.array([np.hypot(thing.length_m, thing.width_m) / 2 for thing in things])
+    clear = np.ones(len(things), dtype=bool)
+    if not road.line.straight:
+        from scipy.spatial import cKDTree  # half a second that a straight road need not wait for
+
+        course = road.to_world(np.arange(start_m - 60.0, end_m + 60.0, _COURSE_STEP_M), 0.0)[:, :2]
+        nearest_m, _ = cKDTree(course).query(places)
+        own_m = np.where(np.array([thing.kind in _BY_THE_ROAD for thing in things]), np.inf, reach_m)
+        widest = max(abs(edge) for pair in road.edges_m() for edge in pair) + road.shoulder_m
+        clear &= (nearest_m > widest + own_m) | np.isinf(own_m)
+    for crossing, line in zip(road.crossings, road.crossing_lines, strict=True):
+        x, y, heading = line.to_world(0.0, 0.0)[0]
+        beside = np.abs((places[:, 1] - y) * np.cos(heading) - (places[:, 0] - x) * np.sin(heading))
+        clear &= beside > crossing.half_width_m() + _CORNER_M + reach_m
+    return [thing for thing, stays in zip(things, clear, strict=True) if stays]
+
+
+@dataclass(frozen=True)
+class Roadside:
+    """Placed things with their world poses, ready to be cut to what is near."""
+
+    things: tuple[Thing, ...]
+    s_m: F64
+    poses: F64
+
+    @staticmethod
+    def build(road: Road, seed: int, start_m: float, end_m: float) -> Roadside:
+        things = place(road, seed, start_m, end_m)
+        s_m = np.array([thing.s_m for thing in things])
+        return Roadside(things, s_m, road.to_world(s_m, np.array([thing.d_m for thing in things])))
+
+    def near(self, world: World, behind_m: float, ahead_m: float) -> list[tuple[Thing, float, float, float]]:
+        """Things within reach along the road, each with its ego x, y and yaw, in order of s."""
+        first, last = np.searchsorted(self.s_m, [world.s_m - behind_m, world.s_m + ahead_m])
+        poses = self.poses[first:last]
+        places = world.to_ego(poses)
+        turns = poses[:, 2] - world.pose[2]
+        return [
+            (thing, float(x), float(y), float(yaw))
+            for thing, (x, y), yaw in zip(self.things[first:last], places, turns, strict=True)
+        ]
+
+
+def _rails(road: Road, start_m: float, end_m: float) -> list[Thing]:
+    """Guard rails along the median, when it is wide enough to hold them."""
+    if road.median_m < 1.0:
+        return []
+    middles = np.arange(start_m, end_m, RAIL_LENGTH_M) + RAIL_LENGTH_M / 2
+    sides = (-road.median_m / 2 + 0.6, road.median_m / 2 - 0.6)
+    return [
+        Thing("rail", float(s), d, RAIL_LENGTH_M, 0.12, RAIL_LOW_M, RAIL_HIGH_M, 0.0) for s in middles for d in sides
+    ]
+
+
+def _posts(start_m: float, end_m: float, right_m: float, left_m: float) -> list[Thing]:
+    return [
+        Thing("post", float(s), d, 0.1, 0.12, 0.0, 1.05, 0.0)
+        for s in np.arange(start_m, end_m, _POST_STEP_M)
+        for d in (right_m - 0.4, left_m + 0.4)
+    ]
+
+
+def _gantries(start_m: float, end_m: float, right_m: float) -> list[Thing]:
+    """A sign bridge over the forward carriageway now and then."""
+    things = []
+    first = np.ceil(start_m / _GANTRY_STEP_M) * _GANTRY_STEP_M
+    for s in np.arange(first, end_m, _GANTRY_STEP_M):
+        leg = right_m - 1.0
+        things.append(Thing("gantry_leg", float(s), leg, 0.35, 0.35, 0.0, SIGN_HIGH_M, 0.0))
+        things.append(Thing("gantry_leg", float(s), 0.0, 0.35, 0.35, 0.0, SIGN_HIGH_M, 0.0))
+        things.append(Thing("gantry_sign", float(s), leg / 2, 0.2, -leg * 0.8, SIGN_LOW_M, SIGN_HIGH_M, 0.0))
+    return things
+
+
+def _trees(rng: np.random.Generator, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Thing]:
+    """Two loose rows on either side; nearer than 6 m to the shoulder none grow."""
+    things = []
+    for s in np.arange(start_m, end_m, 11.0):
+        for edge, side in ((right_m, -1.0), (left_m, 1.0)):
+            if rng.random() < 0.72:
+                away, height, variant = rng.uniform(6.0, 24.0), rng.uniform(5.0, 10.0), rng.random()
+                crown = height * rng.uniform(0.45, 0.7)
+                place_s = float(s + rng.uniform(-5.0, 5.0))
+                things.append(Thing("tree", place_s, edge + side * away, crown, crown, 0.0, height, float(variant)))
+    return things
+
+
+def _buildings(rng: np.random.Generator, start_m: float, end_m: float, right_m: float, left_m: float) -> list[Thing]:
+    things = []
+    for s in np.arange(start_m, end_m, 130.0):
+        for edge, side in ((right_m, -1.0), (left_m, 1.0)):
+            if rng.random() < 0.55:
+                length, width, height = rng.uniform(18.0, 45.0), rng.uniform(12.0, 22.0), rng.uniform(6.0, 14.0)
+                d = edge + side * (34.0 + rng.uniform(0.0, 18.0) + width / 2)
+                place_s, variant = float(s + rng.uniform(-30.0, 30.0)), float(rng.random())
+                things.append(Thing("building", place_s, float(d), length, width, 0.0, height, variant))
+    return things

@@ -1,0 +1,117 @@
+"""The world at one moment, seen from the ego vehicle: who is where, and how the ego vehicle moves.
+
+Ego frame: x forward, y left, z up, origin at the LiDAR, which sits level in the middle of the front bumper.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import atan2, hypot, pi, remainder
+
+import numpy as np
+
+from pipeline.common.geometry import Cuboid
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.world.actors import Motion, Vehicle, motion
+from pipeline.simulation.world.roads import Road
+from pipeline.types import F64
+
+LIDAR_HEIGHT_M = 0.5
+_BRAKING_MPS2 = -0.4
+_SLOWEST_STEER_MPS = 2.0  # slower than this a lane change is a creep to the side, not a turn on the spot
+
+
+@dataclass(frozen=True)
+class ActorState:
+    """An actor at one moment, in the ego frame. speed_mps: over ground, the way it points. braking: its brake lights
+    are on. yaw_rate_radps: of its own turning in the world."""
+
+    actor: Vehicle
+    cuboid: Cuboid
+    speed_mps: float
+    braking: bool
+    yaw_rate_radps: float
+
+
+@dataclass(frozen=True)
+class World:
+    """The ego pose (world x, y, heading), its place (s, d) on the road, its motion and the actors, farthest first."""
+
+    t_s: float
+    pose: tuple[float, float, float]
+    s_m: float
+    d_m: float
+    speed_mps: float
+    yaw_rate_radps: float
+    actors: tuple[ActorState, ...]
+
+    def to_ego(self, world: F64) -> F64:
+        """(N, 2) world points as ego x, y."""
+        x, y, heading = self.pose
+        c, s = np.cos(heading), np.sin(heading)
+        away = world[:, :2] - (x, y)
+        return np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s])
+
+
+def at(scenario: Scenario, t_s: float, ego: Motion | None = None) -> World:
+    """The world at time t; nothing is carried from one moment to the next. ``ego`` given: the ego vehicle moves as
+    that says (closed loop), else as the scenario says. The others follow their scripts either way."""
+    road = scenario.road
+    own = ego if ego is not None else scenario.own_motion(t_s)
+    lane_d_m = road.lane_offset_m(scenario.ego.lane) + scenario.ego.offset_m
+    s_m = road.line.advance(scenario.ego.start_m, own.travelled_m, lane_d_m)
+    x, y, road_heading = road.to_world(s_m, own.d_m)[0].tolist()
+    pose = (x, y, road_heading + _drift_rad(own))
+    world = World(t_s, pose, s_m, own.d_m, own.speed_mps, _yaw_rate(own, road, s_m, 1.0), ())
+    states = [*_on_the_road(scenario, world), *_crossing(scenario, world)]
+    return replace(world, actors=tuple(sorted(states, key=lambda s: (-hypot(*s.cuboid.center[:2]), s.actor.id))))
+
+
+def _on_the_road(scenario: Scenario, world: World) -> list[ActorState]:
+    """Those that keep to lanes. A vehicle that drives against the road is turned by half a circle, and its drift to the
+    road's left is one to its driver's right."""
+    road, actors = scenario.road, scenario.cast
+    if not actors:
+        return []
+    motions = [motion(actor, road, world.t_s) for actor in actors]
+    start_m = scenario.ego.start_m
+    s_m = [actor.place_m(road, start_m, now.travelled_m) for actor, now in zip(actors, motions, strict=True)]
+    poses = road.to_world(np.array(s_m), np.array([now.d_m for now in motions]))
+    states = []
+    for actor, now, s, pose in zip(actors, motions, s_m, poses, strict=True):
+        way = actor.direction()
+        pose[2] += way * _drift_rad(now) + (pi if way < 0.0 else 0.0)
+        states.append(_state(world, actor, pose, now.speed_mps, now.accel_mps2, _yaw_rate(now, road, s, way)))
+    return states
+
+
+def _crossing(scenario: Scenario, world: World) -> list[ActorState]:
+    """Those that come over a crossing."""
+    states = []
+    for actor, way in zip(scenario.crossing_actors, scenario.routes, strict=True):
+        s_m = way.arrival_m + actor.travelled_m(world.t_s) - actor.travelled_m(actor.arrive_s)
+        speed, accel = actor.speed_and_accel(world.t_s)
+        states.append(_state(world, actor, way.line.to_world(s_m, 0.0)[0], speed, accel, way.bend(s_m) * speed))
+    return states
+
+
+def _state(world: World, actor: Vehicle, pose: F64, speed_mps: float, accel_mps2: float, yaw_rate: float) -> ActorState:
+    """An actor that stands at a pose in the world, as the ego vehicle sees it."""
+    length, width, height = actor.size()
+    x, y = world.to_ego(pose[None])[0].tolist()
+    yaw = remainder(float(pose[2]) - world.pose[2], 2 * pi)
+    cuboid = Cuboid((x, y, height / 2 - LIDAR_HEIGHT_M), (length, width, height), yaw)
+    return ActorState(actor, cuboid, speed_mps, accel_mps2 < _BRAKING_MPS2, yaw_rate)
+
+
+def _yaw_rate(now: Motion, road: Road, s_m: float, way: float) -> float:
+    """Of something on the road at s; way: +1 along it, −1 against it."""
+    bend = road.curvature_per_m(s_m)
+    return way * (
+        now.speed_mps * bend / (1.0 - bend * now.d_m) + now.d_accel_mps2 / max(now.speed_mps, _SLOWEST_STEER_MPS)
+    )
+
+
+def _drift_rad(now: Motion) -> float:
+    """How far a vehicle that changes lanes points to the left of the road."""
+    return atan2(now.d_rate_mps, max(now.speed_mps, _SLOWEST_STEER_MPS))

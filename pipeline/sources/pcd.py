@@ -1,0 +1,123 @@
+"""A folder of PCD files as a recording, in order of name, with pictures of the same names beside them.
+
+A name that is a number of nanoseconds, microseconds or seconds since 1970 is the sweep's time; else sweeps are taken as
+10 Hz. Pictures lie in the same folder, or in one named ``images``, ``image``, ``camera`` or ``image_02``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.formats.file_reading import files_by_name, picture_of, picture_size, read_bytes, recording_folder
+from pipeline.formats.pcd_file import parse_pcd
+from pipeline.formats.point_cloud_fields import cloud_of
+from pipeline.sources import rig as rig_files
+from pipeline.sources.uri_options import split_options
+from pipeline.types import Frame, Sweep
+from pipeline.types.source import SourceError, TruthObject
+
+_STEP_NS = 100_000_000
+_PICTURES = ("", "images", "image", "camera", "image_02")
+_PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
+_CLOUDS = ("", "pcd", "lidar", "velodyne", "points")
+_NUMBER = re.compile(r"^\d+(\.\d+)?$")
+_EPOCH_S = 631_152_000  # 1990: smaller numbers count frames
+_UNITS_NS = ((10**18, 1), (10**15, 1_000), (10**12, 1_000_000))
+
+
+class PcdSource:
+    """``<folder>?rig=file.yaml``. The file ``rig.yaml`` in the folder is taken without being named."""
+
+    def __init__(self, uri: str, rest: str) -> None:
+        path, options = split_options(rest, ("rig",))
+        folder = recording_folder(path)
+        self.uri, self.title = uri, folder.resolve().name
+        self._sweeps = next((found for name in _CLOUDS if (found := files_by_name(folder / name, (".pcd",)))), {})
+        if not self._sweeps:
+            raise SourceError(f"{path}: no PCD files in it")
+        self._names = list(self._sweeps)
+        self._pictures = next(
+            (found for name in _PICTURES if (found := files_by_name(folder / name, _PICTURE_SUFFIXES))), {}
+        )
+        self._size = picture_size(self._pictures.values()) or (0, 0)
+        rig = _rig(folder, options)
+        self._T_ego_lidar, self._camera = rig.lidar.mount.T_ego_sensor(), rig.camera_calibration()
+        stamps = [_stamp_ns(name) for name in self._names]
+        known = [stamp for stamp in stamps if stamp is not None]
+        self._has_times = len(known) == len(stamps) and bool(np.all(np.diff(known) > 0))
+        self._ticks = known if self._has_times else [index * _STEP_NS for index in range(len(self._names))]
+        steps = np.diff(self._ticks)
+        self.rate_hz = round(1e9 / float(np.median(steps)), 2) if len(steps) else 10.0
+        self.notes = self._about()
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def t_ns(self, index: int) -> int:
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        return self._ticks[index]
+
+    def frame(self, index: int) -> Frame:
+        t_ns, name, notes = self.t_ns(index), self._names[index], list[str]()
+        sweep = self._sweep(name, t_ns, notes)
+        picture = picture_of(self._pictures.get(name), None, self._size, notes) if self._pictures else None
+        camera = rig_files.calibration_for(self._camera, picture, notes)
+        return Frame(index, name, t_ns, sweep, picture, camera, notes=tuple(notes))
+
+    def outlines(self) -> Iterator[Frame]:
+        """A camera's pictures are of one size: the first one tells whether the calibration is theirs."""
+        first = picture_of(next(iter(self._pictures.values()), None), None, self._size, []) if self._pictures else None
+        camera = rig_files.calibration_for(self._camera, first, [])
+        return (Frame(index, name, self.t_ns(index), camera=camera) for index, name in enumerate(self._names))
+
+    def sweep(self, index: int) -> Sweep | None:
+        return self._sweep(self._names[index], self.t_ns(index), [])
+
+    def truth(self, index: int) -> tuple[TruthObject, ...] | None:
+        self.t_ns(index)
+        return None
+
+    def _sweep(self, name: str, t_ns: int, notes: list[str]) -> Sweep | None:
+        path = self._sweeps[name]
+        try:
+            cloud = cloud_of(parse_pcd(read_bytes(path), path.name, notes), t_ns, notes)
+        except SourceError as error:
+            notes.append(str(error) if path.name in str(error) else f"{path.name}: {error}")
+            return None
+        return cloud.sweep(t_ns, self._T_ego_lidar)
+
+    def _about(self) -> tuple[str, ...]:
+        notes = [] if self._has_times else ["no time stamps in the files' names: taken as 10 Hz"]
+        if self._pictures and self._camera is None:
+            notes.append("the camera has no calibration: LiDAR and camera are not fused")
+        return (*notes, "no ego speed recorded")
+
+
+def _rig(folder: Path, options: dict[str, str]) -> rig_files.Rig:
+    path = folder / options.get("rig", "rig.yaml")
+    if path.is_file():
+        return rig_files.load_rig(path)
+    if "rig" in options:
+        raise SourceError(f"rig={options['rig']}: no such file")
+    return rig_files.Rig()
+
+
+def _stamp_ns(name: str) -> int | None:
+    """The time that a file's name is; null when it is none."""
+    if not _NUMBER.match(name):
+        return None
+    whole, _, fraction = name.partition(".")
+    if len(whole) > 19:
+        return None
+    value = int(whole)
+    for least, unit_ns in _UNITS_NS:
+        if value >= least:
+            return value * unit_ns
+    if value < _EPOCH_S:
+        return None
+    return value * 1_000_000_000 + int(fraction[:9].ljust(9, "0") if fraction else 0)

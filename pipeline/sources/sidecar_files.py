@@ -1,0 +1,139 @@
+"""What lies beside a recording of a LiDAR: a video, a GNSS receiver's sentences, and a file that says where sensors
+sit. Found by the recording's own name, or named by options."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from pipeline.common.fast_replace import evolve
+from pipeline.common.nearest_in_time import Timeline, nearest
+from pipeline.common.progress import Progress, silent
+from pipeline.common.user_file_errors import given_path, reason_of
+from pipeline.formats import video_file as video_files
+from pipeline.formats.file_reading import files_by_name
+from pipeline.formats.nmea import NmeaReader
+from pipeline.sources import rig as rig_files
+from pipeline.sources.live.gnss_motion import MotionFromGnss
+from pipeline.sources.uri_options import number_option
+from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Sweep
+from pipeline.types.source import SourceError
+
+OPTIONS = ("video", "video_offset_s", "nmea", "rig")
+_NMEA_SUFFIXES = (".nmea", ".nma", ".ubx.txt")
+_PICTURE_WITHIN_NS = 100_000_000
+_FIX_WITHIN_NS = 1_500_000_000
+_LONGEST_LINE = 1024
+
+
+class Beside:
+    """Everything of a frame but its sweep. notes: what was found, and what had to be assumed.
+
+    begin_ns: when the recording begins, which is when its video is taken to begin. fixes: what the recording itself
+    says of the place; used where no file of sentences lies beside it. progress: told how much of a video was read.
+    SourceError for a named file that cannot be used.
+    """
+
+    def __init__(
+        self,
+        recording: Path,
+        options: dict[str, str],
+        rig: rig_files.Rig,
+        begin_ns: int,
+        fixes: Iterable[GnssFix] = (),
+        progress: Progress = silent,
+    ) -> None:
+        self.notes: list[str] = []
+        self._camera = rig.camera_calibration()
+        self._video = self._open_video(_named(recording, options, "video", video_files.SUFFIXES), progress)
+        offset_s = number_option(options, "video_offset_s", 0.0) + rig.camera.time_offset_ms / 1e3
+        self._video_begins_ns = begin_ns + round(offset_s * 1e9)
+        if self._video is not None and not offset_s:
+            self.notes.append("the video is taken to begin with the recording; ?video_offset_s= shifts it")
+        if self._video is not None and self._camera is None:
+            self.notes.append("the camera has no calibration: LiDAR and camera are not fused")
+        sentences = _named(recording, options, "nmea", _NMEA_SUFFIXES)
+        found = _fixes_of(sentences, begin_ns, self.notes) if sentences is not None else list(fixes)
+        found = [evolve(fix, t_ns=fix.t_ns + round(rig.gnss.time_offset_ms * 1e6)) for fix in found]
+        self._fixes = Timeline([fix.t_ns for fix in found], found)
+        follow = MotionFromGnss()
+        own = [follow.push(fix) for fix in sorted(found, key=lambda fix: fix.t_ns)]
+        self._own = Timeline([each.t_ns for each in own], own)
+        if not found:
+            self.notes.append("no ego speed recorded")
+
+    def frame(self, index: int, t_ns: int, sweep: Sweep | None, notes: list[str]) -> Frame:
+        """The frame at ``t_ns``: with the nearest picture within 0.1 s and the last fix within 1.5 s."""
+        picture = self._picture(t_ns, notes)
+        camera = rig_files.calibration_for(self._camera, picture, notes)
+        outline = self._outline(index, t_ns, camera)
+        return evolve(outline, sweep=sweep, picture=picture, notes=tuple(notes))
+
+    def outlines(self, times_ns: Sequence[int]) -> Iterator[Frame]:
+        """As ``frame`` without sweep and picture, one for each of these times. A video's pictures are of one size: the
+        first one tells whether the calibration is theirs."""
+        first = self._picture(self._video_begins_ns, []) if self._video is not None else None
+        camera = rig_files.calibration_for(self._camera, first, [])
+        return (self._outline(index, t_ns, camera) for index, t_ns in enumerate(times_ns))
+
+    def _outline(self, index: int, t_ns: int, camera: CameraCalibration | None) -> Frame:
+        ego, gnss = self._ego(t_ns), self._fixes.latest(t_ns, _FIX_WITHIN_NS)
+        return Frame(index, f"{index:06d}", t_ns, camera=camera, ego=ego, gnss=gnss)
+
+    def _ego(self, t_ns: int) -> EgoState | None:
+        return self._own.latest(t_ns, _FIX_WITHIN_NS)
+
+    def _picture(self, t_ns: int, notes: list[str]) -> Picture | None:
+        if self._video is None:
+            return None
+        index = nearest(self._video.times_ns, t_ns - self._video_begins_ns, _PICTURE_WITHIN_NS)
+        if index is None:
+            notes.append("no picture within 0.1 s")
+            return None
+        try:
+            bgr = self._video.picture(index)
+        except SourceError as error:
+            notes.append(str(error))
+            return None
+        return Picture(self._video_begins_ns + int(self._video.times_ns[index]), bgr)
+
+    def _open_video(self, path: Path | None, progress: Progress) -> video_files.VideoFile | None:
+        if path is None:
+            return None
+        self.notes.append(f"pictures from {path.name}")
+        return video_files.VideoFile(path, progress)
+
+
+def rig_of(recording: Path, options: dict[str, str]) -> rig_files.Rig:
+    """The file that says where sensors sit; without one every sensor is at the ego origin."""
+    path = _named(recording, options, "rig", rig_files.SUFFIXES)
+    return rig_files.load_rig(path) if path is not None else rig_files.Rig()
+
+
+def _named(recording: Path, options: dict[str, str], option: str, suffixes: tuple[str, ...]) -> Path | None:
+    """The file that an option names, from the recording's folder; else the one with the recording's own name."""
+    if option in options:
+        path = recording.parent / given_path(options[option], SourceError)
+        if not path.is_file():
+            raise SourceError(f"{option}={options[option]}: no such file")
+        return path
+    return files_by_name(recording.parent, suffixes).get(recording.stem)
+
+
+def _fixes_of(path: Path, near_ns: int, notes: list[str]) -> list[GnssFix]:
+    """Every fix of a file of sentences. Damaged lines are counted in ``notes``."""
+    reader, fixes = NmeaReader(), []
+    try:
+        with path.open("rb") as file:
+            while line := file.readline(_LONGEST_LINE):
+                fix = reader.push(line.decode("ascii", "replace"), near_ns) if line.strip() else None
+                if fix is not None:
+                    fixes.append(fix)
+    except OSError as error:
+        raise SourceError(f"{path.name}: cannot be read: {reason_of(error)}") from None
+    last = reader.flush(near_ns)
+    fixes += [last] if last is not None else []
+    notes.append(f"{len(fixes)} GNSS fixes from {path.name}, by the receiver's own time")
+    if reader.bad:
+        notes.append(f"{path.name}: {reader.bad} damaged lines left out")
+    return fixes

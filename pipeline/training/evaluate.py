@@ -1,0 +1,167 @@
+"""How well a detector finds simulated vehicles, by distance.
+
+``python -m pipeline.training.evaluate [MODEL] --count 100 --seeds 101 202 303``
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import reduce
+from operator import add
+
+import numpy as np
+from scipy.stats import binomtest
+
+from pipeline.common.geometry import iou_matrix
+from pipeline.params import DetectionParams
+from pipeline.simulation.scenario import names
+from pipeline.simulation.sensors.camera import HEIGHT, WIDTH, calibration
+from pipeline.training.labels import CLASSES, Label, labels
+from pipeline.training.scenes import Moment, drive, moments
+from pipeline.types import Detection
+from pipeline.vision.detector import Detector, open_detector
+from pipeline.vision.nms import select
+
+EDGES_M = (0.0, 10.0, 20.0, 30.0, 45.0, 60.0, 80.0, 100.0)
+MATCH_IOU = 0.5
+JUDGE_SEEDS = (101, 202, 303, 404, 505, 606, 707)
+"""Random traffic that neither training nor the distance law knows."""
+FREE_SHARE = 0.5
+"""Vehicles less visible than this are neither asked for nor counted as wrong when found."""
+LEAD_M = 60.0
+"""A lead is asked for up to here."""
+_HEIGHT_M = 1.6
+
+
+@dataclass
+class Bin:
+    """Counts of one range of distances. height_errors: found height over true height − 1, of boxes whole and clear."""
+
+    vehicles: int = 0
+    found: int = 0
+    named: int = 0
+    leads: int = 0
+    leads_found: int = 0
+    wrong: int = 0
+    height_errors: list[float] = field(default_factory=list)
+
+    def recall(self) -> float:
+        return self.found / max(self.vehicles, 1)
+
+    def lead_recall(self) -> float:
+        return self.leads_found / max(self.leads, 1)
+
+    def lead_interval(self) -> tuple[float, float]:
+        """Of the lead's recall, at 95 % (Wilson 1927): what as many other pictures may show."""
+        interval = binomtest(self.leads_found, self.leads).proportion_ci(method="wilson")
+        return float(interval.low), float(interval.high)
+
+    def precision(self) -> float:
+        return self.found / max(self.found + self.wrong, 1)
+
+    def class_accuracy(self) -> float:
+        return self.named / max(self.found, 1)
+
+    def height_error(self) -> float:
+        """Mean of the absolute relative error."""
+        return float(np.mean(np.abs(self.height_errors))) if self.height_errors else 0.0
+
+
+def evaluate(detector: Detector, pictures: Iterable[Moment], params: DetectionParams | None = None) -> list[Bin]:
+    """One bin for each pair of ``EDGES_M``. A lead is the nearest vehicle straight ahead. A wrong detection has no
+    distance; it counts where a car of its box's height would be."""
+    camera = calibration()
+    bins = [Bin() for _ in EDGES_M[1:]]
+    for moment in pictures:
+        detections = select(detector.detect(moment.picture), params or DetectionParams())
+        _count(labels(moment.world, camera), detections, float(camera.K[1, 1]), bins)
+    return bins
+
+
+def within(bins: list[Bin], far_m: float) -> Bin:
+    """What is nearer, as one bin."""
+    return _sum(part for part, end_m in zip(bins, EDGES_M[1:], strict=True) if end_m <= far_m)
+
+
+def pooled(runs: Iterable[list[Bin]]) -> list[Bin]:
+    """Several evaluations as one."""
+    return [_sum(parts) for parts in zip(*runs, strict=True)]
+
+
+def _sum(bins: Iterable[Bin]) -> Bin:
+    """Every count is the sum of theirs."""
+    return Bin(*(reduce(add, counts) for counts in zip(*(vars(part).values() for part in bins), strict=True)))
+
+
+def _count(truth: tuple[Label, ...], detections: tuple[Detection, ...], focal_px: float, bins: list[Bin]) -> None:
+    boxes = np.array([label.box for label in truth]).reshape(-1, 4)
+    found = np.array([detection.bbox for detection in detections]).reshape(-1, 4)
+    overlap = iou_matrix(boxes, found)
+    lead = next((label for label in truth if label.ahead), None)
+    for label, row in zip(truth, overlap, strict=True):
+        place = _bin(label.distance_m, bins)
+        if place is None or label.visible < FREE_SHARE:
+            continue
+        best = int(np.argmax(row)) if len(row) else -1
+        hit = best >= 0 and bool(row[best] >= MATCH_IOU)
+        place.vehicles += 1
+        place.found += hit
+        place.leads += label is lead
+        place.leads_found += hit and label is lead
+        if hit:
+            place.named += detections[best].label == CLASSES[label.label]
+            if not label.cut:
+                box, seen = label.box, detections[best].bbox
+                place.height_errors.append((seen[3] - seen[1]) / (box[3] - box[1]) - 1.0)
+    for detection, column in zip(detections, overlap.T, strict=True):
+        place = _bin(focal_px * _HEIGHT_M / max(detection.bbox[3] - detection.bbox[1], 1.0), bins)
+        if place is not None and (not len(column) or column.max() < MATCH_IOU):
+            place.wrong += 1
+
+
+def _bin(distance_m: float, bins: list[Bin]) -> Bin | None:
+    index = int(np.searchsorted(EDGES_M, distance_m, side="right")) - 1
+    return bins[index] if 0 <= index < len(bins) else None
+
+
+def _print(title: str, bins: list[Bin]) -> None:
+    print(f"\n{title}\n  distance m  vehicles  recall  leads  recall  precision  class  height error")
+    for (low, high), part in zip(itertools.pairwise(EDGES_M), bins, strict=True):
+        print(
+            f"  {low:4.0f} – {high:3.0f} {part.vehicles:9d} {100 * part.recall():6.1f}% {part.leads:6d}"
+            f" {100 * part.lead_recall():6.1f}% {100 * part.precision():9.1f}% {100 * part.class_accuracy():5.1f}%"
+            f" {100 * part.height_error():10.1f}%"
+        )
+    near = within(bins, LEAD_M)
+    if near.leads:
+        low, high = near.lead_interval()
+        print(
+            f"  lead within {LEAD_M:.0f} m: {near.leads_found} of {near.leads}, {100 * near.lead_recall():.1f} % "
+            f"(95 %: {100 * low:.1f}–{100 * high:.1f} %); all vehicles {100 * near.recall():.1f} %, "
+            f"precision {100 * near.precision():.1f} %"
+        )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("model", nargs="?", default="embedded")
+    parser.add_argument("--count", type=int, default=100, help="pictures of each seed")
+    parser.add_argument("--seeds", type=int, nargs="+", default=JUDGE_SEEDS)
+    options = parser.parse_args()
+    detector = open_detector(options.model, (WIDTH, HEIGHT))
+    of_seeds = {seed: evaluate(detector, moments(seed, options.count)) for seed in options.seeds}
+    for seed, bins in of_seeds.items():
+        near = within(bins, LEAD_M)
+        print(f"seed {seed}: lead within {LEAD_M:.0f} m {near.leads_found} of {near.leads}")
+    _print(f"{options.count} random pictures of each seed", pooled(of_seeds.values()))
+    of_scenarios = {name: evaluate(detector, drive(name, 1.0)) for name in names()}
+    for name, bins in of_scenarios.items():
+        _print(f"scenario {name}", bins)
+    _print(f"all {len(of_scenarios)} scenarios", pooled(of_scenarios.values()))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,68 @@
+"""What the network is trained to make small."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from pipeline.training.targets import IGNORED
+from pipeline.vision.heads import Size, grid_centres
+
+_IOU_WEIGHT, _OFFSET_WEIGHT = 3.0, 1.0
+_MOST_LOG_SIZE = 6.0
+
+
+@dataclass(frozen=True)
+class Losses:
+    """Means over the cells that answer for a vehicle; iou: how well their boxes fit."""
+
+    total: Tensor
+    objectness: float
+    classes: float
+    iou: float
+
+
+def losses(logits: Tensor, labels: Tensor, boxes: Tensor, size: Size) -> Losses:
+    """logits (B, N, 5 + C), labels (B, N), boxes (B, N, 4) of ``targets``.
+
+    Objectness aims at the box's IoU, weighted by its error (quality focal loss, Li 2020), so that of several
+    candidates the one with the best box wins. Boxes: generalised IoU (Rezatofighi 2019) and L1 of the raw numbers,
+    which for far vehicles of ten pixels says more about the height.
+    """
+    cells, strides = (torch.from_numpy(part) for part in grid_centres(size))
+    positive = labels >= 0
+    count = positive.sum().clamp(min=1)
+    raw, box = logits[..., :4][positive], boxes[positive]
+    cell, stride = cells.expand(len(logits), -1, -1)[positive], strides.expand(len(logits), -1, -1)[positive]
+    centre = (raw[:, :2] + cell) * stride
+    extent = raw[:, 2:].clamp(max=_MOST_LOG_SIZE).exp() * stride
+    iou, giou = _overlap(torch.cat([centre - extent / 2, centre + extent / 2], dim=1), box)
+    wanted = torch.cat(
+        [(box[:, :2] + box[:, 2:]) / 2 / stride - cell, ((box[:, 2:] - box[:, :2]) / stride).clamp(min=1e-3).log()], 1
+    )
+    fit = _IOU_WEIGHT * (1.0 - giou).sum() + _OFFSET_WEIGHT * F.smooth_l1_loss(raw, wanted, reduction="sum", beta=0.1)
+
+    quality = torch.zeros_like(logits[..., 4])
+    quality[positive] = iou.detach().clamp(min=0.0)
+    error = (logits[..., 4].sigmoid() - quality).abs().square()
+    entropy = F.binary_cross_entropy_with_logits(logits[..., 4], quality, reduction="none")
+    objectness = (error * entropy)[labels != IGNORED].sum()
+
+    named = F.one_hot(labels[positive], logits.shape[2] - 5).to(logits.dtype)
+    classes = F.binary_cross_entropy_with_logits(logits[..., 5:][positive], named, reduction="sum")
+    total = (fit + 2.0 * objectness + classes) / count
+    return Losses(
+        total, objectness.item() / count.item(), classes.item() / count.item(), iou.mean().item() if len(iou) else 0.0
+    )
+
+
+def _overlap(a: Tensor, b: Tensor) -> tuple[Tensor, Tensor]:
+    """(M,) IoU and generalised IoU of (M, 4) boxes, pair by pair."""
+    inner = (torch.minimum(a[:, 2:], b[:, 2:]) - torch.maximum(a[:, :2], b[:, :2])).clamp(min=0).prod(dim=1)
+    outer = (torch.maximum(a[:, 2:], b[:, 2:]) - torch.minimum(a[:, :2], b[:, :2])).prod(dim=1)
+    union = (a[:, 2:] - a[:, :2]).prod(dim=1) + (b[:, 2:] - b[:, :2]).prod(dim=1) - inner
+    iou = inner / union.clamp(min=1e-6)
+    return iou, iou - (outer - union) / outer.clamp(min=1e-6)

@@ -1,0 +1,54 @@
+"""Which cells of the grid answer for which vehicle, and what they should say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pipeline.types import F32
+from pipeline.vision.heads import Size, grid_centres
+
+RANGES_PX = {8: (0.0, 56.0), 16: (40.0, 128.0), 32: (96.0, np.inf)}
+"""Geometric mean of a box's sides that each stride answers for; neighbours overlap, so that no size falls between."""
+RADIUS_CELLS = 1.0
+MIN_VISIBLE, MIN_HEIGHT_PX = 0.25, 5.0
+"""Less than this is neither wanted nor punished; less than ``_HIDDEN`` of a vehicle visible is background."""
+_HIDDEN = 0.05
+
+BACKGROUND, IGNORED = -1, -2
+
+
+@dataclass(frozen=True)
+class Targets:
+    """For the N cells of a picture: labels (N,) int64 a class, ``BACKGROUND`` or ``IGNORED``; boxes (N, 4) float32
+    x1 y1 x2 y2 in network pixels, zero where there is no class."""
+
+    labels: npt.NDArray[np.int64]
+    boxes: F32
+
+
+def assign(boxes: F32, labels: npt.NDArray[np.int64], visible: F32, size: Size) -> Targets:
+    """Cells for (M, 4) boxes with classes (M,) and visible shares (M,) in an input of (height, width).
+
+    A cell whose centre lies within ``RADIUS_CELLS`` of a box's centre answers for it (Tian 2019, centre sampling), at
+    every stride whose range holds the box. Of two boxes the one more visible wins.
+    """
+    cells, strides = grid_centres(size)
+    centres, stride = (cells + 0.5) * strides, strides[:, 0]
+    wanted = np.full(len(cells), BACKGROUND, dtype=np.int64)
+    chosen = np.zeros((len(cells), 4), dtype=np.float32)
+    low, high = (np.array([RANGES_PX[int(s)][end] for s in stride]) for end in (0, 1))
+    for row in np.argsort(visible, kind="stable"):
+        box = boxes[row]
+        width, height = float(box[2] - box[0]), float(box[3] - box[1])
+        if visible[row] < _HIDDEN or width <= 0.0 or height <= 0.0:
+            continue
+        side = float(np.sqrt(width * height))
+        away = np.abs(centres - (box[:2] + box[2:]) / 2).max(axis=1)
+        mine = (away < RADIUS_CELLS * stride) & (low <= side) & (side < high)
+        clear = visible[row] >= MIN_VISIBLE and height >= MIN_HEIGHT_PX
+        wanted[mine] = labels[row] if clear else IGNORED
+        chosen[mine] = box if clear else 0.0
+    return Targets(wanted, chosen)

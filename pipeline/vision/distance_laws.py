@@ -1,0 +1,76 @@
+"""Distance laws that were measured for a network, in a file beside it: ``best.onnx`` has ``best.law.json``.
+
+The file names the network's SHA-256, so that a law never outlives the weights it was fitted to.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from pipeline.common.data_dir import file_sha256
+from pipeline.common.errors import BadInput
+from pipeline.types import DistanceLaw
+
+
+@dataclass(frozen=True)
+class FoundLaw:
+    """law: of this network, null when none was measured. note: why a law that is there is not used, else empty."""
+
+    law: DistanceLaw | None
+    note: str = ""
+
+
+def law_file(network: Path) -> Path:
+    """Where a network's law is kept; it need not be there."""
+    return network.with_suffix(".law.json")
+
+
+def find_law(network: Path) -> FoundLaw:
+    """The law measured for these very weights."""
+    path = law_file(network)
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        law = DistanceLaw(**{each.name: float(kept["law"][each.name]) for each in fields(DistanceLaw)})
+        fitted_to = str(kept["network_sha256"])
+    except FileNotFoundError:
+        return FoundLaw(None)
+    except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
+        return FoundLaw(None, f"{path.name} is damaged and not used; fit the law again with `cipv calibrate distance`")
+    if not _is_possible(law):
+        return FoundLaw(None, f"{path.name} holds numbers that no camera can have and is not used")
+    if fitted_to != file_sha256(network):
+        return FoundLaw(None, f"{path.name} was fitted to other weights and is not used")
+    return FoundLaw(law)
+
+
+def keep_law(network: Path, law: DistanceLaw, fitted: Mapping[str, Any]) -> Path:
+    """Write a network's law. fitted: what it was fitted to and how well, for people; plain JSON values.
+
+    BadInput where the file cannot be written.
+    """
+    path = law_file(network)
+    text = json.dumps(
+        {"network_sha256": file_sha256(network), "law": asdict(law), "fitted": dict(fitted)},
+        indent=1,
+        ensure_ascii=False,
+    )
+    part = path.with_suffix(".part")
+    try:
+        part.write_text(text + "\n", encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise BadInput(
+            f"{path} cannot be written ({error.strerror or error}); register the network, and fit the law to that"
+        ) from None
+    return path
+
+
+def _is_possible(law: DistanceLaw) -> bool:
+    """Whether a taller box means a nearer vehicle, and every number is one that a camera can have."""
+    sizes = (law.coefficient, law.focal_px, law.truck_ratio, law.bus_ratio, law.motorcycle_ratio)
+    return all(math.isfinite(size) and size > 0.0 for size in sizes) and -10.0 < law.exponent < 0.0

@@ -1,0 +1,287 @@
+"""Networks by name: which ones are known, where their official files are, and the folder that keeps them.
+
+The folder is ``~/.cache/cipv/models`` (``CIPV_HOME`` replaces ``~/.cache/cipv``). A network is chosen by name or path;
+without either it is the registered default, then the first known one found in the folder or in ``$CIPV_DATA/models``,
+then the embedded one, which is part of the program and knows simulated vehicles only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import urllib.error
+import urllib.request
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pipeline.common.data_dir import data_dir, file_sha256
+from pipeline.common.errors import BadInput
+from pipeline.common.progress import Progress, silent
+from pipeline.common.user_file_errors import given_path
+from pipeline.types import DistanceLaw
+from pipeline.vision.distance_laws import find_law, law_file
+
+Task = Literal["detector", "lanes"]
+EMBEDDED = "embedded"
+"""Name of the detector that comes with the program."""
+_EMBEDDED_FILE = Path(__file__).parent / "embedded" / "simulated_vehicles.onnx"
+_CHUNK = 1 << 16
+_TIMEOUT_S = 30.0
+
+
+class ModelError(BadInput):
+    """A network that cannot be fetched, registered or found; one sentence with the remedy."""
+
+
+@dataclass(frozen=True)
+class KnownModel:
+    """An official file, size in bytes; or, where size and checksum are null, the project that has it: such a network is
+    fetched, or exported to ONNX, by hand and registered."""
+
+    name: str
+    task: Task
+    url: str
+    size: int | None
+    sha256: str | None
+    licence: str
+    note: str
+
+    @property
+    def remedy(self) -> str:
+        """How it comes here."""
+        if self.size is not None:
+            return f"`cipv models pull {self.name}` ({self.size / 1e6:.1f} MB)"
+        return f"fetch or export its ONNX file, then {self.register}"
+
+    @property
+    def register(self) -> str:
+        """The command that takes a file fetched by hand."""
+        task = "" if self.task == "detector" else f" --task {self.task}"
+        return f"`cipv models register PATH {self.name}{task}`"
+
+
+_YOLOX = "https://github.com/Megvii-BaseDetection/YOLOX/releases/download/0.1.1rc0/"
+KNOWN: tuple[KnownModel, ...] = (
+    KnownModel(
+        "yolox_nano", "detector", _YOLOX + "yolox_nano.onnx", 3_659_407,
+        "c789161ed43c8269fcd4e67c67eeeb4e80c622da2eb296a20bc6007bd18a0b7d",
+        "Apache-2.0", "COCO, 0.9 M parameters: about 10 ms a picture on one core",
+    ),
+    KnownModel(
+        "yolox_tiny", "detector", _YOLOX + "yolox_tiny.onnx", 20_219_662,
+        "427cc366d34e27ff7a03e2899b5e3671425c262ea2291f88bb942bc1cc70b0f7",
+        "Apache-2.0", "COCO, 5 M parameters",
+    ),
+    KnownModel(
+        "yolox_s", "detector", _YOLOX + "yolox_s.onnx", 35_858_002,
+        "c5c2d13e59ae883e6af3b45daea64af4833a4951c92d116ec270d9ddbe998063",
+        "Apache-2.0", "COCO, 9 M parameters: for a graphics card",
+    ),
+    KnownModel(
+        "twinlitenet", "lanes", "https://github.com/harrylal/TwinLiteNet-onnx-opencv-dnn/raw/main/models/best.onnx",
+        1_800_549, "f505b56bd7c9e4e38b2928373aa4daa191a9a398e07e1fb340024b9ce84d4285",
+        "MIT", "BDD100K, lane lines and drivable area",
+    ),
+    KnownModel(
+        "yolop", "lanes", "https://github.com/hustvl/YOLOP", None, None,
+        "MIT", "BDD100K, lane lines, drivable area and cars; its weights/ folder has ONNX files",
+    ),
+    KnownModel(
+        "ufld", "lanes", "https://github.com/cfzd/Ultra-Fast-Lane-Detection", None, None,
+        "MIT", "CULane or TuSimple, up to four lines; export it to ONNX",
+    ),
+    KnownModel(
+        "enet_sad", "lanes", "https://github.com/InhwanBae/ENet-SAD_Pytorch", None, None,
+        "MIT", "BDD100K or CULane, the paper's network; export it to ONNX",
+    ),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ModelEntry:
+    """One row of ``cipv models``. ``path`` is null while it is not here. law: the distance law measured for it, null
+    where it has none and the one for real vehicles is used."""
+
+    name: str
+    task: Task
+    path: Path | None
+    default: bool
+    licence: str | None
+    url: str | None
+    note: str
+    law: DistanceLaw | None = None
+
+
+def store() -> Path:
+    """The folder that keeps networks; it need not exist."""
+    home = os.environ.get("CIPV_HOME")
+    return (Path(home) if home else Path.home() / ".cache" / "cipv") / "models"
+
+
+def list_models() -> tuple[ModelEntry, ...]:
+    """Known networks in their order, the embedded one, then registered ones by name."""
+    defaults = {task: default_model(task) for task in ("detector", "lanes")}
+
+    def entry(name: str, task: Task, licence: str | None, url: str | None, note: str) -> ModelEntry:
+        path = _located(name)
+        law = find_law(path).law if path is not None and task == "detector" else None
+        return ModelEntry(name, task, path, _same(path, defaults[task]), licence, url, note, law)
+
+    known = [entry(each.name, each.task, each.licence, each.url, each.note) for each in KNOWN]
+    own = "part of the program: simulated vehicles only, 0.5 M parameters"
+    names = {each.name for each in KNOWN}
+    registered = [
+        entry(name, row["task"], None, None, "registered")
+        for name, row in sorted(_read_registry()["models"].items())
+        if name not in names
+    ]
+    return (*known, entry(EMBEDDED, "detector", None, None, own), *registered)
+
+
+def find(spec: str) -> Path | None:
+    """The file of a path or a name; null when there is none."""
+    path = given_path(spec, ModelError)
+    if path.is_file():
+        return path
+    return _located(spec) if _is_name(spec) else None
+
+
+def default_model(task: Task) -> Path | None:
+    """The network used when nobody names one; null when none is here."""
+    chosen = _read_registry()["defaults"].get(task)
+    names = [chosen] if chosen else []
+    names += [known.name for known in KNOWN if known.task == task]
+    names += [EMBEDDED] if task == "detector" else []
+    found = (_located(name) for name in names)
+    return next((path for path in found if path is not None), None)
+
+
+def own_file(path: Path) -> Path:
+    """A file that a person wants to register, ``~`` resolved. ModelError when it is not there."""
+    given = given_path(path, ModelError)
+    if not given.is_file():
+        raise ModelError(f"no file at {path}")
+    return given
+
+
+def register(path: Path, name: str, task: Task = "detector", default: bool = True) -> Path:
+    """Copy a file, with the distance law beside it, into the folder under ``name`` and, unless told otherwise, make it
+    its task's default."""
+    if not _is_name(name):
+        raise ModelError(f"{name!r} cannot be a network's name: use letters, digits, '-', '_' and '.'")
+    if name == EMBEDDED:
+        raise ModelError(f"{EMBEDDED!r} is the detector that comes with the program: use another name")
+    path = own_file(path)
+    target = store() / f"{name}.onnx"
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if not _same(path, target):
+            part = target.with_suffix(".part")
+            shutil.copyfile(path, part)
+            part.replace(target)
+            law_file(target).unlink(missing_ok=True)
+            if law_file(path).is_file():
+                shutil.copyfile(law_file(path), law_file(target))
+    except OSError as error:
+        raise ModelError(f"{target} cannot be written: {error.strerror or error}") from None
+    registry = _read_registry()
+    registry["models"][name] = {"task": task, "sha256": file_sha256(target)}
+    if default:
+        registry["defaults"][task] = name
+    _write_registry(registry)
+    return target
+
+
+def known_model(name: str) -> KnownModel:
+    """The official network of this name. ModelError for any other."""
+    known = next((model for model in KNOWN if model.name == name), None)
+    if known is None:
+        raise ModelError(f"no network named {name!r}; known are {', '.join(model.name for model in KNOWN)}")
+    return known
+
+
+def pull(name: str, progress: Progress = silent) -> Path:
+    """Fetch a known network into the folder; size and SHA-256 must be the official ones. A file that is already there
+    and right is kept. ModelError says what went wrong; no part of a failed download stays."""
+    known = known_model(name)
+    if known.size is None or known.sha256 is None:
+        raise ModelError(f"{name} has no file of known checksum: {known.remedy}; the project is {known.url}")
+    target = store() / f"{name}.onnx"
+    if target.is_file() and file_sha256(target) == known.sha256:
+        return target
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ModelError(f"{target.parent} cannot be made: {error.strerror or error}") from None
+    part = target.with_suffix(".part")
+    try:
+        _download(known, known.size, part, progress)
+        part.replace(target)
+    finally:
+        part.unlink(missing_ok=True)
+    return target
+
+
+def _download(known: KnownModel, size: int, part: Path, progress: Progress) -> None:
+    digest, done = hashlib.sha256(), 0
+    try:
+        with urllib.request.urlopen(known.url, timeout=_TIMEOUT_S) as response, part.open("wb") as file:
+            while chunk := response.read(_CHUNK):
+                done += len(chunk)
+                if done > size:
+                    break
+                file.write(chunk)
+                digest.update(chunk)
+                progress(done, size)
+    except urllib.error.HTTPError as error:
+        error.close()
+        raise ModelError(
+            f"{known.url} answered {error.code} {error.reason}; fetch the file by hand and use {known.register}"
+        ) from None
+    except (OSError, ValueError) as error:
+        why = getattr(error, "reason", None) or error
+        raise ModelError(
+            f"{known.name} cannot be fetched ({why}); without a network connection use {known.register}"
+        ) from None
+    if done != size:
+        raise ModelError(f"{known.url} gave {'more than ' if done > size else f'{done} of '}{size} bytes; try again")
+    if digest.hexdigest() != known.sha256:
+        raise ModelError(
+            f"{known.url} is not the official file: its SHA-256 is {digest.hexdigest()}, not {known.sha256}"
+        )
+
+
+def _located(name: str) -> Path | None:
+    if name == EMBEDDED:
+        return _EMBEDDED_FILE
+    candidates = (folder / f"{name}.onnx" for folder in (store(), data_dir() / "models"))
+    return next((path for path in candidates if path.is_file()), None)
+
+
+def _is_name(text: str) -> bool:
+    return bool(text) and not text.startswith(".") and all(c.isalnum() or c in "-_." for c in text)
+
+
+def _same(a: Path | None, b: Path | None) -> bool:
+    return a is not None and b is not None and a.resolve() == b.resolve()
+
+
+def _read_registry() -> dict[str, dict[str, Any]]:
+    path = store() / "registry.json"
+    try:
+        loaded = json.loads(path.read_text(encoding="utf-8"))
+        return {"defaults": dict(loaded["defaults"]), "models": dict(loaded["models"])}
+    except FileNotFoundError:
+        return {"defaults": {}, "models": {}}
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        raise ModelError(f"{path} is damaged; delete it and register your networks again") from None
+
+
+def _write_registry(registry: dict[str, dict[str, Any]]) -> None:
+    path = store() / "registry.json"
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(registry, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    part.replace(path)

@@ -1,0 +1,59 @@
+"""What a start waits for: the libraries that are imported before the first picture, and before a command's help."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+DRAWING = {"fastapi", "uvicorn", "viser", "rerun", "rich.progress", "prometheus_client"}
+RECORDING = {"mcap", "foxglove", "rosbags", "velodyne_decoder", "av", "serial", "can", "pynmea2", "zstandard"}
+LABELS = {"sqlalchemy", "alembic", "psycopg", "trackeval", "scipy.interpolate", "pipeline.labels.formats.registry"}
+LINE = {"numba", "scipy.optimize", "onnxruntime", "onnx", "pyproj"}
+SERVING = LABELS | RECORDING | {"open3d", "dask", "scipy.ndimage", "viser", "rerun", "rich", "app.clips.video"}
+
+
+def run(program: str) -> str:
+    """Standard output of a fresh interpreter."""
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
+def imported(program: str) -> set[str]:
+    """The modules that are there when a program has run."""
+    return set(json.loads(run(f"{program}\nimport json, sys\nprint(json.dumps(sorted(sys.modules)))").splitlines()[-1]))
+
+
+@pytest.mark.parametrize(
+    ("module", "without"),
+    [
+        ("app.web.server", SERVING),
+        ("app.commands.params", LINE | SERVING - {"rich"} | DRAWING - {"rich.progress"} | {"cv2"}),
+        (
+            "app.commands.info",
+            LINE - {"numba"} | LABELS | DRAWING - {"rich.progress"} | {"rosbags", "velodyne_decoder"},
+        ),
+        (
+            "app.commands.labels",
+            LINE - {"numba"} | {"sqlalchemy", "alembic", "trackeval", "scipy.interpolate", "viser"},
+        ),
+    ],
+)
+def test_a_command_imports_what_it_needs(module: str, without: set[str]) -> None:
+    assert without & imported(f"import {module}") == set()
+
+
+def test_the_list_of_commands_needs_none_of_them() -> None:
+    there = imported("from app.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass")
+    assert {"numpy", "pydantic", *LINE, *SERVING, *DRAWING} & there <= {"rich"}
+    assert not [name for name in there if name.startswith("app.commands.")]
+
+
+def test_the_engine_opens_the_recording_before_the_server_is_imported() -> None:
+    engine = "class Engine:\n    class labels:\n        class kept: pass\n    def start(self): raise SystemExit"
+    serving = "from app.commands.serve import serve\ntry: serve(Engine(), port=0)\nexcept SystemExit: pass"
+    assert (SERVING | DRAWING) & imported(f"{engine}\n{serving}") == set()

@@ -1,0 +1,300 @@
+"""The stream over real sockets: several clients at once, one of them slow, one that joins late."""
+
+from __future__ import annotations
+
+import json
+import socket
+import struct
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+from starlette.applications import Starlette
+from starlette.routing import WebSocketRoute
+from websockets.sync.client import ClientConnection, connect
+
+from app.core.line import DetectionCache, Line
+from app.core.server_address import listen_socket
+from app.engine.snapshot import Snapshot
+from app.streaming.picture import MAX_WIDTH_PX
+from app.streaming.stream import FRAMES_UNDER_WAY, Stream
+from app.web.server import Server
+from pipeline.common.geometry import Cuboid
+from pipeline.params import Params
+from pipeline.run import Detectors
+from pipeline.types import Picture
+from tests.app.engine.recording_helpers import CountingDetector, Recording
+
+WAIT_S = 60.0
+FAST_FRAMES = 40
+"""More than the system's buffers between a server and a client that does not read can hold."""
+
+
+@dataclass
+class Site:
+    """A server of nothing but the stream; ``show(n)`` publishes frame n, as an engine's thread does."""
+
+    stream: Stream
+    port: int
+    first: Snapshot
+
+    def show(self, sequence: int, **changes: Any) -> None:
+        self.stream.publish(replace(self.first, sequence=sequence, index=sequence, **changes))
+
+    def connected(self, query: str = "") -> AbstractContextManager[ClientConnection]:
+        """A client with little room for what it has not read yet, and that does not wait long to be let go."""
+        end = socket.socket()
+        end.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 16)
+        end.connect(("127.0.0.1", self.port))
+        url = f"ws://127.0.0.1:{self.port}/{query}"
+        patience = {"open_timeout": WAIT_S, "close_timeout": 0.5}
+        return connect(url, sock=end, max_size=None, compression=None, max_queue=1, **patience)
+
+
+@pytest.fixture
+def site() -> Iterator[Site]:
+    stream = Stream()
+    bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
+    app = Starlette(routes=[WebSocketRoute("/", stream.serve)])
+    server = Server(app, "http://ready", lambda _: is_ready.set())  # type: ignore[arg-type]
+    thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
+    thread.start()
+    assert is_ready.wait(WAIT_S)
+    site = Site(stream, bound.getsockname()[1], _first())
+    site.show(0)
+    yield site
+    server.should_exit = True
+    thread.join()
+
+
+def _first() -> Snapshot:
+    """A frame with a picture wider than any page needs, of noise: its JPEG is large."""
+    recording = Recording()
+    line = Line(recording, Detectors(CountingDetector(), None), DetectionCache(), "both")
+    tick = line.seek(0, Params())
+    assert tick is not None
+    noise = np.random.default_rng(0).integers(0, 255, (900, 2560, 3), np.uint8)
+    tick = replace(tick, frame=replace(tick.frame, picture=Picture(0, noise)))
+    return Snapshot(Params(), uri=recording.uri, count=1, tick=tick)
+
+
+def next_header(client: ClientConnection) -> dict[str, Any]:
+    while True:
+        message = client.recv(WAIT_S)
+        if isinstance(message, bytes):
+            (length,) = struct.unpack_from("<I", message)
+            return json.loads(message[4 : 4 + length])
+
+
+def header_where(client: ClientConnection, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+    while not wanted(header := next_header(client)):
+        pass
+    return header
+
+
+def sequence_of(header: dict[str, Any]) -> int:
+    return int(header["state"]["sequence"])
+
+
+def test_a_client_that_does_not_read_hurts_nobody_and_gets_the_newest_afterwards(site: Site):
+    with site.connected() as slow, site.connected() as fast:
+        assert sequence_of(next_header(fast)) == 0
+        for number in range(1, FAST_FRAMES + 1):
+            site.show(number)
+            assert sequence_of(next_header(fast)) == number, "each one, at once"
+        got = [sequence_of(next_header(slow))]
+        while got[-1] != FAST_FRAMES:
+            got.append(sequence_of(next_header(slow)))
+    assert got == sorted(set(got))
+    assert len(got) < FAST_FRAMES / 2, "what it had no time for was dropped, not kept for it"
+
+
+def test_a_page_that_does_not_paint_is_sent_no_more_than_two_frames(site: Site):
+    with site.connected("?paced=1") as page, site.connected() as other:
+        assert sequence_of(next_header(page)) == sequence_of(next_header(other)) == 0
+        for number in range(1, 8):
+            site.show(number)
+            assert sequence_of(next_header(other)) == number
+        second = sequence_of(next_header(page))
+        assert second < FRAMES_UNDER_WAY, "the next one went out before it was painted, no further one did"
+        page.send(json.dumps({"painted": True}))
+        assert sequence_of(next_header(page)) == 7, "then the newest"
+
+
+def test_one_frame_is_encoded_once_for_all(site: Site, monkeypatch: pytest.MonkeyPatch):
+    made: list[int] = []
+    encode = site.stream._encoder.message
+    monkeypatch.setattr(
+        site.stream._encoder, "message", lambda shown, width: made.append(shown.sequence) or encode(shown, width)
+    )
+    with site.connected() as one, site.connected() as two, site.connected() as three:
+        for client in (one, two, three):
+            next_header(client)
+        for number in range(1, 4):
+            site.show(number)
+            for client in (one, two, three):
+                assert sequence_of(next_header(client)) == number
+    assert [number for number in made if number > 0] == [1, 2, 3]
+
+
+def test_who_joins_late_sees_the_present_frame_and_the_present_state(site: Site):
+    site.show(5)
+    site.show(5, playing=True)
+    with site.connected() as late:
+        assert sequence_of(next_header(late)) == 5
+        state = json.loads(late.recv(WAIT_S))
+    assert state["type"] == "state"
+    assert state["state"]["playing"] is True, "also what came after the frame"
+
+
+def test_the_picture_is_as_wide_as_the_widest_page_shows_it(site: Site):
+    """Also while nothing plays; a page may say so as it comes."""
+
+    def width(header: dict[str, Any]) -> int:
+        return int(header["picture"]["width"])
+
+    with site.connected() as narrow:
+        assert width(next_header(narrow)) == MAX_WIDTH_PX, "until it says what it needs"
+        narrow.send(json.dumps({"picture_px": 500}))
+        _heard(narrow)
+        site.show(1)
+        assert width(next_header(narrow)) == 640
+        with site.connected() as wide:
+            assert width(next_header(wide)) == MAX_WIDTH_PX
+            wide.send(json.dumps({"picture_px": 1700}))
+            assert width(header_where(wide, lambda header: width(header) > MAX_WIDTH_PX)) == 1760
+            site.show(2)
+            assert width(next_header(narrow)) == 1760
+        assert any(width(shown_next(site, narrow, number)) == 640 for number in range(3, 100)), "the wide one has gone"
+    with site.connected("?picture_px=300") as small:
+        assert width(shown_next(site, small, 100)) == 320
+
+
+def test_a_pause_is_heard_while_the_picture_is_made_wider(site: Site, monkeypatch: pytest.MonkeyPatch):
+    """The frame, which says that it plays, comes late; a page must not believe it."""
+    encode, begun, gate = site.stream._encoder.message, threading.Event(), threading.Event()
+
+    def slowly(snapshot: Snapshot, width_px: int) -> bytes | None:
+        begun.set()
+        assert gate.wait(WAIT_S)
+        return encode(snapshot, width_px)
+
+    site.show(1, playing=True)
+    with site.connected() as client:
+        assert next_header(client)["state"]["playing"] is True
+        monkeypatch.setattr(site.stream._encoder, "message", slowly)
+        client.send(json.dumps({"picture_px": 1700}))
+        assert begun.wait(WAIT_S)
+        pausing = threading.Thread(target=lambda: site.show(1, playing=False))
+        pausing.start()
+        gate.set()
+        pausing.join()
+        assert believed(client) is False
+
+
+def believed(client: ClientConnection) -> bool:
+    """Whether a page takes it to play: what came last holds. Asked twice: the first answer may stand before a state
+    that goes out with it."""
+    playing, answers = True, 0
+    client.send(json.dumps({"ping": 1}))
+    while answers < 2:
+        message = client.recv(WAIT_S)
+        if isinstance(message, bytes):
+            (length,) = struct.unpack_from("<I", message)
+            playing = json.loads(message[4 : 4 + length])["state"]["playing"]
+        elif (said := json.loads(message))["type"] == "state":
+            playing = said["state"]["playing"]
+        elif said["type"] == "pong":
+            answers += 1
+            client.send(json.dumps({"ping": 1}))
+    return playing
+
+
+def shown_next(site: Site, client: ClientConnection, sequence: int) -> dict[str, Any]:
+    """Publish a frame, and what the client gets of it."""
+    site.show(sequence)
+    return header_where(client, lambda header: sequence_of(header) == sequence)
+
+
+@pytest.mark.parametrize("said", ["1e9", "-3", "null", '"wide"', "NaN", "[]"])
+def test_a_nonsense_width_changes_nothing(site: Site, said: str):
+    with site.connected() as client:
+        next_header(client)
+        client.send(f'{{"picture_px": {said}}}')
+        _heard(client)
+        site.show(1)
+        width = next_header(client)["picture"]["width"]
+    assert width == MAX_WIDTH_PX
+
+
+@pytest.mark.parametrize("said", ["²", "wide", "9" * 400, ""])
+def test_a_nonsense_width_in_the_address_changes_nothing(site: Site, said: str):
+    with site.connected(f"?picture_px={quote(said)}") as client:
+        assert next_header(client)["picture"]["width"] == MAX_WIDTH_PX
+
+
+def test_what_a_page_looks_at_is_heard_until_it_leaves(site: Site):
+    looks = site.stream._looks
+    with site.connected() as page:
+        page.send(json.dumps({"selected": 7, "hides_3d": True}))
+        _heard(page)
+        assert (looks.selected, looks.hiding) == (7, 1)
+        for nonsense in ('{"selected": "7"}', '{"selected": -1}', '{"selected": 1e400}', '{"hides_3d": 2}'):
+            page.send(nonsense)
+        _heard(page)
+        assert (looks.selected, looks.hiding) == (7, 1)
+        page.send(json.dumps({"selected": None}))
+        _heard(page)
+        assert looks.selected is None
+    with site.connected() as other:
+        next_header(other)
+        for _ in range(100):
+            _heard(other)
+            if looks.hiding == 0:
+                break
+    assert looks.hiding == 0
+
+
+def test_a_label_that_is_held_in_3d_is_followed_by_its_page_alone(site: Site):
+    looks, cuboid = site.stream._looks, {"center": [20, 0, 1], "size": [4, 2, 1.5], "yaw_rad": 0.5}
+    with site.connected() as page, site.connected() as other:
+        page.send(json.dumps({"held": {"track": 7, "frame": 3, "cuboid": cuboid}}))
+        _heard(page)
+        held = looks.held
+        assert held is not None
+        assert (held.track, held.frame, held.cuboid) == (7, 3, Cuboid((20.0, 0.0, 1.0), (4.0, 2.0, 1.5), 0.5))
+        other.send(json.dumps({"held": {"track": 9, "frame": 3, "cuboid": cuboid}}))
+        _heard(other)
+        looks.drag(replace(held, cuboid=held.cuboid._replace(yaw_rad=1.0)), True)
+        said = {"type": "held", "track": 7, "frame": 3, "cuboid": cuboid | {"yaw_rad": 1.0}, "ended": True}
+        assert next(message for message in _texts(page) if message["type"] == "held") == said
+        assert (looks.held and looks.held.track) == 9, "the other's stays where it is"
+        looks.hold(held)
+        other.send(json.dumps({"held": None}))
+        _heard(other)
+        assert looks.held is not None, "another page holds nothing of this one's"
+        for nonsense in ({"track": "7", "cuboid": 3}, {"track": 7, "cuboid": cuboid}, 5):
+            page.send(json.dumps({"held": nonsense}))
+            _heard(page)
+            assert looks.held is None
+            page.send(json.dumps({"held": {"track": 7, "frame": 3, "cuboid": cuboid}}))
+        _heard(page)
+        assert looks.held is not None
+
+
+def _texts(client: ClientConnection) -> Iterator[dict[str, Any]]:
+    while True:
+        if isinstance(message := client.recv(WAIT_S), str):
+            yield json.loads(message)
+
+
+def _heard(client: ClientConnection) -> None:
+    """Wait until the server has read everything that was sent before."""
+    client.send(json.dumps({"ping": 1}))
+    while isinstance(message := client.recv(WAIT_S), bytes) or json.loads(message)["type"] != "pong":
+        pass

@@ -1,0 +1,58 @@
+"""A running engine and a real server, for a while."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from fastapi import FastAPI
+
+from app.core.server_address import listen_socket
+from app.engine.engine import Engine
+from app.engine.session_recording import RecordingDesk
+from app.web.server import Server
+from pipeline.params import Params
+from pipeline.types.source import Source
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
+
+WAIT_S = 60.0
+
+
+@contextmanager
+def running(
+    desk: RecordingDesk | None = None, *, whole_drives: bool = False, source: Source | None = None
+) -> Iterator[Engine]:
+    """An engine on a made-up recording, or another, which shows its first frame."""
+    recording = source if source is not None else Recording()
+    engine = Engine(
+        opener(recording),
+        lambda _: CountingDetector(),
+        Params(),
+        uri=recording.uri,
+        desk=desk,
+        whole_drives=whole_drives,
+    )
+    engine.start()
+    try:
+        engine.wait_for(lambda shown: shown.tick is not None, WAIT_S)
+        yield engine
+    finally:
+        engine.stop()
+
+
+@contextmanager
+def serving(app: FastAPI) -> Iterator[str]:
+    """Its address, as soon as it answers there."""
+    bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
+    address = f"http://127.0.0.1:{bound.getsockname()[1]}"
+    server = Server(app, address, lambda _: is_ready.set())
+    thread = threading.Thread(target=lambda: server.run(sockets=[bound]))
+    thread.start()
+    assert is_ready.wait(WAIT_S)
+    try:
+        yield address
+    finally:
+        server.should_exit = True
+        thread.join()
+        bound.close()

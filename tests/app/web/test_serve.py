@@ -1,0 +1,107 @@
+"""The server as a program: it says where it is, answers there, and ends at once on Ctrl-C."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx
+import pytest
+from websockets.sync.client import connect
+
+from app.core.server_address import listen_socket
+from app.engine.engine import Engine
+from app.web.serve import serve
+from app.web.server import Server
+from pipeline.params import Params
+from tests.app.engine.recording_helpers import Recording, opener
+
+ROOT = Path(__file__).resolve().parents[3]
+PROGRAM = """
+import sys
+from app.engine.engine import Engine
+from app.web.serve import serve
+from pipeline.params import Params
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
+engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car", playing=True)
+serve(engine, port=int(sys.argv[1]), host=sys.argv[2])
+"""
+
+
+@pytest.fixture
+def taken_port() -> Iterator[int]:
+    """A port that somebody else listens on."""
+    with listen_socket("127.0.0.1", 0) as held:
+        held.listen()
+        yield held.getsockname()[1]
+
+
+def test_two_servers_of_one_machine_keep_their_parameters_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    ports: list[int] = []
+    monkeypatch.setattr(Server, "run", lambda _, sockets: ports.append(sockets[0].getsockname()[1]))
+    engine = Engine(opener(Recording()), None, Params())
+    serve(engine, port=0)
+    assert engine.labels.kept.station == f"{socket.gethostname()}:{ports[0]}"
+
+
+def test_it_passes_over_a_taken_port_answers_and_ends_with_open_streams(taken_port: int):
+    program = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(taken_port), "127.0.0.1"],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert program.stdout is not None
+        address = program.stdout.readline().strip()
+        port = int(address.removeprefix("http://127.0.0.1:"))
+        assert taken_port < port <= taken_port + 20
+        assert httpx.get(f"{address}/api/healthz", timeout=60).json()["status"] == "ok"
+        with connect(f"{address.replace('http', 'ws')}/api/stream", max_size=None) as stream:
+            stream.recv(60)
+            program.send_signal(signal.SIGINT)
+            _, errors = program.communicate(timeout=30)
+        assert program.returncode == 0
+        assert errors.strip() == f"cipv: port {taken_port} is taken, using {port}"
+    finally:
+        program.kill()
+        program.wait()
+
+
+def test_for_other_machines_it_shows_links_with_tokens_and_lets_nobody_else_in():
+    token = "chosen-for-the-display-1234"
+    program = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, "0", "0.0.0.0"],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "CIPV_DISPLAY_TOKEN": token},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert program.stdout is not None
+        address, person, display = (program.stdout.readline().strip() for _ in range(3))
+        port = urlsplit(address).port
+        assert "0.0.0.0" not in address
+        assert person.startswith(f"everything:         {address}/?token=")
+        assert display == f"display in the car: {address}/drive/?token={token}"
+        here = f"http://127.0.0.1:{port}"
+        assert httpx.get(f"{here}/api/state", timeout=60).status_code == 401
+        assert httpx.get(f"{here}/healthz", timeout=60).status_code == 200
+        with httpx.Client(base_url=here, timeout=60) as client:
+            assert client.get("/", params={"token": person.partition("token=")[2]}).status_code == 200
+            assert client.get("/api/state").json()["speed"] == 1.0
+        program.send_signal(signal.SIGINT)
+        out, errors = program.communicate(timeout=30)
+        assert out == ""
+        assert "token" not in errors, "it is shown once"
+    finally:
+        program.kill()

@@ -1,0 +1,156 @@
+"""The car slows for its lead, returns to its speed, and never winds up. Manoeuvres are sentences."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.decision.acc import AccState, control, desired_gap_m, pid
+from pipeline.decision.cipv import CipvState, choose
+from pipeline.decision.object_motion import describe
+from pipeline.params import AccParams, CipvParams, MotionParams, PathParams
+from pipeline.path.corridor import corridor
+from pipeline.types import AccCommand, Cipv, EgoState, FusedObject
+from tests.pipeline.build import fused
+
+PARAMS = AccParams(set_speed_kmh=108.0, min_gap_m=5.0, time_gap_s=1.5, ttc_limit_s=2.5, kp=2.0, ki=0.05)
+PATH = corridor(None, PathParams(half_width_m=1.5))
+
+
+def command(speed_mps: float, gap_m: float | None, *others: FusedObject, state: AccState | None = None) -> AccCommand:
+    lead = None if gap_m is None else Cipv(99, gap_m, None, None, "")
+    ego = EgoState(0, speed_mps)
+    objects = choose(CipvState(), describe(others, ego, MotionParams()), PATH, ego, None, CipvParams())[1].objects
+    _, result = control(state or AccState(), ego, lead, objects, PATH, 0.1, PARAMS)
+    assert result is not None
+    return result
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "gap_m", "desired_mps", "state"),
+    [
+        pytest.param(20.0, None, 30.0, "cruise", id="nothing ahead: the set speed, not v_current for ever"),
+        pytest.param(20.0, 60.0, 30.0, "cruise", id="lead beyond the desired gap: the set speed"),
+        pytest.param(20.0, 35.0, 20.0, "follow", id="exactly at the desired gap: hold the speed"),
+        pytest.param(20.0, 20.0, 10.0, "follow", id="half way between the two gaps: half the speed"),
+        pytest.param(20.0, 5.0, 0.0, "stop", id="at d_min: stop"),
+        pytest.param(20.0, 2.0, 0.0, "stop", id="inside d_min: stop, never a negative speed"),
+        pytest.param(0.0, 4.0, 0.0, "stop", id="standing behind a standing lead"),
+        pytest.param(40.0, 64.9, 30.0, "follow", id="faster than the set speed: never above it"),
+    ],
+)
+def test_gap_law(speed_mps: float, gap_m: float | None, desired_mps: float, state: str) -> None:
+    result = command(speed_mps, gap_m)
+    assert result.desired_speed_mps == pytest.approx(desired_mps, abs=0.05)
+    assert result.state == state
+
+
+@given(st.floats(0.0, 50.0), st.none() | st.floats(0.0, 200.0))
+def test_desired_speed_stays_between_standstill_and_set_speed(speed_mps: float, gap_m: float | None) -> None:
+    result = command(speed_mps, gap_m)
+    assert 0.0 <= result.desired_speed_mps <= 30.0
+    assert 0.0 <= result.accelerator <= 1.0
+    assert 0.0 <= result.brake <= 1.0
+    assert result.accelerator == 0.0 or result.brake == 0.0
+
+
+def test_closer_is_never_faster() -> None:
+    speeds = [command(20.0, gap).desired_speed_mps for gap in (2.0, 5.0, 10.0, 20.0, 30.0, 36.0, 80.0)]
+    assert speeds == sorted(speeds)
+
+
+@pytest.mark.parametrize(
+    ("other", "state"),
+    [
+        pytest.param(fused(1, 15.0, 3.0, velocity=(-12.0, -2.0)), "warn", id="a car swerves into our path"),
+        pytest.param(fused(1, 15.0, 0.0, velocity=(-12.0, 0.0), label="person"), "warn", id="an obstacle in our path"),
+        pytest.param(fused(1, 15.0, 3.5, velocity=(-30.0, 0.0)), "cruise", id="oncoming in its own lane passes"),
+        pytest.param(fused(1, 60.0, 0.0, velocity=(-12.0, 0.0)), "cruise", id="far enough"),
+        pytest.param(fused(1, 15.0, 0.0, velocity=(3.0, 0.0)), "cruise", id="pulling away"),
+        pytest.param(fused(1, 15.0, 6.0, velocity=(-12.0, -12.0)), "warn", id="crosses our path before we are there"),
+    ],
+)
+def test_ttc_rule_for_objects_that_are_not_the_lead(other: FusedObject, state: str) -> None:
+    assert command(20.0, None, other).state == state
+
+
+def test_the_smallest_demand_wins_whatever_the_order() -> None:
+    mild = fused(1, 25.0, 0.0, velocity=(-11.0, 0.0))
+    hard = fused(2, 10.0, 0.0, velocity=(-12.0, 0.0))
+    forward, backward = command(20.0, 34.0, mild, hard), command(20.0, 34.0, hard, mild)
+    assert forward == backward
+    assert "#2" in forward.reason
+    assert forward.object_id == 2
+
+
+@pytest.mark.parametrize(("distance_m", "object_id"), [(60.0, None), (20.0, 99), (2.0, 99), (None, None)])
+def test_it_names_the_lead_that_it_slows_down_for(distance_m: float | None, object_id: int | None) -> None:
+    assert command(20.0, distance_m).object_id == object_id
+
+
+def test_no_ego_speed_no_command() -> None:
+    state, result = control(AccState(5.0, 1.0), None, None, (), PATH, 0.1, PARAMS)
+    assert result is None
+    assert state == AccState()
+
+
+def test_integral_removes_a_standing_error_and_does_not_wind_up() -> None:
+    state = AccState()
+    for _ in range(100):
+        state, small = pid(state, 0.5, 0.1, PARAMS)
+    assert small > PARAMS.kp * 0.5 + 0.2  # the integral has added to the proportional part
+    state = AccState()
+    for _ in range(1000):
+        state, full = pid(state, 40.0, 0.1, PARAMS)
+    assert full == PARAMS.max_accel_mps2
+    _, after = pid(state, -1.0, 0.1, PARAMS)
+    assert after < 0.0, "after a long full throttle a small overspeed brakes at once"
+
+
+def test_braking_may_be_left_to_others() -> None:
+    comfortable = AccParams(brake_limit_mps2=3.5)
+    assert pid(AccState(), -20.0, 0.1, comfortable)[1] == -3.5
+    assert pid(AccState(), -20.0, 0.1, AccParams(brake_limit_mps2=0.0))[1] == 0.0
+    assert pid(AccState(), -20.0, 0.1, AccParams())[1] == -8.0
+
+
+def test_the_desired_gap_grows_with_speed() -> None:
+    assert desired_gap_m(0.0, PARAMS) == 5.0
+    assert desired_gap_m(20.0, PARAMS) == 35.0
+
+
+def test_approaching_a_standing_car_from_100_m_at_72_km_h_the_car_stops_before_it() -> None:
+    """Ideal actuators, exact distance, default parameters: the law and its PID alone end in standstill, no contact."""
+    defaults = AccParams()
+    speed, gap, state = 20.0, 100.0, AccState()
+    for _ in range(1200):
+        ego = EgoState(0, speed)
+        state, result = control(state, ego, Cipv(1, gap, speed, None, ""), (), PATH, 0.05, defaults)
+        assert result is not None
+        speed = max(speed + result.accel_mps2 * 0.05, 0.0)
+        gap -= speed * 0.05
+    assert speed == pytest.approx(0.0, abs=0.2)
+    assert gap > 2.0
+
+
+def test_where_nobody_knows_the_way_it_gets_no_faster() -> None:
+    """Whoever may lead on an unknown path: with the set speed far above, the car holds its speed and says why; slowing
+    down for a lead comes first all the same, and from standstill it may creep on."""
+    vague = dataclasses.replace(PATH, usable=False, reach_m=12.0, doubt="path known for 12 m only")
+    for speed_mps, wanted_mps in ((20.0, 20.0), (0.0, 3.0)):
+        _, held = control(AccState(), EgoState(0, speed_mps), None, (), vague, 0.1, PARAMS)
+        assert held is not None
+        assert held.desired_speed_mps == wanted_mps
+        assert held.reason == "path known for 12 m only: no faster than now"
+    eager = AccState(integral_m=50.0, error_mps=0.0)
+    assert control(eager, EgoState(0, 20.0), None, (), PATH, 0.1, PARAMS)[1].accelerator > 0.0  # type: ignore[union-attr]
+    _, held = control(eager, EgoState(0, 20.0), None, (), vague, 0.1, PARAMS)
+    assert held is not None
+    assert held.accelerator == 0.0, "whatever the integral has gathered"
+    _, follows = control(AccState(), EgoState(0, 20.0), Cipv(1, 20.0, None, None, ""), (), vague, 0.1, PARAMS)
+    assert follows is not None
+    assert follows.state == "follow"
+    assert follows.desired_speed_mps == pytest.approx(10.0)

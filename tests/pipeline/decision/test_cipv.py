@@ -1,0 +1,275 @@
+"""Who is the closest in-path vehicle, and the reason for each one that is not."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.decision.cipv import Choice, CipvState, choose
+from pipeline.decision.object_motion import describe
+from pipeline.params import CipvParams, MotionParams, PathParams
+from pipeline.path.corridor import corridor
+from pipeline.types import Cipv, EgoState, FusedObject, Path
+from tests.pipeline.build import fused
+
+PARAMS = CipvParams(confirm_hits=3, hysteresis_m=0.3)
+PATH = corridor(None, PathParams(half_width_m=1.5))
+
+
+def decide(*objects: FusedObject, last: int | None = None) -> tuple[Cipv | None, dict[int, str]]:
+    _, lead, _, rejected = choose(CipvState(last), objects, PATH, None, None, PARAMS)[1]
+    return lead, {row.id: row.reason for row in rejected}
+
+
+def test_the_nearest_in_path_leads_and_every_other_says_why_not() -> None:
+    lead, why_not = decide(fused(1, 40.0), fused(2, 25.0, 0.4), fused(3, 12.0, 3.5), fused(4, 12.0, -3.2))
+    assert lead is not None
+    assert lead.id == 2
+    assert lead.distance_m == pytest.approx(25.0, abs=0.01)
+    assert lead.reason == "car seen by both sensors, nearest of 2 in path, 0.4 m left of its centre"
+    assert why_not == {1: "behind #2", 3: "out of path by 2.0 m", 4: "out of path by 1.7 m"}
+
+
+@pytest.mark.parametrize(
+    ("item", "reason"),
+    [
+        pytest.param(fused(1, 20.0, label="person"), "class person", id="a person is no vehicle"),
+        pytest.param(fused(1, 20.0, label="bicycle"), "class bicycle", id="nor is a bicycle"),
+        pytest.param(fused(1, None, source="V"), "distance not known", id="box without a distance"),
+        pytest.param(fused(1, 20.0, source="V", hits=2), "seen 2 of 3 times", id="camera alone, not confirmed"),
+        pytest.param(fused(1, 20.0, source="L", hits=1), "seen 1 of 3 times", id="LiDAR alone, not confirmed"),
+        pytest.param(fused(1, 20.0, source="L", width=0.3, length=0.2), "only 0.3 m across", id="a post is not a rear"),
+        pytest.param(fused(1, 20.0, source="L", height=0.2), "only 0.2 m high", id="a kerb is not a rear"),
+        pytest.param(fused(1, 20.0, source="L", length=40.0), "40 m long: not a vehicle", id="a wall"),
+        pytest.param(fused(1, 20.0, 3.0), "out of path by 1.5 m", id="next lane"),
+        pytest.param(fused(1, -6.0, 0.0), "beside or behind the bumper", id="behind us"),
+    ],
+)
+def test_why_not(item: FusedObject, reason: str) -> None:
+    lead, why_not = decide(item)
+    assert lead is None
+    assert why_not == {1: reason}
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        pytest.param(fused(1, 20.0, hits=1), id="both sensors: from its first frame"),
+        pytest.param(fused(1, 20.0, source="V", hits=3), id="camera alone, confirmed"),
+        pytest.param(fused(1, 20.0, source="L", hits=3), id="a nameless obstacle as large as a car"),
+        pytest.param(fused(1, 20.0, label="truck"), id="a truck"),
+        pytest.param(fused(1, 20.0, label="motorcycle", width=0.8, length=2.0), id="a motorcycle, however narrow"),
+    ],
+)
+def test_who_may_lead(item: FusedObject) -> None:
+    lead, _ = decide(item)
+    assert lead is not None
+    assert lead.id == 1
+
+
+def test_the_gate_that_stopped_it_carries_number_and_limit() -> None:
+    (item,), lead, _, _ = choose(CipvState(), (fused(1, 20.0, 3.0),), PATH, None, None, PARAMS)[1]
+    assert lead is None
+    failed = {gate.name: (gate.value, gate.limit) for gate in item.gates if not gate.passed}
+    assert failed["path_offset"] == (pytest.approx(3.0), pytest.approx(1.5))
+    assert len(failed) == 1
+
+
+def test_hysteresis_holds_the_lead_at_the_edge_but_takes_in_nobody_new() -> None:
+    at_edge = fused(1, 20.0, 1.7)
+    assert decide(at_edge, last=None)[0] is None
+    held, _ = decide(at_edge, last=1)
+    assert held is not None
+    assert decide(fused(1, 20.0, 1.9), last=1)[0] is None
+
+
+def test_a_carried_object_may_stay_the_lead_but_not_become_it() -> None:
+    unseen = dataclasses.replace(fused(1, 20.0), seen_by="")
+    lead, why_not = decide(unseen)
+    assert lead is None
+    assert why_not == {1: "not seen in this frame"}
+    held, _ = decide(unseen, last=1)
+    assert held is not None
+
+
+def test_a_box_too_near_to_be_measured_does_not_become_the_lead() -> None:
+    """The picture's edge cuts a passing car's box: it is seen, but how far it is now is only predicted."""
+    cut = dataclasses.replace(fused(1, 1.5, source="V"), measured=False)
+    lead, why_not = decide(cut)
+    assert lead is None
+    assert why_not == {1: "its distance was not measured in this frame"}
+
+
+def test_in_path_is_relative_to_a_curved_path() -> None:
+    """On a 200 m left arc the car 40 m ahead stands 4 m to the left; the one straight ahead is in the next lane."""
+    bent = corridor(EgoState(0, 20.0, 0.1), PathParams(half_width_m=1.5))
+    (on_arc, straight), lead, _, _ = choose(
+        CipvState(), (fused(1, 40.0, 4.0), fused(2, 40.0, 0.0)), bent, None, None, PARAMS
+    )[1]
+    assert lead is not None
+    assert lead.id == 1
+    assert on_arc.in_path
+    assert not straight.in_path
+    assert straight.path_offset_m == pytest.approx(-4.0, abs=0.2)
+    assert on_arc.in_path_probability > 0.6 > 0.4 > straight.in_path_probability  # type: ignore[operator]
+
+
+@given(st.lists(st.tuples(st.floats(1, 90), st.floats(-6, 6), st.sampled_from(["V", "L", "VL"]), st.integers(1, 5))))
+def test_everyone_is_either_the_lead_or_has_a_reason(
+    things: list[tuple[float, float, str, int]],
+) -> None:
+    objects = [fused(i + 1, x, y, source=kind, hits=hits) for i, (x, y, kind, hits) in enumerate(things)]  # type: ignore[arg-type]
+    lead, why_not = decide(*objects)
+    assert set(why_not) | ({lead.id} if lead else set()) == {item.id for item in objects}
+    assert len(why_not) + (lead is not None) == len(objects)
+    assert all(why_not.values())
+    if lead is not None:
+        rivals = [o.distance_m for o in objects if why_not.get(o.id, "").startswith("behind #")]
+        assert all(distance >= lead.distance_m for distance in rivals if distance is not None)
+
+
+@pytest.mark.parametrize(
+    ("doubtful", "surer"),
+    [
+        pytest.param(
+            dataclasses.replace(fused(1, 20.0, source="V"), distance_sigma_m=2.0),
+            fused(2, 22.8),
+            id="box and cluster of one car",
+        ),
+        pytest.param(
+            dataclasses.replace(fused(1, 21.5), seen_by="", distance_sigma_m=0.6),
+            fused(2, 22.8),
+            id="lost and found again",
+        ),
+    ],
+)
+def test_a_doubtful_view_yields_to_the_surer_one_it_agrees_with(doubtful: FusedObject, surer: FusedObject) -> None:
+    lead, why_not = decide(doubtful, surer, last=1)
+    assert lead is not None
+    assert lead.id == 2
+    assert why_not == {1: "taken for #2, which is surer"}
+
+
+def test_a_nearer_car_that_only_the_camera_sees_still_leads() -> None:
+    near = dataclasses.replace(fused(1, 20.0, source="V"), distance_sigma_m=2.0)
+    lead, why_not = decide(near, fused(2, 40.0))
+    assert lead is not None
+    assert lead.id == 1
+    assert why_not == {2: "behind #1"}
+
+
+def over_time(frames: list[tuple[FusedObject, ...]], path: Path = PATH, ego: EgoState | None = None) -> list[Choice]:
+    """Each frame's choice, ten a second."""
+    state, choices = CipvState(), []
+    for k, objects in enumerate(frames):
+        objects = describe(objects, ego, MotionParams())
+        state, choice = choose(state, objects, path, ego, 0.1 if k else None, PARAMS)
+        choices.append(choice)
+    return choices
+
+
+def test_a_decoy_whose_place_sways_does_not_take_over() -> None:
+    """A box in the next lane, twice in ten frames measured inside the path."""
+    lead = fused(1, 50.0, source="V")
+    offsets = [3.2, 2.9, 3.3, 1.0, 3.1, 2.8, 1.2, 3.4, 3.0, 3.2]
+    choices = over_time([(lead, dataclasses.replace(fused(2, 40.0, y, source="V"))) for y in offsets])
+    assert {choice.lead.id for choice in choices if choice.lead} == {1}
+
+
+def test_one_that_moves_over_is_told_before_and_leads_when_it_is_in() -> None:
+    """A car 25 m ahead comes over from 3.5 m aside at 1.2 m/s; its wheel is on the edge when its middle is at 2.4 m."""
+    frames = []
+    for k in range(40):
+        y = max(3.5 - 0.12 * k, 0.0)
+        frames.append((fused(1, 50.0), fused(2, 25.0, y, velocity=(-1.0, -1.2 if y else 0.0))))
+    choices = over_time(frames, ego=EgoState(0, 20.0, 0.0))
+    on_the_edge = next(k for k in range(40) if 3.5 - 0.12 * k <= 2.4)
+    told = next(k for k, choice in enumerate(choices) if choice.next_lead and choice.next_lead.id == 2)
+    leads = next(k for k, choice in enumerate(choices) if choice.lead and choice.lead.id == 2)
+    assert told < on_the_edge < leads < on_the_edge + 12
+    assert choices[told].next_lead.reason.startswith("cuts in: over the edge of the path in ")  # type: ignore[union-attr]
+    assert all(2 in ids(choice) for choice in choices[told:]), "from then on it is one of the two"
+    assert choices[-1].next_lead is not None
+    assert choices[-1].next_lead.reason == "next behind #2"
+
+
+def test_a_lead_that_leaves_names_the_one_behind_it() -> None:
+    leaving = fused(1, 20.0, 0.8, velocity=(0.0, 1.5))
+    (choice,) = over_time([(leaving, fused(2, 50.0))], ego=EgoState(0, 20.0, 0.0))
+    assert choice.lead is not None
+    assert choice.next_lead is not None
+    assert (choice.lead.id, choice.next_lead.id) == (1, 2)
+    assert choice.next_lead.reason == "#1 leaves the path in 0.7 s"
+
+
+def test_nobody_beside_is_next() -> None:
+    (choice,) = over_time([(fused(2, 25.0, 3.5, velocity=(-1.0, 0.0)), fused(3, 15.0, 2.6, label="person"))])
+    assert choice.lead is None
+    assert choice.next_lead is None
+
+
+def test_where_the_path_is_not_known_nobody_new_leads() -> None:
+    vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 5.0))
+    (item,), lead, _, (why,) = choose(CipvState(), (fused(1, 40.0),), vague, None, None, PARAMS)[1]
+    assert lead is None
+    assert why.reason == "its place against the path is uncertain by 5.0 m"
+    assert item.in_path
+    assert item.in_path_probability == pytest.approx(0.51, abs=0.01)
+    assert choose(CipvState(1), (fused(1, 40.0),), vague, None, None, PARAMS)[1].lead is not None, "who led may stay"
+    unusable = dataclasses.replace(PATH, usable=False, profile_m=np.full(len(PATH.center), 1.5))
+    assert choose(CipvState(), (fused(1, 40.0),), unusable, None, None, PARAMS)[1].lead is None
+
+
+def ids(choice: Choice) -> set[int]:
+    return {lead.id for lead in (choice.lead, choice.next_lead) if lead is not None}
+
+
+def sightings(*places: FusedObject) -> list[Choice]:
+    """What is chosen while one object is seen here and there, every 0.1 s, from a car at 20 m/s."""
+    state, ego, found = CipvState(), EgoState(0, 20.0, 0.0), []
+    for item in places:
+        seen = describe([item], ego, MotionParams())
+        state, choice = choose(state, tuple(seen), PATH, ego, 0.1, PARAMS)
+        found.append(choice)
+    return found
+
+
+@given(st.lists(st.floats(-4.0, 4.0), min_size=1, max_size=8))
+def test_the_gates_value_and_limit_say_what_it_decides(asides: list[float]) -> None:
+    """Wherever it was seen before: over the limit is out, and the odds say the same."""
+    for choice in sightings(*[fused(1, 20.0, y) for y in asides]):
+        gates = {gate.name: gate for gate in choice.objects[0].gates}
+        offset = gates["path_offset"]
+        assert offset.value is not None
+        assert offset.passed == choice.objects[0].in_path
+        assert offset.value <= offset.limit + 1e-9 if offset.passed else offset.value >= offset.limit - 1e-9
+
+
+def test_what_falls_behind_the_bumper_fails_for_that_alone() -> None:
+    """Its offset is one that may lead, and says so."""
+    (item,) = sightings(*[fused(1, 6.0, 0.2)] * 6, fused(1, -6.0, 0.2))[-1].objects
+    assert not item.in_path
+    assert [gate.name for gate in item.gates if not gate.passed] == ["ahead"]
+
+
+def test_what_crosses_fast_is_judged_where_it_is_now() -> None:
+    """A car crosses from the right at 6 m/s: it leads from the first frame on in which 0.9 m of it, its nose included,
+    are inside, and not in the first in which they are not. One that is there at a bound is believed after a while."""
+    crossing = [fused(1, 20.0, -4.1 + 0.6 * k, velocity=(-10.0, 6.0)) for k in range(14)]
+    inside = [choice.lead is not None for choice in sightings(*crossing)]
+    assert inside == [-2.4 < -4.1 + 0.6 * k < 1.5 for k in range(14)]
+    swaying = [fused(1, 20.0, -3.0), fused(1, 20.0, -3.0), fused(1, 20.0, 0.0)]
+    assert sightings(*swaying)[-1].lead is None
+
+
+def test_the_lidar_has_just_lost_what_the_camera_sees() -> None:
+    """It may become the lead while its tracked distance is known well, and not when it has drifted."""
+    lost = dataclasses.replace(fused(1, 20.0), seen_by="V", measured=False)
+    assert decide(dataclasses.replace(lost, distance_sigma_m=0.2))[0] is not None
+    lead, why_not = decide(dataclasses.replace(lost, distance_sigma_m=0.8))
+    assert lead is None
+    assert why_not == {1: "its distance was not measured in this frame"}

@@ -1,0 +1,60 @@
+"""Signs, in words."""
+
+from __future__ import annotations
+
+import pytest
+
+from pipeline.decision.object_motion import closing_speed_mps, describe
+from pipeline.params import MotionParams
+from pipeline.types import EgoState
+from tests.pipeline.build import fused
+
+PARAMS = MotionParams()
+
+
+@pytest.mark.parametrize(
+    ("relative", "closing", "ttc"),
+    [
+        pytest.param((-5.0, 0.0), 5.0, 4.0, id="lead slower: positive closing speed, finite TTC"),
+        pytest.param((5.0, 0.0), -5.0, None, id="lead pulls away: negative closing speed, no TTC"),
+        pytest.param((0.0, 0.0), 0.0, None, id="same speed: no TTC"),
+        pytest.param((0.0, 3.0), 0.0, None, id="moving across only"),
+        pytest.param((-0.05, 0.0), 0.05, None, id="too slow to be measured: no TTC of minutes"),
+        pytest.param(None, None, None, id="velocity not known: nothing made up"),
+    ],
+)
+def test_closing(relative: tuple[float, float] | None, closing: float | None, ttc: float | None) -> None:
+    (item,) = describe([fused(1, 20.0, velocity=relative)], None, PARAMS)
+    assert closing_speed_mps(item) == (pytest.approx(closing) if closing is not None else None)
+    assert item.ttc_s == (pytest.approx(ttc) if ttc is not None else None)
+
+
+@pytest.mark.parametrize(
+    ("ego", "relative", "speed", "moving"),
+    [
+        pytest.param(EgoState(0, 20.0), (-20.0, 0.0), 0.0, False, id="parked car"),
+        pytest.param(EgoState(0, 20.0), (0.0, 0.0), 20.0, True, id="lead at our speed"),
+        pytest.param(EgoState(0, 20.0), (-35.0, 0.0), 15.0, True, id="oncoming"),
+        pytest.param(EgoState(0, 10.0, 0.1), (-10.0, -2.0), 0.0, False, id="parked car while we turn left"),
+        pytest.param(None, (0.0, 0.0), None, None, id="ego speed not known"),
+    ],
+)
+def test_over_ground(
+    ego: EgoState | None, relative: tuple[float, float], speed: float | None, moving: bool | None
+) -> None:
+    (item,) = describe([fused(1, 20.0, velocity=relative)], ego, PARAMS)
+    assert item.speed_over_ground_mps == (pytest.approx(speed, abs=1e-9) if speed is not None else None)
+    assert item.moving is moving
+
+
+def test_a_parked_car_aside_stands_still_while_we_turn() -> None:
+    """In a frame that turns by 0.1 rad/s what stands at (20, 8) seems to go 0.8 m/s ahead and 2 m/s to the right."""
+    (item,) = describe([fused(1, 20.0, 8.0, velocity=(-10.0 + 0.8, -2.0))], EgoState(0, 10.0, 0.1), PARAMS)
+    assert item.closest_point is not None
+    assert item.closest_point[:2] == (20.0, 8.0)
+    assert item.speed_over_ground_mps == pytest.approx(0.0, abs=1e-9)
+
+
+def test_an_object_without_a_place_has_no_ttc() -> None:
+    (item,) = describe([fused(1, None, source="V")], EgoState(0, 20.0), PARAMS)
+    assert (item.ttc_s, item.speed_over_ground_mps, item.moving) == (None, None, None)

@@ -1,0 +1,186 @@
+"""How far an object reaches into the path, how surely, and when it crosses its edge."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.common.geometry import Cuboid
+from pipeline.decision import path_position
+from pipeline.decision.object_motion import describe
+from pipeline.decision.path_position import Place, place
+from pipeline.params import CipvParams, MotionParams, PathParams
+from pipeline.path.corridor import corridor
+from pipeline.path.estimates import arc, samples
+from pipeline.types import EgoState, FusedObject, Path
+from tests.pipeline.build import fused
+
+STRAIGHT = corridor(None, PathParams(half_width_m=1.5))
+EGO = EgoState(0, 20.0, 0.0)
+
+
+def placed(item: FusedObject, path: Path = STRAIGHT, ego: EgoState | None = EGO) -> tuple[Place, float | None]:
+    (found,) = place(describe([item], ego, MotionParams()), path, ego, CipvParams())
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    ("width", "limit_m"),
+    [
+        pytest.param(1.8, 1.5, id="a car: the middle of its rear between the edges"),
+        pytest.param(0.8, 1.5, id="a motorcycle: half of it"),
+        pytest.param(2.5, 1.85, id="a truck leaves no room earlier"),
+    ],
+)
+def test_how_far_aside_it_is_still_in_the_path(width: float, limit_m: float) -> None:
+    for side in (1.0, -1.0):
+        inside, outside = (placed(fused(1, 20.0, side * (limit_m + step), width=width))[0] for step in (-0.05, 0.05))
+        assert inside.margin_m() == pytest.approx(0.05, abs=0.01)
+        assert outside.margin_m() == pytest.approx(-0.05, abs=0.01)
+        assert inside.log_odds(0.0, 0.0) > 0.0 > outside.log_odds(0.0, 0.0)
+
+
+def test_lines_need_not_be_parallel_to_the_centre() -> None:
+    """A lane that widens to the left: what is out of it at 20 m is in it at 60 m."""
+    center = STRAIGHT.center
+    left = center + np.column_stack([np.zeros(len(center)), 1.5 + 0.03 * center[:, 0]])
+    path = dataclasses.replace(STRAIGHT, left=left)
+    assert placed(fused(1, 20.0, 2.8), path)[0].margin_m() < 0.0
+    assert placed(fused(1, 60.0, 2.8), path)[0].margin_m() > 0.0
+
+
+def test_a_finer_path_is_looked_up_by_path_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A point every half metre: the edges at 20 m are those of its fortieth."""
+    monkeypatch.setattr(path_position, "STEP_M", 0.5)
+    center, _ = arc(0.0, samples(100.0) / 2)
+    aside = np.column_stack([np.zeros(len(center)), 1.5 + 0.03 * center[:, 0]])
+    left, right = center + aside, center - aside
+    fine = dataclasses.replace(STRAIGHT, center=center, left=left, right=right, profile_m=np.zeros(0))
+    found, _ = placed(fused(1, 20.0, 0.0), fine)
+    assert found.ahead_m == pytest.approx(20.0, abs=3.0)
+    assert found.left_m == pytest.approx(1.5 + 0.03 * found.ahead_m, abs=0.02)
+
+
+def test_what_stands_across_the_path_is_in_it_while_any_of_it_reaches_in() -> None:
+    """A car turns out of the path: its front is 2.5 m aside, its tail still in the middle."""
+    turned = Cuboid((20.0, 1.2, 0.2), (4.5, 1.8, 1.5), 0.75)
+    corners = tuple((float(x), float(y)) for x, y in turned.footprint())
+    item = dataclasses.replace(fused(1, 20.0, 1.2), cuboid=turned, bev=corners)
+    across, _ = placed(item)
+    assert across.low_m < 0.0 < 2.5 < across.high_m
+    assert across.margin_m() > 0.0
+
+
+def test_a_wrong_distance_matters_where_the_path_turns_away_from_the_line_of_sight() -> None:
+    """60 m ahead on an arc of 125 m radius the path leads 0.24 rad away from the line of sight."""
+    seen = dataclasses.replace(fused(1, 60.0, 0.0, source="V"), distance_sigma_m=6.0)
+    center, _ = arc(1 / 125.0, samples(100.0))
+    x, y = center[60]
+    there = dataclasses.replace(fused(1, float(x), float(y), source="V"), distance_sigma_m=6.0)
+    bent = Path("gnss", center, center, center, 1.5, {}, {})
+    assert placed(seen)[0].sigma_m < 5.0
+    straight_on = dataclasses.replace(STRAIGHT, profile_m=np.zeros(0))
+    assert placed(seen, straight_on)[0].sigma_m == pytest.approx(0.3, abs=0.01)
+    assert placed(there, bent)[0].sigma_m == pytest.approx(6.0 * math.sin(0.24), rel=0.1)
+
+
+def test_a_path_known_less_says_less() -> None:
+    sure = dataclasses.replace(STRAIGHT, profile_m=np.full(101, 0.05))
+    vague = dataclasses.replace(STRAIGHT, profile_m=np.full(101, 3.0))
+    assert placed(fused(1, 30.0), sure)[0].log_odds(0.0, 0.0) == 4.0
+    assert 0.0 < placed(fused(1, 30.0), vague)[0].log_odds(0.0, 0.0) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("item", "seconds"),
+    [
+        pytest.param(
+            fused(1, 30.0, 4.4, velocity=(-5.0, -1.5)), 1.7, id="its nose 1.7 m from the line at 1 m/s believed"
+        ),
+        pytest.param(fused(1, 30.0, -4.4, velocity=(-5.0, 1.5)), 1.7, id="from the right"),
+        pytest.param(fused(1, 30.0, 2.0, velocity=(-5.0, -1.5)), 0.0, id="its side is over the line"),
+        pytest.param(fused(1, 30.0, 4.4, velocity=(-5.0, -0.4)), None, id="noise"),
+        pytest.param(fused(1, 30.0, 4.4, velocity=(-5.0, 1.5)), None, id="moves away"),
+        pytest.param(fused(1, 30.0, 4.4, velocity=(-20.0, -1.4)), None, id="a post does not cut in"),
+        pytest.param(fused(1, 30.0, 0.5, velocity=(-5.0, 1.5)), 1.0, id="cuts out"),
+        pytest.param(fused(1, 30.0, 0.5, velocity=(-5.0, -1.5)), None, id="comes to the middle"),
+        pytest.param(fused(1, 30.0, 0.5, velocity=None), None, id="velocity not known"),
+    ],
+)
+def test_time_to_the_crossing(item: FusedObject, seconds: float | None) -> None:
+    _, crossing_s = placed(item)
+    assert crossing_s == (pytest.approx(seconds, abs=0.05) if seconds is not None else None)
+
+
+def test_a_car_that_follows_the_bend_does_not_move_sideways() -> None:
+    """20 m/s on a 200 m radius, the lead 40 m ahead on the same arc at the same speed: seen from the turning car it
+    stands still; over ground and against the path it goes straight along it."""
+    ego = EgoState(0, 20.0, 0.1)
+    bent = corridor(ego, PathParams(half_width_m=1.5))
+    x, y = bent.center[40]
+    there, crossing_s = placed(fused(1, float(x), float(y), velocity=(0.0, 0.0)), bent, ego)
+    assert there.sideways_mps == pytest.approx(0.0, abs=0.1)
+    assert crossing_s is None
+
+
+def test_what_has_no_place_has_none() -> None:
+    assert place((fused(1, None, source="V"),), STRAIGHT, EGO, CipvParams()) == [None]
+    assert place((), STRAIGHT, EGO, CipvParams()) == []
+
+
+@pytest.mark.parametrize("y", [-6.0, -2.4, -1.0, 0.0, 1.7, 3.5])
+def test_a_thin_slice_of_a_rear_is_placed_by_its_long_side(y: float) -> None:
+    """A LiDAR that sees a rear alone gives a box of 0.1 m by 1.7 m, whose two nearest corners are those of a short
+    side."""
+    there, _ = placed(fused(1, 19.0, y, length=0.1, width=1.7))
+    assert (there.offset_m, there.middle_m) == (pytest.approx(y, abs=0.02), pytest.approx(y, abs=0.02))
+    assert there.high_m - there.low_m == pytest.approx(1.7, abs=0.01)
+
+
+@pytest.mark.parametrize("x", [4.0, 8.0, 30.0])
+@pytest.mark.parametrize("y", [-3.5, 0.0, 3.5])
+def test_a_whole_car_is_placed_by_its_rear(x: float, y: float) -> None:
+    there, _ = placed(fused(1, x, y, length=4.5))
+    assert there.middle_m == pytest.approx(y, abs=0.02)
+
+
+def crossing_car(x: float, from_m: float, to_m: float) -> FusedObject:
+    """One that stands square across, of whose flank the LiDAR sees only the first metre and a half."""
+    item = fused(1, x, from_m + 0.75, length=0.1, width=1.5)
+    return dataclasses.replace(item, box_sides=((x, to_m), (x, from_m)))
+
+
+def test_of_one_that_stands_across_the_box_says_how_far_it_reaches() -> None:
+    alone, _ = placed(dataclasses.replace(crossing_car(30.0, -4.4, 0.1), box_sides=None))
+    both, _ = placed(crossing_car(30.0, -4.4, 0.1))
+    assert alone.margin_m() < 0.0 < both.margin_m()
+    assert (both.low_m, both.high_m) == (pytest.approx(-4.4, abs=0.02), pytest.approx(0.1, abs=0.02))
+
+
+@pytest.mark.parametrize("edge", [(math.nan, math.nan), (30.0, math.nan), (math.inf, -4.0)])
+def test_a_box_of_which_one_edge_is_nowhere_says_nothing(edge: tuple[float, float]) -> None:
+    item = crossing_car(30.0, -4.4, 0.1)
+    alone = placed(dataclasses.replace(item, box_sides=None))
+    assert placed(dataclasses.replace(item, box_sides=(edge, (30.0, -8.0)))) == alone
+    assert placed(dataclasses.replace(item, box_sides=((30.0, -8.0), edge))) == alone
+
+
+def test_the_flank_of_a_car_in_the_next_lane_does_not_widen_it() -> None:
+    """Its box covers rear and flank: from 4.4 m aside at its rear to 2.6 m at its front, which is farther away."""
+    item = fused(1, 15.0, 3.5, length=4.5)
+    beside = dataclasses.replace(item, box_sides=((15.0, 4.4), (15.0, 2.0)))
+    assert placed(beside)[0].middle_m == pytest.approx(3.5, abs=0.02)
+
+
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_the_nose_of_one_that_moves_over_is_farther_that_way(way: float) -> None:
+    """2 m/s sideways at 15 m/s, of which 1.5 are believed: 0.45 m over a car's length."""
+    steady, _ = placed(fused(1, 20.0, 3.0, velocity=(-5.0, 0.0)))
+    moving, _ = placed(fused(1, 20.0, 3.0, velocity=(-5.0, 2.0 * way)))
+    gained = moving.high_m - steady.high_m if way > 0.0 else steady.low_m - moving.low_m
+    assert gained == pytest.approx(0.45, abs=0.02)
+    assert moving.high_m - moving.low_m == pytest.approx(steady.high_m - steady.low_m + 0.45, abs=0.02)

@@ -1,0 +1,30 @@
+"""A drive kept by an experiment, opened again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from pipeline.evaluation.report_sections import Replay
+from pipeline.run import Detectors, run
+from pipeline.simulation.drive_as_scenario import to_yaml
+from pipeline.sources import open_source
+from pipeline.types import Result
+
+SeeAgain = Callable[[Replay, int], list[Result]]
+
+
+@pytest.fixture
+def see_again(tmp_path: Path) -> SeeAgain:
+    """What the line believes in the first frames of a kept drive whose detections are given, opened as a file."""
+
+    def believed(replay: Replay, frames: int) -> list[Result]:
+        file = tmp_path / f"{replay.name}.yaml"
+        file.write_text(to_yaml(replay.as_seen()), encoding="utf-8")
+        drive = run(open_source(f"sim:{file}"), replay.params, Detectors())
+        return [result for _, result in islice(drive, frames)]
+
+    return believed

@@ -1,0 +1,218 @@
+"""Fusion loses nothing and doubles nothing, joins what belongs together, and keeps its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.alignment.projection import Alignment, Angular, project_cuboid
+from pipeline.common.fast_replace import evolve
+from pipeline.fusion.fuse import Fusion, FusionState, fuse
+from pipeline.fusion.vehicle_sizes import LONGEST_M
+from pipeline.params import FusionParams, preset
+from pipeline.types import Box, LidarTrack, VisionTrack
+from tests.pipeline.build import lidar_track, vision_track
+
+ALIGNMENT: Alignment = Angular(np.radians(0.06), np.radians(0.06), 640.0, 360.0)
+SIZE = (1280, 720)
+OPTIMAL, GREEDY = FusionParams(), preset("paper").fusion
+
+
+def box_of(track: LidarTrack) -> Box:
+    box = project_cuboid(ALIGNMENT, track.obstacle.cuboid.corners(), *SIZE)
+    assert box is not None
+    return box
+
+
+def joined(
+    lidar: list[LidarTrack], vision: list[VisionTrack], params: FusionParams = OPTIMAL, state: FusionState | None = None
+) -> tuple[FusionState, Fusion]:
+    return fuse(state or FusionState(), tuple(lidar), tuple(vision), ALIGNMENT, SIZE, params)
+
+
+boxes = st.tuples(st.floats(0, 1200), st.floats(0, 650), st.floats(0, 300), st.floats(0, 300)).map(
+    lambda b: (b[0], b[1], min(b[0] + b[2], 1280.0), min(b[1] + b[3], 720.0))
+)
+places = st.tuples(st.floats(-10, 60), st.floats(-15, 15))
+
+
+@pytest.mark.parametrize("params", [OPTIMAL, GREEDY], ids=["optimal", "greedy"])
+@given(seen=st.lists(st.tuples(boxes, st.none() | st.floats(3, 100)), max_size=8), hit=st.lists(places, max_size=8))
+def test_every_track_lands_in_exactly_one_row(
+    params: FusionParams, seen: list[tuple[Box, float | None]], hit: list[tuple[float, float]]
+) -> None:
+    vision = [vision_track(i + 1, box, distance) for i, (box, distance) in enumerate(seen)]
+    # the first box is made to fit the first cuboid, so that pairs do happen
+    lidar = [lidar_track(j + 1, x, y) for j, (x, y) in enumerate(hit)]
+    if vision and lidar and project_cuboid(ALIGNMENT, lidar[0].obstacle.cuboid.corners(), *SIZE):
+        vision[0] = vision_track(1, box_of(lidar[0]), None)
+    _, result = joined(lidar, vision, params)
+    kinds = [item.source for item in result.objects]
+    assert kinds.count("V") + kinds.count("VL") == len(vision)
+    assert kinds.count("L") + kinds.count("VL") == len(lidar)
+    assert sorted(o.vision_track for o in result.objects if o.vision_track) == [v.id for v in vision]
+    assert sorted(o.lidar_track for o in result.objects if o.lidar_track) == [t.id for t in lidar]
+    assert len({item.id for item in result.objects}) == len(result.objects)
+
+
+def test_where_the_sight_lines_past_a_box_end() -> None:
+    """At the LiDAR's distance where it has one, at the camera's else; nowhere for what the camera does not see now."""
+    near, far = lidar_track(1, 20.0), vision_track(2, (300.0, 330.0, 400.0, 390.0), 40.0)
+    lost = evolve(vision_track(3, (900.0, 330.0, 950.0, 390.0), 30.0), carried=True)
+    u1, v1, u2, v2 = box_of(near)
+    _, result = joined([near], [vision_track(1, (u1, v1, u2, v2), 26.0), far, lost])
+    both, alone, carried = (next(o for o in result.objects if o.vision_track == k) for k in (1, 2, 3))
+    for item, box, range_m in ((both, (u1, u2), 20.0), (alone, (300.0, 400.0), 40.0)):
+        assert item.box_sides is not None
+        for place, u in zip(item.box_sides, box, strict=True):
+            assert np.hypot(*place) == pytest.approx(range_m)
+            assert np.arctan2(-place[1], place[0]) == pytest.approx(np.radians(0.06) * (u - 640.0))
+    assert carried.box_sides is None
+
+
+def test_one_car_seen_by_both_is_one_row_with_the_lidars_place_and_the_cameras_name() -> None:
+    track = lidar_track(1, 20.0, 1.0, velocity=(-2.0, 0.0))
+    _, result = joined([track], [vision_track(1, box_of(track), 21.0)])
+    (item,) = result.objects
+    assert (item.source, item.label, item.distance_m) == ("VL", "car", pytest.approx(np.hypot(20.0, 1.0)))
+    assert item.lidar_hits == track.hits
+    assert item.velocity_mps == (-2.0, 0.0)
+    assert item.bbox == result.lidar_boxes[item.id]
+    assert result.vision_boxes[item.id] == box_of(track)
+
+
+def test_a_far_cluster_of_one_ring_still_meets_its_cars_box() -> None:
+    """At 40 m rings lie 1.4 m apart: one ring on a car is a line, and only the gap beyond it makes it a box."""
+    line = lidar_track(1, 40.0, height=0.1)
+    whole = vision_track(1, box_of(lidar_track(2, 40.0, height=1.5)), 40.0)
+    _, result = joined([line], [whole])
+    assert [item.source for item in result.objects] == ["VL"]
+    _, without = joined([line], [whole], FusionParams(ring_gap_deg=0.0))
+    assert sorted(item.source for item in without.objects) == ["L", "V"]
+
+
+def test_boxes_apart_stay_two_objects() -> None:
+    track = lidar_track(1, 20.0, 6.0)
+    _, result = joined([track], [vision_track(1, (900.0, 300.0, 1000.0, 400.0), 20.0)])
+    assert sorted(item.source for item in result.objects) == ["L", "V"]
+
+
+def test_a_far_car_over_the_roof_of_a_near_one_is_not_joined_with_it() -> None:
+    """Their boxes overlap in the picture, their ranges do not; the L row says which test kept them apart."""
+    near = lidar_track(1, 15.0)
+    x1, y1, x2, y2 = box_of(near)
+    far = vision_track(1, (x1 + 20, y1 - 10, x2 - 25, (y1 + y2) / 2), 50.0, sigma_m=3.0)
+    _, result = joined([near], [far])
+    assert [item.source for item in result.objects] == ["L", "V"]
+    gate = next(g for g in result.objects[0].gates if g.name == "range_sigmas")
+    assert (gate.passed, gate.limit) == (False, OPTIMAL.range_gate_sigmas)
+    _, paper = joined([near], [far], GREEDY)
+    assert [item.source for item in paper.objects] == ["VL"]
+
+
+def test_boxes_of_one_place_and_size_are_one_object_though_the_height_law_errs() -> None:
+    """A van taken for a car seems nearer than it is: the LiDAR knows better."""
+    van = lidar_track(1, 30.0, height=2.3)
+    _, result = joined([van], [vision_track(1, box_of(van), 19.0, sigma_m=1.5)])
+    assert [item.source for item in result.objects] == ["VL"]
+    assert result.objects[0].distance_m == pytest.approx(30.0)
+
+
+HEDGE_M, LORRY_M = 35.0, 16.5
+
+
+@pytest.mark.parametrize(
+    ("label", "length_m", "params", "sources"),
+    [
+        ("car", 4.5, OPTIMAL, ["VL"]),
+        ("car", HEDGE_M, OPTIMAL, ["L", "V"]),
+        ("car", LORRY_M, OPTIMAL, ["L", "V"]),
+        ("truck", LORRY_M, OPTIMAL, ["VL"]),
+        ("truck", HEDGE_M, OPTIMAL, ["L", "V"]),
+        ("person", 4.5, OPTIMAL, ["L", "V"]),
+        ("stop sign", HEDGE_M, OPTIMAL, ["VL"]),
+        ("car", HEDGE_M, FusionParams(size_gate=False), ["VL"]),
+        ("car", HEDGE_M, GREEDY, ["VL"]),
+    ],
+)
+def test_what_is_longer_than_any_of_its_class_is_not_joined(
+    label: str, length_m: float, params: FusionParams, sources: list[str]
+) -> None:
+    """A hedge beside the road fills the box of the car before it; the row of either says how long it is."""
+    track = lidar_track(1, 12.0, 3.0, length=length_m)
+    _, result = joined([track], [vision_track(1, box_of(track), None, label=label)], params)
+    assert sorted(item.source for item in result.objects) == sources
+    if sources != ["VL"]:
+        for item in result.objects:
+            gate = next(gate for gate in item.gates if gate.name == "class_size")
+            assert (gate.passed, gate.value, gate.limit) == (False, length_m, LONGEST_M[label])
+
+
+def test_optimal_assignment_beats_first_come_first_served() -> None:
+    """Two cars side by side, one box between: greedily it takes the better half and leaves the other car's alone."""
+    left, right = lidar_track(1, 20.0, 1.1), lidar_track(2, 20.0, -1.1)
+    a, b = box_of(left), box_of(right)
+    shift = (b[0] - a[0]) * 0.45
+    between = vision_track(1, (a[0] + shift, a[1], a[2] + shift, a[3]))
+    on_left = vision_track(2, (a[0] - 5, a[1], a[2] - 5, a[3]))
+    _, greedy = joined([left, right], [between, on_left], GREEDY)
+    _, optimal = joined([left, right], [between, on_left], FusionParams(min_iou=0.05))
+    assert sorted(item.source for item in greedy.objects) == ["L", "V", "VL"]
+    assert sorted(item.source for item in optimal.objects) == ["VL", "VL"]
+
+
+def test_without_a_picture_every_track_keeps_its_row() -> None:
+    _, result = fuse(FusionState(), (lidar_track(1, 20.0),), (vision_track(1, (0, 0, 9, 9)),), ALIGNMENT, None, OPTIMAL)
+    assert sorted(item.source for item in result.objects) == ["L", "V"]
+
+
+def test_a_vision_object_without_distance_keeps_its_row_last() -> None:
+    _, result = joined([lidar_track(1, 50.0, -9.0)], [vision_track(1, (0, 0, 9, 9), None)])
+    assert [item.source for item in result.objects] == ["L", "V"]
+    assert result.objects[1].distance_m is None
+    assert result.objects[1].bev is None
+
+
+def test_an_object_keeps_its_number_from_v_to_vl_to_l() -> None:
+    track = lidar_track(7, 20.0)
+    seen = vision_track(4, box_of(track), 20.5)
+    state, first = joined([], [seen])
+    state, second = joined([track], [seen], state=state)
+    state, third = joined([track], [], state=state)
+    assert [f.objects[0].source for f in (first, second, third)] == ["V", "VL", "L"]
+    assert len({f.objects[0].id for f in (first, second, third)}) == 1
+
+
+def test_a_fragment_does_not_take_the_number_of_the_whole() -> None:
+    """The box that the car had is a fragment now, and a new one has its cluster: the number goes with the cluster."""
+    track = lidar_track(1, 20.0)
+    state, first = joined([track], [vision_track(1, box_of(track))])
+    assert [item.source for item in first.objects] == ["VL"]
+    fragment = vision_track(1, (0.0, 0.0, 20.0, 20.0))
+    _, second = joined([track], [fragment, vision_track(2, box_of(track))], state=state)
+    by_box = {item.vision_track: item.id for item in second.objects}
+    assert by_box == {1: 2, 2: first.objects[0].id}
+
+
+def test_two_numbers_that_become_one_object_keep_the_older_and_part_again_without_a_clash() -> None:
+    track = lidar_track(1, 20.0)
+    apart = vision_track(1, (900.0, 300.0, 1000.0, 400.0), 20.0)
+    state, before = joined([track], [apart])
+    older = min(item.id for item in before.objects)
+    state, together = joined([track], [vision_track(1, box_of(track), 20.0)], state=state)
+    assert [item.id for item in together.objects] == [older]
+    _, after = joined([track], [apart], state=state)
+    assert len({item.id for item in after.objects}) == 2
+
+
+def test_an_object_that_the_lidar_has_just_found_keeps_the_cameras_velocity() -> None:
+    track = lidar_track(1, 30.0, velocity=None)
+    seen = vision_track(1, box_of(track), 30.5)
+    closing = evolve(seen, velocity_mps=(-12.0, 0.0))
+    _, result = joined([track], [closing])
+    assert result.objects[0].source == "VL"
+    assert result.objects[0].velocity_mps == (-12.0, 0.0)
+    _, later = joined([lidar_track(1, 30.0, velocity=(-11.0, 0.0))], [closing])
+    assert later.objects[0].velocity_mps == (-11.0, 0.0), "the LiDAR's own is the better one"

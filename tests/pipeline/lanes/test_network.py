@@ -1,0 +1,133 @@
+"""Lane networks of every kind, run for real, on pictures whose red and green are the lines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.inference.runtime import DetectorError, DetectorMissing
+from pipeline.lanes.classical import ClassicalLanes
+from pipeline.lanes.heads import UnknownLaneHead, pick_head
+from pipeline.lanes.network import LaneNetwork, open_lane_network
+from pipeline.lanes.open_detector import OFF, open_lanes
+from pipeline.types import U8
+from pipeline.vision import model_registry
+from tests.pipeline.lanes import lane_networks
+from tests.pipeline.vision import networks
+
+RED, GREEN = (0, 0, 255), (0, 255, 0)
+WIDTH, HEIGHT = 1280, 720
+
+
+@pytest.fixture(autouse=True)
+def _own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for variable in ("CIPV_HOME", "CIPV_DATA"):
+        monkeypatch.setenv(variable, str(tmp_path / variable))
+
+
+def picture(**bars: tuple[int, int]) -> U8:
+    """Black, with upright bars: ``red=(left, right)`` columns."""
+    bgr = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    for name, (left, right) in bars.items():
+        bgr[:, left:right] = {"red": RED, "green": GREEN}[name]
+    return bgr
+
+
+MASKS = {
+    "two masks": (lane_networks.twin, (72, 128), "two masks"),
+    "two masks of free size": (lane_networks.twin, ("h", "w"), "two masks"),
+    "YOLOP, letterboxed": (lane_networks.yolop, (128, 128), "YOLOP"),
+    "YOLOP, upright": (lane_networks.yolop, (256, 128), "YOLOP"),
+    "classes": (lane_networks.classes, (72, 128), "classes"),
+    "classes of the lower part": (lane_networks.classes, (52, 244), "classes"),
+}
+
+
+@pytest.mark.parametrize("kind", MASKS)
+def test_a_line_is_found_where_it_is_in_the_picture(tmp_path: Path, kind: str) -> None:
+    make, size, head = MASKS[kind]
+    network = open_lane_network(str(make(tmp_path / "tiny.onnx", size)))
+    assert network.head.name == head
+    raw = network.detect(picture(red=(600, 640)))
+    assert np.abs(raw.points[:, 0] - 619.5).max() < 6.0
+    assert raw.points[:, 1].max() > 0.97 * HEIGHT
+    top = HEIGHT - WIDTH * 52 / 244 if "lower" in kind else 0.03 * HEIGHT
+    assert raw.points[:, 1].min() == pytest.approx(top, abs=0.05 * HEIGHT)
+    assert raw.scores.min() > 0.5
+    assert raw.model == network.name
+    assert set(raw.line.tolist()) == ({1} if head == "classes" else {-1})
+
+
+def test_classes_are_lines_and_one_that_is_not_there_is_dropped(tmp_path: Path) -> None:
+    bgr = picture(red=(300, 340), green=(900, 940))
+    both = open_lane_network(str(lane_networks.classes(tmp_path / "both.onnx"))).detect(bgr)
+    assert both.points[both.line == 1, 0].mean() == pytest.approx(319.5, abs=6.0)
+    assert both.points[both.line == 2, 0].mean() == pytest.approx(919.5, abs=6.0)
+    one = open_lane_network(str(lane_networks.classes(tmp_path / "one.onnx", there=(0.0, 1.0, 0.2, 0.0)))).detect(bgr)
+    assert set(one.line.tolist()) == {1}
+
+
+@pytest.mark.parametrize(("anchors", "cells", "first_row"), [(56, 100, 160 / 720), (18, 200, 121 / 288)])
+def test_a_row_grid_gives_a_place_in_each_row(tmp_path: Path, anchors: int, cells: int, first_row: float) -> None:
+    network = open_lane_network(str(lane_networks.rows(tmp_path / "ufld.onnx", anchors, cells, cells // 4)))
+    raw = network.detect(picture())
+    assert raw.points.shape == (anchors, 2)
+    assert raw.points[:, 0] == pytest.approx(np.full(anchors, WIDTH * (cells // 4) / (cells - 1)), abs=1.5)
+    assert raw.points[0, 1] == pytest.approx(HEIGHT * first_row, abs=1.5)
+    assert np.all(np.diff(raw.points[:, 1]) > 0)
+    assert set(raw.line.tolist()) == {1}
+    assert raw.scores.min() > 0.9
+
+
+def test_what_is_too_wide_for_a_line_is_none(tmp_path: Path) -> None:
+    network = open_lane_network(str(lane_networks.twin(tmp_path / "tiny.onnx")))
+    assert len(network.detect(picture(red=(200, 700))).points) == 0
+    assert len(network.detect(picture()).points) == 0
+
+
+def test_equal_files_have_equal_names(tmp_path: Path) -> None:
+    path = str(lane_networks.twin(tmp_path / "tiny.onnx"))
+    names = {open_lane_network(path).name, open_lane_network(path).name}
+    assert len(names) == 1
+    other = lane_networks.twin(tmp_path / "tiny.onnx", (36, 64))
+    assert open_lane_network(str(other)).name not in names
+
+
+def test_a_file_that_is_no_lane_network_is_refused_with_a_sentence(tmp_path: Path) -> None:
+    (tmp_path / "text.onnx").write_text("no network")
+    with pytest.raises(DetectorError, match="not an ONNX file"):
+        open_lane_network(str(tmp_path / "text.onnx"))
+    with pytest.raises(DetectorError, match=r"yolox\.onnx: its outputs \(1×84×85\) are of no lane network"):
+        open_lane_network(str(networks.yolox(tmp_path / "yolox.onnx")))
+    with pytest.raises(DetectorError, match=r"\(H, W, 3\) uint8"):
+        open_lane_network(str(lane_networks.twin(tmp_path / "tiny.onnx"))).detect(np.zeros((4, 4), np.uint8))
+
+
+def test_heads_are_told_apart_by_shape_and_name() -> None:
+    mask, boxes = np.zeros((1, 2, 36, 64), np.float32), np.zeros((1, 20, 6), np.float32)
+    assert pick_head([mask, mask], ["ll", "da"]).output == 0
+    assert pick_head([mask, mask], ["a", "b"]).output == 1
+    assert pick_head([boxes, mask, mask], ["det_out", "drive_area_seg", "lane_line_seg"]).name == "YOLOP"
+    with pytest.raises(UnknownLaneHead, match="1×20×6"):
+        pick_head([boxes], ["x"])
+
+
+def test_which_lane_detector_is_taken(tmp_path: Path) -> None:
+    assert open_lanes(OFF, None) is None
+    drawn = open_lanes(None, None, drawn=True)
+    assert isinstance(drawn, ClassicalLanes)
+    real = open_lanes(None, None)
+    assert isinstance(real, ClassicalLanes)
+    assert "cipv models pull twinlitenet" in real.notes[0]
+    assert "cipv models pull" not in drawn.notes[0]
+    with pytest.raises(DetectorMissing, match="No lane network 'nowhere'"):
+        open_lanes("nowhere", None)
+    model_registry.register(lane_networks.twin(tmp_path / "mine.onnx"), "mine", "lanes")
+    installed = open_lanes(None, None)
+    assert isinstance(installed, LaneNetwork)
+    assert "mine" in installed.notes[0]
+    assert isinstance(open_lanes(None, None, drawn=True), ClassicalLanes)
+    assert isinstance(open_lanes("classical", None), ClassicalLanes)
+    assert isinstance(open_lanes("mine", None, drawn=True), LaneNetwork)

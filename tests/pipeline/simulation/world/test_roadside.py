@@ -1,0 +1,43 @@
+"""What stands beside a road stands on no road."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.simulation.world.roads import Road
+from pipeline.simulation.world.roadside import Roadside
+
+TOWN = {"lanes_forward": 1, "lanes_oncoming": 1, "median_m": 0.0, "lane_width_m": 3.5}
+
+
+def built(**road: object) -> tuple[Road, Roadside]:
+    made = Road.model_validate({**TOWN, **road})
+    return made, Roadside.build(made, 5, 0.0, 900.0)
+
+
+@pytest.mark.parametrize("angle_deg", [60.0, 90.0])
+def test_nothing_stands_on_a_crossing_road(angle_deg: float) -> None:
+    crossed, beside = built(segments=[{"length_m": 900}], crossings=[{"s_m": 400.0, "angle_deg": angle_deg}])
+    _, without = built(segments=[{"length_m": 900}])
+    line = crossed.crossing_lines[0]
+
+    def on_it(roadside: Roadside) -> int:
+        x, y, heading = line.to_world(0.0, 0.0)[0]
+        across = (roadside.poses[:, 1] - y) * np.cos(heading) - (roadside.poses[:, 0] - x) * np.sin(heading)
+        return int(np.count_nonzero(np.abs(across) < crossed.crossings[0].half_width_m() + 1.0))
+
+    assert on_it(beside) == 0
+    assert on_it(without) > 0, "the crossing is what makes room"
+    assert len(beside.things) > 0.8 * len(without.things)
+
+
+def test_in_a_winding_road_no_tree_or_house_stands_on_another_stretch_of_it() -> None:
+    hairpin = {"length_m": 44, "radius_m": 14}  # the way back runs 28 m beside the way there
+    road, beside = built(segments=[{"length_m": 300}, hairpin, {"length_m": 600}])
+    course = road.to_world(np.arange(-60.0, 960.0, 1.0), 0.0)[:, :2]
+    for thing, pose in zip(beside.things, beside.poses, strict=True):
+        if thing.kind in ("tree", "building"):
+            nearest = np.hypot(*(course - pose[:2]).T).min()
+            assert nearest > 3.5 + min(thing.length_m, thing.width_m) / 2, thing
+    assert any(thing.kind == "tree" for thing in beside.things)
