@@ -9,8 +9,7 @@ import pytest
 
 from pipeline.formats.video_file import VideoFile
 from pipeline.sources import SourceError
-
-from .captures import write_video
+from tests.pipeline.sources.captures import write_video
 
 PICTURES = 12
 

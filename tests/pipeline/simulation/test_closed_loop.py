@@ -10,8 +10,7 @@ from pipeline.params import Params, with_changes
 from pipeline.simulation.closed_loop import NetworkEyes, Setup, Tick, drive
 from pipeline.simulation.scenario import Scenario
 from pipeline.types import RawBoxes
-
-from .worlds import with_actors
+from tests.pipeline.simulation.worlds import with_actors
 
 SLOWER = "{id: 1, kind: car, lane: -2, ahead_m: 28, speed_mps: {0: 12}}"
 

@@ -14,8 +14,7 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from pipeline.types import Sweep
-
-from .velodyne.streams import drive, ring_wall
+from tests.pipeline.formats.velodyne.streams import drive, ring_wall
 
 Kind = Literal["ros1", "db3", "mcap"]
 HEADER_NS = 1_700_000_000_000_000_000

@@ -9,7 +9,7 @@ from pathlib import Path
 import av
 import numpy as np
 
-from .velodyne.streams import START_NS, drive
+from tests.pipeline.formats.velodyne.streams import START_NS, drive
 
 Datagrams = Iterable[tuple[int, int, bytes]]
 """When captured (ns), port, payload."""

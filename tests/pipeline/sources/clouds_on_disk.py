@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 
 from pipeline.types import Sweep
-
-from .velodyne.streams import ring_wall
+from tests.pipeline.formats.velodyne.streams import ring_wall
 
 DTYPE = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("intensity", "<f4"), ("ring", "<u2"), ("time", "<f4")])
 STAMPS_NS = (1_700_000_000_000_000_000, 1_700_000_000_100_000_000)

@@ -14,8 +14,7 @@ from pipeline.common.geometry import inverse, rotation, transform
 from pipeline.params import AlignmentParams
 from pipeline.sources import SourceError, open_source
 from pipeline.types.source import Source
-
-from .conftest import LIDAR_ROWS, astyx_calibration
+from tests.pipeline.sources.conftest import LIDAR_ROWS, astyx_calibration
 
 
 def opened(folder: Path) -> Source:

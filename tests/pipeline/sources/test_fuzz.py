@@ -10,11 +10,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from pipeline.sources import SourceError, open_source
-
-from .bags import Kind, write_bag
-from .captures import write_capture
-from .clouds_on_disk import STAMPS_NS, write_clouds
-from .conftest import write_astyx, write_kitti, write_kitti_raw
+from tests.pipeline.sources.bags import Kind, write_bag
+from tests.pipeline.sources.captures import write_capture
+from tests.pipeline.sources.clouds_on_disk import STAMPS_NS, write_clouds
+from tests.pipeline.sources.conftest import write_astyx, write_kitti, write_kitti_raw
 
 
 def small_bag(folder: Path, kind: Kind = "db3") -> Path:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.sources.hdl64_rings import keep_rings, match_vlp16, ring_elevations_deg, turns
-
-from .conftest import rings_file
+from tests.pipeline.sources.conftest import rings_file
 
 
 def points(count: int = 64) -> np.ndarray:

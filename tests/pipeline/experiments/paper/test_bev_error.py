@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pipeline.experiments.paper.bev_error import PRINTED, Case, Error, Sighting, cases, replay, report, run
-from tests.pipeline.evaluation.experiments.conftest import SeeAgain
+from tests.pipeline.experiments.conftest import SeeAgain
 
 
 def test_errors_are_small_near_honest_far_and_stand_beside_the_print(see_again: SeeAgain) -> None:

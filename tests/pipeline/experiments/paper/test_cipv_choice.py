@@ -10,7 +10,7 @@ from pipeline.experiments.paper.cipv_choice import UNDECIDABLE, Case, Frame, Ver
 from pipeline.experiments.perception import SENSORS
 from pipeline.experiments.true_lead import MAX_M
 from pipeline.simulation import scenario
-from tests.pipeline.evaluation.experiments.conftest import SeeAgain
+from tests.pipeline.experiments.conftest import SeeAgain
 
 
 @pytest.mark.parametrize(("verdict", "fails"), [("correct", False), ("missed", True), ("new", False)])

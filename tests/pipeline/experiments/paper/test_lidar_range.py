@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipeline.experiments.paper.lidar_range import PRINTED, Case, Sighting, recognised_to_m, replay, report, run
-from tests.pipeline.evaluation.experiments.conftest import SeeAgain
+from tests.pipeline.experiments.conftest import SeeAgain
 
 
 def test_near_it_is_exact_and_far_it_is_blind(see_again: SeeAgain) -> None:

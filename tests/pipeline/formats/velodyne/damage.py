@@ -9,8 +9,7 @@ import numpy as np
 
 from pipeline.formats.velodyne import Vlp16Decoder
 from pipeline.types import Sweep
-
-from .streams import drive, spoil, time_us
+from tests.pipeline.formats.velodyne.streams import drive, spoil, time_us
 
 _SWEEPS = 40
 

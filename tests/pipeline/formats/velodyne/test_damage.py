@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from .damage import survives
+from tests.pipeline.formats.velodyne.damage import survives
 
 
 @pytest.mark.parametrize("share", [0.02, 0.2])

@@ -9,8 +9,17 @@ from pipeline.common.geometry import inverse, rotation, transform
 from pipeline.formats.velodyne import SensorClock, Vlp16Decoder
 from pipeline.formats.velodyne.encode import PACKETS_A_ROTATION, packets_of
 from pipeline.types import Sweep
-
-from .streams import MODE, START_NS, STEP_NS, decoded, drive, ring_wall, stamped, time_us, with_byte
+from tests.pipeline.formats.velodyne.streams import (
+    MODE,
+    START_NS,
+    STEP_NS,
+    decoded,
+    drive,
+    ring_wall,
+    stamped,
+    time_us,
+    with_byte,
+)
 
 STREAM = drive(4)
 POINTS = len(ring_wall(0).points)

@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.formats.velodyne import PACKET_BYTES, BadPacket, read_packet
-
-from .streams import MODE, PRODUCT, drive, stamped, with_azimuth, with_byte
+from tests.pipeline.formats.velodyne.streams import MODE, PRODUCT, drive, stamped, with_azimuth, with_byte
 
 GOOD = drive(1)[10][0]
 DUAL = with_byte(GOOD, MODE, 0x39)

@@ -13,8 +13,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial import cKDTree
 
 from pipeline.formats.velodyne import SensorClock, Vlp16Decoder, read_position
-
-from .streams import decoded, einride, mrpt
+from tests.pipeline.formats.velodyne.streams import decoded, einride, mrpt
 
 SCAN = "velodyne_msgs/msg/VelodyneScan"
 PACKET = "velodyne_msgs/msg/VelodynePacket"

@@ -13,9 +13,8 @@ from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats.base import FormatName
 from pipeline.labels.formats.registry import export_labels, import_labels
 from pipeline.labels.model import LabelTrack, LeadRange, Origin, Sighting
-
-from .sets import IMPORT, drive
-from .test_round_trip import full_set
+from tests.pipeline.labels.formats.sets import IMPORT, drive
+from tests.pipeline.labels.formats.test_round_trip import full_set
 
 
 def written(name: FormatName, folder: Path) -> Any:

@@ -20,10 +20,9 @@ from pipeline.labels.formats.base import Drive, FormatName
 from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
 from pipeline.labels.validate import check
+from tests.pipeline.labels.formats.sets import IMPORT, camera, drive
+from tests.pipeline.labels.formats.test_round_trip import full_set
 from tests.pipeline.sources.test_fuzz import EDITS, damaged
-
-from .sets import IMPORT, camera, drive
-from .test_round_trip import full_set
 
 SCRATCH = count()
 

@@ -11,8 +11,7 @@ from pipeline.labels.formats.registry import export_labels, import_labels
 from pipeline.labels.recorded_truth import LINKED, truth_labels
 from pipeline.recording.save import save
 from pipeline.sources import open_source
-
-from .sets import IMPORT, assert_same
+from tests.pipeline.labels.formats.sets import IMPORT, assert_same
 
 
 @pytest.fixture(scope="module")

@@ -20,9 +20,8 @@ from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, Le
 from pipeline.recording.rewrite import clip
 from pipeline.recording.session_source import SessionSource
 from pipeline.sources import open_source
+from tests.pipeline.labels.formats.sets import IMPORT, assert_same, assert_same_alone, camera, drive, label_sets, plain
 from tests.pipeline.recording.frames import full, write
-
-from .sets import IMPORT, assert_same, assert_same_alone, camera, drive, label_sets, plain
 
 SCRATCH = count()
 

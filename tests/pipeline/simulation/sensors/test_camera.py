@@ -15,8 +15,7 @@ from pipeline.simulation.sensors import camera
 from pipeline.simulation.world import world
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.types import F64, U8
-
-from .worlds import with_actors
+from tests.pipeline.simulation.worlds import with_actors
 
 
 def draw(scene: Scenario, t_s: float = 0.0) -> tuple[U8, world.World]:

@@ -11,8 +11,7 @@ from pipeline.simulation.sensors import gnss
 from pipeline.simulation.sensors.gnss_model import GnssModel
 from pipeline.simulation.world import world
 from pipeline.types import GnssFix
-
-from .worlds import with_actors
+from tests.pipeline.simulation.worlds import with_actors
 
 QUIET = {"sigma_m": 0.0, "sigma_up_m": 0.0, "sigma_speed_mps": 0.0, "sigma_course_deg": 0.0}
 

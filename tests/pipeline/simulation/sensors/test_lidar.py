@@ -15,8 +15,7 @@ from pipeline.simulation.sensors.lidar_scene import PAINT, WALL
 from pipeline.simulation.world import world
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.types import F64, Sweep
-
-from .worlds import with_actors
+from tests.pipeline.simulation.worlds import with_actors
 
 NOTHING = Roadside((), np.empty(0), np.empty((0, 3)))
 

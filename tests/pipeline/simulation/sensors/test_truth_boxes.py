@@ -11,8 +11,7 @@ from pipeline.simulation.sensors.camera import calibration
 from pipeline.simulation.sensors.detection_model import BoxNoise
 from pipeline.simulation.world import world
 from pipeline.types import RawBoxes
-
-from .worlds import with_actors
+from tests.pipeline.simulation.worlds import with_actors
 
 PERFECT = BoxNoise(lasting_share=0.0, frame_share=0.0, edge_px=0.0, missed=0.0)
 

@@ -15,8 +15,7 @@ from pipeline.simulation.sensors.truth_lanes import lane_points
 from pipeline.simulation.world import world
 from pipeline.simulation.world.planned_route import planned_route
 from pipeline.simulation.world.world import LIDAR_HEIGHT_M
-
-from .worlds import with_actors
+from tests.pipeline.simulation.worlds import with_actors
 
 
 @pytest.mark.parametrize("segments", ["{length_m: 2000}", "{length_m: 2000, radius_m: 125}"], ids=["straight", "bend"])

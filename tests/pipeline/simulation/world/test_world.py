@@ -7,8 +7,7 @@ import pytest
 
 from pipeline.simulation.world import world
 from pipeline.simulation.world.actors import Motion
-
-from .worlds import with_actors
+from tests.pipeline.simulation.worlds import with_actors
 
 
 def only(actors: str, **road: object) -> world.ActorState:

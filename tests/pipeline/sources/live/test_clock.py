@@ -10,8 +10,7 @@ from pipeline.replay.wire import WireEvent
 from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.lidar import LidarInput
 from tests.pipeline.formats.velodyne.test_position import position
-
-from .bench import MS, SECOND, START, Bench, Taken, sent
+from tests.pipeline.sources.live.bench import MS, SECOND, START, Bench, Taken, sent
 
 HOST_AHEAD_NS = 1_234 * MS
 """The host's clock is wrong by so much; a car has no network to set it by."""

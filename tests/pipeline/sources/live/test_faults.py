@@ -12,8 +12,7 @@ from pipeline.replay.faults import Fault
 from pipeline.sources.live.gnss import GnssInput
 from pipeline.sources.live.lidar import LidarInput
 from tests.pipeline.formats.test_nmea import whole
-
-from .bench import START, Bench, Taken, sent, small_sweep
+from tests.pipeline.sources.live.bench import START, Bench, Taken, sent, small_sweep
 
 FROM_S, TO_S = 1.2, 2.4
 RECOVERED_WITHIN_S = 1.0

@@ -17,9 +17,8 @@ from pipeline.sources.live.source import LiveSensors
 from pipeline.sources.pcap import PcapSource
 from pipeline.step import State
 from pipeline.types import Frame, Result
-
-from .bench import MS, endless
-from .rig import Replaying, frames_until, free_port, loopback_config, opened
+from tests.pipeline.sources.live.bench import MS, endless
+from tests.pipeline.sources.live.rig import Replaying, frames_until, free_port, loopback_config, opened
 
 
 def is_whole(frame: Frame) -> bool:

@@ -11,8 +11,7 @@ import pytest
 
 from pipeline.sources.live.device_reader import DeviceLost, Stop
 from pipeline.sources.live.mjpeg import NotMjpeg, read_mjpeg
-
-from .bench import small_jpeg
+from tests.pipeline.sources.live.bench import small_jpeg
 
 MULTIPART = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace;boundary=--x\r\n\r\n"
 

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 from pipeline.sources.live.source import LiveSensors
-
-from .rig import frames_until, free_port, loopback_config
+from tests.pipeline.sources.live.rig import frames_until, free_port, loopback_config
 
 CAMERA = Path(__file__).with_name("rtsp_camera.py")
 PYTHON = shutil.which("python3", path=os.defpath)

@@ -16,8 +16,7 @@ from pipeline.sources.live.device_reader import DeviceLost
 from pipeline.sources.live.source import LiveSensors
 from pipeline.sources.live.video_stream import device_number
 from pipeline.types import Frame
-
-from .rig import frames_until, opened
+from tests.pipeline.sources.live.rig import frames_until, opened
 
 
 def test_a_number_is_itself() -> None:

@@ -20,9 +20,8 @@ from pipeline.sources.live.config import LiveConfig
 from pipeline.sources.live.source import LiveSensors
 from pipeline.types import EgoState, Frame, GnssFix
 from pipeline.types.source import SourceError
-
-from .bench import MS, fix_at, small_sweep
-from .rig import Replaying, frames_until, free_port, loopback_config, opened
+from tests.pipeline.sources.live.bench import MS, fix_at, small_sweep
+from tests.pipeline.sources.live.rig import Replaying, frames_until, free_port, loopback_config, opened
 
 DBC = """\
 VERSION ""
