@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol, TypeVar, cast
 
+from pipeline.inference.model_registry import EMBEDDED
 from pipeline.lanes.open_detector import LaneDetector, open_lanes
 from pipeline.params import Params
 from pipeline.step import State, step, warm_up
 from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result
 from pipeline.types.source import AnySource, LiveSource, Source, is_live_source, is_simulated
 from pipeline.vision.detector import Detector, open_detector
-from pipeline.vision.model_registry import EMBEDDED
 
 _SILENCE_S = 0.5
 

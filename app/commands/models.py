@@ -11,10 +11,10 @@ from typing import Annotated, Literal
 import tyro
 
 from app.commands.support.progress_bars import bytes_progress
+from pipeline.inference.model_registry import ModelEntry, known_model, list_models, own_file, pull, register, store
 from pipeline.lanes.network import open_lane_network
 from pipeline.types import REAL_VEHICLES
 from pipeline.vision.detector import open_detector
-from pipeline.vision.model_registry import ModelEntry, known_model, list_models, own_file, pull, register, store
 
 
 @dataclass(frozen=True)

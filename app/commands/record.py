@@ -16,7 +16,8 @@ import tyro
 from app.commands.support.options import LineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.commands.support.sensor_wait import Waiting
-from app.engine.session_recording import SESSIONS, new_session
+from app.core.session_folder import SESSIONS
+from app.engine.session_recording import new_session
 from pipeline.common.errors import BadInput
 from pipeline.params import Params
 from pipeline.recording.recorder import Recorder

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.core.line import Tick
+from app.core.session_folder import SESSIONS
 from pipeline.common.errors import BadInput
 from pipeline.types.source import AnySource, LiveSource, is_live_source
 
 if TYPE_CHECKING:
     from pipeline.recording.recorder import Recorder, RecordingState
 
-SESSIONS = Path(__file__).resolve().parents[2] / "sessions"
-"""What this machine keeps: recordings, marks."""
 
 _LONGEST_NAME = 60
 

@@ -16,7 +16,8 @@ from urllib.parse import urlencode
 from app.core.server_address import DEFAULT_PORT
 from app.reports.html import page, section_html
 from app.reports.svg_charts import chart_svg
-from pipeline.evaluation.report_sections import Experiment, Linked, Replay, Section, Table
+from pipeline.evaluation.report_sections import Linked, Section, Table
+from pipeline.experiments.experiment import Experiment, Replay
 from pipeline.params import Params, changes_of
 from pipeline.params import to_yaml as params_to_yaml
 from pipeline.simulation.drive_as_scenario import to_yaml

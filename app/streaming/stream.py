@@ -28,12 +28,12 @@ from typing import Any
 from pydantic import BaseModel, Field, ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from app.core.client_role import is_display
 from app.core.request_shapes import GivenCuboid
 from app.core.shared_view_state import Held, Looks
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.streaming.picture import MAX_WIDTH_PX, width_for
-from app.web.access import is_display
 
 FRAMES_UNDER_WAY = 2
 """One being painted while the next is on its way."""

@@ -22,7 +22,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from app.core.server_address import LOOPBACK_HOSTS, WILDCARDS, is_address
-from app.web.tokens import Role, Tokens
+from app.web.tokens import Tokens
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OWN_SITES = (None, "same-origin", "none")
@@ -123,15 +123,6 @@ class Guard:
             return JSONResponse({"detail": "the display in the car may not do this"}, 403)
         set_role(connection, role)
         return None
-
-
-def set_role(connection: HTTPConnection, role: Role) -> None:
-    connection.scope.setdefault("state", {})["role"] = role
-
-
-def is_display(connection: HTTPConnection) -> bool:
-    """True for who came with the display's token."""
-    return connection.scope.get("state", {}).get("role") == "display"
 
 
 def cookie_name(connection: HTTPConnection) -> str:

@@ -11,10 +11,10 @@ import sys
 from collections.abc import Callable, Iterable
 
 from app.core.server_address import DEFAULT_PORT, is_loopback, listen_socket, reachable
+from app.core.session_folder import SESSIONS
 from app.core.shared_view_state import Looks
 from app.drive.marks import Marks
 from app.engine.engine import Engine
-from app.engine.session_recording import SESSIONS
 from app.web.tokens import Tokens
 from pipeline.step import spare_what_is_loaded
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from importlib import resources
 from pathlib import Path
 
-from app.engine.session_recording import SESSIONS
+from app.core.session_folder import SESSIONS
 from pipeline.common.data_dir import data_dir
 from pipeline.sources import looks_like
 

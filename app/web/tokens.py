@@ -12,12 +12,9 @@ import os
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
+from app.core.client_role import Role
 from pipeline.common.errors import BadInput
-
-Role = Literal["person", "display"]
-"""A display may look, mark and record; it changes no parameters, seeks nothing and opens nothing."""
 
 _BYTES = 24
 SHORTEST = 16

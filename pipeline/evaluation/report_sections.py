@@ -1,18 +1,13 @@
-"""What an experiment reports: text, tables and charts as plain values, for a page or a script to show."""
+"""Reports as plain values: text, tables and charts, for a page or a script to show."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Literal
 
-from pipeline.experiments.perception import GIVEN
-from pipeline.params import Params
-from pipeline.run import Sensors
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.sensors.detection_model import Detections
 
-Suite = Literal["paper", "curves", "euroncap", "iso"]
 Tone = Literal["green", "yellow", "orange", "brown", "red", "grey"]
 Cell = str | float | int | None
 
@@ -29,7 +24,7 @@ class Coloured:
 
 @dataclass(frozen=True)
 class Driven:
-    """A cell with the drive behind it, by the name of its ``Replay``."""
+    """A cell with the drive behind it, by its name."""
 
     value: Cell
     replay: str
@@ -102,44 +97,6 @@ class Section:
     charts: tuple[Chart, ...] = ()
     failures: tuple[str, ...] = ()
     scenes: tuple[Scene, ...] = ()
-
-
-@dataclass(frozen=True)
-class Replay:
-    """A drive that can be seen again. name: fit for a file. scenario: with the ego vehicle as driven, or its script.
-    text: what came of it. detections: what was seen in its pictures; null: what the embedded network saw there."""
-
-    name: str
-    title: str
-    text: tuple[str, ...]
-    scenario: Scenario
-    params: Params
-    sensors: Sensors
-    charts: tuple[Chart, ...]
-    detections: Detections | None = GIVEN
-
-    def as_seen(self) -> Scenario:
-        """The scenario with what the line was given in that drive, so that it believes the same again."""
-        return self.scenario.model_copy(update={"sensors": self.sensors, "detections": self.detections})
-
-
-Case = TypeVar("Case")
-Outcome = TypeVar("Outcome")
-
-
-@dataclass(frozen=True)
-class Experiment(Generic[Case, Outcome]):
-    """cases: what is to be driven, in short or in full; each can be sent to another process. run: one case to its
-    outcome, a pure function at a module's top level. report: all of them, in order, to a section. replay: the drive
-    behind an outcome."""
-
-    name: str
-    suite: Suite
-    title: str
-    cases: Callable[[bool], Sequence[Case]]
-    run: Callable[[Case], Outcome]
-    report: Callable[[Sequence[Case], Sequence[Outcome]], Section]
-    replay: Callable[[Case, Outcome], Replay]
 
 
 def as_json(section: Section) -> dict[str, Any]:

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Literal
 
+from pipeline.inference.model_registry import EMBEDDED
 from pipeline.run import Sensors
 from pipeline.simulation.closed_loop import Eyes, NetworkEyes, TruthEyes
 from pipeline.simulation.sensors.camera import HEIGHT, WIDTH
 from pipeline.simulation.sensors.detection_model import BoxNoise, Detections
 from pipeline.vision.detector import Detector, open_detector
-from pipeline.vision.model_registry import EMBEDDED
 
 Boxes = Literal["truth", "network"]
 """Whose the camera's boxes are: projected truth with a detector's errors, or the embedded network's on drawn

@@ -10,9 +10,10 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 from pipeline.common.errors import BadInput
-from pipeline.evaluation.report_sections import Experiment, Replay, Section
+from pipeline.evaluation.report_sections import Section
 from pipeline.experiments.curves.experiment import CURVES
 from pipeline.experiments.euro_ncap.experiment import NCAP
+from pipeline.experiments.experiment import Experiment, Replay
 from pipeline.experiments.iso15622.experiment import ISO
 from pipeline.experiments.paper.bev_error import BEV_ERROR
 from pipeline.experiments.paper.braking import BRAKING

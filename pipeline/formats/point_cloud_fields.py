@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from pipeline.sources.hdl64_rings import VLP16_ELEVATIONS_DEG
+from pipeline.formats.velodyne.elevations import VLP16_ELEVATIONS_DEG
 from pipeline.types import F32, F64, U8, Sweep
 from pipeline.types.source import SourceError
 

@@ -11,7 +11,8 @@ import math
 
 import onnx
 
-from pipeline.vision.heads import Size
+Size = tuple[int, int]
+"""Height and width of a network's input, pixels."""
 
 MULTIPLE = 32
 """Coarsest stride of the YOLO family: input sides are multiples of it."""

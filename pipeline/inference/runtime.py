@@ -15,9 +15,9 @@ import onnx
 import onnxruntime as ort
 
 from pipeline.common.errors import BadInput
+from pipeline.inference import model_registry
 from pipeline.inference.cancellation import Stopped, of_this_thread
 from pipeline.types import F32
-from pipeline.vision import model_registry
 
 _GIVES_WAY = 5
 """How much nicer than who opens it a network's own threads are. Alike, a step that runs meanwhile may share its core

@@ -22,7 +22,6 @@ import numpy.typing as npt
 from pipeline.common.geometry import F64
 from pipeline.types import F32
 
-Size = tuple[int, int]
 Fit = Literal["stretch", "letterbox", "lower"]
 """How a picture is fitted to the input: stretched; scaled whole onto grey; its lower part, in the input's aspect."""
 _ROWS = 180

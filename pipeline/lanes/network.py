@@ -13,9 +13,9 @@ import numpy as np
 import onnxruntime as ort
 
 from pipeline.common.data_dir import file_sha256
-from pipeline.inference.graph import input_size, with_input_size
+from pipeline.inference.graph import Size, input_size, with_input_size
 from pipeline.inference.runtime import DetectorError, DetectorMissing, find_graph, open_session, read_graph, run_session
-from pipeline.lanes.heads import Head, Size, UnknownLaneHead, pick_head
+from pipeline.lanes.heads import Head, UnknownLaneHead, pick_head
 from pipeline.types import F32, U8, RawLanes
 
 _FREE_SIZE: Size = (360, 640)
@@ -79,7 +79,7 @@ class _Placed:
 
 
 def open_lane_network(spec: str | None, threads: int = 2) -> LaneNetwork:
-    """Load a lane network by name or path; null: the default one (``pipeline.vision.model_registry``).
+    """Load a lane network by name or path; null: the default one (``pipeline.inference.model_registry``).
 
     DetectorMissing when there is no file, DetectorError when the file is no lane network that can be run.
     """

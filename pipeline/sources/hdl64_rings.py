@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.formats.velodyne.elevations import VLP16_ELEVATIONS_DEG
 from pipeline.types import F32, F64, U8
 
-VLP16_ELEVATIONS_DEG = np.arange(-15.0, 16.0, 2.0)
 _MATCH_DEG = 1.0
 _FAR_M = 10.0
 _ENOUGH_POINTS = 50

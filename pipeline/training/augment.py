@@ -5,9 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from pipeline.inference.graph import Size
 from pipeline.types import F32, U8
 from pipeline.vision.detector import PADDING
-from pipeline.vision.heads import Size
 
 _NEAREST_SCALE, _FARTHEST_SCALE = 1.35, 0.75
 _AIMED = 0.75

@@ -14,6 +14,8 @@ import numpy as np
 
 from pipeline.calibration.distance import MIN_DEPTH_M, Pair, as_law, fit_laws
 from pipeline.common.geometry import closest_on_polygon, iou_matrix, transform
+from pipeline.inference.distance_laws import keep_law
+from pipeline.inference.model_registry import EMBEDDED
 from pipeline.params import DetectionParams, DistanceParams
 from pipeline.simulation.scenario import names
 from pipeline.simulation.sensors.camera import HEIGHT, WIDTH, calibration
@@ -23,8 +25,6 @@ from pipeline.training.scenes import Moment, drive, moments
 from pipeline.types import DistanceLaw
 from pipeline.vision.detector import Detector, open_detector
 from pipeline.vision.distance import height_at_reference, is_cut
-from pipeline.vision.distance_laws import keep_law
-from pipeline.vision.model_registry import EMBEDDED
 from pipeline.vision.nms import select
 
 FIT_SEEDS = (7, 8, 9)

@@ -15,9 +15,10 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from pipeline.inference.graph import Size
 from pipeline.training.labels import CLASSES
 from pipeline.vision.detector import PADDING
-from pipeline.vision.heads import STRIDES, Size
+from pipeline.vision.heads import STRIDES
 
 INPUT_SIZE: Size = (384, 640)
 WIDTHS = (16, 24, 48, 80, 128)

@@ -15,13 +15,13 @@ import cv2
 import numpy as np
 import torch
 
+from pipeline.inference.graph import Size
 from pipeline.training.augment import view
 from pipeline.training.dataset import read_labels
 from pipeline.training.loss import losses
 from pipeline.training.network import INPUT_SIZE, Network, export
 from pipeline.training.targets import assign
 from pipeline.types import F32
-from pipeline.vision.heads import Size
 
 _WINDOWS: tuple[tuple[Size, int], ...] = (((192, 320), 20), (INPUT_SIZE, 5))
 """Sizes of training windows with the batch that costs about the same; the small one is four times as cheap a picture,

@@ -16,13 +16,13 @@ import onnx
 import onnxruntime as ort
 
 from pipeline.common.data_dir import file_sha256
-from pipeline.inference.graph import MULTIPLE, fitting_size, input_size, with_input_size
+from pipeline.inference import model_registry
+from pipeline.inference.distance_laws import find_law
+from pipeline.inference.graph import MULTIPLE, Size, fitting_size, input_size, with_input_size
 from pipeline.inference.runtime import DetectorError, DetectorMissing, find_graph, open_session, read_graph, run_session
 from pipeline.types import F32, REAL_VEHICLES, U8, DistanceLaw, RawBoxes
-from pipeline.vision import model_registry
 from pipeline.vision.classes import class_names
-from pipeline.vision.distance_laws import find_law
-from pipeline.vision.heads import Decoder, Size, UnknownHead, pick_decoder
+from pipeline.vision.heads import Decoder, UnknownHead, pick_decoder
 
 FLOOR_SCORE = 0.05
 """Candidates scored lower are not even kept; ``detection.min_score`` cannot go below it."""
@@ -93,7 +93,7 @@ def open_detector(
     threads: int = 2,
     input_size: Size | None = None,
 ) -> Detector:
-    """Load a network by name or path; null: the default one (``pipeline.vision.model_registry``), with a note when that is the
+    """Load a network by name or path; null: the default one (``pipeline.inference.model_registry``), with a note when that is the
     embedded one.
 
     picture_size (width, height): the input is given the picture's aspect where the graph permits. input_size (height,

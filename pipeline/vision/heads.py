@@ -17,12 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.inference.graph import Size
 from pipeline.types import F32
 
 I64 = npt.NDArray[np.int64]
 Decoded = tuple[F32, F32, I64]
-Size = tuple[int, int]
-"""Network input ``(height, width)`` in pixels."""
 
 STRIDES = (8, 16, 32)
 _STRIDE_SETS = (STRIDES, (8, 16, 32, 64), (16, 32))

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.inference.model_registry import EMBEDDED, find, register
 from pipeline.params import Params, SyncParams
 from pipeline.run import Detectors, LiveDetectors, advance, detect, detector_for, lanes_for, run_live
 from pipeline.sources import open_source
 from pipeline.step import State
 from pipeline.types import U8, Frame, Picture, RawBoxes, RawLanes
-from pipeline.vision.model_registry import EMBEDDED, find, register
 from tests.pipeline.vision import networks
 
 

@@ -20,7 +20,7 @@ from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.engine import URL, Engine, make_url
 from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 
-from app.engine.session_recording import SESSIONS
+from app.core.session_folder import SESSIONS
 from app.labels import URL_VARIABLE
 from app.labels.errors import DatabaseError
 from app.labels.store.migrations import HEAD

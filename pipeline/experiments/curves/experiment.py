@@ -16,9 +16,10 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.evaluation.report_sections import Cell, Chart, Experiment, Replay, Scene, Section, Series, Table
+from pipeline.evaluation.report_sections import Cell, Chart, Scene, Section, Series, Table
 from pipeline.experiments.curves import scenarios
 from pipeline.experiments.curves.drives import BOXES, LIDAR_ALONE, LINES, SOURCES, Frames, driven
+from pipeline.experiments.experiment import Experiment, Replay
 from pipeline.params import CipvParams, Params
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.detection_model import Detections

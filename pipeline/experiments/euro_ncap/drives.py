@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pipeline.evaluation.report_sections import Replay
+from pipeline.experiments.experiment import Replay
 from pipeline.experiments.perception import SENSORS, Boxes, boxes_said, detections_for, eyes_for
 from pipeline.experiments.straight_track import KMH, Drive, approach, drive_charts, parameters, scene
 from pipeline.params import Params

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipeline.evaluation.report_sections import Cell, Coloured, Experiment, Scene, Section, Table, Tone
+from pipeline.evaluation.report_sections import Cell, Coloured, Scene, Section, Table, Tone
 from pipeline.experiments.euro_ncap.drives import (
     OVERLAPS,
     RUN_UP_S,
@@ -26,6 +26,7 @@ from pipeline.experiments.euro_ncap.drives import (
     scenario,
 )
 from pipeline.experiments.euro_ncap.limits import impact_tone, r152_limit_kmh
+from pipeline.experiments.experiment import Experiment
 from pipeline.experiments.perception import SENSORS
 from pipeline.experiments.straight_track import KMH
 

@@ -11,17 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from pipeline.evaluation.report_sections import (
-    AnyCell,
-    Chart,
-    Coloured,
-    Experiment,
-    Replay,
-    Scene,
-    Section,
-    Series,
-    Table,
-)
+from pipeline.evaluation.report_sections import AnyCell, Chart, Coloured, Scene, Section, Series, Table
+from pipeline.experiments.experiment import Experiment, Replay
 from pipeline.experiments.iso15622.scenarios import BEND_FROM_M, CURVE_LATERAL_MPS2, RADII_M, Test, scenario
 from pipeline.experiments.perception import COMPARED, GIVEN_SAID, SENSORS
 from pipeline.experiments.straight_track import gap_m, measured_m, parameters, target_of, true_range_m

@@ -17,7 +17,8 @@ import numpy as np
 from pipeline.alignment.projection import Pinhole, project_cuboid
 from pipeline.common.geometry import iou_matrix
 from pipeline.decision.path_position import near_face_middle
-from pipeline.evaluation.report_sections import Cell, Chart, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.report_sections import Cell, Chart, Section, Series, Table
+from pipeline.experiments.experiment import Experiment, Replay
 from pipeline.experiments.paper import layouts
 from pipeline.experiments.paper.layouts import LAYOUTS
 from pipeline.experiments.perception import COMPARED, SENSORS, Boxes, boxes_said, detections_for, eyes_for

@@ -12,17 +12,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import mean
 
-from pipeline.evaluation.report_sections import (
-    AnyCell,
-    Chart,
-    Driven,
-    Experiment,
-    Replay,
-    Scene,
-    Section,
-    Series,
-    Table,
-)
+from pipeline.evaluation.report_sections import AnyCell, Chart, Driven, Scene, Section, Series, Table
+from pipeline.experiments.experiment import Experiment, Replay
 from pipeline.experiments.paper.closed_forms import LEAD_DECEL_MPS2, PAPER, Manoeuvre, closed_forms
 from pipeline.experiments.perception import COMPARED, SENSORS, Boxes, boxes_said, detections_for, eyes_for
 from pipeline.experiments.straight_track import KMH, Drive, approach, drive_charts, parameters, scene

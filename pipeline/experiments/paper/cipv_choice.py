@@ -15,17 +15,8 @@ from typing import Literal
 
 from pipeline.decision.path_position import near_face_middle
 from pipeline.evaluation.lead_verdict import switches
-from pipeline.evaluation.report_sections import (
-    AnyCell,
-    Chart,
-    Driven,
-    Experiment,
-    Replay,
-    Scene,
-    Section,
-    Series,
-    Table,
-)
+from pipeline.evaluation.report_sections import AnyCell, Chart, Driven, Scene, Section, Series, Table
+from pipeline.experiments.experiment import Experiment, Replay
 from pipeline.experiments.perception import GIVEN_SAID, SENSORS
 from pipeline.experiments.true_lead import MAX_M, InSight, Way, range_m, same_place, true_lead
 from pipeline.params import CipvParams, Params

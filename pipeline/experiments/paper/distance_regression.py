@@ -14,7 +14,8 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.common.geometry import closest_on_polygon, transform
-from pipeline.evaluation.report_sections import Chart, Experiment, Replay, Section, Series, Table
+from pipeline.evaluation.report_sections import Chart, Section, Series, Table
+from pipeline.experiments.experiment import Experiment, Replay
 from pipeline.experiments.paper.layouts import LAYOUTS, Case, cases, scenario, scenes
 from pipeline.experiments.perception import GIVEN_SAID
 from pipeline.experiments.straight_track import TARGET, true_range_m

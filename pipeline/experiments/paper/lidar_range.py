@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipeline.evaluation.report_sections import Chart, Experiment, Replay, Scene, Section, Series, Table
+from pipeline.evaluation.report_sections import Chart, Scene, Section, Series, Table
+from pipeline.experiments.experiment import Experiment, Replay
 from pipeline.experiments.straight_track import parameters, scene, target_of, true_range_m
 from pipeline.simulation.closed_loop import Setup, Tick, drive
 from pipeline.simulation.scenario import Scenario

@@ -10,8 +10,8 @@ import pytest
 import yaml
 
 from app.cli import main
-from pipeline.vision.distance_laws import find_law
-from pipeline.vision.model_registry import EMBEDDED, find
+from pipeline.inference.distance_laws import find_law
+from pipeline.inference.model_registry import EMBEDDED, find
 
 SCENE = """
 title: cars ahead

@@ -8,7 +8,7 @@ from typing import get_args
 import pytest
 
 from app.commands.models import ListModels, RegisterModel
-from pipeline.vision import model_registry
+from pipeline.inference import model_registry
 
 
 def test_the_printed_list_has_every_address_and_command_whole(

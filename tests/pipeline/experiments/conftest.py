@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.evaluation.report_sections import Replay
+from pipeline.experiments.experiment import Replay
 from pipeline.run import Detectors, run
 from pipeline.simulation.drive_as_scenario import to_yaml
 from pipeline.sources import open_source

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from pipeline.evaluation.report_sections import Chart, Coloured, Experiment, Replay, Section, Series, Table, as_json
+from pipeline.evaluation.report_sections import Chart, Coloured, Section, Series, Table, as_json
+from pipeline.experiments.experiment import Experiment, Replay
 from pipeline.experiments.runner import EXPERIMENTS, SUITES, NoSuchSuite, count_cases, of_suite, run_all
 from pipeline.params import Params
 from pipeline.simulation.scenario import Ego, Scenario

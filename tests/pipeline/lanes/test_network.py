@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.inference import model_registry
 from pipeline.inference.runtime import DetectorError, DetectorMissing
 from pipeline.lanes.classical import ClassicalLanes
 from pipeline.lanes.heads import UnknownLaneHead, pick_head
 from pipeline.lanes.network import LaneNetwork, open_lane_network
 from pipeline.lanes.open_detector import OFF, open_lanes
 from pipeline.types import U8
-from pipeline.vision import model_registry
 from tests.pipeline.lanes import lane_networks
 from tests.pipeline.vision import networks
 

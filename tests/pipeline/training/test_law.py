@@ -7,12 +7,12 @@ from itertools import islice
 import numpy as np
 import pytest
 
+from pipeline.inference.model_registry import EMBEDDED
 from pipeline.simulation.sensors.camera import HEIGHT, WIDTH
 from pipeline.training.law import SeenPair, errors, fit, pairs
 from pipeline.training.scenes import drive
 from pipeline.types import REAL_VEHICLES
 from pipeline.vision.detector import Detector, open_detector
-from pipeline.vision.model_registry import EMBEDDED
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from pipeline.inference.graph import fitting_size
+from pipeline.inference.model_registry import register
 from pipeline.inference.runtime import DetectorError, DetectorMissing
 from pipeline.params import DetectionParams
 from pipeline.vision.detector import FLOOR_SCORE, open_detector
-from pipeline.vision.model_registry import register
 from pipeline.vision.nms import select
 from tests.pipeline.vision import networks
 

@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.common.errors import BadInput
+from pipeline.inference import model_registry
+from pipeline.inference.distance_laws import find_law, keep_law, law_file
 from pipeline.params import DistanceParams
 from pipeline.types import REAL_VEHICLES, DistanceLaw
-from pipeline.vision import model_registry
 from pipeline.vision.detector import open_detector
 from pipeline.vision.distance import law_in_use
-from pipeline.vision.distance_laws import find_law, keep_law, law_file
 from tests.pipeline.vision.networks import yolox
 
 LAW = DistanceLaw(1300.0, -1.0, 1000.0, truck_ratio=2.5, bus_ratio=2.1, motorcycle_ratio=1.0)

@@ -21,13 +21,13 @@ from pipeline.common.data_dir import data_dir, file_sha256
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.common.user_file_errors import given_path
+from pipeline.inference.distance_laws import find_law, law_file
 from pipeline.types import DistanceLaw
-from pipeline.vision.distance_laws import find_law, law_file
 
 Task = Literal["detector", "lanes"]
 EMBEDDED = "embedded"
 """Name of the detector that comes with the program."""
-_EMBEDDED_FILE = Path(__file__).parent / "embedded" / "simulated_vehicles.onnx"
+_EMBEDDED_FILE = Path(__file__).parents[1] / "vision" / "embedded" / "simulated_vehicles.onnx"
 _CHUNK = 1 << 16
 _TIMEOUT_S = 30.0
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.vision import model_registry
+from pipeline.inference import model_registry
 
 CONTENT = bytes(range(256)) * 1000
 

@@ -1,0 +1,7 @@
+"""Where this machine keeps what it records: sessions, marks and the local label database."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+SESSIONS = Path(__file__).resolve().parents[2] / "sessions"
