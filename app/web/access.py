@@ -21,6 +21,7 @@ from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
+from app.core.client_role import set_role
 from app.core.server_address import LOOPBACK_HOSTS, WILDCARDS, is_address
 from app.web.tokens import Tokens
 

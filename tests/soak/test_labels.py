@@ -15,8 +15,8 @@ from typing import Any
 import cv2
 import pytest
 
-from app.labels.acts import do
 from app.labels.acts.bulk import importing
+from app.labels.acts.registry import do
 from app.labels.acts.requests import SetSighting
 from app.labels.acts.scope import Scope
 from app.labels.service.answers import changes_json, window_json

@@ -136,7 +136,7 @@ class LabelDesk:
         recording, labels = self._open.named(drive)
         done = labels.log.sent_before(act_id, person)
         if done is None:
-            from app.labels.acts import do
+            from app.labels.acts.registry import do
             from app.labels.acts.scope import Scope
 
             doing, note = act, ""

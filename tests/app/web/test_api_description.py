@@ -68,7 +68,7 @@ def names_of(route: Route) -> set[str]:
 
 
 def test_every_route_is_described(app: FastAPI):
-    answered = {name for route in routes_of(app.web.routes) for name in names_of(route)}
+    answered = {name for route in routes_of(app.routes) for name in names_of(route)}
     assert len(answered) > 40
     unsaid = {name for name in answered - operations(app).keys() if name.split()[1] not in FILES | {"/openapi.json"}}
     assert unsaid == set()
@@ -78,7 +78,7 @@ def test_a_route_that_reads_its_body_itself_says_what_it_takes(app: FastAPI):
     """The framework describes what it reads for a route; of one that takes the whole request it knows nothing."""
     bare = {
         name
-        for route in routes_of(app.web.routes)
+        for route in routes_of(app.routes)
         if isinstance(route, APIRoute) and route.dependant.request_param_name is not None
         for name in names_of(route)
         if name in operations(app) and not name.startswith("GET ")

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from app.labels.acts import do
+from app.labels.acts.registry import do
 from app.labels.acts.requests import Act
 from app.labels.acts.scope import Scope
 from app.labels.store.act_log import Acted

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from app.labels.acts import do
+from app.labels.acts.registry import do
 from app.labels.acts.scope import Scope
 from app.labels.errors import BadAct, NoSuchLabel
 from app.labels.store.drive_labels import DriveLabels

@@ -1,0 +1,62 @@
+"""What each act does to the labels of a drive, by its kind."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from app.labels.acts import frames, leads, review, shape, tags, tracks
+from app.labels.acts.requests import (
+    Accept,
+    AddEvent,
+    AddMeasured,
+    AddTrack,
+    ClearLead,
+    DropKeyframe,
+    DropSightings,
+    Merge,
+    Reject,
+    Relabel,
+    Remove,
+    RemovePath,
+    ReviewOk,
+    SendBack,
+    SetLead,
+    SetPath,
+    SetSighting,
+    SizeAlong,
+    Split,
+    Tag,
+    TrimLead,
+)
+from app.labels.acts.scope import Scope
+from app.labels.store.draft import Draft
+
+_ACTS: dict[type, Callable[[Draft, Scope, Any], str]] = {
+    Accept: review.accept,
+    Reject: review.reject,
+    SendBack: review.send_back,
+    ReviewOk: review.review_ok,
+    Remove: review.remove,
+    SetSighting: shape.set_sighting,
+    DropKeyframe: shape.drop_keyframe,
+    DropSightings: shape.drop_sightings,
+    SizeAlong: shape.size_along,
+    AddTrack: tracks.add_track,
+    AddMeasured: tracks.add_measured,
+    Relabel: tracks.relabel,
+    Split: tracks.split,
+    Merge: tracks.merge,
+    SetLead: leads.set_lead,
+    ClearLead: leads.clear_lead,
+    TrimLead: leads.trim_lead,
+    SetPath: frames.set_path,
+    RemovePath: frames.remove_path,
+    AddEvent: frames.add_event,
+    Tag: tags.tag,
+}
+
+
+def do(draft: Draft, scope: Scope, act: Any) -> str:
+    """Do it in the draft; what was done, in a few words. ActRefused, NoSuchLabel or BadInput when it cannot be."""
+    return _ACTS[type(act)](draft, scope, act)
