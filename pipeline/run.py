@@ -92,8 +92,8 @@ def detector_for(source: AnySource, spec: str | None = None) -> Detector:
 
 
 def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None:
-    """The lane detector for the source's pictures, as ``pipeline.lanes.open_detector.open_lanes`` chooses it. None for a
-    source that has no pictures, unless one is named."""
+    """The lane detector for the source's pictures, as ``pipeline.lanes.open_detector.open_lanes`` chooses it. None for
+    a source that has no pictures, unless one is named."""
     if spec is None and picture_size(source) is None:
         return None
     camera = source.camera if is_live_source(source) else cast("Source", source).frame(0).camera

@@ -1,7 +1,7 @@
 """Which vehicle ahead is the closest one in the path, why this one, and why not each other (paper, section CIPV).
 
-The rule: among the objects that may be a lead at all (``pipeline.decision.gates``), the one in the path with the smallest
-distance. Each test leaves its number and limit on the object; the first that fails is the reason given.
+The rule: among the objects that may be a lead at all (``pipeline.decision.gates``), the one in the path with the
+smallest distance. Each test leaves its number and limit on the object; the first that fails is the reason given.
 
 Being in the path is decided over time: every sighting gives log-odds, a running mean of them decides, so that neither a
 swaying distance nor one bad box makes the lead flicker. Which one will be next is said as well.

@@ -67,7 +67,8 @@ def replay(case: Case, outcome: Outcome) -> Replay:
     share, frames = share_right([fused])
     return Replay(
         f"curves_{case.kind}_{case.layout}_{case.seed}",
-        f"{scenarios.LAYOUTS[case.layout].title}: {'cut-in' if case.kind == 'cut_in' else 'following'}, run {case.seed}",
+        f"{scenarios.LAYOUTS[case.layout].title}: "
+        f"{'cut-in' if case.kind == 'cut_in' else 'following'}, run {case.seed}",
         (f"All sources of the path fused: right in {100.0 * share:.1f} % of {frames} decidable frames.",),
         _scenario(case)[0],
         Params(),
