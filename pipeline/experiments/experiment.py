@@ -1,4 +1,4 @@
-"""What an experiment is: its cases, how one is run, how the outcomes are reported, and the drive behind each outcome."""
+"""An experiment: its cases, how one is run, how the outcomes are reported, and the drive behind each outcome."""
 
 from __future__ import annotations
 

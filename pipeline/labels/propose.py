@@ -7,8 +7,8 @@ is a vehicle and what stands beside it, or none at all: where it lies tells noth
 
 What the camera alone sees is proposed as a box in the picture, without a cuboid. One from how tall it looks, as
 ``pipeline.labels.cuboid_from_pixel`` makes where somebody points, was tried: on Astyx its middle was 14 m off (median
-of 55 that have truth, at 68 m), two in three did not even touch the vehicle; and a distance that nobody measured must not become
-the truth by which distances are scored.
+of 55 that have truth, at 68 m), two in three did not even touch the vehicle; and a distance that nobody measured must
+not become the truth by which distances are scored.
 """
 
 from __future__ import annotations
