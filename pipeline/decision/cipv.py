@@ -19,7 +19,7 @@ from pipeline.decision.gates import BESIDE_PLACE, QUESTIONS, Candidate
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.path_position import Place, believed_mps, place
 from pipeline.params import CipvParams
-from pipeline.types import Cipv, EgoState, FusedObject, Path, Rejection
+from pipeline.types import Cipv, FusedObject, Moment, Path, Rejection
 
 AGREEMENT_SIGMAS = 3.0
 _BLUR_M = 0.2
@@ -60,13 +60,12 @@ def choose(
     state: CipvState,
     objects: tuple[FusedObject, ...],
     path: Path,
-    ego: EgoState | None,
-    dt_s: float | None,
+    now: Moment,
     params: CipvParams,
 ) -> tuple[CipvState, Choice]:
     """The CIPV of this frame, the next one, and a reason for each other object."""
-    places = place(objects, path, ego, params)
-    judged = [_judge(state, item, placed, path, dt_s, params) for item, placed in zip(objects, places, strict=True)]
+    places = place(objects, path, now.ego, params)
+    judged = [_judge(state, item, placed, path, now.dt_s, params) for item, placed in zip(objects, places, strict=True)]
     able = [each.item for each in judged if each.why_not is None]
     nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
     lead = _surer(nearest, able) if nearest is not None else None

@@ -45,6 +45,7 @@ from pipeline.types.result import (
     Result,
     SensorHealth,
 )
+from pipeline.types.situation import Moment, Situation
 
 __all__ = [
     "DROPPED",
@@ -74,6 +75,7 @@ __all__ = [
     "Layers",
     "LidarTrack",
     "Mask",
+    "Moment",
     "Obstacle",
     "Path",
     "PathSource",
@@ -86,6 +88,7 @@ __all__ = [
     "Result",
     "Route",
     "SensorHealth",
+    "Situation",
     "SourceKind",
     "StreamHealth",
     "Sweep",
