@@ -72,9 +72,8 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     # Camera: the detector's boxes, each with a distance from its height, followed from picture to picture
     boxes = _measure_boxes(frame, aligned, params)
     clock.lap("distance")
-    own_speed_mps = now.ego.speed_mps if now.ego is not None else None
     vision_state, vision_tracks = vision_tracking.track(
-        state.vision, boxes, now.dt_s, params.vision_tracking, own_speed_mps
+        state.vision, boxes, now.dt_s, params.vision_tracking, now.speed_mps
     )
     clock.lap("vision_tracking")
 
@@ -86,9 +85,8 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     objects = object_motion.describe(fused.objects, now.measured, params.motion)
 
     # Path: lane lines, the route and the yaw rate, each weighed by how sure it is
-    view = lanes.RoadView(
-        aligned, sweep.ground, frame.camera.road_z_m if frame.camera is not None else None, _vehicle_boxes(boxes)
-    )
+    road_z_m = frame.camera.road_z_m if frame.camera is not None else None
+    view = lanes.RoadView(aligned, sweep.ground, road_z_m, _vehicle_boxes(boxes))
     lane_state, lane = lanes.follow(state.lanes, frame.raw_lanes, view, now, params.lanes)
     clock.lap("lanes")
     evidence = corridor.Evidence(lane, frame.gnss, frame.route)

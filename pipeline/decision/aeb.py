@@ -86,7 +86,7 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
         is_lead = situation.lead is not None and item.id == situation.lead.id
         if (is_lead and not item.carried) or (is_dependable(item) and enters_corridor(item, situation.path)):
             required = required_decel_mps2(item.distance_m, closing, params)
-            found.append(Threat(item.id, item.ttc_s, required, item.source != "V"))
+            found.append(Threat(item.id, item.ttc_s, required, item.ranged))
     return tuple(found)
 
 

@@ -5,7 +5,20 @@ u right, v down, pixels. Times are nanoseconds of the sensors' own clock. Every 
 treated as read-only. What a frame makes by the hundred is a named tuple, which costs a fraction of a data class.
 """
 
-from pipeline.types.arrays import F32, F64, I32, I64, U8, VEHICLES, Box, Mask, Point2, Point3, SourceKind
+from pipeline.types.arrays import (
+    F32,
+    F64,
+    I32,
+    I64,
+    U8,
+    VEHICLES,
+    Box,
+    Mask,
+    Point2,
+    Point3,
+    SourceKind,
+    sensors_in_words,
+)
 from pipeline.types.frame import (
     REAL_VEHICLES,
     CameraCalibration,
@@ -23,7 +36,9 @@ from pipeline.types.frame import (
     Sweep,
 )
 from pipeline.types.objects import (
+    Conditions,
     Detection,
+    Eligibility,
     FusedObject,
     Gate,
     Ground,
@@ -63,9 +78,11 @@ __all__ = [
     "CameraCalibration",
     "Cipv",
     "Coasting",
+    "Conditions",
     "Detection",
     "DistanceLaw",
     "EgoState",
+    "Eligibility",
     "Frame",
     "FusedObject",
     "Gate",
@@ -94,4 +111,5 @@ __all__ = [
     "Sweep",
     "VisionMeasurement",
     "VisionTrack",
+    "sensors_in_words",
 ]

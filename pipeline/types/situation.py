@@ -26,6 +26,11 @@ class Moment(NamedTuple):
         """Own motion if it was measured in this frame."""
         return self.motion if self.motion is not None and self.motion.coasting is None else None
 
+    @property
+    def speed_mps(self) -> float | None:
+        """Own speed while it is recent enough to drive by."""
+        return self.ego.speed_mps if self.ego is not None else None
+
 
 class Situation(NamedTuple):
     """What ACC and emergency braking decide from."""
