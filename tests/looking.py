@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Generic
 
-from pipeline.run import Detects, Seen_co, lanes_for
+from pipeline.detection import Detects, Seen_co, lanes_for
 from pipeline.sources import open_source
 from pipeline.types import U8, RawBoxes, RawLanes
 from pipeline.vision.detector import open_detector

@@ -22,8 +22,8 @@ from app.core.line import DetectionCache, Line, Tick
 from app.core.server_address import listen_socket
 from app.engine.snapshot import Snapshot
 from app.streaming.stream import Stream
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors
 from pipeline.sources import open_source
 
 RATE_HZ = 10.0

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from app.bench.timing import figures
+from pipeline.detection import Detectors, Detects, detect
 from pipeline.params import Params
-from pipeline.run import Detectors, Detects, detect
-from pipeline.step import State, step, warm_up
+from pipeline.step import State, step
 from pipeline.types import Frame, RawBoxes
 from pipeline.types.source import Source
+from pipeline.warm_up import warm_up
 
 _ROUNDS = 3
 """The step alone and the step beside the network take turns, so that what slows the machine slows both."""

@@ -11,10 +11,10 @@ from app.bench import line as line_bench
 from app.bench import packets as packets_bench
 from app.bench import simulation as simulation_bench
 from app.web.source_catalog import recordings
+from pipeline.detection import Detectors, detector_for, lanes_for
 from pipeline.inference.runtime import DetectorMissing
 from pipeline.lanes.open_detector import usual_every
 from pipeline.params import Params
-from pipeline.run import Detectors, detector_for, lanes_for
 from pipeline.sources import open_source
 from pipeline.types import Sweep
 from pipeline.types.source import Source

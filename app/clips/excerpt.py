@@ -10,10 +10,11 @@ from typing import Any, Literal
 from app.core.line import WARM_UP_FRAMES
 from app.views.rerun_start_options import PLAYING, Opening
 from pipeline.common.progress import Progress, silent
+from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.recording.save import save
 from pipeline.recording.session_source import SessionSource
-from pipeline.run import Detectors, through
+from pipeline.run import through
 from pipeline.types import Frame, Result
 from pipeline.types.result_json import to_json
 from pipeline.types.source import Source

@@ -17,9 +17,9 @@ from rich.table import Table
 from app.commands.support.options import LineOptions, SourceOptions
 from pipeline.calibration.distance import LawFit, as_law, as_overrides, collect_pairs, fit_laws
 from pipeline.common.errors import BadInput
+from pipeline.detection import detector_for
 from pipeline.inference.distance_laws import keep_law
 from pipeline.inference.model_registry import EMBEDDED, find
-from pipeline.run import detector_for
 from pipeline.types.source import Source
 
 

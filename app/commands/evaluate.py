@@ -18,6 +18,7 @@ from app.commands.support.progress_bars import frames_progress
 from app.reports.html import html
 from app.reports.terminal_tables import show
 from pipeline.common.errors import BadInput
+from pipeline.detection import Detectors, detect
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
 from pipeline.evaluation.scores.report import as_json, sections
@@ -26,10 +27,11 @@ from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels, of_
 from pipeline.labels.formats import native
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.params import Params, from_yaml, preset
-from pipeline.run import Detectors, Sensors, detect, only
-from pipeline.step import State, step, warm_up
+from pipeline.run import Sensors, only
+from pipeline.step import State, step
 from pipeline.types import Frame, Result
 from pipeline.types.source import Source
+from pipeline.warm_up import warm_up
 
 DASHBOARD = "http://127.0.0.1:8420"
 """Where `cipv serve` listens unless told otherwise."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from pipeline.detection import Detectors, detector_for, lanes_for
 from pipeline.params import Params
-from pipeline.run import Detectors, detector_for, lanes_for, run
+from pipeline.run import run
 from pipeline.sources import open_source
 
 STARTED = ("app.cli", "app.commands.serve", "app.web.server", "app.views.scene_feed", "app.labels.store.drive_labels")

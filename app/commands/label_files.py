@@ -15,7 +15,7 @@ import tyro
 from app.commands.support.open_with_progress import opened_recording
 from app.commands.support.progress_bars import frames_progress
 from app.labels.wording import WORKING
-from pipeline.common.gc_pause import uncollected
+from pipeline.common.garbage_collection import gc_paused
 from pipeline.common.user_file_errors import given_path
 from pipeline.labels.formats.base import Drive, FormatName, drive_of
 from pipeline.labels.formats.native import from_json, onto
@@ -67,7 +67,7 @@ class ExportLabels:
     def _labels(self, source: Source, drive: Drive) -> tuple[LabelSet, tuple[str, ...]]:
         """The labels that are meant, with what there is to say of them."""
         if self.labels is not None:
-            with uncollected():
+            with gc_paused():
                 found = from_json(read_bytes(given_path(self.labels)), str(self.labels))
                 placed = onto(found, drive, str(self.labels))
             return placed.labels, placed.notes

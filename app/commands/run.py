@@ -16,8 +16,9 @@ import tyro
 from app.commands.support.options import LineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.commands.support.sensor_wait import Waiting
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors, run, run_live
+from pipeline.run import run, run_live
 from pipeline.types import Frame, Result
 from pipeline.types.result_json import write_line
 from pipeline.types.source import AnySource, Source, is_live_source

@@ -22,7 +22,7 @@ from app.labels.service.desk import LabelDesk
 from app.views.lazy_scene import LateScene
 from app.web.serve import serve
 from pipeline.common.progress import Progress
-from pipeline.run import detector_for, lanes_for
+from pipeline.detection import detector_for, lanes_for
 from pipeline.sources import open_any
 from pipeline.sources.along_route import along_route
 from pipeline.types.source import AnySource

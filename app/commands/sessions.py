@@ -16,9 +16,9 @@ from app.commands.support.options import LineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.core.playback_clock import timeline_s
 from pipeline.common.errors import BadInput
+from pipeline.detection import Detectors
 from pipeline.recording.rewrite import recover
 from pipeline.recording.save import save
-from pipeline.run import Detectors
 from pipeline.types.source import Source
 
 

@@ -14,8 +14,9 @@ from typing import cast
 
 from app.core.lru import BoundedCache
 from app.core.playback_clock import timeline_s
+from pipeline.detection import Detectors, Detects, Seen, detect
 from pipeline.params import Params
-from pipeline.run import Detectors, Detects, Seen, Sensors, advance, detect
+from pipeline.run import Sensors, advance
 from pipeline.sources.fingerprint import fingerprint
 from pipeline.step import State, step
 from pipeline.types import U8, Frame, RawBoxes, RawLanes, Result

@@ -17,8 +17,9 @@ from app.drive.open_recording import Recipe, Recording
 from pipeline.common.errors import BadInput
 from pipeline.inference.cancellation import Stopped
 from pipeline.params import Params
-from pipeline.step import State, warm_up
+from pipeline.step import State
 from pipeline.types import Frame
+from pipeline.warm_up import warm_up
 
 logger = logging.getLogger("cipv.drive")
 

@@ -1,7 +1,7 @@
 """What whole drives are computed from again and again: their frames without the pictures' pixels.
 
-The networks have looked at a picture before the line runs (``pipeline.run.detect``), and no stage needs its pixels. So
-a frame of 300 KB is all that another run with other parameters asks for, and no network, disk or simulator.
+The networks have looked at a picture before the pipeline runs (``pipeline.detection.detect``), and no stage needs its
+pixels. So a frame of 300 KB is all that another run with other parameters asks for, and no network, disk or simulator.
 """
 
 from __future__ import annotations

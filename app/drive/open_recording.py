@@ -15,9 +15,10 @@ from app.drive.frame_inputs import InputStore
 from app.drive.full_run import DriveRun, Kept, calibration_digest, digest
 from app.drive.run_registry import RunBook
 from pipeline.common.progress import Progress
+from pipeline.detection import Detectors, detect
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.params import Params
-from pipeline.run import Detectors, Sensors, detect, only
+from pipeline.run import Sensors, only
 from pipeline.step import State, step
 from pipeline.types import F64, I64, Frame
 from pipeline.types.source import Mark, Marked, Source, TruthObject, is_simulated

@@ -7,9 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.engine.snapshot import Notice
+from pipeline.detection import Detectors, Detects, brings_detections, picture_size
 from pipeline.inference.runtime import DetectorError, DetectorMissing
 from pipeline.lanes.open_detector import usual_every
-from pipeline.run import Detectors, Detects, Sensors, brings_detections, picture_size
+from pipeline.run import Sensors
 from pipeline.types import RawBoxes, RawLanes
 from pipeline.types.source import AnySource, is_simulated
 

@@ -24,10 +24,11 @@ from app.engine.shown import Showing
 from app.engine.snapshot import Notice, Snapshot
 from app.labels.service.desk import LabelDesk
 from pipeline.common.progress import Progress
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors, Sensors
-from pipeline.step import warm_up
+from pipeline.run import Sensors
 from pipeline.types.source import AnySource, Source, SourceError, is_live_source
+from pipeline.warm_up import warm_up
 
 logger = logging.getLogger("cipv.engine")
 

@@ -11,8 +11,9 @@ from time import monotonic, perf_counter
 
 from app.core.line import Tick
 from app.engine.snapshot import Notice
+from pipeline.detection import Detectors, Detects, LiveDetectors, Seen
 from pipeline.params import Params
-from pipeline.run import Detectors, Detects, LiveDetectors, Seen, Sensors, advance
+from pipeline.run import Sensors, advance
 from pipeline.sources.live.health import not_delivering
 from pipeline.step import State, step
 from pipeline.types import U8, Frame

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 
 from app.core.shared_view_state import Looks
 from app.engine.engine import Engine
-from pipeline.step import spare_what_is_loaded
+from pipeline.common.garbage_collection import freeze_loaded_objects
 
 
 class LateScene:
@@ -27,7 +27,7 @@ class LateScene:
                 from app.views.scene_feed import SceneFeed
 
                 self._port = self._running.enter_context(SceneFeed(self._engine, self._looks)).port
-                spare_what_is_loaded()
+                freeze_loaded_objects()
             return self._port
 
     def __enter__(self) -> LateScene:

@@ -16,7 +16,7 @@ from app.core.shared_view_state import Looks
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.web.tokens import Tokens
-from pipeline.step import spare_what_is_loaded
+from pipeline.common.garbage_collection import freeze_loaded_objects
 
 
 def serve(
@@ -47,7 +47,7 @@ def serve(
         from app.web.server import Server, create_app
 
         app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks, tokens)
-        spare_what_is_loaded()
+        freeze_loaded_objects()
         Server(app, address, on_ready, tokens).run(sockets=[bound])
     except KeyboardInterrupt:
         pass  # uvicorn raises the signal again once it has shut down

@@ -14,7 +14,7 @@ from typing import Literal
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import AccParams
-from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Path
+from pipeline.types import AccCommand, Cipv, EgoState, Path, Situation
 
 STANDSTILL_MPS = 0.1
 CREEP_MPS = 3.0
@@ -42,24 +42,20 @@ class Demand:
     no_faster: bool = False
 
 
-def control(
-    state: AccState,
-    ego: EgoState | None,
-    cipv: Cipv | None,
-    objects: tuple[FusedObject, ...],
-    path: Path,
-    dt_s: float | None,
-    params: AccParams,
-) -> tuple[AccState, AccCommand | None]:
-    """Pedals for this frame; null, with the memory cleared, where ego speed is not known, nor was a moment ago
-    (``own_motion.recent``)."""
+def control(state: AccState, situation: Situation, params: AccParams) -> tuple[AccState, AccCommand | None]:
+    """Pedals for this frame; None, with the memory cleared, where own speed is neither known nor was a moment ago."""
+    ego = situation.now.ego
     if ego is None:
         return AccState(), None
     demand = min(
-        (follow(ego, cipv, params), *avoid(ego, cipv, objects, path, params), *hold(ego, path, params)),
+        (
+            follow(ego, situation.lead, params),
+            *avoid(ego, situation, params),
+            *hold(ego, situation.path, params),
+        ),
         key=lambda wish: wish.speed_mps,
     )
-    state, accel = pid(state, demand.speed_mps - ego.speed_mps, dt_s, params)
+    state, accel = pid(state, demand.speed_mps - ego.speed_mps, situation.now.dt_s, params)
     accel = min(accel, 0.0) if demand.no_faster else accel
     return state, AccCommand(
         state=demand.state,
@@ -97,9 +93,7 @@ def follow(ego: EgoState, cipv: Cipv | None, params: AccParams) -> Demand:
     return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} inside the desired gap of {wanted:.1f} m", cipv.id)
 
 
-def avoid(
-    ego: EgoState, cipv: Cipv | None, objects: tuple[FusedObject, ...], path: Path, params: AccParams
-) -> list[Demand]:
+def avoid(ego: EgoState, situation: Situation, params: AccParams) -> list[Demand]:
     """Slow down for objects that are not the CIPV while their TTC is below the limit (paper, Algorithm 3; "slow down
     until TTC goes below" means above). Only those whose course leads into the corridor by then: an oncoming car in its
     own lane has a short TTC too, and passes."""
@@ -110,13 +104,13 @@ def avoid(
             f"#{item.id} would be hit in {item.ttc_s:.1f} s",
             item.id,
         )
-        for item in objects
-        if (cipv is None or item.id != cipv.id)
+        for item in situation.objects
+        if (situation.lead is None or item.id != situation.lead.id)
         and item.ttc_s is not None
         and item.ttc_s < params.ttc_limit_s
         and (closing_speed_mps(item) or 0.0) > STANDSTILL_MPS
         and is_dependable(item)
-        and enters_corridor(item, path)
+        and enters_corridor(item, situation.path)
     ]
 
 

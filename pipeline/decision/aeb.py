@@ -18,7 +18,7 @@ from pipeline.decision.acc import STANDSTILL_MPS
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import AccParams, AebParams
-from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Path
+from pipeline.types import AccCommand, EgoState, Situation
 
 Stage = Literal["warn", "partial_brake", "full_brake"]
 STAGES: tuple[Stage, ...] = ("warn", "partial_brake", "full_brake")
@@ -51,21 +51,18 @@ class Threat(NamedTuple):
 def guard(
     state: AebState,
     command: AccCommand | None,
-    ego: EgoState | None,
-    lead: Cipv | None,
-    objects: tuple[FusedObject, ...],
-    path: Path,
-    dt_s: float | None,
+    situation: Situation,
     params: AebParams,
     pedals: AccParams,
 ) -> tuple[AebState, AccCommand | None]:
     """ACC's command, or the stage's own where that brakes harder. A warning leaves the pedals to ACC. Null and calm
     where ego speed is not known, since then nothing is known about braking."""
+    ego = situation.now.ego
     if ego is None or command is None or not params.enabled:
         return AebState(), command
-    threats = find_threats(lead, objects, path, params)
+    threats = find_threats(situation, params)
     worst = max(threats, key=lambda threat: (_level(threat, params), threat.required_mps2), default=None)
-    state = _next(state, worst, ego, dt_s or 0.0, params)
+    state = _next(state, worst, ego, situation.now.dt_s or 0.0, params)
     return state, _stronger(command, state, params, pedals)
 
 
@@ -79,19 +76,17 @@ def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams
     return closing_mps**2 / (2.0 * left_m) if left_m > _SMALLEST_GAP_M else inf
 
 
-def find_threats(
-    lead: Cipv | None, objects: tuple[FusedObject, ...], path: Path, params: AebParams
-) -> tuple[Threat, ...]:
+def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
     """The CIPV, and what else is dependable and heads into the corridor: nothing brakes fully for a single blob."""
     found = []
-    for item in objects:
+    for item in situation.objects:
         closing = closing_speed_mps(item)
         if closing is None or closing <= STANDSTILL_MPS or not item.distance_m or item.ttc_s is None:
             continue
-        is_lead = lead is not None and item.id == lead.id
-        if (is_lead and not item.carried) or (is_dependable(item) and enters_corridor(item, path)):
+        is_lead = situation.lead is not None and item.id == situation.lead.id
+        if (is_lead and not item.carried) or (is_dependable(item) and enters_corridor(item, situation.path)):
             required = required_decel_mps2(item.distance_m, closing, params)
-            found.append(Threat(item.id, item.ttc_s, required, item.source != "V"))
+            found.append(Threat(item.id, item.ttc_s, required, item.ranged))
     return tuple(found)
 
 

@@ -15,11 +15,11 @@ from math import exp, hypot
 from typing import NamedTuple
 
 from pipeline.common.fast_replace import evolve
-from pipeline.decision.gates import BESIDE_PLACE, QUESTIONS, Candidate
+from pipeline.decision.gates import Candidate, judge, may_cut_in
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.path_position import Place, believed_mps, place
 from pipeline.params import CipvParams
-from pipeline.types import Cipv, EgoState, FusedObject, Path, Rejection
+from pipeline.types import Cipv, FusedObject, Moment, Path, Rejection, sensors_in_words
 
 AGREEMENT_SIGMAS = 3.0
 _BLUR_M = 0.2
@@ -60,13 +60,12 @@ def choose(
     state: CipvState,
     objects: tuple[FusedObject, ...],
     path: Path,
-    ego: EgoState | None,
-    dt_s: float | None,
+    now: Moment,
     params: CipvParams,
 ) -> tuple[CipvState, Choice]:
     """The CIPV of this frame, the next one, and a reason for each other object."""
-    places = place(objects, path, ego, params)
-    judged = [_judge(state, item, placed, path, dt_s, params) for item, placed in zip(objects, places, strict=True)]
+    places = place(objects, path, now.ego, params)
+    judged = [_judge(state, item, placed, path, now.dt_s, params) for item, placed in zip(objects, places, strict=True)]
     able = [each.item for each in judged if each.why_not is None]
     nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
     lead = _surer(nearest, able) if nearest is not None else None
@@ -103,19 +102,18 @@ def _judge(
     is_in = probability > 0.5
     if where is not None and where.margin_m() >= 0.0 and is_ahead and not is_in:
         crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
-    candidate = Candidate(item, where, odds or 0.0, leads, widening_m, path, params)
-    gates = [question.ask(candidate) for question in QUESTIONS]
-    failed = next((question for question, gate in zip(QUESTIONS, gates, strict=True) if not gate.passed), None)
+    verdict = judge(Candidate(item, where, odds or 0.0, leads, widening_m, path, params))
     item = evolve(
         item,
-        gates=(*item.gates, *gates),
+        gates=(*item.gates, *verdict.gates),
+        eligibility=verdict.eligibility,
         path_offset_m=where.offset_m if where is not None else None,
         in_path=is_in,
         in_path_probability=probability if where is not None else None,
         lateral_mps=where.sideways_mps if where is not None else None,
         crossing_s=crossing_s,
     )
-    return _Judged(item, odds, failed.why_not(candidate) if failed is not None else None)
+    return _Judged(item, odds, verdict.why_not)
 
 
 def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rejection]:
@@ -147,7 +145,7 @@ def _surer(nearest: FusedObject, able: list[FusedObject]) -> FusedObject:
 
 
 def _surety(item: FusedObject) -> int:
-    return 0 if item.carried else 1 if item.source == "V" else 2
+    return 0 if item.carried else 2 if item.ranged else 1
 
 
 def _agree(a: FusedObject, b: FusedObject) -> bool:
@@ -180,7 +178,7 @@ def _next_lead(
         and item.crossing_s <= params.cut_in_s
         and (item.distance_m or 0.0) < lead_m
         and not item.carried
-        and all(gate.passed for gate in item.gates if gate.name in BESIDE_PLACE)
+        and may_cut_in(item)
     ]
     if cutting_in:
         first = min(cutting_in, key=lambda item: (item.crossing_s or 0.0, item.id))
@@ -195,8 +193,7 @@ def _next_lead(
 
 
 def _why(lead: FusedObject, candidates: int) -> str:
-    seen_by = {"V": "camera only", "L": "LiDAR only", "VL": "both sensors"}[lead.source]
-    what = f"{lead.label or 'obstacle'} seen by {seen_by}"
+    what = f"{lead.label or 'obstacle'} seen by {sensors_in_words(lead.source)}"
     others = f", nearest of {candidates} in path" if candidates > 1 else ", alone in path"
     offset = lead.path_offset_m or 0.0
     side = (

@@ -1,5 +1,7 @@
-"""Who may be a lead at all: the questions, in the order in which the first failure is the reason given:
-what it is, where it is, and only then how well it is known: nobody waits for the third sighting of what is aside."""
+"""Which objects may be a lead at all: one function for each condition, and the judgement of an object by all of them.
+
+Each condition gives a yes or no with the number and the limit behind it. The answers become ``Eligibility``, which
+decisions read, and gates, which people read; a gate's name means nothing to the pipeline."""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ from typing import NamedTuple
 
 from pipeline.decision.path_position import Place
 from pipeline.params import CipvParams
-from pipeline.types import VEHICLES, FusedObject, Gate, Path
+from pipeline.types import VEHICLES, Conditions, Eligibility, FusedObject, Gate, Path
 
 _KNOWN_M = 0.5
 """A tracked distance that is as sure as this is as good as a measured one."""
@@ -20,21 +22,24 @@ STAYS_UP_TO = 1.5
 
 
 class Candidate(NamedTuple):
-    """An object with what its tests need to know: its place against the path, the running log-odds of being in it,
-    whether it led in the frame before, by how much the path is wider for it, and the path."""
+    """An object with all that its conditions are checked by."""
 
     item: FusedObject
     place: Place | None
+    """Where it is against the path; None where that is not known."""
     odds: float
+    """Running mean of the log-odds that it is in the path."""
     leads: bool
+    """Whether it was the lead in the frame before."""
     widening_m: float
+    """By how much the path is wider for it, to either side."""
     path: Path
     params: CipvParams
 
     @property
     def aside_m(self) -> float:
-        """How far beside the middle of the path it is, as ``path_offset`` is asked: as measured now, unless its
-        sightings so far say otherwise; then what they stand for."""
+        """How far it is from the middle of the path: as measured now, unless its sightings so far say otherwise; then
+        the offset that they stand for."""
         assert self.place is not None
         margin_m = self.place.margin_m(self.widening_m)
         if (margin_m >= 0.0) == (self.odds > 0.0):
@@ -43,58 +48,99 @@ class Candidate(NamedTuple):
         return self.place.limit_m + self.widening_m - so_far_m
 
 
-class Question(NamedTuple):
-    """One test of a candidate: the gate with its number and limit, and the sentence that says why it failed, which
-    is only made for the one failure of an object that is given as its reason."""
+Answer = tuple[bool, float | None, float]
+"""Whether a condition is met, the number that decided it (None where there was none), and its limit."""
 
-    ask: Callable[[Candidate], Gate]
+
+class Condition(NamedTuple):
+    """One thing that a lead must be."""
+
+    shown_as: str
+    """Name of its gate, for display only."""
+    check: Callable[[Candidate], Answer]
     why_not: Callable[[Candidate], str]
+    """The sentence that says why it failed. Only the first failure of an object is put in words."""
 
 
-def _vehicle_class(who: Candidate) -> Gate:
-    """A named object must be a vehicle; a nameless one (L) is judged by its size."""
+class Verdict(NamedTuple):
+    """What was found about one candidate."""
+
+    eligibility: Eligibility
+    """Which conditions it meets: what decisions read."""
+    gates: tuple[Gate, ...]
+    """The same with numbers and limits: what people read."""
+    why_not: str | None
+    """Why it cannot be the lead; None if it can."""
+
+
+def judge(who: Candidate) -> Verdict:
+    """Hold one object against every condition of a lead."""
+    answers = [condition.check(who) for condition in CONDITIONS]
+    eligibility = Conditions(*[met for met, _, _ in answers])
+    gates = tuple(
+        [Gate(each.shown_as, value, limit, met) for each, (met, value, limit) in zip(CONDITIONS, answers, strict=True)]
+    )
+    why_not = None if all(eligibility) else CONDITIONS[eligibility.index(False)].why_not(who)
+    return Verdict(eligibility, gates, why_not)
+
+
+def may_cut_in(item: FusedObject) -> bool:
+    """Whether an object that is not in the path yet could lead once it is."""
+    found = item.eligibility
+    return found is not None and found.vehicle and found.distance and found.confirmed and found.size
+
+
+def is_solid(item: FusedObject) -> bool:
+    """Whether an object is surely there, now, and large enough to matter, whatever its class and place."""
+    found = item.eligibility
+    return found is not None and found.distance and found.confirmed and found.seen and found.size
+
+
+def _vehicle(who: Candidate) -> Answer:
+    """A named object must be a vehicle; a nameless one is judged by its size."""
     label = who.item.label
-    return Gate("vehicle_class", None, 1.0, label is None or label in VEHICLES)
+    return label is None or label in VEHICLES, None, 1.0
 
 
-def _distance_known(who: Candidate) -> Gate:
+def _distance(who: Candidate) -> Answer:
     distance_m = who.item.distance_m
-    return Gate("distance_known", distance_m, 0.0, distance_m is not None)
+    return distance_m is not None, distance_m, 0.0
 
 
-def _hits(who: Candidate) -> Gate:
+def _confirmed(who: Candidate) -> Answer:
     """Two sensors that both see it now are enough at once; one alone must see it again. The lead is confirmed."""
-    hits, needed = who.item.hits, 1 if who.item.seen_by == "VL" or who.leads else who.params.confirm_hits
-    return Gate("hits", hits, needed, hits >= needed)
+    at_once = who.item.seen_by_two_sensors or who.leads
+    hits, needed = who.item.hits, 1 if at_once else who.params.confirm_hits
+    return hits >= needed, hits, needed
 
 
-def _seen(who: Candidate) -> Gate:
+def _seen(who: Candidate) -> Answer:
     """An object whose distance was not measured in this frame may stay the lead, so that the lead does not flicker; it
     may not become it, because where it is now is only a guess. One that the camera sees and the LiDAR has just lost is
     still known."""
     item = who.item
-    followed = item.seen_by == "V" and item.source == "VL" and (item.distance_sigma_m or 0.0) < _KNOWN_M
-    known = bool(item.seen_by) and (item.measured or followed)
-    passed = known or who.leads or who.params.carried_may_become_lead
-    return Gate("seen", float(known), 0.0 if who.leads else 1.0, passed)
+    just_lost = item.ranged and item.seen_by_camera and not item.seen_by_lidar
+    followed = just_lost and (item.distance_sigma_m or 0.0) < _KNOWN_M
+    known = not item.carried and (item.measured or followed)
+    return known or who.leads or who.params.carried_may_become_lead, float(known), 0.0 if who.leads else 1.0
 
 
 def _not_seen(who: Candidate) -> str:
     return "not seen in this frame" if who.item.carried else "its distance was not measured in this frame"
 
 
-def _size(who: Candidate) -> Gate:
-    """An L object must be as large as a vehicle's rear or side: kerbs, posts and hedges are not leads."""
+def _size(who: Candidate) -> Answer:
+    """What no camera has named must be as large as a vehicle's rear or side: kerbs, posts and hedges are not leads."""
     item, params = who.item, who.params
-    if item.source != "L" or item.cuboid is None:
-        return Gate("size", None, params.min_width_m, True)
+    if item.pictured or item.cuboid is None:
+        return True, None, params.min_width_m
     length, width, height = item.cuboid.size
     across = length if length > width else width
     if across < params.min_width_m:
-        return Gate("size", across, params.min_width_m, False)
+        return False, across, params.min_width_m
     if height < params.min_height_m:
-        return Gate("size", height, params.min_height_m, False)
-    return Gate("size", across, params.max_size_m, across <= params.max_size_m)
+        return False, height, params.min_height_m
+    return across <= params.max_size_m, across, params.max_size_m
 
 
 def _wrong_size(who: Candidate) -> str:
@@ -107,17 +153,17 @@ def _wrong_size(who: Candidate) -> str:
     return f"{across:.0f} m long: not a vehicle"
 
 
-def _ahead(who: Candidate) -> Gate:
+def _ahead(who: Candidate) -> Answer:
     """By the way along the path to it, from the bumper."""
     ahead_m = who.place.ahead_m if who.place is not None else None
-    return Gate("ahead", ahead_m, 0.0, ahead_m is not None and ahead_m > 0.0)
+    return ahead_m is not None and ahead_m > 0.0, ahead_m, 0.0
 
 
-def _path_offset(who: Candidate) -> Gate:
+def _in_path(who: Candidate) -> Answer:
     """In metres, what the running mean of the log-odds says: see ``aside_m``."""
     if who.place is None:
-        return Gate("path_offset", None, who.path.half_width_m, False)
-    return Gate("path_offset", who.aside_m, who.place.limit_m + who.widening_m, who.odds > 0.0)
+        return False, None, who.path.half_width_m
+    return who.odds > 0.0, who.aside_m, who.place.limit_m + who.widening_m
 
 
 def _out_of_path(who: Candidate) -> str:
@@ -127,28 +173,28 @@ def _out_of_path(who: Candidate) -> str:
     return f"out of path by {outside_m:.1f} m" if outside_m > 0.0 else "in path for a moment only"
 
 
-def _path_sigma(who: Candidate) -> Gate:
-    """So far ahead that its place against the path is uncertain by more than a lane, nobody can be said to be in it.
-    On a path that is too vague to be driven after, only what lies where it is known well may lead."""
+def _placed(who: Candidate) -> Answer:
+    """Far ahead an object's place against the path may be uncertain by more than a lane; then it cannot be said to be
+    in it. On a path that is too vague to drive by, only what lies where the path is known well may lead."""
     limit = who.params.max_sigma_m * (STAYS_UP_TO if who.leads else 1.0)
     limit *= 1.0 if who.path.usable else ON_A_VAGUE_PATH
     sigma = who.place.sigma_m if who.place is not None else 0.0
-    return Gate("path_sigma", sigma, limit, sigma <= limit)
+    return sigma <= limit, sigma, limit
 
 
 def _uncertain(who: Candidate) -> str:
     return f"its place against the path is uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
 
 
-QUESTIONS = (
-    Question(_vehicle_class, lambda who: f"class {who.item.label}"),
-    Question(_distance_known, lambda _: "distance not known"),
-    Question(_size, _wrong_size),
-    Question(_ahead, lambda who: "place not known" if who.place is None else "beside or behind the bumper"),
-    Question(_path_offset, _out_of_path),
-    Question(_hits, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
-    Question(_seen, _not_seen),
-    Question(_path_sigma, _uncertain),
+CONDITIONS = Conditions(
+    vehicle=Condition("vehicle_class", _vehicle, lambda who: f"class {who.item.label}"),
+    distance=Condition("distance_known", _distance, lambda _: "distance not known"),
+    size=Condition("size", _size, _wrong_size),
+    ahead=Condition(
+        "ahead", _ahead, lambda who: "place not known" if who.place is None else "beside or behind the bumper"
+    ),
+    in_path=Condition("path_offset", _in_path, _out_of_path),
+    confirmed=Condition("hits", _confirmed, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
+    seen=Condition("seen", _seen, _not_seen),
+    placed=Condition("path_sigma", _placed, _uncertain),
 )
-BESIDE_PLACE = frozenset({"vehicle_class", "distance_known", "hits", "size"})
-"""The gates that one which is not in the path yet must pass all the same."""

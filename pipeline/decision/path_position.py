@@ -96,7 +96,7 @@ def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
     """The part of a sideways speed that its noise does not explain."""
     if sideways_mps is None or item.moving is False:
         return 0.0
-    doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * (item.distance_m or 0.0) if item.source == "V" else 0.0)
+    doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * (item.distance_m or 0.0) if not item.ranged else 0.0)
     return copysign(max(abs(sideways_mps) - doubt, 0.0), sideways_mps)
 
 
@@ -159,8 +159,8 @@ def _numbers(item: FusedObject) -> tuple[float, ...]:
         yaw_rad,
         *velocity,
         item.distance_sigma_m or 0.0,
-        item.source == "V",
-        not item.seen_by,
+        not item.ranged,
+        item.carried,
         *e,
         *f,
     )

@@ -6,6 +6,7 @@ confirmed and no kerb or post) and its course must really lead into the corridor
 
 from __future__ import annotations
 
+from pipeline.decision.gates import is_solid
 from pipeline.decision.path_position import believed_mps
 from pipeline.types import FusedObject, Path
 
@@ -13,15 +14,13 @@ ABREAST_M = 1.0
 _VELOCITY_HITS = 3
 """From two sightings the LiDAR knows no more than the difference of two noisy places, which may point across the road,
 and the camera's having followed the object for long does not make it better."""
-_MUST_PASS = frozenset({"distance_known", "hits", "seen", "size"})
 
 
 def is_dependable(item: FusedObject) -> bool:
-    """Seen now, by the LiDAR, and every test for a lead passed but class and place. A box height alone says too little
-    about speed to brake for what is not even the lead."""
-    tests = [gate for gate in item.gates if gate.name in _MUST_PASS]
-    by_lidar = item.source == "L" or (item.source == "VL" and item.lidar_hits >= _VELOCITY_HITS)
-    return by_lidar and not item.carried and bool(tests) and all(gate.passed for gate in tests)
+    """Seen now, with a measured range, and every condition of a lead met but class and place. A box height alone says
+    too little about speed to brake for what is not even the lead."""
+    has_velocity = item.ranged and (not item.pictured or item.lidar_hits >= _VELOCITY_HITS)
+    return has_velocity and not item.carried and is_solid(item)
 
 
 def enters_corridor(item: FusedObject, path: Path) -> bool:

@@ -33,7 +33,7 @@ def follow(
 ) -> AgreementState:
     """The share after this frame; as it was where nothing near is seen by either."""
     near = [item for item in objects if item.distance_m is not None and item.distance_m <= _REACH_M]
-    joined = sum(item.seen_by == "VL" for item in near)
+    joined = sum(item.seen_by_two_sensors for item in near)
     apart = _come_apart(near)
     if not dt_s or not joined + apart:
         return state
@@ -58,10 +58,10 @@ def heed(path: Path, state: AgreementState, params: FusionParams) -> Path:
 def _come_apart(near: list[FusedObject]) -> int:
     """Pairs of a car that only the camera has and a cluster that only the LiDAR has, as far away and a little aside;
     each cluster is taken once."""
-    clusters = [item for item in near if item.source == "L" and item.seen_by and _is_a_car_wide(item)]
+    clusters = [item for item in near if not item.pictured and not item.carried and _is_a_car_wide(item)]
     count = 0
     for box in near:
-        if box.source == "V" and box.seen_by and box.label in VEHICLES and box.hits >= _CONFIRMED:
+        if not box.ranged and not box.carried and box.label in VEHICLES and box.hits >= _CONFIRMED:
             partner = next((each for each in clusters if _are_apart(box, each)), None)
             if partner is not None:
                 clusters.remove(partner)

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from pipeline.lanes import line_fit, tracking
 from pipeline.lanes.line_fit import FittedLine, Shape, Sightings
 from pipeline.lidar.ground import Ground
 from pipeline.params import LaneParams
-from pipeline.types import I32, Box, EgoState, RawLanes
+from pipeline.types import I32, Box, Moment, RawLanes
 from pipeline.types.lane import EgoLane, LaneLine, powers
 
 Seed = tuple[float, Sightings]
@@ -80,29 +81,33 @@ class LaneState:
     sweeps: int = 0
 
 
+class RoadView(NamedTuple):
+    """How the road lies in one picture."""
+
+    aligned: Alignment | None
+    """Where ego points fall in the picture; None: not known, and nothing can be measured."""
+    ground: Ground | None = None
+    """The ground of this frame's sweep, if any."""
+    road_z_m: float | None = None
+    """The road below the car in the ego frame, as the calibration has it; None: as the parameter has it."""
+    vehicles: Sequence[Box] = ()
+    """Boxes in the picture, pixels, that hide the road."""
+
+
 def follow(
-    state: LaneState,
-    raw: RawLanes | None,
-    aligned: Alignment | None,
-    ground: Ground | None,
-    ego: EgoState | None,
-    dt_s: float | None,
-    params: LaneParams,
-    vehicles: Sequence[Box] = (),
-    road_z_m: float | None = None,
+    state: LaneState, raw: RawLanes | None, view: RoadView, now: Moment, params: LaneParams
 ) -> tuple[LaneState, EgoLane | None]:
-    """One frame: measure if a lane detector has looked at it, and track. Null until one has. ground: of this frame's
-    sweep, if any. dt_s: since the frame before; null at the start. vehicles: boxes in the picture that hide it.
-    road_z_m: of the road in the ego frame, as the calibration has it; null: as the parameter has it."""
-    plane, sweeps = _settled(state, road_plane(ground))
-    level_m = road_z_m if road_z_m is not None else -params.mount_height_m
+    """One frame: measure if a lane detector has looked at it, and track. None until one has."""
+    plane, sweeps = _settled(state, road_plane(view.ground))
+    level_m = view.road_z_m if view.road_z_m is not None else -params.mount_height_m
     road = plane if plane is not None else np.array([0.0, 0.0, level_m])
-    pitch = _drifted(state.pitch, dt_s, params)
+    pitch = _drifted(state.pitch, now.dt_s, params)
     measured = None
-    if raw is not None and aligned is not None:
-        measured = measure(_beside(raw, vehicles), aligned, road, pitch, params, tracking.expected_shape(state.tracks))
+    if raw is not None and view.aligned is not None:
+        expected = tracking.expected_shape(state.tracks)
+        measured = measure(_beside(raw, view.vehicles), view.aligned, road, pitch, params, expected)
         pitch = measured.pitch
-    tracks = tracking.predict(state.tracks, ego, dt_s, params)
+    tracks = tracking.predict(state.tracks, now.ego, now.dt_s, params)
     if measured is not None:
         tracks = tracking.update(tracks, measured.source, measured.lines, params)
     lane = tracking.ego_lane(tracks, pitch.rad, road, params)

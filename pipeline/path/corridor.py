@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import erf, exp, isfinite, pi, sqrt
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -26,7 +27,7 @@ from pipeline.path.blend_estimates import FusedPath
 from pipeline.path.estimates import SOURCES, STEP_M, PathEstimate, between_lines, straight
 from pipeline.path.route_following import GnssState
 from pipeline.path.yaw_rate import YawRate
-from pipeline.types import EgoState, GnssFix, Path, PathSource, Route
+from pipeline.types import EgoState, GnssFix, Moment, Path, PathSource, Route
 from pipeline.types.lane import EgoLane
 
 _LOOK_AHEAD_M = (10, 30, 60)
@@ -49,32 +50,41 @@ class PathState:
     last: FusedPath | None = None
 
 
-def predict(
-    state: PathState,
-    ego: EgoState | None,
-    lane: EgoLane | None,
-    fix: GnssFix | None,
-    route: Route | None,
-    t_ns: int,
-    dt_s: float | None,
-    params: PathParams,
-) -> tuple[PathState, Path]:
-    """The path ahead. Whatever is missing is left out; with nothing at all it is straight and says how little that is
-    worth."""
-    ego = ego if ego is not None and isfinite(ego.speed_mps) else None
+class Evidence(NamedTuple):
+    """What shows the path ahead, own motion apart; each may be missing."""
+
+    lane: EgoLane | None = None
+    """The painted lines on either side."""
+    fix: GnssFix | None = None
+    """Where the car is on the Earth, if a fix came with this frame."""
+    route: Route | None = None
+    """The road it follows."""
+
+
+def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParams) -> tuple[PathState, Path]:
+    """The path ahead. Whatever is missing is left out; with nothing at all the path is straight, and its sigma says how
+    little that is worth. It goes on by ``now.motion``, however old, until its own sigma ends it."""
+    ego = now.motion if now.motion is not None and isfinite(now.motion.speed_mps) else None
+    dt_s = now.dt_s
+
+    # Each source says where the path is and how sure it is of that at each distance
     yaw = yaw_rate.follow(state.yaw, ego, dt_s, params) if params.use_yaw_rate else None
-    placed, wrong_fix = gnss.follow(state.gnss, route, fix, ego, t_ns, dt_s, params)
+    placed, wrong_fix = gnss.follow(state.gnss, evidence.route, evidence.fix, ego, now.t_ns, dt_s, params)
     placed, along_route, wrong_route = gnss.ahead(placed, params)
     seen = (
-        between_lines(lane, params) if params.use_lanes else None,
+        between_lines(evidence.lane, params) if params.use_lanes else None,
         along_route,
         yaw_rate.ahead(yaw, ego, params),
     )
     estimates = [each for each in seen if each is not None]
     if not estimates or _fades(ego, estimates):
         estimates.append(straight(ego, params))
+
+    # They are compared with each other and with the last path, moved on; what disagrees is left out, the rest weighed
     expected = _expected(state.last, yaw, ego, dt_s, len(estimates[0].center))
     fresh, left_out = blend_estimates.fuse(estimates, expected, params.half_width_m, params.outlier_sigmas)
+
+    # The path of the frame before takes part, so that nothing jumps when a source comes or goes
     path = fresh
     if expected is not None and dt_s:
         keep = exp(-dt_s / params.smoothing_s) if params.smoothing_s > 0.0 else 0.0
@@ -85,7 +95,7 @@ def predict(
 
 def corridor(ego: EgoState | None, params: PathParams) -> Path:
     """The path of a single moment that has no lane lines, route or history."""
-    return predict(PathState(), ego, None, None, None, 0, None, params)[1]
+    return predict(PathState(), Evidence(), Moment(0, None, ego, ego), params)[1]
 
 
 def warm_up() -> None:
@@ -95,7 +105,9 @@ def warm_up() -> None:
     for k in range(2):
         t_ns = k * 100_000_000
         fix = GnssFix(t_ns, k * 6.4e-6, k * 6.4e-6, 0.0, pi / 4, 10.0, "rtk_fixed", 0.01)
-        state, path = predict(state, EgoState(t_ns, 10.0, 0.0), None, fix, route, t_ns, 0.1 if k else None, params)
+        ego = EgoState(t_ns, 10.0, 0.0)
+        now = Moment(t_ns, 0.1 if k else None, ego, ego)
+        state, path = predict(state, Evidence(None, fix, route), now, params)
     nearest_on_path(path, np.zeros((1, 2)))
 
 
@@ -122,8 +134,7 @@ def _fades(ego: EgoState | None, estimates: list[PathEstimate]) -> bool:
 def _about_own_motion(ego: EgoState | None) -> tuple[str, ...]:
     if ego is not None and ego.coasting is not None:
         return (f"own speed not measured for {ego.coasting.age_s:.1f} s: taken for {ego.speed_mps * 3.6:.0f} km/h",)
-    broken = ego is not None and ego.yaw_rate_radps is not None and yaw_rate.usable_rate(ego) is None
-    return ("the yaw rate is not one that a car can have: left out",) if broken else ()
+    return ()
 
 
 def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], params: PathParams) -> Path:

@@ -74,6 +74,13 @@ def believable(ego: EgoState | None) -> EgoState | None:
     return ego if ego.yaw_rate_radps == usable_rate(ego) else evolve(ego, yaw_rate_radps=None)
 
 
+def doubts(ego: EgoState | None) -> tuple[str, ...]:
+    """What a person should know of a measured own motion."""
+    if ego is None or not isfinite(ego.speed_mps) or ego.yaw_rate_radps is None or usable_rate(ego) is not None:
+        return ()
+    return ("the yaw rate is not one that a car can have: left out",)
+
+
 def ahead(yaw: YawRate | None, ego: EgoState | None, params: PathParams) -> PathEstimate | None:
     """The arc ahead, r(1 − cos θ) aside at path length s = rθ; null where no yaw rate is known.
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from pipeline.common.fast_replace import evolve
+from pipeline.detection import Detectors, detect
 from pipeline.params import Params
-from pipeline.run import Detectors, detect, only
 from pipeline.run import Sensors as Sensed
+from pipeline.run import only
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.detection_model import BoxNoise
@@ -24,9 +25,10 @@ from pipeline.simulation.world import actors, world
 from pipeline.simulation.world import ego_vehicle as vehicle
 from pipeline.simulation.world.ego_vehicle import Pedals, VehicleModel, VehicleState
 from pipeline.simulation.world.world import World
-from pipeline.step import State, step, warm_up
+from pipeline.step import State, step
 from pipeline.types import AccCommand, Frame, Result
 from pipeline.vision.detector import Detector
+from pipeline.warm_up import warm_up
 
 STEP_S = 0.005
 

@@ -5,7 +5,20 @@ u right, v down, pixels. Times are nanoseconds of the sensors' own clock. Every 
 treated as read-only. What a frame makes by the hundred is a named tuple, which costs a fraction of a data class.
 """
 
-from pipeline.types.arrays import F32, F64, I32, I64, U8, VEHICLES, Box, Mask, Point2, Point3, SourceKind
+from pipeline.types.arrays import (
+    F32,
+    F64,
+    I32,
+    I64,
+    U8,
+    VEHICLES,
+    Box,
+    Mask,
+    Point2,
+    Point3,
+    SourceKind,
+    sensors_in_words,
+)
 from pipeline.types.frame import (
     REAL_VEHICLES,
     CameraCalibration,
@@ -23,7 +36,9 @@ from pipeline.types.frame import (
     Sweep,
 )
 from pipeline.types.objects import (
+    Conditions,
     Detection,
+    Eligibility,
     FusedObject,
     Gate,
     Ground,
@@ -45,6 +60,7 @@ from pipeline.types.result import (
     Result,
     SensorHealth,
 )
+from pipeline.types.situation import Moment, Situation
 
 __all__ = [
     "DROPPED",
@@ -62,9 +78,11 @@ __all__ = [
     "CameraCalibration",
     "Cipv",
     "Coasting",
+    "Conditions",
     "Detection",
     "DistanceLaw",
     "EgoState",
+    "Eligibility",
     "Frame",
     "FusedObject",
     "Gate",
@@ -74,6 +92,7 @@ __all__ = [
     "Layers",
     "LidarTrack",
     "Mask",
+    "Moment",
     "Obstacle",
     "Path",
     "PathSource",
@@ -86,9 +105,11 @@ __all__ = [
     "Result",
     "Route",
     "SensorHealth",
+    "Situation",
     "SourceKind",
     "StreamHealth",
     "Sweep",
     "VisionMeasurement",
     "VisionTrack",
+    "sensors_in_words",
 ]

@@ -18,7 +18,19 @@ Point3 = tuple[float, float, float]
 Box = tuple[float, float, float, float]
 """Axis-aligned image box ``x1 y1 x2 y2`` in pixels."""
 SourceKind = Literal["V", "L", "VL"]
-"""Which sensor saw an object: vision only, LiDAR only, or both (paper, Table 3 "Name")."""
+"""Which sensors have an object: vision only, LiDAR only, or both (paper, Table 3 "Name"). One letter a sensor."""
+
+SENSOR_NAMES = {"V": "camera", "L": "LiDAR"}
+"""What people call the sensor of each letter."""
+
+
+def sensors_in_words(source: str) -> str:
+    """``camera only``, ``LiDAR only``, ``both sensors``."""
+    if len(source) == 2:
+        return "both sensors"
+    names = [SENSOR_NAMES[letter] for letter in source]
+    return f"{names[0]} only" if len(names) == 1 else ", ".join(names)
+
 
 VEHICLES = frozenset({"car", "truck", "bus", "motorcycle"})
 """Class names that may be a lead vehicle. Detector labels are mapped to the COCO names by the detector."""

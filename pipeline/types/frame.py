@@ -198,3 +198,10 @@ class Frame:
     streams: tuple[StreamHealth, ...] = ()
     timing_ms: Mapping[str, float] = field(default_factory=dict)
     detections_given: bool = False
+
+    @property
+    def picture_size(self) -> tuple[int, int] | None:
+        """(width, height) of the picture, or of the calibration where the picture itself is missing."""
+        if self.picture is not None:
+            return self.picture.bgr.shape[1], self.picture.bgr.shape[0]
+        return (self.camera.width, self.camera.height) if self.camera is not None else None

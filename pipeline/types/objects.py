@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -107,59 +107,148 @@ class VisionTrack:
 
 
 class Gate(NamedTuple):
-    """One test an object went through, with its number and limit; ``value`` is null when there was nothing to test."""
+    """One test an object went through, for people to read. No decision looks at gates: decisions read ``Conditions``,
+    and gates are made from the same answers."""
 
     name: str
+    """What the test is called where it is shown."""
     value: float | None
+    """The number that was tested; None when there was nothing to test."""
     limit: float
+    """What it was held against."""
     passed: bool
+    """Whether the object passed."""
+
+
+Each = TypeVar("Each")
+
+
+class Conditions(NamedTuple, Generic[Each]):
+    """One value for each condition that a lead must meet, in the order in which the first failure is the reason given:
+    what the object is, where it is, and only then how well it is known. So nothing in the next lane is said to wait for
+    its third sighting."""
+
+    vehicle: Each
+    """Its class is a vehicle's, or not known."""
+    distance: Each
+    """Its distance is known."""
+    size: Each
+    """It is as large as a vehicle, where only its size says what it is."""
+    ahead: Each
+    """It is ahead of the bumper."""
+    in_path: Each
+    """Its sightings so far say that it is in the path."""
+    confirmed: Each
+    """It was seen often enough."""
+    seen: Each
+    """It was seen in this frame, and its distance measured."""
+    placed: Each
+    """Its place against the path is known well enough."""
+
+
+Eligibility = Conditions[bool]
+"""Which conditions of a lead an object meets (``pipeline.decision.gates`` decides)."""
 
 
 @dataclass(frozen=True)
 class FusedObject:
-    """The paper's Table 3 row, widened by what the contract asks for. Frames and units as in the contract.
+    """One physical object: the paper's Table 3 row, widened by what the contract asks for, whose frames and units hold.
 
-    A V object whose distance nobody knows (no law for its class, box cut by the picture's edge, beyond the law's
-    reach) keeps its row: its place and distance are null, and it cannot be the CIPV.
+    A V object whose distance is not known (no law for its class, a box cut by the picture's edge, beyond the law's
+    reach) keeps its row; its place and distance are None, and it cannot be the CIPV.
 
-    source: which sensors' tracks it is made of. seen_by: which of them saw it in this frame; none: it is carried.
-    measured: its distance was measured in this frame; else it is a prediction.
-    in_path_probability: what its sightings so far say together, the fresh ones most; in_path where it is over a half.
-    lateral_mps: how fast it moves to the left of the path, over ground. crossing_s: until it is over the edge of it, or
-    out of it where it is in; null when its sideways speed leads nowhere. lidar_hits: sightings of its LiDAR track.
-    box_sides: ego x, y where the sight lines past its box's left and right edge are as far away as it is; null unless
-    the camera sees it now."""
+    Stages ask for capabilities (``ranged``, ``seen_by_lidar``); the letters of ``source`` and ``seen_by`` are for the
+    result.
+    """
 
     id: int
+    """The same from frame to frame, whichever sensors see the object."""
     source: SourceKind
+    """Which sensors' tracks it is made of."""
     label: str | None
+    """Its class, by the camera; None for what only the LiDAR has."""
     score: float | None
+    """The detector's score of that class, 0–1."""
     bbox: Box | None
+    """Its image box, pixels; None outside the picture."""
     bev: tuple[Point2, Point2, Point2, Point2] | None
+    """Its footprint from above: ego x, y of front left, front right, rear right, rear left."""
     cuboid: Cuboid | None
+    """The box around its LiDAR points; None without any."""
     closest_point: Point3 | None
+    """Ego x, y, z of the point of it that is nearest to the ego origin."""
     distance_m: float | None
+    """Horizontal range from the ego origin to that point."""
     distance_sigma_m: float | None
+    """Standard deviation of the distance."""
     velocity_mps: Point2 | None
+    """Relative to ego, x and y; None until it can be told."""
     seen_by: Literal["", "V", "L", "VL"]
+    """Which of its sensors saw it in this frame; none: it is carried."""
     hits: int
+    """Sightings so far, by the sensor that has more of them."""
     lidar_points: int
+    """Points of its last cluster."""
     lidar_track: int | None
+    """Id of its LiDAR track."""
     vision_track: int | None
+    """Id of its vision track."""
     gates: tuple[Gate, ...] = ()
+    """The tests it went through, for display."""
     speed_over_ground_mps: float | None = None
+    """None where own speed is not known."""
     moving: bool | None = None
+    """Whether it moves over the ground; None where own speed is not known."""
     ttc_s: float | None = None
+    """Time to collision; None while the gap does not shrink."""
     in_path: bool = False
+    """Whether ``in_path_probability`` is above a half."""
     in_path_probability: float | None = None
+    """What its sightings so far say together, the fresh ones most; None where its place is not known."""
     path_offset_m: float | None = None
+    """From the path's centre to the middle of its nearest face, positive to the left."""
     measured: bool = True
+    """Whether its distance was measured in this frame; otherwise it is a prediction."""
     lateral_mps: float | None = None
+    """Speed to the left of the path, over ground."""
     crossing_s: float | None = None
+    """Until it is over the edge of the path, or out of the path if it is in it; None when its sideways speed leads to
+    neither."""
     lidar_hits: int = 0
+    """Sightings of its LiDAR track."""
     box_sides: tuple[Point2, Point2] | None = None
+    """Ego x, y where the lines of sight past its box's left and right edge are as far away as the object; None unless
+    the camera sees it now."""
+    eligibility: Eligibility | None = None
+    """Which conditions of a lead it meets; None before it was judged."""
 
     @property
     def carried(self) -> bool:
         """Not seen in this frame: where it is now is a prediction."""
         return not self.seen_by
+
+    @property
+    def ranged(self) -> bool:
+        """A sensor that measures range follows it, today the LiDAR. Otherwise its distance and speed come from the
+        height of its image box, and are much less sure."""
+        return "L" in self.source
+
+    @property
+    def pictured(self) -> bool:
+        """The camera follows it, so that its class is known."""
+        return "V" in self.source
+
+    @property
+    def seen_by_camera(self) -> bool:
+        """The camera saw it in this frame."""
+        return "V" in self.seen_by
+
+    @property
+    def seen_by_lidar(self) -> bool:
+        """The LiDAR saw it in this frame."""
+        return "L" in self.seen_by
+
+    @property
+    def seen_by_two_sensors(self) -> bool:
+        """More than one sensor saw it in this frame, so no second look is needed to believe in it."""
+        return len(self.seen_by) > 1

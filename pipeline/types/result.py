@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.types.arrays import F32, F64, I32, Box
-from pipeline.types.frame import EgoState, StreamHealth
+from pipeline.types.frame import EgoState, Frame, StreamHealth
 from pipeline.types.lane import EgoLane
 from pipeline.types.objects import FusedObject, Ground, LidarTrack, Obstacle, VisionTrack
 
@@ -83,6 +83,23 @@ class SensorHealth:
     camera_age_ms: float | None
     camera_skew_ms: float | None
     ego_age_ms: float | None
+
+    @staticmethod
+    def of(frame: Frame) -> SensorHealth:
+        """The health of the sensors that a frame came from."""
+
+        def age_ms(t_ns: int | None) -> float | None:
+            return None if t_ns is None else (frame.t_ns - t_ns) / 1e6
+
+        sweep, picture = frame.sweep, frame.picture
+        picture_ns = picture.t_ns if picture is not None else None
+        return SensorHealth(
+            lidar_age_ms=age_ms(sweep.t_ns if sweep is not None else None),
+            lidar_points=len(sweep.points) if sweep is not None else None,
+            camera_age_ms=age_ms(picture_ns),
+            camera_skew_ms=(picture_ns - sweep.t_ns) / 1e6 if picture_ns is not None and sweep is not None else None,
+            ego_age_ms=age_ms(frame.ego.t_ns if frame.ego is not None else None),
+        )
 
 
 GROUND, UNCLUSTERED, DROPPED = -1, -2, -3

@@ -93,8 +93,8 @@ def open_detector(
     threads: int = 2,
     input_size: Size | None = None,
 ) -> Detector:
-    """Load a network by name or path; null: the default one (``pipeline.inference.model_registry``), with a note when that is
-    the embedded one.
+    """Load a network by name or path. Without one the default (``pipeline.inference.model_registry``), with a note when
+    that is the embedded network.
 
     picture_size (width, height): the input is given the picture's aspect where the graph permits. input_size (height,
     width), multiples of 32: that size instead, or DetectorError. DetectorMissing when there is no file, DetectorError

@@ -8,10 +8,11 @@ from functools import cache
 from pathlib import Path
 
 from pipeline.calibration.distance import Pair, collect_pairs, fit_laws
+from pipeline.detection import Detectors
 from pipeline.evaluation.lead_verdict import Judged, LeadRule, judge
 from pipeline.lanes.open_detector import usual_every
 from pipeline.params import preset, with_changes
-from pipeline.run import Detectors, Sensors, through
+from pipeline.run import Sensors, through
 from pipeline.sources import open_source
 from pipeline.types import Frame, Result
 from tests import looking

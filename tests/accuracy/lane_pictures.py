@@ -14,9 +14,9 @@ import numpy as np
 
 from pipeline.alignment.projection import Alignment, Pinhole
 from pipeline.common.geometry import F64
-from pipeline.lanes.road_lines import LaneState, follow, in_picture
+from pipeline.lanes.road_lines import LaneState, RoadView, follow, in_picture
 from pipeline.params import LaneParams
-from pipeline.types import U8, CameraCalibration, RawLanes
+from pipeline.types import U8, CameraCalibration, Moment, RawLanes
 from pipeline.types.lane import EgoLane
 
 EYE_HEIGHT_M = 1.4
@@ -52,7 +52,7 @@ def alone(raw: RawLanes, width: int, height: int) -> tuple[EgoLane | None, Align
     """The ego lane of a single uncalibrated picture, and the guessed camera it was seen with."""
     camera = guessed_camera(width, height)
     aligned = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
-    _, lane = follow(LaneState(), raw, aligned, None, None, None, UNSURE)
+    _, lane = follow(LaneState(), raw, RoadView(aligned), Moment(0, None, None, None), UNSURE)
     return lane, aligned
 
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.common.geometry import F64
+from pipeline.detection import Detectors, Detects
 from pipeline.params import Params
-from pipeline.run import Detectors, Detects, advance
+from pipeline.run import advance
 from pipeline.simulation import scenario
 from pipeline.simulation.drawing.road_markings import edge_paint_m
 from pipeline.simulation.scenario import Scenario

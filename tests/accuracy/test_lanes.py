@@ -14,18 +14,19 @@ import pytest
 
 from pipeline.alignment.projection import Pinhole
 from pipeline.common.fast_replace import evolve
+from pipeline.detection import Detectors, Detects, lanes_for
 from pipeline.evaluation.lead_verdict import judge
 from pipeline.lanes.classical import open_classical
 from pipeline.lanes.network import open_lane_network
-from pipeline.lanes.road_lines import LaneState, follow, road_plane
+from pipeline.lanes.road_lines import LaneState, RoadView, follow, road_plane
 from pipeline.params import Params
-from pipeline.run import Detectors, Detects, lanes_for, run, through
+from pipeline.run import run, through
 from pipeline.simulation.sensors.camera import calibration
 from pipeline.sources import open_source
-from pipeline.step import warm_up
-from pipeline.types import F64, GROUND, U8, Frame, RawLanes, Result
+from pipeline.types import F64, GROUND, U8, Frame, Moment, RawLanes, Result
 from pipeline.types.lane import EgoLane
 from pipeline.vision.detector import open_detector
+from pipeline.warm_up import warm_up
 from tests.accuracy import lane_pictures, lane_truth
 from tests.accuracy.drives import FOLDERS, RULE, SCORED_CLIPS, all_scored, drive
 from tests.accuracy.lane_marks import MARKS
@@ -109,7 +110,9 @@ def test_the_lane_is_kept_through_the_video(data_dir: Path, kind: str) -> None:
         raw = detector(data_dir, kind).detect(bgr) if looked else None
         camera = lane_pictures.guessed_camera(bgr.shape[1], bgr.shape[0])
         aligned = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
-        state, lane = follow(state, raw, aligned, None, None, 0.04 if index else None, lane_pictures.UNSURE)
+        state, lane = follow(
+            state, raw, RoadView(aligned), Moment(0, 0.04 if index else None, None, None), lane_pictures.UNSURE
+        )
         assert lane is not None
         assert lane.left is not None, index
         assert lane.right is not None, index

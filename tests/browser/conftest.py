@@ -18,9 +18,9 @@ from app.core.server_address import listen_socket
 from app.engine.engine import Engine
 from app.engine.session_recording import RecordingDesk
 from app.web.server import Server, create_app
+from pipeline.detection import detector_for
 from pipeline.inference.runtime import DetectorMissing
 from pipeline.params import Params
-from pipeline.run import detector_for
 from pipeline.sources import Source, open_source
 from pipeline.types import U8, RawBoxes
 from pipeline.vision.detector import Detector

@@ -14,8 +14,9 @@ from typing import Any
 
 import pytest
 
+from pipeline.detection import Detectors, detector_for
 from pipeline.params import preset
-from pipeline.run import Detectors, detector_for, through
+from pipeline.run import through
 from pipeline.sources import open_source
 from pipeline.types.result_json import to_json
 

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.common.geometry import Cuboid
-from pipeline.types import Box, FusedObject, LidarTrack, Obstacle, SourceKind, VisionTrack
+from pipeline.types import Box, EgoState, FusedObject, LidarTrack, Moment, Obstacle, SourceKind, VisionTrack
+
+
+def moment(ego: EgoState | None = None, dt_s: float | None = None) -> Moment:
+    """A frame's time and own motion; without arguments a first frame of a car that knows nothing of its own motion."""
+    return Moment(0, dt_s, ego, ego)
 
 
 def cuboid(x: float, y: float, length: float = 4.0, width: float = 1.8, height: float = 1.5) -> Cuboid:

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.detection import Detectors, LiveDetectors, detect, detector_for, lanes_for
 from pipeline.inference.model_registry import EMBEDDED, find, register
 from pipeline.params import Params, SyncParams
-from pipeline.run import Detectors, LiveDetectors, advance, detect, detector_for, lanes_for, run_live
+from pipeline.run import advance, run_live
 from pipeline.sources import open_source
 from pipeline.step import State
 from pipeline.types import U8, Frame, Picture, RawBoxes, RawLanes

@@ -13,7 +13,8 @@ import velodyne_decoder
 from numba.core.dispatcher import Dispatcher
 from pipeline.params import Params
 from pipeline.sources import open_source
-from pipeline.step import State, step, warm_up
+from pipeline.step import State, step
+from pipeline.warm_up import warm_up
 from pipeline.types import RawBoxes, RawLanes
 
 kernels = [thing for thing in gc.get_objects() if isinstance(thing, Dispatcher)]

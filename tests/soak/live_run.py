@@ -19,12 +19,12 @@ import yaml
 from app.engine.engine import Engine
 from app.engine.session_recording import RecordingDesk
 from pipeline.common.data_dir import data_dir
+from pipeline.detection import detector_for, lanes_for
 from pipeline.inference.model_registry import EMBEDDED
 from pipeline.lanes.classical import NAME as CLASSICAL
 from pipeline.lanes.open_detector import LaneDetector, usual_every
 from pipeline.params import Params
 from pipeline.replay.faults import Fault
-from pipeline.run import detector_for, lanes_for
 from pipeline.sources import open_any
 from pipeline.types.source import AnySource
 from tests.conftest import ROOT

@@ -12,8 +12,8 @@ import pytest
 from app.core.line import DetectionCache, Line
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors
 from pipeline.sources import open_source
 from pipeline.vision.detector import Detector, open_detector
 from tests.conftest import ROOT

@@ -15,7 +15,8 @@ from pipeline.common.user_file_errors import parse_yaml
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
 
 if TYPE_CHECKING:
-    from pipeline.run import Detectors, Sensors
+    from pipeline.detection import Detectors
+    from pipeline.run import Sensors
     from pipeline.types import Route
     from pipeline.types.source import AnySource, Source
     from pipeline.vision.detector import Detector
@@ -113,8 +114,8 @@ class LineOptions:
     def open_detectors(self, source: AnySource, sensors: Sensors = "both") -> Detectors:
         """Everything that looks at the source's pictures, with what there is to say about it. None for LiDAR alone, and
         where detections come with them."""
+        from pipeline.detection import Detectors, brings_detections, lanes_for
         from pipeline.lanes.open_detector import usual_every
-        from pipeline.run import Detectors, brings_detections, lanes_for
 
         every = self.every()
         if sensors == "lidar" or brings_detections(source):
@@ -127,8 +128,8 @@ class LineOptions:
     def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
         """The detector for the source's pictures, with what there is to say about it. A named one that is missing is
         an error, and so is none for a camera on its own; else a sentence says so and LiDAR goes on alone."""
+        from pipeline.detection import detector_for
         from pipeline.inference.runtime import DetectorMissing
-        from pipeline.run import detector_for
 
         try:
             detector = detector_for(source, self.detector)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from app.drive.open_recording import Recording
 from app.labels.errors import ActRefused, NoSuchLabel
-from pipeline.step import spare_what_is_loaded
+from pipeline.common.garbage_collection import freeze_loaded_objects
 
 if TYPE_CHECKING:
     from app.labels.store.database import Database
@@ -52,7 +52,7 @@ class KeptLabels:
         with self._opening:
             if self._database is None:
                 self._database = (self._open_later or _temporary)()
-                spare_what_is_loaded()
+                freeze_loaded_objects()
             return self._database
 
 

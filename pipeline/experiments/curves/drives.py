@@ -26,8 +26,9 @@ from pipeline.simulation.sensors.rig import Sensors
 from pipeline.simulation.sensors.truth_lanes import lane_points
 from pipeline.simulation.world import world
 from pipeline.simulation.world.world import ActorState, World
-from pipeline.step import State, step, warm_up
+from pipeline.step import State, step
 from pipeline.types import Frame, Path, Result
+from pipeline.warm_up import warm_up
 
 LIDAR_ALONE = "LiDAR alone"
 SOURCES: Mapping[str, Mapping[str, bool]] = {

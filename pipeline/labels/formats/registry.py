@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from pipeline.common.errors import BadInput
-from pipeline.common.gc_pause import uncollected
+from pipeline.common.garbage_collection import gc_paused
 from pipeline.labels.formats import (
     coco,
     kitti,
@@ -50,7 +50,7 @@ def export_labels(labels: LabelSet, drive: Drive, name: FormatName, out: Path) -
     the recording has not (KITTI: a camera).
     """
     kind = FORMATS[name]
-    with uncollected():
+    with gc_paused():
         placed = native.onto(check(labels, "these labels"), drive, "these labels")
         kept, lost = reduce(placed.labels, kind.holds)
         return (*placed.notes, *lost, *kind.write(kept, drive, out))
@@ -61,7 +61,7 @@ def import_labels(path: Path, drive: Drive, name: FormatName, origin: Origin) ->
     kind = FORMATS[name]
     if not path.exists():
         raise BadInput(f"{path}: no such file")
-    with uncollected():
+    with gc_paused():
         found = kind.read(path, drive, origin)
         labels = check(found.labels, str(path))
         check_extrinsic(labels, drive, str(path))

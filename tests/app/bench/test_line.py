@@ -12,8 +12,8 @@ from rich.console import Console
 
 from app.bench import line
 from app.commands.bench import _table
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors
 from pipeline.sources import open_source
 from pipeline.types import U8, RawBoxes, RawLanes
 from pipeline.vision.detector import Detector, open_detector

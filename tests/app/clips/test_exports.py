@@ -25,8 +25,9 @@ from app.drive.open_recording import Recipe
 from app.drive.open_recording import Recording as DriveRecording
 from app.views.colors import rgb
 from pipeline.common.errors import BadInput
+from pipeline.detection import Detectors, detector_for
 from pipeline.params import Params
-from pipeline.run import Detectors, detector_for, run
+from pipeline.run import run
 from pipeline.sources import open_source
 from pipeline.step import State, step
 from pipeline.types import Frame, Picture, Result

@@ -12,8 +12,9 @@ import pytest
 
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
+from pipeline.detection import Detectors, Detects, detector_for
 from pipeline.params import Params, with_changes
-from pipeline.run import Detectors, Detects, detector_for, run
+from pipeline.run import run
 from pipeline.sources import open_source
 from pipeline.types import Frame, RawBoxes, Result
 from pipeline.types.result_json import to_json

@@ -15,8 +15,9 @@ from app.drive.full_run import DriveRun, digest
 from app.drive.open_recording import Recipe
 from app.drive.open_recording import Recording as DriveRecording
 from app.drive.run_registry import MOST_KEPT, MOST_UNKEPT, NoSuchRun, RunBook, RunRefused
+from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
-from pipeline.run import Detectors, Sensors, run
+from pipeline.run import Sensors, run
 from pipeline.step import State, step
 from tests.app.engine.recording_helpers import CountingDetector, Recording, SlowDetector
 

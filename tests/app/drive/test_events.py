@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from app.drive.events import DISAGREEMENT_FRAMES, Event, find_events, recorded_marks
 from app.drive.frame_rows import Objects, Row, objects_of, row_of
+from pipeline.detection import Detectors, detector_for
 from pipeline.params import Params
-from pipeline.run import Detectors, detector_for, run
+from pipeline.run import run
 from pipeline.sources import open_source
 from pipeline.types.source import Mark
 from tests.app.drive.rows import beside, drive, inside, objects, row

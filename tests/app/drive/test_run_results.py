@@ -10,11 +10,11 @@ import pytest
 from app.drive.full_run import DriveRun
 from app.drive.open_recording import RULE
 from app.drive.run_results import results_of, seen_of
+from pipeline.detection import Detectors, detect
 from pipeline.evaluation.scores.drive import Rules, score_drive
 from pipeline.evaluation.scores.figures import FIGURES
 from pipeline.evaluation.scores.truth import of_source
 from pipeline.params import Params
-from pipeline.run import Detectors, detect
 from pipeline.sources import open_source
 from pipeline.step import State, step
 from pipeline.types import Result

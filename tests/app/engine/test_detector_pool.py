@@ -10,11 +10,11 @@ from app.commands.support.options import LineOptions
 from app.engine.detector_pool import DetectorPool
 from app.engine.snapshot import Notice
 from pipeline.common.errors import BadInput
+from pipeline.detection import Detectors
 from pipeline.inference.runtime import DetectorMissing
 from pipeline.lanes.classical import open_classical
 from pipeline.lanes.network import open_lane_network
 from pipeline.lanes.open_detector import usual_every
-from pipeline.run import Detectors
 from pipeline.simulation import scenario
 from pipeline.simulation.drive_as_scenario import to_yaml
 from pipeline.sources import open_source

@@ -7,8 +7,8 @@ import pytest
 from app.core.line import WARM_UP_FRAMES, DetectionCache, Line
 from app.drive import compute_scheduler
 from app.engine.snapshot import Snapshot
+from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
-from pipeline.run import Detectors
 from pipeline.step import State
 from tests.app.engine.recording_helpers import CountingDetector, CountingLanes, Recording, SlowDetector
 from tests.app.engine.running import WAIT_S, Start, at, body, played

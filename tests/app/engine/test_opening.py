@@ -13,9 +13,9 @@ from app.core.line import DetectionCache, Line
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
 from pipeline.common.progress import Progress
+from pipeline.detection import Detectors
 from pipeline.inference.runtime import DetectorMissing
 from pipeline.params import Params
-from pipeline.run import Detectors
 from pipeline.types.source import Source
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.app.engine.running import WAIT_S, Start, at

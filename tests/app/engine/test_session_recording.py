@@ -16,10 +16,11 @@ from app.engine.engine import Engine
 from app.engine.session_recording import RecordingDesk, new_session
 from app.web.server import create_app
 from app.web.source_catalog import sessions
+from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
 from pipeline.recording.segments import Segments
 from pipeline.recording.session_source import Mark, SessionSource
-from pipeline.run import Detectors, run
+from pipeline.run import run
 from pipeline.types.result_json import to_json
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.app.waiting import Runs, loop_apart

@@ -17,7 +17,7 @@ from app.labels.service.desk import LabelDesk
 from app.labels.store.database import Database
 from app.web.server import Server, create_app
 from pipeline.params import Params
-from pipeline.step import warm_up
+from pipeline.warm_up import warm_up
 from tests.app.engine.recording_helpers import Recording, opener
 from tests.app.web.serving import WAIT_S
 

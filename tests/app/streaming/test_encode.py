@@ -17,8 +17,8 @@ from app.streaming.encode import Encoder
 from app.streaming.picture import MAX_WIDTH_PX, encode_picture, width_for
 from app.streaming.points import UNKNOWN_AGE, UNSEEN
 from pipeline.alignment.projection import resolve
+from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
-from pipeline.run import Detectors
 from pipeline.types import DROPPED, GROUND, U8, UNCLUSTERED, Picture
 from pipeline.types.lane import EgoLane, LaneLine, Side
 from pipeline.types.result_json import to_json

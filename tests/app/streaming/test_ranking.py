@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from app.streaming.ranking import BEHIND, ranking, ranking_json
+from pipeline.detection import Detectors, detector_for
 from pipeline.params import Params
-from pipeline.run import Detectors, detector_for, run
+from pipeline.run import run
 from pipeline.sources import open_source
 from pipeline.types import Cipv, Gate, Rejection, Result
 from tests.app.engine.recording_helpers import CountingDetector, Recording

@@ -25,8 +25,8 @@ from app.streaming.picture import MAX_WIDTH_PX
 from app.streaming.stream import FRAMES_UNDER_WAY, Stream
 from app.web.server import Server
 from pipeline.common.geometry import Cuboid
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors
 from pipeline.types import Picture
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 

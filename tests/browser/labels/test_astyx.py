@@ -19,13 +19,13 @@ from app.drive.run_results import results_of
 from app.engine.engine import Engine
 from app.engine.session_recording import RecordingDesk
 from pipeline.common.geometry import Cuboid, closest_on_polygon
+from pipeline.detection import detector_for
 from pipeline.evaluation.scores.drive import Rules, score_drive
 from pipeline.evaluation.scores.figures import FIGURES
 from pipeline.evaluation.scores.truth import of_labels
 from pipeline.fusion.vehicle_sizes import largest_size_m
 from pipeline.labels.formats.native import from_json
 from pipeline.params import Params
-from pipeline.run import detector_for
 from pipeline.sources import open_source
 from pipeline.types.source import TruthObject
 from tests.browser.conftest import OpenPage, Site

@@ -13,8 +13,8 @@ from pipeline.decision.cipv import CipvState, choose
 from pipeline.decision.object_motion import describe
 from pipeline.params import AccParams, CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
-from pipeline.types import AccCommand, Cipv, EgoState, FusedObject
-from tests.pipeline.build import fused
+from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Situation
+from tests.pipeline.build import fused, moment
 
 PARAMS = AccParams(set_speed_kmh=108.0, min_gap_m=5.0, time_gap_s=1.5, ttc_limit_s=2.5, kp=2.0, ki=0.05)
 PATH = corridor(None, PathParams(half_width_m=1.5))
@@ -23,8 +23,8 @@ PATH = corridor(None, PathParams(half_width_m=1.5))
 def command(speed_mps: float, gap_m: float | None, *others: FusedObject, state: AccState | None = None) -> AccCommand:
     lead = None if gap_m is None else Cipv(99, gap_m, None, None, "")
     ego = EgoState(0, speed_mps)
-    objects = choose(CipvState(), describe(others, ego, MotionParams()), PATH, ego, None, CipvParams())[1].objects
-    _, result = control(state or AccState(), ego, lead, objects, PATH, 0.1, PARAMS)
+    objects = choose(CipvState(), describe(others, ego, MotionParams()), PATH, moment(ego), CipvParams())[1].objects
+    _, result = control(state or AccState(), Situation(moment(ego, 0.1), PATH, objects, lead), PARAMS)
     assert result is not None
     return result
 
@@ -92,7 +92,7 @@ def test_it_names_the_lead_that_it_slows_down_for(distance_m: float | None, obje
 
 
 def test_no_ego_speed_no_command() -> None:
-    state, result = control(AccState(5.0, 1.0), None, None, (), PATH, 0.1, PARAMS)
+    state, result = control(AccState(5.0, 1.0), Situation(moment(None, 0.1), PATH, (), None), PARAMS)
     assert result is None
     assert state == AccState()
 
@@ -128,7 +128,7 @@ def test_approaching_a_standing_car_from_100_m_at_72_km_h_the_car_stops_before_i
     speed, gap, state = 20.0, 100.0, AccState()
     for _ in range(1200):
         ego = EgoState(0, speed)
-        state, result = control(state, ego, Cipv(1, gap, speed, None, ""), (), PATH, 0.05, defaults)
+        state, result = control(state, Situation(moment(ego, 0.05), PATH, (), Cipv(1, gap, speed, None, "")), defaults)
         assert result is not None
         speed = max(speed + result.accel_mps2 * 0.05, 0.0)
         gap -= speed * 0.05
@@ -141,16 +141,16 @@ def test_where_nobody_knows_the_way_it_gets_no_faster() -> None:
     down for a lead comes first all the same, and from standstill it may creep on."""
     vague = dataclasses.replace(PATH, usable=False, reach_m=12.0, doubt="path known for 12 m only")
     for speed_mps, wanted_mps in ((20.0, 20.0), (0.0, 3.0)):
-        _, held = control(AccState(), EgoState(0, speed_mps), None, (), vague, 0.1, PARAMS)
+        _, held = control(AccState(), Situation(moment(EgoState(0, speed_mps), 0.1), vague, (), None), PARAMS)
         assert held is not None
         assert held.desired_speed_mps == wanted_mps
         assert held.reason == "path known for 12 m only: no faster than now"
-    eager = AccState(integral_m=50.0, error_mps=0.0)
-    assert control(eager, EgoState(0, 20.0), None, (), PATH, 0.1, PARAMS)[1].accelerator > 0.0  # type: ignore[union-attr]
-    _, held = control(eager, EgoState(0, 20.0), None, (), vague, 0.1, PARAMS)
+    eager, fast = AccState(integral_m=50.0, error_mps=0.0), moment(EgoState(0, 20.0), 0.1)
+    assert control(eager, Situation(fast, PATH, (), None), PARAMS)[1].accelerator > 0.0  # type: ignore[union-attr]
+    _, held = control(eager, Situation(fast, vague, (), None), PARAMS)
     assert held is not None
     assert held.accelerator == 0.0, "whatever the integral has gathered"
-    _, follows = control(AccState(), EgoState(0, 20.0), Cipv(1, 20.0, None, None, ""), (), vague, 0.1, PARAMS)
+    _, follows = control(AccState(), Situation(fast, vague, (), Cipv(1, 20.0, None, None, "")), PARAMS)
     assert follows is not None
     assert follows.state == "follow"
     assert follows.desired_speed_mps == pytest.approx(10.0)

@@ -13,8 +13,8 @@ from pipeline.decision.cipv import CipvState, choose
 from pipeline.decision.object_motion import describe
 from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams, preset
 from pipeline.path.corridor import corridor
-from pipeline.types import AccCommand, EgoState, FusedObject
-from tests.pipeline.build import fused
+from pipeline.types import AccCommand, EgoState, FusedObject, Situation
+from tests.pipeline.build import fused, moment
 
 PARAMS = AebParams(margin_m=1.0, build_up_s=0.3, confirm_frames=2)
 PATH = corridor(None, PathParams(half_width_m=1.5))
@@ -30,9 +30,9 @@ def decide(
     params: AebParams = PARAMS,
 ) -> tuple[AebState, AccCommand]:
     ego, state = EgoState(0, speed_mps), state or AebState()
-    judged, lead, _, _ = choose(CipvState(), describe(objects, ego, MotionParams()), PATH, ego, None, CipvParams())[1]
+    judged, lead, _, _ = choose(CipvState(), describe(objects, ego, MotionParams()), PATH, moment(ego), CipvParams())[1]
     for _ in range(frames):
-        state, command = guard(state, acc, ego, lead, judged, PATH, 0.1, params, AccParams())
+        state, command = guard(state, acc, Situation(moment(ego, 0.1), PATH, judged, lead), params, AccParams())
     assert command is not None
     return state, command
 
@@ -130,7 +130,10 @@ def test_switched_off_it_changes_nothing() -> None:
 
 
 def test_without_ego_speed_there_is_no_command() -> None:
-    assert guard(AebState(2), None, None, None, (), PATH, 0.1, PARAMS, AccParams()) == (AebState(), None)
+    assert guard(AebState(2), None, Situation(moment(None, 0.1), PATH, (), None), PARAMS, AccParams()) == (
+        AebState(),
+        None,
+    )
 
 
 @given(st.floats(2.0, 150.0), st.floats(0.1, 60.0))

@@ -14,14 +14,14 @@ from pipeline.decision.object_motion import describe
 from pipeline.params import CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
 from pipeline.types import Cipv, EgoState, FusedObject, Path
-from tests.pipeline.build import fused
+from tests.pipeline.build import fused, moment
 
 PARAMS = CipvParams(confirm_hits=3, hysteresis_m=0.3)
 PATH = corridor(None, PathParams(half_width_m=1.5))
 
 
 def decide(*objects: FusedObject, last: int | None = None) -> tuple[Cipv | None, dict[int, str]]:
-    _, lead, _, rejected = choose(CipvState(last), objects, PATH, None, None, PARAMS)[1]
+    _, lead, _, rejected = choose(CipvState(last), objects, PATH, moment(), PARAMS)[1]
     return lead, {row.id: row.reason for row in rejected}
 
 
@@ -72,7 +72,7 @@ def test_who_may_lead(item: FusedObject) -> None:
 
 
 def test_the_gate_that_stopped_it_carries_number_and_limit() -> None:
-    (item,), lead, _, _ = choose(CipvState(), (fused(1, 20.0, 3.0),), PATH, None, None, PARAMS)[1]
+    (item,), lead, _, _ = choose(CipvState(), (fused(1, 20.0, 3.0),), PATH, moment(), PARAMS)[1]
     assert lead is None
     failed = {gate.name: (gate.value, gate.limit) for gate in item.gates if not gate.passed}
     assert failed["path_offset"] == (pytest.approx(3.0), pytest.approx(1.5))
@@ -108,7 +108,7 @@ def test_in_path_is_relative_to_a_curved_path() -> None:
     """On a 200 m left arc the car 40 m ahead stands 4 m to the left; the one straight ahead is in the next lane."""
     bent = corridor(EgoState(0, 20.0, 0.1), PathParams(half_width_m=1.5))
     (on_arc, straight), lead, _, _ = choose(
-        CipvState(), (fused(1, 40.0, 4.0), fused(2, 40.0, 0.0)), bent, None, None, PARAMS
+        CipvState(), (fused(1, 40.0, 4.0), fused(2, 40.0, 0.0)), bent, moment(), PARAMS
     )[1]
     assert lead is not None
     assert lead.id == 1
@@ -167,7 +167,7 @@ def over_time(frames: list[tuple[FusedObject, ...]], path: Path = PATH, ego: Ego
     state, choices = CipvState(), []
     for k, objects in enumerate(frames):
         objects = describe(objects, ego, MotionParams())
-        state, choice = choose(state, objects, path, ego, 0.1 if k else None, PARAMS)
+        state, choice = choose(state, objects, path, moment(ego, 0.1 if k else None), PARAMS)
         choices.append(choice)
     return choices
 
@@ -214,14 +214,14 @@ def test_nobody_beside_is_next() -> None:
 
 def test_where_the_path_is_not_known_nobody_new_leads() -> None:
     vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 5.0))
-    (item,), lead, _, (why,) = choose(CipvState(), (fused(1, 40.0),), vague, None, None, PARAMS)[1]
+    (item,), lead, _, (why,) = choose(CipvState(), (fused(1, 40.0),), vague, moment(), PARAMS)[1]
     assert lead is None
     assert why.reason == "its place against the path is uncertain by 5.0 m"
     assert item.in_path
     assert item.in_path_probability == pytest.approx(0.51, abs=0.01)
-    assert choose(CipvState(1), (fused(1, 40.0),), vague, None, None, PARAMS)[1].lead is not None, "who led may stay"
+    assert choose(CipvState(1), (fused(1, 40.0),), vague, moment(), PARAMS)[1].lead is not None, "who led may stay"
     unusable = dataclasses.replace(PATH, usable=False, profile_m=np.full(len(PATH.center), 1.5))
-    assert choose(CipvState(), (fused(1, 40.0),), unusable, None, None, PARAMS)[1].lead is None
+    assert choose(CipvState(), (fused(1, 40.0),), unusable, moment(), PARAMS)[1].lead is None
 
 
 def ids(choice: Choice) -> set[int]:
@@ -233,7 +233,7 @@ def sightings(*places: FusedObject) -> list[Choice]:
     state, ego, found = CipvState(), EgoState(0, 20.0, 0.0), []
     for item in places:
         seen = describe([item], ego, MotionParams())
-        state, choice = choose(state, tuple(seen), PATH, ego, 0.1, PARAMS)
+        state, choice = choose(state, tuple(seen), PATH, moment(ego, 0.1), PARAMS)
         found.append(choice)
     return found
 

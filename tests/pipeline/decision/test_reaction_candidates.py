@@ -12,7 +12,7 @@ from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import CipvParams, MotionParams, PathParams
 from pipeline.path.corridor import corridor
 from pipeline.types import EgoState, FusedObject
-from tests.pipeline.build import fused
+from tests.pipeline.build import fused, moment
 
 PATH = corridor(None, PathParams(half_width_m=1.5))
 
@@ -20,7 +20,7 @@ PATH = corridor(None, PathParams(half_width_m=1.5))
 def judged(item: FusedObject, ego_mps: float | None = 20.0) -> FusedObject:
     """The object as the line describes it before anybody reacts."""
     ego = EgoState(0, ego_mps) if ego_mps is not None else None
-    (item,) = choose(CipvState(), describe([item], ego, MotionParams()), PATH, ego, None, CipvParams())[1].objects
+    (item,) = choose(CipvState(), describe([item], ego, MotionParams()), PATH, moment(ego), CipvParams())[1].objects
     return item
 
 

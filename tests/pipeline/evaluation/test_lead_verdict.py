@@ -13,7 +13,7 @@ from pipeline.path.corridor import corridor
 from pipeline.step import State, step
 from pipeline.types import Frame, FusedObject, Result
 from pipeline.types.source import TruthObject
-from tests.pipeline.build import cuboid, fused
+from tests.pipeline.build import cuboid, fused, moment
 
 RULE = LeadRule()
 PATH = corridor(None, PathParams())
@@ -24,7 +24,7 @@ def labelled(x: float, y: float, label: str = "Car") -> TruthObject:
 
 
 def believed(*objects: FusedObject) -> Result:
-    judged, lead, _, rejected = choose(CipvState(), objects, PATH, None, None, CipvParams())[1]
+    judged, lead, _, rejected = choose(CipvState(), objects, PATH, moment(), CipvParams())[1]
     _, empty = step(State(), Frame(0, "000000", 0), Params())
     return dataclasses.replace(empty, objects=judged, cipv=lead, rejected=rejected)
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.detection import Detectors
 from pipeline.experiments.experiment import Replay
-from pipeline.run import Detectors, run
+from pipeline.run import run
 from pipeline.simulation.drive_as_scenario import to_yaml
 from pipeline.sources import open_source
 from pipeline.types import Result

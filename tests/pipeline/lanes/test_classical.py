@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from pipeline.lanes.classical import horizon_row, open_classical
-from pipeline.lanes.road_lines import LaneState, follow
+from pipeline.lanes.road_lines import LaneState, RoadView, follow
 from pipeline.params import LaneParams
 from pipeline.types import U8
+from tests.pipeline.build import moment
 from tests.pipeline.lanes.lane_scenes import GROUND_M, HEIGHT, STRAIGHT, WIDTH, aligned, camera
 
 ASPHALT, WHITE, YELLOW = (88, 86, 84), (235, 235, 235), (60, 190, 225)
@@ -32,7 +33,7 @@ def road(left=WHITE, right=WHITE, *, light: float = 1.0, noise: float = 3.0, lin
 
 def lane_in(bgr: U8):
     raw = open_classical(camera()).detect(bgr)
-    _, lane = follow(LaneState(), raw, aligned(), None, None, None, LaneParams(mount_height_m=-GROUND_M))
+    _, lane = follow(LaneState(), raw, RoadView(aligned()), moment(), LaneParams(mount_height_m=-GROUND_M))
     assert lane is not None
     return lane
 

@@ -8,11 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.alignment.projection import Angular
-from pipeline.lanes.road_lines import LaneState, Pitch, follow, in_picture, measure, polylines, road_plane
+from pipeline.lanes.road_lines import LaneState, Pitch, RoadView, follow, in_picture, measure, polylines, road_plane
 from pipeline.lidar.ground import Ground
 from pipeline.params import LaneParams
 from pipeline.types import EgoState, RawLanes
 from pipeline.types.lane import EgoLane
+from tests.pipeline.build import moment
 from tests.pipeline.lanes.lane_scenes import FLAT, GROUND_M, STRAIGHT, aligned, paint
 
 PARAMS = LaneParams(mount_height_m=-GROUND_M)
@@ -21,7 +22,7 @@ SURE, UNSURE = Pitch(0.0, 1e-4), Pitch(0.0, 0.014)
 
 def seen(raw: RawLanes, through=None, params: LaneParams = PARAMS, **more) -> EgoLane:
     """The ego lane of one picture alone."""
-    _, lane = follow(LaneState(), raw, through or aligned(), None, None, None, params, **more)
+    _, lane = follow(LaneState(), raw, RoadView(through or aligned(), **more), moment(), params)
     assert lane is not None
     return lane
 
@@ -98,7 +99,9 @@ def test_clutter_alone_is_no_lane() -> None:
     state, sure = LaneState(), 0
     for seed in range(12):
         raw = paint((), clutter=150, seed=seed)
-        state, lane = follow(state, raw, aligned(), None, EgoState(0, 15.0, 0.0), 0.1 if seed else None, PARAMS)
+        state, lane = follow(
+            state, raw, RoadView(aligned()), moment(EgoState(0, 15.0, 0.0), 0.1 if seed else None), PARAMS
+        )
         assert lane is not None
         sure += all(line is not None and line.quality > 0.5 for line in (lane.left, lane.right))
     assert sure == 0
@@ -138,7 +141,7 @@ def test_the_calibration_knows_the_roads_height_better_than_the_parameter_and_a_
     low = PARAMS.model_copy(update={"mount_height_m": -GROUND_M / 3})
     assert seen(paint(), params=low).width_m != pytest.approx(3.5, abs=0.2)
     assert seen(paint(), params=low, road_z_m=GROUND_M).width_m == pytest.approx(3.5, abs=0.1)
-    _, lane = follow(LaneState(plane=FLAT), paint(), aligned(), None, None, None, low, road_z_m=GROUND_M / 3)
+    _, lane = follow(LaneState(plane=FLAT), paint(), RoadView(aligned(), road_z_m=GROUND_M / 3), moment(), low)
     assert lane is not None
     assert lane.width_m == pytest.approx(3.5, abs=0.1)
 
@@ -205,26 +208,30 @@ def test_the_road_is_where_the_lidar_sees_it() -> None:
 
 
 def test_the_roads_plane_is_remembered_and_moves_slowly() -> None:
-    state, lane = follow(LaneState(), paint(), aligned(), _sloping(0.0, GROUND_M), None, None, LaneParams())
+    state, lane = follow(LaneState(), paint(), RoadView(aligned(), _sloping(0.0, GROUND_M)), moment(), LaneParams())
     assert lane is not None
     assert lane.width_m == pytest.approx(3.5, abs=0.1)
     for _ in range(30):
-        state, lane = follow(state, paint(), aligned(), _sloping(0.0, GROUND_M), None, 0.1, LaneParams())
-    state, lane = follow(state, paint(), aligned(), _sloping(0.0, GROUND_M - 0.2), None, 0.1, LaneParams())
+        state, lane = follow(
+            state, paint(), RoadView(aligned(), _sloping(0.0, GROUND_M)), moment(dt_s=0.1), LaneParams()
+        )
+    state, lane = follow(
+        state, paint(), RoadView(aligned(), _sloping(0.0, GROUND_M - 0.2)), moment(dt_s=0.1), LaneParams()
+    )
     assert lane is not None
     assert lane.plane[2] == pytest.approx(GROUND_M - 0.02, abs=1e-6)
-    _, blind = follow(state, paint(), aligned(), None, None, 0.1, LaneParams())
+    _, blind = follow(state, paint(), RoadView(aligned()), moment(dt_s=0.1), LaneParams())
     assert blind is not None
     assert blind.plane == pytest.approx(lane.plane)
 
 
 def test_before_a_detector_has_looked_there_is_no_lane_and_afterwards_its_age_counts() -> None:
-    state, nothing = follow(LaneState(), None, aligned(), None, None, None, PARAMS)
+    state, nothing = follow(LaneState(), None, RoadView(aligned()), moment(), PARAMS)
     assert nothing is None
-    state, lane = follow(state, paint(), aligned(), None, None, 0.1, PARAMS)
+    state, lane = follow(state, paint(), RoadView(aligned()), moment(dt_s=0.1), PARAMS)
     assert lane is not None
     assert (lane.source, lane.age_s) == ("drawn", 0.0)
-    _, later = follow(state, None, aligned(), None, None, 0.2, PARAMS)
+    _, later = follow(state, None, RoadView(aligned()), moment(dt_s=0.2), PARAMS)
     assert later is not None
     assert later.age_s == pytest.approx(0.2)
     assert later.left is not None
@@ -249,7 +256,7 @@ def test_the_pitch_stays_where_it_is(curvature: float) -> None:
     state = LaneState()
     for k in range(20):
         raw = paint(lines, noise_px=1.5, numbered=True, seed=k, x_m=(4.0, 55.0))
-        state, lane = follow(state, raw, aligned(), None, EgoState(0, 0.0, 0.0), 0.1 if k else None, PARAMS)
+        state, lane = follow(state, raw, RoadView(aligned()), moment(EgoState(0, 0.0, 0.0), 0.1 if k else None), PARAMS)
     assert state.pitch is not None
     assert state.pitch.rad == pytest.approx(0.0, abs=1.5e-3)
     assert lane is not None

@@ -19,8 +19,9 @@ from pipeline.common.fast_replace import evolve
 from pipeline.experiments.curves import scenarios
 from pipeline.experiments.curves.drives import Moment, judge, moments, seen
 from pipeline.params import Params, with_changes
-from pipeline.step import State, step, warm_up
+from pipeline.step import State, step
 from pipeline.types import CameraCalibration, Frame, Result
+from pipeline.warm_up import warm_up
 
 BREAKS_S, ENDS_S = 4.0, 7.0
 """In the bend from 3 s on."""

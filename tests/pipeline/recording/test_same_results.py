@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
+from pipeline.detection import Detectors, detector_for
 from pipeline.params import Params
 from pipeline.recording.save import save
-from pipeline.run import Detectors, detector_for, run
+from pipeline.run import run
 from pipeline.sources import open_source
 from pipeline.types.result_json import to_json
 from pipeline.types.source import Source

@@ -8,8 +8,9 @@ from typing import Any, Never
 import numpy as np
 import pytest
 
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors, Sensors, run
+from pipeline.run import Sensors, run
 from pipeline.simulation.closed_loop import Setup, drive
 from pipeline.simulation.drive_as_scenario import as_driven, to_yaml
 from pipeline.simulation.scenario import Scenario, load, parse

@@ -16,10 +16,11 @@ from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.web.server import create_app
 from pipeline.calibration.edge_match import FEWEST
+from pipeline.detection import Detectors
 from pipeline.params import Params, from_yaml, preset, with_changes
 from pipeline.recording.provenance import About
 from pipeline.recording.session_writer import SessionWriter
-from pipeline.run import Detectors, run
+from pipeline.run import run
 from pipeline.sources import open_source
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.app.web.serving import WAIT_S, running, serving

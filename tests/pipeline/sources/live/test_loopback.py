@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.detection import Detectors, detector_for
 from pipeline.params import Params
 from pipeline.replay.messages import of_frame, of_recording
-from pipeline.run import Detectors, advance, detector_for
+from pipeline.run import advance
 from pipeline.sources import open_source
 from pipeline.sources.live.check import check
 from pipeline.sources.live.lidar import LidarInput

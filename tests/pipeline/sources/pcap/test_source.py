@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors, run
+from pipeline.run import run
 from pipeline.sources import Source, SourceError, open_source
 from tests.pipeline.formats.velodyne.streams import PRODUCT, START_NS, STEP_NS, mrpt, with_byte
 from tests.pipeline.sources.captures import RIG, lidar, pcap, pcapng, sentences, write_capture, write_video

@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors, run
+from pipeline.run import run
 from pipeline.sources import SourceError, open_source
 from tests.pipeline.formats.velodyne.streams import PRODUCT, START_NS, ring_wall, with_byte
 from tests.pipeline.sources.bags import (

@@ -1,0 +1,23 @@
+"""How long each stage of a frame took."""
+
+from __future__ import annotations
+
+from time import perf_counter_ns
+
+
+class Stopwatch:
+    """Starts when it is made. ``lap`` after each stage gives the stage the time since the lap before."""
+
+    def __init__(self) -> None:
+        self._start = self._last = perf_counter_ns()
+        self._laps: dict[str, float] = {}
+
+    def lap(self, stage: str) -> None:
+        """End a stage."""
+        now = perf_counter_ns()
+        self._laps[stage] = (now - self._last) / 1e6
+        self._last = now
+
+    def timing_ms(self) -> dict[str, float]:
+        """Milliseconds by stage, and ``total`` since the start."""
+        return {**self._laps, "total": (perf_counter_ns() - self._start) / 1e6}

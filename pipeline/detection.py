@@ -1,0 +1,123 @@
+"""Which detectors look at the pictures of a source, and when. Networks run here, before ``step``, and nowhere else:
+their answers are part of the frame and can be cached, so that changing a parameter never waits for a network."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar, cast
+
+from pipeline.inference.model_registry import EMBEDDED
+from pipeline.lanes.open_detector import LaneDetector, open_lanes
+from pipeline.types import U8, Frame, RawBoxes, RawLanes
+from pipeline.types.source import AnySource, Source, is_live_source, is_simulated
+from pipeline.vision.detector import Detector, open_detector
+
+Seen = TypeVar("Seen", RawBoxes, RawLanes)
+Seen_co = TypeVar("Seen_co", bound=RawBoxes | RawLanes, covariant=True)
+
+
+class Detects(Protocol[Seen_co]):
+    """Looks at one picture: a network, or anything that answers like one."""
+
+    @property
+    def name(self) -> str:
+        """Equal names give equal answers: the key of caches."""
+        ...
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know about it, in sentences."""
+        ...
+
+    def detect(self, bgr: U8) -> Seen_co:
+        """What is in a picture (H, W, 3) uint8."""
+        ...
+
+
+@dataclass(frozen=True)
+class Detectors:
+    """The detectors of a recording. For live sensors wrap them in ``LiveDetectors``."""
+
+    boxes: Detects[RawBoxes] | None = None
+    """Finds vehicles; None: nothing does."""
+    lanes: Detects[RawLanes] | None = None
+    """Finds lane lines; None: nothing does."""
+    lanes_every: int = 1
+    """Lane lines are looked for in every n-th frame, by its index, so in whatever order frames are asked for the
+    answers are the same. In between the lane tracker predicts."""
+
+    def looks_for_lanes(self, index: int) -> bool:
+        """Whether lane lines are looked for in the frame of this index."""
+        return self.lanes is not None and index % self.lanes_every == 0
+
+
+class LiveDetectors:
+    """The detectors for each tick of live sensors that is run. Lane lines are looked for again once ``lanes_every``
+    ticks were run; the frame index cannot say so, because it also counts the ticks that were dropped."""
+
+    def __init__(self, detectors: Detectors) -> None:
+        self._detectors = detectors
+        self._since_lanes = detectors.lanes_every
+
+    def of(self, frame: Frame) -> Detectors:
+        """The detectors for a tick; call it once for each. A tick without a picture passes its turn to the next."""
+        is_due = self._since_lanes >= self._detectors.lanes_every and frame.picture is not None
+        self._since_lanes = 1 if is_due else self._since_lanes + 1
+        return replace(self._detectors, lanes=self._detectors.lanes if is_due else None, lanes_every=1)
+
+
+class Look(Protocol):
+    """How a detector is asked about a frame's picture: directly, or through a cache."""
+
+    def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen: ...
+
+
+def look(detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
+    """Ask directly."""
+    return detector.detect(bgr)
+
+
+def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
+    """The frame with what the detectors see in its picture. A frame without a picture, or whose recording already holds
+    detections, is returned as it is."""
+    if frame.picture is None or frame.detections_given:
+        return frame
+    bgr = frame.picture.bgr
+    if detectors.boxes is not None:
+        frame = replace(frame, raw_boxes=ask(detectors.boxes, frame, bgr))
+    if detectors.lanes is not None and detectors.looks_for_lanes(frame.index):
+        frame = replace(frame, raw_lanes=ask(detectors.lanes, frame, bgr))
+    return frame
+
+
+def detector_for(source: AnySource, spec: str | None = None) -> Detector:
+    """The named vehicle detector, its input fitted to the source's pictures. Without a name: the embedded network for
+    the simulator, whose pictures it was trained on; the default network for everything else.
+
+    Raises DetectorMissing when it is not installed, DetectorError when it cannot be run.
+    """
+    if spec is None and is_simulated(source):
+        spec = EMBEDDED
+    return open_detector(spec, picture_size(source))
+
+
+def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None:
+    """The lane detector for the source's pictures (``pipeline.lanes.open_detector.open_lanes``). None for a source
+    without pictures, unless a detector is named."""
+    if spec is None and picture_size(source) is None:
+        return None
+    camera = source.camera if is_live_source(source) else cast("Source", source).frame(0).camera
+    return open_lanes(spec, camera, is_simulated(source))
+
+
+def brings_detections(source: AnySource) -> bool:
+    """Whether a recording holds the detections of its pictures, so that no detector is needed."""
+    return not is_live_source(source) and cast("Source", source).frame(0).detections_given
+
+
+def picture_size(source: AnySource) -> tuple[int, int] | None:
+    """(width, height) of the source's pictures: from the first frame of a recording, from the calibration of live
+    sensors. None without picture and calibration."""
+    if is_live_source(source):
+        return (source.camera.width, source.camera.height) if source.camera is not None else None
+    return cast("Source", source).frame(0).picture_size

@@ -1,0 +1,57 @@
+"""One sweep as obstacles on the ground: deskew → down-sample → ground → cluster → boxes (paper, Point Cloud
+Segmentation)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.common.stopwatch import Stopwatch
+from pipeline.lidar import boxes, cluster, deskew, downsample, ground
+from pipeline.params import Params
+from pipeline.types import F32, I32, EgoState, Ground, Obstacle, Sweep
+
+
+@dataclass(frozen=True)
+class SegmentedSweep:
+    """What one sweep holds."""
+
+    points: F32
+    """(N, 4) float32 ``x y z intensity``, deskewed, before down-sampling."""
+    kind: I32
+    """(N,) int32, what each point was taken for (``pipeline.types.Layers``)."""
+    obstacles: tuple[Obstacle, ...] | None
+    """One a cluster; None without a sweep."""
+    ground: Ground | None
+    """The road under the sweep; None without a sweep."""
+
+
+_NO_SWEEP = SegmentedSweep(np.zeros((0, 4), np.float32), np.zeros(0, np.int32), None, None)
+
+
+def segment(sweep: Sweep | None, ego: EgoState | None, params: Params, clock: Stopwatch) -> SegmentedSweep:
+    """Obstacles and ground of a sweep. ego: own motion, for deskewing. clock: gets a lap for each stage."""
+    # Points as they were at the tick, not while the sensor turned
+    sweep = deskew.deskew(sweep, ego, params.deskew)
+    clock.lap("deskew")
+    if sweep is None:
+        return _NO_SWEEP
+
+    # Fewer points in each channel, none of them from the own body
+    keep = downsample.keep_mask(sweep, params.downsample)
+    clock.lap("downsample")
+
+    # The road: planes through the lowest points
+    plane = ground.fit_ground(sweep.points, keep, params.ground)
+    clock.lap("ground")
+
+    # What stands on it: points near each other are one object, across the gaps between rings too
+    candidates = cluster.candidates(sweep.points, plane, keep, params.cluster)
+    labels = cluster.cluster(sweep.points, candidates, params.cluster)
+    clock.lap("cluster")
+
+    # An upright box around each cluster
+    obstacles = boxes.fit_obstacles(sweep.points, labels, plane, params.box)
+    clock.lap("boxes")
+    return SegmentedSweep(sweep.points, cluster.kinds(labels, keep, plane.mask), obstacles, plane)

@@ -1,0 +1,37 @@
+"""Compiles every kernel of the pipeline before the first frame."""
+
+from __future__ import annotations
+
+import threading
+from functools import cache
+
+import numpy as np
+
+from pipeline import lidar
+from pipeline.common import kalman
+from pipeline.common.garbage_collection import collect_rarely
+from pipeline.common.geometry import iou_matrix
+from pipeline.decision import path_position
+from pipeline.lanes import road_lines
+from pipeline.path import corridor
+
+_LOCK = threading.Lock()
+
+
+def warm_up() -> None:
+    """Make the first frame as fast as the rest: compile every kernel, or load it from numba's cache, and keep the
+    garbage collector away from frames. Only the first call works; calls from other threads wait until it is done."""
+    with _LOCK:
+        _warm_up()
+
+
+@cache
+def _warm_up() -> None:
+    lidar.warm_up()
+    one = np.eye(2)
+    kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)
+    iou_matrix(np.zeros((1, 4)), np.zeros((1, 4)))
+    road_lines.warm_up()
+    corridor.warm_up()
+    path_position.warm_up()
+    collect_rarely()

@@ -1,0 +1,85 @@
+"""Decisions read typed conditions; gates only show them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from pipeline.decision import gates
+from pipeline.decision.acc import AccState, control
+from pipeline.decision.aeb import AebState, find_threats, guard
+from pipeline.decision.cipv import Choice, CipvState, choose
+from pipeline.decision.object_motion import describe
+from pipeline.params import AccParams, AebParams, CipvParams, MotionParams, PathParams
+from pipeline.path.corridor import corridor
+from pipeline.types import AccCommand, Conditions, EgoState, FusedObject, Gate, Situation
+from tests.pipeline.build import fused, moment
+
+EGO = EgoState(0, 15.0, 0.0)
+PATH = corridor(EGO, PathParams(half_width_m=1.5))
+SCENES = {
+    "a lead, one cuts in, one stands aside": (
+        fused(1, 40.0, velocity=(-5.0, 0.0)),
+        fused(2, 20.0, 2.6, velocity=(-1.0, -2.0)),
+        fused(3, 25.0, -4.0),
+        fused(4, 12.0, 0.2, source="L", height=0.2),
+    ),
+    "one crosses whose class is no vehicle's": (fused(1, 14.0, 3.0, label="person", velocity=(-15.0, -4.0)),),
+    "one comes into the path, seen once": (fused(1, 14.0, 3.0, source="L", hits=1, velocity=(-15.0, -4.0)),),
+    "a carried one": (fused(1, 10.0, velocity=(-15.0, 0.0)), fused(2, 14.0, 2.8, hits=9, velocity=(-15.0, -4.0))),
+}
+
+
+def decide(objects: tuple[FusedObject, ...]) -> tuple[Choice, Situation, list[AccCommand | None]]:
+    seen = describe(objects, EGO, MotionParams())
+    state, now = CipvState(), moment(EGO, 0.1)
+    state, choice = choose(state, seen, PATH, now, CipvParams())
+    situation = Situation(now, PATH, choice.objects, choice.lead)
+    commands, acc_state, aeb_state = [], AccState(), AebState()
+    for _ in range(3):
+        acc_state, command = control(acc_state, situation, AccParams())
+        aeb_state, command = guard(aeb_state, command, situation, AebParams(), AccParams())
+        commands.append(command)
+    return choice, situation, commands
+
+
+@pytest.mark.parametrize("objects", SCENES.values(), ids=SCENES.keys())
+def test_decisions_stay_when_every_shown_gate_has_another_name(
+    objects: tuple[FusedObject, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    choice, situation, commands = decide(objects)
+    renamed = Conditions(*[each._replace(shown_as=f"renamed {n}") for n, each in enumerate(gates.CONDITIONS)])
+    monkeypatch.setattr(gates, "CONDITIONS", renamed)
+    other, situation_then, commands_then = decide(objects)
+
+    assert {gate.name for item in other.objects for gate in item.gates} == {f"renamed {n}" for n in range(8)}
+    assert (other.lead, other.next_lead, other.rejected) == (choice.lead, choice.next_lead, choice.rejected)
+    assert commands_then == commands
+    assert find_threats(situation_then, AebParams()) == find_threats(situation, AebParams())
+
+
+def test_the_scenes_ask_for_braking_and_for_a_next_lead() -> None:
+    """Or the test above would compare nothing."""
+    cuts_in, _, _ = decide(SCENES["a lead, one cuts in, one stands aside"])
+    assert cuts_in.lead is not None
+    assert cuts_in.next_lead is not None
+    assert cuts_in.next_lead.reason.startswith("cuts in")
+    _, _, crossing = decide(SCENES["one crosses whose class is no vehicle's"])
+    assert crossing[-1] is not None
+    assert crossing[-1].state == "full_brake"
+
+
+def test_gates_show_the_same_answers_that_eligibility_holds() -> None:
+    choice, _, _ = decide(SCENES["a lead, one cuts in, one stands aside"])
+    for item in choice.objects:
+        assert item.eligibility is not None
+        assert tuple(gate.passed for gate in item.gates) == item.eligibility
+
+
+def test_an_object_that_was_not_judged_starts_no_reaction() -> None:
+    """Whatever its gates say."""
+    shown = tuple(Gate(each.shown_as, None, 1.0, True) for each in gates.CONDITIONS)
+    item = dataclasses.replace(fused(1, 20.0), gates=shown)
+    assert not gates.is_solid(item)
+    assert not gates.may_cut_in(item)
