@@ -62,9 +62,21 @@ class VisionTrackingParams(Section):
     max_missed_s: float = slider(1.0, 0.1, 5.0, 0.1, "s", "A box not seen for longer ends")
     gate_px: float = slider(80.0, 5.0, 400.0, 1.0, "px", "dist_th: largest move of a box's centre between frames")
     gate_sizes: float = slider(1.0, 0.1, 5.0, 0.1, "", "kalman: largest move, in box widths, where that is more")
+    gate_sigmas: float = slider(
+        4.0, 1.0, 10.0, 0.1, "σ", "kalman: a box farther from the expected place and size is another object"
+    )
     max_size_ratio: float = slider(2.0, 1.1, 5.0, 0.1, "", "kalman: largest change of a box's width between sightings")
-    bearing_sigma_deg: float = slider(0.3, 0.05, 3.0, 0.05, "°", "Kalman: noise of a box's direction")
-    accel_sigma_mps2: float = slider(3.0, 0.1, 20.0, 0.1, "m/s²", "Kalman: how hard objects may accelerate")
+    shift_px: float = slider(
+        4.0, 0.0, 40.0, 0.5, "px", "kalman: how far the whole picture may shift between frames, as the car pitches"
+    )
+    bearing_sigma_deg: float = slider(0.3, 0.05, 3.0, 0.05, "°", "kalman: noise of a box's direction")
+    accel_sigma_mps2: float = slider(3.0, 0.1, 20.0, 0.1, "m/s²", "kalman: how hard objects may accelerate")
+    max_nis: float = slider(
+        13.8, 3.0, 1000.0, 0.1, "", "kalman: a distance more surprising is refused; 13.8 is 99.9 % of χ² (2 degrees)"
+    )
+    restart_after: int = slider(
+        3, 1, 30, 1, "frames", "kalman: distances refused in a row before a track's place is measured anew"
+    )
     ghost_iou: float = slider(0.4, 0.1, 1.0, 0.05, "", "kalman: a carried box this much on a seen one is dropped")
 
 

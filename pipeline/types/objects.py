@@ -59,6 +59,9 @@ class VisionMeasurement:
     distance_m: float | None
     sigma_m: float | None
     position: Point2 | None
+    noise_share: float | None = None
+    """Share of the distance by which it differs from picture to picture: the noise of the box's height. The rest of
+    ``sigma_m`` is the object's own unknown height, which no number of pictures averages out."""
 
 
 class Obstacle(NamedTuple):
