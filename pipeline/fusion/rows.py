@@ -65,6 +65,7 @@ def hit_row(
         lidar_points=hit.obstacle.points,
         lidar_track=hit.id,
         lidar_hits=hit.hits,
+        rigid_mps=hit.rigid_mps,
         gates=gates,
     )
     if seen is None:

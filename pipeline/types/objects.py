@@ -87,6 +87,8 @@ class LidarTrack(NamedTuple):
     missed: int
     carried: bool
     unseen_s: float = 0.0
+    rigid_mps: float = 0.0
+    """How fast both sides of it surely move together along ego y, relative to ego."""
 
 
 @dataclass(frozen=True)
@@ -219,6 +221,8 @@ class FusedObject:
     neither."""
     lidar_hits: int = 0
     """Sightings of its LiDAR track."""
+    rigid_mps: float | None = None
+    """Of its LiDAR track: how fast both its sides surely move together along ego y, relative to ego. None without."""
     box_sides: tuple[Point2, Point2] | None = None
     """Ego x, y where the lines of sight past its box's left and right edge are as far away as the object; None unless
     the camera sees it now."""
