@@ -6,7 +6,7 @@ decisions read, and gates, which people read; a gate's name means nothing to the
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import copysign, sqrt
+from math import copysign, exp, sqrt
 from typing import NamedTuple
 
 from pipeline.decision.path_position import Place
@@ -186,6 +186,22 @@ def _uncertain(who: Candidate) -> str:
     return f"its place against the path is uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
 
 
+def _probable(who: Candidate) -> Answer:
+    """That it exists and that it is in the path, together. To become the lead takes a margin over what is merely as
+    likely as not: a car parked at the kerb is in the path by 50 % at 40 m, and so is a reflection in a window."""
+    limit = who.params.stay_probability if who.leads else who.params.become_probability
+    there = who.item.existence if who.item.existence is not None else 1.0
+    probability = there / (1.0 + exp(-who.odds))
+    return probability >= limit, probability, limit
+
+
+def _improbable(who: Candidate) -> str:
+    there = who.item.existence
+    if there is not None and there < 0.5:
+        return f"probably not there: {100 * there:.0f} %"
+    return f"in path with {100 / (1.0 + exp(-who.odds)):.0f} %: not probable enough"
+
+
 CONDITIONS = Conditions(
     vehicle=Condition("vehicle_class", _vehicle, lambda who: f"class {who.item.label}"),
     distance=Condition("distance_known", _distance, lambda _: "distance not known"),
@@ -197,4 +213,5 @@ CONDITIONS = Conditions(
     confirmed=Condition("hits", _confirmed, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
     seen=Condition("seen", _seen, _not_seen),
     placed=Condition("path_sigma", _placed, _uncertain),
+    probable=Condition("lead_probability", _probable, _improbable),
 )

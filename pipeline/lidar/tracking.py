@@ -259,7 +259,9 @@ def slopes(history: F64) -> F64:
     t, xy = (table - mean)[:, :, :1] * known, (table - mean)[:, :, 1:]
     spread = np.sum(t * t, axis=1)
     return np.asarray(
-        np.divide(np.sum(t * xy, axis=1), spread, out=np.full((len(history), table.shape[2] - 1), np.nan), where=spread > 0.0)
+        np.divide(
+            np.sum(t * xy, axis=1), spread, out=np.full((len(history), table.shape[2] - 1), np.nan), where=spread > 0.0
+        )
     )
 
 

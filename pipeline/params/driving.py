@@ -83,6 +83,12 @@ class CipvParams(Section):
     )
     decide_s: float = slider(0.3, 0.0, 2.0, 0.05, "s", "In path: over how long sightings are weighed; 0: each alone")
     max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "A lead's place against the path is no more uncertain")
+    become_probability: float = slider(
+        0.6, 0.0, 0.95, 0.05, "", "A new lead exists and is in the path with at least this probability"
+    )
+    stay_probability: float = slider(
+        0.4, 0.0, 0.95, 0.05, "", "The lead stays it down to this probability of existing and being in the path"
+    )
     cut_in_s: float = slider(3.0, 0.5, 6.0, 0.1, "s", "Lane crossings are told this long before")
     min_width_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest extent across, a vehicle's rear or side")
     min_height_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest height")

@@ -93,6 +93,12 @@ class AlignmentParams(Section):
     roll_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount clockwise")
 
 
+class ExistenceParams(Section):
+    """Whether an object is really there: evidence of both sensors for and against it."""
+
+    enabled: bool = choice(True, "Weigh the evidence for and against each object; off: every object exists")
+
+
 class FusionParams(Section):
     """Which LiDAR and which vision object are one (paper, Algorithm 2, with its slips mended)."""
 

@@ -16,6 +16,7 @@ class Sweep:
     points: (N, 4) float32 ``x y z intensity`` in the ego frame, C-contiguous, finite.
     ring: (N,) uint8, the channel, 0 = lowest beam.
     time_s: (N,) float32, when each point was measured, seconds after ``t_ns``; null where the recording does not say.
+    origin: ego x y z of the sensor, where its rays start.
     """
 
     t_ns: int
@@ -23,6 +24,7 @@ class Sweep:
     ring: U8
     channels: int
     time_s: F32 | None = None
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -149,6 +149,8 @@ class Conditions(NamedTuple, Generic[Each]):
     """It was seen in this frame, and its distance measured."""
     placed: Each
     """Its place against the path is known well enough."""
+    probable: Each
+    """It exists and is in the path with enough probability."""
 
 
 Eligibility = Conditions[bool]
@@ -221,6 +223,8 @@ class FusedObject:
     neither."""
     lidar_hits: int = 0
     """Sightings of its LiDAR track."""
+    existence: float | None = None
+    """Probability that it is really there, by the evidence of both sensors; None where that is not weighed."""
     rigid_mps: float | None = None
     """Of its LiDAR track: how fast both its sides surely move together along ego y, relative to ego. None without."""
     box_sides: tuple[Point2, Point2] | None = None
