@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from pipeline.alignment import projection
 from pipeline.common.stopwatch import Stopwatch
-from pipeline.decision import acc, aeb, cipv, object_motion
+from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
 from pipeline.ego_motion import coasting
 from pipeline.fusion import agreement, existence
 from pipeline.fusion import fuse as fusion
@@ -102,7 +102,8 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     # Decision: the nearest vehicle in the path, a speed that keeps the gap to it, and brakes for an emergency
     cipv_state, chosen = cipv.choose(state.cipv, objects, path, now, params.cipv)
     clock.lap("cipv")
-    situation = Situation(now, path, chosen.objects, chosen.lead)
+    objects = braking_evidence.judge(chosen.objects, params.existence)
+    situation = Situation(now, path, objects, chosen.lead)
     acc_state, command = acc.control(state.acc, situation, params.acc)
     clock.lap("acc")
     aeb_state, command = aeb.guard(state.aeb, command, situation, params.aeb, params.acc)
@@ -124,7 +125,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         t_ns=frame.t_ns,
         sensors=SensorHealth.of(frame),
         ego=frame.ego,
-        objects=chosen.objects,
+        objects=objects,
         path=path,
         cipv=chosen.lead,
         next_cipv=chosen.next_lead,

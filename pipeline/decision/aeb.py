@@ -15,10 +15,11 @@ from typing import Literal, NamedTuple
 
 from pipeline.common.fast_replace import evolve
 from pipeline.decision.acc import STANDSTILL_MPS
+from pipeline.decision.braking_evidence import FRICTION_MPS2
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import AccParams, AebParams
-from pipeline.types import AccCommand, EgoState, Situation
+from pipeline.types import AccCommand, Braking, EgoState, FusedObject, Situation
 
 Stage = Literal["warn", "partial_brake", "full_brake"]
 STAGES: tuple[Stage, ...] = ("warn", "partial_brake", "full_brake")
@@ -40,12 +41,13 @@ class AebState:
 
 
 class Threat(NamedTuple):
-    """Something on our way that we close in on. measured: by the LiDAR; else its speed comes from box heights."""
+    """Something on our way that we close in on."""
 
     id: int
     ttc_s: float
     required_mps2: float
-    measured: bool
+    justified: Braking
+    """The hardest braking that what is known of it can justify."""
 
 
 def guard(
@@ -86,16 +88,21 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
         is_lead = situation.lead is not None and item.id == situation.lead.id
         if (is_lead and not item.carried) or (is_dependable(item) and enters_corridor(item, situation.path)):
             required = required_decel_mps2(item.distance_m, closing, params)
-            found.append(Threat(item.id, item.ttc_s, required, item.ranged))
+            found.append(Threat(item.id, item.ttc_s, required, _justified(item, required)))
     return tuple(found)
 
 
+def _justified(item: FusedObject, required_mps2: float) -> Braking:
+    """As its evidence says; but what no LiDAR has measured and no tyre could avoid is not believed."""
+    return item.justifies if item.ranged or required_mps2 <= FRICTION_MPS2 else Braking.COMFORT
+
+
 def _level(threat: Threat, params: AebParams) -> int:
-    """The stage asked for. Without a measured distance never the full one: a box height errs by a tenth."""
+    """The stage asked for, no harder than the evidence justifies; a warning needs none beyond that of a lead."""
     if threat.ttc_s < params.full_ttc_s or threat.required_mps2 > params.full_when_mps2:
-        return _FULL if threat.measured else _PARTIAL
+        return min(_FULL, _WARN + threat.justified)
     if threat.ttc_s < params.partial_ttc_s or threat.required_mps2 > params.partial_when_mps2:
-        return _PARTIAL
+        return min(_PARTIAL, _WARN + threat.justified)
     return _WARN if threat.ttc_s < params.warn_ttc_s else _NONE
 
 

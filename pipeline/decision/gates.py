@@ -187,11 +187,12 @@ def _uncertain(who: Candidate) -> str:
 
 
 def _probable(who: Candidate) -> Answer:
-    """That it exists and that it is in the path, together. To become the lead takes a margin over what is merely as
-    likely as not: a car parked at the kerb is in the path by 50 % at 40 m, and so is a reflection in a window."""
+    """That it exists and that it is in the path: the less probable of the two decides. To become the lead takes a
+    margin over what is merely as likely as not: a car parked at the kerb is in the path by 50 % at 40 m, and a
+    reflection in a window is a car by 50 %."""
     limit = who.params.stay_probability if who.leads else who.params.become_probability
     there = who.item.existence if who.item.existence is not None else 1.0
-    probability = there / (1.0 + exp(-who.odds))
+    probability = min(there, 1.0 / (1.0 + exp(-who.odds)))
     return probability >= limit, probability, limit
 
 

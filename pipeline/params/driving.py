@@ -84,11 +84,9 @@ class CipvParams(Section):
     decide_s: float = slider(0.3, 0.0, 2.0, 0.05, "s", "In path: over how long sightings are weighed; 0: each alone")
     max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "A lead's place against the path is no more uncertain")
     become_probability: float = slider(
-        0.6, 0.0, 0.95, 0.05, "", "A new lead exists and is in the path with at least this probability"
+        0.6, 0.0, 0.95, 0.05, "", "A new lead exists, and is in the path, each with at least this probability"
     )
-    stay_probability: float = slider(
-        0.4, 0.0, 0.95, 0.05, "", "The lead stays it down to this probability of existing and being in the path"
-    )
+    stay_probability: float = slider(0.4, 0.0, 0.95, 0.05, "", "The lead stays it down to this probability of each")
     cut_in_s: float = slider(3.0, 0.5, 6.0, 0.1, "s", "Lane crossings are told this long before")
     min_width_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest extent across, a vehicle's rear or side")
     min_height_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest height")
@@ -107,6 +105,9 @@ class AccParams(Section):
     kd: float = slider(0.0, 0.0, 2.0, 0.01, "", "PID: derivative gain")
     max_accel_mps2: float = slider(2.0, 0.5, 5.0, 0.1, "m/s²", "Accelerator pedal at 1")
     max_decel_mps2: float = slider(8.0, 1.0, 10.0, 0.1, "m/s²", "Brake pedal at 1")
+    comfort_decel_mps2: float = slider(
+        3.5, 0.5, 10.0, 0.1, "m/s²", "ACC brakes no harder for a lead on weak evidence (ISO 15622 permits 3.5 at speed)"
+    )
     brake_limit_mps2: float = slider(
         8.0, 0.0, 10.0, 0.1, "m/s²", "ACC brakes no harder; ISO 15622 permits 3.5 at speed, 0 leaves it all to AEB"
     )

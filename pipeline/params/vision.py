@@ -97,6 +97,12 @@ class ExistenceParams(Section):
     """Whether an object is really there: evidence of both sensors for and against it."""
 
     enabled: bool = choice(True, "Weigh the evidence for and against each object; off: every object exists")
+    min_braking: float = slider(
+        0.8, 0.0, 0.99, 0.01, "", "An object that exists less probably is slowed down for, but not braked for"
+    )
+    camera_ranges: int = slider(
+        8, 1, 50, 1, "frames", "Distances in a row after which the camera alone knows a closing speed to brake for"
+    )
 
 
 class FusionParams(Section):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -109,6 +110,8 @@ class VisionTrack:
     missed: int
     carried: bool
     measured: bool = True
+    ranges: int = 0
+    """Distances in a row that its place took in, since it was last begun."""
 
 
 class Gate(NamedTuple):
@@ -151,6 +154,17 @@ class Conditions(NamedTuple, Generic[Each]):
     """Its place against the path is known well enough."""
     probable: Each
     """It exists and is in the path with enough probability."""
+
+
+class Braking(IntEnum):
+    """How hard the car brakes."""
+
+    COMFORT = 0
+    """As adaptive cruise control does for any lead."""
+    PARTIAL = 1
+    """As emergency braking begins."""
+    FULL = 2
+    """As hard as it can."""
 
 
 Eligibility = Conditions[bool]
@@ -223,6 +237,10 @@ class FusedObject:
     neither."""
     lidar_hits: int = 0
     """Sightings of its LiDAR track."""
+    justifies: Braking = Braking.COMFORT
+    """The hardest braking that what is known of it can justify."""
+    camera_ranges: int = 0
+    """Distances in a row that its vision track took in."""
     existence: float | None = None
     """Probability that it is really there, by the evidence of both sensors; None where that is not weighed."""
     rigid_mps: float | None = None

@@ -290,6 +290,7 @@ def _shown(track: VisionTrack, place: CvState, placed: int, share: float | None 
         sigma_m=max(filter_sigma, share * range_m),
         position=(x, y),
         velocity_mps=(vx, vy) if placed >= 2 else None,
+        ranges=placed,
     )
 
 
