@@ -88,9 +88,9 @@ def follow(ego: EgoState, cipv: Cipv | None, params: AccParams) -> Demand:
     if cipv.distance_m > wanted:
         return Demand(set_speed, "cruise", f"lead #{cipv.id} beyond the desired gap of {wanted:.1f} m")
     if cipv.distance_m <= params.min_gap_m:
-        return Demand(0.0, "stop", f"lead #{cipv.id} inside the smallest gap of {params.min_gap_m:.1f} m", cipv.id)
+        return Demand(0.0, "stop", f"lead #{cipv.id} within the minimum gap of {params.min_gap_m:.1f} m", cipv.id)
     speed = ego.speed_mps * (cipv.distance_m - params.min_gap_m) / (wanted - params.min_gap_m)
-    return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} inside the desired gap of {wanted:.1f} m", cipv.id)
+    return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} within the desired gap of {wanted:.1f} m", cipv.id)
 
 
 def avoid(ego: EgoState, situation: Situation, params: AccParams) -> list[Demand]:
@@ -124,7 +124,9 @@ def hold(ego: EgoState, path: Path, params: AccParams) -> list[Demand]:
     if allowed >= params.set_speed_kmh / 3.6:
         return []
     why = f"own speed not measured for {ego.coasting.age_s:.1f} s" if ego.coasting is not None else path.doubt
-    return [Demand(allowed, "cruise", f"{why}: no faster than now", no_faster=allowed <= ego.speed_mps)]
+    holds = allowed <= ego.speed_mps
+    limit = "ACC will not accelerate" if holds else f"ACC will not exceed {allowed * 3.6:.0f} km/h"
+    return [Demand(allowed, "cruise", f"{why}: {limit}", no_faster=holds)]
 
 
 def pid(state: AccState, error_mps: float, dt_s: float | None, params: AccParams) -> tuple[AccState, float]:

@@ -158,7 +158,7 @@ def _agree(a: FusedObject, b: FusedObject) -> bool:
 
 def _why_after(item: FusedObject, lead: FusedObject) -> str:
     doubtful = (item.distance_m or 0.0) < (lead.distance_m or 0.0)
-    return f"taken for #{lead.id}, which is surer" if doubtful else f"behind #{lead.id}"
+    return f"probably the same object as #{lead.id}, which is better measured" if doubtful else f"behind #{lead.id}"
 
 
 # ---------------------------------------------------------------- who will be next
@@ -182,7 +182,7 @@ def _next_lead(
     ]
     if cutting_in:
         first = min(cutting_in, key=lambda item: (item.crossing_s or 0.0, item.id))
-        return _named(first, f"cuts in: over the edge of the path in {first.crossing_s:.1f} s")
+        return _named(first, f"cutting in: enters the path in {first.crossing_s:.1f} s")
     behind = [item for item in able if lead is not None and item.id != lead.id and (item.distance_m or 0.0) > lead_m]
     if lead is None or not behind:
         return None

@@ -40,11 +40,13 @@ def find_law(network: Path) -> FoundLaw:
     except FileNotFoundError:
         return FoundLaw(None)
     except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
-        return FoundLaw(None, f"{path.name} is damaged and not used; fit the law again with `cipv calibrate distance`")
+        return FoundLaw(
+            None, f"{path.name} is damaged and was ignored; fit the law again with `cipv calibrate distance`"
+        )
     if not _is_possible(law):
-        return FoundLaw(None, f"{path.name} holds numbers that no camera can have and is not used")
+        return FoundLaw(None, f"{path.name} holds implausible numbers and was ignored")
     if fitted_to != file_sha256(network):
-        return FoundLaw(None, f"{path.name} was fitted to other weights and is not used")
+        return FoundLaw(None, f"{path.name} was fitted to other weights and was ignored")
     return FoundLaw(law)
 
 

@@ -42,7 +42,7 @@ def input_size(model: onnx.ModelProto) -> Size | None:
     inputs = [value for value in model.graph.input if value.name not in weights]
     dims = inputs[0].type.tensor_type.shape.dim if len(inputs) == 1 else []
     if len(dims) != 4 or dims[0].dim_value > 1 or dims[1].dim_value not in (0, 3):
-        raise ValueError("it does not take one picture of 1×3×height×width")
+        raise ValueError("its input is not one picture of 1×3×height×width")
     if inputs[0].type.tensor_type.elem_type != onnx.TensorProto.FLOAT:
         raise ValueError("its input is not float32")
     height, width = dims[2].dim_value, dims[3].dim_value

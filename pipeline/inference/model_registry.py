@@ -26,14 +26,14 @@ from pipeline.types import DistanceLaw
 
 Task = Literal["detector", "lanes"]
 EMBEDDED = "embedded"
-"""Name of the detector that comes with the program."""
+"""Name of the built-in detector."""
 _EMBEDDED_FILE = Path(__file__).parents[1] / "vision" / "embedded" / "simulated_vehicles.onnx"
 _CHUNK = 1 << 16
 _TIMEOUT_S = 30.0
 
 
 class ModelError(BadInput):
-    """A network that cannot be fetched, registered or found; one sentence with the remedy."""
+    """A network that cannot be downloaded, registered or found; one sentence with the remedy."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class KnownModel:
         """How it comes here."""
         if self.size is not None:
             return f"`cipv models pull {self.name}` ({self.size / 1e6:.1f} MB)"
-        return f"fetch or export its ONNX file, then {self.register}"
+        return f"download or export its ONNX file, then {self.register}"
 
     @property
     def register(self) -> str:
@@ -68,7 +68,7 @@ KNOWN: tuple[KnownModel, ...] = (
     KnownModel(
         "yolox_nano", "detector", _YOLOX + "yolox_nano.onnx", 3_659_407,
         "c789161ed43c8269fcd4e67c67eeeb4e80c622da2eb296a20bc6007bd18a0b7d",
-        "Apache-2.0", "COCO, 0.9 M parameters: about 10 ms a picture on one core",
+        "Apache-2.0", "COCO, 0.9 M parameters: about 10 ms per image on one core",
     ),
     KnownModel(
         "yolox_tiny", "detector", _YOLOX + "yolox_tiny.onnx", 20_219_662,
@@ -78,7 +78,7 @@ KNOWN: tuple[KnownModel, ...] = (
     KnownModel(
         "yolox_s", "detector", _YOLOX + "yolox_s.onnx", 35_858_002,
         "c5c2d13e59ae883e6af3b45daea64af4833a4951c92d116ec270d9ddbe998063",
-        "Apache-2.0", "COCO, 9 M parameters: for a graphics card",
+        "Apache-2.0", "COCO, 9 M parameters; best on a GPU",
     ),
     KnownModel(
         "twinlitenet", "lanes", "https://github.com/harrylal/TwinLiteNet-onnx-opencv-dnn/raw/main/models/best.onnx",
@@ -131,7 +131,7 @@ def list_models() -> tuple[ModelEntry, ...]:
         return ModelEntry(name, task, path, _same(path, defaults[task]), licence, url, note, law)
 
     known = [entry(each.name, each.task, each.licence, each.url, each.note) for each in KNOWN]
-    own = "part of the program: simulated vehicles only, 0.5 M parameters"
+    own = "built in: simulated vehicles only, 0.5 M parameters"
     names = {each.name for each in KNOWN}
     registered = [
         entry(name, row["task"], None, None, "registered")
@@ -171,9 +171,9 @@ def register(path: Path, name: str, task: Task = "detector", default: bool = Tru
     """Copy a file, with the distance law beside it, into the folder under ``name`` and, unless told otherwise, make it
     its task's default."""
     if not _is_name(name):
-        raise ModelError(f"{name!r} cannot be a network's name: use letters, digits, '-', '_' and '.'")
+        raise ModelError(f"{name!r} is not a valid network name: use letters, digits, '-', '_' and '.'")
     if name == EMBEDDED:
-        raise ModelError(f"{EMBEDDED!r} is the detector that comes with the program: use another name")
+        raise ModelError(f"{EMBEDDED!r} is the built-in detector: use another name")
     path = own_file(path)
     target = store() / f"{name}.onnx"
     try:
@@ -208,14 +208,14 @@ def pull(name: str, progress: Progress = silent) -> Path:
     and right is kept. ModelError says what went wrong; no part of a failed download stays."""
     known = known_model(name)
     if known.size is None or known.sha256 is None:
-        raise ModelError(f"{name} has no file of known checksum: {known.remedy}; the project is {known.url}")
+        raise ModelError(f"{name} has no download with a known checksum: {known.remedy}; the project is {known.url}")
     target = store() / f"{name}.onnx"
     if target.is_file() and file_sha256(target) == known.sha256:
         return target
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ModelError(f"{target.parent} cannot be made: {error.strerror or error}") from None
+        raise ModelError(f"{target.parent} cannot be created: {error.strerror or error}") from None
     part = target.with_suffix(".part")
     try:
         _download(known, known.size, part, progress)
@@ -239,15 +239,15 @@ def _download(known: KnownModel, size: int, part: Path, progress: Progress) -> N
     except urllib.error.HTTPError as error:
         error.close()
         raise ModelError(
-            f"{known.url} answered {error.code} {error.reason}; fetch the file by hand and use {known.register}"
+            f"{known.url} answered {error.code} {error.reason}; download the file manually and use {known.register}"
         ) from None
     except (OSError, ValueError) as error:
         why = getattr(error, "reason", None) or error
         raise ModelError(
-            f"{known.name} cannot be fetched ({why}); without a network connection use {known.register}"
+            f"{known.name} cannot be downloaded ({why}); without a network connection use {known.register}"
         ) from None
     if done != size:
-        raise ModelError(f"{known.url} gave {'more than ' if done > size else f'{done} of '}{size} bytes; try again")
+        raise ModelError(f"{known.url} sent {'more than ' if done > size else f'{done} of '}{size} bytes; try again")
     if digest.hexdigest() != known.sha256:
         raise ModelError(
             f"{known.url} is not the official file: its SHA-256 is {digest.hexdigest()}, not {known.sha256}"

@@ -62,7 +62,7 @@ def fuse(
     for row, each in zip(weights, estimates, strict=True):
         shares[:, SOURCES.index(each.source)] += row
     notes = tuple(
-        f"{each.source} disagrees with the rest by {much:.0f} sigmas: left out"
+        f"{each.source} disagrees with the rest by {much:.0f} sigmas: ignored"
         for each, much in zip(estimates, disagree.tolist(), strict=True)
         if much > 0.0
     )

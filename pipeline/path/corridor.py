@@ -133,7 +133,7 @@ def _fades(ego: EgoState | None, estimates: list[PathEstimate]) -> bool:
 
 def _about_own_motion(ego: EgoState | None) -> tuple[str, ...]:
     if ego is not None and ego.coasting is not None:
-        return (f"own speed not measured for {ego.coasting.age_s:.1f} s: taken for {ego.speed_mps * 3.6:.0f} km/h",)
+        return (f"own speed not measured for {ego.coasting.age_s:.1f} s: assuming {ego.speed_mps * 3.6:.0f} km/h",)
     return ()
 
 
@@ -146,7 +146,7 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
     needed_sigma_m = float(sigma_m[min(int(needed_m / STEP_M), len(sigma_m) - 1)])
     usable = reach_m >= min(needed_m, params.length_m)
     if not usable:
-        notes = (*notes, f"the path is known well enough for {max(reach_m, 0.0):.0f} m only")
+        notes = (*notes, f"the path is reliable for only {max(reach_m, 0.0):.0f} m ahead")
     return Path(
         source=_carrier(shares[1]),
         center=path.center,
@@ -159,7 +159,7 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
         carried_by={f"{s}": _by_source(row) for s, row in zip(_LOOK_AHEAD_M, shares, strict=True)},
         reach_m=max(reach_m, 0.0),
         usable=usable,
-        doubt="" if usable else f"path known for {max(reach_m, 0.0):.0f} m only",
+        doubt="" if usable else f"path known only {max(reach_m, 0.0):.0f} m ahead",
         confidence=erf(params.half_width_m / needed_sigma_m / sqrt(2.0)) if needed_sigma_m > 0.0 else 1.0,
         notes=notes,
     )

@@ -70,13 +70,13 @@ def follow(
         return GnssState(), ()
     line = state.line if state.line is not None and _is_same(state.line.route, route) else lay_out(route)
     if line is None:
-        return GnssState(), (f"route {route.name}: no line in it",)
+        return GnssState(), (f"route {route.name} contains no line",)
     if state.line is not line:
         state = GnssState(line=line)
     state = _dead_reckoned(state, ego, dt_s or 0.0)
     state, notes = _with_fix(state, line, fix, ego, t_ns, dt_s or 0.0, params)
     if state.placed_anew:
-        notes = (f"GNSS placed anew after a jump, doubted by {state.doubt_m:.1f} m: the lane is not known from it",)
+        notes = (f"GNSS position reset after a jump, uncertain by {state.doubt_m:.1f} m: it does not show the lane",)
     return state, notes
 
 
@@ -146,7 +146,7 @@ def _refused(
         refused_s=0.0 if stayed else refused_s,
         placed_anew=state.placed_anew or stayed,
     )
-    return kept, (f"GNSS jumped by {jump_m:.1f} m: not believed",)
+    return kept, (f"GNSS jumped by {jump_m:.1f} m: fix ignored",)
 
 
 def ahead(state: GnssState, params: PathParams) -> tuple[GnssState, PathEstimate | None, tuple[str, ...]]:
@@ -155,13 +155,13 @@ def ahead(state: GnssState, params: PathParams) -> tuple[GnssState, PathEstimate
     if state.line is None:
         return state, None, ()
     if state.pose is None:
-        return state, None, ("no GNSS fix to place the car on the route",)
+        return state, None, ("no GNSS fix yet to locate the car on the route",)
     side_var = _sideways_variance(state.pose) + state.fix_sigma_m**2
     if side_var > _LOST_SIGMA_M**2:
-        return _at(state, None), None, ("GNSS fix lost for too long to know the place on the route",)
+        return _at(state, None), None, ("no GNSS fix for too long: position on the route unknown",)
     at_m = _match(state.line, state.pose, state.at_m, params.route_reach_m)
     if at_m is None:
-        return _at(state, None), None, ("not on the route",)
+        return _at(state, None), None, ("the car is off the route",)
     s = samples(params.length_m)
     line, (x, y, heading) = state.line, state.pose.mean.tolist()
     steps = np.arange(len(line.places)) * SPACING_M

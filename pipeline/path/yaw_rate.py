@@ -78,7 +78,7 @@ def doubts(ego: EgoState | None) -> tuple[str, ...]:
     """What a person should know of a measured own motion."""
     if ego is None or not isfinite(ego.speed_mps) or ego.yaw_rate_radps is None or usable_rate(ego) is not None:
         return ()
-    return ("the yaw rate is not one that a car can have: left out",)
+    return ("implausible yaw rate ignored",)
 
 
 def ahead(yaw: YawRate | None, ego: EgoState | None, params: PathParams) -> PathEstimate | None:

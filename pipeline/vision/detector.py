@@ -31,7 +31,7 @@ PADDING = 114
 _FREE_SIZE: Size = (384, 640)
 """Input of a graph of free size when no picture is known yet: 16:9."""
 _SIMULATED_ONLY = (
-    "using the embedded detector, which knows simulated cars only; pull a real one with `cipv models pull yolox_nano`"
+    "using the embedded detector, trained on simulated cars only; get a real one with `cipv models pull yolox_nano`"
 )
 
 
@@ -63,7 +63,7 @@ class Detector:
         DetectorError for an array that is no such picture or a network that fails on it.
         """
         if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
-            raise DetectorError(f"a picture is (H, W, 3) uint8, this is {bgr.shape} {bgr.dtype}")
+            raise DetectorError(f"expected a picture of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
         return self.decode(run_session(self._session, self.blob(bgr)), (bgr.shape[0], bgr.shape[1]))
 
     def blob(self, bgr: U8) -> F32:
@@ -106,7 +106,9 @@ def open_detector(
     own = _own_size(model, path)
     if input_size is not None:
         if min(input_size) < MULTIPLE or any(side % MULTIPLE for side in input_size):
-            raise DetectorError(f"an input size is two multiples of {MULTIPLE}, not {input_size[1]}×{input_size[0]}")
+            raise DetectorError(
+                f"input width and height must be multiples of {MULTIPLE}, not {input_size[1]}×{input_size[0]}"
+            )
         return _at_size(model, path, own, input_size, threads, notes)
     wanted = fitting_size(picture_size, own) if picture_size else own or _FREE_SIZE
     try:
@@ -131,7 +133,7 @@ def _own_size(model: onnx.ModelProto, path: Path) -> Size | None:
     try:
         return input_size(model)
     except ValueError as error:
-        raise DetectorError(f"{path.name} is no detector of pictures: {error}") from None
+        raise DetectorError(f"{path.name} is not an image detector: {error}") from None
 
 
 def _at_size(
@@ -148,7 +150,7 @@ def _at_size(
         raise DetectorError(f"{path.name}: {error}") from None
     if own is not None and own != size and not decoder.own_grid and own[0] * own[1] == size[0] * size[1]:
         # The grid inside such a graph may be of the old width: the run cannot fail, and every box would be elsewhere.
-        raise DetectorError("the grid inside the graph may belong to its own size")
+        raise DetectorError("the graph may hold a grid for its own size")
     labels = class_names(decoder.classes, metadata)
     found = find_law(path)
     name = f"{path.stem}-{file_sha256(path)[:12]}-{size[1]}x{size[0]}{_name_of(found.law)}"

@@ -27,4 +27,4 @@ def pick_head(outputs: Sequence[F32], names: Sequence[str]) -> Head:
         if head is not None:
             return head
     described = ", ".join("×".join(map(str, shape)) for shape in answer.shapes)
-    raise UnknownLaneHead(f"its outputs ({described}) are of no lane network known here")
+    raise UnknownLaneHead(f"its outputs ({described}) match no known lane network")

@@ -101,7 +101,7 @@ def test_a_file_that_is_no_lane_network_is_refused_with_a_sentence(tmp_path: Pat
     (tmp_path / "text.onnx").write_text("no network")
     with pytest.raises(DetectorError, match="not an ONNX file"):
         open_lane_network(str(tmp_path / "text.onnx"))
-    with pytest.raises(DetectorError, match=r"yolox\.onnx: its outputs \(1×84×85\) are of no lane network"):
+    with pytest.raises(DetectorError, match=r"yolox\.onnx: its outputs \(1×84×85\) match no known lane network"):
         open_lane_network(str(networks.yolox(tmp_path / "yolox.onnx")))
     with pytest.raises(DetectorError, match=r"\(H, W, 3\) uint8"):
         open_lane_network(str(lane_networks.twin(tmp_path / "tiny.onnx"))).detect(np.zeros((4, 4), np.uint8))
