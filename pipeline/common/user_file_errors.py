@@ -1,4 +1,4 @@
-"""What is wrong with a file that a person wrote, in one sentence."""
+"""What is wrong with a file that the user wrote, in one sentence."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _IN_OUR_WORDS = {
 
 
 def read_yaml(path: Path, what: str, refuse: Callable[[str], BadInput] = BadInput) -> Any:
-    """The plain values of a YAML file, null of an empty one. Else what ``refuse`` makes of a sentence that begins with
+    """The plain values of a YAML file, None of an empty one. Else what ``refuse`` makes of a sentence that begins with
     ``what`` is raised."""
     try:
         text = path.read_text(encoding="utf-8")

@@ -16,7 +16,7 @@ from pipeline.types import Coasting, EgoState
 def follow(
     before: EgoState | None, measured: EgoState | None, dt_s: float | None, params: MotionParams
 ) -> EgoState | None:
-    """What was measured; without it the motion of the frame before, older by ``dt_s``. Null before the first one."""
+    """What was measured; without it the motion of the frame before, older by ``dt_s``. None before the first one."""
     if measured is not None or before is None:
         return measured
     since_s = before.coasting.age_s if before.coasting is not None else 0.0
@@ -27,7 +27,7 @@ def follow(
 
 
 def recent(own: EgoState | None, params: MotionParams) -> EgoState | None:
-    """The own motion while it is good enough to drive by; null once it has not been measured for ``coast_s``."""
+    """The own motion while it is good enough to drive by; None once it has not been measured for ``coast_s``."""
     if own is None or own.coasting is None:
         return own
     return own if own.coasting.age_s <= params.coast_s else None

@@ -19,19 +19,21 @@ from pipeline.types import DistanceLaw
 
 @dataclass(frozen=True)
 class FoundLaw:
-    """law: of this network, null when none was measured. note: why a law that is there is not used, else empty."""
+    """What was found beside a network."""
 
     law: DistanceLaw | None
+    """Its distance law; None when none was measured, or the one that was cannot be used."""
     note: str = ""
+    """Why a law that is there is not used; else empty."""
 
 
 def law_file(network: Path) -> Path:
-    """Where a network's law is kept; it need not be there."""
+    """Where a network's law is kept; the file need not exist."""
     return network.with_suffix(".law.json")
 
 
 def find_law(network: Path) -> FoundLaw:
-    """The law measured for these very weights."""
+    """The law measured for exactly these weights."""
     path = law_file(network)
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))

@@ -1,8 +1,8 @@
-"""Networks by name: which ones are known, where their official files are, and the folder that keeps them.
+"""Networks by name: which ones are known, where to download them, and the folder that keeps them.
 
 The folder is ``~/.cache/cipv/models`` (``CIPV_HOME`` replaces ``~/.cache/cipv``). A network is chosen by name or path;
 without either it is the registered default, then the first known one found in the folder or in ``$CIPV_DATA/models``,
-then the embedded one, which is part of the program and knows simulated vehicles only.
+then the embedded one, which is built in and was trained on simulated vehicles only.
 """
 
 from __future__ import annotations
@@ -38,27 +38,33 @@ class ModelError(BadInput):
 
 @dataclass(frozen=True)
 class KnownModel:
-    """An official file, size in bytes; or, where size and checksum are null, the project that has it: such a network is
-    fetched, or exported to ONNX, by hand and registered."""
+    """A network that can be downloaded, or a project that has one to export."""
 
     name: str
+    """As in ``cipv models pull NAME``."""
     task: Task
+    """What it detects."""
     url: str
+    """Of the file, or of the project."""
     size: int | None
+    """Bytes; None where there is no official file: the user downloads or exports one and registers it."""
     sha256: str | None
+    """Of the official file."""
     licence: str
+    """Of the weights."""
     note: str
+    """For people."""
 
     @property
     def remedy(self) -> str:
-        """How it comes here."""
+        """How to install it."""
         if self.size is not None:
             return f"`cipv models pull {self.name}` ({self.size / 1e6:.1f} MB)"
         return f"download or export its ONNX file, then {self.register}"
 
     @property
     def register(self) -> str:
-        """The command that takes a file fetched by hand."""
+        """The command that installs a file downloaded manually."""
         task = "" if self.task == "detector" else f" --task {self.task}"
         return f"`cipv models register PATH {self.name}{task}`"
 
@@ -102,21 +108,28 @@ KNOWN: tuple[KnownModel, ...] = (
 
 @dataclass(frozen=True)
 class ModelEntry:
-    """One row of ``cipv models``. ``path`` is null while it is not here. law: the distance law measured for it, null
-    where it has none and the one for real vehicles is used."""
+    """One row of ``cipv models``."""
 
     name: str
+    """As in ``--detector NAME``."""
     task: Task
+    """What it detects."""
     path: Path | None
+    """Its file; None while it is not installed."""
     default: bool
+    """Used when no network is named."""
     licence: str | None
+    """Of the weights; None where it is not known."""
     url: str | None
+    """Where it comes from; None where that is not known."""
     note: str
+    """For people."""
     law: DistanceLaw | None = None
+    """The distance law measured for it; None: the one for real vehicles is used."""
 
 
 def store() -> Path:
-    """The folder that keeps networks; it need not exist."""
+    """The folder of installed networks; it need not exist."""
     home = os.environ.get("CIPV_HOME")
     return (Path(home) if home else Path.home() / ".cache" / "cipv") / "models"
 
@@ -142,7 +155,7 @@ def list_models() -> tuple[ModelEntry, ...]:
 
 
 def find(spec: str) -> Path | None:
-    """The file of a path or a name; null when there is none."""
+    """The file of a network by path or name; None when there is none."""
     path = given_path(spec, ModelError)
     if path.is_file():
         return path
@@ -150,7 +163,7 @@ def find(spec: str) -> Path | None:
 
 
 def default_model(task: Task) -> Path | None:
-    """The network used when nobody names one; null when none is here."""
+    """The network used when none is named; None when none is installed."""
     chosen = _read_registry()["defaults"].get(task)
     names = [chosen] if chosen else []
     names += [known.name for known in KNOWN if known.task == task]
@@ -160,7 +173,7 @@ def default_model(task: Task) -> Path | None:
 
 
 def own_file(path: Path) -> Path:
-    """A file that a person wants to register, ``~`` resolved. ModelError when it is not there."""
+    """A file that the user wants to register, ``~`` resolved. ModelError when it does not exist."""
     given = given_path(path, ModelError)
     if not given.is_file():
         raise ModelError(f"no file at {path}")
@@ -168,8 +181,8 @@ def own_file(path: Path) -> Path:
 
 
 def register(path: Path, name: str, task: Task = "detector", default: bool = True) -> Path:
-    """Copy a file, with the distance law beside it, into the folder under ``name`` and, unless told otherwise, make it
-    its task's default."""
+    """Install a file, with the distance law beside it, under ``name``, by default as its task's default. ModelError
+    says why it cannot be installed."""
     if not _is_name(name):
         raise ModelError(f"{name!r} is not a valid network name: use letters, digits, '-', '_' and '.'")
     if name == EMBEDDED:
@@ -204,8 +217,8 @@ def known_model(name: str) -> KnownModel:
 
 
 def pull(name: str, progress: Progress = silent) -> Path:
-    """Fetch a known network into the folder; size and SHA-256 must be the official ones. A file that is already there
-    and right is kept. ModelError says what went wrong; no part of a failed download stays."""
+    """Download and install a known network, checking size and SHA-256. A correct file that is installed already is
+    kept. ModelError says what went wrong; no part of a failed download remains."""
     known = known_model(name)
     if known.size is None or known.sha256 is None:
         raise ModelError(f"{name} has no download with a known checksum: {known.remedy}; the project is {known.url}")

@@ -79,7 +79,7 @@ class _Placed:
 
 
 def open_lane_network(spec: str | None, threads: int = 2) -> LaneNetwork:
-    """Load a lane network by name or path; null: the default one (``pipeline.inference.model_registry``).
+    """Load a lane network by name or path; None: the default one (``pipeline.inference.model_registry``).
 
     DetectorMissing when there is no file, DetectorError when the file is not a lane network that can be run.
     """

@@ -1,7 +1,7 @@
 """What a lane detector saw in the picture, as lines on the road in metres.
 
 ``measure``    points of one picture → ground → lines, with the pitch that makes them parallel
-``follow``     the same, and the lines tracked from frame to frame: what the rest of the line calls
+``follow``     the same, and the lines tracked from frame to frame: the stage that ``step`` runs
 ``polylines``  an ``EgoLane`` as points on the road, and ``in_picture`` as pixels, for views
 
 The road is a plane: the one that the LiDAR's ground points show, else as far below the ego origin as the calibration
@@ -73,7 +73,7 @@ class LaneMeasurement:
 @dataclass(frozen=True, eq=False)
 class LaneState:
     """What one frame leaves to the next. plane: (3,) a, b, c of the road z = a·x + b·y + c, a running mean over the
-    sweeps that showed it; null before one did. sweeps: how many those are."""
+    sweeps that showed it; None before one did. sweeps: how many those are."""
 
     tracks: tracking.LaneTracks = tracking.LaneTracks()
     pitch: Pitch | None = None
@@ -120,7 +120,7 @@ def measure(
     """Lines on the road from points in the picture; none where too few points lie on it.
 
     plane: (3,) as in ``LaneState``. pitch: as believed before this picture. expected: the shape of the tracked lines,
-    around which the search is then narrow; null searches wide.
+    around which the search is then narrow; None searches wide.
     """
     nothing = LaneMeasurement(raw.model, (), pitch)
     eye, rays = aligned.rays(np.asarray(raw.points, np.float64))
@@ -155,7 +155,7 @@ def _beside(raw: RawLanes, vehicles: Sequence[Box]) -> RawLanes:
 
 
 def road_plane(ground: Ground | None) -> F64 | None:
-    """(3,) a, b, c of the road's height z = a·x + b·y + c ahead, from the LiDAR's ground; null without one."""
+    """(3,) a, b, c of the road's height z = a·x + b·y + c ahead, from the LiDAR's ground; None without one."""
     if ground is None:
         return None
     z = ground.height(np.array([[_NEAR_M, 0.0], [_FAR_M, 0.0], [_NEAR_M, 2.0], [_NEAR_M, -2.0]]))

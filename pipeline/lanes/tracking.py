@@ -63,7 +63,7 @@ class LineTrack:
 
 @dataclass(frozen=True, eq=False)
 class LaneTracks:
-    """Every line that is followed. source: the detector's name, null before it first delivered; age_s: since then."""
+    """Every line that is followed. source: the detector's name, None before it first delivered; age_s: since then."""
 
     lines: tuple[LineTrack, ...] = ()
     source: str | None = None
@@ -104,7 +104,7 @@ def update(tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], pa
 
 
 def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParams) -> EgoLane | None:
-    """The pair of lines that the car is most likely between; null before a detector ever delivered.
+    """The pair of lines that the car is most likely between; None before a detector ever delivered.
 
     Each side takes a believed line or none. A pair whose width is no lane's is not taken: one of the two is wrong, or
     the calibration is, and if no other line says which, the better supported one stands alone.
@@ -121,7 +121,7 @@ def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParam
 
 
 def expected_shape(tracks: LaneTracks) -> Shape | None:
-    """Heading and curvature of the best line, to search around; null when none is sure."""
+    """Heading and curvature of the best line, to search around; None when none is sure."""
     best = max(tracks.lines, key=lambda line: line.quality, default=None)
     if best is None or best.quality < 0.5 or best.seen < 3:
         return None

@@ -69,8 +69,8 @@ def track(
 ) -> tuple[LidarTrackerState, tuple[LidarTrack, ...]]:
     """One tick: the next state, and every living track by ascending id.
 
-    obstacles: null when the LiDAR delivered nothing, in which case every track is carried on by its prediction. dt_s:
-    seconds ≥ 0 since the tick before; null at the first, and then no track of an earlier time lives on.
+    obstacles: None when the LiDAR delivered nothing, in which case every track is carried on by its prediction. dt_s:
+    seconds ≥ 0 since the tick before; None at the first, and then no track of an earlier time lives on.
     """
     if dt_s is None:
         state, dt_s = LidarTrackerState(next_id=state.next_id, clock_s=state.clock_s), 0.0

@@ -43,7 +43,7 @@ _USABLE_WITHOUT_SPEED_M, _USABLE_AT_STANDSTILL_M = 20.0, 5.0
 
 @dataclass(frozen=True, eq=False)
 class PathState:
-    """What one frame's path leaves to the next. last: the fused path; null where nothing can be carried over."""
+    """What one frame's path leaves to the next. last: the fused path; None where nothing can be carried over."""
 
     yaw: YawRate | None = None
     gnss: GnssState = GnssState()
@@ -114,7 +114,7 @@ def warm_up() -> None:
 def _expected(
     last: FusedPath | None, yaw: YawRate | None, ego: EgoState | None, dt_s: float | None, size: int
 ) -> FusedPath | None:
-    """The last path where it should be now; null when there is none, or when the car's own motion is not known."""
+    """The last path where it should be now; None when there is none, or when the car's own motion is not known."""
     if last is None or ego is None or not dt_s or len(last.center) != size:
         return None
     rate = yaw_rate.usable_rate(ego)

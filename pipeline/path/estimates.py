@@ -43,7 +43,7 @@ point on the road may be taken to be."""
 @dataclass(frozen=True, eq=False)
 class PathEstimate:
     """center: (K, 2) float64 ego x, y at s = 0, 1, … m. sigma_m: (K,) float64, of the sideways place. left_m, right_m:
-    (K,) float64 distances from the centre to the lane's edges; null where the source does not see edges."""
+    (K,) float64 distances from the centre to the lane's edges; None where the source does not see edges."""
 
     source: SourceName
     center: F64
@@ -86,7 +86,7 @@ def straight(ego: EgoState | None, params: PathParams) -> PathEstimate:
 
 
 def between_lines(lane: EgoLane | None, params: PathParams) -> PathEstimate | None:
-    """The middle between the lane's two lines, or half a lane beside the one that is seen; null without any. The lines
+    """The middle between the lane's two lines, or half a lane beside the one that is seen; None without any. The lines
     need not be parallel. Where a line ends, its own covariance grows, and so does the sigma here."""
     if lane is None or (lane.left is None and lane.right is None):
         return None

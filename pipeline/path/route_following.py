@@ -40,9 +40,9 @@ _SEARCH_M = 60.0
 
 @dataclass(frozen=True, eq=False)
 class GnssState:
-    """line: the route laid out. pose: of the car; null before the first fix with a course. fix_t_ns: of the last fix
+    """line: the route laid out. pose: of the car; None before the first fix with a course. fix_t_ns: of the last fix
     looked at. fix_sigma_m: of the last one believed. doubt_m: what the last jump left, fading. refused_s: for how long
-    every fix has been refused. at_m: place along the route; null while not on it. placed_anew: after a jump that
+    every fix has been refused. at_m: place along the route; None while not on it. placed_anew: after a jump that
     stayed, until the doubt has faded."""
 
     line: RouteLine | None = None
@@ -150,7 +150,7 @@ def _refused(
 
 
 def ahead(state: GnssState, params: PathParams) -> tuple[GnssState, PathEstimate | None, tuple[str, ...]]:
-    """The route from where the car is on it, as points in the ego frame; null, with a sentence, when the car is not on
+    """The route from where the car is on it, as points in the ego frame; None, with a sentence, when the car is not on
     the route or nobody knows where it is."""
     if state.line is None:
         return state, None, ()

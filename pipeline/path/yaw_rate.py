@@ -43,7 +43,7 @@ class YawRate:
 def follow(before: YawRate | None, ego: EgoState | None, dt_s: float | None, params: PathParams) -> YawRate | None:
     """The yaw rate now: a random walk that changes with the lateral jerk of roads, j/v in rad/s² (Kalman, one state).
 
-    What is not finite, or faster than any car turns, is as good as not measured. Null before the first one, and where
+    What is not finite, or faster than any car turns, is as good as not measured. None before the first one, and where
     ego speed is unknown or so slow that turning means no curve."""
     if ego is None or not isfinite(ego.speed_mps) or ego.speed_mps < params.min_speed_mps:
         return None
@@ -62,13 +62,13 @@ def follow(before: YawRate | None, ego: EgoState | None, dt_s: float | None, par
 
 
 def usable_rate(ego: EgoState | None) -> float | None:
-    """The measured yaw rate, or null when there is none that a car can have."""
+    """The measured yaw rate, or None when there is none that a car can have."""
     rate = ego.yaw_rate_radps if ego is not None else None
     return rate if rate is not None and isfinite(rate) and abs(rate) <= _FASTEST_RADPS else None
 
 
 def believable(ego: EgoState | None) -> EgoState | None:
-    """The ego state without a yaw rate that no car has; null where the speed is not a number."""
+    """The ego state without a yaw rate that no car has; None where the speed is not a number."""
     if ego is None or not isfinite(ego.speed_mps):
         return None
     return ego if ego.yaw_rate_radps == usable_rate(ego) else evolve(ego, yaw_rate_radps=None)
@@ -82,7 +82,7 @@ def doubts(ego: EgoState | None) -> tuple[str, ...]:
 
 
 def ahead(yaw: YawRate | None, ego: EgoState | None, params: PathParams) -> PathEstimate | None:
-    """The arc ahead, r(1 − cos θ) aside at path length s = rθ; null where no yaw rate is known.
+    """The arc ahead, r(1 − cos θ) aside at path length s = rθ; None where no yaw rate is known.
 
     Its sigma adds up where the car is in its lane, its sideways speed there, the yaw rate's error and the lateral jerk
     of roads. A yaw rate not measured any more is one whose variance has grown."""

@@ -1,6 +1,6 @@
-"""Any YOLO-family ONNX network as one function: picture in, candidate boxes out (paper, Object Detection).
+"""Any ONNX network of the YOLO family as one function: picture in, candidate boxes out (paper, Object Detection).
 
-The paper runs YOLOv3 under TensorRT; here the best provider that works is taken: TensorRT, CUDA, CPU.
+The paper runs YOLOv3 under TensorRT; here the best available provider runs it: TensorRT, CUDA or CPU.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from pipeline.vision.heads import Decoder, UnknownHead, pick_decoder
 FLOOR_SCORE = 0.05
 """Candidates scored lower are not even kept; ``detection.min_score`` cannot go below it."""
 PADDING = 114
-"""Grey that fills what the picture leaves of the input, as the YOLO family is trained."""
+"""Grey that fills the rest of the input, as the YOLO family is trained."""
 _FREE_SIZE: Size = (384, 640)
-"""Input of a graph of free size when no picture is known yet: 16:9."""
+"""Input of a graph without a fixed size when the pictures are not known yet: 16:9."""
 _SIMULATED_ONLY = (
     "using the embedded detector, trained on simulated cars only; get a real one with `cipv models pull yolox_nano`"
 )
@@ -37,23 +37,28 @@ _SIMULATED_ONLY = (
 
 @dataclass(frozen=True)
 class Detector:
-    """A loaded network.
-
-    path: its file. name: file, digest, input size and law, so that equal names give equal boxes: the key of caches.
-    input_size: (height, width). labels: class names in COCO's spelling. law: what its boxes tell of distance. notes:
-    what a person should know about how it was loaded. graph: the ONNX file as it runs, at this input size.
-    """
+    """A loaded network."""
 
     path: Path
+    """Its file."""
     name: str
+    """File, digest, input size and law: equal names give equal boxes, so this is the key of caches."""
     providers: tuple[str, ...]
+    """Of onnxruntime, in the order in which they are tried for each node."""
     input_size: Size
+    """(height, width)."""
     labels: tuple[str, ...]
+    """Class names in COCO's spelling, by class id."""
     law: DistanceLaw
+    """Distance from the heights of its boxes."""
     head: str
+    """Name of its head."""
     notes: tuple[str, ...]
+    """What a user should know about how it was loaded."""
     threads: int
+    """How many threads it runs on."""
     graph: bytes = field(repr=False, compare=False)
+    """The ONNX graph as it runs, at this input size."""
     _session: ort.InferenceSession = field(repr=False, compare=False)
     _decoder: Decoder = field(repr=False, compare=False)
 
@@ -67,7 +72,7 @@ class Detector:
         return self.decode(run_session(self._session, self.blob(bgr)), (bgr.shape[0], bgr.shape[1]))
 
     def blob(self, bgr: U8) -> F32:
-        """The picture as the network takes it: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey."""
+        """The picture as the network's input: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey."""
         scale = _scale((bgr.shape[0], bgr.shape[1]), self.input_size)
         height, width = (max(1, min(round(n * scale), m)) for n, m in zip(bgr.shape[:2], self.input_size, strict=True))
         filled = np.full((*self.input_size, 3), PADDING, np.uint8)
