@@ -75,6 +75,7 @@ def track(
     """
     if dt_s is None:
         state, dt_s = LidarTrackerState(next_id=state.next_id, clock_s=state.clock_s), 0.0
+    # Every track is predicted to now and takes the nearest obstacle that its gates permit, one-to-one
     clock_s = state.clock_s + dt_s
     sweep, has_sweep = obstacles or (), obstacles is not None
     seen = looks(sweep)
@@ -84,6 +85,7 @@ def track(
     history = _recorded(state.history, partner, seen.place, clock_s, params.trajectory_frames)
     velocity = filters.mean[:, 2:] if params.filter == "kalman" else slopes(history)
 
+    # A track that found its obstacle is updated; one that did not is carried, or dropped
     tracks, rows = [], []
     for i, (last, j, speed) in enumerate(zip(state.tracks, partner.tolist(), velocity.tolist(), strict=True)):
         if j >= 0:
@@ -94,6 +96,8 @@ def track(
         else:
             continue
         rows.append(i)
+
+    # Every obstacle that no track took starts a new one
     matched = partner >= 0
     is_fresh = np.ones(len(sweep), dtype=np.bool_)
     is_fresh[partner[matched]] = False

@@ -162,7 +162,7 @@ def test_a_name_that_is_a_path_is_refused(tmp_path: Path, name: str) -> None:
 
 def test_the_embedded_name_is_taken(tmp_path: Path) -> None:
     (tmp_path / "a.onnx").write_bytes(b"a")
-    with pytest.raises(model_registry.ModelError, match="comes with the program"):
+    with pytest.raises(model_registry.ModelError, match="built-in detector"):
         model_registry.register(tmp_path / "a.onnx", "embedded")
 
 

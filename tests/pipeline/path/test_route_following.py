@@ -192,7 +192,7 @@ def test_a_route_without_a_line_is_told(rows: F64) -> None:
     assert lay_out(route) is None
     _, path, said = drive(north_bound(3), route)
     assert path is None
-    assert said[0] == "route empty: contains no line"
+    assert said[0] == "route empty contains no line"
 
 
 def test_scatter_of_a_recorded_route_is_smoothed() -> None:

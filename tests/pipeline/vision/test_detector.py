@@ -166,7 +166,7 @@ def test_an_impossible_input_size_is_refused(tmp_path: Path, size: tuple[int, in
 )
 def test_what_is_no_picture_is_refused(tmp_path: Path, picture: np.ndarray) -> None:
     detector = open_detector(str(networks.yolox(tmp_path / "tiny.onnx")), None)
-    with pytest.raises(DetectorError, match="a picture is"):
+    with pytest.raises(DetectorError, match="expected a picture"):
         detector.detect(picture)
 
 
