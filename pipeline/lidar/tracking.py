@@ -1,11 +1,11 @@
 """Obstacles followed over time: recursive Bayes under the Markov assumption (paper, LiDAR Tracking).
 
-Predict, associate one-to-one under gates (place, number of points, density, spread), then add, keep or delete tracks.
-Time is the sensors' own: nothing here assumes a rate.
+Predict, associate one-to-one under gates (position, number of points, density, spread), then add, keep or delete
+tracks. Time comes from the sensors' timestamps: nothing here assumes a rate.
 
-What is followed is the middle of a box's rear: the side that faces back along ego x (``looks``). The centre
-of a cluster moves by metres when a vehicle's flank goes in or out of view, the nearest point jumps from one corner to
-the other; the rear of a vehicle ahead stays in both x and y. For oncoming traffic the same side is its front.
+The point that is tracked is the middle of a box's rear: the side that faces back along ego x (``looks``). The centre of
+a cluster moves by metres when a vehicle's flank comes into view or leaves it, and the nearest point jumps from one
+corner to the other; the rear of a vehicle ahead is stable in both x and y. For oncoming traffic it is the front.
 
 The paper computes velocity "from the trajectory": ``trajectory`` fits a line to the last positions by their stamps.
 ``kalman`` is a constant-velocity filter. Velocities are relative to ego.
@@ -26,28 +26,29 @@ from pipeline.params import LidarTrackingParams
 from pipeline.types import F64, I64, LidarTrack, Obstacle, Point3
 
 NEVER = 1e6
-"""Cost of a pair that a gate forbids: more than all allowed ones together."""
+"""Cost of a pair that a gate forbids: more than all permitted pairs together."""
 MIN_GATE_POINTS = 10
 """Counts and densities below this many points are noise: one ring more or less doubles them."""
 _SIDES_FRAMES = 10
 """Sightings over which the sides of a footprint are compared: a second at 10 Hz."""
 _SIDE_NOISE_M = 0.15
-"""Least noise of a side: two neighbouring rays of a VLP-16 are 0.1 m apart at 28 m, and a rounded corner adds as much."""
+"""Least noise of a side: neighbouring rays of a VLP-16 are 0.1 m apart at 28 m, and a rounded corner
+adds as much."""
 _SURE_SIGMAS = 2.0
 THINNEST_M = 0.5
-"""A rear alone is as thin as the LiDAR's noise; with a bit of flank it has twenty times the area, and is the same car.
-"""
+"""Thinnest footprint for comparing densities. A rear alone is as thin as the LiDAR's noise; with some flank the same
+car has twenty times the area."""
 
 
 class Looks(NamedTuple):
-    """Of many obstacles what association goes by."""
+    """What obstacles are associated by."""
 
     place: F64
-    """(M, 2) the reference points."""
+    """(M, 2) reference points, ego x, y."""
     shape: F64
-    """(M, 5) points, density, spread x, y, z, as the gates compare them."""
+    """(M, 5) number of points, density, spread along x, y and z, as the gates compare them."""
     sides: F64
-    """(M, 2) the least and the greatest ego y of each footprint."""
+    """(M, 2) least and greatest ego y of each footprint."""
 
 
 _NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
@@ -55,7 +56,7 @@ _NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
 
 @dataclass(frozen=True)
 class LidarTrackerState:
-    """All that one frame leaves to the next; the arrays have one row a track, in the order of ``tracks``.
+    """What one frame leaves to the next; arrays have one row per track, in the order of ``tracks``.
 
     filters: mean (T, 4), cov (T, 4, 4). shape: (T, 5) of the last sighting, as in ``Looks``. history: (T, H, 5)
     ``t_s x y low high`` of the last sightings' reference points and sides, newest last, NaN before the first.
@@ -77,11 +78,12 @@ def track(
 ) -> tuple[LidarTrackerState, tuple[LidarTrack, ...]]:
     """One tick: the next state, and every living track by ascending id.
 
-    obstacles: null when the LiDAR delivered nothing, in which case every track is carried on by its prediction. dt_s:
-    seconds ≥ 0 since the tick before; null at the first, and then no track of an earlier time lives on.
+    obstacles: None when the LiDAR delivered nothing; then every track is carried by its prediction. dt_s: seconds ≥ 0
+    since the tick before; None at the first, and then earlier tracks are dropped.
     """
     if dt_s is None:
         state, dt_s = LidarTrackerState(next_id=state.next_id, clock_s=state.clock_s), 0.0
+    # Every track is predicted to now and takes the nearest obstacle that its gates permit, one-to-one
     clock_s = state.clock_s + dt_s
     sweep, has_sweep = obstacles or (), obstacles is not None
     seen = looks(sweep)
@@ -95,6 +97,7 @@ def track(
         velocity = slopes(history[:, -params.trajectory_frames :, :3])
     sideways = rigid_sideways(history[:, -_SIDES_FRAMES:]).tolist()
 
+    # A track that found its obstacle is updated; one that did not is carried, or dropped
     tracks, rows = [], []
     for i, (last, j, speed) in enumerate(zip(state.tracks, partner.tolist(), velocity.tolist(), strict=True)):
         if j >= 0:
@@ -105,6 +108,8 @@ def track(
         else:
             continue
         rows.append(i)
+
+    # Every obstacle that no track took starts a new one
     matched = partner >= 0
     is_fresh = np.ones(len(sweep), dtype=np.bool_)
     is_fresh[partner[matched]] = False
@@ -135,7 +140,8 @@ def looks(obstacles: tuple[Obstacle, ...]) -> Looks:
 
 @numba.njit(cache=True, nogil=True)
 def _looks(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """place (M, 2), shape (M, 5) and sides (M, 2) of (M, 12) center x y z, length, width, height, yaw, points, density, spread."""
+    """place (M, 2), shape (M, 5) and sides (M, 2) of (M, 12) center x y z, length, width, height, yaw,
+    points, density, spread."""
     place, shape, sides = np.empty((len(rows), 2)), np.empty((len(rows), 5)), np.empty((len(rows), 2))
     for i in range(len(rows)):
         length, width, yaw, points = rows[i, 3], rows[i, 4], rows[i, 6], rows[i, 7]
@@ -251,8 +257,8 @@ def _first(place: F64, clock_s: float, frames: int) -> F64:
 
 
 def slopes(history: F64) -> F64:
-    """(T, C) speed in m/s of the least-squares line through each column of (T, H, 1 + C) ``t_s …``; NaN where all are of
-    one time."""
+    """(T, C) speed in m/s of the least-squares line through each column of (T, H, 1 + C) ``t_s …``; NaN where all are
+    of one time."""
     known = ~np.isnan(history[:, :, :1])
     table = np.where(known, history, 0.0)
     mean = table.sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1)
@@ -291,8 +297,8 @@ def rigid_sideways(history: F64) -> F64:
 
 
 def _lives_on(last: LidarTrack, unseen_s: float, has_sweep: bool, params: LidarTrackingParams) -> bool:
-    """Whether a track not seen now is carried on. One seen only once or twice does not outlive a sweep that lacks it:
-    its velocity is the difference of two noisy places, and would send a ghost across the road."""
+    """Whether a track that is not seen now is carried. One seen only once or twice is dropped at once: its velocity is
+    the difference of two noisy positions, and would send a ghost across the road."""
     too_young = has_sweep and last.hits < params.carry_hits
     return not too_young and unseen_s <= params.max_missed_s + 1e-9
 
