@@ -79,7 +79,7 @@ def control(state: AccState, situation: Situation, params: AccParams) -> tuple[A
 
 def _justified(object_id: int, situation: Situation) -> Braking:
     """The hardest braking that the object which is slowed down for can justify."""
-    return next((item.justifies for item in situation.objects if item.id == object_id), Braking.COMFORT)
+    return next((item.justifies for item in situation.objects if item.id == object_id), Braking.FULL)
 
 
 def cruise(params: AccParams) -> Demand:

@@ -99,7 +99,9 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
 
 def _justified(item: FusedObject, required_mps2: float) -> Braking:
     """As its evidence says; but what no LiDAR has measured and no tyre could avoid is not believed."""
-    return item.justifies if item.ranged or required_mps2 <= FRICTION_MPS2 else Braking.COMFORT
+    if item.ranged:
+        return item.justifies
+    return min(item.justifies, Braking.PARTIAL) if required_mps2 <= FRICTION_MPS2 else Braking.COMFORT
 
 
 def _level(threat: Threat, params: AebParams) -> int:

@@ -219,7 +219,7 @@ def _extrapolated(state: LidarTrackerState, dt_s: float) -> F64:
     """(T, 2) where the trajectories lead to now."""
     since_s = np.array([[t.unseen_s + dt_s] for t in state.tracks])
     velocity = np.array([t.velocity_mps or (0.0, 0.0) for t in state.tracks])
-    return np.asarray(state.history[:, -1, 1:] + velocity * since_s)
+    return np.asarray(state.history[:, -1, 1:3] + velocity * since_s)
 
 
 def _correct(filters: kalman.CvState, place: F64, partner: I64, params: LidarTrackingParams) -> kalman.CvState:

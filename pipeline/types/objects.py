@@ -263,7 +263,7 @@ class FusedObject:
     neither."""
     lidar_hits: int = 0
     """Sightings of its LiDAR track."""
-    justifies: Braking = Braking.COMFORT
+    justifies: Braking = Braking.FULL
     """The hardest braking that what is known of it can justify."""
     camera_ranges: int = 0
     """Distances in a row that its vision track took in."""
