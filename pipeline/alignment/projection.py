@@ -1,6 +1,6 @@
-"""Where an ego point falls in the picture, and back: the paper's ``angular`` model and ``pinhole`` beside it.
+"""Projection of ego points into the picture, and back: the paper's ``angular`` model, and ``pinhole``.
 
-Both answer the same two questions, so that every stage and view works with either:
+Both have the same interface, so every stage and view works with either:
 
 ``project``    (N, 3) ego points → (N, 2) pixels u, v; NaN for points that the camera cannot see (behind it).
 ``unproject``  (N, 2) pixels and (N,) horizontal ranges from the ego origin → (N, 3) ego points.
@@ -25,24 +25,34 @@ from pipeline.types import Box, CameraCalibration
 
 
 class Alignment(Protocol):
-    """The one interface to either model."""
+    """What both models do."""
 
-    def project(self, points: F64) -> F64: ...
+    def project(self, points: F64) -> F64:
+        """(N, 3) ego points → (N, 2) pixels u, v; NaN for points that the camera cannot see."""
+        ...
 
-    def unproject(self, pixels: F64, range_m: F64) -> F64: ...
+    def unproject(self, pixels: F64, range_m: F64) -> F64:
+        """(N, 2) pixels and (N,) horizontal ranges from the ego origin, metres → (N, 3) ego points."""
+        ...
 
-    def rays(self, pixels: F64) -> tuple[F64, F64]: ...
+    def rays(self, pixels: F64) -> tuple[F64, F64]:
+        """(N, 2) pixels → (3,) ego point they are seen from, and (N, 3) directions, not normalised."""
+        ...
 
 
 @dataclass(frozen=True)
 class Angular:
-    """Pixels proportional to angles (paper, Eq. alignment). h_res, v_res are radians per pixel; (cx, cy) is the
-    pixel that looks along ego +x. Exact only for an equirectangular picture taken at the ego origin."""
+    """Pixels proportional to angles (paper, Eq. alignment). Exact only for an equirectangular picture taken at the ego
+    origin."""
 
     h_res_rad: float
+    """Radians per pixel across."""
     v_res_rad: float
+    """Radians per pixel down."""
     cx: float
+    """Column of the pixel that looks along ego +x."""
     cy: float
+    """Row of that pixel."""
 
     def project(self, points: F64) -> F64:
         points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
@@ -65,7 +75,7 @@ class Angular:
 
 @dataclass(frozen=True)
 class Pinhole:
-    """K, distortion and T_camera_ego; parallax between the two mounts is handled."""
+    """A calibrated camera; takes the parallax between the two mounts into account."""
 
     K: F64
     distortion: F64
@@ -107,16 +117,16 @@ class Pinhole:
 
 
 def angular_from_calibration(camera: CameraCalibration) -> Angular:
-    """The angular model that agrees with a calibrated camera at its centre: pixels per radian there are fx and fy, and
-    the origin is where ego +x points (at infinity, since the model has no mount of its own)."""
+    """The angular model that agrees with a calibrated camera at its centre: fx and fy pixels per radian, and the
+    origin where ego +x points (at infinity, since the model has no mounting position)."""
     forward = camera.T_camera_ego[:3, :3] @ np.array([1.0, 0.0, 0.0])
     u, v = (camera.K @ (forward / forward[2]))[:2]
     return Angular(1.0 / camera.K[0, 0], 1.0 / camera.K[1, 1], float(u), float(v))
 
 
 def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignment | None:
-    """The alignment in use: parameters where a person set them, the recording's calibration for the rest. Null when
-    neither is known, in which case nothing can be projected. Pinhole needs a calibration; angular needs none."""
+    """The model to use: parameters where they are set, the recording's calibration for the rest. None when neither is
+    known, and nothing can be projected. Pinhole needs a calibration; angular does not, if all four values are set."""
     if params.model == "pinhole" and camera is not None:
         return Pinhole(camera.K, camera.distortion, camera.T_camera_ego @ inverse(_correction(params, camera)))
     measured = angular_from_calibration(camera) if camera is not None else None
@@ -133,7 +143,7 @@ def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignm
 
 
 def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
-    """(4, 4) turn of the camera where it is mounted, in ego axes: its place stays."""
+    """(4, 4) rotation of the camera in its mount, in ego axes: its position stays."""
     turn = rotation(*(np.radians(angle) for angle in (params.roll_deg, params.pitch_deg, params.yaw_deg)))
     place = inverse(camera.T_camera_ego)[:3, 3]
     correction = np.eye(4)
@@ -142,9 +152,9 @@ def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
 
 
 def project_cuboids(alignment: Alignment, corners: F64, width: int, height: int) -> list[Box | None]:
-    """The image boxes around cuboids' (M, 8, 3) corners, clipped to the picture; null for one outside it or behind.
+    """Image boxes around the (M, 8, 3) corners of cuboids, clipped to the picture; None for one outside of it.
 
-    Paper: "the cuboid of the bounding box … is projected onto the image". All at once: a sweep has dozens."""
+    Paper: "the cuboid of the bounding box … is projected onto the image". All at once, because a sweep has dozens."""
     uv = alignment.project(corners.reshape(-1, 3)).reshape(-1, 8, 2)
     behind = np.isnan(uv)
     enough = np.sum(~behind[..., 0], axis=1) >= 4

@@ -1,4 +1,4 @@
-"""Where recordings and networks that are not part of the program are kept."""
+"""Where recordings and networks that do not ship with the program are kept."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""What a person did or gave that cannot work, as opposed to a fault of ours."""
+"""Errors caused by what the user did or provided, as opposed to bugs."""
 
 from __future__ import annotations
 
 
 class BadInput(Exception):
-    """The text is one sentence for a person: what is wrong with which file, name or value, and the remedy if there is
+    """The text is one sentence for the user: what is wrong with which file, name or value, and the remedy if there is
     one. The command line prints it and exits with 2; the page shows it as a notice."""

@@ -1,4 +1,4 @@
-"""Things that happened at times: finding the nearest, and the last one before."""
+"""Finding the timestamped value that is nearest to a time, or the last one before it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Times = npt.NDArray[np.int64]
 
 
 def nearest(times_ns: Times, t_ns: int, within_ns: int) -> int | None:
-    """Index of the time nearest to ``t_ns`` in ascending times, the earlier of two; null when none is so near."""
+    """Index of the time nearest to ``t_ns`` in ascending times, the earlier of two; None when none is within reach."""
     at = int(np.searchsorted(times_ns, t_ns))
     around = [index for index in (at - 1, at) if 0 <= index < len(times_ns)]
     best = min(around, key=lambda index: abs(int(times_ns[index]) - t_ns), default=None)
@@ -20,7 +20,7 @@ def nearest(times_ns: Times, t_ns: int, within_ns: int) -> int | None:
 
 
 class Timeline(Generic[Value]):
-    """Values by their time, in whatever order they were given."""
+    """Values sorted by time, whatever order they are given in."""
 
     def __init__(self, times_ns: list[int], values: list[Value]) -> None:
         order = np.argsort(np.asarray(times_ns, dtype=np.int64), kind="stable")
@@ -31,6 +31,6 @@ class Timeline(Generic[Value]):
         return len(self._values)
 
     def latest(self, t_ns: int, within_ns: int) -> Value | None:
-        """The last one at or before ``t_ns``, if it is not older than that."""
+        """The last value at or before ``t_ns``; None if it is older than ``within_ns``."""
         at = int(np.searchsorted(self.times_ns, t_ns, side="right")) - 1
         return self._values[at] if at >= 0 and t_ns - int(self.times_ns[at]) <= within_ns else None

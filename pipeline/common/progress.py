@@ -1,12 +1,12 @@
-"""How far something is that takes a while."""
+"""Reporting the progress of long work."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 Progress = Callable[[int, int], object]
-"""Told (done, total) as the work goes on. What it raises ends the work."""
+"""Called with (done, total) as the work proceeds. An exception that it raises ends the work."""
 
 
 def silent(done: int, total: int) -> None:
-    """For who does not want to know."""
+    """Ignores progress: the default for callers that do not show it."""

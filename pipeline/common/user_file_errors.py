@@ -1,4 +1,4 @@
-"""What is wrong with a file that a person wrote, in one sentence."""
+"""What is wrong with a file that the user wrote, in one sentence."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from pipeline.common.errors import BadInput
 _IN_OUR_WORDS = {
     "extra_forbidden": "no such setting",
     "missing": "is missing",
-    "list_type": "has to be a list",
-    "model_type": "has to be settings, each with its name",
+    "list_type": "must be a list",
+    "model_type": "must be settings by name",
 }
 
 
 def read_yaml(path: Path, what: str, refuse: Callable[[str], BadInput] = BadInput) -> Any:
-    """The plain values of a YAML file, null of an empty one. Else what ``refuse`` makes of a sentence that begins with
+    """The plain values of a YAML file, None of an empty one. Else what ``refuse`` makes of a sentence that begins with
     ``what`` is raised."""
     try:
         text = path.read_text(encoding="utf-8")
@@ -37,7 +37,7 @@ def parse_yaml(text: str, what: str, refuse: Callable[[str], BadInput] = BadInpu
     try:
         return yaml.safe_load(text)
     except RecursionError:
-        raise refuse(f"{what}: not YAML: nested too deep") from None
+        raise refuse(f"{what}: not YAML: nested too deeply") from None
     except (yaml.YAMLError, ValueError) as error:  # ValueError: a day that is in no calendar, a number without end
         raise refuse(f"{what}: not YAML: {str(error).splitlines()[0]}") from None
 
@@ -47,7 +47,7 @@ def given_path(text: str | Path, refuse: Callable[[str], BadInput] = BadInput) -
     try:
         return Path(text).expanduser()
     except RuntimeError:
-        raise refuse(f"{text}: nobody here has that home folder") from None
+        raise refuse(f"{text}: unknown home directory") from None
 
 
 def reason_of(error: Exception) -> str:

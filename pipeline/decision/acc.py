@@ -1,10 +1,9 @@
 """Adaptive cruise control: a desired speed from the lead's distance, and pedals from a PID (paper, section ACC).
 
-Algorithm 3 prints the gap law under d ≤ d_min, where it is negative, keeps v_current for ever once the lead is gone and
-lets the last object of its loop win. Built here is what it means: the law holds when d ≤ d_desired, clipped to
-[0, set speed]; with nothing ahead the car returns to the set speed; the smallest demand wins. Where the path is not
-known well enough to say who leads, the car gets no faster.
-"""
+The printed Algorithm 3 applies the gap law where d ≤ d_min, where it is negative; keeps v_current for ever once the
+lead is gone; and lets the last object of its loop win. Implemented here is what it means: the law applies where d ≤
+d_desired, clipped to [0, set speed]; with nothing ahead the car returns to the set speed; the smallest demand wins.
+Where the path is not known well enough to tell the lead, ACC does not accelerate."""
 
 from __future__ import annotations
 
@@ -18,28 +17,34 @@ from pipeline.types import AccCommand, Cipv, EgoState, Path, Situation
 
 STANDSTILL_MPS = 0.1
 CREEP_MPS = 3.0
-"""Slower than this no curve shows in the own motion: a car that might not creep would never learn its path."""
+"""Below this speed own motion shows no curve: a car that may not creep would never learn its path."""
 State = Literal["cruise", "follow", "stop", "warn"]
 
 
 @dataclass(frozen=True)
 class AccState:
-    """The PID's memory. integral_m: of the speed error over time. error_mps: of the frame before; null at first."""
+    """The PID's memory."""
 
     integral_m: float = 0.0
+    """Integral of the speed error over time."""
     error_mps: float | None = None
+    """Speed error of the frame before; None at the start."""
 
 
 @dataclass(frozen=True)
 class Demand:
-    """One wish for a speed, what asks for it, and the object it slows down for. no_faster: than now, whatever the PID
-    remembers."""
+    """One demand for a speed; the smallest wins."""
 
     speed_mps: float
+    """The speed demanded."""
     state: State
+    """What the car is said to do if this demand wins."""
     reason: str
+    """Why, in words."""
     object_id: int | None = None
+    """The object that the car slows down for."""
     no_faster: bool = False
+    """Do not accelerate, even if the PID's memory asks for it."""
 
 
 def control(state: AccState, situation: Situation, params: AccParams) -> tuple[AccState, AccCommand | None]:
@@ -47,6 +52,7 @@ def control(state: AccState, situation: Situation, params: AccParams) -> tuple[A
     ego = situation.now.ego
     if ego is None:
         return AccState(), None
+    # Each rule demands a speed, and the smallest demand wins
     demand = min(
         (
             follow(ego, situation.lead, params),
@@ -55,6 +61,7 @@ def control(state: AccState, situation: Situation, params: AccParams) -> tuple[A
         ),
         key=lambda wish: wish.speed_mps,
     )
+    # A PID turns the speed error into an acceleration, and that into pedals
     state, accel = pid(state, demand.speed_mps - ego.speed_mps, situation.now.dt_s, params)
     accel = min(accel, 0.0) if demand.no_faster else accel
     return state, AccCommand(
@@ -69,7 +76,7 @@ def control(state: AccState, situation: Situation, params: AccParams) -> tuple[A
 
 
 def cruise(params: AccParams) -> Demand:
-    """The speed a person set."""
+    """The set speed."""
     return Demand(params.set_speed_kmh / 3.6, "cruise", "nothing to slow down for")
 
 
@@ -79,8 +86,8 @@ def desired_gap_m(speed_mps: float, params: AccParams) -> float:
 
 
 def follow(ego: EgoState, cipv: Cipv | None, params: AccParams) -> Demand:
-    """v_desired = v_current · (d − d_min) / (d_desired − d_min) (paper, Eq. acc), clipped to [0, set speed]. With the
-    lead farther than d_desired the law is not defined: the set speed."""
+    """v_desired = v_current · (d − d_min) / (d_desired − d_min) (paper, Eq. acc), clipped to [0, set speed]. The law is
+    not defined for a lead beyond d_desired: the set speed."""
     set_speed = params.set_speed_kmh / 3.6
     if cipv is None:
         return cruise(params)
@@ -88,15 +95,15 @@ def follow(ego: EgoState, cipv: Cipv | None, params: AccParams) -> Demand:
     if cipv.distance_m > wanted:
         return Demand(set_speed, "cruise", f"lead #{cipv.id} beyond the desired gap of {wanted:.1f} m")
     if cipv.distance_m <= params.min_gap_m:
-        return Demand(0.0, "stop", f"lead #{cipv.id} inside the smallest gap of {params.min_gap_m:.1f} m", cipv.id)
+        return Demand(0.0, "stop", f"lead #{cipv.id} within the minimum gap of {params.min_gap_m:.1f} m", cipv.id)
     speed = ego.speed_mps * (cipv.distance_m - params.min_gap_m) / (wanted - params.min_gap_m)
-    return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} inside the desired gap of {wanted:.1f} m", cipv.id)
+    return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} within the desired gap of {wanted:.1f} m", cipv.id)
 
 
 def avoid(ego: EgoState, situation: Situation, params: AccParams) -> list[Demand]:
-    """Slow down for objects that are not the CIPV while their TTC is below the limit (paper, Algorithm 3; "slow down
-    until TTC goes below" means above). Only those whose course leads into the corridor by then: an oncoming car in its
-    own lane has a short TTC too, and passes."""
+    """Slow down for objects other than the CIPV while their TTC is below the limit (paper, Algorithm 3; its "slow down
+    until TTC goes below" means above). Only for those whose course leads into the corridor by then: an oncoming car in
+    its own lane also has a short TTC, and passes."""
     return [
         Demand(
             ego.speed_mps * item.ttc_s / params.ttc_limit_s,
@@ -115,8 +122,8 @@ def avoid(ego: EgoState, situation: Situation, params: AccParams) -> list[Demand
 
 
 def hold(ego: EgoState, path: Path, params: AccParams) -> list[Demand]:
-    """No faster than now where nobody knows well enough where the car is going: a lead could be anywhere. Slower than
-    the speed at which a curve shows at all, the car may creep on. Nor where the own speed is one of a while ago."""
+    """Do not accelerate while the path is not usable, because a lead could be anywhere, or while own speed is not
+    measured. On an unusable path the car may still creep, at speeds where own motion cannot show a curve."""
     coasts = ego.coasting is not None
     if path.usable and not coasts:
         return []
@@ -124,12 +131,14 @@ def hold(ego: EgoState, path: Path, params: AccParams) -> list[Demand]:
     if allowed >= params.set_speed_kmh / 3.6:
         return []
     why = f"own speed not measured for {ego.coasting.age_s:.1f} s" if ego.coasting is not None else path.doubt
-    return [Demand(allowed, "cruise", f"{why}: no faster than now", no_faster=allowed <= ego.speed_mps)]
+    holds = allowed <= ego.speed_mps
+    limit = "ACC will not accelerate" if holds else f"ACC will not exceed {allowed * 3.6:.0f} km/h"
+    return [Demand(allowed, "cruise", f"{why}: {limit}", no_faster=holds)]
 
 
 def pid(state: AccState, error_mps: float, dt_s: float | None, params: AccParams) -> tuple[AccState, float]:
-    """Acceleration in m/s² from a speed error, with anti-windup: while the pedals are at their end the integral only
-    moves back. Without dt (first frame) only the proportional part acts."""
+    """Acceleration in m/s² from a speed error, with anti-windup: while the output is clipped, the integral only
+    unwinds. Without dt (first frame) only the proportional part acts."""
     slope = (error_mps - state.error_mps) / dt_s if dt_s and state.error_mps is not None else 0.0
     integral = state.integral_m + (error_mps * dt_s if dt_s else 0.0)
     wanted = params.kp * error_mps + params.ki * integral + params.kd * slope

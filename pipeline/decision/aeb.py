@@ -1,10 +1,9 @@
 """Autonomous emergency braking beside ACC: warning, partial braking, full braking.
 
-The paper brakes with its cruise control alone, a speed law that knows the distance but neither how fast the gap closes
-nor what braking is still possible. Here each vehicle in the path is asked two questions: when would it be hit (TTC),
-and how hard must we brake from now on so as not to hit it (required deceleration, brake build-up counted in). A stage
-comes in when either answer passes its limit, and stays until the danger is over. Terms as in UN Regulation 152 and
-Euro NCAP's AEB car-to-car protocol.
+The paper brakes with its cruise control alone, whose speed law knows the distance but neither how fast the gap closes
+nor what braking is still possible. Here two numbers decide for each vehicle in the path: the time to collision (TTC),
+and the deceleration required to avoid it, brake build-up included. A stage starts when either passes its limit, and
+lasts until the danger is over. Terms as in UN Regulation 152 and Euro NCAP's AEB car-to-car protocol.
 """
 
 from __future__ import annotations
@@ -28,24 +27,31 @@ _SMALLEST_GAP_M = 0.1
 
 @dataclass(frozen=True)
 class AebState:
-    """level: the stage that acts, 0 none to 3 full. streak: for how many frames in a row each of the three was asked
-    for. calm_s: for how long nothing has asked while a braking stage acted. cause: what it acts for, in words, and the
-    id of that object."""
+    """What one frame leaves to the next."""
 
     level: int = _NONE
+    """The active stage: 0 none, 1 warning, 2 partial braking, 3 full braking."""
     streak: tuple[int, ...] = (0, 0, 0)
+    """For each of the three stages, the frames in a row that called for it."""
     calm_s: float = 0.0
+    """How long no danger has been present while a braking stage was active."""
     cause: str = ""
+    """What the stage is active for, in words."""
     object_id: int | None = None
+    """The object it is active for."""
 
 
 class Threat(NamedTuple):
-    """Something on our way that we close in on. measured: by the LiDAR; else its speed comes from box heights."""
+    """An object on a collision course."""
 
     id: int
+    """Of the object."""
     ttc_s: float
+    """Time to collision."""
     required_mps2: float
-    measured: bool
+    """Deceleration required to avoid it; infinite when no distance is left."""
+    ranged: bool
+    """A ranging sensor measures its distance; otherwise it comes from the height of its box."""
 
 
 def guard(
@@ -55,8 +61,8 @@ def guard(
     params: AebParams,
     pedals: AccParams,
 ) -> tuple[AebState, AccCommand | None]:
-    """ACC's command, or the stage's own where that brakes harder. A warning leaves the pedals to ACC. Null and calm
-    where ego speed is not known, since then nothing is known about braking."""
+    """ACC's command, or that of the active stage where it brakes harder. A warning leaves the pedals to ACC. Without
+    own speed nothing can be said about braking: no command, and no stage."""
     ego = situation.now.ego
     if ego is None or command is None or not params.enabled:
         return AebState(), command
@@ -67,9 +73,9 @@ def guard(
 
 
 def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams) -> float:
-    """The constant deceleration that ends the approach ``margin_m`` before contact: Δv² / (2·d), where d is what is
-    left after the brakes have built up. It is against the *relative* speed: a lead that moves needs less than a
-    standing one. Infinite when no distance is left."""
+    """The constant deceleration that ends the approach ``margin_m`` before contact: Δv² / (2·d), where d is the
+    distance left after brake build-up. Δv is the *relative* speed: a moving lead needs less than a standing one.
+    Infinite when no distance is left."""
     if closing_mps <= 0.0:
         return 0.0
     left_m = distance_m - params.margin_m - closing_mps * params.build_up_s
@@ -77,7 +83,7 @@ def required_decel_mps2(distance_m: float, closing_mps: float, params: AebParams
 
 
 def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
-    """The CIPV, and what else is dependable and heads into the corridor: nothing brakes fully for a single blob."""
+    """The CIPV, and any other dependable object that heads into the corridor, while the gap to them shrinks."""
     found = []
     for item in situation.objects:
         closing = closing_speed_mps(item)
@@ -91,16 +97,16 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
 
 
 def _level(threat: Threat, params: AebParams) -> int:
-    """The stage asked for. Without a measured distance never the full one: a box height errs by a tenth."""
+    """The stage that a threat calls for. Never full braking without a ranging sensor: a box height errs by a tenth."""
     if threat.ttc_s < params.full_ttc_s or threat.required_mps2 > params.full_when_mps2:
-        return _FULL if threat.measured else _PARTIAL
+        return _FULL if threat.ranged else _PARTIAL
     if threat.ttc_s < params.partial_ttc_s or threat.required_mps2 > params.partial_when_mps2:
         return _PARTIAL
     return _WARN if threat.ttc_s < params.warn_ttc_s else _NONE
 
 
 def _next(state: AebState, worst: Threat | None, ego: EgoState, dt_s: float, params: AebParams) -> AebState:
-    """The stage that acts now: one that has been asked for long enough, or a braking one that is not over yet."""
+    """The stage that is active now: one called for in enough frames in a row, or a braking one that is not over yet."""
     fast = ego.speed_mps * 3.6 >= params.min_speed_kmh
     asked = _level(worst, params) if worst is not None and fast else _NONE
     streak = tuple(count + 1 if asked > level else 0 for level, count in enumerate(state.streak))
@@ -120,7 +126,7 @@ def _next(state: AebState, worst: Threat | None, ego: EgoState, dt_s: float, par
 
 def _cause(threat: Threat) -> str:
     if threat.required_mps2 == inf:
-        return f"#{threat.id} in {threat.ttc_s:.1f} s, nearer than any braking"
+        return f"#{threat.id} in {threat.ttc_s:.1f} s, too close to brake in time"
     return f"#{threat.id} in {threat.ttc_s:.1f} s, {threat.required_mps2:.1f} m/s² needed"
 
 

@@ -1,10 +1,10 @@
 """Which vehicle ahead is the closest one in the path, why this one, and why not each other (paper, section CIPV).
 
-The rule: among the objects that may be a lead at all (``pipeline.decision.gates``), the one in the path with the
-smallest distance. Each test leaves its number and limit on the object; the first that fails is the reason given.
+The rule: of all objects that meet the conditions of a lead (``pipeline.decision.gates``), the nearest. The first
+condition that an object fails is the reason given.
 
-Being in the path is decided over time: every sighting gives log-odds, a running mean of them decides, so that neither a
-swaying distance nor one bad box makes the lead flicker. Which one will be next is said as well.
+Whether an object is in the path is decided over time: each sighting gives log-odds and their running mean decides, so
+that neither a swaying distance nor one bad box makes the lead flicker. The next lead is predicted as well.
 """
 
 from __future__ import annotations
@@ -23,37 +23,45 @@ from pipeline.types import Cipv, FusedObject, Moment, Path, Rejection, sensors_i
 
 AGREEMENT_SIGMAS = 3.0
 _BLUR_M = 0.2
-"""What moves sideways is weighed over no longer than it takes to move this far: older sightings were elsewhere."""
+"""Sightings of an object that moves sideways are averaged over no longer than it takes to move this far."""
 _HOVERS_MPS = 1.0
 _HALF_WAY = 0.7
-"""A running mean has turned half way after 0.7 of its time: what moves sideways is judged where it will be by then."""
+"""A running mean has turned half way after 0.7 of its time constant: an object that moves sideways is judged where it
+will be by then."""
 
 
 @dataclass(frozen=True)
 class CipvState:
-    """What one frame leaves to the next. lead_id: the CIPV. odds: of each object, the running mean of its log-odds."""
+    """What one frame leaves to the next."""
 
     lead_id: int | None = None
+    """The CIPV."""
     odds: dict[int, float] = field(default_factory=dict)
+    """By object id, the running mean of the log-odds that it is in the path."""
 
 
 class Choice(NamedTuple):
-    """objects: with their place against the path and every gate. lead: the CIPV with its reason. next_lead: who will be
-    it next. rejected: a reason for each other object."""
+    """The CIPV and why."""
 
     objects: tuple[FusedObject, ...]
+    """Every object, with its place against the path, its eligibility and its gates."""
     lead: Cipv | None
+    """The CIPV with the reason."""
     next_lead: Cipv | None
+    """The vehicle that will be the CIPV next."""
     rejected: tuple[Rejection, ...]
+    """The reason for each other object."""
 
 
 class _Judged(NamedTuple):
-    """An object with its place against the path and every gate. odds: the running mean of its log-odds, null without a
-    place. why_not: the reason why it cannot be the lead; null for one that can."""
+    """One object after all conditions were checked."""
 
     item: FusedObject
+    """With its place against the path, its eligibility and its gates."""
     odds: float | None
+    """The running mean of its log-odds; None where its place is not known."""
     why_not: str | None
+    """Why it cannot be the lead; None if it can."""
 
 
 def choose(
@@ -64,8 +72,10 @@ def choose(
     params: CipvParams,
 ) -> tuple[CipvState, Choice]:
     """The CIPV of this frame, the next one, and a reason for each other object."""
+    # Where each object is across the path, and which conditions of a lead it meets
     places = place(objects, path, now.ego, params)
     judged = [_judge(state, item, placed, path, now.dt_s, params) for item, placed in zip(objects, places, strict=True)]
+    # The nearest of those that meet them all leads
     able = [each.item for each in judged if each.why_not is None]
     nearest = min(able, key=lambda item: (item.distance_m or 0.0, item.id), default=None)
     lead = _surer(nearest, able) if nearest is not None else None
@@ -87,7 +97,7 @@ def _judge(
     dt_s: float | None,
     params: CipvParams,
 ) -> _Judged:
-    """One object. placed: where it is against the path, and when it will be over its edge."""
+    """Judge one object. placed: its place against the path, and when it will cross the edge."""
     where, crossing_s = placed if placed is not None else (None, None)
     leads, widening_m, odds = item.id == state.lead_id, 0.0, None
     if where is not None:
@@ -125,20 +135,20 @@ def _rejections(judged: list[_Judged], lead: FusedObject | None) -> Iterator[Rej
 
 
 def _fresh(dt_s: float | None, decide_s: float) -> float:
-    """The share that a new sighting has in the running mean."""
+    """The weight of a new sighting in the running mean."""
     return 1.0 - exp(-dt_s / decide_s) if dt_s and decide_s > 0.0 else 1.0
 
 
 def _widening_m(leads: bool, moving_mps: float, params: CipvParams) -> float:
-    """The last lead leaves the path only this far outside it, so that a lead at the edge does not flicker. One that
-    moves sideways is on its way."""
+    """How much wider the path is for the last lead, so that one at the edge does not flicker. Less for a lead that
+    moves sideways: it is leaving."""
     return params.hysteresis_m * max(0.0, 1.0 - abs(moving_mps) / _HOVERS_MPS) if leads else 0.0
 
 
 def _surer(nearest: FusedObject, able: list[FusedObject]) -> FusedObject:
-    """The nearest candidate, or the surer one that it may be a doubtful view of: one car can have two rows when its box
-    and its cluster were not joined, or when it was lost and found again under another number. A row that is carried
-    yields to one seen now, one that only the camera has to one the LiDAR measures, when the two distances agree."""
+    """The nearest candidate, or a better measured one that is probably the same car. One car has two rows when its box
+    and its cluster were not joined, or when it was lost and found again under another id. If the two distances agree, a
+    carried row yields to one seen now, and a camera-only row to one that is ranged."""
     rank = _surety(nearest)
     same_place = [item for item in able if _surety(item) > rank and _agree(nearest, item)]
     return min(same_place, key=lambda item: (item.distance_m or 0.0, item.id), default=nearest)
@@ -158,7 +168,7 @@ def _agree(a: FusedObject, b: FusedObject) -> bool:
 
 def _why_after(item: FusedObject, lead: FusedObject) -> str:
     doubtful = (item.distance_m or 0.0) < (lead.distance_m or 0.0)
-    return f"taken for #{lead.id}, which is surer" if doubtful else f"behind #{lead.id}"
+    return f"probably the same object as #{lead.id}, which is better measured" if doubtful else f"behind #{lead.id}"
 
 
 # ---------------------------------------------------------------- who will be next
@@ -167,8 +177,8 @@ def _why_after(item: FusedObject, lead: FusedObject) -> str:
 def _next_lead(
     judged: list[FusedObject], able: list[FusedObject], lead: FusedObject | None, params: CipvParams
 ) -> Cipv | None:
-    """The next-to-be CIPV: the vehicle that will be first over the edge of the path, nearer than the lead; else the one
-    behind a lead that leaves, or simply behind it."""
+    """The next CIPV: the vehicle nearer than the lead that will enter the path first; otherwise the one behind the
+    lead."""
     lead_m = lead.distance_m if lead is not None and lead.distance_m is not None else float("inf")
     cutting_in = [
         item
@@ -182,7 +192,7 @@ def _next_lead(
     ]
     if cutting_in:
         first = min(cutting_in, key=lambda item: (item.crossing_s or 0.0, item.id))
-        return _named(first, f"cuts in: over the edge of the path in {first.crossing_s:.1f} s")
+        return _named(first, f"cutting in: enters the path in {first.crossing_s:.1f} s")
     behind = [item for item in able if lead is not None and item.id != lead.id and (item.distance_m or 0.0) > lead_m]
     if lead is None or not behind:
         return None

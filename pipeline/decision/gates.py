@@ -126,7 +126,7 @@ def _seen(who: Candidate) -> Answer:
 
 
 def _not_seen(who: Candidate) -> str:
-    return "not seen in this frame" if who.item.carried else "its distance was not measured in this frame"
+    return "not seen in this frame" if who.item.carried else "distance not measured in this frame"
 
 
 def _size(who: Candidate) -> Answer:
@@ -147,7 +147,7 @@ def _wrong_size(who: Candidate) -> str:
     length, width, height = who.item.cuboid.size if who.item.cuboid is not None else (0.0, 0.0, 0.0)
     across = max(length, width)
     if across < who.params.min_width_m:
-        return f"only {across:.1f} m across"
+        return f"only {across:.1f} m wide"
     if height < who.params.min_height_m:
         return f"only {height:.1f} m high"
     return f"{across:.0f} m long: not a vehicle"
@@ -168,9 +168,9 @@ def _in_path(who: Candidate) -> Answer:
 
 def _out_of_path(who: Candidate) -> str:
     if who.place is None:
-        return "place not known"
+        return "position unknown"
     outside_m = -who.place.margin_m(who.widening_m)
-    return f"out of path by {outside_m:.1f} m" if outside_m > 0.0 else "in path for a moment only"
+    return f"out of path by {outside_m:.1f} m" if outside_m > 0.0 else "in path only briefly"
 
 
 def _placed(who: Candidate) -> Answer:
@@ -183,15 +183,15 @@ def _placed(who: Candidate) -> Answer:
 
 
 def _uncertain(who: Candidate) -> str:
-    return f"its place against the path is uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
+    return f"its position across the path is uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
 
 
 CONDITIONS = Conditions(
     vehicle=Condition("vehicle_class", _vehicle, lambda who: f"class {who.item.label}"),
-    distance=Condition("distance_known", _distance, lambda _: "distance not known"),
+    distance=Condition("distance_known", _distance, lambda _: "distance unknown"),
     size=Condition("size", _size, _wrong_size),
     ahead=Condition(
-        "ahead", _ahead, lambda who: "place not known" if who.place is None else "beside or behind the bumper"
+        "ahead", _ahead, lambda who: "position unknown" if who.place is None else "beside or behind the bumper"
     ),
     in_path=Condition("path_offset", _in_path, _out_of_path),
     confirmed=Condition("hits", _confirmed, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),

@@ -1,4 +1,4 @@
-"""How objects move against the ego car and over the ground: closing speed, time to collision, moving or not.
+"""How objects move relative to the car and over the ground: closing speed, time to collision, moving or not.
 
 Signs, in words: a lead that is slower than ego closes the gap, its closing speed is positive and its TTC finite; a lead
 that pulls away has a negative closing speed and no TTC.
@@ -15,11 +15,11 @@ from pipeline.path.yaw_rate import usable_rate
 from pipeline.types import EgoState, FusedObject
 
 SMALLEST_CLOSING_MPS = 0.1
-"""A gap that shrinks more slowly does not measurably shrink, and has no TTC."""
+"""A gap that shrinks more slowly than this does not shrink measurably, and has no TTC."""
 
 
 def closing_speed_mps(item: FusedObject) -> float | None:
-    """How fast the gap to the object's nearest point shrinks; null where place or velocity are unknown."""
+    """How fast the gap to the object's nearest point shrinks; None where place or velocity are unknown."""
     if item.velocity_mps is None or item.closest_point is None or not item.distance_m:
         return None
     x, y, _ = item.closest_point

@@ -1,8 +1,8 @@
-"""Where each object is against the path: its extent across it, how surely it is in it, and when it will cross the edge.
+"""Where each object is across the path: its extent, how surely it is in the path, and when it will cross the edge.
 
-An object is in the path when enough of its width reaches between the two edges: as much as stops a car, or half of
-what is narrower. For a car that is the paper's rule, the middle of its rear between the lines; a wide truck whose
-middle is outside but which leaves no room is in the path too.
+An object is in the path when enough of its width lies between the two edges: as much as stops a car, or half of a
+narrower object. For a car that is the paper's rule, the middle of its rear between the lines; a wide truck whose middle
+is outside but which leaves no room is in the path too.
 """
 
 from __future__ import annotations
@@ -21,55 +21,61 @@ from pipeline.path.yaw_rate import usable_rate
 from pipeline.types import EgoState, FusedObject, Path, Point2
 
 LIDAR_SIDEWAYS_SIGMA_M = 0.15
-"""How well a cluster's sides are known: a beam's width, and what of the car was hit."""
+"""Lateral uncertainty of a cluster: the width of a beam, and which part of the car was hit."""
 BEARING_SIGMA_RAD = 0.005
 """How well a box's middle is known sideways (0.3°, ``vision_tracking.bearing_sigma_deg``)."""
 SIDEWAYS_SIGMA_MPS = 0.5
-"""What a tracked cluster's sideways speed may be off by: only what exceeds it is believed."""
+"""Error of a tracked cluster's sideways speed: only what exceeds it is believed."""
 CAMERA_SIDEWAYS_PER_S = 0.02
-"""The same of a box, a metre of distance: it is placed by its bearing, and swings with its estimated distance."""
+"""Additional error of a camera-only object, per metre of distance: it is placed by its bearing, and swings with its
+estimated distance."""
 _SLANTED = 0.64
 """Turned by more than 20° from along or across the path, as |sin 2φ|."""
 _WIDEST_M, _LONGEST_M = 3.2, 6.0
 """A vehicle that drives along is no wider across the path, but for as much of its flank as can be seen."""
 _CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
-"""Of what moves over faster than that the nose is taken to lie a car's length on, by its sideways over its forward
-speed, this much at most."""
+"""A car that changes lanes faster than the second is turned by its sideways over its forward speed, at most the third;
+its nose is this car length further on."""
 _NO_SIDES = ((nan, nan), (nan, nan))
 SURE = 4.0
 """Log-odds beyond which nothing gets surer: the sigmas themselves are not known that well."""
 
 
 class Place(NamedTuple):
-    """One object against the path. offset_m: of the middle of its nearest face, positive to the left of the centre;
-    ahead_m: path length to its foot. low_m, high_m: from where to where it reaches across the path, middle_m: between
-    them. left_m, right_m: how far that may lie to either side and still be in the path. sigma_m: of its sideways place
-    against the path, both errors together. sideways_mps: how fast it moves to the left of the path, over ground; null
-    where its velocity is not known."""
+    """One object against the path. Sideways is positive to the left of the path's centre."""
 
     offset_m: float
+    """Of the middle of its nearest face."""
     ahead_m: float
+    """Path length to the foot of that point."""
     low_m: float
+    """Its rightmost extent across the path."""
     high_m: float
+    """Its leftmost extent across the path."""
     middle_m: float
+    """Between the two."""
     left_m: float
+    """How far to the left the middle may be for the object to be in the path."""
     right_m: float
+    """The same to the right."""
     sigma_m: float
+    """Standard deviation of its sideways position against the path, with the errors of both."""
     sideways_mps: float | None
+    """Speed to the left of the path, over ground; None where its velocity is not known."""
 
     @property
     def limit_m(self) -> float:
-        """The limit on the side it is on."""
+        """``left_m`` or ``right_m``, on the side where it is."""
         return self.left_m if self.middle_m >= 0.0 else self.right_m
 
     def margin_m(self, extra_m: float = 0.0) -> float:
-        """How far inside the path it is; negative: how far outside. extra_m widens the path."""
+        """How far inside the path it is; negative: outside. extra_m widens the path."""
         return min(self.left_m + extra_m - self.middle_m, self.right_m + extra_m + self.middle_m)
 
     def log_odds(self, extra_m: float, moves_m: float) -> float:
-        """What this sighting says for (positive) or against its being in the path: the log of the likelihood ratio of
-        where it was seen against the nearest place on the other side of the edge, ±4 at most. moves_m: how far to the
-        left it is taken to have moved on."""
+        """Log-odds of this sighting that the object is in the path: the log-likelihood ratio of its position against
+        the nearest one on the other side of the edge, at most ±4. moves_m: distance to the left that the object is
+        assumed to have moved on."""
         if self.ahead_m <= 0.0:
             return -SURE
         middle = self.middle_m + moves_m
@@ -78,12 +84,12 @@ class Place(NamedTuple):
         return surety if margin >= 0.0 else -surety
 
     def crossing_s(self, believed_mps: float, half_left_m: float, half_right_m: float) -> float | None:
-        """Seconds until an object that is out of the path has its nearer side over the edge, or until one that is in it
-        has left it; null when its believed sideways speed (positive to the left) leads nowhere. 0: on the edge."""
+        """Seconds until the nearer side of an object outside of the path crosses the edge, or until one inside has
+        left; None when its believed sideways speed (positive to the left) leads to neither. 0: on the edge."""
         if believed_mps == 0.0 or self.ahead_m <= 0.0:
             return None
         outwards = (self.middle_m > 0.0) == (believed_mps > 0.0)
-        if outwards != (self.margin_m() >= 0.0):  # it comes to the middle of the path, or goes away beside it
+        if outwards != (self.margin_m() >= 0.0):  # it moves within the path towards its middle, or away from the path
             return None
         if outwards:
             way = self.margin_m()
@@ -93,7 +99,7 @@ class Place(NamedTuple):
 
 
 def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
-    """The part of a sideways speed that its noise does not explain."""
+    """The part of a sideways speed that noise does not explain."""
     if sideways_mps is None or item.moving is False:
         return 0.0
     doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * (item.distance_m or 0.0) if not item.ranged else 0.0)
@@ -103,7 +109,7 @@ def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
 def place(
     objects: Sequence[FusedObject], path: Path, ego: EgoState | None, params: CipvParams
 ) -> list[tuple[Place, float | None] | None]:
-    """Each object's place with its ``crossing_s``; null where it is not known where it is."""
+    """Each object's place with its ``crossing_s``; None where its position is unknown."""
     known = [item for item in objects if item.bev is not None]
     if not known:
         return [None] * len(objects)

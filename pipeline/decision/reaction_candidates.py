@@ -1,7 +1,7 @@
-"""Which objects beside the CIPV deserve a reaction, for ACC's TTC rule and for emergency braking alike.
+"""Which objects other than the CIPV ACC's TTC rule and emergency braking react to.
 
-A wrong brake is a danger of its own, so an object must be dependable (the LiDAR measures it in this frame, it is
-confirmed and no kerb or post) and its course must really lead into the corridor.
+Braking for nothing is dangerous too, so an object must be dependable (ranged in this frame, confirmed, not a kerb or
+post), and its course must lead into the corridor.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from pipeline.types import FusedObject, Path
 
 ABREAST_M = 1.0
 _VELOCITY_HITS = 3
-"""From two sightings the LiDAR knows no more than the difference of two noisy places, which may point across the road,
-and the camera's having followed the object for long does not make it better."""
+"""After two sightings the LiDAR's velocity is the difference of two noisy positions, which may point across the road.
+That the camera has followed the object for longer does not help."""
 
 
 def is_dependable(item: FusedObject) -> bool:
@@ -24,14 +24,14 @@ def is_dependable(item: FusedObject) -> bool:
 
 
 def enters_corridor(item: FusedObject, path: Path) -> bool:
-    """Whether the object is in the corridor, or its sideways motion carries it there before it is reached. What stands
-    still beside the road does not swerve: its sideways speed is noise."""
+    """Whether the object is in the corridor, or its sideways motion takes it there before the car reaches it. What
+    stands still beside the road stays there: its sideways speed is noise."""
     if item.path_offset_m is None or item.velocity_mps is None or item.ttc_s is None:
         return False
     if item.in_path or item.moving is False:
         return item.in_path
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
-        return False  # beside us already: braking no longer parts the two
+        return False  # beside the car already: braking would not avoid it
     sideways = believed_mps(item.lateral_mps, item)
     toward = -sideways if item.path_offset_m > 0 else sideways
     return abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s <= path.half_width_m

@@ -1,10 +1,9 @@
-"""The car's own motion while nobody measures it: it goes on at its last speed and yaw rate, less surely each moment.
+"""Own motion while it is not measured: the last speed and yaw rate, with growing uncertainty.
 
-Where speed comes from GNSS, a lost fix takes away place and speed at once. What was known then is worth something for
-seconds: the speed may change by ``coast_accel_mps2`` and the yaw rate by ``coast_turn_radps2`` all the while, so that
-their errors grow with age, and those of the way driven and of the heading with its square. Each consumer adds what a
-tick adds. The path goes on until its own sigma ends it; what drives by it does so for ``coast_s`` at most.
-"""
+Where speed comes from GNSS, a lost fix takes away position and speed at once. The last values are useful for some
+seconds: the speed may change by ``coast_accel_mps2`` and the yaw rate by ``coast_turn_radps2``, so their errors grow
+with age, and those of the distance driven and the heading with its square. Each consumer adds what a tick adds. The
+path goes on until its own sigma ends it; ACC and emergency braking use the motion for at most ``coast_s``."""
 
 from __future__ import annotations
 
@@ -16,7 +15,8 @@ from pipeline.types import Coasting, EgoState
 def follow(
     before: EgoState | None, measured: EgoState | None, dt_s: float | None, params: MotionParams
 ) -> EgoState | None:
-    """What was measured; without it the motion of the frame before, older by ``dt_s``. Null before the first one."""
+    """The measured motion; without one, that of the frame before, older by ``dt_s``. None before the first
+    measurement."""
     if measured is not None or before is None:
         return measured
     since_s = before.coasting.age_s if before.coasting is not None else 0.0
@@ -27,7 +27,7 @@ def follow(
 
 
 def recent(own: EgoState | None, params: MotionParams) -> EgoState | None:
-    """The own motion while it is good enough to drive by; null once it has not been measured for ``coast_s``."""
+    """Own motion while it is recent enough to drive by; None once it has not been measured for ``coast_s``."""
     if own is None or own.coasting is None:
         return own
     return own if own.coasting.age_s <= params.coast_s else None

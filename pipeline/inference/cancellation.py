@@ -1,7 +1,7 @@
-"""Ending a network's run from another thread.
+"""Cancelling a network's run from another thread.
 
-A run takes up to 0.2 s of every core, and cannot give way by itself. The runtime looks between two layers whether it is
-to end: within some milliseconds.
+A run takes up to 0.2 s of every core and cannot yield by itself. The runtime checks between two layers whether it
+should stop, so a run ends within milliseconds.
 """
 
 from __future__ import annotations
@@ -13,17 +13,18 @@ from typing import Protocol
 
 
 class Stopped(Exception):
-    """Somebody ended it. Nothing is wrong: it can be asked again."""
+    """The run was cancelled. Nothing is wrong: the network can be asked again."""
 
 
 class Terminates(Protocol):
-    """As ``onnxruntime.RunOptions``."""
+    """The part of ``onnxruntime.RunOptions`` used here."""
 
     terminate: bool
 
 
 class Stop:
-    """``set`` on any thread ends what runs, and refuses what would run, in the block of ``here`` on another."""
+    """Cancels what another thread runs: ``set`` ends the run under way in that thread's ``here`` block, and refuses
+    further ones."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -42,7 +43,7 @@ class Stop:
 
     @contextmanager
     def here(self) -> Iterator[None]:
-        """Networks that this thread asks in the block can be stopped: they raise Stopped then."""
+        """Within the block, networks that this thread runs can be cancelled; they raise Stopped then."""
         before, _of_thread.stop = _of_thread.stop, self
         try:
             yield
@@ -51,7 +52,7 @@ class Stop:
 
     @contextmanager
     def ends(self, run: Terminates) -> Iterator[None]:
-        """For a runtime: this is the run to end, while the block lasts."""
+        """For a runtime: ``run`` is the one to cancel while the block lasts."""
         with self._lock:
             if self._is_set:
                 raise Stopped
@@ -71,5 +72,5 @@ _of_thread = _OfThread()
 
 
 def of_this_thread() -> Stop:
-    """What ends the networks that this thread asks; nobody sets it outside of such a block."""
+    """What cancels the networks that this thread runs; outside of a ``here`` block nothing does."""
     return _of_thread.stop or Stop()

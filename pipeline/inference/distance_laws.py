@@ -19,19 +19,21 @@ from pipeline.types import DistanceLaw
 
 @dataclass(frozen=True)
 class FoundLaw:
-    """law: of this network, null when none was measured. note: why a law that is there is not used, else empty."""
+    """What was found beside a network."""
 
     law: DistanceLaw | None
+    """Its distance law; None when none was measured, or the one that was cannot be used."""
     note: str = ""
+    """Why a law that is there is not used; else empty."""
 
 
 def law_file(network: Path) -> Path:
-    """Where a network's law is kept; it need not be there."""
+    """Where a network's law is kept; the file need not exist."""
     return network.with_suffix(".law.json")
 
 
 def find_law(network: Path) -> FoundLaw:
-    """The law measured for these very weights."""
+    """The law measured for exactly these weights."""
     path = law_file(network)
     try:
         kept = json.loads(path.read_text(encoding="utf-8"))
@@ -40,11 +42,13 @@ def find_law(network: Path) -> FoundLaw:
     except FileNotFoundError:
         return FoundLaw(None)
     except (OSError, ValueError, KeyError, TypeError, OverflowError, RecursionError):
-        return FoundLaw(None, f"{path.name} is damaged and not used; fit the law again with `cipv calibrate distance`")
+        return FoundLaw(
+            None, f"{path.name} is damaged and was ignored; fit the law again with `cipv calibrate distance`"
+        )
     if not _is_possible(law):
-        return FoundLaw(None, f"{path.name} holds numbers that no camera can have and is not used")
+        return FoundLaw(None, f"{path.name} holds implausible numbers and was ignored")
     if fitted_to != file_sha256(network):
-        return FoundLaw(None, f"{path.name} was fitted to other weights and is not used")
+        return FoundLaw(None, f"{path.name} was fitted to other weights and was ignored")
     return FoundLaw(law)
 
 

@@ -1,8 +1,8 @@
-"""A detector's ONNX graph, given another input size than the one it was exported with.
+"""Giving a detector's ONNX graph another input size than the one it was exported with.
 
-A fully convolutional network works at any size its strides divide. An export fixes one all the same, usually a square
-one, on which a wide road picture is mostly padding. Rewriting the declared shapes, in memory, lets the same weights
-see the picture at its own aspect.
+A fully convolutional network works at any size that its strides divide. Exports fix one all the same, usually a square,
+in which a wide picture of the road is mostly padding. Rewriting the declared shapes in memory lets the same weights see
+the picture at its own aspect.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ def fitting_size(picture_size: tuple[int, int], own: Size | None) -> Size:
 
 
 def input_size(model: onnx.ModelProto) -> Size | None:
-    """The graph's fixed input (height, width), null when it is free. ValueError when it takes no 1×3×H×W picture."""
+    """The graph's fixed input (height, width), None when it is free. ValueError when it takes no 1×3×H×W picture."""
     weights = {tensor.name for tensor in model.graph.initializer}
     inputs = [value for value in model.graph.input if value.name not in weights]
     dims = inputs[0].type.tensor_type.shape.dim if len(inputs) == 1 else []
     if len(dims) != 4 or dims[0].dim_value > 1 or dims[1].dim_value not in (0, 3):
-        raise ValueError("it does not take one picture of 1×3×height×width")
+        raise ValueError("its input is not one picture of 1×3×height×width")
     if inputs[0].type.tensor_type.elem_type != onnx.TensorProto.FLOAT:
         raise ValueError("its input is not float32")
     height, width = dims[2].dim_value, dims[3].dim_value

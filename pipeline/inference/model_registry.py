@@ -1,8 +1,8 @@
-"""Networks by name: which ones are known, where their official files are, and the folder that keeps them.
+"""Networks by name: which ones are known, where to download them, and the folder that keeps them.
 
 The folder is ``~/.cache/cipv/models`` (``CIPV_HOME`` replaces ``~/.cache/cipv``). A network is chosen by name or path;
 without either it is the registered default, then the first known one found in the folder or in ``$CIPV_DATA/models``,
-then the embedded one, which is part of the program and knows simulated vehicles only.
+then the embedded one, which is built in and was trained on simulated vehicles only.
 """
 
 from __future__ import annotations
@@ -26,39 +26,45 @@ from pipeline.types import DistanceLaw
 
 Task = Literal["detector", "lanes"]
 EMBEDDED = "embedded"
-"""Name of the detector that comes with the program."""
+"""Name of the built-in detector."""
 _EMBEDDED_FILE = Path(__file__).parents[1] / "vision" / "embedded" / "simulated_vehicles.onnx"
 _CHUNK = 1 << 16
 _TIMEOUT_S = 30.0
 
 
 class ModelError(BadInput):
-    """A network that cannot be fetched, registered or found; one sentence with the remedy."""
+    """A network that cannot be downloaded, registered or found; one sentence with the remedy."""
 
 
 @dataclass(frozen=True)
 class KnownModel:
-    """An official file, size in bytes; or, where size and checksum are null, the project that has it: such a network is
-    fetched, or exported to ONNX, by hand and registered."""
+    """A network that can be downloaded, or a project that has one to export."""
 
     name: str
+    """As in ``cipv models pull NAME``."""
     task: Task
+    """What it detects."""
     url: str
+    """Of the file, or of the project."""
     size: int | None
+    """Bytes; None where there is no official file: the user downloads or exports one and registers it."""
     sha256: str | None
+    """Of the official file."""
     licence: str
+    """Of the weights."""
     note: str
+    """For people."""
 
     @property
     def remedy(self) -> str:
-        """How it comes here."""
+        """How to install it."""
         if self.size is not None:
             return f"`cipv models pull {self.name}` ({self.size / 1e6:.1f} MB)"
-        return f"fetch or export its ONNX file, then {self.register}"
+        return f"download or export its ONNX file, then {self.register}"
 
     @property
     def register(self) -> str:
-        """The command that takes a file fetched by hand."""
+        """The command that installs a file downloaded manually."""
         task = "" if self.task == "detector" else f" --task {self.task}"
         return f"`cipv models register PATH {self.name}{task}`"
 
@@ -68,7 +74,7 @@ KNOWN: tuple[KnownModel, ...] = (
     KnownModel(
         "yolox_nano", "detector", _YOLOX + "yolox_nano.onnx", 3_659_407,
         "c789161ed43c8269fcd4e67c67eeeb4e80c622da2eb296a20bc6007bd18a0b7d",
-        "Apache-2.0", "COCO, 0.9 M parameters: about 10 ms a picture on one core",
+        "Apache-2.0", "COCO, 0.9 M parameters: about 10 ms per image on one core",
     ),
     KnownModel(
         "yolox_tiny", "detector", _YOLOX + "yolox_tiny.onnx", 20_219_662,
@@ -78,7 +84,7 @@ KNOWN: tuple[KnownModel, ...] = (
     KnownModel(
         "yolox_s", "detector", _YOLOX + "yolox_s.onnx", 35_858_002,
         "c5c2d13e59ae883e6af3b45daea64af4833a4951c92d116ec270d9ddbe998063",
-        "Apache-2.0", "COCO, 9 M parameters: for a graphics card",
+        "Apache-2.0", "COCO, 9 M parameters; best on a GPU",
     ),
     KnownModel(
         "twinlitenet", "lanes", "https://github.com/harrylal/TwinLiteNet-onnx-opencv-dnn/raw/main/models/best.onnx",
@@ -102,21 +108,28 @@ KNOWN: tuple[KnownModel, ...] = (
 
 @dataclass(frozen=True)
 class ModelEntry:
-    """One row of ``cipv models``. ``path`` is null while it is not here. law: the distance law measured for it, null
-    where it has none and the one for real vehicles is used."""
+    """One row of ``cipv models``."""
 
     name: str
+    """As in ``--detector NAME``."""
     task: Task
+    """What it detects."""
     path: Path | None
+    """Its file; None while it is not installed."""
     default: bool
+    """Used when no network is named."""
     licence: str | None
+    """Of the weights; None where it is not known."""
     url: str | None
+    """Where it comes from; None where that is not known."""
     note: str
+    """For people."""
     law: DistanceLaw | None = None
+    """The distance law measured for it; None: the one for real vehicles is used."""
 
 
 def store() -> Path:
-    """The folder that keeps networks; it need not exist."""
+    """The folder of installed networks; it need not exist."""
     home = os.environ.get("CIPV_HOME")
     return (Path(home) if home else Path.home() / ".cache" / "cipv") / "models"
 
@@ -131,7 +144,7 @@ def list_models() -> tuple[ModelEntry, ...]:
         return ModelEntry(name, task, path, _same(path, defaults[task]), licence, url, note, law)
 
     known = [entry(each.name, each.task, each.licence, each.url, each.note) for each in KNOWN]
-    own = "part of the program: simulated vehicles only, 0.5 M parameters"
+    own = "built in: simulated vehicles only, 0.5 M parameters"
     names = {each.name for each in KNOWN}
     registered = [
         entry(name, row["task"], None, None, "registered")
@@ -142,7 +155,7 @@ def list_models() -> tuple[ModelEntry, ...]:
 
 
 def find(spec: str) -> Path | None:
-    """The file of a path or a name; null when there is none."""
+    """The file of a network by path or name; None when there is none."""
     path = given_path(spec, ModelError)
     if path.is_file():
         return path
@@ -150,7 +163,7 @@ def find(spec: str) -> Path | None:
 
 
 def default_model(task: Task) -> Path | None:
-    """The network used when nobody names one; null when none is here."""
+    """The network used when none is named; None when none is installed."""
     chosen = _read_registry()["defaults"].get(task)
     names = [chosen] if chosen else []
     names += [known.name for known in KNOWN if known.task == task]
@@ -160,7 +173,7 @@ def default_model(task: Task) -> Path | None:
 
 
 def own_file(path: Path) -> Path:
-    """A file that a person wants to register, ``~`` resolved. ModelError when it is not there."""
+    """A file that the user wants to register, ``~`` resolved. ModelError when it does not exist."""
     given = given_path(path, ModelError)
     if not given.is_file():
         raise ModelError(f"no file at {path}")
@@ -168,12 +181,12 @@ def own_file(path: Path) -> Path:
 
 
 def register(path: Path, name: str, task: Task = "detector", default: bool = True) -> Path:
-    """Copy a file, with the distance law beside it, into the folder under ``name`` and, unless told otherwise, make it
-    its task's default."""
+    """Install a file, with the distance law beside it, under ``name``, by default as its task's default. ModelError
+    says why it cannot be installed."""
     if not _is_name(name):
-        raise ModelError(f"{name!r} cannot be a network's name: use letters, digits, '-', '_' and '.'")
+        raise ModelError(f"{name!r} is not a valid network name: use letters, digits, '-', '_' and '.'")
     if name == EMBEDDED:
-        raise ModelError(f"{EMBEDDED!r} is the detector that comes with the program: use another name")
+        raise ModelError(f"{EMBEDDED!r} is the built-in detector: use another name")
     path = own_file(path)
     target = store() / f"{name}.onnx"
     try:
@@ -204,18 +217,18 @@ def known_model(name: str) -> KnownModel:
 
 
 def pull(name: str, progress: Progress = silent) -> Path:
-    """Fetch a known network into the folder; size and SHA-256 must be the official ones. A file that is already there
-    and right is kept. ModelError says what went wrong; no part of a failed download stays."""
+    """Download and install a known network, checking size and SHA-256. A correct file that is installed already is
+    kept. ModelError says what went wrong; no part of a failed download remains."""
     known = known_model(name)
     if known.size is None or known.sha256 is None:
-        raise ModelError(f"{name} has no file of known checksum: {known.remedy}; the project is {known.url}")
+        raise ModelError(f"{name} has no download with a known checksum: {known.remedy}; the project is {known.url}")
     target = store() / f"{name}.onnx"
     if target.is_file() and file_sha256(target) == known.sha256:
         return target
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ModelError(f"{target.parent} cannot be made: {error.strerror or error}") from None
+        raise ModelError(f"{target.parent} cannot be created: {error.strerror or error}") from None
     part = target.with_suffix(".part")
     try:
         _download(known, known.size, part, progress)
@@ -239,15 +252,15 @@ def _download(known: KnownModel, size: int, part: Path, progress: Progress) -> N
     except urllib.error.HTTPError as error:
         error.close()
         raise ModelError(
-            f"{known.url} answered {error.code} {error.reason}; fetch the file by hand and use {known.register}"
+            f"{known.url} answered {error.code} {error.reason}; download the file manually and use {known.register}"
         ) from None
     except (OSError, ValueError) as error:
         why = getattr(error, "reason", None) or error
         raise ModelError(
-            f"{known.name} cannot be fetched ({why}); without a network connection use {known.register}"
+            f"{known.name} cannot be downloaded ({why}); without a network connection use {known.register}"
         ) from None
     if done != size:
-        raise ModelError(f"{known.url} gave {'more than ' if done > size else f'{done} of '}{size} bytes; try again")
+        raise ModelError(f"{known.url} sent {'more than ' if done > size else f'{done} of '}{size} bytes; try again")
     if digest.hexdigest() != known.sha256:
         raise ModelError(
             f"{known.url} is not the official file: its SHA-256 is {digest.hexdigest()}, not {known.sha256}"

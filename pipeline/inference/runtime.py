@@ -20,25 +20,25 @@ from pipeline.inference.cancellation import Stopped, of_this_thread
 from pipeline.types import F32
 
 _GIVES_WAY = 5
-"""How much nicer than who opens it a network's own threads are. Alike, a step that runs meanwhile may share its core
-with one of them for seconds on end and take twice as long. The thread that asks computes too and stays as it is: with
-all of them nicer the network would lose to whatever else runs."""
+"""Niceness added to a network's own threads. At equal priority a step that runs meanwhile may share its core with one
+of them for seconds on end and take twice as long. The calling thread computes too and keeps its priority: with all of
+them nicer, the network would lose to whatever else runs."""
 _FATAL = 4
-"""What is said on standard error; all else comes as an exception."""
+"""Log level: only this is written to standard error; everything else is raised as an exception."""
 _PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
 
 
 class DetectorMissing(BadInput):
-    """There is no network to run. The text is a sentence with the remedy."""
+    """There is no network to run. The text says how to get one."""
 
 
 class DetectorError(BadInput):
-    """A network that cannot be run, or a picture that is none. The text is a sentence for a person."""
+    """A network that cannot be run, or an array that is not a picture. The text is a sentence for the user."""
 
 
 def find_graph(spec: str | None, task: model_registry.Task) -> Path | None:
-    """The file of a name or path; without either the task's default. Null when it is not here; DetectorMissing when
-    the folder of networks itself is damaged."""
+    """The file of a network by name or path; without either the task's default. None when it is not installed;
+    DetectorMissing when the folder of networks is damaged."""
     try:
         return model_registry.find(spec) if spec else model_registry.default_model(task)
     except model_registry.ModelError as error:
@@ -54,17 +54,17 @@ def read_graph(path: Path) -> onnx.ModelProto:
 
 
 def open_session(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
-    """The graph on the best provider that takes it: TensorRT, CUDA, CPU. path: for the error alone."""
-    # Threads are as nice as the one that starts them, and a thread without rights cannot take that back: so not ours.
+    """The graph on the best provider that accepts it: TensorRT, CUDA, CPU. path: only for the error text."""
+    # Threads inherit niceness, and an unprivileged thread cannot lower its own again: so another thread opens it.
     with ThreadPoolExecutor(1, "cipv-open-network", _give_way) as opener:
         return opener.submit(_open, graph, path, threads).result()
 
 
 def _give_way() -> None:
-    """Make this thread, and those that it will start, nicer. On other systems than Linux niceness is a process's."""
+    """Make this thread and those it starts nicer. Only on Linux: elsewhere niceness belongs to the process."""
     if sys.platform == "linux":
         this = threading.get_native_id()
-        with suppress(OSError):  # a sandbox may refuse; then all run alike
+        with suppress(OSError):  # a sandbox may refuse; then all have equal priority
             os.setpriority(os.PRIO_PROCESS, this, os.getpriority(os.PRIO_PROCESS, this) + _GIVES_WAY)
 
 
@@ -86,7 +86,7 @@ def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
 
 
 def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
-    """Every output for one input. DetectorError when the network fails on it, Stopped when it was told to end."""
+    """Every output for one input. DetectorError when the network fails on it, Stopped when the run was cancelled."""
     options, stop = ort.RunOptions(), of_this_thread()
     options.log_severity_level = _FATAL
     with stop.ends(options):

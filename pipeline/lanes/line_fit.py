@@ -112,7 +112,7 @@ def peaks(histogram: F64) -> list[float]:
 def fit_line(
     seen: Sightings, y0_m: float, shape: Shape, bearing_sigma_rad: float, rounds: int = 3
 ) -> FittedLine | None:
-    """The line near ``y0_m``, of about the shared shape, through the points around it; null with too few. rounds: of
+    """The line near ``y0_m``, of about the shared shape, through the points around it; None with too few. rounds: of
     weighing the points anew."""
     prior = np.array([y0_m, shape.heading_rad, shape.curvature_per_m / 2.0, 0.0])
     x = seen.x_m(shape.pitch_rad)

@@ -45,7 +45,7 @@ class LaneNetwork:
         DetectorError for an array that is no such picture or a network that fails on it.
         """
         if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
-            raise DetectorError(f"a picture is (H, W, 3) uint8, this is {bgr.shape} {bgr.dtype}")
+            raise DetectorError(f"expected a picture of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
         placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head)
         found = self.head.points(run_session(self._session, self._blob(bgr, placed)))
         keep = found.score >= _MIN_SCORE
@@ -79,9 +79,9 @@ class _Placed:
 
 
 def open_lane_network(spec: str | None, threads: int = 2) -> LaneNetwork:
-    """Load a lane network by name or path; null: the default one (``pipeline.inference.model_registry``).
+    """Load a lane network by name or path; None: the default one (``pipeline.inference.model_registry``).
 
-    DetectorMissing when there is no file, DetectorError when the file is no lane network that can be run.
+    DetectorMissing when there is no file, DetectorError when the file is not a lane network that can be run.
     """
     path = find_graph(spec, "lanes")
     if path is None:
@@ -99,7 +99,7 @@ def _loaded(path: Path, threads: int) -> LaneNetwork:
     try:
         own = input_size(model)
     except ValueError as error:
-        raise DetectorError(f"{path.name} is no lane network: {error}") from None
+        raise DetectorError(f"{path.name} is not a lane network: {error}") from None
     size = own or _FREE_SIZE
     graph = (model if own else with_input_size(model, size)).SerializeToString()
     session = open_session(graph, path, threads)

@@ -1,4 +1,4 @@
-"""Which lane detector looks at pictures: a network where one is named or installed, else the classical one."""
+"""The choice of the lane detector: a network where one is named or installed, else the classical one."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from pipeline.types import CameraCalibration
 
 OFF = "off"
 _NETWORK_EVERY, _NETWORK_EVERY_S = 3, 0.3
-"""A network takes longer than a frame on a processor; its lines are good for the time between by the car's motion, and
-for no longer: of a slow recording it looks at more of the frames."""
+"""On a CPU a network takes longer than a frame lasts. In between, its lines are carried on by own motion, but not for
+longer than this: in a recording with few frames a second it looks at more of them."""
 LaneDetector = LaneNetwork | ClassicalLanes
 _REMEDY = "; for real roads pull a network with `cipv models pull twinlitenet`"
 
 
 def usual_every(lanes: object, rate_hz: float) -> int:
-    """In every how many of ``rate_hz`` frames a second a lane detector looks at the picture where nobody says so."""
+    """The default of ``Detectors.lanes_every`` at ``rate_hz`` frames a second: every how many frames a lane detector
+    looks at the picture."""
     if not isinstance(lanes, LaneNetwork):
         return 1
     return max(1, min(_NETWORK_EVERY, int(_NETWORK_EVERY_S * rate_hz + 1e-6)))
@@ -28,7 +29,7 @@ def usual_every(lanes: object, rate_hz: float) -> int:
 def open_lanes(spec: str | None, camera: CameraCalibration | None, drawn: bool = False) -> LaneDetector | None:
     """The named lane detector: a network's name or file, ``classical``, or ``off``, which is none. Without a name: the
     default network if one is here, except for drawn pictures, whose paint the classical one sees as well at a tenth of
-    the cost. camera: of the pictures; null where it is not known.
+    the cost. camera: of the pictures; None where it is not known.
 
     DetectorMissing when the named one is not here, DetectorError when it cannot be run.
     """

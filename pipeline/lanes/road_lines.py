@@ -1,7 +1,7 @@
 """What a lane detector saw in the picture, as lines on the road in metres.
 
 ``measure``    points of one picture → ground → lines, with the pitch that makes them parallel
-``follow``     the same, and the lines tracked from frame to frame: what the rest of the line calls
+``follow``     the same, and the lines tracked from frame to frame: the stage that ``step`` runs
 ``polylines``  an ``EgoLane`` as points on the road, and ``in_picture`` as pixels, for views
 
 The road is a plane: the one that the LiDAR's ground points show, else as far below the ego origin as the calibration
@@ -32,9 +32,9 @@ Seed = tuple[float, Sightings]
 
 _MIN_POINTS = 12
 _NEAR_M, _FAR_M = 5.0, 12.0
-"""Where the LiDAR's ground is asked for the road's height: its rings lie dense there."""
+"""Where the road's height is read from the LiDAR's ground: its rings are dense there."""
 _PLANE_GAIN = 0.1
-"""Share by which one sweep moves the road's plane: one fit errs by centimetres, the car's stance changes slowly."""
+"""Weight of one sweep in the road's plane: one fit errs by centimetres, and the car's pitch changes slowly."""
 _UNPARALLEL = 0.004
 """Real lines of one road differ this much in heading, radians."""
 _HEADING_AT_M = 15.0
@@ -43,7 +43,7 @@ _HEADING = np.array([0.0, 1.0, 2.0 * _HEADING_AT_M, 3.0 * _HEADING_AT_M**2])
 _FLATNESS_RAD = 0.003
 """A road that bends up or down ahead looks like this much pitch."""
 _STRAY_M = 9.0
-"""Farther aside no line concerns the car."""
+"""Lines farther to the side are ignored."""
 _HOPELESS = 0.05
 _BEYOND = 0.6
 """Points that seem farther than ``max_range_m`` may be nearer under another pitch: this much of the inverse."""
@@ -72,13 +72,17 @@ class LaneMeasurement:
 
 @dataclass(frozen=True, eq=False)
 class LaneState:
-    """What one frame leaves to the next. plane: (3,) a, b, c of the road z = a·x + b·y + c, a running mean over the
-    sweeps that showed it; null before one did. sweeps: how many those are."""
+    """What one frame leaves to the next."""
 
     tracks: tracking.LaneTracks = tracking.LaneTracks()
+    """Every tracked line."""
     pitch: Pitch | None = None
+    """The camera's pitch as estimated so far; None before the first frame."""
     plane: F64 | None = None
+    """(3,) a, b, c of the road z = a·x + b·y + c, a running mean over the sweeps that showed it; None before one
+    did."""
     sweeps: int = 0
+    """How many sweeps showed it."""
 
 
 class RoadView(NamedTuple):
@@ -98,15 +102,20 @@ def follow(
     state: LaneState, raw: RawLanes | None, view: RoadView, now: Moment, params: LaneParams
 ) -> tuple[LaneState, EgoLane | None]:
     """One frame: measure if a lane detector has looked at it, and track. None until one has."""
+    # The road: the plane that the LiDAR's ground shows, else as far below as calibration or parameter say
     plane, sweeps = _settled(state, road_plane(view.ground))
     level_m = view.road_z_m if view.road_z_m is not None else -params.mount_height_m
     road = plane if plane is not None else np.array([0.0, 0.0, level_m])
+
+    # A picture that a detector looked at gives lines on the road, and the pitch that makes them parallel
     pitch = _drifted(state.pitch, now.dt_s, params)
     measured = None
     if raw is not None and view.aligned is not None:
         expected = tracking.expected_shape(state.tracks)
         measured = measure(_beside(raw, view.vehicles), view.aligned, road, pitch, params, expected)
         pitch = measured.pitch
+
+    # Every line is tracked; the ego lane is the pair of them that the car is between
     tracks = tracking.predict(state.tracks, now.ego, now.dt_s, params)
     if measured is not None:
         tracks = tracking.update(tracks, measured.source, measured.lines, params)
@@ -120,7 +129,7 @@ def measure(
     """Lines on the road from points in the picture; none where too few points lie on it.
 
     plane: (3,) as in ``LaneState``. pitch: as believed before this picture. expected: the shape of the tracked lines,
-    around which the search is then narrow; null searches wide.
+    around which the search is then narrow; None searches wide.
     """
     nothing = LaneMeasurement(raw.model, (), pitch)
     eye, rays = aligned.rays(np.asarray(raw.points, np.float64))
@@ -155,7 +164,7 @@ def _beside(raw: RawLanes, vehicles: Sequence[Box]) -> RawLanes:
 
 
 def road_plane(ground: Ground | None) -> F64 | None:
-    """(3,) a, b, c of the road's height z = a·x + b·y + c ahead, from the LiDAR's ground; null without one."""
+    """(3,) a, b, c of the road's height z = a·x + b·y + c ahead, from the LiDAR's ground; None without one."""
     if ground is None:
         return None
     z = ground.height(np.array([[_NEAR_M, 0.0], [_FAR_M, 0.0], [_NEAR_M, 2.0], [_NEAR_M, -2.0]]))

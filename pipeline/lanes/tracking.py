@@ -21,7 +21,7 @@ from pipeline.types.lane import EgoLane, LaneLine, Side, powers
 
 _COMPARE_AT = powers([5.0, 15.0])
 _SIDE_AT_M = 4.0
-"""Which side of the car a line is on is judged here: where the front wheels will be."""
+"""Distance ahead at which a line counts as left or right of the car: where the front wheels will be."""
 _OVER_M = 20.0
 _PLACES = powers([_SIDE_AT_M, 0.0, _OVER_M / 2, _OVER_M])
 _CAR_HALF_M = 0.9
@@ -32,7 +32,7 @@ _FURTHEST_M = 5.0
 _USUAL_WIDTH_M = 3.5
 _USUALLY_OFF_MIDDLE_M = 0.7
 _SEEN_GAIN = 0.35
-"""Share by which a sighting moves a line's quality."""
+"""Weight of a sighting in a line's quality."""
 _FADE_S = 0.8
 """The quality of a line that is not seen falls to a third in this time."""
 _FORGOTTEN = 0.1
@@ -42,15 +42,16 @@ _YAW_RATE_SIGMA_RADPS = 0.01
 _UNKNOWN_YAW_RATE_RADPS = 0.06
 _UNKNOWN_SPEED_MPS = 20.0
 _NOT_CUBIC = np.diag(np.square([0.03, 1e-3, 1e-4, 4e-6]))
-"""What a line keeps of error however often it is seen, as a covariance: a road that is no cubic and no plane. Set so
-that in the simulator's S-curve 95 % of the lines lie within 2.5 sigma at 30 m."""
+"""Covariance that remains however often a line is seen, because roads are neither cubics nor planes. Set so that in the
+simulator's S-curve 95 % of the lines lie within 2.5 sigma at 30 m."""
 _CLOTHOID_PER_M2 = 1.0 / 150.0**2
 """How fast roads change their curvature: a clothoid of parameter A = 150 m, that of a road for 80 km/h."""
 
 
 @dataclass(frozen=True, eq=False)
 class LineTrack:
-    """One painted line. coefficients (4,), covariance (4, 4); seen: how often; unseen_s: since it was last seen."""
+    """One tracked line. coefficients (4,), covariance (4, 4); seen: how often; unseen_s: time since it was last
+    seen."""
 
     coefficients: F64
     covariance: F64
@@ -63,7 +64,8 @@ class LineTrack:
 
 @dataclass(frozen=True, eq=False)
 class LaneTracks:
-    """Every line that is followed. source: the detector's name, null before it first delivered; age_s: since then."""
+    """Every tracked line. source: the detector's name, None before it first delivered; age_s: time since it last
+    did."""
 
     lines: tuple[LineTrack, ...] = ()
     source: str | None = None
@@ -71,7 +73,7 @@ class LaneTracks:
 
 
 def predict(tracks: LaneTracks, ego: EgoState | None, dt_s: float | None, params: LaneParams) -> LaneTracks:
-    """The lines ``dt_s`` later, seen from the moved car; those not seen for too long end."""
+    """The lines ``dt_s`` later, seen from the moved car, without those not seen for too long."""
     if dt_s is None:
         return tracks
     speed = ego.speed_mps if ego is not None else 0.0
@@ -95,7 +97,7 @@ def predict(tracks: LaneTracks, ego: EgoState | None, dt_s: float | None, params
 
 
 def update(tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], params: LaneParams) -> LaneTracks:
-    """The lines after a picture. One that was not found in it fades; one that is new is born with its own quality."""
+    """The lines after a picture. A line that was not found in it fades; a new one starts with its measured quality."""
     pairs = _pairs(tracks.lines, measured, params.gate_m)
     lines = [_joined(line, measured[pairs[i]]) if i in pairs else _faded(line) for i, line in enumerate(tracks.lines)]
     new = [found for j, found in enumerate(measured) if j not in pairs.values()]
@@ -104,7 +106,7 @@ def update(tracks: LaneTracks, source: str, measured: tuple[FittedLine, ...], pa
 
 
 def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParams) -> EgoLane | None:
-    """The pair of lines that the car is most likely between; null before a detector ever delivered.
+    """The pair of lines that the car is most likely between; None before a detector ever delivered.
 
     Each side takes a believed line or none. A pair whose width is no lane's is not taken: one of the two is wrong, or
     the calibration is, and if no other line says which, the better supported one stands alone.
@@ -121,7 +123,7 @@ def ego_lane(tracks: LaneTracks, pitch_rad: float, plane: F64, params: LaneParam
 
 
 def expected_shape(tracks: LaneTracks) -> Shape | None:
-    """Heading and curvature of the best line, to search around; null when none is sure."""
+    """Heading and curvature of the best line, to search around; None when none is sure."""
     best = max(tracks.lines, key=lambda line: line.quality, default=None)
     if best is None or best.quality < 0.5 or best.seen < 3:
         return None
@@ -208,8 +210,8 @@ class _Candidate:
 
 
 def _worth(left: _Candidate | None, right: _Candidate | None, params: LaneParams) -> float:
-    """How good a pair is: well supported and long known, as wide as a lane, the car near its middle. A line alone must
-    not lie under the car: so do shadows and tracks in snow, and to which side of it the lane is nobody can say."""
+    """How good a pair is: well supported, long known, as wide as a lane, with the car near its middle. A single line
+    must not lie under the car, as shadows and tracks in snow do: on which side of it the lane is cannot be told."""
     both = [each for each in (left, right) if each is not None]
     worth = sum(each.quality * each.line.seen / (each.line.seen + 1.0) for each in both)
     places = sum(each.beside_m for each in both)

@@ -1,13 +1,13 @@
-"""Motion compensation: a sweep takes a tenth of a second, in which the car drives on and turns.
+"""Motion compensation: a sweep takes a tenth of a second, during which the car drives on and turns.
 
-Every point is brought to where a thing that stands still would be seen at the sweep's tick. At time τ after the tick
+Every point is moved to where a static object would be seen at the sweep's tick. At time τ after the tick
 the ego frame has turned by ωτ and moved along an arc of radius v/ω, so the point goes to
 R(ωτ)·p + (v/ω)·(sin ωτ, 1 − cos ωτ).
 
-What moves with the car, as a lead does, is seen undistorted in the raw sweep and is distorted by this, by its own speed
-over ground times τ. Straight ahead τ is zero, so a lead keeps its place either way; what gains stands beside the road:
-at 30 m/s a parked car at 45° is seen 0.38 m off without it, and a car driving alongside as much with it. That is why it
-is off by default: in the simulated cut-in the distances to moving cars err by 6 cm with it and by 3 cm without.
+Objects that move with the car, as a lead does, are undistorted in the raw sweep, and this distorts them by their speed
+over ground times τ. Straight ahead τ is zero, so a lead stays where it is either way; objects beside the road gain: at
+30 m/s a parked car at 45° is seen 0.38 m off without it, and a car driving alongside as much with it. It is off by
+default: in the simulated cut-in the distances to moving cars err by 6 cm with it and by 3 cm without.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from pipeline.types import EgoState, Sweep
 
 
 def deskew(sweep: Sweep | None, ego: EgoState | None, params: DeskewParams) -> Sweep | None:
-    """The sweep as a camera with an instant shutter at its tick would have it, for all that stands still.
+    """The sweep with static objects where they are at its tick.
 
-    Unchanged where it is switched off, where the recording does not say when each point was measured, or where the own
-    speed is unknown. An unknown yaw rate counts as driving straight.
+    Unchanged where deskewing is off, points have no times, or own speed is unknown. An unknown yaw rate counts as
+    driving straight.
     """
     if sweep is None or sweep.time_s is None or ego is None or not params.enabled:
         return sweep

@@ -1,11 +1,11 @@
 """Obstacles followed over time: recursive Bayes under the Markov assumption (paper, LiDAR Tracking).
 
-Predict, associate one-to-one under gates (place, number of points, density, spread), then add, keep or delete tracks.
-Time is the sensors' own: nothing here assumes a rate.
+Predict, associate one-to-one under gates (position, number of points, density, spread), then add, keep or delete
+tracks. Time comes from the sensors' timestamps: nothing here assumes a rate.
 
-What is followed is the middle of a box's rear: the side that faces back along ego x (``looks``). The centre
-of a cluster moves by metres when a vehicle's flank goes in or out of view, the nearest point jumps from one corner to
-the other; the rear of a vehicle ahead stays in both x and y. For oncoming traffic the same side is its front.
+The point that is tracked is the middle of a box's rear: the side that faces back along ego x (``looks``). The centre of
+a cluster moves by metres when a vehicle's flank comes into view or leaves it, and the nearest point jumps from one
+corner to the other; the rear of a vehicle ahead is stable in both x and y. For oncoming traffic it is the front.
 
 The paper computes velocity "from the trajectory": ``trajectory`` fits a line to the last positions by their stamps.
 ``kalman`` is a constant-velocity filter. Velocities are relative to ego.
@@ -26,20 +26,21 @@ from pipeline.params import LidarTrackingParams
 from pipeline.types import F64, I64, LidarTrack, Obstacle, Point3
 
 NEVER = 1e6
-"""Cost of a pair that a gate forbids: more than all allowed ones together."""
+"""Cost of a pair that a gate forbids: more than all permitted pairs together."""
 MIN_GATE_POINTS = 10
 """Counts and densities below this many points are noise: one ring more or less doubles them."""
 THINNEST_M = 0.5
-"""A rear alone is as thin as the LiDAR's noise; with a bit of flank it has twenty times the area, and is the same car.
-"""
+"""Thinnest footprint for comparing densities. A rear alone is as thin as the LiDAR's noise; with some flank the same
+car has twenty times the area."""
 
 
 class Looks(NamedTuple):
-    """Of many obstacles what association goes by. place: (M, 2) the reference points. shape: (M, 5) points, density,
-    spread x, y, z, as the gates compare them."""
+    """What obstacles are associated by."""
 
     place: F64
+    """(M, 2) reference points, ego x, y."""
     shape: F64
+    """(M, 5) number of points, density, spread along x, y and z, as the gates compare them."""
 
 
 _NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
@@ -47,7 +48,7 @@ _NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
 
 @dataclass(frozen=True)
 class LidarTrackerState:
-    """All that one frame leaves to the next; the arrays have one row a track, in the order of ``tracks``.
+    """What one frame leaves to the next; arrays have one row per track, in the order of ``tracks``.
 
     filters: mean (T, 4), cov (T, 4, 4). shape: (T, 5) of the last sighting, as in ``Looks``. history: (T, H, 3)
     ``t_s x y`` of the last sightings' reference points, newest last, NaN before the first. ``clock_s`` runs from the
@@ -69,11 +70,12 @@ def track(
 ) -> tuple[LidarTrackerState, tuple[LidarTrack, ...]]:
     """One tick: the next state, and every living track by ascending id.
 
-    obstacles: null when the LiDAR delivered nothing, in which case every track is carried on by its prediction. dt_s:
-    seconds ≥ 0 since the tick before; null at the first, and then no track of an earlier time lives on.
+    obstacles: None when the LiDAR delivered nothing; then every track is carried by its prediction. dt_s: seconds ≥ 0
+    since the tick before; None at the first, and then earlier tracks are dropped.
     """
     if dt_s is None:
         state, dt_s = LidarTrackerState(next_id=state.next_id, clock_s=state.clock_s), 0.0
+    # Every track is predicted to now and takes the nearest obstacle that its gates permit, one-to-one
     clock_s = state.clock_s + dt_s
     sweep, has_sweep = obstacles or (), obstacles is not None
     seen = looks(sweep)
@@ -83,6 +85,7 @@ def track(
     history = _recorded(state.history, partner, seen.place, clock_s, params.trajectory_frames)
     velocity = filters.mean[:, 2:] if params.filter == "kalman" else slopes(history)
 
+    # A track that found its obstacle is updated; one that did not is carried, or dropped
     tracks, rows = [], []
     for i, (last, j, speed) in enumerate(zip(state.tracks, partner.tolist(), velocity.tolist(), strict=True)):
         if j >= 0:
@@ -93,6 +96,8 @@ def track(
         else:
             continue
         rows.append(i)
+
+    # Every obstacle that no track took starts a new one
     matched = partner >= 0
     is_fresh = np.ones(len(sweep), dtype=np.bool_)
     is_fresh[partner[matched]] = False
@@ -250,8 +255,8 @@ def slopes(history: F64) -> F64:
 
 
 def _lives_on(last: LidarTrack, unseen_s: float, has_sweep: bool, params: LidarTrackingParams) -> bool:
-    """Whether a track not seen now is carried on. One seen only once or twice does not outlive a sweep that lacks it:
-    its velocity is the difference of two noisy places, and would send a ghost across the road."""
+    """Whether a track that is not seen now is carried. One seen only once or twice is dropped at once: its velocity is
+    the difference of two noisy positions, and would send a ghost across the road."""
     too_young = has_sweep and last.hits < params.carry_hits
     return not too_young and unseen_s <= params.max_missed_s + 1e-9
 

@@ -1,4 +1,4 @@
-"""Every tunable of the line, declared once: default, bounds, step, unit and help.
+"""Every parameter of the pipeline, declared once: default, bounds, step, unit and help.
 
 From this one place come the sliders of the page, ``--set`` and ``--params`` of the command line, the API's schema and
 the preset files. People read and type degrees; the stages turn them into radians where they use them.
@@ -72,7 +72,7 @@ class ParamsError(BadInput):
 
 
 class Params(Section):
-    """All parameters of the line, by stage."""
+    """All parameters of the pipeline, by stage."""
 
     deskew: DeskewParams = DeskewParams()
     downsample: DownsampleParams = DownsampleParams()

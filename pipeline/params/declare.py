@@ -1,4 +1,4 @@
-"""How a parameter is declared: default, bounds, step, unit and what it does, once."""
+"""How a parameter is declared, once: its default, bounds, step, unit and what it does."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 def slider(default: float | int | None, low: float, high: float, step: float, unit: str, text: str) -> Any:
+    """A number between two bounds, shown as a slider. text: what it does, for the page and the command line."""
     return Field(default, ge=low, le=high, description=text, json_schema_extra={"step": step, "unit": unit})
 
 
 def choice(default: Any, text: str) -> Any:
+    """One of a few values, or a switch. text: what it does, for the page and the command line."""
     return Field(default, description=text)
 
 
 class Section(BaseModel):
+    """The parameters of one stage. Frozen; unknown names and numbers that are not finite are refused."""
+
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

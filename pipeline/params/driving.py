@@ -1,4 +1,4 @@
-"""Parameters of what follows from the objects: path, choice, control; and of time."""
+"""Parameters of the path, the choice of the lead, longitudinal control, and time."""
 
 from __future__ import annotations
 
@@ -6,140 +6,163 @@ from pipeline.params.declare import Section, choice, slider
 
 
 class MotionParams(Section):
-    """What counts as moving."""
+    """When an object counts as moving, and how long own motion is trusted after it was last measured."""
 
     moving_mps: float = slider(1.5, 0.1, 10.0, 0.1, "m/s", "Speed over ground above which an object is moving")
     coast_s: float = slider(
-        2.0, 0.0, 5.0, 0.1, "s", "ACC and AEB go on with the last own speed for this long when none is measured"
+        2.0, 0.0, 5.0, 0.1, "s", "How long ACC and AEB go on with the last own speed when none is measured"
     )
-    coast_accel_mps2: float = slider(
-        1.0, 0.1, 5.0, 0.1, "m/s²", "How fast an own speed that is not measured may change"
-    )
+    coast_accel_mps2: float = slider(1.0, 0.1, 5.0, 0.1, "m/s²", "Assumed change of own speed while it is not measured")
     coast_turn_radps2: float = slider(
-        0.03, 0.001, 0.2, 0.001, "rad/s²", "How fast a yaw rate that is not measured may change"
+        0.03, 0.001, 0.2, 0.001, "rad/s²", "Assumed change of the yaw rate while it is not measured"
     )
 
 
 class PathParams(Section):
-    """The ego corridor: which sources bend it, and what each is worth."""
+    """The ego corridor: which sources shape it, and how far each is trusted."""
 
-    half_width_m: float = slider(1.5, 0.5, 4.0, 0.05, "m", "Half the width of the corridor where no lane lines say it")
-    length_m: float = slider(100.0, 20.0, 200.0, 5.0, "m", "How far ahead the corridor is drawn")
-    use_lanes: bool = choice(True, "Lay the corridor between the lane lines where they are seen")
-    use_gnss: bool = choice(True, "Lay the corridor along the route where one is given and GNSS says where we are")
-    use_yaw_rate: bool = choice(True, "Bend the corridor with the yaw rate where it is known")
-    min_speed_mps: float = slider(2.0, 0.0, 10.0, 0.5, "m/s", "Below this speed yaw rate and course say nothing")
+    half_width_m: float = slider(1.5, 0.5, 4.0, 0.05, "m", "Half the width of the corridor without lane lines")
+    length_m: float = slider(100.0, 20.0, 200.0, 5.0, "m", "Length of the corridor")
+    use_lanes: bool = choice(True, "Put the corridor between the lane lines where they are visible")
+    use_gnss: bool = choice(True, "Put the corridor along the planned route where GNSS locates the car on it")
+    use_yaw_rate: bool = choice(True, "Bend the corridor by the yaw rate")
+    min_speed_mps: float = slider(2.0, 0.0, 10.0, 0.5, "m/s", "Yaw rate and GNSS course are ignored below this speed")
     yaw_rate_sigma_radps: float = slider(
-        0.007, 0.0005, 0.05, 0.0005, "rad/s", "Noise of one yaw rate, the driver's small corrections included"
+        0.007, 0.0005, 0.05, 0.0005, "rad/s", "Noise of the yaw rate, including small steering corrections"
     )
     lateral_jerk_mps3: float = slider(
-        0.8, 0.05, 3.0, 0.05, "m/s³", "How fast a road's lateral acceleration changes: sets how far an arc is good for"
+        0.8, 0.05, 3.0, 0.05, "m/s³", "Largest lateral jerk of a road: limits how far ahead an arc is valid"
     )
     lateral_accel_mps2: float = slider(
-        1.5, 0.1, 6.0, 0.1, "m/s²", "Lateral acceleration that a straight guess leaves open"
+        1.5, 0.1, 6.0, 0.1, "m/s²", "Lateral acceleration assumed possible when the path is guessed straight"
     )
-    lane_keeping_sigma_m: float = slider(0.2, 0.0, 1.0, 0.05, "m", "How far a driver is off the middle of the lane")
-    lane_keeping_sigma_mps: float = slider(0.1, 0.0, 1.0, 0.05, "m/s", "Sideways speed within the lane")
-    route_reach_m: float = slider(8.0, 1.0, 50.0, 1.0, "m", "Farther from the route than this we are not on it")
-    gnss_gate_sigmas: float = slider(3.7, 1.0, 10.0, 0.1, "σ", "A fix farther from the expected place is refused")
-    gnss_restart_s: float = slider(2.0, 0.2, 30.0, 0.1, "s", "Fixes refused for this long are believed, with doubt")
-    outlier_sigmas: float = slider(3.0, 1.0, 10.0, 0.1, "σ", "A source that disagrees more is left out")
-    smoothing_s: float = slider(0.2, 0.0, 2.0, 0.05, "s", "How slowly the corridor follows its sources; 0 at once")
-    good_sigma_m: float = slider(1.0, 0.1, 3.0, 0.1, "m", "The path is good as far as its sigma stays below this")
-    usable_s: float = slider(1.5, 0.2, 5.0, 0.1, "s", "The path must be good for this time ahead to be driven after")
+    lane_keeping_sigma_m: float = slider(0.2, 0.0, 1.0, 0.05, "m", "Usual distance from the lane's centre")
+    lane_keeping_sigma_mps: float = slider(0.1, 0.0, 1.0, 0.05, "m/s", "Usual lateral speed within the lane")
+    route_reach_m: float = slider(8.0, 1.0, 50.0, 1.0, "m", "The car is off the route beyond this distance from it")
+    gnss_gate_sigmas: float = slider(3.7, 1.0, 10.0, 0.1, "σ", "Fixes farther from the predicted position are rejected")
+    gnss_restart_s: float = slider(
+        2.0, 0.2, 30.0, 0.1, "s", "Accept fixes again, with more uncertainty, after rejecting them for this long"
+    )
+    outlier_sigmas: float = slider(3.0, 1.0, 10.0, 0.1, "σ", "Sources that disagree more are left out")
+    smoothing_s: float = slider(
+        0.2, 0.0, 2.0, 0.05, "s", "Time constant with which the corridor follows its sources; 0: immediately"
+    )
+    good_sigma_m: float = slider(
+        1.0, 0.1, 3.0, 0.1, "m", "The path is usable as far ahead as its sigma stays below this"
+    )
+    usable_s: float = slider(
+        1.5, 0.2, 5.0, 0.1, "s", "ACC accelerates only if the path is usable for this travel time ahead"
+    )
 
 
 class LaneParams(Section):
-    """Lane lines: from the picture to the ground, and over time."""
+    """Lane lines: mapping from the image to the road, and tracking."""
 
-    max_range_m: float = slider(60.0, 15.0, 100.0, 5.0, "m", "Paint farther away is left out")
+    max_range_m: float = slider(60.0, 15.0, 100.0, 5.0, "m", "Paint beyond this distance is ignored")
     mount_height_m: float = slider(
-        0.6, 0.0, 3.0, 0.05, "m", "Height of the ego origin above the road, where neither sweep nor calibration knows"
+        0.6, 0.0, 3.0, 0.05, "m", "Height of the ego origin above the road where neither LiDAR nor calibration gives it"
     )
-    bearing_sigma_deg: float = slider(0.1, 0.01, 1.0, 0.01, "°", "Noise of a point's direction in the picture")
-    min_quality: float = slider(0.3, 0.05, 0.95, 0.01, "", "Lines supported less are not believed")
-    min_width_m: float = slider(2.4, 1.5, 4.0, 0.1, "m", "Two lines nearer than this are no lane")
-    max_width_m: float = slider(4.8, 3.0, 8.0, 0.1, "m", "Two lines farther apart than this are no lane")
-    max_heading_deg: float = slider(7.0, 1.0, 30.0, 0.5, "°", "A line turned further away from the car is no lane line")
-    gate_m: float = slider(0.7, 0.1, 2.0, 0.05, "m", "A line farther from the expected place is another one")
-    max_age_s: float = slider(1.0, 0.1, 5.0, 0.1, "s", "A line not seen for longer ends")
-    pitch_sigma_deg: float = slider(0.8, 0.0, 3.0, 0.1, "°", "How far the camera's pitch may be off its calibration")
-    pitch_drift_deg: float = slider(0.15, 0.01, 2.0, 0.01, "°/√s", "How fast the pitch changes: load and springs")
+    bearing_sigma_deg: float = slider(0.1, 0.01, 1.0, 0.01, "°", "Noise of a point's direction in the image")
+    min_quality: float = slider(0.3, 0.05, 0.95, 0.01, "", "Lines of lower quality are ignored")
+    min_width_m: float = slider(2.4, 1.5, 4.0, 0.1, "m", "Narrowest lane")
+    max_width_m: float = slider(4.8, 3.0, 8.0, 0.1, "m", "Widest lane")
+    max_heading_deg: float = slider(7.0, 1.0, 30.0, 0.5, "°", "Largest angle between a lane line and the car")
+    gate_m: float = slider(0.7, 0.1, 2.0, 0.05, "m", "Largest distance of a line from its prediction")
+    max_age_s: float = slider(1.0, 0.1, 5.0, 0.1, "s", "A line is dropped after this long without a detection")
+    pitch_sigma_deg: float = slider(
+        0.8, 0.0, 3.0, 0.1, "°", "Uncertainty of the camera's pitch against its calibration"
+    )
+    pitch_drift_deg: float = slider(0.15, 0.01, 2.0, 0.01, "°/√s", "How fast the pitch drifts with load and suspension")
 
 
 class CipvParams(Section):
-    """Who may be the closest in-path vehicle, and who is."""
+    """Which objects may be the closest in-path vehicle, and which one is."""
 
-    confirm_hits: int = slider(3, 1, 20, 1, "frames", "Sightings before an object seen by one sensor counts")
-    carried_may_become_lead: bool = choice(False, "An object that is not seen in this frame may take over as CIPV")
-    hysteresis_m: float = slider(0.3, 0.0, 2.0, 0.05, "m", "The lead leaves the path only this far outside it")
+    confirm_hits: int = slider(3, 1, 20, 1, "frames", "Sightings needed by an object that only one sensor sees")
+    carried_may_become_lead: bool = choice(False, "Let an object that is not seen in this frame become the CIPV")
+    hysteresis_m: float = slider(0.3, 0.0, 2.0, 0.05, "m", "The lead stays in the path up to this far outside its edge")
     min_overlap_m: float = slider(
         0.9,
         0.0,
         2.0,
         0.05,
         "m",
-        "In path: this much of its width reaches between the edges, or half of what is narrower",
+        "In path: at least this much of its width lies between the edges, or half of a narrower object",
     )
-    decide_s: float = slider(0.3, 0.0, 2.0, 0.05, "s", "In path: over how long sightings are weighed; 0: each alone")
-    max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "A lead's place against the path is no more uncertain")
-    cut_in_s: float = slider(3.0, 0.5, 6.0, 0.1, "s", "Lane crossings are told this long before")
-    min_width_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest extent across, a vehicle's rear or side")
-    min_height_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "L objects: smallest height")
-    max_size_m: float = slider(15.0, 3.0, 40.0, 0.5, "m", "L objects: largest extent; walls and hedges are longer")
+    decide_s: float = slider(
+        0.3, 0.0, 2.0, 0.05, "s", "In path: time over which sightings are averaged; 0: this frame only"
+    )
+    max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "Largest uncertainty of a lead's position across the path")
+    cut_in_s: float = slider(3.0, 0.5, 6.0, 0.1, "s", "Lane crossings are announced this long ahead")
+    min_width_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "LiDAR-only objects: smallest width")
+    min_height_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "LiDAR-only objects: smallest height")
+    max_size_m: float = slider(
+        15.0, 3.0, 40.0, 0.5, "m", "LiDAR-only objects: largest extent; excludes walls and hedges"
+    )
 
 
 class AccParams(Section):
-    """Adaptive cruise control (paper, Algorithm 3 and Eq. 6, with its slips mended)."""
+    """Adaptive cruise control (paper, Algorithm 3 and Eq. 6, with their errors corrected)."""
 
-    set_speed_kmh: float = slider(100.0, 10.0, 200.0, 5.0, "km/h", "Speed driven when nothing is ahead")
+    set_speed_kmh: float = slider(100.0, 10.0, 200.0, 5.0, "km/h", "Speed with nothing ahead")
     min_gap_m: float = slider(5.0, 1.0, 20.0, 0.5, "m", "d_min: gap at standstill")
     time_gap_s: float = slider(1.8, 0.8, 4.0, 0.1, "s", "d_desired = d_min + time gap × speed")
-    ttc_limit_s: float = slider(2.5, 0.5, 10.0, 0.1, "s", "Any object closing in faster than this is braked for")
+    ttc_limit_s: float = slider(2.5, 0.5, 10.0, 0.1, "s", "Slow down for any object that would be hit sooner than this")
     kp: float = slider(2.0, 0.0, 5.0, 0.05, "1/s", "PID: proportional gain")
     ki: float = slider(0.05, 0.0, 2.0, 0.01, "1/s²", "PID: integral gain")
     kd: float = slider(0.0, 0.0, 2.0, 0.01, "", "PID: derivative gain")
-    max_accel_mps2: float = slider(2.0, 0.5, 5.0, 0.1, "m/s²", "Accelerator pedal at 1")
-    max_decel_mps2: float = slider(8.0, 1.0, 10.0, 0.1, "m/s²", "Brake pedal at 1")
+    max_accel_mps2: float = slider(2.0, 0.5, 5.0, 0.1, "m/s²", "Acceleration at full accelerator")
+    max_decel_mps2: float = slider(8.0, 1.0, 10.0, 0.1, "m/s²", "Deceleration at full brake")
     brake_limit_mps2: float = slider(
-        8.0, 0.0, 10.0, 0.1, "m/s²", "ACC brakes no harder; ISO 15622 permits 3.5 at speed, 0 leaves it all to AEB"
+        8.0,
+        0.0,
+        10.0,
+        0.1,
+        "m/s²",
+        "Hardest braking by ACC; ISO 15622 permits 3.5 at speed, 0 leaves all braking to AEB",
     )
 
 
 class AebParams(Section):
-    """Emergency braking beside ACC: a stage comes in when the time to collision falls below its limit, or when more
-    deceleration is needed than its limit."""
+    """Emergency braking beside ACC. A stage starts when the time to collision falls below its limit or the required
+    deceleration exceeds its limit."""
 
-    enabled: bool = choice(True, "Warn and brake in an emergency; off: ACC alone, as in print")
-    min_speed_kmh: float = slider(5.0, 0.0, 30.0, 1.0, "km/h", "Below this own speed no stage comes in")
-    warn_ttc_s: float = slider(2.2, 0.5, 6.0, 0.1, "s", "Warning when the time to collision is shorter")
-    partial_ttc_s: float = slider(1.4, 0.3, 4.0, 0.1, "s", "Partial braking when it is shorter")
-    full_ttc_s: float = slider(0.9, 0.2, 3.0, 0.1, "s", "Full braking when it is shorter")
-    partial_when_mps2: float = slider(4.0, 1.0, 10.0, 0.1, "m/s²", "Partial braking when this much is needed")
-    full_when_mps2: float = slider(5.5, 1.0, 10.0, 0.1, "m/s²", "Full braking when this much is needed")
-    partial_decel_mps2: float = slider(4.0, 0.5, 8.0, 0.1, "m/s²", "How hard partial braking brakes")
-    full_decel_mps2: float = slider(8.0, 2.0, 10.0, 0.1, "m/s²", "How hard full braking brakes")
-    build_up_s: float = slider(0.3, 0.0, 1.0, 0.05, "s", "From the command to full pressure; driven unbraked")
-    margin_m: float = slider(1.0, 0.0, 5.0, 0.1, "m", "Gap that braking shall leave")
-    confirm_frames: int = slider(2, 1, 10, 1, "frames", "A stage must be asked for in this many frames in a row")
-    release_ttc_s: float = slider(6.0, 1.0, 20.0, 0.5, "s", "Braking goes on while the time to collision is shorter")
-    release_s: float = slider(0.3, 0.0, 3.0, 0.1, "s", "Braking ends when the danger has been gone for this long")
-    standstill_s: float = slider(2.0, 0.0, 10.0, 0.5, "s", "The brakes hold for this long at standstill")
+    enabled: bool = choice(True, "Warn and brake in an emergency; off: ACC only, as in the paper")
+    min_speed_kmh: float = slider(5.0, 0.0, 30.0, 1.0, "km/h", "No stage starts below this own speed")
+    warn_ttc_s: float = slider(2.2, 0.5, 6.0, 0.1, "s", "Warn below this time to collision")
+    partial_ttc_s: float = slider(1.4, 0.3, 4.0, 0.1, "s", "Partial braking below this time to collision")
+    full_ttc_s: float = slider(0.9, 0.2, 3.0, 0.1, "s", "Full braking below this time to collision")
+    partial_when_mps2: float = slider(4.0, 1.0, 10.0, 0.1, "m/s²", "Partial braking above this required deceleration")
+    full_when_mps2: float = slider(5.5, 1.0, 10.0, 0.1, "m/s²", "Full braking above this required deceleration")
+    partial_decel_mps2: float = slider(4.0, 0.5, 8.0, 0.1, "m/s²", "Deceleration of partial braking")
+    full_decel_mps2: float = slider(8.0, 2.0, 10.0, 0.1, "m/s²", "Deceleration of full braking")
+    build_up_s: float = slider(
+        0.3, 0.0, 1.0, 0.05, "s", "Delay from the command to full brake pressure, driven unbraked"
+    )
+    margin_m: float = slider(1.0, 0.0, 5.0, 0.1, "m", "Gap left after braking")
+    confirm_frames: int = slider(2, 1, 10, 1, "frames", "Frames in a row that must call for a stage before it starts")
+    release_ttc_s: float = slider(6.0, 1.0, 20.0, 0.5, "s", "Keep braking below this time to collision")
+    release_s: float = slider(0.3, 0.0, 3.0, 0.1, "s", "Braking ends this long after the danger has passed")
+    standstill_s: float = slider(2.0, 0.0, 10.0, 0.5, "s", "Hold the brakes for this long at standstill")
 
 
 class TimeParams(Section):
     """Gaps in a recording."""
 
     reset_gap_s: float = slider(
-        1.5, 0.2, 10.0, 0.1, "s", "After a longer gap, or a jump back, every tracker starts anew"
+        1.5, 0.2, 10.0, 0.1, "s", "All trackers reset after a longer gap, or a jump back in time"
     )
 
 
 class SyncParams(Section):
-    """How live sensors are put together; recordings are together already."""
+    """How live sensors are synchronised; recordings already are."""
 
-    camera_offset_ms: float = slider(0.0, -500.0, 500.0, 1.0, "ms", "Added to the camera's times: negative, it lags")
-    ego_offset_ms: float = slider(0.0, -500.0, 500.0, 1.0, "ms", "Added to the times of speed and yaw rate")
-    gnss_offset_ms: float = slider(0.0, -500.0, 500.0, 1.0, "ms", "Added to the times of GNSS fixes")
-    max_skew_ms: float = slider(60.0, 5.0, 200.0, 1.0, "ms", "A picture farther than this from the sweep is left out")
-    wait_ms: float = slider(25.0, 0.0, 100.0, 1.0, "ms", "A sweep waits this long at most for a picture taken after it")
+    camera_offset_ms: float = slider(
+        0.0, -500.0, 500.0, 1.0, "ms", "Added to the camera's timestamps; negative if the camera lags"
+    )
+    ego_offset_ms: float = slider(0.0, -500.0, 500.0, 1.0, "ms", "Added to the timestamps of speed and yaw rate")
+    gnss_offset_ms: float = slider(0.0, -500.0, 500.0, 1.0, "ms", "Added to the timestamps of GNSS fixes")
+    max_skew_ms: float = slider(
+        60.0, 5.0, 200.0, 1.0, "ms", "Images farther than this from the sweep in time are ignored"
+    )
+    wait_ms: float = slider(25.0, 0.0, 100.0, 1.0, "ms", "Longest wait of a sweep for an image taken after it")

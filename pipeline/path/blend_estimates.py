@@ -1,7 +1,7 @@
-"""Estimates of the path become one, point by point, each weighted by the inverse of its variance.
+"""Blends estimates of the path into one, point by point, each weighted by the inverse of its variance.
 
-All are compared along the normals of the surest one. Errors of different sources are independent, so that the variance
-of the weighted mean is the inverse of the sum of the weights; how one source's errors hang together along the path
+All are compared along the normals of the most certain one. Errors of different sources are independent, so the variance
+of the weighted mean is the inverse of the sum of the weights; whether one source's errors are correlated along the path
 does not matter for that. Where the sources scatter more than their sigmas say, the sigma grows by the Birge ratio
 (R. T. Birge, Phys. Rev. 40, 207 (1932)). A source that contradicts the rest is left out, and lowers the confidence.
 """
@@ -18,18 +18,18 @@ from pipeline.path.estimates import SOURCES, STEP_M, PathEstimate
 from pipeline.types import Coasting
 
 COMPARED_M = 60.0
-"""Sources are compared up to here: farther ahead none of them is meant to agree closely."""
+"""Sources are compared up to this distance: farther ahead they need not agree closely."""
 LARGEST_BIRGE = 3.0
 IN_DISPUTE = 1.5
-"""How much less sure a path is while a source is left out: it may be the others that err."""
+"""Factor on the sigma while a source is ignored: the others may be the ones that are wrong."""
 EDGE_SIGMA_M = 0.5
 """Where lane lines are this uncertain, the edges lie half way between them and the usual half width."""
 
 
 @dataclass(frozen=True, eq=False)
 class FusedPath:
-    """center: (K, 2). sigma_m: (K,). left_m, right_m: (K,) distances to the edges. shares: (K, 4) of ``SOURCES``.
-    behind_m: (K,) how far it has not yet followed its sources, which makes it doubtful for now."""
+    """The path of all sources together. center: (K, 2). sigma_m: (K,). left_m, right_m: (K,) distances to the edges.
+    shares: (K, 4) of ``SOURCES``. behind_m: (K,) how far it still lags behind its sources."""
 
     center: F64
     sigma_m: F64
@@ -47,8 +47,8 @@ def normals(center: F64) -> F64:
 def fuse(
     estimates: list[PathEstimate], expected: FusedPath | None, half_width_m: float, outlier_sigmas: float
 ) -> tuple[FusedPath, tuple[str, ...]]:
-    """One path out of at least one estimate, and a sentence for each source left out. expected: the path of the frame
-    before, where it should be now: it takes part in the comparison of sources, not in the mean."""
+    """One path from one or more estimates, and a sentence for each source ignored. expected: the path of the frame
+    before, where it should be now; it takes part in the comparison of sources, not in the mean."""
     centers = np.stack([each.center for each in estimates])
     sigmas = np.stack([each.sigma_m for each in estimates])
     compared = int(COMPARED_M / STEP_M)
@@ -62,7 +62,7 @@ def fuse(
     for row, each in zip(weights, estimates, strict=True):
         shares[:, SOURCES.index(each.source)] += row
     notes = tuple(
-        f"{each.source} disagrees with the rest by {much:.0f} sigmas: left out"
+        f"{each.source} disagrees with the rest by {much:.0f} sigmas: ignored"
         for each, much in zip(estimates, disagree.tolist(), strict=True)
         if much > 0.0
     )
@@ -71,8 +71,8 @@ def fuse(
 
 
 def _edges(estimates: list[PathEstimate], half_width_m: float) -> tuple[F64, F64]:
-    """Distances from the centre to the edges: the lane's as far as its lines are known well, whoever carries the
-    centre; the usual half width where they are not."""
+    """Distances from the centre to the edges: those of the lane where its lines are known well, whichever source
+    carries the centre; the usual half width elsewhere."""
     usual = np.full(len(estimates[0].center), half_width_m)
     for each in estimates:
         if each.left_m is not None and each.right_m is not None:
@@ -82,12 +82,13 @@ def _edges(estimates: list[PathEstimate], half_width_m: float) -> tuple[F64, F64
 
 
 def blend(fresh: FusedPath, expected: FusedPath, keep: float, largest_m: float) -> FusedPath:
-    """The path follows its sources smoothly. keep: 0–1, how much of the expected path stays at equal sigmas.
-    largest_m: no point moves farther than this in one frame, and by what the fresh path knows better: one that has just
-    lost a source does not jump to what is left.
+    """Make the path follow its sources smoothly. keep: 0–1, the weight of the expected path at equal sigmas. largest_m:
+    no point moves farther than this in one frame, apart from what the fresh path knows better: a path that has just
+    lost a source does not jump to the remaining ones.
 
-    The two share their sources, so they are joined by covariance intersection (Julier and Uhlmann 1997): the weights
-    are ``keep`` and 1 − ``keep`` times the inverse variances, and the outcome is never surer than either."""
+    Both come from the same sources, so they are joined by covariance intersection (Julier and Uhlmann 1997): the
+    weights are ``keep`` and 1 − ``keep`` times the inverse variances, and the result is never more certain than
+    either."""
     center, sigma, kept, behind = _blend(
         fresh.center, fresh.sigma_m, expected.center, expected.sigma_m, keep, largest_m
     )
@@ -105,9 +106,9 @@ def blend(fresh: FusedPath, expected: FusedPath, keep: float, largest_m: float) 
 def moved(
     path: FusedPath, travelled_m: float, turned_rad: float, dt_s: float, coasting: Coasting | None = None
 ) -> FusedPath:
-    """The path of ``dt_s`` ago as the car sees it now, having driven a little arc. It is less sure by what speed and
-    yaw rate may be off by: 0.3 m sideways and 0.003 rad in a second, growing with the root of time. coasting: and by
-    what they may be off by where they are those of a while ago; a way that is longer or shorter shifts a bend aside."""
+    """The path of ``dt_s`` ago in the car's frame now, after a short arc. Errors of speed and yaw rate add 0.3 m
+    sideways and 0.003 rad in a second, growing with the square root of time. coasting: adds the errors of a motion that
+    is no longer measured; a wrong distance driven shifts a bend sideways."""
     rows = np.column_stack([path.sigma_m, path.left_m, path.right_m, path.shares])
     center, rows = _moved(path.center, rows, travelled_m, turned_rad, STEP_M)
     s = np.arange(len(center)) * STEP_M

@@ -5,10 +5,9 @@
     yaw rate's arc ───────┤
     (else straight ahead) ┘
 
-The paper takes lane centres on straights and a GPS path in curves, by hand. Here every source says how sure it is at
-each distance, and the sigmas decide. The path of the frame before is moved by the car's own motion and takes part, so
-that nothing jumps when a source comes or goes.
-"""
+The paper uses lane centres on straights and a GPS path in curves, chosen by hand. Here every source gives its sigma at
+each distance, and the sigmas decide. The path of the frame before is moved by own motion and takes part, so that
+nothing jumps when a source comes or goes."""
 
 from __future__ import annotations
 
@@ -36,14 +35,14 @@ _CARRIES_ALONE = 0.7
 _NO_SHARE = 0.005
 """Smaller shares are not named."""
 _FASTEST_SHIFT_MPS = 3.0
-"""No point of the corridor moves sideways faster than this, its own uncertainty apart: a lane change takes a second."""
+"""Largest lateral speed of any point of the corridor, apart from its uncertainty: a lane change takes a second."""
 _USABLE_WITHOUT_SPEED_M, _USABLE_AT_STANDSTILL_M = 20.0, 5.0
-"""How far ahead a path must be known where ``usable_s`` times the speed says nothing, or too little."""
+"""How far ahead a path must be known where the speed is unknown, or ``usable_s`` times the speed too short."""
 
 
 @dataclass(frozen=True, eq=False)
 class PathState:
-    """What one frame's path leaves to the next. last: the fused path; null where nothing can be carried over."""
+    """What one frame leaves to the next. last: the fused path; None where nothing can be carried over."""
 
     yaw: YawRate | None = None
     gnss: GnssState = GnssState()
@@ -94,7 +93,7 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
 
 
 def corridor(ego: EgoState | None, params: PathParams) -> Path:
-    """The path of a single moment that has no lane lines, route or history."""
+    """The path from own motion alone, without lane lines, route or history."""
     return predict(PathState(), Evidence(), Moment(0, None, ego, ego), params)[1]
 
 
@@ -114,7 +113,7 @@ def warm_up() -> None:
 def _expected(
     last: FusedPath | None, yaw: YawRate | None, ego: EgoState | None, dt_s: float | None, size: int
 ) -> FusedPath | None:
-    """The last path where it should be now; null when there is none, or when the car's own motion is not known."""
+    """The last path where it should be now; None when there is none, or own motion is not known."""
     if last is None or ego is None or not dt_s or len(last.center) != size:
         return None
     rate = yaw_rate.usable_rate(ego)
@@ -126,14 +125,14 @@ def _expected(
 
 
 def _fades(ego: EgoState | None, estimates: list[PathEstimate]) -> bool:
-    """Whether yaw rate and pose are those of a while ago and no line shows the road: as they get less sure, a straight
-    guess takes over little by little."""
+    """Whether own motion is no longer measured and no line shows the road. Then, as yaw rate and pose get less certain,
+    a straight guess gradually takes over."""
     return ego is not None and ego.coasting is not None and all(each.source != "lane" for each in estimates)
 
 
 def _about_own_motion(ego: EgoState | None) -> tuple[str, ...]:
     if ego is not None and ego.coasting is not None:
-        return (f"own speed not measured for {ego.coasting.age_s:.1f} s: taken for {ego.speed_mps * 3.6:.0f} km/h",)
+        return (f"own speed not measured for {ego.coasting.age_s:.1f} s: assuming {ego.speed_mps * 3.6:.0f} km/h",)
     return ()
 
 
@@ -146,7 +145,7 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
     needed_sigma_m = float(sigma_m[min(int(needed_m / STEP_M), len(sigma_m) - 1)])
     usable = reach_m >= min(needed_m, params.length_m)
     if not usable:
-        notes = (*notes, f"the path is known well enough for {max(reach_m, 0.0):.0f} m only")
+        notes = (*notes, f"the path is reliable for only {max(reach_m, 0.0):.0f} m ahead")
     return Path(
         source=_carrier(shares[1]),
         center=path.center,
@@ -159,7 +158,7 @@ def _as_path(path: FusedPath, ego: EgoState | None, notes: tuple[str, ...], para
         carried_by={f"{s}": _by_source(row) for s, row in zip(_LOOK_AHEAD_M, shares, strict=True)},
         reach_m=max(reach_m, 0.0),
         usable=usable,
-        doubt="" if usable else f"path known for {max(reach_m, 0.0):.0f} m only",
+        doubt="" if usable else f"path known only {max(reach_m, 0.0):.0f} m ahead",
         confidence=erf(params.half_width_m / needed_sigma_m / sqrt(2.0)) if needed_sigma_m > 0.0 else 1.0,
         notes=notes,
     )
@@ -171,19 +170,19 @@ def _by_source(shares: F64) -> dict[str, float]:
 
 
 def _carrier(shares: F64) -> PathSource:
-    """Who carries the path, by (4,) shares of ``SOURCES``."""
+    """The source that carries the path, by (4,) shares of ``SOURCES``."""
     main = int(np.argmax(shares))
     return SOURCES[main] if shares[main] >= _CARRIES_ALONE else "fused"
 
 
 def _reach_m(sigma_m: F64, params: PathParams) -> float:
-    """How far the path is good enough to drive after, by (K,) sigmas; negative where it nowhere is."""
+    """How far ahead the path is good enough to drive by, from (K,) sigmas; negative where it is nowhere."""
     too_vague = np.flatnonzero(~(sigma_m <= params.good_sigma_m))
     return float(too_vague[0] - 1) * STEP_M if len(too_vague) else params.length_m
 
 
 def _needed_m(ego: EgoState | None, params: PathParams) -> float:
-    """How far ahead a path must be known to be driven after."""
+    """How far ahead a path must be known to drive by it."""
     if ego is None:
         return _USABLE_WITHOUT_SPEED_M
     return max(params.usable_s * ego.speed_mps, _USABLE_AT_STANDSTILL_M)

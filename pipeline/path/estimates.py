@@ -1,7 +1,8 @@
-"""What one source says of the path ahead, and the two simplest sources: a straight guess, and the middle between lines.
+"""The estimate of the path ahead by one source, and the two simplest sources: straight ahead, and between the lane
+lines.
 
-Every estimate is sampled at the same path lengths s = 0, 1, 2, … m, as points in the ego frame: a line x → y would
-fold up in a tight bend, points do not. Its sigma is that of the sideways place, along the normal, at each point.
+Every estimate is sampled at the same path lengths s = 0, 1, 2, … m, as points in the ego frame, because a function
+x → y would fold up in a tight bend. Its sigma is that of the lateral position, along the normal, at each point.
 """
 
 from __future__ import annotations
@@ -21,18 +22,17 @@ SourceName = Literal["lane", "gnss", "yaw_rate", "straight"]
 SOURCES: tuple[SourceName, ...] = ("lane", "gnss", "yaw_rate", "straight")
 STEP_M = 1.0
 UNKNOWN_SIGMA_M = 1e3
-"""Sigma of a place about which a source says nothing."""
+"""Sigma of a position about which a source says nothing."""
 
 _STRAIGHT_CURVATURE = 1e-6
 _FASTEST_CURVATURE_PER_M = 1.0 / 500.0
-"""Curvature a straight guess leaves open where the speed is not known: a 500 m radius is the tightest curve of a road
-driven at 100 km/h."""
+"""Curvature assumed possible where the speed is not known: a road for 100 km/h has curves down to a 500 m radius."""
 _TIGHTEST_CURVATURE_PER_M = 0.02
 _LANE_WIDTH_SIGMA_M = 0.3
-"""How far a lane's width may be off where only one of its lines is seen."""
+"""Uncertainty of a lane's width where only one of its lines is seen."""
 _USUAL_LANE_M = 3.5
 _CAR_HALF_M, _SOON_M = 0.9, 15.0
-"""Half a car's width, and how far ahead a line is crossed that is being crossed on purpose."""
+"""Half a car's width, and the distance within which a line is crossed if it is crossed on purpose."""
 _HEADING_AT = 5
 """The lane's heading against the car is taken over so many metres."""
 _PITCH_SIGMA_RAD, _EYE_HEIGHT_M = 0.003, 1.2
@@ -42,12 +42,14 @@ point on the road may be taken to be."""
 
 @dataclass(frozen=True, eq=False)
 class PathEstimate:
-    """center: (K, 2) float64 ego x, y at s = 0, 1, … m. sigma_m: (K,) float64, of the sideways place. left_m, right_m:
-    (K,) float64 distances from the centre to the lane's edges; null where the source does not see edges."""
+    """The path as one source has it, at s = 0, 1, … m. left_m, right_m: (K,) float64 distances from the centre to the
+    lane's edges; None where the source does not see edges."""
 
     source: SourceName
     center: F64
+    """(K, 2) float64 ego x, y."""
     sigma_m: F64
+    """(K,) float64, standard deviation of the lateral position."""
     left_m: F64 | None = None
     right_m: F64 | None = None
 
@@ -74,7 +76,7 @@ def arc(curvature: float, s: F64) -> tuple[F64, F64]:
 
 
 def straight(ego: EgoState | None, params: PathParams) -> PathEstimate:
-    """Straight ahead, which is always there to fall back on. It leaves open every curvature that the speed allows."""
+    """Straight ahead: the fallback that is always available. Its sigma covers every curvature that the speed allows."""
     s = samples(params.length_m)
     if ego is None:
         curvature_sigma = _FASTEST_CURVATURE_PER_M
@@ -86,7 +88,7 @@ def straight(ego: EgoState | None, params: PathParams) -> PathEstimate:
 
 
 def between_lines(lane: EgoLane | None, params: PathParams) -> PathEstimate | None:
-    """The middle between the lane's two lines, or half a lane beside the one that is seen; null without any. The lines
+    """The middle between the lane's two lines, or half a lane beside the one that is seen; None without any. The lines
     need not be parallel. Where a line ends, its own covariance grows, and so does the sigma here."""
     if lane is None or (lane.left is None and lane.right is None):
         return None
@@ -105,11 +107,10 @@ def between_lines(lane: EgoLane | None, params: PathParams) -> PathEstimate | No
 
 
 def _leaving(x: F64, y: F64, left: F64, right: F64) -> tuple[F64, F64]:
-    """How far a car that points out of its lane will be beside the lane's middle, and how open that is, at each x.
+    """How far from the middle of its lane a car that points out of it will be at each x, and the uncertainty of that.
 
-    It either stays or goes on from where it is as it points, the likelier so the sooner its side crosses the line: mean
-    and spread of the two.
-    """
+    The car either stays in the lane or goes on as it points, which is the likelier the sooner its side crosses the
+    line: mean and spread of the two."""
     heading = float(y[_HEADING_AT] - y[0]) / _HEADING_AT
     to_line_m = float(left[0] + y[0] if heading < 0.0 else right[0] - y[0]) - _CAR_HALF_M
     crossing_m = max(to_line_m, 0.0) / max(abs(heading), 1e-6)

@@ -77,7 +77,7 @@ def predict(
 
 def jump_m(pose: Pose, x: float, y: float, sigma_m: float, sigmas: float) -> float | None:
     """How far a fix lies from where it was expected, when that is farther than the noise explains (the innovation's
-    Mahalanobis distance against ``sigmas``); null when it is where it should be."""
+    Mahalanobis distance against ``sigmas``); None when it is where it should be."""
     dx, dy = x - float(pose.mean[0]), y - float(pose.mean[1])
     a, b, d = float(pose.cov[0, 0]) + sigma_m**2, float(pose.cov[0, 1]), float(pose.cov[1, 1]) + sigma_m**2
     distance2 = (d * dx * dx - 2.0 * b * dx * dy + a * dy * dy) / (a * d - b * b)

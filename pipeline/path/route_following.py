@@ -1,8 +1,8 @@
-"""The path that a route gives: the car is placed on it by GNSS, and the route ahead is drawn in the ego frame.
+"""The path along a route: GNSS locates the car on it, and the route ahead is transformed to the ego frame.
 
-Its sigma at s ahead adds up the route's own, the fix's (which no averaging lowers, since it lasts for minutes), what
-dead reckoning has added since, the heading's times s, and the doubt that a jump has left. In doubt the route tells how
-the road bends, and no more in which lane the car is.
+Its sigma at distance s combines those of the route, of the fix (which averaging does not reduce, since its error lasts
+for minutes), of dead reckoning since the fix, of the heading times s, and the doubt after a jump. In doubt the route
+still shows how the road bends, but no longer in which lane the car is.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ from pipeline.types import EgoState, GnssFix, Route
 
 _DOUBT_FADES_S = 3.0
 _ANEW_DOUBT_FADES_S = 60.0
-"""After a jump that stayed: what moves a receiver by metres for good, a reflection or another correction service, lasts
-for minutes, and nothing tells yet whether the old place was wrong or the new one is."""
+"""How long doubt lasts after a permanent jump. What moves a receiver by metres, a reflection or another correction
+service, lasts for minutes, and nothing shows yet whether the old or the new position was wrong."""
 _SMALLEST_DOUBT_M = 0.3
-"""Once a doubt has faded to this the car counts as placed again."""
+"""Below this doubt the car counts as located again."""
 _OLDEST_FIX_S = 1.0
-"""An older fix is not moved on to the tick: where the car went since is guessed."""
+"""Older fixes are not extrapolated to the tick."""
 _LOST_SIGMA_M = 15.0
-"""A pose less sure than this places nothing on a route."""
+"""A less certain pose does not locate the car on a route."""
 _LARGEST_TURN_RAD = pi / 3
-"""A stretch of the route that runs more aslant to the car is not the one that it drives on."""
+"""The car does not drive on a stretch of the route at a larger angle to its heading."""
 _SEARCH_M = 60.0
-"""The car is looked for so far behind and ahead of its last place on the route."""
+"""Search range behind and ahead of the car's last position on the route."""
 
 
 @dataclass(frozen=True, eq=False)
 class GnssState:
-    """line: the route laid out. pose: of the car; null before the first fix with a course. fix_t_ns: of the last fix
+    """line: the route laid out. pose: of the car; None before the first fix with a course. fix_t_ns: of the last fix
     looked at. fix_sigma_m: of the last one believed. doubt_m: what the last jump left, fading. refused_s: for how long
-    every fix has been refused. at_m: place along the route; null while not on it. placed_anew: after a jump that
+    every fix has been refused. at_m: place along the route; None while not on it. placed_anew: after a jump that
     stayed, until the doubt has faded."""
 
     line: RouteLine | None = None
@@ -64,24 +64,24 @@ def follow(
     dt_s: float | None,
     params: PathParams,
 ) -> tuple[GnssState, tuple[str, ...]]:
-    """The pose at the frame's tick, with sentences for a person about what is wrong. Without a route nothing is done:
-    a place on the Earth says nothing about the path then."""
+    """The pose at the frame's tick, and sentences about what is wrong. Does nothing without a route, because a position
+    on the Earth says nothing about the path then."""
     if route is None or not params.use_gnss:
         return GnssState(), ()
     line = state.line if state.line is not None and _is_same(state.line.route, route) else lay_out(route)
     if line is None:
-        return GnssState(), (f"route {route.name}: no line in it",)
+        return GnssState(), (f"route {route.name} contains no line",)
     if state.line is not line:
         state = GnssState(line=line)
     state = _dead_reckoned(state, ego, dt_s or 0.0)
     state, notes = _with_fix(state, line, fix, ego, t_ns, dt_s or 0.0, params)
     if state.placed_anew:
-        notes = (f"GNSS placed anew after a jump, doubted by {state.doubt_m:.1f} m: the lane is not known from it",)
+        notes = (f"GNSS position reset after a jump, uncertain by {state.doubt_m:.1f} m: it does not show the lane",)
     return state, notes
 
 
 def _dead_reckoned(state: GnssState, ego: EgoState | None, dt_s: float) -> GnssState:
-    """Moved on by ego speed and yaw rate; where there never was an ego speed the pose is lost."""
+    """The pose moved on by own speed and yaw rate; without own speed it is lost."""
     if state.pose is None or dt_s <= 0.0:
         return state
     pose = None
@@ -101,7 +101,7 @@ def _with_fix(
     dt_s: float,
     params: PathParams,
 ) -> tuple[GnssState, tuple[str, ...]]:
-    """A new fix taken in, or refused when it is a jump; one that was looked at before says nothing new."""
+    """Use a new fix, or reject it when it jumped. A fix that was seen before is ignored."""
     if fix is None or fix.t_ns == state.fix_t_ns or not _is_whole(fix):
         return state, ()
     age_s = (t_ns - fix.t_ns) / 1e9
@@ -131,8 +131,8 @@ def _with_fix(
 def _refused(
     state: GnssState, fix: GnssFix, jump_m: float, x: float, y: float, dt_s: float, params: PathParams
 ) -> tuple[GnssState, tuple[str, ...]]:
-    """A jump does not move the pose, it makes it doubtful. When every fix has been refused for a while it is the pose
-    that is wrong, or the receiver for long: it starts anew where the fixes are, and the doubt stays."""
+    """A jump does not move the pose but makes it doubtful. When every fix has been rejected for a while, the pose is
+    wrong, or the receiver is for long: the pose restarts at the fixes, and the doubt stays."""
     assert state.pose is not None
     refused_s, pose = state.refused_s + dt_s, state.pose
     stayed = refused_s >= params.gnss_restart_s
@@ -146,22 +146,22 @@ def _refused(
         refused_s=0.0 if stayed else refused_s,
         placed_anew=state.placed_anew or stayed,
     )
-    return kept, (f"GNSS jumped by {jump_m:.1f} m: not believed",)
+    return kept, (f"GNSS jumped by {jump_m:.1f} m: fix ignored",)
 
 
 def ahead(state: GnssState, params: PathParams) -> tuple[GnssState, PathEstimate | None, tuple[str, ...]]:
-    """The route from where the car is on it, as points in the ego frame; null, with a sentence, when the car is not on
-    the route or nobody knows where it is."""
+    """The route ahead of the car as points in the ego frame; None, with a sentence, when the car is off the route or
+    its position unknown."""
     if state.line is None:
         return state, None, ()
     if state.pose is None:
-        return state, None, ("no GNSS fix to place the car on the route",)
+        return state, None, ("no GNSS fix yet to locate the car on the route",)
     side_var = _sideways_variance(state.pose) + state.fix_sigma_m**2
     if side_var > _LOST_SIGMA_M**2:
-        return _at(state, None), None, ("GNSS fix lost for too long to know the place on the route",)
+        return _at(state, None), None, ("no GNSS fix for too long: position on the route unknown",)
     at_m = _match(state.line, state.pose, state.at_m, params.route_reach_m)
     if at_m is None:
-        return _at(state, None), None, ("not on the route",)
+        return _at(state, None), None, ("the car is off the route",)
     s = samples(params.length_m)
     line, (x, y, heading) = state.line, state.pose.mean.tolist()
     steps = np.arange(len(line.places)) * SPACING_M
@@ -180,9 +180,9 @@ def ahead(state: GnssState, params: PathParams) -> tuple[GnssState, PathEstimate
 def _doubted(aside_m: float, turned: F64, doubt_m: float, params: PathParams) -> tuple[float, F64]:
     """By how much to move a route that lies ``aside_m`` of the car to the right, and the variance that doubt adds.
 
-    Who doubts the place still knows how the road bends. Sideways the place is weighed against that cars keep near the
-    middle of their lane: in full doubt the route leads through the car. Along the road nothing helps: where the route
-    has ``turned``, (N,) radians, from the car's place, being elsewhere along it is being aside."""
+    A doubtful position still shows how the road bends. Sideways it is weighed against the assumption that cars keep to
+    the middle of their lane: in full doubt the route leads through the car. Along the road nothing helps: where the
+    route has ``turned``, (N,) radians, from the car's position, an error along it is an error sideways."""
     keeping_var = params.lane_keeping_sigma_m**2
     believed = keeping_var / (keeping_var + doubt_m**2)
     return (1.0 - believed) * aside_m, believed * doubt_m**2 + (doubt_m * np.sin(turned)) ** 2
@@ -211,13 +211,14 @@ def _match(line: RouteLine, pose: Pose, last_m: float | None, reach_m: float) ->
 
 
 def _sideways_variance(pose: Pose) -> float:
-    """Of the place across the car's heading."""
+    """Variance of the position across the car's heading."""
     n = np.array([-np.sin(pose.mean[2]), np.cos(pose.mean[2])])
     return float(n @ pose.cov[:2, :2] @ n)
 
 
 def _beyond_the_end(center: F64, s: F64, left_m: float) -> F64:
-    """Where the route has ended the line goes straight on, so that its points stay apart; its sigma says not to."""
+    """Beyond its end the route is extended straight, so that its points stay distinct; their sigma marks them
+    unusable."""
     over = np.maximum(s - left_m, 0.0)
     if not over.any():
         return center
@@ -229,7 +230,7 @@ def _beyond_the_end(center: F64, s: F64, left_m: float) -> F64:
 
 
 def _moved_on(x: float, y: float, heading: float, speed_mps: float, age_s: float) -> tuple[float, float]:
-    """Where a fix of some time ago has the car now."""
+    """The position of an older fix, extrapolated to now."""
     return x + speed_mps * age_s * float(np.cos(heading)), y + speed_mps * age_s * float(np.sin(heading))
 
 

@@ -32,7 +32,7 @@ class RouteLine:
 
 
 def lay_out(route: Route) -> RouteLine | None:
-    """The route as a line; null when it has no two places apart. Places closer than 0.3 m are the same (a car that
+    """The route as a line; None when it has no two places apart. Places closer than 0.3 m are the same (a car that
     stood). Recorded places scatter: they are smoothed over a length of 20 sigmas, 8 m at most, which draws a bend of
     125 m radius 0.26 m inwards at worst, and not at all where RTK recorded them."""
     lat, lon = np.asarray(route.lat_deg, np.float64), np.asarray(route.lon_deg, np.float64)

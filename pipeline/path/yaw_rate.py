@@ -1,17 +1,17 @@
-"""The path that the car's own turning predicts: the arc of its yaw rate, smoothed, and how far ahead it is good for.
+"""The path predicted from the car's turning: the arc of its smoothed yaw rate, and how far ahead it is valid.
 
-Two noises set what an arc is worth. One yaw rate errs (sensor, and the driver's small corrections), which bends the arc
-wrongly by σ·s²/(2v). And a road does not keep its curvature: between a straight and a bend the lateral acceleration
-changes by some lateral jerk j, so after the path length s the arc is off by j·s³/(6v³). The second term is a law of
-time, s/v: an arc is good for about two seconds at any speed, which is the look-ahead that grows with speed.
+Two errors limit an arc. The yaw rate is noisy (the sensor, and small steering corrections), which bends the arc wrongly
+by σ·s²/(2v). And a road does not keep its curvature: between a straight and a bend the lateral acceleration changes
+with some lateral jerk j, so after the path length s the arc is off by j·s³/(6v³). The second term depends only on the
+time s/v: an arc is valid for about two seconds at any speed, so the look-ahead grows with speed.
 
 Measured on 60 s of a real drive (comma2k19, 8–20 m/s, nearly straight): yaw rate as sampled 0.0046 rad/s around zero
 (of which 0.0024 white, 0.0005 bias), lateral jerk 0.1 m/s³. Curves are entered at 0.3–0.9 m/s³ (AASHTO, *A Policy on
-Geometric Design*, length of spirals): the default is near the upper end, since an arc that is too sure of itself where
-a bend ends pulls the path off the lane lines that show the end.
+Geometric Design*, length of spirals): the default is near the upper end, because an overconfident arc at the end of a
+bend pulls the path off the lane lines that show the end.
 
-A yaw rate no larger than its noise is not a road that bends but a driver who corrects, and is gone in a second: the arc
-takes ω / (1 + (σ/ω)⁴) of it, all of a bend and nothing of the noise. The noise that predicts the driven path of that
+A yaw rate no larger than its noise is not a bend but a steering correction, and is gone in a second: the arc takes
+ω / (1 + (σ/ω)⁴) of it, which keeps a bend and drops the noise. The noise that predicts the driven path of that
 drive best, 0.007 rad/s, is the default: 0.04, 0.10 and 0.17 m aside after 1, 2 and 3 s.
 """
 
@@ -43,8 +43,8 @@ class YawRate:
 def follow(before: YawRate | None, ego: EgoState | None, dt_s: float | None, params: PathParams) -> YawRate | None:
     """The yaw rate now: a random walk that changes with the lateral jerk of roads, j/v in rad/s² (Kalman, one state).
 
-    What is not finite, or faster than any car turns, is as good as not measured. Null before the first one, and where
-    ego speed is unknown or so slow that turning means no curve."""
+    A rate that is not finite, or faster than any car turns, counts as not measured. None before the first measurement,
+    and where own speed is unknown or too low for the yaw rate to show a curve."""
     if ego is None or not isfinite(ego.speed_mps) or ego.speed_mps < params.min_speed_mps:
         return None
     if before is not None and dt_s:
@@ -62,30 +62,30 @@ def follow(before: YawRate | None, ego: EgoState | None, dt_s: float | None, par
 
 
 def usable_rate(ego: EgoState | None) -> float | None:
-    """The measured yaw rate, or null when there is none that a car can have."""
+    """The measured yaw rate; None when there is none, or an implausible one."""
     rate = ego.yaw_rate_radps if ego is not None else None
     return rate if rate is not None and isfinite(rate) and abs(rate) <= _FASTEST_RADPS else None
 
 
 def believable(ego: EgoState | None) -> EgoState | None:
-    """The ego state without a yaw rate that no car has; null where the speed is not a number."""
+    """Own motion without an implausible yaw rate; None where the speed is not a finite number."""
     if ego is None or not isfinite(ego.speed_mps):
         return None
     return ego if ego.yaw_rate_radps == usable_rate(ego) else evolve(ego, yaw_rate_radps=None)
 
 
 def doubts(ego: EgoState | None) -> tuple[str, ...]:
-    """What a person should know of a measured own motion."""
+    """What is wrong with a measured own motion, in sentences."""
     if ego is None or not isfinite(ego.speed_mps) or ego.yaw_rate_radps is None or usable_rate(ego) is not None:
         return ()
-    return ("the yaw rate is not one that a car can have: left out",)
+    return ("implausible yaw rate ignored",)
 
 
 def ahead(yaw: YawRate | None, ego: EgoState | None, params: PathParams) -> PathEstimate | None:
-    """The arc ahead, r(1 − cos θ) aside at path length s = rθ; null where no yaw rate is known.
+    """The arc ahead, r(1 − cos θ) aside at path length s = rθ; None where no yaw rate is known.
 
-    Its sigma adds up where the car is in its lane, its sideways speed there, the yaw rate's error and the lateral jerk
-    of roads. A yaw rate not measured any more is one whose variance has grown."""
+    Its sigma combines the car's position and lateral speed within its lane, the yaw rate's error and the lateral jerk
+    of roads. The variance of a yaw rate that is no longer measured has grown."""
     if yaw is None or ego is None or ego.speed_mps < params.min_speed_mps:
         return None
     s, speed = samples(params.length_m), ego.speed_mps
@@ -103,5 +103,5 @@ def ahead(yaw: YawRate | None, ego: EgoState | None, params: PathParams) -> Path
 
 
 def _of_the_road(rate_radps: float, sigma_radps: float) -> float:
-    """The part of a yaw rate that is taken for the road's bend."""
+    """The part of a yaw rate that is attributed to the road."""
     return rate_radps**5 / (rate_radps**4 + sigma_radps**4)

@@ -10,7 +10,7 @@ from torch.nn import functional as F
 
 from pipeline.inference.graph import Size
 from pipeline.training.targets import IGNORED
-from pipeline.vision.heads import grid_centres
+from pipeline.vision.heads.decoder import grid_centres
 
 _IOU_WEIGHT, _OFFSET_WEIGHT = 3.0, 1.0
 _MOST_LOG_SIZE = 6.0

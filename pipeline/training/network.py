@@ -18,7 +18,7 @@ from torch.nn import functional as F
 from pipeline.inference.graph import Size
 from pipeline.training.labels import CLASSES
 from pipeline.vision.detector import PADDING
-from pipeline.vision.heads import STRIDES
+from pipeline.vision.heads.decoder import STRIDES
 
 INPUT_SIZE: Size = (384, 640)
 WIDTHS = (16, 24, 48, 80, 128)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from pipeline.inference.graph import Size
 from pipeline.types import F32
-from pipeline.vision.heads import grid_centres
+from pipeline.vision.heads.decoder import grid_centres
 
 RANGES_PX = {8: (0.0, 56.0), 16: (40.0, 128.0), 32: (96.0, np.inf)}
 """Geometric mean of a box's sides that each stride answers for; neighbours overlap, so that no size falls between."""

@@ -1,8 +1,8 @@
-"""What flows along the line: one ``Frame`` in, one ``Result`` out, and the values handed from stage to stage.
+"""What flows through the pipeline: one ``Frame`` in, one ``Result`` out, and what one stage hands to the next.
 
 Frames of reference: the *ego frame* is x forward, y left, z up, metres, origin named by the source. The image is
 u right, v down, pixels. Times are nanoseconds of the sensors' own clock. Every class is frozen; arrays inside are
-treated as read-only. What a frame makes by the hundred is a named tuple, which costs a fraction of a data class.
+treated as read-only. Values that a frame makes by the hundred are named tuples, which cost a fraction of a dataclass.
 """
 
 from pipeline.types.arrays import (

@@ -1,4 +1,4 @@
-"""Arrays, points and boxes by name, and the words for what was seen by whom."""
+"""Names for arrays, points and boxes, and for the sensors that have an object."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A picture as a camera gave it, decoded only when it is wanted: of a 60 Hz camera five in six are not."""
+"""A picture as the camera sent it, decoded only when it is needed: of a 60 Hz camera five in six are not."""
 
 from __future__ import annotations
 
@@ -16,14 +16,17 @@ _END_BYTES = 64
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """Either the JPEG as it came, or a decoder's frame (PyAV), or pixels."""
+    """A picture in one of three forms."""
 
     encoded: bytes | None = None
+    """The JPEG file."""
     frame: Any = None
+    """A video decoder's frame (PyAV)."""
     pixels: U8 | None = None
+    """(H, W, 3) uint8, blue green red."""
 
     def bgr(self) -> U8 | None:
-        """(H, W, 3) uint8; null when the picture is damaged."""
+        """(H, W, 3) uint8; None when the picture is damaged."""
         if self.pixels is not None:
             return self.pixels
         if self.frame is not None:
@@ -36,5 +39,5 @@ class Shot:
 
 
 def is_whole_jpeg(data: bytes) -> bool:
-    """Begins and ends as a JPEG does: one that was cut off decodes to grey, which a detector takes for road."""
+    """Whether data begins and ends as a JPEG does. A truncated one decodes to grey, which a detector takes for road."""
     return data.startswith(_JPEG_START) and _JPEG_END in data[-_END_BYTES:]

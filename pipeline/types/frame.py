@@ -11,67 +11,76 @@ from pipeline.types.arrays import F32, F64, I32, U8
 
 @dataclass(frozen=True)
 class Sweep:
-    """One LiDAR rotation.
-
-    points: (N, 4) float32 ``x y z intensity`` in the ego frame, C-contiguous, finite.
-    ring: (N,) uint8, the channel, 0 = lowest beam.
-    time_s: (N,) float32, when each point was measured, seconds after ``t_ns``; null where the recording does not say.
-    """
+    """One LiDAR rotation."""
 
     t_ns: int
+    """The sweep's own timestamp."""
     points: F32
+    """(N, 4) float32 ``x y z intensity`` in the ego frame, C-contiguous, finite."""
     ring: U8
+    """(N,) uint8, the channel, 0 = lowest beam."""
     channels: int
+    """How many channels the sensor has."""
     time_s: F32 | None = None
+    """(N,) float32, when each point was measured, seconds after ``t_ns``; None where the recording does not say."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One camera image. t_ns: the camera's own stamp, null where the recording has none. bgr: (H, W, 3) uint8.
-    ``encoded`` is the file as the camera gave it (JPEG), if it did."""
+    """One camera image."""
 
     t_ns: int | None
+    """The camera's own timestamp; None where the recording has none."""
     bgr: U8
+    """(H, W, 3) uint8."""
     encoded: bytes | None = None
+    """The JPEG file, if the camera sent one."""
 
 
 @dataclass(frozen=True)
 class CameraCalibration:
-    """Pinhole camera with OpenCV distortion.
-
-    K: (3, 3). distortion: (0,), (4,), (5,) or (8,) OpenCV order, of the raw image. T_camera_ego: (4, 4) takes
-    ego points to the camera frame (z along the optical axis, x right, y down). road_z_m: the road below the car in the
-    ego frame; null where the recording does not know it.
-    """
+    """Pinhole camera with OpenCV distortion."""
 
     K: F64
+    """(3, 3) intrinsic matrix, pixels."""
     distortion: F64
+    """(0,), (4,), (5,) or (8,) coefficients in OpenCV's order, of the raw image."""
     T_camera_ego: F64
+    """(4, 4), takes ego points to the camera frame (z along the optical axis, x right, y down)."""
     width: int
+    """Of the image, pixels."""
     height: int
+    """Of the image, pixels."""
     road_z_m: float | None = None
+    """The road below the car in the ego frame; None where the recording does not say."""
 
 
 @dataclass(frozen=True)
 class Coasting:
-    """Of an own motion that is not measured any more. age_s: for how long. The others are what this tick adds to the
-    variances of the way driven, the heading and the yaw rate."""
+    """How uncertain an own motion is that is no longer measured."""
 
     age_s: float
+    """Time since it was last measured."""
     travelled_var_m2: float
+    """What this tick adds to the variance of the distance driven."""
     turned_var_rad2: float
+    """What this tick adds to the variance of the heading."""
     rate_var_rad2ps2: float
+    """What this tick adds to the variance of the yaw rate."""
 
 
 @dataclass(frozen=True)
 class EgoState:
-    """Own motion. ``yaw_rate_radps`` is positive to the left; null when no sensor gives it. coasting: null while it is
-    measured."""
+    """Own motion."""
 
     t_ns: int
+    """When it was measured."""
     speed_mps: float
+    """Positive forwards."""
     yaw_rate_radps: float | None = None
+    """Positive to the left; None when no sensor gives it."""
     coasting: Coasting | None = None
+    """Set while it is carried on without a measurement; None while it is measured."""
 
 
 GnssQuality = Literal["single", "dgnss", "rtk_float", "rtk_fixed"]
@@ -79,125 +88,160 @@ GnssQuality = Literal["single", "dgnss", "rtk_float", "rtk_fixed"]
 
 @dataclass(frozen=True)
 class GnssFix:
-    """Where the ego origin is on the Earth (WGS 84). alt_m: above the ellipsoid. course_rad: which way it moves,
-    clockwise from true north; null when it stands. sigma_m: standard deviation of the place, each way."""
+    """Where the ego origin is on the Earth (WGS 84)."""
 
     t_ns: int
+    """When the fix holds."""
     lat_deg: float
+    """Positive to the north."""
     lon_deg: float
+    """Positive to the east."""
     alt_m: float
+    """Above the ellipsoid."""
     course_rad: float | None
+    """Direction of motion, clockwise from true north; None at standstill."""
     speed_mps: float
+    """Speed over ground."""
     quality: GnssQuality
+    """How the fix was computed."""
     sigma_m: float
+    """Standard deviation of the position along each horizontal axis."""
 
 
 @dataclass(frozen=True)
 class DistanceLaw:
-    """What the height of a detector's boxes tells of distance: depth in metres = coefficient · height ^ exponent, of a
-    car, the height in pixels as a camera of ``focal_px`` sees it. The ratios are heights of other classes, in cars.
+    """Distance from the height of a detector's boxes: depth of a car in metres = coefficient · height ^ exponent.
 
-    How tight a network draws its boxes, and how tall the vehicles are that it meets, are in these numbers, so each
-    detector has its own.
+    How tightly a network draws its boxes, and how tall the vehicles it meets are, is in these numbers, so each detector
+    has its own law.
     """
 
     coefficient: float
+    """Depth in metres at a height of one pixel."""
     exponent: float
+    """−1 for an ideal pinhole camera."""
     focal_px: float
+    """Focal length of the camera that heights refer to."""
     truck_ratio: float
+    """Height of a truck's box relative to a car's at the same depth."""
     bus_ratio: float
+    """The same of a bus."""
     motorcycle_ratio: float
+    """The same of a motorcycle."""
 
     def at_focal(self, focal_px: float) -> DistanceLaw:
-        """The same law for heights as a camera of another focal length sees them."""
+        """The same law for heights in the images of a camera of another focal length."""
         factor = (self.focal_px / focal_px) ** self.exponent
         return replace(self, coefficient=self.coefficient * factor, focal_px=focal_px)
 
 
 REAL_VEHICLES = DistanceLaw(1444.0, -1.0, 907.0, truck_ratio=1.6, bus_ratio=2.0, motorcycle_ratio=0.75)
-"""The law of a detector that has none of its own: fitted by ``pipeline.calibration.distance`` to what YOLOX boxes of 38
-labelled cars of two real cameras (Astyx 047–051 and 057–059, KITTI 2011_09_26 drive 0052), 1.59 m tall. 907 px is 720p
-with a 78° diagonal. A motorcycle is boxed without its rider."""
+"""The law of a detector that has no law of its own. Fitted by ``pipeline.calibration.distance`` to YOLOX's boxes of 38
+labelled cars, 1.59 m tall, of two real cameras (Astyx 047–051 and 057–059, KITTI 2011_09_26 drive 0052). 907 px is 720p
+with a 78° diagonal. Motorcycles are boxed without their riders."""
 
 
 @dataclass(frozen=True)
 class RawBoxes:
     """A detector's candidates above a low floor, before thresholds and non-maximum suppression.
 
-    Thresholds are parameters of the line, the network is not: this is what is cached per image and model.
-    boxes: (M, 4) float32 ``x1 y1 x2 y2`` pixels of the raw image. scores: (M,) float32. labels: M class names.
-    law: what the boxes' heights tell of distance, where no parameter says otherwise.
+    Thresholds are parameters of the pipeline and the network is not, so this is what is cached per image and model.
     """
 
     model: str
+    """The detector's name: equal names give equal boxes."""
     boxes: F32
+    """(M, 4) float32 ``x1 y1 x2 y2``, pixels of the raw image."""
     scores: F32
+    """(M,) float32, 0–1."""
     labels: tuple[str, ...]
+    """M class names in COCO's spelling."""
     law: DistanceLaw = REAL_VEHICLES
+    """Distance from box heights, where no parameter says otherwise."""
 
 
 @dataclass(frozen=True)
 class RawLanes:
-    """What a lane detector saw in one picture, before any geometry: like ``RawBoxes`` it is cached per image and model.
-
-    points: (M, 2) float32 ``u v``, pixels of the raw image, on painted lines. scores: (M,) float32, 0–1.
-    line: (M,) int32, which line a point belongs to, −1 where the detector does not group its points.
-    """
+    """What a lane detector saw in one image, before any geometry; cached per image and model like ``RawBoxes``."""
 
     model: str
+    """The detector's name: equal names give equal points."""
     points: F32
+    """(M, 2) float32 ``u v`` on painted lines, pixels of the raw image."""
     scores: F32
+    """(M,) float32, 0–1."""
     line: I32
+    """(M,) int32, which line each point belongs to; −1 where the detector does not group its points."""
 
 
 @dataclass(frozen=True)
 class Route:
-    """A road driven or planned before, as a line on the Earth (WGS 84), in driving order.
-
-    lat_deg, lon_deg: (K,) float64. sigma_m: standard deviation of each point, each way.
-    """
+    """A planned or previously driven road as a line on the Earth (WGS 84), in driving order."""
 
     name: str
+    """For people: the file it came from."""
     lat_deg: F64
+    """(K,) float64."""
     lon_deg: F64
+    """(K,) float64."""
     sigma_m: float
+    """Standard deviation of each point along each horizontal axis."""
 
 
 @dataclass(frozen=True)
 class StreamHealth:
-    """How one live sensor does. rate_hz and jitter_ms: over the last seconds, null until enough came. age_ms: of
-    its newest message, against now. lost: messages known to be missing since the start. note: what a person can do."""
+    """Whether one live sensor delivers, and how regularly."""
 
     sensor: Literal["lidar", "camera", "gnss", "ego"]
+    """Which sensor."""
     state: Literal["ok", "stale", "silent", "absent"]
+    """``absent``: nothing has arrived since the start. ``stale``: messages are overdue. ``silent``: for long."""
     rate_hz: float | None
+    """Over the last seconds; None until enough messages arrived."""
     age_ms: float | None
+    """Age of the newest message."""
     jitter_ms: float | None
+    """Over the last seconds; None until enough messages arrived."""
     lost: int
+    """Messages known to be missing since the start."""
     note: str = ""
+    """What a user can do about it."""
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Everything known at one tick. Any branch may be missing; ``notes`` says why, in words a person can act on.
-    ``timing_ms``: of a live source, how long what it holds was under way, by stage. ``detections_given``: what is seen
-    in the picture came with the frame; no detector is to look at it."""
+    """Everything known at one tick. Any branch may be missing; ``notes`` says why."""
 
     index: int
+    """Its number in the recording, from 0; of live sensors the number of the tick, dropped ones included."""
     name: str
+    """The recording's own name of the frame."""
     t_ns: int
+    """The tick."""
     sweep: Sweep | None = None
+    """The LiDAR's rotation."""
     picture: Picture | None = None
+    """The camera's image."""
     camera: CameraCalibration | None = None
+    """The camera's calibration; known without an image too."""
     ego: EgoState | None = None
+    """Own motion as measured."""
     raw_boxes: RawBoxes | None = None
+    """What the detector saw in the image; None: no detector looked."""
     notes: tuple[str, ...] = ()
+    """What is missing or wrong, in sentences a user can act on."""
     gnss: GnssFix | None = None
+    """Where the car is on the Earth."""
     raw_lanes: RawLanes | None = None
+    """What the lane detector saw in the image; None: no detector looked."""
     route: Route | None = None
+    """The road that the car follows."""
     streams: tuple[StreamHealth, ...] = ()
+    """Health of each sensor of a live source."""
     timing_ms: Mapping[str, float] = field(default_factory=dict)
+    """Of a live source: how long its data was under way, by stage."""
     detections_given: bool = False
+    """The recording holds what was seen in the image, so no detector looks at it."""
 
     @property
     def picture_size(self) -> tuple[int, int] | None:

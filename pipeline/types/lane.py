@@ -21,20 +21,22 @@ def powers(x_m: npt.ArrayLike) -> F64:
 
 @dataclass(frozen=True, eq=False)
 class LaneLine:
-    """One painted line, y(x) = Σ c_k·x^k in the ego frame (x forward, y left, metres).
-
-    coefficients: (4,) float64 c0…c3, of metres. covariance: (4, 4) float64 of them; it has grown with the time since
-    the line was last measured. x_min_m, x_max_m: where paint supports the line; beyond, ``sigma_m`` says how little it
-    is worth. quality: 0–1, how much the detector and the track support it. age_s: since it was last measured.
-    """
+    """One painted line, y(x) = Σ c_k·x^k in the ego frame (x forward, y left, metres)."""
 
     side: Side
+    """On which side of the car it is."""
     coefficients: F64
+    """(4,) float64 c0 … c3, of metres."""
     covariance: F64
+    """(4, 4) float64 of the coefficients; grows while the line is not measured."""
     x_min_m: float
+    """From here paint supports the line."""
     x_max_m: float
+    """As far as here paint supports the line; beyond, ``sigma_m`` says how little it is worth."""
     quality: float
+    """0–1, how well the detector and the track support it."""
     age_s: float
+    """Time since it was last measured."""
 
     def y_m(self, x_m: npt.ArrayLike) -> F64:
         """Lateral place at x, metres to the left. Same shape as ``x_m``."""
@@ -48,18 +50,19 @@ class LaneLine:
 
 @dataclass(frozen=True, eq=False)
 class EgoLane:
-    """The lines left and right of the car, null where none is believed.
-
-    source: the lane detector's name; ``classical`` for the one without a network. age_s: since the detector last
-    delivered anything. pitch_rad: the estimated pitch of the camera against its calibration, positive downwards, that
-    the ground mapping used. width_m: between the lines at x = 0 … 20 m, null without both. plane: (3,) a, b, c of
-    the road z = a·x + b·y + c that the mapping used.
-    """
+    """The lines left and right of the car."""
 
     left: LaneLine | None
+    """None where no line is believed."""
     right: LaneLine | None
+    """None where no line is believed."""
     source: str
+    """The lane detector's name; ``classical`` for the one without a network."""
     age_s: float
+    """Time since the detector last delivered anything."""
     pitch_rad: float
+    """Estimated pitch of the camera against its calibration, positive downwards, used to map the lines to the road."""
     width_m: float | None
+    """Mean distance between the lines at x = 0 … 20 m; None without both."""
     plane: F64
+    """(3,) a, b, c of the road z = a·x + b·y + c, used to map the lines."""

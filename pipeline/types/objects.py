@@ -1,4 +1,4 @@
-"""What the stages hand on: from detections and clusters to fused objects."""
+"""What one stage hands to the next: from detections and clusters to fused objects."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from pipeline.types.arrays import F64, Box, Mask, Point2, Point3, SourceKind
 
 @dataclass(frozen=True)
 class Ground:
-    """The road under the sweep.
-
-    mask: (N,) bool, kept points that are ground. planes: (S, 4) float64 ``nx ny nz d`` with n·p + d = 0, |n| = 1,
-    n_z > 0; all NaN where no ground was found. edges: (S + 1,) float64, bounds of the segments along x in metres;
-    the outer segments reach on beyond theirs. fitted: (S,) bool, false where the plane is a neighbour's.
-    """
+    """The road under the sweep, as one plane for each segment along x."""
 
     mask: Mask
+    """(N,) bool, kept points that are ground."""
     planes: F64
+    """(S, 4) float64 ``nx ny nz d`` with n·p + d = 0, |n| = 1, n_z > 0; all NaN where no ground was found."""
     edges: F64
+    """(S + 1,) float64, bounds of the segments along x in metres; the outer segments extend beyond theirs."""
     fitted: Mask
+    """(S,) bool, false where the plane is a neighbour's."""
 
     def height(self, xy: npt.NDArray[np.floating]) -> F64:
         """(M,) ground z in metres at (M, 2) ego places; NaN where no ground was found."""
@@ -46,64 +45,91 @@ class Detection:
     """One box after thresholds and suppression."""
 
     bbox: Box
+    """Pixels of the raw image."""
     label: str
+    """Class name in COCO's spelling."""
     score: float
+    """0–1."""
 
 
 @dataclass(frozen=True)
 class VisionMeasurement:
-    """A detection with its estimated place. ``distance_m`` is the horizontal range from the ego origin to the nearest
-    face; it and ``position`` (ego x, y of that face's centre) are null where no law gives a distance."""
+    """A detection with its estimated place."""
 
     detection: Detection
+    """The box."""
     distance_m: float | None
+    """Horizontal range from the ego origin to the nearest face; None where no law gives a distance."""
     sigma_m: float | None
+    """Standard deviation of the distance."""
     position: Point2 | None
+    """Ego x, y of the nearest face's centre."""
 
 
 class Obstacle(NamedTuple):
-    """One LiDAR cluster. ``density`` is points per square metre of footprint (paper: "number, density and
-    distribution"); ``spread`` the standard deviation of its points along x, y, z in metres."""
+    """One LiDAR cluster, described by what the paper tracks it by: "number, density and distribution" of its points."""
 
     cluster: int
+    """Its number in this sweep."""
     cuboid: Cuboid
+    """The box around its points, standing on the ground."""
     closest_point: Point3
+    """Its point of least horizontal range from the ego origin."""
     points: int
+    """How many points it has."""
     density: float
+    """Points per square metre of footprint."""
     spread: Point3
+    """Standard deviation of its points along x, y and z, metres."""
 
 
 class LidarTrack(NamedTuple):
-    """An obstacle followed over time. ``velocity_mps`` is relative to ego (x, y); null until two sightings.
-    ``obstacle`` is the last one seen, moved by the prediction while ``carried``; ``unseen_s`` says for how long."""
+    """An obstacle followed over time."""
 
     id: int
+    """Never given twice."""
     obstacle: Obstacle
+    """The last one seen, moved by the prediction while the track is carried."""
     velocity_mps: Point2 | None
+    """Relative to ego, x and y; None until two sightings."""
     hits: int
+    """Sightings so far."""
     missed: int
+    """Sweeps in a row that lacked it."""
     carried: bool
+    """Not seen in this frame."""
     unseen_s: float = 0.0
+    """Time since it was last seen."""
 
 
 @dataclass(frozen=True)
 class VisionTrack:
-    """A detected box followed over time. ``distance_m``/``sigma_m``/``position``/``velocity_mps`` are filtered;
-    null where never measured. A carried box was not seen in this frame; ``measured`` says whether its distance was (a
-    box that the picture's edge cuts is seen, but not measured)."""
+    """A detected box followed over time. What was never measured is None."""
 
     id: int
+    """Never given twice."""
     bbox: Box
+    """Pixels of the raw image."""
     label: str
+    """Class name in COCO's spelling."""
     score: float
+    """The detector's score, 0–1."""
     distance_m: float | None
+    """Horizontal range from the ego origin to the nearest face, filtered."""
     sigma_m: float | None
+    """Standard deviation of the distance."""
     position: Point2 | None
+    """Ego x, y of the nearest face's centre, filtered."""
     velocity_mps: Point2 | None
+    """Relative to ego, x and y, filtered."""
     hits: int
+    """Sightings so far."""
     missed: int
+    """Images in a row that lacked it."""
     carried: bool
+    """Not seen in this frame."""
     measured: bool = True
+    """Whether its distance was measured in this frame: a box cut by the image's edge is seen, but not measured."""
 
 
 class Gate(NamedTuple):

@@ -1,4 +1,4 @@
-"""What the line believes at one tick."""
+"""What the pipeline concludes at one tick."""
 
 from __future__ import annotations
 
@@ -17,28 +17,36 @@ PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "fused"]
 
 @dataclass(frozen=True)
 class Path:
-    """Where the car is going. center, left, right: (K, 2) float64 ego x, y, from the bumper outwards; the edges need
-    not be parallel to the centre. source: which one carries it at 30 m, or ``fused`` when none does alone. sigma_m: of
-    the centre's sideways place at 10, 30, 60 m; profile_m: (K,) float64, the same at every point, empty where nobody
-    worked it out. weights: each source's share over the whole; carried_by: at 10, 30, 60 m. reach_m: how far it is good
-    enough to drive after. usable: that is far enough at this speed, and nothing speaks against it. doubt: else why not,
-    in words. confidence: 0–1, that the true centre lies within the corridor there. notes:
-    what is wrong with the sources, for a person."""
+    """Where the car is going."""
 
     source: PathSource
+    """Which source carries it at 30 m; ``fused`` when none does alone."""
     center: F64
+    """(K, 2) float64 ego x, y, from the bumper outwards."""
     left: F64
+    """(K, 2) float64, the left edge; not necessarily parallel to the centre."""
     right: F64
+    """(K, 2) float64, the right edge."""
     half_width_m: float
+    """Half the corridor's width where no lane lines give it."""
     sigma_m: dict[str, float]
+    """Standard deviation of the centre's lateral position at 10, 30 and 60 m."""
     weights: dict[str, float]
+    """Each source's share over the whole length."""
     profile_m: F64 = field(default_factory=lambda: np.zeros(0))
+    """(K,) float64, ``sigma_m`` at every point; empty where it was not computed."""
     carried_by: dict[str, dict[str, float]] = field(default_factory=dict)
+    """Each source's share at 10, 30 and 60 m."""
     reach_m: float = 0.0
+    """How far ahead it is good enough to drive by."""
     usable: bool = True
+    """Whether it reaches far enough at this speed, and nothing else speaks against it."""
     doubt: str = ""
+    """Why it is not usable; empty while it is."""
     confidence: float = 1.0
+    """Probability, 0–1, that the true centre lies within the corridor as far as it must reach."""
     notes: tuple[str, ...] = ()
+    """What is wrong with its sources, in sentences for people."""
 
 
 @dataclass(frozen=True)
@@ -46,10 +54,15 @@ class Cipv:
     """The closest in-path vehicle, and why it is this one."""
 
     id: int
+    """Of the object."""
     distance_m: float
+    """Of the object."""
     closing_speed_mps: float | None
+    """How fast the gap shrinks; None where place or velocity are unknown."""
     ttc_s: float | None
+    """Time to collision; None while the gap does not shrink."""
     reason: str
+    """Why this object, in words."""
 
 
 @dataclass(frozen=True)
@@ -57,32 +70,45 @@ class Rejection:
     """Why an object is not the CIPV."""
 
     id: int
+    """Of the object."""
     reason: str
+    """The first condition that it fails, in words."""
 
 
 @dataclass(frozen=True)
 class AccCommand:
-    """What the longitudinal controller asks for. accelerator and brake are 0–1. object_id: what it slows down for, null
-    for nothing."""
+    """What ACC and emergency braking ask of the car."""
 
     state: Literal["cruise", "follow", "stop", "warn", "partial_brake", "full_brake"]
+    """What it does."""
     desired_speed_mps: float
+    """The speed it steers towards."""
     accel_mps2: float
+    """The acceleration it asks for; negative: braking."""
     accelerator: float
+    """Pedal, 0–1."""
     brake: float
+    """Pedal, 0–1."""
     reason: str
+    """Why, in words."""
     object_id: int | None = None
+    """The object it slows down for; None for nothing."""
 
 
 @dataclass(frozen=True)
 class SensorHealth:
-    """Ages are against the frame's tick, milliseconds; null when the sensor gave nothing in this frame."""
+    """How fresh each sensor's data is. Ages are against the frame's tick; None when the sensor delivered nothing."""
 
     lidar_age_ms: float | None
+    """Age of the sweep."""
     lidar_points: int | None
+    """Points of the sweep."""
     camera_age_ms: float | None
+    """Age of the image."""
     camera_skew_ms: float | None
+    """How much later than the sweep the image was taken."""
     ego_age_ms: float | None
+    """Age of own motion."""
 
     @staticmethod
     def of(frame: Frame) -> SensorHealth:
@@ -108,44 +134,61 @@ GROUND, UNCLUSTERED, DROPPED = -1, -2, -3
 
 @dataclass(frozen=True)
 class Layers:
-    """What the stages saw, for views only; never part of the JSON.
-
-    points: (N, 4) float32, the sweep before down-sampling. kind: (N,) int32, ``GROUND``, ``UNCLUSTERED``,
-    ``DROPPED`` or the cluster index (``Obstacle.cluster``). lidar_boxes / vision_boxes: the two boxes that fusion
-    compared, by fused object id. lanes: the ego lane's lines, null where no lane detector runs.
-    ground: the road under the sweep, null without one.
-    """
+    """What the stages saw, for views only; never part of the JSON."""
 
     points: F32
+    """(N, 4) float32, the sweep before down-sampling."""
     kind: I32
+    """(N,) int32: ``GROUND``, ``UNCLUSTERED``, ``DROPPED`` or the cluster's number (``Obstacle.cluster``)."""
     obstacles: tuple[Obstacle, ...] = ()
+    """One a cluster."""
     lidar_tracks: tuple[LidarTrack, ...] = ()
+    """By id."""
     vision_tracks: tuple[VisionTrack, ...] = ()
+    """By id."""
     lidar_boxes: dict[int, Box] = field(default_factory=dict)
+    """By object id: where fusion found the cuboid in the image."""
     vision_boxes: dict[int, Box] = field(default_factory=dict)
+    """By object id: the camera's box that fusion compared it with."""
     lanes: EgoLane | None = None
+    """The ego lane's lines; None where no lane detector runs."""
     ground: Ground | None = None
+    """The road under the sweep; None without one."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """What the line believes at one tick. ``pipeline.types.result_json.to_json`` writes it in the contract's form."""
+    """What the pipeline concludes at one tick. ``pipeline.types.result_json`` writes it in the contract's form."""
 
     frame: str
+    """The recording's own name of the frame."""
     t_ns: int
+    """The tick."""
     sensors: SensorHealth
+    """How fresh each sensor's data is."""
     ego: EgoState | None
+    """Own motion as measured."""
     objects: tuple[FusedObject, ...]
+    """Every object, nearest first."""
     path: Path
+    """Where the car is going."""
     cipv: Cipv | None
+    """The closest in-path vehicle."""
     rejected: tuple[Rejection, ...]
+    """Why each other object is not the CIPV."""
     acc: AccCommand | None
+    """What the car is asked to do; None where own speed is not known."""
     notes: tuple[str, ...]
+    """What is missing or wrong, in sentences a user can act on."""
     timing_ms: dict[str, float]
+    """How long each stage took, and the ``total``."""
     layers: Layers
+    """What the stages saw, for views."""
     next_cipv: Cipv | None = None
+    """The vehicle that will be the CIPV next."""
     streams: tuple[StreamHealth, ...] = ()
+    """Health of each sensor of a live source."""
 
     def chosen(self) -> FusedObject | None:
-        """The object that is the CIPV; null without one."""
+        """The object that is the CIPV; None without one."""
         return next((item for item in self.objects if self.cipv is not None and item.id == self.cipv.id), None)

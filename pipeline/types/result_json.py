@@ -1,4 +1,4 @@
-"""A ``Result`` as the one JSON object a frame that scripts, labels and scores read (version 1 of its form).
+"""A ``Result`` as one JSON object per frame that scripts, labels and scores read (version 1 of its form).
 
 Metres, metres per second, radians and pixels rounded to four decimals; nanoseconds are whole. What is unknown is
 null: a number that is not finite is unknown too, so NaN and infinity never reach a file. Keys come in a fixed order,

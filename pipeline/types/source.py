@@ -1,4 +1,4 @@
-"""The one protocol behind every recording and device: a source gives frames, by index, in the ego frame."""
+"""The protocols of every recording and of live sensors: a source gives frames, in the ego frame."""
 
 from __future__ import annotations
 
@@ -17,35 +17,40 @@ LIVE = "live:"
 
 
 class SourceError(BadInput):
-    """A source that cannot be opened. The text is one sentence for a person: what is wrong and with which file."""
+    """A source that cannot be opened. The text is one sentence: what is wrong and with which file."""
 
 
 @dataclass(frozen=True)
 class TruthObject:
-    """One labelled object, ego frame. ``id`` is null where the labels follow no identity over time. bbox: in pixels of
-    the raw picture, null where the labels have none. called: the labels' own word where ``label`` is another one, which
-    would not be written as that word again."""
+    """One labelled object."""
 
     label: str
+    """Its class."""
     cuboid: Cuboid
+    """In the ego frame."""
     id: int | None = None
+    """The same from frame to frame; None where the labels follow no identity over time."""
     bbox: Box | None = None
+    """Pixels of the raw picture; None where the labels have no box."""
     called: str = ""
+    """The labels' own word for the class where it differs from ``label``, so that it can be written again."""
 
 
 class Source(Protocol):
-    """A recording that can be read anywhere. Reading a frame never raises for what is wrong with that frame's data:
-    the missing branch is null and ``Frame.notes`` says why. Any thread, and several at once: what is shown and what is
-    computed beside it are read from one.
+    """A recording with random access.
 
-    uri: what was opened, as a person typed it. title: short, for a heading. rate_hz: nominal frames per second.
-    notes: what a person should know about the whole (for example how many rings remain).
+    Reading a frame never raises for what is wrong with that frame's data: the missing branch is None and
+    ``Frame.notes`` says why. Several threads may read at once: playback and background runs share one source.
     """
 
     uri: str
+    """What was opened, as the user typed it."""
     title: str
+    """Short, for a heading."""
     rate_hz: float
+    """Nominal frames per second."""
     notes: tuple[str, ...]
+    """What a user should know about the whole recording, for example how many rings remain."""
 
     def __len__(self) -> int: ...
 
@@ -59,14 +64,16 @@ class Source(Protocol):
         ...
 
     def truth(self, index: int) -> tuple[TruthObject, ...] | None:
-        """The labelled objects, empty when the frame is labelled and holds none; null when it is not labelled."""
+        """The labelled objects, empty when the frame is labelled and holds none; None when it is not labelled."""
         ...
 
 
 class Tap(Protocol):
-    """Is told of everything that comes, whether or not a tick takes it, each on the thread of its reader: it must be
-    quick. A frame's sweep has the very points that were told. t_ns: when it was measured; arrived_ns: when it came;
-    both on the source's timeline."""
+    """Receives every message of live sensors, whether or not a tick uses it.
+
+    Called on the thread that reads the sensor, so it must be quick. A frame's sweep shares its points with the sweep
+    that was passed here. t_ns: when the data was measured; arrived_ns: when it arrived; both on the source's timeline.
+    """
 
     def packet(self, payload: bytes, arrived_ns: int) -> object:
         """A data packet of the LiDAR."""
@@ -79,35 +86,37 @@ class Tap(Protocol):
 
 
 class LiveSource(Protocol):
-    """Devices that are read as they deliver. There is no way back: what nobody took in time is dropped and counted.
-
-    notes: what a person should know about the whole, as with ``Source``; a frame's own troubles are in its notes.
-    camera: calibration of the pictures, null without one. dropped: ticks that nobody took in time.
-    """
+    """Live sensors. There is no way back: ticks that are not taken in time are dropped and counted."""
 
     uri: str
+    """What was opened, as the user typed it."""
     title: str
+    """Short, for a heading."""
     rate_hz: float
+    """Nominal ticks per second."""
     notes: tuple[str, ...]
+    """What a user should know about all of it; what is wrong with one tick is in ``Frame.notes``."""
     camera: CameraCalibration | None
+    """Calibration of the pictures; None without one."""
     dropped: int
+    """Ticks that were not taken in time."""
 
     def start(self) -> None:
-        """Open the devices; one that is not there yet is waited for in the background."""
+        """Open the devices. One that is not available yet is retried in the background."""
         ...
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
-        """The newest tick not given yet; null when none came in time. A tick is a whole LiDAR sweep with the nearest
-        picture, or, while the LiDAR is silent, a picture. ``params``: how sensors are put together, as it stands."""
+        """The newest tick not returned yet; None when none arrives in time. A tick is a whole LiDAR sweep with the
+        nearest picture, or a picture alone while the LiDAR is silent. params: how sensors are synchronised."""
         ...
 
     @property
     def lidar_mount(self) -> tuple[F64, int] | None:
-        """T_ego_lidar (4, 4) and what is added to the LiDAR's stamps in ns; null when there is none."""
+        """T_ego_lidar (4, 4) and what is added to the LiDAR's timestamps in ns; None without a LiDAR."""
         ...
 
     def tap(self, tap: Tap | None) -> None:
-        """Have what comes told from now on; null ends that."""
+        """Pass every message to ``tap`` from now on; None ends that."""
         ...
 
     def now_ns(self) -> int:
@@ -115,26 +124,29 @@ class LiveSource(Protocol):
         ...
 
     def health(self) -> tuple[StreamHealth, ...]:
-        """How each sensor does now, also while none ticks."""
+        """Health of each sensor now, also while none delivers."""
         ...
 
     def close(self) -> None:
-        """Give the devices back. Safe to call twice."""
+        """Release the devices. Safe to call twice."""
         ...
 
 
 @runtime_checkable
 class Recorded(Protocol):
-    """A source that was made from another one. origin: that one's URI."""
+    """A source made from another one."""
 
     origin: str
+    """The other one's URI."""
 
 
 class Mark(NamedTuple):
-    """A moment that a person marked while it was recorded: the tick of the frame, and their words."""
+    """A moment that someone marked during the recording."""
 
     t_ns: int
+    """The tick of the frame."""
     text: str
+    """What they wrote."""
 
 
 @runtime_checkable
@@ -155,15 +167,15 @@ class Rectified(Protocol):
 
 @runtime_checkable
 class InParts(Protocol):
-    """A source whose frames can be had in parts: who needs one part does not pay for all."""
+    """A source that can read parts of a frame without reading the rest."""
 
     def outlines(self) -> Iterator[Frame]:
-        """Every frame, in order, without sweep, picture, route and given detections, which need not be read, and
-        without what reading them would note."""
+        """Every frame, in order, without sweep, picture, route and given detections, and without the notes that reading
+        them would add."""
         ...
 
     def sweep(self, index: int) -> Sweep | None:
-        """The frame's alone."""
+        """Only the sweep of a frame."""
         ...
 
 
@@ -171,10 +183,10 @@ AnySource = Source | LiveSource
 
 
 def is_live_source(source: AnySource) -> TypeGuard[LiveSource]:
-    """Whether it is devices, which have no frames to choose from."""
+    """Whether it is live sensors, which have no frames to choose from."""
     return source.uri.startswith(LIVE)
 
 
 def is_simulated(source: AnySource) -> bool:
-    """Whether its pictures are drawn, which a detector may have to know."""
+    """Whether its pictures are rendered by the simulator, which decides the default detectors."""
     return (source.origin if isinstance(source, Recorded) else source.uri).startswith("sim:")

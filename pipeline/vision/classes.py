@@ -1,4 +1,4 @@
-"""Class names of detectors, in COCO's spelling, in which the line decides who is a vehicle."""
+"""Class names of detectors in COCO's spelling, by which the pipeline tells vehicles from the rest."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SYNONYMS = {
     "cyclist": "bicycle",
     "lorry": "truck",
 }
-"""Other data sets' names for the classes that matter on a road."""
+"""Names that other data sets have for the classes that matter on a road."""
 
 
 def canonical(name: str) -> str:

@@ -1,6 +1,6 @@
-"""Any YOLO-family ONNX network as one function: picture in, candidate boxes out (paper, Object Detection).
+"""Any ONNX network of the YOLO family as one function: picture in, candidate boxes out (paper, Object Detection).
 
-The paper runs YOLOv3 under TensorRT; here the best provider that works is taken: TensorRT, CUDA, CPU.
+The paper runs YOLOv3 under TensorRT; here the best available provider runs it: TensorRT, CUDA or CPU.
 """
 
 from __future__ import annotations
@@ -27,33 +27,38 @@ from pipeline.vision.heads import Decoder, UnknownHead, pick_decoder
 FLOOR_SCORE = 0.05
 """Candidates scored lower are not even kept; ``detection.min_score`` cannot go below it."""
 PADDING = 114
-"""Grey that fills what the picture leaves of the input, as the YOLO family is trained."""
+"""Grey that fills the rest of the input, as the YOLO family is trained."""
 _FREE_SIZE: Size = (384, 640)
-"""Input of a graph of free size when no picture is known yet: 16:9."""
+"""Input of a graph without a fixed size when the pictures are not known yet: 16:9."""
 _SIMULATED_ONLY = (
-    "using the embedded detector, which knows simulated cars only; pull a real one with `cipv models pull yolox_nano`"
+    "using the embedded detector, trained on simulated cars only; get a real one with `cipv models pull yolox_nano`"
 )
 
 
 @dataclass(frozen=True)
 class Detector:
-    """A loaded network.
-
-    path: its file. name: file, digest, input size and law, so that equal names give equal boxes: the key of caches.
-    input_size: (height, width). labels: class names in COCO's spelling. law: what its boxes tell of distance. notes:
-    what a person should know about how it was loaded. graph: the ONNX file as it runs, at this input size.
-    """
+    """A loaded network."""
 
     path: Path
+    """Its file."""
     name: str
+    """File, digest, input size and law: equal names give equal boxes, so this is the key of caches."""
     providers: tuple[str, ...]
+    """Of onnxruntime, in the order in which they are tried for each node."""
     input_size: Size
+    """(height, width)."""
     labels: tuple[str, ...]
+    """Class names in COCO's spelling, by class id."""
     law: DistanceLaw
+    """Distance from the heights of its boxes."""
     head: str
+    """Name of its head."""
     notes: tuple[str, ...]
+    """What a user should know about how it was loaded."""
     threads: int
+    """How many threads it runs on."""
     graph: bytes = field(repr=False, compare=False)
+    """The ONNX graph as it runs, at this input size."""
     _session: ort.InferenceSession = field(repr=False, compare=False)
     _decoder: Decoder = field(repr=False, compare=False)
 
@@ -63,11 +68,11 @@ class Detector:
         DetectorError for an array that is no such picture or a network that fails on it.
         """
         if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
-            raise DetectorError(f"a picture is (H, W, 3) uint8, this is {bgr.shape} {bgr.dtype}")
+            raise DetectorError(f"expected a picture of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
         return self.decode(run_session(self._session, self.blob(bgr)), (bgr.shape[0], bgr.shape[1]))
 
     def blob(self, bgr: U8) -> F32:
-        """The picture as the network takes it: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey."""
+        """The picture as the network's input: (1, 3, h, w) float32, scaled to fit the upper left, the rest grey."""
         scale = _scale((bgr.shape[0], bgr.shape[1]), self.input_size)
         height, width = (max(1, min(round(n * scale), m)) for n, m in zip(bgr.shape[:2], self.input_size, strict=True))
         filled = np.full((*self.input_size, 3), PADDING, np.uint8)
@@ -106,7 +111,9 @@ def open_detector(
     own = _own_size(model, path)
     if input_size is not None:
         if min(input_size) < MULTIPLE or any(side % MULTIPLE for side in input_size):
-            raise DetectorError(f"an input size is two multiples of {MULTIPLE}, not {input_size[1]}×{input_size[0]}")
+            raise DetectorError(
+                f"input width and height must be multiples of {MULTIPLE}, not {input_size[1]}×{input_size[0]}"
+            )
         return _at_size(model, path, own, input_size, threads, notes)
     wanted = fitting_size(picture_size, own) if picture_size else own or _FREE_SIZE
     try:
@@ -131,7 +138,7 @@ def _own_size(model: onnx.ModelProto, path: Path) -> Size | None:
     try:
         return input_size(model)
     except ValueError as error:
-        raise DetectorError(f"{path.name} is no detector of pictures: {error}") from None
+        raise DetectorError(f"{path.name} is not an image detector: {error}") from None
 
 
 def _at_size(
@@ -148,7 +155,7 @@ def _at_size(
         raise DetectorError(f"{path.name}: {error}") from None
     if own is not None and own != size and not decoder.own_grid and own[0] * own[1] == size[0] * size[1]:
         # The grid inside such a graph may be of the old width: the run cannot fail, and every box would be elsewhere.
-        raise DetectorError("the grid inside the graph may belong to its own size")
+        raise DetectorError("the graph may hold a grid for its own size")
     labels = class_names(decoder.classes, metadata)
     found = find_law(path)
     name = f"{path.stem}-{file_sha256(path)[:12]}-{size[1]}x{size[0]}{_name_of(found.law)}"

@@ -141,7 +141,7 @@ def test_a_jump_of_five_metres_is_not_believed(drive: Drive) -> None:
     assert not said
     jumped = dataclasses.replace(fix, lon_deg=fix.lon_deg + 5.0 / 88_000.0)
     moved, notes = route_following.follow(before, route, jumped, ego, ego.t_ns, dt_s, PARAMS)
-    assert notes == ("GNSS jumped by 5.0 m: not believed",)
+    assert notes == ("GNSS jumped by 5.0 m: fix ignored",)
     assert moved.pose is not None
     assert state.pose is not None
     assert np.hypot(*(moved.pose.mean - state.pose.mean)[:2]) < 0.2

@@ -79,7 +79,7 @@ class LineOptions:
     """Change one parameter, e.g. cluster.z_weight=0.4 (repeatable; `cipv params` lists them)"""
     detector: str | None = None
     """Name or path of an ONNX detector; else the registered default, then $CIPV_DATA/models, then the
-    embedded one, which knows simulated cars only and is the default for sim:"""
+    embedded one, trained on simulated cars only and is the default for sim:"""
     lanes: str | None = None
     """Name or path of an ONNX lane network, `classical` for the detector without one, or `off`; else the registered
     default, then $CIPV_DATA/models, then the classical one, which is the default for sim:. Live sensors on two

@@ -32,7 +32,7 @@ def with_objects() -> Result:
         (1, 20.0, (alone, ok)),
     ]
     objects = tuple(type(item)(**{**vars(item), "id": n, "distance_m": d, "gates": gates}) for n, d, gates in rows)
-    rejected = (Rejection(2, "behind #1"), Rejection(3, "out of path by 1.5 m"), Rejection(4, "only 0.2 m across"))
+    rejected = (Rejection(2, "behind #1"), Rejection(3, "out of path by 1.5 m"), Rejection(4, "only 0.2 m wide"))
     return result_of(objects=objects, cipv=Cipv(1, 20.0, None, None, "car, alone"), rejected=rejected)
 
 

@@ -55,9 +55,9 @@ class Car(Strict):
         ({"engine": {}}, "title: is missing"),
         ({"title": "a", "mass_kg": -1}, "mass_kg: Input should be greater than 0"),
         ({"title": "a", "wheels": []}, "a car without wheels"),
-        ({"title": "a", "wheels": {"radius_m": 1}}, "wheels: has to be a list"),
-        ({"title": "a", "wheels": [0.3]}, "wheels.0: has to be settings, each with its name"),
-        ([], "has to be settings, each with its name"),
+        ({"title": "a", "wheels": {"radius_m": 1}}, "wheels: must be a list"),
+        ({"title": "a", "wheels": [0.3]}, "wheels.0: must be settings by name"),
+        ([], "must be settings by name"),
     ],
 )
 def test_the_first_complaint(data: dict[str, Any], sentence: str) -> None:
@@ -76,7 +76,7 @@ def test_what_is_near_is_proposed() -> None:
     [
         pytest.param(b"a: 2026-13-45", "not YAML: month must be in 1..12", id="a day in no calendar"),
         pytest.param(b"a: " + b"9" * 5000, "not YAML: Exceeds the limit", id="a number without end"),
-        pytest.param(b"[" * 100_000, "not YAML: nested too deep", id="nested without end"),
+        pytest.param(b"[" * 100_000, "not YAML: nested too deeply", id="nested without end"),
         pytest.param(b"a: {", "not YAML: while parsing", id="cut off"),
         pytest.param(b"\xff\xfe", "not YAML: not a text file", id="no text"),
         pytest.param(None, "cannot be read: No such file", id="no file"),

@@ -136,15 +136,16 @@ def test_approaching_a_standing_car_from_100_m_at_72_km_h_the_car_stops_before_i
     assert gap > 2.0
 
 
-def test_where_nobody_knows_the_way_it_gets_no_faster() -> None:
+def test_on_an_unknown_path_acc_does_not_accelerate() -> None:
     """Whoever may lead on an unknown path: with the set speed far above, the car holds its speed and says why; slowing
     down for a lead comes first all the same, and from standstill it may creep on."""
-    vague = dataclasses.replace(PATH, usable=False, reach_m=12.0, doubt="path known for 12 m only")
-    for speed_mps, wanted_mps in ((20.0, 20.0), (0.0, 3.0)):
+    vague = dataclasses.replace(PATH, usable=False, reach_m=12.0, doubt="path known only 12 m ahead")
+    limits = ((20.0, 20.0, "ACC will not accelerate"), (0.0, 3.0, "ACC will not exceed 11 km/h"))
+    for speed_mps, wanted_mps, limit in limits:
         _, held = control(AccState(), Situation(moment(EgoState(0, speed_mps), 0.1), vague, (), None), PARAMS)
         assert held is not None
         assert held.desired_speed_mps == wanted_mps
-        assert held.reason == "path known for 12 m only: no faster than now"
+        assert held.reason == f"path known only 12 m ahead: {limit}"
     eager, fast = AccState(integral_m=50.0, error_mps=0.0), moment(EgoState(0, 20.0), 0.1)
     assert control(eager, Situation(fast, PATH, (), None), PARAMS)[1].accelerator > 0.0  # type: ignore[union-attr]
     _, held = control(eager, Situation(fast, vague, (), None), PARAMS)

@@ -39,10 +39,10 @@ def test_the_nearest_in_path_leads_and_every_other_says_why_not() -> None:
     [
         pytest.param(fused(1, 20.0, label="person"), "class person", id="a person is no vehicle"),
         pytest.param(fused(1, 20.0, label="bicycle"), "class bicycle", id="nor is a bicycle"),
-        pytest.param(fused(1, None, source="V"), "distance not known", id="box without a distance"),
+        pytest.param(fused(1, None, source="V"), "distance unknown", id="box without a distance"),
         pytest.param(fused(1, 20.0, source="V", hits=2), "seen 2 of 3 times", id="camera alone, not confirmed"),
         pytest.param(fused(1, 20.0, source="L", hits=1), "seen 1 of 3 times", id="LiDAR alone, not confirmed"),
-        pytest.param(fused(1, 20.0, source="L", width=0.3, length=0.2), "only 0.3 m across", id="a post is not a rear"),
+        pytest.param(fused(1, 20.0, source="L", width=0.3, length=0.2), "only 0.3 m wide", id="a post is not a rear"),
         pytest.param(fused(1, 20.0, source="L", height=0.2), "only 0.2 m high", id="a kerb is not a rear"),
         pytest.param(fused(1, 20.0, source="L", length=40.0), "40 m long: not a vehicle", id="a wall"),
         pytest.param(fused(1, 20.0, 3.0), "out of path by 1.5 m", id="next lane"),
@@ -101,7 +101,7 @@ def test_a_box_too_near_to_be_measured_does_not_become_the_lead() -> None:
     cut = dataclasses.replace(fused(1, 1.5, source="V"), measured=False)
     lead, why_not = decide(cut)
     assert lead is None
-    assert why_not == {1: "its distance was not measured in this frame"}
+    assert why_not == {1: "distance not measured in this frame"}
 
 
 def test_in_path_is_relative_to_a_curved_path() -> None:
@@ -151,7 +151,7 @@ def test_a_doubtful_view_yields_to_the_surer_one_it_agrees_with(doubtful: FusedO
     lead, why_not = decide(doubtful, surer, last=1)
     assert lead is not None
     assert lead.id == 2
-    assert why_not == {1: "taken for #2, which is surer"}
+    assert why_not == {1: "probably the same object as #2, which is better measured"}
 
 
 def test_a_nearer_car_that_only_the_camera_sees_still_leads() -> None:
@@ -191,7 +191,7 @@ def test_one_that_moves_over_is_told_before_and_leads_when_it_is_in() -> None:
     told = next(k for k, choice in enumerate(choices) if choice.next_lead and choice.next_lead.id == 2)
     leads = next(k for k, choice in enumerate(choices) if choice.lead and choice.lead.id == 2)
     assert told < on_the_edge < leads < on_the_edge + 12
-    assert choices[told].next_lead.reason.startswith("cuts in: over the edge of the path in ")  # type: ignore[union-attr]
+    assert choices[told].next_lead.reason.startswith("cutting in: enters the path in ")  # type: ignore[union-attr]
     assert all(2 in ids(choice) for choice in choices[told:]), "from then on it is one of the two"
     assert choices[-1].next_lead is not None
     assert choices[-1].next_lead.reason == "next behind #2"
@@ -216,7 +216,7 @@ def test_where_the_path_is_not_known_nobody_new_leads() -> None:
     vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 5.0))
     (item,), lead, _, (why,) = choose(CipvState(), (fused(1, 40.0),), vague, moment(), PARAMS)[1]
     assert lead is None
-    assert why.reason == "its place against the path is uncertain by 5.0 m"
+    assert why.reason == "its position across the path is uncertain by 5.0 m"
     assert item.in_path
     assert item.in_path_probability == pytest.approx(0.51, abs=0.01)
     assert choose(CipvState(1), (fused(1, 40.0),), vague, moment(), PARAMS)[1].lead is not None, "who led may stay"
@@ -272,4 +272,4 @@ def test_the_lidar_has_just_lost_what_the_camera_sees() -> None:
     assert decide(dataclasses.replace(lost, distance_sigma_m=0.2))[0] is not None
     lead, why_not = decide(dataclasses.replace(lost, distance_sigma_m=0.8))
     assert lead is None
-    assert why_not == {1: "its distance was not measured in this frame"}
+    assert why_not == {1: "distance not measured in this frame"}

@@ -64,7 +64,7 @@ def test_the_scenes_ask_for_braking_and_for_a_next_lead() -> None:
     cuts_in, _, _ = decide(SCENES["a lead, one cuts in, one stands aside"])
     assert cuts_in.lead is not None
     assert cuts_in.next_lead is not None
-    assert cuts_in.next_lead.reason.startswith("cuts in")
+    assert cuts_in.next_lead.reason.startswith("cutting in")
     _, _, crossing = decide(SCENES["one crosses whose class is no vehicle's"])
     assert crossing[-1] is not None
     assert crossing[-1].state == "full_brake"

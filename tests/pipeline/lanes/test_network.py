@@ -9,8 +9,10 @@ import pytest
 
 from pipeline.inference import model_registry
 from pipeline.inference.runtime import DetectorError, DetectorMissing
+from pipeline.lanes import heads
 from pipeline.lanes.classical import ClassicalLanes
 from pipeline.lanes.heads import UnknownLaneHead, pick_head
+from pipeline.lanes.heads.head import Answer, Head, Points
 from pipeline.lanes.network import LaneNetwork, open_lane_network
 from pipeline.lanes.open_detector import OFF, open_lanes
 from pipeline.types import U8
@@ -99,7 +101,7 @@ def test_a_file_that_is_no_lane_network_is_refused_with_a_sentence(tmp_path: Pat
     (tmp_path / "text.onnx").write_text("no network")
     with pytest.raises(DetectorError, match="not an ONNX file"):
         open_lane_network(str(tmp_path / "text.onnx"))
-    with pytest.raises(DetectorError, match=r"yolox\.onnx: its outputs \(1×84×85\) are of no lane network"):
+    with pytest.raises(DetectorError, match=r"yolox\.onnx: its outputs \(1×84×85\) match no known lane network"):
         open_lane_network(str(networks.yolox(tmp_path / "yolox.onnx")))
     with pytest.raises(DetectorError, match=r"\(H, W, 3\) uint8"):
         open_lane_network(str(lane_networks.twin(tmp_path / "tiny.onnx"))).detect(np.zeros((4, 4), np.uint8))
@@ -112,6 +114,26 @@ def test_heads_are_told_apart_by_shape_and_name() -> None:
     assert pick_head([boxes, mask, mask], ["det_out", "drive_area_seg", "lane_line_seg"]).name == "YOLOP"
     with pytest.raises(UnknownLaneHead, match="1×20×6"):
         pick_head([boxes], ["x"])
+
+
+def _points_in_a_table(values: np.ndarray) -> Points:
+    return Points(values[:, :2].astype(np.float64), values[:, 2], np.zeros(len(values), np.int32))
+
+
+def _recognise(answer: Answer) -> Head | None:
+    one_table = len(answer.shapes) == 1 and len(answer.shapes[0]) == 3 and answer.shapes[0][2] == 3
+    return Head("table", 0, _points_in_a_table) if one_table else None
+
+
+def test_a_head_is_added_by_a_file_and_one_entry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the two functions above hold is all that a new form of answer takes."""
+    table = np.array([[[0.25, 0.5, 0.9]]], np.float32)
+    with pytest.raises(UnknownLaneHead):
+        pick_head([table], ["points"])
+    monkeypatch.setattr(heads, "HEADS", (*heads.HEADS, _recognise))
+    found = pick_head([table], ["points"])
+    assert found.name == "table"
+    assert found.points([table]).uv.tolist() == [[0.25, 0.5]]
 
 
 def test_which_lane_detector_is_taken(tmp_path: Path) -> None:

@@ -147,7 +147,7 @@ def test_an_own_motion_that_is_lost_goes_on_for_a_while_and_is_said() -> None:
     assert path_sources[:5] == ["gnss"] * 5
     assert all(command is not None and command.accelerator == 0.0 for command in commands[: coasted - 1])
     assert commands[0] is not None
-    assert commands[0].reason == "own speed not measured for 0.1 s: no faster than now"
+    assert commands[0].reason == "own speed not measured for 0.1 s: ACC will not accelerate"
     assert commands[coasted + 1 :] == [None] * len(commands[coasted + 1 :])
 
 
@@ -179,13 +179,13 @@ def test_a_jump_that_stays_misleads_nobody(layout: str) -> None:
     followed in how it bends, not in where it lies, and the lead is right in every frame."""
     results, verdicts = driven(lambda frame: no_lines(jumped(frame)), moments=lambda: drive(layout, 11.5))
     assert set(verdicts) == {"right"}
-    assert results[-1].path.notes[-1].startswith("GNSS placed anew after a jump, doubted by 4.")
+    assert results[-1].path.notes[-1].startswith("GNSS position reset after a jump, uncertain by 4.")
     assert largest_step_m(results) < 0.6
 
 
 def test_a_broken_yaw_rate_is_said() -> None:
     results, _ = driven(yaw_rate(math.nan))
-    assert all("the yaw rate is not one that a car can have: left out" in result.notes for result in results)
+    assert all("implausible yaw rate ignored" in result.notes for result in results)
     assert all(np.isfinite(result.path.center).all() for result in results)
 
 
@@ -199,7 +199,7 @@ def test_acc_hears_that_nobody_knows_the_way() -> None:
     assert not result.path.usable
     assert result.acc is not None
     assert result.acc.accelerator == 0.0
-    assert result.acc.reason == f"path known for {result.path.reach_m:.0f} m only: no faster than now"
+    assert result.acc.reason == f"path known only {result.path.reach_m:.0f} m ahead: ACC will not accelerate"
     alone = without("raw_boxes", "sweep")(drive()[0].frame)
     _, result = step(State(), alone, params)
     assert result.path.usable

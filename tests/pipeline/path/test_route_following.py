@@ -115,7 +115,7 @@ def test_a_jump_lowers_confidence_and_does_not_move_the_path() -> None:
     _, after, said = drive(jumped, bend(500.0))
     assert before is not None
     assert after is not None
-    assert said == ["GNSS jumped by 5.0 m: not believed"]
+    assert said == ["GNSS jumped by 5.0 m: fix ignored"]
     assert np.abs(after.center - before.center)[:60].max() < 0.2
     assert np.all(after.sigma_m > 0.99 * PARAMS.lane_keeping_sigma_m), "no surer of the lane than any car is"
     assert np.all(after.sigma_m > before.sigma_m + 0.1)
@@ -135,15 +135,15 @@ def test_a_jump_that_stays_is_doubted_for_long() -> None:
     assert PARAMS.lane_keeping_sigma_m * 0.99 < path.sigma_m[0] < 1.0
     assert state.placed_anew
     assert 4.0 < state.doubt_m < 5.0
-    assert sum(each == "GNSS jumped by 5.0 m: not believed" for each in said) == 19
-    assert said[-1] == "GNSS placed anew after a jump, doubted by 5.0 m: the lane is not known from it"
+    assert sum(each == "GNSS jumped by 5.0 m: fix ignored" for each in said) == 19
+    assert said[-1] == "GNSS position reset after a jump, uncertain by 5.0 m: it does not show the lane"
 
 
 def test_the_doubt_of_a_jump_ends() -> None:
     fixes = [*north_bound(20), *[fix(0.1 * k, 2.0 * k, 5.0) for k in range(20, 2000)]]
     state, path, said = drive(fixes, bend(1e9, 4100.0))
     assert not state.placed_anew
-    assert said[-1].startswith("GNSS placed anew after a jump, doubted by 0.3 m")
+    assert said[-1].startswith("GNSS position reset after a jump, uncertain by 0.3 m")
     assert path is not None
     assert path.center[0, 1] > 3.5, "the place counts again"
 
@@ -151,16 +151,16 @@ def test_the_doubt_of_a_jump_ends() -> None:
 @pytest.mark.parametrize(
     ("fixes", "sentence"),
     [
-        pytest.param(north_bound(10, east_m=40.0), "not on the route", id="on another road"),
-        pytest.param([None] * 10, "no GNSS fix to place the car on the route", id="no fix at all"),
+        pytest.param(north_bound(10, east_m=40.0), "the car is off the route", id="on another road"),
+        pytest.param([None] * 10, "no GNSS fix yet to locate the car on the route", id="no fix at all"),
         pytest.param(
             [dataclasses.replace(each, course_rad=math.pi) for each in north_bound(10) if each],
-            "not on the route",
+            "the car is off the route",
             id="the other way round",
         ),
         pytest.param(
             [dataclasses.replace(each, lat_deg=math.nan) for each in north_bound(10) if each],
-            "no GNSS fix to place the car on the route",
+            "no GNSS fix yet to locate the car on the route",
             id="not a number",
         ),
     ],
@@ -192,7 +192,7 @@ def test_a_route_without_a_line_is_told(rows: F64) -> None:
     assert lay_out(route) is None
     _, path, said = drive(north_bound(3), route)
     assert path is None
-    assert said[0] == "route empty: no line in it"
+    assert said[0] == "route empty contains no line"
 
 
 def test_scatter_of_a_recorded_route_is_smoothed() -> None:

@@ -25,7 +25,7 @@ from pipeline.sources import SourceError, open_any, open_source
         ("sim:", "no scenario named ''; there are"),
         ("sim:nosuch", "no scenario named 'nosuch'; there are"),
         ("sim:nosuch.yaml", "nosuch.yaml: cannot be read"),
-        ("sim:~no_such_user_here/x.yaml", "~no_such_user_here/x.yaml: nobody here has that home folder"),
+        ("sim:~no_such_user_here/x.yaml", "~no_such_user_here/x.yaml: unknown home directory"),
     ],
 )
 def test_a_wrong_uri_gives_one_sentence(uri: str, says: str) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from pipeline.training.targets import BACKGROUND, IGNORED, assign
-from pipeline.vision.heads import decode_yolox, grid_centres
+from pipeline.vision.heads.decoder import grid_centres
+from pipeline.vision.heads.yolox import decode_yolox
 
 SIZE = (192, 320)
 CAR = np.array([[100.0, 60.0, 130.0, 84.0]], dtype=np.float32)

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
-from pipeline.vision.heads import V3_ANCHORS, UnknownHead, pick_decoder
+from pipeline.vision import heads
+from pipeline.vision.heads import UnknownHead, pick_decoder
+from pipeline.vision.heads.anchor_maps import ANCHORS
+from pipeline.vision.heads.decoder import Answer, Decoded, Decoder, Head
 
 SIZE = (64, 96)
 CELLS = 8 * 12 + 4 * 6 + 2 * 3
@@ -79,7 +84,7 @@ def _maps(version: int) -> list[np.ndarray]:
     for stride in (32, 16, 8):
         grid = np.full((3, SIZE[0] // stride, SIZE[1] // stride, 5 + CLASSES), -30.0)
         if stride == 16:
-            anchor = np.array(V3_ANCHORS[16][1])
+            anchor = np.array(ANCHORS[16][1])
             for box, scores in zip(_centre_size(), _class_rows(True), strict=True):
                 i, j = int(box[1] // stride), int(box[0] // stride)
                 offset, size = box[:2] / stride - [j, i], box[2:] / anchor
@@ -151,3 +156,28 @@ def test_an_unknown_head_is_named_by_its_shapes(shapes: list[tuple[int, ...]]) -
         pick_decoder([np.zeros(shape, np.float32) for shape in shapes], SIZE)
     for shape in shapes:
         assert "×".join(map(str, shape)) in str(caught.value)
+
+
+def _corners_first(outputs: Sequence[np.ndarray], size: tuple[int, int], floor: float) -> Decoded:
+    rows = outputs[0]
+    return rows[:, :4], rows[:, 4], rows[:, 5].astype(np.int64)
+
+
+def _recognise(answer: Answer) -> Decoder | None:
+    one_table = len(answer.outputs) == 1 and answer.outputs[0].ndim == 2
+    return Decoder("tables", 5, True, 1.0, True, _corners_first) if one_table else None
+
+
+def test_a_head_is_added_by_a_file_and_one_entry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What the two functions above hold is all that a new form of answer takes."""
+    table = np.array([[1.0, 2.0, 3.0, 4.0, 0.9, 2.0]], np.float32)
+    with pytest.raises(UnknownHead):
+        pick_decoder([table], SIZE)
+    monkeypatch.setattr(heads, "HEADS", (*heads.HEADS, Head("Tables", _recognise)))
+    decoder = pick_decoder([table], SIZE)
+    boxes, _, classes = decoder.decode([table], SIZE, FLOOR)
+    assert (decoder.name, boxes.tolist(), classes.tolist()) == ("tables", [[1.0, 2.0, 3.0, 4.0]], [2])
+    with pytest.raises(UnknownHead, match="known are YOLOv3, .*Tables"):
+        pick_decoder([], SIZE)
+    for name, (outputs, metadata, *_) in HEADS.items():
+        assert pick_decoder(outputs, SIZE, metadata).name == name, "the others stay"

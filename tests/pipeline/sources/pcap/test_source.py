@@ -121,7 +121,7 @@ WRONG = {
     "twice": ("pcap:{file}?port=1&port=2", "given twice"),
     "no number": ("pcap:{file}?port=many", "port=many: not a number"),
     "no video": ("pcap:{file}?video=other.mp4", "video=other.mp4: no such file"),
-    "nobody's rig": ("pcap:{file}?rig=~no_such_user_here/rig.yaml", "nobody here has that home folder"),
+    "nobody's rig": ("pcap:{file}?rig=~no_such_user_here/rig.yaml", "unknown home directory"),
     "bad video": ("pcap:{file}?video=rig.yaml", "rig.yaml: not a readable video"),
     "bad rig": ("pcap:{file}?rig=bad.yaml", "bad.yaml: lidar.mount.z_m: Input should be less than or equal to 20"),
     "no rig": ("pcap:{file}?rig=drive.pcap", "drive.pcap: not YAML"),

@@ -1,0 +1,30 @@
+"""What lane networks put out, as points in the picture: one file a head, and the choice between them.
+
+To add a head, write a file like ``row_grid.py`` that ends in a ``recognise``, and list it in ``HEADS``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from pipeline.lanes.heads import classes, row_grid, two_masks
+from pipeline.lanes.heads.head import Answer, Head, UnknownLaneHead
+from pipeline.types import F32
+
+__all__ = ["HEADS", "Head", "UnknownLaneHead", "pick_head"]
+
+HEADS: tuple[Callable[[Answer], Head | None], ...] = (two_masks.recognise, row_grid.recognise, classes.recognise)
+"""Each gives the head, if an answer is of its form. The first that does is taken."""
+
+
+def pick_head(outputs: Sequence[F32], names: Sequence[str]) -> Head:
+    """The head of a network, by the shapes and the names of its outputs. UnknownLaneHead when none recognises them."""
+    answer = Answer([np.asarray(output).shape for output in outputs], names)
+    for recognise in HEADS:
+        head = recognise(answer)
+        if head is not None:
+            return head
+    described = ", ".join("×".join(map(str, shape)) for shape in answer.shapes)
+    raise UnknownLaneHead(f"its outputs ({described}) match no known lane network")

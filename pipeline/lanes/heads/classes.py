@@ -1,0 +1,24 @@
+"""One mask with a class for each line, (1, 2 or more, h, w), perhaps with the probability (1, k) that each is there:
+ENet-SAD and its like (CULane). Class 0 is nothing. CULane's mean and spread, RGB."""
+
+from __future__ import annotations
+
+from pipeline.lanes.heads.head import Answer, Fit, Head
+from pipeline.lanes.heads.masks import from_masks
+
+_CULANE = ((0.3598, 0.3653, 0.3662), (0.2573, 0.2663, 0.2756))
+_CUT_ASPECT = 4.0
+"""An input wider than this is for pictures whose sky was cut off (CULane at 976×208)."""
+
+
+def recognise(answer: Answer) -> Head | None:
+    """A single map of some classes, too large for a grid of cells."""
+    index = answer.only_map()
+    if index is None:
+        return None
+    _, channels, rows, columns = answer.shapes[index]
+    if not 2 <= channels <= 16 or rows < 32 or columns < 32:
+        return None
+    exists = next((i for i, shape in enumerate(answer.shapes) if shape == (1, channels - 1)), None)
+    fit: Fit = "lower" if columns > _CUT_ASPECT * rows else "stretch"
+    return Head("classes", index, from_masks, fit, exists, *_CULANE)
