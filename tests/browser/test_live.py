@@ -48,7 +48,7 @@ def until(page: Page, holds: str, gives: str = "get('frame').state.sequence") ->
     """Wait until something holds of the store, and what it gives then: both are expressions of ``get``."""
     return page.evaluate(
         f"""async () => {{
-          const {{ get, on }} = await import('/js/store.js');
+          const {{ get, on }} = await import('/js/core/store.js');
           const holds = () => {holds};
           if (!holds()) await new Promise((done) => on(['frame', 'drive', 'state'], () => holds() && done()));
           return {gives};

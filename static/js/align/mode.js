@@ -3,13 +3,13 @@
  * every move is a change of the alignment's parameters: the server projects, as always. What fits automatically belongs
  * beside the score, in the bar.
  */
-import { newestOnly, request } from "../api.js";
-import { $, el, press, text } from "../dom.js";
-import { get, on, set } from "../store.js";
-import { change, reveal } from "../params.js";
-import { followHand } from "./hand.js";
-import { drawEdges } from "./edges.js";
-import { addLayer } from "../camera.js";
+import { newestOnly, request } from "../core/api.js";
+import { $, el, press, text } from "../core/dom.js";
+import { get, on, set } from "../core/store.js";
+import { change, reveal } from "../panels/params.js";
+import { followHand } from "./pointer.js";
+import { drawEdges } from "./picture_edges.js";
+import { addLayer } from "../views/camera.js";
 import { grow } from "../workspace/panes.js";
 
 /** Between two scores while the hand moves: each costs the server a tenth of a second. */
@@ -21,7 +21,7 @@ const score = el("b", { class: "score", title: "How well the LiDAR's depth edges
 const how = el("span", { class: "facts" });
 
 const fetchScore = newestOnly(async () => {
-  const found = /** @type {import("../types.js").AlignmentScore|Error} */ (await request("api/alignment/score").catch((error) => error));
+  const found = /** @type {import("../core/types.js").AlignmentScore|Error} */ (await request("api/alignment/score").catch((error) => error));
   text(score, found instanceof Error ? "no score" : found.brief);
   score.title = found instanceof Error ? found.message : found.text;
   await new Promise((done) => setTimeout(done, PAUSE_MS));

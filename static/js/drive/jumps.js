@@ -1,5 +1,5 @@
 /** From event to event, and from difference to difference. */
-import { get } from "../store.js";
+import { get } from "../core/store.js";
 import { here, seekTo } from "./seek.js";
 
 /** @param {number[]} places ascending @param {number} from @param {1|-1} direction */

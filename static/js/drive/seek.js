@@ -1,6 +1,6 @@
 /** Going to a frame. At most one seek is under way; of those asked for meanwhile the newest counts. */
-import { request } from "../api.js";
-import { get, on, set } from "../store.js";
+import { request } from "../core/api.js";
+import { get, on, set } from "../core/store.js";
 
 /** A server that shows another frame instead (a new recording, the end of playing) must not block seeking. */
 const PATIENCE_MS = 1000;

@@ -1,6 +1,6 @@
 /** J, K and L as on a cutting table: back, stop, on; pressed again, faster. */
-import { playback } from "../api.js";
-import { get, on } from "../store.js";
+import { playback } from "../core/api.js";
+import { get, on } from "../core/store.js";
 import { seekTo } from "./seek.js";
 
 const FASTEST = 4;

@@ -2,9 +2,9 @@
  * Shapes of a whole drive as the server sends it (app/routes/): its columns, events, runs and what is exported of it.
  * `tests/app/page/test_page_types.py` holds every key here against real messages.
  *
- * @typedef {import("../types.js").AccState} AccState
- * @typedef {import("../types.js").ParamValue} ParamValue
- * @typedef {import("../types.js").SourceKind} SourceKind
+ * @typedef {import("../core/types.js").AccState} AccState
+ * @typedef {import("../core/types.js").ParamValue} ParamValue
+ * @typedef {import("../core/types.js").SourceKind} SourceKind
  *
  * @typedef {object} Columns  one entry a frame; the CIPV's figures are null without one
  * @property {(number|null)[]} cipv_id

@@ -1,15 +1,15 @@
 /** Keys of the labeling mode. They go before the page's own while it is on. */
-import { playback } from "../api.js";
-import { get } from "../store.js";
-import * as byKeys from "./bykeys.js";
-import * as commands from "./commands.js";
-import { bringHere } from "./ends.js";
-import { cancel, isOn, setTool, toggleObjects } from "./mode.js";
-import * as review from "./review.js";
-import * as span from "./span.js";
-import { toggleWhole } from "./tags.js";
+import { playback } from "../core/api.js";
+import { get } from "../core/store.js";
+import * as byKeys from "./acts/keyboard_drawing.js";
+import * as commands from "./acts/commands.js";
+import { bringHere } from "./acts/range_ends.js";
+import { cancel, isOn, setTool, toggleObjects } from "./state/mode.js";
+import * as review from "./acts/review.js";
+import * as span from "./state/marked_frames.js";
+import { toggleWhole } from "./acts/tags.js";
 
-/** @typedef {import("../keymap.js").Binding} Binding */
+/** @typedef {import("../keys/keymap.js").Binding} Binding */
 /** `brief`: the words of the strip below the timeline; what has none is only in the help. @typedef {Binding & {brief?: string}} LabelBinding */
 
 const STEP_M = 0.1, FAR_M = 1, TURN_DEG = 1, FAR_DEG = 10;
@@ -20,7 +20,7 @@ const key = (keys, shown, words, act, brief) => ({ keys: keys.split(" "), shown,
 /** Arrows move the selected cuboid; with none they go through the frames, as without the mode. @param {LabelBinding} binding @returns {LabelBinding} */
 const selected = (binding) => ({ ...binding, isOn: () => isOn() && get("track") !== null && !["shape", "path"].includes(get("labeling")?.tool ?? "") });
 
-/** While something is to be drawn. @param {import("../store.js").Labeling["tool"]} tool @param {LabelBinding} binding @returns {LabelBinding} */
+/** While something is to be drawn. @param {import("../core/store.js").Labeling["tool"]} tool @param {LabelBinding} binding @returns {LabelBinding} */
 const during = (tool, binding) => ({ ...binding, isOn: () => isOn() && get("labeling")?.tool === tool });
 
 /** While others' labels are looked through. @param {LabelBinding} binding @returns {LabelBinding} */

@@ -1,15 +1,15 @@
 /** The labels' rows of the timeline: who leads, above what the pipeline says; where the selected track is, with its keyframes; and which
  * frames are tagged. */
-import { color, ui } from "../colors.js";
-import { get } from "../store.js";
+import { color, ui } from "../core/colors.js";
+import { get } from "../core/store.js";
 import { colorOf } from "../timeline/ribbon.js";
-import { chosen, leadName } from "./held.js";
-import { span as marked } from "./span.js";
-import { rangesOf, saidTags, WHOLE_TAG } from "./tags.js";
+import { chosen, leadName } from "./state/labels.js";
+import { span as marked } from "./state/marked_frames.js";
+import { rangesOf, saidTags, WHOLE_TAG } from "./acts/tags.js";
 
 /** @typedef {import("../timeline/span.js").Span} Span */
 /** @typedef {import("../timeline/rows.js").Row} Row */
-/** @typedef {import("./types.js").LeadRange} LeadRange */
+/** @typedef {import("./state/types.js").LeadRange} LeadRange */
 
 const NAME_FROM_PX = 22, HATCH_PX = 5, MOST_TAGS = 3;
 const FONT = '600 10.5px system-ui, "DejaVu Sans", sans-serif';

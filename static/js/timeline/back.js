@@ -1,8 +1,8 @@
 /** What of the timeline stays while the cursor moves: axis, flags, ribbons, differences, curves. Drawn when data change. */
-import { color, ui } from "../colors.js";
-import { clock } from "../format.js";
+import { color, ui } from "../core/colors.js";
+import { clock } from "../core/format.js";
 import { drawLabelRows } from "../labeling/ribbon.js";
-import { get } from "../store.js";
+import { get } from "../core/store.js";
 import { scaleOf, traceLine, yOf } from "./curves.js";
 import { drawFlags } from "./flags.js";
 import { colorLeads, drawRibbon } from "./ribbon.js";

@@ -1,8 +1,8 @@
 /** Marking a stretch of the recording: in, out, and none. */
-import { $, text } from "../dom.js";
+import { $, text } from "../core/dom.js";
 import { here } from "../drive/seek.js";
-import { clock } from "../format.js";
-import { get, on, set } from "../store.js";
+import { clock } from "../core/format.js";
+import { get, on, set } from "../core/store.js";
 
 export function setUp() {
   $("#clip-in").addEventListener("click", markIn);

@@ -1,5 +1,5 @@
 /** The curves below the ribbon: what each shows, in which unit and on which scale, and how it is drawn. */
-import { num, ttc } from "../format.js";
+import { num, ttc } from "../core/format.js";
 
 /** @typedef {import("../drive/types.js").Columns} Columns */
 /** @typedef {import("./span.js").Span} Span */

@@ -1,10 +1,10 @@
 /** The list of events; a click goes there, and what is at the shown frame stands out. */
-import { request } from "../api.js";
-import { $, el, text } from "../dom.js";
+import { request } from "../core/api.js";
+import { $, el, text } from "../core/dom.js";
 import { seekTo } from "../drive/seek.js";
-import { clock } from "../format.js";
-import { refused } from "../notices.js";
-import { get, on, paint, set } from "../store.js";
+import { clock } from "../core/format.js";
+import { refused } from "../panels/notices.js";
+import { get, on, paint, set } from "../core/store.js";
 import { nameOf, tintOf } from "./flags.js";
 
 /** @typedef {import("../drive/types.js").DriveEvent} DriveEvent */

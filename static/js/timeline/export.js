@@ -1,6 +1,6 @@
 /** The menu that exports the marked clip, or everything; made in the background, with its progress. */
-import { request } from "../api.js";
-import { $, el, text } from "../dom.js";
+import { request } from "../core/api.js";
+import { $, el, text } from "../core/dom.js";
 import { attachMenu, refill } from "../workspace/menu.js";
 import { chosen } from "./clip.js";
 

@@ -1,5 +1,5 @@
 /** Events on the timeline: a flag each, and what their kinds are called. */
-import { color, ui } from "../colors.js";
+import { color, ui } from "../core/colors.js";
 
 /** @typedef {import("../drive/types.js").DriveEvent} DriveEvent */
 

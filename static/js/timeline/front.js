@@ -1,8 +1,8 @@
 /** What a hand has put onto the timeline: the marked clip, labels being painted, and the frame under the pointer. */
-import { color, ui } from "../colors.js";
+import { color, ui } from "../core/colors.js";
 import { here } from "../drive/seek.js";
 import { drawMarked, drawTrimmed } from "../labeling/ribbon.js";
-import { get } from "../store.js";
+import { get } from "../core/store.js";
 
 /** @typedef {import("./span.js").Span} Span */
 /** @typedef {import("./rows.js").Rows} Rows */

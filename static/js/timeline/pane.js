@@ -1,17 +1,17 @@
 /** The timeline: the whole recording at a glance. What changes at different times is drawn apart: the recording, what a hand put
  * onto it, and what moves with the frame. */
-import { ui } from "../colors.js";
-import { $, el, memory, press, text } from "../dom.js";
+import { ui } from "../core/colors.js";
+import { $, el, memory, press, text } from "../core/dom.js";
 import { here } from "../drive/seek.js";
-import { clock, num } from "../format.js";
+import { clock, num } from "../core/format.js";
 import { tagRows } from "../labeling/ribbon.js";
-import { get, on, paint, painter } from "../store.js";
-import { Surface } from "../surface.js";
+import { get, on, paint, painter } from "../core/store.js";
+import { Surface } from "../views/drawing/surface.js";
 import { drawBack } from "./back.js";
 import * as clip from "./clip.js";
 import { CURVES } from "./curves.js";
 import * as events from "./events.js";
-import * as live from "./live.js";
+import * as live from "./live_controls.js";
 import { nameOf } from "./flags.js";
 import { drawFront } from "./front.js";
 import { followPointer } from "./pointer.js";

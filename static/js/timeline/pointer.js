@@ -1,9 +1,9 @@
 /** The hand on the timeline: press or drag to go to a frame, wheel to zoom, shift or two fingers to move along. */
 import { seekTo } from "../drive/seek.js";
-import { dragEnd, endAt } from "../labeling/ends.js";
-import { leadAt } from "../labeling/held.js";
-import * as marking from "../labeling/span.js";
-import { get, set } from "../store.js";
+import { dragEnd, endAt } from "../labeling/acts/range_ends.js";
+import { leadAt } from "../labeling/state/labels.js";
+import * as marking from "../labeling/state/marked_frames.js";
+import { get, set } from "../core/store.js";
 import { flagAt } from "./flags.js";
 
 /** @typedef {import("./span.js").Span} Span */

@@ -1,10 +1,10 @@
 /** What of the timeline moves with the frame: the names of its rows with the values at a frame, and the cursor. They are small
  * and apart from the rest, so that ten times a second little is drawn and nothing large is put on the screen again. */
-import { ui } from "../colors.js";
-import { DASH } from "../format.js";
-import { leadAt, leadName } from "../labeling/held.js";
+import { ui } from "../core/colors.js";
+import { DASH } from "../core/format.js";
+import { leadAt, leadName } from "../labeling/state/labels.js";
 import { tagRows } from "../labeling/ribbon.js";
-import { get } from "../store.js";
+import { get } from "../core/store.js";
 import { said } from "./curves.js";
 import { colorOf } from "./ribbon.js";
 

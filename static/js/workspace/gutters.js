@@ -1,6 +1,6 @@
 /** Panes that can be resized by dragging between them, or with the arrow keys. Sizes belong to the layout. */
-import { $ } from "../dom.js";
-import { get, on } from "../store.js";
+import { $ } from "../core/dom.js";
+import { get, on } from "../core/store.js";
 import { change } from "./panes.js";
 
 /**

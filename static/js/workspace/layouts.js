@@ -1,6 +1,6 @@
 /** Layouts: panes, sizes, layers. A few come with the page; a person saves others in this browser. */
-import { $, el, memory } from "../dom.js";
-import { get, set } from "../store.js";
+import { $, el, memory } from "../core/dom.js";
+import { get, set } from "../core/store.js";
 import { attachMenu, close, refill } from "./menu.js";
 import { EVERYTHING, PANES, change, toggle } from "./panes.js";
 

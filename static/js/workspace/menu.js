@@ -1,5 +1,5 @@
 /** One menu for the page: it opens below its button, and closes by itself. */
-import { $ } from "../dom.js";
+import { $ } from "../core/dom.js";
 
 const GAP_PX = 4;
 const menu = $("#menu");

@@ -1,8 +1,8 @@
 /** Which panes are shown, which one has the whole workspace, and which tab the plan's pane shows. */
-import { $, el, memory, press } from "../dom.js";
-import { icon } from "../icons.js";
-import { get, on, set } from "../store.js";
-import { showRerun } from "./rerun.js";
+import { $, el, memory, press } from "../core/dom.js";
+import { icon } from "../core/icons.js";
+import { get, on, set } from "../core/store.js";
+import { showRerun } from "./rerun_tab.js";
 
 /** @typedef {"camera"|"plan"|"objects"|"why"|"params"|"timeline"} Pane */
 /** @typedef {"plan"|"3d"|"rerun"} Tab */

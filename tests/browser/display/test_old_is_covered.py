@@ -12,8 +12,8 @@ from tests.browser.display.conftest import OpenDisplay, is_now, keep
 COVERED_WITHIN_MS = 300
 
 WATCH = """async (within) => {
-  const { get } = await import("/js/store.js");
-  const { serverNow } = await import("/js/connection.js");
+  const { get } = await import("/js/core/store.js");
+  const { serverNow } = await import("/js/core/connection.js");
   const { mayBeMs } = await import("/drive/freshness.js");
   window.worst = { fresh: 0, covered: 0 };
   const cover = document.querySelector("#cover");

@@ -16,7 +16,7 @@ SIZES = [(1024, 600), (1280, 800), (800, 480)]
 FINGER_PX = 48
 
 STREAMS = """async () => {
-  const { get, set } = await import("/js/store.js");
+  const { get, set } = await import("/js/core/store.js");
   const stream = (state, rate_hz) => ({ state, rate_hz, age_ms: 10, jitter_ms: 1, lost: 0, note: "" });
   const streams = { lidar: stream("ok", 10), camera: stream("stale", 5), gnss: stream("silent", null) };
   set("state", { ...get("state"), streams });
@@ -97,7 +97,7 @@ def test_the_figures_are_those_of_the_result(open_display: OpenDisplay, site: Si
 
 
 SHOW = """async (change) => {
-  const { get, on, set } = await import("/js/store.js");
+  const { get, on, set } = await import("/js/core/store.js");
   const hold = () => {
     const frame = get("frame"), { result } = frame;
     if (result.acc.reason !== window.command.reason) {

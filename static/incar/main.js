@@ -1,0 +1,14 @@
+/** The display in the car: each part draws from the store, and one of them watches that what is drawn is not old. */
+import { connect } from "../js/core/connection.js";
+import * as acc from "./acc.js";
+import * as awake from "./wake_lock.js";
+import * as buttons from "./buttons.js";
+import * as freshness from "./freshness.js";
+import * as lead from "./lead.js";
+import * as night from "./night.js";
+import * as plan from "./plan.js";
+import * as road from "./road.js";
+import * as sensors from "./sensors.js";
+
+for (const part of [night, freshness, acc, lead, road, plan, sensors, buttons, awake]) part.setUp();
+connect();

@@ -1,0 +1,86 @@
+/** Every key of the page: what it does, and the words that the help shows. The one table of both. */
+import { toggleAlign } from "../align/mode.js";
+import { playback } from "../core/api.js";
+import { toDifference, toEvent } from "../drive/jumps.js";
+import { seekTo } from "../drive/seek.js";
+import * as shuttle from "../drive/shuttle.js";
+import * as help from "./help.js";
+import { labelKeys } from "../labeling/keys.js";
+import * as labeling from "../labeling/state/mode.js";
+import * as sources from "../panels/open_dialog.js";
+import { get, set } from "../core/store.js";
+import { toggleTape } from "../views/measuring_tape.js";
+import * as clip from "../timeline/clip.js";
+import { addMark } from "../timeline/events.js";
+import { fit, zoom } from "../timeline/pane.js";
+import { shiftSpeed, toggleLoop, togglePlay } from "../panels/playback_bar.js";
+import { redo, undo } from "../panels/undo.js";
+import { grow, nextTab, toggle, toggleInspector, toggleTab } from "../workspace/panes.js";
+import { share } from "../workspace/share_link.js";
+import { toggleTheme } from "../workspace/theme.js";
+
+/** keys: as `nameOf` in keyboard.js gives them; isOn: when it counts, of several of one key the first that does. A binding without words is said by another one.
+ * @typedef {{keys: string[], shown: string, words: string, act: () => unknown, isOn?: () => boolean}} Binding */
+/** mode: whose keys they are; they go before the page's own while it is on. @typedef {{title: string, mode?: string, bindings: Binding[]}} Group */
+
+/** @param {string} keys one or more, apart by spaces @param {string} shown @param {string} words @param {() => void} act @returns {Binding} */
+const key = (keys, shown, words, act) => ({ keys: keys.split(" "), shown, words, act });
+const last = () => Math.max(0, (get("state")?.count ?? 1) - 1);
+
+/** @returns {Group[]} */
+export const keymap = () => [
+  ...labelKeys(),
+  { title: "Playing", bindings: [
+    key("Space", "Space", "play or pause", togglePlay),
+    key("ArrowLeft", "←", "one frame back", () => playback({ step: -1 })),
+    key("ArrowRight", "→", "one frame on", () => playback({ step: 1 })),
+    key("Shift+ArrowLeft", "Shift ←", "ten frames back", () => playback({ step: -10 })),
+    key("Shift+ArrowRight", "Shift →", "ten frames on", () => playback({ step: 10 })),
+    key("j", "J", "backwards; again: faster", shuttle.backward),
+    key("k", "K", "stop", shuttle.stop),
+    key("l", "L", "forwards; again: faster", shuttle.forward),
+    key("Home", "Home", "first frame", () => seekTo(0)),
+    key("End", "End", "last frame", () => seekTo(last())),
+    key("[", "[", "slower", () => shiftSpeed(-1)),
+    key("]", "]", "faster", () => shiftSpeed(1)),
+    key("r", "R", "repeat at the end", toggleLoop),
+  ] },
+  { title: "Timeline", bindings: [
+    key("e", "E", "next event", () => toEvent(1)),
+    key("Shift+E", "Shift E", "event before", () => toEvent(-1)),
+    key("x", "X", "next difference of the two runs", () => toDifference(1)),
+    key("Shift+X", "Shift X", "difference before", () => toDifference(-1)),
+    key("i", "I", "clip begins here", clip.markIn),
+    key("o", "O", "clip ends here", clip.markOut),
+    key("t", "T", "mark this moment", addMark),
+    key("+ =", "+", "zoom the timeline in", () => zoom(1)),
+    key("-", "−", "zoom it out", () => zoom(-1)),
+    key("0", "0", "the whole recording", fit),
+  ] },
+  { title: "Views", bindings: [
+    key("1", "1", "camera", () => toggle("camera")),
+    key("2", "2", "plan", () => toggleTab("plan")),
+    key("3", "3", "3D", () => toggleTab("3d")),
+    key("4", "4", "objects", () => toggle("objects")),
+    key("5", "5", "why", () => toggle("why")),
+    key("6", "6", "parameters", () => toggle("params")),
+    key("7", "7", "timeline", () => toggle("timeline")),
+    key("Shift+1", "Shift 1", "camera on the whole workspace", () => grow("camera")),
+    key("m Shift+2", "M", "plan or 3D on the whole workspace", () => grow("plan")),
+    key("Shift+4", "Shift 4", "objects on the whole workspace", () => grow("objects")),
+    key("b", "B", "plan or 3D", nextTab),
+    key("p", "P", "why and parameters", toggleInspector),
+    key("g", "G", "measuring tape (also: drag with Shift)", toggleTape),
+    key("a", "A", "align LiDAR and camera", toggleAlign),
+    key("Shift+L", "Shift L", "label: who leads, and where everybody is", labeling.toggle),
+  ] },
+  { title: "Everything else", bindings: [
+    key("Ctrl+z", "Ctrl Z", "undo your last change, of labels or parameters", undo),
+    key("Ctrl+Shift+Z Ctrl+y", "Ctrl Shift Z", "redo", redo),
+    key("c", "C", "copy a link to what is shown", share),
+    key("f", "F", "open a recording", sources.open),
+    key("d", "D", "dark or light", toggleTheme),
+    key("Escape", "Esc", "deselect", () => set("selection", null)),
+    key("?", "?", "this help", help.show),
+  ] },
+];

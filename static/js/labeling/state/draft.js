@@ -1,0 +1,72 @@
+/** A label under a hand: drawn at once in every view, sent when the hand lets go, dropped when the server's own has come. */
+import { get, on, set } from "../../core/store.js";
+import { act } from "../acts/queue.js";
+import { knownUpTo, sightingsAt } from "./sightings.js";
+import { shown, trackOf } from "./labels.js";
+
+/** @typedef {import("./types.js").Cuboid} Cuboid */
+/** @typedef {import("./types.js").Box} Box */
+/** @typedef {import("./types.js").LabelSighting} LabelSighting */
+/**
+ * @typedef {object} Draft
+ * @property {number|null} track  null of a new one
+ * @property {number} frame
+ * @property {number} revision  of the track when it was taken hold of
+ * @property {Cuboid|null} cuboid
+ * @property {Box|null} bbox
+ * @property {number|null} settled  the act that it became
+ */
+
+export function setUp() {
+  on(["labelFrames"], () => {
+    const draft = get("draft");
+    if (draft?.settled != null) settle(draft, draft.settled);
+  });
+}
+
+/** It has become an act: it is shown until the server's own has come, which may be before the act's answer. @param {Draft} draft @param {number} act */
+export function settle(draft, act) {
+  const isHeld = knownUpTo(draft.frame) >= act;
+  if (!isHeld || get("draft")) set("draft", isHeld ? null : { ...draft, settled: act });
+}
+
+/** Everything that is labelled in the shown frame, as it looks now. @returns {LabelSighting[]} */
+export const present = () => presentIn(shown());
+
+/** @param {number} frame @returns {LabelSighting[]} */
+function presentIn(frame) {
+  const draft = get("draft"), known = sightingsAt(frame);
+  if (!draft || draft.frame !== frame || draft.track === null) return known;
+  const held = { track: draft.track, cuboid: draft.cuboid, bbox: draft.bbox, keyframe: true };
+  return [...known.filter(({ track }) => track !== held.track), held];
+}
+
+/** @param {number|null} track @returns {LabelSighting|null} */
+export const presentOf = (track) => (track === null ? null : present().find((each) => each.track === track) ?? null);
+
+/** Draw a track's label otherwise than it is held. @param {number} track @param {{cuboid?: Cuboid|null, bbox?: Box|null}} shape @param {number} [frame] */
+export function hold(track, shape, frame = shown()) {
+  const draft = get("draft"), before = presentIn(frame).find((each) => each.track === track);
+  const isSame = draft?.track === track && draft.frame === frame;
+  const revision = isSame ? draft.revision : trackOf(track)?.revision ?? 0;
+  set("draft", { track, frame, revision, cuboid: before?.cuboid ?? null, bbox: before?.bbox ?? null, ...shape, settled: null });
+}
+
+/** Send what is held. A hand that has taken hold of it again meanwhile goes on from what its own act left. */
+export async function release() {
+  const draft = get("draft");
+  if (!draft || draft.track === null || draft.settled !== null) return;
+  const { track, frame, revision, cuboid, bbox } = draft;
+  const answer = await act({ kind: "set_sighting", track, revision, frame, cuboid, bbox, interpolate: true });
+  const now = get("draft");
+  if (now?.track !== track || now.frame !== frame) return;
+  const left = answer?.changed?.tracks.find(({ id }) => id === track)?.revision ?? revision;
+  if (now !== draft) set("draft", { ...now, revision: Math.max(now.revision, left) });
+  else if (answer) settle({ ...now, revision: left }, answer.revision);
+  else set("draft", null);
+}
+
+/** Let go of it without a trace. */
+export function drop() {
+  set("draft", null);
+}

@@ -1,0 +1,85 @@
+/** The labeling mode: the pipeline's output becomes proposals, a person makes them true. */
+import { playback } from "../../core/api.js";
+import { $, press } from "../../core/dom.js";
+import { get, on, set } from "../../core/store.js";
+import { toggle as togglePane } from "../../workspace/panes.js";
+import { personName } from "./person.js";
+
+/** @type {import("../../core/store.js").Labeling} */
+const OFF = { on: false, tool: null, from: null, hasObjects: false, review: false, item: null };
+
+const button = $("#label-button", HTMLButtonElement);
+
+export function setUp() {
+  set("labeling", OFF);
+  button.addEventListener("click", toggle);
+  on(["labeling", "state"], reflect);
+}
+
+export const isOn = () => get("labeling")?.on === true;
+
+const canLabel = () => get("state")?.labels != null;
+
+export function toggle() {
+  if (!isOn() && !canLabel()) return;
+  change({ ...OFF, on: !isOn(), hasObjects: get("labeling")?.hasObjects ?? false });
+  set("draft", null);
+  set("marked", null);
+  set("trimmed", null);
+  if (!isOn()) return;
+  if (get("state")?.playing) playback({ playing: false }); // what is labelled is what is shown
+  togglePane("params", true); // the labels' panel stands in the inspector's column
+  personName();
+}
+
+/** @type {Record<string, string>} */
+const HINTS = {
+  new: "A new label: drag it in the plan, drag a box or press on it in the picture, or Enter. Esc lets go",
+  shape: "Its shape: drag it in the plan, drag a box around it in the picture, Enter for a box, or G for a cuboid. Esc lets go",
+  path: "Our path: drag along its middle in the plan, or bend the pipeline's by arrows; Enter keeps it. Esc lets go",
+};
+
+/** What the next drag or click does, which is said. @param {import("../../core/store.js").Labeling["tool"]} tool */
+export function setTool(tool) {
+  const next = get("labeling")?.tool === tool ? null : tool;
+  if (next === "shape" && get("track") === null) return set("said", "Select a label first");
+  if (next || Object.values(HINTS).includes(get("said") ?? "")) set("said", (next && HINTS[next]) ?? "");
+  change({ tool: next, from: next === "merge" ? get("track") : null });
+  if (next === null) set("drawnPath", null);
+}
+
+/** Which label of others is looked at; null for none. @param {import("../../core/store.js").Labeling["item"]} item */
+export const setItem = (item) => change({ item });
+
+/** @param {boolean} review */
+export const setReview = (review) => change({ review, item: null, tool: null });
+
+export function toggleObjects() {
+  change({ hasObjects: !get("labeling")?.hasObjects });
+}
+
+/** Let go of one thing, the newest first. @returns {boolean} whether there was one */
+export function cancel() {
+  if (get("trimmed")) set("trimmed", null);
+  else if (get("labeling")?.tool) setTool(null);
+  else if (get("marked")) set("marked", null);
+  else if (get("track") !== null) set("track", null);
+  else if (get("labeling")?.review) setReview(false);
+  else return false;
+  return true;
+}
+
+/** @param {Partial<import("../../core/store.js").Labeling>} changes */
+function change(changes) {
+  set("labeling", { ...(get("labeling") ?? OFF), ...changes });
+}
+
+function reflect() {
+  if (isOn() && get("state") && !canLabel()) return change({ on: false, tool: null });
+  press(button, isOn());
+  button.disabled = !canLabel();
+  document.body.classList.toggle("is-labeling", isOn());
+  document.body.classList.toggle("is-reviewing", isOn() && get("labeling")?.review === true);
+  document.body.dataset.tool = get("labeling")?.tool ?? "";
+  $("#label-bar").hidden = $("#label-keys").hidden = $("#label-pane").hidden = !isOn();
+}

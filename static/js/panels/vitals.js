@@ -1,0 +1,50 @@
+/** How fresh and how fast: from result made to painted, frames painted a second, what the stages took, what was skipped. */
+import { serverNow } from "../core/connection.js";
+import { $, el, text } from "../core/dom.js";
+import { num } from "../core/format.js";
+import { get, on } from "../core/store.js";
+
+const ITEMS = [
+  ["fps", "fps", "Frames painted in the last second", ""],
+  ["age", "age", "Milliseconds from the result made to the frame painted", ""],
+  ["line", "line", "Milliseconds that the stages took, without the network", "optional"],
+  ["net", "net", "Milliseconds of the network; 0 when its boxes were cached", "optional"],
+  ["skipped", "skipped", "Frames since the opening that came faster than they could be computed or shown", ""],
+];
+/** @type {Record<string, HTMLElement>} */
+const values = {};
+/** @type {number[]} */
+let painted = [];
+
+export function setUp() {
+  $("#vitals").append(...ITEMS.map(([key, label, title, className]) =>
+    el("div", { title, class: className }, el("dt", { textContent: label }), (values[key] = el("dd", { textContent: "–" })))));
+  on(["frame"], () => requestAnimationFrame(afterPaint));
+  on(["state"], showSkipped);
+  showSkipped();
+  setInterval(showRate, 500);
+}
+
+function afterPaint() {
+  const frame = get("frame");
+  if (!frame) return;
+  painted.push(performance.now());
+  text(values.age, frame.isLate ? "–" : num(Math.max(0, serverNow() - frame.madeUnixMs), 0));
+  text(values.line, num(frame.result.timing_ms.total, 1));
+  text(values.net, num(frame.detectMs, 0));
+  const { timing_ms: stages } = frame.result;
+  $("#vitals").title = Object.entries(stages).map(([stage, ms]) => `${stage} ${num(ms, 2)} ms`).join("\n");
+}
+
+/** Whoever is spared nothing needs no word of it. */
+function showSkipped() {
+  const skipped = get("state")?.skipped ?? 0;
+  text(values.skipped, String(skipped));
+  $("#vitals").lastElementChild?.toggleAttribute("hidden", !skipped);
+}
+
+function showRate() {
+  const now = performance.now();
+  painted = painted.filter((t) => now - t < 1000);
+  text(values.fps, String(painted.length));
+}

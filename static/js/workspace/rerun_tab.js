@@ -1,0 +1,38 @@
+/** This drive at this moment in rerun's own viewer, whose files our server serves. */
+import { request } from "../core/api.js";
+import { el } from "../core/dom.js";
+import { NO_DRIVE } from "../drive/live_buffer.js";
+import { get } from "../core/store.js";
+
+/** A pane narrower than this shows one view at a time below the camera. */
+const NARROW_PX = 900;
+
+/** @param {HTMLElement} body the pane that the viewer is put into, once there is one; a press of its button opens it anew */
+export async function showRerun(body) {
+  if (!body.querySelector("iframe")) await load(body);
+}
+
+/** @param {HTMLElement} body @param {number} [from] frame; else the shown one */
+async function load(body, from) {
+  if (get("state")?.live) return void body.replaceChildren(el("p", { class: "facts pad", textContent: NO_DRIVE }));
+  const note = el("p", { class: "busy", textContent: "Opening rerun …" });
+  body.replaceChildren(note);
+  try {
+    const query = new URLSearchParams({ compact: String(Number(body.clientWidth < NARROW_PX)) });
+    if (from !== undefined) query.set("first", String(from));
+    const { url, first, last } = await request(`api/rerun/open?${query}`);
+    body.replaceChildren(bar(body, `frames ${first + 1} to ${last + 1} of ${get("state")?.count ?? 0}`), el("iframe", { src: url, title: "rerun", class: "below-bar" }));
+  } catch (problem) {
+    note.textContent = /** @type {Error} */ (problem).message;
+    body.append(bar(body, ""));
+  }
+}
+
+/** @param {HTMLElement} body @param {string} what is open */
+function bar(body, what) {
+  const save = el("a", { href: "api/rerun.rrd", textContent: "Save .rrd", title: "For the native viewer: 100 frames around this one" });
+  save.setAttribute("download", "");
+  return el("div", { class: "rerun-bar" }, el("span", { class: "facts", textContent: what }), el("span", { class: "spacer" }), save,
+    el("button", { type: "button", textContent: "Start", title: "Open it from the start on", onclick: () => load(body, 0) }),
+    el("button", { type: "button", textContent: "Here", title: "Open it from the shown frame on", onclick: () => load(body) }));
+}
