@@ -6,7 +6,8 @@ import { ACC_WORDS } from "../js/core/urgency.js";
 
 /** @typedef {import("../js/core/types.js").AccState} AccState */
 
-const TRIANGLE = "M24 6 45 42H3z M24 19v11 M24 36v.5", OCTAGON = "M15 3h18l12 12v18L33 45H15L3 33V15z M15 24h18";
+const TRIANGLE = "M24 6 45 42H3z M24 19v11 M24 36v.5",
+  OCTAGON = "M15 3h18l12 12v18L33 45H15L3 33V15z M15 24h18";
 /** Tone of the band, and the shape in it. @type {Record<AccState|"off", {tone: string, shape: string}>} */
 const LOOKS = {
   off: { tone: "off", shape: "M24 5a19 19 0 1 0 .1 0z M12 36 36 12" },
@@ -18,8 +19,13 @@ const LOOKS = {
   full_brake: { tone: "full", shape: OCTAGON },
 };
 
-const band = $("#acc"), path = $("#acc-shape path", SVGElement);
-const word = $("#acc-word"), reason = $("#acc-reason"), own = $("#own-speed"), desired = $("#desired-speed"), speeds = $("#acc .speeds");
+const band = $("#acc"),
+  path = $("#acc-shape path", SVGElement);
+const word = $("#acc-word"),
+  reason = $("#acc-reason"),
+  own = $("#own-speed"),
+  desired = $("#desired-speed"),
+  speeds = $("#acc .speeds");
 
 export function setUp() {
   on(["frame"], update);
@@ -28,7 +34,8 @@ export function setUp() {
 function update() {
   const result = get("frame")?.result;
   if (!result) return;
-  const { acc, ego } = result, looks = LOOKS[acc?.state ?? "off"];
+  const { acc, ego } = result,
+    looks = LOOKS[acc?.state ?? "off"];
   mark(band, "tone", looks.tone);
   mark(band, "state", acc?.state ?? "off");
   if (path.getAttribute("d") !== looks.shape) path.setAttribute("d", looks.shape);

@@ -4,8 +4,12 @@ import { $, mark, press, text } from "../js/core/dom.js";
 import { clock } from "../js/core/format.js";
 import { get, on } from "../js/core/store.js";
 
-const ANSWER_MS = 4000, PATIENCE_MS = 5000;
-const record = $("#record"), marking = $("#mark"), words = $("#record span"), answer = $("#answer");
+const ANSWER_MS = 4000,
+  PATIENCE_MS = 5000;
+const record = $("#record"),
+  marking = $("#mark"),
+  words = $("#record span"),
+  answer = $("#answer");
 let hiding = 0;
 
 export function setUp() {
@@ -18,7 +22,11 @@ const isOn = () => Boolean(get("state")?.recording) && !get("state")?.recording?
 
 function toggleRecording() {
   const begins = !isOn();
-  ask(request("api/recording", "POST", { on: begins }), () => (begins ? "Recording" : "Recording saved"), begins ? "Not recorded" : "Not saved");
+  ask(
+    request("api/recording", "POST", { on: begins }),
+    () => (begins ? "Recording" : "Recording saved"),
+    begins ? "Not recorded" : "Not saved",
+  );
 }
 
 function markMoment() {
@@ -33,12 +41,17 @@ function marked({ index, t_s, in_session }) {
 
 /** @param {Promise<any>} asked @param {(given: any) => string} done @param {string} refused */
 async function ask(asked, done, refused) {
-  const late = new Promise((_, reject) => setTimeout(() => reject(new Error("the server does not answer")), PATIENCE_MS));
+  const late = new Promise((_, reject) =>
+    setTimeout(() => reject(new Error("the server does not answer")), PATIENCE_MS),
+  );
   try {
     say(done(await Promise.race([asked, late])), "done");
   } catch (error) {
     // a browser's own words for a lost connection say nothing to a driver
-    say(`${refused}: ${error instanceof TypeError ? "no connection" : error instanceof Error ? error.message : error}`, "refused");
+    say(
+      `${refused}: ${error instanceof TypeError ? "no connection" : error instanceof Error ? error.message : error}`,
+      "refused",
+    );
   }
 }
 
@@ -56,7 +69,10 @@ let toldError = "";
 function show() {
   const recording = get("state")?.recording;
   press(record, isOn());
-  text(words, isOn() && recording ? `${clock(recording.seconds)}${recording.dropped ? ` −${recording.dropped}` : ""}` : "Record");
+  text(
+    words,
+    isOn() && recording ? `${clock(recording.seconds)}${recording.dropped ? ` −${recording.dropped}` : ""}` : "Record",
+  );
   record.setAttribute("aria-label", isOn() ? "End the recording" : "Record");
   if (recording?.error && recording.error !== toldError) say(`Recording ended: ${recording.error}`, "refused");
   toldError = recording?.error ?? "";

@@ -10,12 +10,18 @@ import { get, on } from "../js/core/store.js";
 
 const CHECK_MS = 50;
 /** A frame may be missed, a second one not. */
-const FRAMES = 3, LEAST_MS = 300, DEFAULT_HZ = 10;
+const FRAMES = 3,
+  LEAST_MS = 300,
+  DEFAULT_HZ = 10;
 const WORDS = { paused: "PAUSED", stale: "NO NEW DATA", lost: "NO CONNECTION", waiting: "WAITING" };
 
-const root = document.documentElement, cover = $("#cover"), word = $("#cover-word"), why = $("#cover-why");
+const root = document.documentElement,
+  cover = $("#cover"),
+  word = $("#cover-word"),
+  why = $("#cover-why");
 /** The page's own clock when the frame came and when playing went on: it never jumps, as clocks of the day do. */
-let cameAt = -Infinity, wentOnAt = -Infinity;
+let cameAt = -Infinity,
+  wentOnAt = -Infinity;
 let wasPlaying = false;
 /** @type {Frame|null} */
 let frame = null;
@@ -54,7 +60,9 @@ export function ageMs() {
 
 /** @returns {Kind} */
 function judge() {
-  const state = get("state"), link = get("link"), age = ageMs();
+  const state = get("state"),
+    link = get("link"),
+    age = ageMs();
   if (!state || !frame) return link?.status === "lost" ? "lost" : "waiting";
   if (link?.status === "lost" && (age === null || age > LEAST_MS)) return "lost";
   if (state.busy || age === null || frame.state.uri !== state.uri) return "waiting";
@@ -76,7 +84,8 @@ function look() {
 
 /** @param {Exclude<Kind, "fresh">} kind */
 function reasonOf(kind) {
-  const age = ageMs(), state = get("state");
+  const age = ageMs(),
+    state = get("state");
   if (kind === "paused") return state?.live ? "this is not now" : "";
   if (kind === "waiting") return state?.busy ?? "for the first frame";
   const since = age === null ? "" : `last frame ${num(age / 1000)} s ago`;

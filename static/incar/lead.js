@@ -10,8 +10,13 @@ const BAR_S = 8;
 const TENTHS_BELOW_M = 20;
 const SAME_SPEED_KMH = 0.5;
 
-const name = $("#lead-name"), distance = $("#distance"), closing = $("#closing"), word = $("#closing-word");
-const ttc = $("#ttc"), ttcValue = $("#ttc-value"), bar = $("#ttc-bar");
+const name = $("#lead-name"),
+  distance = $("#distance"),
+  closing = $("#closing"),
+  word = $("#closing-word");
+const ttc = $("#ttc"),
+  ttcValue = $("#ttc-value"),
+  bar = $("#ttc-bar");
 
 export function setUp() {
   on(["frame"], update);
@@ -20,8 +25,12 @@ export function setUp() {
 function update() {
   const result = get("frame")?.result;
   if (!result) return;
-  const { cipv } = result, item = result.objects.find(({ id }) => id === cipv?.id);
-  text(name, cipv ? `${item?.type ?? "obstacle"} ahead${item?.carried ? ", not seen now" : ""}` : "No vehicle in our path");
+  const { cipv } = result,
+    item = result.objects.find(({ id }) => id === cipv?.id);
+  text(
+    name,
+    cipv ? `${item?.type ?? "obstacle"} ahead${item?.carried ? ", not seen now" : ""}` : "No vehicle in our path",
+  );
   text(distance, num(cipv?.distance_m, (cipv?.distance_m ?? 0) < TENTHS_BELOW_M ? 1 : 0));
   updateClosing(kmh(cipv?.closing_speed_mps));
   const left_s = cipv?.ttc_s ?? null;

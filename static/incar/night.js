@@ -3,7 +3,8 @@ import { forget } from "../js/core/colors.js";
 import { $, memory, press } from "../js/core/dom.js";
 import { set } from "../js/core/store.js";
 
-const root = document.documentElement, button = $("#night");
+const root = document.documentElement,
+  button = $("#night");
 const SYSTEM = matchMedia("(prefers-color-scheme: dark)");
 
 export function setUp() {

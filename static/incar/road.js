@@ -10,8 +10,10 @@ import { isAlarmed, reactsTo } from "./acc.js";
 
 /** @typedef {import("../js/core/types.js").Frame} Frame */
 
-const TAG_PX = 20, ALARM = "#ff5a5f";
-const canvas = $("#road", HTMLCanvasElement), notes = $("#notes");
+const TAG_PX = 20,
+  ALARM = "#ff5a5f";
+const canvas = $("#road", HTMLCanvasElement),
+  notes = $("#notes");
 /** @type {Surface} */
 let surface;
 
@@ -28,14 +30,20 @@ function say() {
 
 function draw() {
   if (surface.isHidden) return;
-  const ctx = surface.begin(), frame = get("frame");
+  const ctx = surface.begin(),
+    frame = get("frame");
   if (!frame) return;
   if (!frame.picture || !frame.bitmap) return sayNoPicture(ctx);
   const { width, height } = frame.picture;
   // the picture fills the pane; what is cut off is at its sides, where no lead is
-  const scale = Math.max(Math.min(surface.width / width, surface.height / height), Math.min(surface.height / height, (1.5 * surface.width) / width));
-  const left = (surface.width - width * scale) / 2, top = (surface.height - height * scale) / 2;
-  const X = (/** @type {number} */ u) => left + u * scale, Y = (/** @type {number} */ v) => top + v * scale;
+  const scale = Math.max(
+    Math.min(surface.width / width, surface.height / height),
+    Math.min(surface.height / height, (1.5 * surface.width) / width),
+  );
+  const left = (surface.width - width * scale) / 2,
+    top = (surface.height - height * scale) / 2;
+  const X = (/** @type {number} */ u) => left + u * scale,
+    Y = (/** @type {number} */ v) => top + v * scale;
   showPictureAt(width * scale * surface.ratio);
   ctx.globalAlpha = Number(ui("light"));
   ctx.drawImage(frame.bitmap, left, top, width * scale, height * scale);
@@ -60,7 +68,9 @@ function sayNoPicture(ctx) {
 
 /** @param {CanvasRenderingContext2D} ctx @param {Frame} frame @param {(u: number) => number} X @param {(v: number) => number} Y */
 function drawObjects(ctx, { result, display }, X, Y) {
-  const lead = result.cipv?.id ?? null, acted = reactsTo(result), alarmed = isAlarmed(result);
+  const lead = result.cipv?.id ?? null,
+    acted = reactsTo(result),
+    alarmed = isAlarmed(result);
   /** @param {number} id */
   const boxOf = (id) => display.vision_boxes[id] ?? display.lidar_boxes[id];
   const important = (/** @type {number} */ id) => id === lead || id === acted;
@@ -86,8 +96,10 @@ function drawObjects(ctx, { result, display }, X, Y) {
 /** @param {CanvasRenderingContext2D} ctx @param {string} words @param {number} x @param {number} y of its lower left corner @param {string} tint */
 function drawTag(ctx, words, x, y, tint) {
   ctx.font = `700 ${TAG_PX}px system-ui, "DejaVu Sans", sans-serif`;
-  const width = ctx.measureText(words).width + 16, height = TAG_PX + 10;
-  const left = Math.max(2, Math.min(x - 2, surface.width - width - 2)), top = Math.max(2, Math.min(y - height, surface.height - height - 2));
+  const width = ctx.measureText(words).width + 16,
+    height = TAG_PX + 10;
+  const left = Math.max(2, Math.min(x - 2, surface.width - width - 2)),
+    top = Math.max(2, Math.min(y - height, surface.height - height - 2));
   ctx.fillStyle = tint;
   ctx.beginPath();
   ctx.roundRect(left, top, width, height, 6);

@@ -22,13 +22,20 @@ export function setUp() {
 }
 
 function update() {
-  const frame = get("frame"), streams = get("state")?.streams ?? {};
+  const frame = get("frame"),
+    streams = get("state")?.streams ?? {};
   if (!frame) return;
   const { sensors, ego } = frame.result;
   /** What the frame has of each; an age alone does not tell, a recording may know no times. @type {Record<string, boolean>} */
   const held = { lidar: Boolean(sensors.lidar?.points), camera: frame.picture !== null, ego: ego !== null };
   const keys = Object.keys(NAMES).filter((key) => key in held || key in streams);
-  keyed(list, keys.map((key) => look(key, held[key] ?? false, streams[key])), ({ key }) => key, create, show);
+  keyed(
+    list,
+    keys.map((key) => look(key, held[key] ?? false, streams[key])),
+    ({ key }) => key,
+    create,
+    show,
+  );
 }
 
 /** @param {string} key @param {boolean} isHeld by the frame @param {Record<string, any>|undefined} stream @returns {Sensor} */
@@ -36,7 +43,11 @@ function look(key, isHeld, stream) {
   if (stream) {
     /** @type {Health} */
     const health = stream.state === "ok" ? "ok" : stream.state === "stale" ? "stale" : "gone";
-    return { key, health, detail: health === "ok" && stream.rate_hz ? `${num(stream.rate_hz, 0)} Hz` : health === "ok" ? "" : stream.state };
+    return {
+      key,
+      health,
+      detail: health === "ok" && stream.rate_hz ? `${num(stream.rate_hz, 0)} Hz` : health === "ok" ? "" : stream.state,
+    };
   }
   return isHeld ? { key, health: "ok", detail: "" } : { key, health: "gone", detail: "none" };
 }

@@ -19,7 +19,7 @@ import * as notices from "./panels/notices.js";
 import * as objects from "./panels/objects_table.js";
 import * as params from "./panels/params.js";
 import * as sources from "./panels/open_dialog.js";
-import * as exporting from "./timeline/export.js";
+import * as exporting from "./timeline/export_menu.js";
 import * as timeline from "./timeline/pane.js";
 import * as three from "./views/three.js";
 import * as trails from "./views/drawing/trails.js";

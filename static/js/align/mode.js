@@ -16,12 +16,19 @@ import { grow } from "../workspace/panes.js";
 const PAUSE_MS = 250;
 const OFF = { on: false, blend: 0.5, edges: true };
 
-const bar = $("#align-bar"), button = $("#align-button");
-const score = el("b", { class: "score", title: "How well the LiDAR's depth edges lie on the picture's edges", textContent: "looking …" });
+const bar = $("#align-bar"),
+  button = $("#align-button");
+const score = el("b", {
+  class: "score",
+  title: "How well the LiDAR's depth edges lie on the picture's edges",
+  textContent: "looking …",
+});
 const how = el("span", { class: "facts" });
 
 const fetchScore = newestOnly(async () => {
-  const found = /** @type {import("../core/types.js").AlignmentScore|Error} */ (await request("api/alignment/score").catch((error) => error));
+  const found = /** @type {import("../core/types.js").AlignmentScore|Error} */ (
+    await request("api/alignment/score").catch((error) => error)
+  );
   text(score, found instanceof Error ? "no score" : found.brief);
   score.title = found instanceof Error ? found.message : found.text;
   await new Promise((done) => setTimeout(done, PAUSE_MS));
@@ -30,7 +37,16 @@ const fetchScore = newestOnly(async () => {
 export function setUp() {
   set("align", OFF);
   button.addEventListener("click", toggleAlign);
-  bar.append(model("angular"), model("pinhole"), el("span", { class: "facts", textContent: "Match" }), score, el("span", { class: "spacer" }), how, blendSlider(), edgesButton());
+  bar.append(
+    model("angular"),
+    model("pinhole"),
+    el("span", { class: "facts", textContent: "Match" }),
+    score,
+    el("span", { class: "spacer" }),
+    how,
+    blendSlider(),
+    edgesButton(),
+  );
   followHand($("#camera", HTMLCanvasElement), isOn);
   addLayer((ctx, frame, place) => isOn() && get("align")?.edges && drawEdges(ctx, frame, place));
   on(["frame"], () => isOn() && fetchScore(undefined));
@@ -52,8 +68,12 @@ function reflect() {
   press(button, isOn());
   document.body.classList.toggle("is-aligning", isOn());
   const isAngular = get("params")?.values["alignment.model"] === "angular";
-  text(how, isAngular ? "Drag: origin · wheel: h_res and v_res · shift wheel: v_res" : "Drag: yaw and pitch · wheel: roll");
-  for (const choice of bar.querySelectorAll("[data-model]")) press(choice, /** @type {HTMLElement} */ (choice).dataset.model === get("params")?.values["alignment.model"]);
+  text(
+    how,
+    isAngular ? "Drag: origin · wheel: h_res and v_res · shift wheel: v_res" : "Drag: yaw and pitch · wheel: roll",
+  );
+  for (const choice of bar.querySelectorAll("[data-model]"))
+    press(choice, /** @type {HTMLElement} */ (choice).dataset.model === get("params")?.values["alignment.model"]);
 }
 
 /** @param {string} name */
@@ -63,7 +83,14 @@ function model(name) {
 }
 
 function blendSlider() {
-  const range = el("input", { type: "range", min: "0", max: "1", step: "0.01", value: String(OFF.blend), aria: { label: "Blend of picture and cloud" } });
+  const range = el("input", {
+    type: "range",
+    min: "0",
+    max: "1",
+    step: "0.01",
+    value: String(OFF.blend),
+    aria: { label: "Blend of picture and cloud" },
+  });
   range.addEventListener("input", () => set("align", { ...(get("align") ?? OFF), blend: Number(range.value) }));
   return el("label", { class: "blend" }, "Picture", range, "Cloud");
 }

@@ -26,7 +26,8 @@ export function drawEdges(target, frame, place) {
 
 /** Leave the edges on the canvas. @param {ImageBitmap} bitmap */
 function find(bitmap) {
-  const width = Math.min(WIDTH_PX, bitmap.width), height = Math.max(1, Math.round((bitmap.height * width) / bitmap.width));
+  const width = Math.min(WIDTH_PX, bitmap.width),
+    height = Math.max(1, Math.round((bitmap.height * width) / bitmap.width));
   canvas.width = width;
   canvas.height = height;
   ctx.drawImage(bitmap, 0, 0, width, height);
@@ -43,7 +44,8 @@ function find(bitmap) {
 /** @param {Uint8ClampedArray} rgba */
 function brightness(rgba) {
   const grey = new Float32Array(rgba.length / 4);
-  for (let i = 0; i < grey.length; i++) grey[i] = 0.299 * rgba[4 * i] + 0.587 * rgba[4 * i + 1] + 0.114 * rgba[4 * i + 2];
+  for (let i = 0; i < grey.length; i++)
+    grey[i] = 0.299 * rgba[4 * i] + 0.587 * rgba[4 * i + 1] + 0.114 * rgba[4 * i + 2];
   return grey;
 }
 
@@ -52,12 +54,20 @@ function brightness(rgba) {
  * @param {Float32Array} grey @param {number} width @param {number} height
  */
 function gradient(grey, width, height) {
-  const strength = new Float32Array(grey.length), step = new Int32Array(grey.length);
+  const strength = new Float32Array(grey.length),
+    step = new Int32Array(grey.length);
   for (let y = 1; y < height - 1; y++) {
     for (let i = y * width + 1; i < (y + 1) * width - 1; i++) {
-      const a = grey[i - width - 1], b = grey[i - width], c = grey[i - width + 1], d = grey[i - 1];
-      const e = grey[i + 1], f = grey[i + width - 1], g = grey[i + width], h = grey[i + width + 1];
-      const across = Math.abs(c + 2 * e + h - a - 2 * d - f), down = Math.abs(f + 2 * g + h - a - 2 * b - c);
+      const a = grey[i - width - 1],
+        b = grey[i - width],
+        c = grey[i - width + 1],
+        d = grey[i - 1];
+      const e = grey[i + 1],
+        f = grey[i + width - 1],
+        g = grey[i + width],
+        h = grey[i + width + 1];
+      const across = Math.abs(c + 2 * e + h - a - 2 * d - f),
+        down = Math.abs(f + 2 * g + h - a - 2 * b - c);
       strength[i] = across + down;
       step[i] = across > down ? 1 : width;
     }
@@ -66,4 +76,5 @@ function gradient(grey, width, height) {
 }
 
 /** @param {Float32Array} values @param {number} share */
-const quantile = (values, share) => Float32Array.from(values).sort()[Math.min(values.length - 1, Math.floor(share * values.length))];
+const quantile = (values, share) =>
+  Float32Array.from(values).sort()[Math.min(values.length - 1, Math.floor(share * values.length))];

@@ -5,7 +5,8 @@ import { get } from "../core/store.js";
 
 /** @typedef {Record<string, number>} Values */
 
-const SCALE_PER_PX = 0.0002, ROLL_PER_PX_DEG = 0.004;
+const SCALE_PER_PX = 0.0002,
+  ROLL_PER_PX_DEG = 0.004;
 /** A turning wheel has ended when it rests this long. */
 const REST_MS = 400;
 
@@ -30,21 +31,30 @@ export function followHand(canvas, isOn) {
     drag = null;
   };
   for (const name of /** @type {const} */ (["pointerup", "pointercancel"])) canvas.addEventListener(name, lift);
-  canvas.addEventListener("wheel", (event) => {
-    if (!isOn()) return;
-    event.preventDefault();
-    const turned = wheeled(present(), event.deltaY || event.deltaX, event.shiftKey);
-    change(turned, false);
-    clearTimeout(rest);
-    rest = setTimeout(() => change(turned, true), REST_MS);
-  }, { passive: false });
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      if (!isOn()) return;
+      event.preventDefault();
+      const turned = wheeled(present(), event.deltaY || event.deltaX, event.shiftKey);
+      change(turned, false);
+      clearTimeout(rest);
+      rest = setTimeout(() => change(turned, true), REST_MS);
+    },
+    { passive: false },
+  );
 }
 
 /** The alignment's numbers as they are, whether set or taken from the calibration. @returns {Values} */
 function present() {
   const params = get("params");
   const names = ["h_res_deg", "v_res_deg", "cx_px", "cy_px", "yaw_deg", "pitch_deg", "roll_deg"];
-  return Object.fromEntries(names.map((name) => [name, Number(params?.values[`alignment.${name}`] ?? params?.effective[`alignment.${name}`] ?? 0)]));
+  return Object.fromEntries(
+    names.map((name) => [
+      name,
+      Number(params?.values[`alignment.${name}`] ?? params?.effective[`alignment.${name}`] ?? 0),
+    ]),
+  );
 }
 
 const isAngular = () => get("params")?.values["alignment.model"] === "angular";
@@ -55,15 +65,21 @@ const isAngular = () => get("params")?.values["alignment.model"] === "angular";
  */
 function shifted(from, dx, dy) {
   const perPixel = 1 / (place().scale * (get("frame")?.picture?.scale ?? 1));
-  const du = dx * perPixel, dv = dy * perPixel;
-  if (isAngular()) return { "alignment.cx_px": Math.round(from.cx_px + du), "alignment.cy_px": Math.round(from.cy_px + dv) };
-  return { "alignment.yaw_deg": rounded(from.yaw_deg + du * from.h_res_deg, 3), "alignment.pitch_deg": rounded(from.pitch_deg - dv * from.v_res_deg, 3) };
+  const du = dx * perPixel,
+    dv = dy * perPixel;
+  if (isAngular())
+    return { "alignment.cx_px": Math.round(from.cx_px + du), "alignment.cy_px": Math.round(from.cy_px + dv) };
+  return {
+    "alignment.yaw_deg": rounded(from.yaw_deg + du * from.h_res_deg, 3),
+    "alignment.pitch_deg": rounded(from.pitch_deg - dv * from.v_res_deg, 3),
+  };
 }
 
 /** @param {Values} from @param {number} turn @param {boolean} onlyDown @returns {Values} */
 function wheeled(from, turn, onlyDown) {
   if (!isAngular()) return { "alignment.roll_deg": rounded(from.roll_deg + turn * ROLL_PER_PX_DEG, 3) };
-  const factor = Math.exp(turn * SCALE_PER_PX), down = { "alignment.v_res_deg": rounded(from.v_res_deg * factor, 5) };
+  const factor = Math.exp(turn * SCALE_PER_PX),
+    down = { "alignment.v_res_deg": rounded(from.v_res_deg * factor, 5) };
   return onlyDown ? down : { ...down, "alignment.h_res_deg": rounded(from.h_res_deg * factor, 5) };
 }
 

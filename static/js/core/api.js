@@ -40,7 +40,8 @@ const newerOf = (_, newer) => newer;
  * @param {(waiting: T, newer: T) => T} merge  what to keep of two that wait
  */
 export function newestOnly(send, merge = newerOf) {
-  let busy = false, hasWaiting = false;
+  let busy = false,
+    hasWaiting = false;
   /** @type {T|undefined} undefined is a body too */
   let waiting;
   let idle = Promise.resolve();
@@ -49,7 +50,8 @@ export function newestOnly(send, merge = newerOf) {
     try {
       await send(body);
     } finally {
-      const next = /** @type {T} */ (waiting), goesOn = hasWaiting;
+      const next = /** @type {T} */ (waiting),
+        goesOn = hasWaiting;
       waiting = undefined;
       hasWaiting = false;
       busy = goesOn;
@@ -72,8 +74,14 @@ export function newestOnly(send, merge = newerOf) {
 /** @typedef {{playing?: boolean, seek?: number, step?: number, speed?: number, loop?: boolean}} PlaybackChange */
 
 /** @param {PlaybackChange} waiting @param {PlaybackChange} newer */
-const merged = (waiting, newer) => ({ ...waiting, ...newer, ...(newer.step ? { step: (waiting.step ?? 0) + newer.step } : {}) });
+const merged = (waiting, newer) => ({
+  ...waiting,
+  ...newer,
+  ...(newer.step ? { step: (waiting.step ?? 0) + newer.step } : {}),
+});
 
 /** Change playback. */
 export const playback = newestOnly(
-  (/** @type {PlaybackChange} */ body) => request("api/playback", "POST", body).catch(() => {}), merged);
+  (/** @type {PlaybackChange} */ body) => request("api/playback", "POST", body).catch(() => {}),
+  merged,
+);

@@ -34,13 +34,20 @@ export const roleOf = (item, cipvId) => (item.id === cipvId ? "cipv" : ROLE_OF_S
 export const cipvId = () => get("frame")?.result.cipv?.id ?? null;
 
 /** Near is warm, far is cold; no green and no magenta, which mean something. */
-const STOPS = [[255, 86, 56], [255, 160, 30], [250, 226, 90], [150, 205, 255], [80, 120, 255], [90, 80, 200]];
+const STOPS = [
+  [255, 86, 56],
+  [255, 160, 30],
+  [250, 226, 90],
+  [150, 205, 255],
+  [80, 120, 255],
+  [90, 80, 200],
+];
 const RANGE_STEPS = 32;
 export const RANGE_MAX_M = 70;
 
 /** `RANGE_STEPS` colours [r, g, b] from 0 m to `RANGE_MAX_M`. */
 export const RANGE_COLORS = Array.from({ length: RANGE_STEPS }, (_, i) => {
-  const at = (Math.sqrt(i / (RANGE_STEPS - 1))) * (STOPS.length - 1);
+  const at = Math.sqrt(i / (RANGE_STEPS - 1)) * (STOPS.length - 1);
   const low = Math.min(Math.floor(at), STOPS.length - 2);
   return STOPS[low].map((c, k) => Math.round(c + (STOPS[low + 1][k] - c) * (at - low)));
 });

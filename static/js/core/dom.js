@@ -33,7 +33,8 @@ export function el(tag, props = {}, ...children) {
   const { class: className, data, aria, style, ...rest } = props;
   if (className) node.className = className;
   for (const [key, value] of Object.entries(data ?? {})) node.dataset[key] = String(value);
-  for (const [key, value] of Object.entries(aria ?? {})) node.setAttribute(key === "role" ? "role" : `aria-${key}`, String(value));
+  for (const [key, value] of Object.entries(aria ?? {}))
+    node.setAttribute(key === "role" ? "role" : `aria-${key}`, String(value));
   for (const [key, value] of Object.entries(style ?? {})) node.style.setProperty(key, value);
   Object.assign(node, rest);
   node.append(.../** @type {(Node|string)[]} */ (children.filter((child) => child !== null && child !== undefined)));
@@ -61,9 +62,11 @@ const kept = new WeakMap();
  * @param {(item: T) => N} create @param {(node: N, item: T) => void} update
  */
 export function keyed(parent, items, keyOf, create, update) {
-  const before = kept.get(parent) ?? new Map(), now = new Map();
+  const before = kept.get(parent) ?? new Map(),
+    now = new Map();
   items.forEach((item, place) => {
-    const key = keyOf(item), node = before.get(key) ?? create(item);
+    const key = keyOf(item),
+      node = before.get(key) ?? create(item);
     now.set(key, node);
     update(node, item);
     if (parent.children[place] !== node) parent.insertBefore(node, parent.children[place] ?? null);

@@ -4,7 +4,12 @@ export const DASH = "–";
 
 /** @param {number|null|undefined} value @param {number} [digits] */
 export function num(value, digits = 1) {
-  return value === null || value === undefined ? DASH : value.toFixed(digits).replace(/^-(?=0(\.0*)?$)/, "").replace("-", "−");
+  return value === null || value === undefined
+    ? DASH
+    : value
+        .toFixed(digits)
+        .replace(/^-(?=0(\.0*)?$)/, "")
+        .replace("-", "−");
 }
 
 /** With its sign, unless it is shown as 0. @param {number|null|undefined} value @param {number} [digits] */
@@ -23,7 +28,8 @@ export const ttc = (seconds) => ((seconds ?? 0) > LONG_S ? `> ${LONG_S}` : num(s
 
 /** Seconds as m:ss.s @param {number} seconds */
 export function clock(seconds) {
-  const tenths = Math.round(10 * seconds), minutes = Math.floor(tenths / 600); // rounded first: 59.97 s is 1:00.0
+  const tenths = Math.round(10 * seconds),
+    minutes = Math.floor(tenths / 600); // rounded first: 59.97 s is 1:00.0
   return `${minutes}:${((tenths - 600 * minutes) / 10).toFixed(1).padStart(4, "0")}`;
 }
 

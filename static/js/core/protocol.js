@@ -17,8 +17,14 @@ export function decode(buffer) {
   /** Where the next array of so many bytes begins. @param {number} bytes */
   const next = (bytes) => (end += bytes) - bytes;
   const frame = {
-    madeUnixMs: header.made_unix_ms, detectMs: header.detect_ms, state: header.state, result: header.result,
-    display: header.display, picture: header.picture, bitmap: null, count,
+    madeUnixMs: header.made_unix_ms,
+    detectMs: header.detect_ms,
+    state: header.state,
+    result: header.result,
+    display: header.display,
+    picture: header.picture,
+    bitmap: null,
+    count,
     xyz: new Int16Array(buffer, next(6 * count), 3 * count),
     uv: new Int16Array(buffer, next(4 * count), 2 * count),
     owner: new Uint16Array(buffer, next(2 * count), count),

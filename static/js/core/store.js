@@ -19,6 +19,7 @@
  * @property {{first: number, last: number}} clip  what is marked for export
  * @property {import("../workspace/panes.js").Layout} layout
  * @property {{on: boolean, blend: number, edges: boolean}} align  alignment mode
+ * @property {number} lanes  how many lanes the timeline has
  * @property {Labeling} labeling  the mode in which people label
  * @property {import("../labeling/state/labels.js").Labels} labels
  * @property {number} labelFrames  grows when what is labelled in some frames has come
@@ -45,7 +46,8 @@ const listeners = new Map();
 const due = new Set();
 /** @type {Set<() => void>} */
 const after = new Set();
-let isAsked = false, hasWaited = false;
+let isAsked = false,
+  hasWaited = false;
 
 /** @template {Key} K @param {K} key @returns {Values[K]|null} */
 export function get(key) {

@@ -1,7 +1,8 @@
 /** One tooltip for the page: help that appears on hover and on keyboard focus, and what lies under the pointer in a view. */
 import { $ } from "./dom.js";
 
-const GAP_PX = 6, POINTER_PX = 14;
+const GAP_PX = 6,
+  POINTER_PX = 14;
 const tip = $("#tooltip");
 
 /** @param {HTMLElement} node @param {string} words */

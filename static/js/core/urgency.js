@@ -1,6 +1,7 @@
 /** How urgent it is: the shades of time to collision, and the words for what ACC does. */
 
-export const TTC_DANGER_S = 2.5, TTC_WARN_S = 5;
+export const TTC_DANGER_S = 2.5,
+  TTC_WARN_S = 5;
 
 /** @param {number|null|undefined} ttc_s @returns {"danger"|"warn"|"none"} */
 export function urgencyOf(ttc_s) {
@@ -10,5 +11,10 @@ export function urgencyOf(ttc_s) {
 
 /** @type {Record<import("./types.js").AccState, string>} */
 export const ACC_WORDS = {
-  cruise: "Cruise", follow: "Follow", stop: "Stop", warn: "Warn", partial_brake: "Partial brake", full_brake: "Full brake",
+  cruise: "Cruise",
+  follow: "Follow",
+  stop: "Stop",
+  warn: "Warn",
+  partial_brake: "Partial brake",
+  full_brake: "Full brake",
 };

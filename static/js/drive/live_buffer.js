@@ -89,7 +89,15 @@ function remember() {
     for (const name of NAMES) columns[name].shift();
   }
   for (const mark of marks) mark.index = placeOf(mark.t_s);
-  set("drive", { uri, count: times.length, t_s: times, now: { run: -1, done: times.length, columns }, base: null, events: marks, comparison: null });
+  set("drive", {
+    uri,
+    count: times.length,
+    t_s: times,
+    now: { run: -1, done: times.length, columns },
+    base: null,
+    events: marks,
+    comparison: null,
+  });
 }
 
 /** The frame at a time; of one that is not held any more, far before all. @param {number} t_s */

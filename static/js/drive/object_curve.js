@@ -14,7 +14,8 @@ export function setUp() {
 }
 
 function follow() {
-  const id = get("selection"), now = get("drive")?.now;
+  const id = get("selection"),
+    now = get("drive")?.now;
   const key = `${id} ${now?.run} ${now?.done}`;
   if (key === known) return;
   known = key;

@@ -18,12 +18,13 @@ export function setUp() {
 /** The frame that the timeline stands at: where a seek is going, else the shown one; of live sensors the newest. */
 export function here() {
   const state = get("state");
-  return state?.live ? Math.max(0, (get("drive")?.count ?? 1) - 1) : get("scrub") ?? state?.index ?? 0;
+  return state?.live ? Math.max(0, (get("drive")?.count ?? 1) - 1) : (get("scrub") ?? state?.index ?? 0);
 }
 
 /** @param {number} index beyond the ends is the first or last frame */
 export function seekTo(index) {
-  const state = get("state"), count = state?.count ?? 0;
+  const state = get("state"),
+    count = state?.count ?? 0;
   if (!count || state?.live) return;
   const target = Math.min(count - 1, Math.max(0, Math.round(index)));
   set("scrub", target);

@@ -7,7 +7,8 @@ import { get, on, set } from "../core/store.js";
 /** @typedef {Pick<Drive, "events"|"comparison">} Findings */
 
 /** While a run is under way, columns are fetched no more often than this, and what is found in them less often. */
-const PAUSE_MS = 200, FINDINGS_PAUSE_MS = 1000;
+const PAUSE_MS = 200,
+  FINDINGS_PAUSE_MS = 1000;
 
 let known = "";
 /** @type {Record<number, Series>} the runs shown, by number */
@@ -26,7 +27,8 @@ export function setUp() {
 function follow() {
   const state = get("state");
   if (!state || state.live || state.drive.run === null) return;
-  const { revision, run, base } = state.drive, key = `${state.uri} ${revision} ${run} ${base} ${base === null ? "" : state.labels?.revision}`;
+  const { revision, run, base } = state.drive,
+    key = `${state.uri} ${revision} ${run} ${base} ${base === null ? "" : state.labels?.revision}`;
   if (key === known) return;
   known = key;
   refresh(key);
@@ -43,7 +45,14 @@ async function fetchAll() {
   held = Object.fromEntries([now, old].filter((series) => series !== null).map((series) => [series.run, series]));
   const found = await findings(before, now, old);
   if (get("state")?.uri !== state.uri) return;
-  set("drive", { uri: state.uri, count: state.count, t_s: t_s.length ? t_s : before?.t_s ?? [], now, base: old, ...found });
+  set("drive", {
+    uri: state.uri,
+    count: state.count,
+    t_s: t_s.length ? t_s : (before?.t_s ?? []),
+    now,
+    base: old,
+    ...found,
+  });
 }
 
 /**
@@ -54,12 +63,18 @@ async function fetchSeries(run, path) {
   const from = held[run]?.done ?? 0;
   const answer = /** @type {import("./types.js").ColumnsAnswer} */ (await request(`${path}?from=${from}`));
   const isMore = answer.run === run && from > 0;
-  return [isMore ? extended(held[run], answer) : { run: answer.run, done: answer.done, columns: answer.columns }, answer.t_s];
+  return [
+    isMore ? extended(held[run], answer) : { run: answer.run, done: answer.done, columns: answer.columns },
+    answer.t_s,
+  ];
 }
 
 /** @param {Series} series @param {import("./types.js").ColumnsAnswer} more @returns {Series} */
 function extended({ run, columns }, more) {
-  const joined = Object.entries(more.columns).map(([name, values]) => [name, [...columns[/** @type {keyof typeof columns} */ (name)].slice(0, more.from), ...values]]);
+  const joined = Object.entries(more.columns).map(([name, values]) => [
+    name,
+    [...columns[/** @type {keyof typeof columns} */ (name)].slice(0, more.from), ...values],
+  ]);
   return { run, done: more.done, columns: Object.fromEntries(joined) };
 }
 
@@ -69,7 +84,8 @@ async function findings(before, now, base) {
   if (isSame && get("state")?.drive.running && performance.now() - foundAt_ms < FINDINGS_PAUSE_MS) return before;
   foundAt_ms = performance.now();
   const [{ events }, compared] = await Promise.all([
-    request("api/drive/events"), base ? request("api/compare").catch(() => null) : null, // by numbers one may be gone by now
+    request("api/drive/events"),
+    base ? request("api/compare").catch(() => null) : null, // by numbers one may be gone by now
   ]);
   return { events, comparison: compared?.base === base?.run && compared?.run === now.run ? compared : null };
 }

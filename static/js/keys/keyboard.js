@@ -3,20 +3,36 @@ import { $ } from "../core/dom.js";
 import { keymap } from "./keymap.js";
 
 /** What the 3D view is flown through with, whatever is held besides (viser's CAMERA_MOVEMENT_KEYS): it keeps these. */
-const FLYING = new Set(["KeyW", "KeyA", "KeyS", "KeyD", "KeyQ", "KeyE", "ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight"]);
+const FLYING = new Set([
+  "KeyW",
+  "KeyA",
+  "KeyS",
+  "KeyD",
+  "KeyQ",
+  "KeyE",
+  "ArrowUp",
+  "ArrowDown",
+  "ArrowLeft",
+  "ArrowRight",
+]);
 
 export function setUp() {
   const bindings = keymap().flatMap((group) => group.bindings);
   const act = (/** @type {KeyboardEvent} */ event) => {
     if (event.altKey || event.defaultPrevented || isTaken(event)) return;
-    const name = nameOf(event), binding = bindings.find(({ keys, isOn }) => keys.includes(name) && (isOn?.() ?? true));
+    const name = nameOf(event),
+      binding = bindings.find(({ keys, isOn }) => keys.includes(name) && (isOn?.() ?? true));
     if (!binding) return;
     event.preventDefault();
     binding.act();
   };
   document.addEventListener("keydown", act);
   // the 3D view is a page of its own, of our origin: its keys are heard there
-  $("#three-body").addEventListener("load", ({ target }) => target instanceof HTMLIFrameElement && hearIn(target, act), true);
+  $("#three-body").addEventListener(
+    "load",
+    ({ target }) => target instanceof HTMLIFrameElement && hearIn(target, act),
+    true,
+  );
 }
 
 /** @param {HTMLIFrameElement} view @param {(event: KeyboardEvent) => void} act */
@@ -36,14 +52,16 @@ function giveBack(view) {
 /** "Shift+1" whatever the keyboard prints there, "Ctrl+z", "?", "Space". @param {KeyboardEvent} event */
 function nameOf({ key, code, shiftKey, ctrlKey, metaKey }) {
   const digit = /^Digit(\d)$/.exec(code)?.[1];
-  const bare = key === " " ? "Space" : shiftKey && digit ? digit : key.length === 1 && !shiftKey ? key.toLowerCase() : key;
+  const bare =
+    key === " " ? "Space" : shiftKey && digit ? digit : key.length === 1 && !shiftKey ? key.toLowerCase() : key;
   const isSaid = shiftKey && (digit !== undefined || bare.length > 1 || bare.toLowerCase() !== bare.toUpperCase());
   return `${ctrlKey || metaKey ? "Ctrl+" : ""}${isSaid ? "Shift+" : ""}${bare}`;
 }
 
 /** True when the focused element means the key for itself. @param {KeyboardEvent} event */
 function isTaken({ target, key, ctrlKey, metaKey }) {
-  if (document.querySelector("dialog[open]") || (key === "Escape" && document.querySelector(":popover-open"))) return true;
+  if (document.querySelector("dialog[open]") || (key === "Escape" && document.querySelector(":popover-open")))
+    return true;
   const focused = /** @type {Element} */ (target); // maybe another page's, whose elements are none of our HTMLElement
   if (!("matches" in focused)) return false;
   if (focused.matches("select, textarea, input:not([type=range]):not([type=checkbox])")) return true;

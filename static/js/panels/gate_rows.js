@@ -33,7 +33,8 @@ const HEADROOM = 1.2;
 export const kindOf = (name) => KINDS[name] ?? { label: name.replaceAll("_", " "), test: "flag" };
 
 /** A number with its unit. @param {number|null} value @param {Kind} kind */
-export const quantity = (value, { unit }) => (value === null ? DASH : `${num(value, digits(value))}${unit ? ` ${unit}` : ""}`);
+export const quantity = (value, { unit }) =>
+  value === null ? DASH : `${num(value, digits(value))}${unit ? ` ${unit}` : ""}`;
 
 /** @param {number} value */
 const digits = (value) => (Number.isInteger(value) ? 0 : Math.abs(value) < 10 ? 2 : 1);
@@ -42,18 +43,28 @@ const digits = (value) => (Number.isInteger(value) ? 0 : Math.abs(value) < 10 ? 
 export function gateRow({ name }) {
   const { label, param } = kindOf(name);
   const title = param ? `Limit set by ${param}: press to go there` : label;
-  const row = el("button", { type: "button", class: "gate", title, disabled: !param, onclick: () => param && reveal(param)?.focus() },
-    el("i", { class: "sign" }), el("span", { class: "name", textContent: label }), el("span", { class: "number" }), el("span", { class: "bar" }, el("i"), el("b")));
+  const row = el(
+    "button",
+    { type: "button", class: "gate", title, disabled: !param, onclick: () => param && reveal(param)?.focus() },
+    el("i", { class: "sign" }),
+    el("span", { class: "name", textContent: label }),
+    el("span", { class: "number" }),
+    el("span", { class: "bar" }, el("i"), el("b")),
+  );
   return row;
 }
 
 /** @param {HTMLElement} row @param {Gate} gate */
 export function showGate(row, gate) {
-  const kind = kindOf(gate.name), [, , number, bar] = /** @type {HTMLElement[]} */ ([...row.children]);
+  const kind = kindOf(gate.name),
+    [, , number, bar] = /** @type {HTMLElement[]} */ ([...row.children]);
   mark(row, "passed", gate.passed ? "yes" : "no");
   const sign = signOf(kind, gate);
   const limit = sign && gate.limit !== null ? ` ${sign} ${quantity(gate.limit, { ...kind, unit: "" })}` : "";
-  text(number, kind.test === "flag" && !kind.unit ? (gate.passed ? "yes" : "no") : `${quantity(gate.value, kind)}${limit}`);
+  text(
+    number,
+    kind.test === "flag" && !kind.unit ? (gate.passed ? "yes" : "no") : `${quantity(gate.value, kind)}${limit}`,
+  );
   row.setAttribute("aria-label", `${kind.label}: ${number.textContent}, ${gate.passed ? "passed" : "failed"}`);
   const isMeasured = sign !== "" && gate.value !== null && gate.limit !== null;
   bar.classList.toggle("is-empty", !isMeasured);
@@ -68,5 +79,7 @@ function signOf({ test }, { value, limit, passed }) {
   if (test === "flag" || limit === null) return "";
   const holds = value !== null && (test === "least" ? value >= limit : value <= limit);
   if (holds !== passed) return "–";
-  return { least: { true: "≥", false: "<" }, most: { true: "≤", false: ">" } }[test][/** @type {"true"|"false"} */ (String(holds))];
+  return { least: { true: "≥", false: "<" }, most: { true: "≤", false: ">" } }[test][
+    /** @type {"true"|"false"} */ (String(holds))
+  ];
 }

@@ -6,15 +6,38 @@ import { ACC_WORDS, urgencyOf } from "../core/urgency.js";
 
 /** @typedef {import("../core/types.js").Result} Result */
 
-const source = el("span", { class: "pill" }), name = el("span"), reason = el("p", { class: "reason" });
-const lead = el("div", { class: "card lead" }, el("div", { class: "title", aria: { live: "polite" } }, source, name), reason);
-const distance = figure("distance", "Distance", "m"), closing = figure("closing", "Closing speed", "km/h"), ttc = figure("ttc", "Time to collision", "s");
-const state = el("span", { class: "state" }), desired = el("span"), note = el("p", { class: "note" });
+const source = el("span", { class: "pill" }),
+  name = el("span"),
+  reason = el("p", { class: "reason" });
+const lead = el(
+  "div",
+  { class: "card lead" },
+  el("div", { class: "title", aria: { live: "polite" } }, source, name),
+  reason,
+);
+const distance = figure("distance", "Distance", "m"),
+  closing = figure("closing", "Closing speed", "km/h"),
+  ttc = figure("ttc", "Time to collision", "s");
+const state = el("span", { class: "state" }),
+  desired = el("span"),
+  note = el("p", { class: "note" });
 const pedals = { accelerator: bar("--ok"), brake: bar("--danger") };
-const acc = el("div", { class: "card acc" },
+const acc = el(
+  "div",
+  { class: "card acc" },
   el("div", { class: "top" }, el("span", { class: "label", textContent: "ACC" }), state, desired),
-  el("div", { class: "pedals" }, el("span", { textContent: "accel" }), pedals.accelerator.node, pedals.accelerator.value,
-    el("span", { textContent: "brake" }), pedals.brake.node, pedals.brake.value), note);
+  el(
+    "div",
+    { class: "pedals" },
+    el("span", { textContent: "accel" }),
+    pedals.accelerator.node,
+    pedals.accelerator.value,
+    el("span", { textContent: "brake" }),
+    pedals.brake.node,
+    pedals.brake.value,
+  ),
+  note,
+);
 
 export function setUp() {
   $("#banner").append(lead, distance.card, closing.card, ttc.card, acc);
@@ -24,8 +47,12 @@ export function setUp() {
 /** @param {string} key @param {string} label @param {string} unit */
 function figure(key, label, unit) {
   const value = el("span", { textContent: DASH });
-  const card = el("div", { class: "card", data: { figure: key } }, el("div", { class: "label", textContent: label }),
-    el("div", { class: "value" }, value, el("small", { textContent: unit })));
+  const card = el(
+    "div",
+    { class: "card", data: { figure: key } },
+    el("div", { class: "label", textContent: label }),
+    el("div", { class: "value" }, value, el("small", { textContent: unit })),
+  );
   return { card, value };
 }
 
@@ -58,7 +85,9 @@ function update() {
 /** @param {Result} result */
 function whyNone(result) {
   const n = result.rejected.length;
-  return n ? `${n} object${n > 1 ? "s" : ""} considered; the reasons are in the table.` : "Nothing was seen in this frame.";
+  return n
+    ? `${n} object${n > 1 ? "s" : ""} considered; the reasons are in the table.`
+    : "Nothing was seen in this frame.";
 }
 
 /** @param {Result} result */

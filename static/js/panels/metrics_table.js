@@ -4,13 +4,31 @@ import { DASH, num, signed } from "../core/format.js";
 
 /** @typedef {import("../drive/types.js").Metric} Metric */
 
-const JUDGES = { labels: "what people labelled here", recording: "the labels that come with the recording", simulator: "the simulator's truth" };
+const JUDGES = {
+  labels: "what people labelled here",
+  recording: "the labels that come with the recording",
+  simulator: "the simulator's truth",
+};
 
 /** @param {Pick<import("../drive/types.js").Comparison, "metrics"|"truth"|"judged">} comparison @param {boolean} [isAlone] there is nothing to compare with: one column @returns {HTMLElement} */
 export function metricsTable({ metrics, truth, judged }, isAlone = false) {
-  const judge = truth ? `Judged in ${judged} ${judged === 1 ? "frame" : "frames"} against ${JUDGES[truth]}` : "Without labels: what needs none";
-  const head = (isAlone ? [] : ["", "before", "after", "change"]).map((words) => el("th", { scope: "col", textContent: words }));
-  return el("div", {}, el("table", { class: "metrics" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...metrics.map((metric) => row(metric, isAlone)))), el("p", { class: "facts", textContent: judge }));
+  const judge = truth
+    ? `Judged in ${judged} ${judged === 1 ? "frame" : "frames"} against ${JUDGES[truth]}`
+    : "Without labels: what needs none";
+  const head = (isAlone ? [] : ["", "before", "after", "change"]).map((words) =>
+    el("th", { scope: "col", textContent: words }),
+  );
+  return el(
+    "div",
+    {},
+    el(
+      "table",
+      { class: "metrics" },
+      el("thead", {}, el("tr", {}, ...head)),
+      el("tbody", {}, ...metrics.map((metric) => row(metric, isAlone))),
+    ),
+    el("p", { class: "facts", textContent: judge }),
+  );
 }
 
 /** @param {Metric} metric @param {boolean} isAlone */
@@ -20,8 +38,14 @@ function row(metric, isAlone) {
   const change = base === null || run === null ? null : run - base;
   const title = el("th", { scope: "row", textContent: unit ? `${name}, ${unit}` : name });
   if (isAlone) return el("tr", {}, title, el("td", { textContent: num(run, digits) }));
-  return el("tr", { data: { change: verdict(metric, change) } }, title,
-    el("td", { textContent: num(base, digits) }), el("td", { textContent: num(run, digits) }), el("td", { textContent: change === null ? DASH : change === 0 ? "=" : signed(change, digits) }));
+  return el(
+    "tr",
+    { data: { change: verdict(metric, change) } },
+    title,
+    el("td", { textContent: num(base, digits) }),
+    el("td", { textContent: num(run, digits) }),
+    el("td", { textContent: change === null ? DASH : change === 0 ? "=" : signed(change, digits) }),
+  );
 }
 
 /** @param {Metric} metric @param {number|null} change */

@@ -35,7 +35,9 @@ function update() {
   $("#busy").hidden = !busy;
   document.documentElement.toggleAttribute("data-busy", Boolean(busy)); // what the other panes show is of before
   text($("#busy"), busy ?? "");
-  const notices = [...lost(link), ...ofHand(), ...standing(), ...ofFrame()].filter(({ text: words }) => !dismissed.has(words));
+  const notices = [...lost(link), ...ofHand(), ...standing(), ...ofFrame()].filter(
+    ({ text: words }) => !dismissed.has(words),
+  );
   const key = JSON.stringify(notices);
   if (key === shown) return;
   shown = key;
@@ -46,7 +48,13 @@ function update() {
 function lost(link) {
   if (link?.status !== "lost") return [];
   const seconds = Math.round((Date.now() - link.since) / 1000);
-  return [{ level: "error", text: `Connection lost ${seconds} s ago. What you see is old; trying to reach the server again.`, fixed: true }];
+  return [
+    {
+      level: "error",
+      text: `Connection lost ${seconds} s ago. What you see is old; trying to reach the server again.`,
+      fixed: true,
+    },
+  ];
 }
 
 /** @returns {Shown[]} */
@@ -74,6 +82,11 @@ function notice({ level, text: words, fixed }) {
     dismissed.add(words);
     update();
   };
-  return el("div", { class: "notice", data: { level } }, el("b", { textContent: level }), el("span", { textContent: words }),
-    fixed ? null : el("button", { type: "button", textContent: "✕", aria: { label: "Dismiss" }, onclick: close }));
+  return el(
+    "div",
+    { class: "notice", data: { level } },
+    el("b", { textContent: level }),
+    el("span", { textContent: words }),
+    fixed ? null : el("button", { type: "button", textContent: "✕", aria: { label: "Dismiss" }, onclick: close }),
+  );
 }

@@ -17,16 +17,64 @@ import { get, on, paintAfter, select, set } from "../core/store.js";
 
 /** @type {Column[]} */
 const COLUMNS = [
-  { key: "id", label: "#", help: "Number of the object; it keeps it while it is tracked", words: (o) => `#${o.id}`, by: (o) => o.id },
+  {
+    key: "id",
+    label: "#",
+    help: "Number of the object; it keeps it while it is tracked",
+    words: (o) => `#${o.id}`,
+    by: (o) => o.id,
+  },
   { key: "source", label: "Seen", help: "V camera, L LiDAR, VL both", words: (o) => o.source, by: (o) => o.source },
-  { key: "type", label: "Class", help: "What the detector calls it, and its score", words: (o) => (o.type ? `${o.type} ${num(o.type_score, 2)}` : DASH), by: (o) => o.type ?? "~" },
-  { key: "distance", label: "Distance", help: "To its nearest point, with one sigma, metres", words: distance, by: (o) => o.distance_m ?? Infinity },
-  { key: "velocity", label: "Closing", help: "Closing speed, km/h: positive while the gap shrinks", words: (o) => signed(kmh(closing(o))), by: (o) => -(closing(o) ?? -Infinity) },
-  { key: "ttc", label: "TTC", help: "Time to collision, seconds; a dash when the gap does not shrink", words: (o) => num(o.ttc_s), by: (o) => o.ttc_s ?? Infinity },
-  { key: "offset", label: "Offset", help: "From the middle of the path, metres to the left or right", words: (o) => side(o.path_offset_m), by: (o) => Math.abs(o.path_offset_m ?? Infinity) },
-  { key: "inPath", label: "In path", help: "Inside our corridor, and how probable its sightings so far make that: yes from 50 % on", words: inPath, by: (o) => -(o.in_path_probability ?? Number(o.in_path)) },
+  {
+    key: "type",
+    label: "Class",
+    help: "What the detector calls it, and its score",
+    words: (o) => (o.type ? `${o.type} ${num(o.type_score, 2)}` : DASH),
+    by: (o) => o.type ?? "~",
+  },
+  {
+    key: "distance",
+    label: "Distance",
+    help: "To its nearest point, with one sigma, metres",
+    words: distance,
+    by: (o) => o.distance_m ?? Infinity,
+  },
+  {
+    key: "velocity",
+    label: "Closing",
+    help: "Closing speed, km/h: positive while the gap shrinks",
+    words: (o) => signed(kmh(closing(o))),
+    by: (o) => -(closing(o) ?? -Infinity),
+  },
+  {
+    key: "ttc",
+    label: "TTC",
+    help: "Time to collision, seconds; a dash when the gap does not shrink",
+    words: (o) => num(o.ttc_s),
+    by: (o) => o.ttc_s ?? Infinity,
+  },
+  {
+    key: "offset",
+    label: "Offset",
+    help: "From the middle of the path, metres to the left or right",
+    words: (o) => side(o.path_offset_m),
+    by: (o) => Math.abs(o.path_offset_m ?? Infinity),
+  },
+  {
+    key: "inPath",
+    label: "In path",
+    help: "Inside our corridor, and how probable its sightings so far make that: yes from 50 % on",
+    words: inPath,
+    by: (o) => -(o.in_path_probability ?? Number(o.in_path)),
+  },
   { key: "hits", label: "Hits", help: "Sightings so far", words: (o) => String(o.hits), by: (o) => -o.hits },
-  { key: "points", label: "Points", help: "LiDAR points on it", words: (o) => (o.lidar_points ? String(o.lidar_points) : DASH), by: (o) => -o.lidar_points },
+  {
+    key: "points",
+    label: "Points",
+    help: "LiDAR points on it",
+    words: (o) => (o.lidar_points ? String(o.lidar_points) : DASH),
+    by: (o) => -o.lidar_points,
+  },
 ];
 const TEXTS = new Set(["id", "source", "type"]);
 
@@ -35,10 +83,15 @@ let sort = { key: null, down: false };
 /** An object, and why it is the CIPV or why not. @typedef {{item: FusedObject, why: string}} Row */
 /** @type {WeakMap<HTMLElement, {cells: Record<string, HTMLElement>, reason: HTMLElement}>} */
 const parts = new WeakMap();
-const body = $("#objects tbody"), list = new LongList(body, (/** @type {Row} */ { item }) => item.id, create, fill);
+const body = $("#objects tbody"),
+  list = new LongList(body, (/** @type {Row} */ { item }) => item.id, create, fill);
 
 export function setUp() {
-  const last = el("th", { scope: "col", class: "left reason" }, el("button", { type: "button", textContent: "Why, or why not", disabled: true }));
+  const last = el(
+    "th",
+    { scope: "col", class: "left reason" },
+    el("button", { type: "button", textContent: "Why, or why not", disabled: true }),
+  );
   $("#objects thead").append(el("tr", {}, ...COLUMNS.map(heading), last));
   paintAfter(["frame", "selection"], update);
   on(["selection"], () => list.rowOf(get("selection") ?? -1)?.scrollIntoView({ block: "nearest" }));
@@ -81,7 +134,8 @@ function sortBy(key) {
 
 function reflectSort() {
   for (const th of document.querySelectorAll("#objects th[data-key]")) {
-    if (/** @type {HTMLElement} */ (th).dataset.key === sort.key) th.setAttribute("aria-sort", sort.down ? "descending" : "ascending");
+    if (/** @type {HTMLElement} */ (th).dataset.key === sort.key)
+      th.setAttribute("aria-sort", sort.down ? "descending" : "ascending");
     else th.removeAttribute("aria-sort");
   }
 }
@@ -92,9 +146,12 @@ function update() {
   const { objects, rejected, cipv } = frame.result;
   const reasons = new Map(rejected.map(({ id, reason }) => [id, reason]));
   if (cipv) reasons.set(cipv.id, cipv.reason);
-  const by = COLUMNS.find(({ key }) => key === sort.key)?.by ?? ((/** @type {FusedObject} */ o) => relevance(o, cipv?.id));
+  const by =
+    COLUMNS.find(({ key }) => key === sort.key)?.by ?? ((/** @type {FusedObject} */ o) => relevance(o, cipv?.id));
   const order = [...objects].sort((a, b) => compare(by(a), by(b)) * (sort.down ? -1 : 1) || a.id - b.id);
-  const focused = body.contains(document.activeElement) ? Number(/** @type {HTMLElement} */ (document.activeElement).dataset.id) : null;
+  const focused = body.contains(document.activeElement)
+    ? Number(/** @type {HTMLElement} */ (document.activeElement).dataset.id)
+    : null;
   list.show(order.map((item) => ({ item, why: reasons.get(item.id) ?? "" })));
   if (focused !== null) list.rowOf(focused)?.focus({ preventScroll: true });
   const count = (/** @type {string} */ source) => objects.filter((o) => o.source === source).length;
@@ -130,10 +187,15 @@ function create() {
   /** @type {Record<string, HTMLElement>} */
   const cells = {};
   const reason = el("td", { class: "reason" });
-  const row = el("tr", { tabIndex: 0 }, ...COLUMNS.map(({ key }) => {
-    if (key === "source") return el("td", { class: "left" }, (cells[key] = el("span", { class: "pill" })));
-    return (cells[key] = el("td", { class: key === "id" ? "id" : TEXTS.has(key) ? "left" : "", data: { key } }));
-  }), reason);
+  const row = el(
+    "tr",
+    { tabIndex: 0 },
+    ...COLUMNS.map(({ key }) => {
+      if (key === "source") return el("td", { class: "left" }, (cells[key] = el("span", { class: "pill" })));
+      return (cells[key] = el("td", { class: key === "id" ? "id" : TEXTS.has(key) ? "left" : "", data: { key } }));
+    }),
+    reason,
+  );
   parts.set(row, { cells, reason });
   return row;
 }
@@ -148,7 +210,8 @@ function onKey(event) {
   const row = within(event, "tr");
   if (!row) return;
   if (event.key === "Enter") pick(row);
-  const next = event.key === "ArrowDown" ? row.nextElementSibling : event.key === "ArrowUp" ? row.previousElementSibling : null;
+  const next =
+    event.key === "ArrowDown" ? row.nextElementSibling : event.key === "ArrowUp" ? row.previousElementSibling : null;
   if (next instanceof HTMLElement) {
     next.focus();
     set("selection", Number(next.dataset.id));

@@ -23,15 +23,31 @@ export function setUp() {
 export async function open() {
   /** @type {{sources: {uri: string, title: string}[], open: string|null}} */
   const { sources, open: current } = await request("api/sources").catch(() => ({ sources: [], open: null }));
-  const field = el("input", { type: "text", name: "uri", value: wanted ?? current ?? "", placeholder: "pcap:<file>, rosbag:<path>, kitti:<folder>, sim:<scenario>", aria: { label: "Address of a recording" }, spellcheck: false });
+  const field = el("input", {
+    type: "text",
+    name: "uri",
+    value: wanted ?? current ?? "",
+    placeholder: "pcap:<file>, rosbag:<path>, kitti:<folder>, sim:<scenario>",
+    aria: { label: "Address of a recording" },
+    spellcheck: false,
+  });
   const form = el("form", { class: "open-row", method: "dialog" }, field, el("button", { textContent: "Open" }));
   form.addEventListener("submit", () => choose(field.value));
   const list = sources.map(({ uri, title }) => {
-    const button = el("button", { type: "button", onclick: () => choose(uri) }, el("span", { textContent: title }), el("code", { textContent: uri }));
+    const button = el(
+      "button",
+      { type: "button", onclick: () => choose(uri) },
+      el("span", { textContent: title }),
+      el("code", { textContent: uri }),
+    );
     if (uri === current) button.setAttribute("aria-current", "true");
     return button;
   });
-  dialog.replaceChildren(el("h2", { textContent: "Open a recording" }), form, el("div", { class: "open-list" }, ...list));
+  dialog.replaceChildren(
+    el("h2", { textContent: "Open a recording" }),
+    form,
+    el("div", { class: "open-list" }, ...list),
+  );
   dialog.showModal();
   field.select();
 }

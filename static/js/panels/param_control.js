@@ -24,10 +24,28 @@ export function control(name, param, change) {
     change(value, isFinal);
   };
   const input = { boolean: toggle, choice: choices, number: slider, integer: slider }[param.kind](id, param, moved);
-  const auto = el("span", { class: "auto", textContent: "auto", hidden: true, title: "Taken from the recording's calibration, or the detector's own" });
-  const reset = el("button", { type: "button", class: "reset", textContent: "↺", title: "Back to the preset's value", aria: { label: `Reset ${words(param.key)}` } });
+  const auto = el("span", {
+    class: "auto",
+    textContent: "auto",
+    hidden: true,
+    title: "Taken from the recording's calibration, or the detector's own",
+  });
+  const reset = el("button", {
+    type: "button",
+    class: "reset",
+    textContent: "↺",
+    title: "Back to the preset's value",
+    aria: { label: `Reset ${words(param.key)}` },
+  });
   const label = el("label", { htmlFor: id, textContent: words(param.key) });
-  const head = el("div", { class: "head" }, label, auto, el("span", { class: "unit", textContent: param.unit ?? "" }), reset);
+  const head = el(
+    "div",
+    { class: "head" },
+    label,
+    auto,
+    el("span", { class: "unit", textContent: param.unit ?? "" }),
+    reset,
+  );
   if (param.kind === "boolean") head.append(input.node);
   const node = el("div", { class: "param", data: { param: name } }, head, param.kind === "boolean" ? null : input.node);
   attachTooltip(label, `${param.help}. ${name}`);
@@ -59,9 +77,17 @@ function words(key) {
 
 /** @param {string} id @param {Param} param @param {Change} change @returns {Input} */
 function slider(id, param, change) {
-  const low = param.min ?? 0, high = param.max ?? 1, step = String(param.step ?? "any");
+  const low = param.min ?? 0,
+    high = param.max ?? 1,
+    step = String(param.step ?? "any");
   const range = el("input", { type: "range", id, step, min: String(low), max: String(high) });
-  const box = el("input", { type: "number", step, min: String(low), max: String(high), aria: { label: `${words(param.key)}, number` } });
+  const box = el("input", {
+    type: "number",
+    step,
+    min: String(low),
+    max: String(high),
+    aria: { label: `${words(param.key)}, number` },
+  });
   const read = (/** @type {string} */ text) => (param.kind === "integer" ? Math.round(Number(text)) : Number(text));
   range.addEventListener("input", () => {
     box.value = range.value;
@@ -92,7 +118,8 @@ function slider(id, param, change) {
 
 /** @param {HTMLInputElement} range */
 function fill(range) {
-  const low = Number(range.min), share = (Number(range.value) - low) / (Number(range.max) - low || 1);
+  const low = Number(range.min),
+    share = (Number(range.value) - low) / (Number(range.max) - low || 1);
   range.style.setProperty("--fill", `${100 * share}%`);
 }
 
@@ -106,7 +133,13 @@ function toggle(id, _, change) {
 /** @param {string} id @param {Param} param @param {Change} change @returns {Input} */
 function choices(id, param, change) {
   const names = param.choices ?? [];
-  const buttons = names.map((choice) => el("button", { type: "button", textContent: choice.replaceAll("_", " "), onclick: () => change(choice, true) }));
-  const node = el("div", { class: "control single" }, el("div", { class: "choices", id, aria: { role: "group", label: words(param.key) } }, ...buttons));
+  const buttons = names.map((choice) =>
+    el("button", { type: "button", textContent: choice.replaceAll("_", " "), onclick: () => change(choice, true) }),
+  );
+  const node = el(
+    "div",
+    { class: "control single" },
+    el("div", { class: "choices", id, aria: { role: "group", label: words(param.key) } }, ...buttons),
+  );
   return { node, show: (value) => buttons.forEach((button, i) => press(button, names[i] === value)) };
 }

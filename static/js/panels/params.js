@@ -14,16 +14,31 @@ const OPEN_AT_FIRST = ["alignment", "cluster"];
 const FIRST_SECTION = "alignment";
 /** Moving one of these means: use the model that it belongs to. @type {Record<string, string>} */
 const MODEL_OF = {
-  "alignment.h_res_deg": "angular", "alignment.v_res_deg": "angular", "alignment.cx_px": "angular", "alignment.cy_px": "angular",
-  "alignment.yaw_deg": "pinhole", "alignment.pitch_deg": "pinhole", "alignment.roll_deg": "pinhole",
+  "alignment.h_res_deg": "angular",
+  "alignment.v_res_deg": "angular",
+  "alignment.cx_px": "angular",
+  "alignment.cy_px": "angular",
+  "alignment.yaw_deg": "pinhole",
+  "alignment.pitch_deg": "pinhole",
+  "alignment.roll_deg": "pinhole",
 };
 const PROMINENT = new Set(["alignment.h_res_deg", "alignment.v_res_deg"]);
 
 const error = el("p", { class: "params-error", aria: { role: "alert" }, hidden: true });
 const list = el("div", { class: "params-list" });
 const presets = el("select", { aria: { label: "Preset" } });
-const search = el("input", { type: "search", placeholder: "Search parameters", aria: { label: "Search parameters" }, oninput: filter });
-const nothing = el("p", { class: "facts", aria: { role: "status" }, textContent: "No parameter is called or explained so.", hidden: true });
+const search = el("input", {
+  type: "search",
+  placeholder: "Search parameters",
+  aria: { label: "Search parameters" },
+  oninput: filter,
+});
+const nothing = el("p", {
+  class: "facts",
+  aria: { role: "status" },
+  textContent: "No parameter is called or explained so.",
+  hidden: true,
+});
 /** @type {Map<string, ReturnType<typeof control>>} */
 const controls = new Map();
 /** @type {Map<string, {node: HTMLDetailsElement, count: HTMLElement, help: string}>} */
@@ -33,7 +48,8 @@ let knownRevision = -1;
 let knownUri = null;
 
 const submit = newestOnly(
-  (/** @type {Changes} */ body) => request("api/params", "PATCH", { ...body, person: knownName() }).then(accept, refuse),
+  (/** @type {Changes} */ body) =>
+    request("api/params", "PATCH", { ...body, person: knownName() }).then(accept, refuse),
   (waiting, newer) => ({ changes: { ...waiting.changes, ...newer.changes }, final: waiting.final || newer.final }),
 );
 
@@ -42,13 +58,36 @@ let told = Promise.resolve();
 export const settled = () => told;
 
 export function setUp() {
-  const download = el("a", { href: "api/params.yaml", textContent: "Save preset", title: "A file for `cipv run --params FILE`" });
+  const download = el("a", {
+    href: "api/params.yaml",
+    textContent: "Save preset",
+    title: "A file for `cipv run --params FILE`",
+  });
   download.setAttribute("download", "cipv-params.yaml");
   presets.addEventListener("change", () => choosePreset(presets.value));
   $("#params").append(
-    el("div", { class: "params-top" }, el("div", { class: "row" }, el("span", { class: "facts", textContent: "Preset" }), presets,
-      el("button", { type: "button", textContent: "Reset", title: "Every parameter back to the preset's value", onclick: () => choosePreset(presets.value) }), download), search, error, nothing),
-    list);
+    el(
+      "div",
+      { class: "params-top" },
+      el(
+        "div",
+        { class: "row" },
+        el("span", { class: "facts", textContent: "Preset" }),
+        presets,
+        el("button", {
+          type: "button",
+          textContent: "Reset",
+          title: "Every parameter back to the preset's value",
+          onclick: () => choosePreset(presets.value),
+        }),
+        download,
+      ),
+      search,
+      error,
+      nothing,
+    ),
+    list,
+  );
   on(["state"], refreshIfForeign);
   on(["params"], () => (knownRevision = Math.max(knownRevision, get("params")?.revision ?? -1)));
   paintAfter(["params"], show); // a hundred controls: the frame that a change makes goes first
@@ -76,10 +115,17 @@ function show() {
   if (presets.value !== answer.preset) presets.value = answer.preset;
   for (const [name, one] of controls) {
     const needed = MODEL_OF[name];
-    one.show(answer.values[name], answer.base[name], answer.effective[name] ?? null, Boolean(needed) && needed !== answer.values["alignment.model"]);
+    one.show(
+      answer.values[name],
+      answer.base[name],
+      answer.effective[name] ?? null,
+      Boolean(needed) && needed !== answer.values["alignment.model"],
+    );
   }
   for (const [name, { count }] of sections) {
-    const changed = Object.keys(answer.values).filter((key) => key.startsWith(`${name}.`) && answer.values[key] !== answer.base[key]).length;
+    const changed = Object.keys(answer.values).filter(
+      (key) => key.startsWith(`${name}.`) && answer.values[key] !== answer.base[key],
+    ).length;
     text(count, changed ? `${changed} changed` : "");
   }
 }
@@ -96,8 +142,11 @@ function build({ sections: described, presets: names }) {
   const order = [...described].sort((a, b) => Number(b.name === FIRST_SECTION) - Number(a.name === FIRST_SECTION));
   for (const section of order) {
     const count = el("span", { class: "count" });
-    const node = el("details", { class: "section", data: { section: section.name } },
-      el("summary", { title: section.help }, section.name.replaceAll("_", " "), count));
+    const node = el(
+      "details",
+      { class: "section", data: { section: section.name } },
+      el("summary", { title: section.help }, section.name.replaceAll("_", " "), count),
+    );
     node.addEventListener("toggle", rememberOpen);
     sections.set(section.name, { node, count, help: section.help });
     for (const param of section.params) {
@@ -118,7 +167,9 @@ function build({ sections: described, presets: names }) {
  * @param {Record<string, ParamValue>} changes @param {boolean} isFinal
  */
 export function change(changes, isFinal) {
-  const model = Object.entries(changes).map(([name, value]) => (value === null ? undefined : MODEL_OF[name])).find(Boolean);
+  const model = Object.entries(changes)
+    .map(([name, value]) => (value === null ? undefined : MODEL_OF[name]))
+    .find(Boolean);
   told = submit({ changes: { ...changes, ...(model ? { "alignment.model": model } : {}) }, final: isFinal });
 }
 
@@ -128,7 +179,8 @@ export function reveal(name) {
   $("#tab-params").click();
   search.value = "";
   filter();
-  const section = sections.get(name.split(".")[0]), node = controls.get(name)?.node;
+  const section = sections.get(name.split(".")[0]),
+    node = controls.get(name)?.node;
   if (!section || !node) return null;
   section.node.open = true;
   node.scrollIntoView({ block: "center" });
@@ -142,7 +194,10 @@ function choosePreset(name) {
 
 function rememberOpen() {
   if (search.value) return;
-  memory.write("sections", [...sections].filter(([, { node }]) => node.open).map(([name]) => name));
+  memory.write(
+    "sections",
+    [...sections].filter(([, { node }]) => node.open).map(([name]) => name),
+  );
 }
 
 /** As names and words are compared: `z_weight` is found by "z weight" and the other way round. @param {string} text */

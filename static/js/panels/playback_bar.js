@@ -10,17 +10,33 @@ import { get, on } from "../core/store.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 
-const playIcon = icon("play"), pauseIcon = icon("pause");
+const playIcon = icon("play"),
+  pauseIcon = icon("pause");
 const back = button("Step back", "One frame back (←)", () => playback({ step: -1 }), icon("back"));
 const play = button("Play", "Play or pause (space)", togglePlay, playIcon, pauseIcon);
 const next = button("Step forward", "One frame on (→)", () => playback({ step: 1 }), icon("next"));
 const name = el("span", { class: "name", title: "The recording's own name of this frame" });
 const count = el("span", { class: "dim" });
 const time = el("span");
-const provisional = el("span", { class: "tag", textContent: "provisional", title: "The whole recording is still being computed: numbers of objects may change", hidden: true });
+const provisional = el("span", {
+  class: "tag",
+  textContent: "provisional",
+  title: "The whole recording is still being computed: numbers of objects may change",
+  hidden: true,
+});
 const live = el("span", { class: "tag live", textContent: "LIVE", title: NO_DRIVE, hidden: true });
-const speed = el("select", { title: "Speed ([ and ])", aria: { label: "Speed" } }, ...SPEEDS.map((s) => el("option", { value: String(s), textContent: `${s}×` })));
-const loop = el("button", { type: "button", class: "toggle", textContent: "Repeat", title: "Start again at the end (R)", onclick: toggleLoop });
+const speed = el(
+  "select",
+  { title: "Speed ([ and ])", aria: { label: "Speed" } },
+  ...SPEEDS.map((s) => el("option", { value: String(s), textContent: `${s}×` })),
+);
+const loop = el("button", {
+  type: "button",
+  class: "toggle",
+  textContent: "Repeat",
+  title: "Start again at the end (R)",
+  onclick: toggleLoop,
+});
 
 export function setUp() {
   play.classList.add("play");
@@ -58,7 +74,8 @@ function update() {
   playIcon.classList.toggle("is-off", state.playing);
   pauseIcon.classList.toggle("is-off", !state.playing);
   play.setAttribute("aria-label", state.playing ? "Pause" : "Play");
-  const frame = get("frame")?.state, at = frame?.uri === state.uri ? frame : state; // named is what is drawn
+  const frame = get("frame")?.state,
+    at = frame?.uri === state.uri ? frame : state; // named is what is drawn
   text(name, at.frame ?? "");
   text(count, has && !state.live ? `${at.index + 1}/${state.count}` : "");
   text(time, state.live ? clock(at.time_s) : `${clock(at.time_s)} / ${clock(state.duration_s)}`);

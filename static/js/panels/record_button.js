@@ -9,7 +9,12 @@ let problem = "";
 /** @returns {HTMLElement} for the transport */
 export function recordButton() {
   const words = el("span", { textContent: "Record" });
-  const button = el("button", { type: "button", class: "record toggle", onclick: toggle }, el("i", { aria: { hidden: "true" } }), words);
+  const button = el(
+    "button",
+    { type: "button", class: "record toggle", onclick: toggle },
+    el("i", { aria: { hidden: "true" } }),
+    words,
+  );
   on(["state"], () => show(button, words));
   return button;
 }
@@ -27,6 +32,8 @@ function show(button, words) {
   press(button, isOn());
   const lost = recording?.dropped ? ` · ${recording.dropped} lost` : "";
   text(words, isOn() && recording ? `${clock(recording.seconds)}${lost}` : "Record");
-  button.title = recording?.error ?? (problem || (recording ? `Recording into ${recording.file}; press to end` : "Record a session"));
+  button.title =
+    recording?.error ??
+    (problem || (recording ? `Recording into ${recording.file}; press to end` : "Record a session"));
   button.setAttribute("aria-label", isOn() ? "End the recording" : "Record");
 }

@@ -8,7 +8,8 @@ import { metricsTable } from "./metrics_table.js";
 
 /** @typedef {import("../drive/types.js").Run} Run */
 
-const list = el("div", { class: "run-list" }), comparison = el("div", { class: "comparison" });
+const list = el("div", { class: "run-list" }),
+  comparison = el("div", { class: "comparison" });
 const problem = el("p", { class: "params-error", aria: { role: "alert" }, hidden: true });
 /** @type {{base: number|null, run: number|null, runs: Run[]}} */
 let answer = { base: null, run: null, runs: [] };
@@ -42,13 +43,16 @@ function showTab(shown) {
 /** @param {string} path @param {string} [method] @param {unknown} [body] */
 function act(path, method = "POST", body = undefined) {
   problem.hidden = true;
-  return request(`api/runs/${path}`, method, body).then((given) => {
-    if (given?.values) set("params", given);
-    refresh(undefined);
-  }, (error) => {
-    problem.textContent = error.message;
-    problem.hidden = false;
-  });
+  return request(`api/runs/${path}`, method, body).then(
+    (given) => {
+      if (given?.values) set("params", given);
+      refresh(undefined);
+    },
+    (error) => {
+      problem.textContent = error.message;
+      problem.hidden = false;
+    },
+  );
 }
 
 function show() {
@@ -60,42 +64,108 @@ function show() {
 function rowOf({ id }) {
   const name = el("input", { type: "text", class: "run-name", maxLength: 60, aria: { label: "Name of the run" } });
   name.addEventListener("change", () => act(`${id}/keep`, "POST", { name: name.value.trim() }));
-  const yaml = el("a", { href: `api/runs/${id}/params.yaml`, textContent: "YAML", title: "A file for `cipv run --params`" });
+  const yaml = el("a", {
+    href: `api/runs/${id}/params.yaml`,
+    textContent: "YAML",
+    title: "A file for `cipv run --params`",
+  });
   yaml.setAttribute("download", `cipv-run-${id}.yaml`);
-  const button = (/** @type {string} */ words, /** @type {string} */ title, /** @type {() => void} */ onclick) => el("button", { type: "button", textContent: words, title, onclick });
-  return el("div", { class: "run", data: { run: id } }, el("div", { class: "run-top" }, name, el("span", { class: "tag" })), el("p", { class: "run-label" }),
-    el("div", { class: "run-buttons" }, button("Keep", "Keep this run; an unkept one goes when newer ones come", () => act(`${id}/keep`, "POST", { name: name.value.trim() })),
-      button("Use", "Take its parameters", () => act(`${id}/use`)), button("Compare", "Compare against this run", () => act(`${id}/base`)), yaml,
-      el("span", { class: "facts" }), button("✕", "Forget this run", () => act(String(id), "DELETE"))));
+  const button = (/** @type {string} */ words, /** @type {string} */ title, /** @type {() => void} */ onclick) =>
+    el("button", { type: "button", textContent: words, title, onclick });
+  return el(
+    "div",
+    { class: "run", data: { run: id } },
+    el("div", { class: "run-top" }, name, el("span", { class: "tag" })),
+    el("p", { class: "run-label" }),
+    el(
+      "div",
+      { class: "run-buttons" },
+      button("Keep", "Keep this run; an unkept one goes when newer ones come", () =>
+        act(`${id}/keep`, "POST", { name: name.value.trim() }),
+      ),
+      button("Use", "Take its parameters", () => act(`${id}/use`)),
+      button("Compare", "Compare against this run", () => act(`${id}/base`)),
+      yaml,
+      el("span", { class: "facts" }),
+      button("✕", "Forget this run", () => act(String(id), "DELETE")),
+    ),
+  );
 }
 
 /** @param {HTMLElement} row @param {Run} run */
 function showRun(row, run) {
-  const name = $(".run-name", HTMLInputElement, row), isNow = run.id === answer.run, isBase = run.id === answer.base;
+  const name = $(".run-name", HTMLInputElement, row),
+    isNow = run.id === answer.run,
+    isBase = run.id === answer.base;
   if (document.activeElement !== name) name.value = run.name;
   name.placeholder = `Run ${run.id}`;
   row.classList.toggle("is-now", isNow);
-  text($(".tag", HTMLElement, row), [isNow ? "shown" : "", isBase ? "compared" : "", run.kept ? "kept" : ""].filter(Boolean).join(" · "));
+  text(
+    $(".tag", HTMLElement, row),
+    [isNow ? "shown" : "", isBase ? "compared" : "", run.kept ? "kept" : ""].filter(Boolean).join(" · "),
+  );
   text($(".run-label", HTMLElement, row), run.label || (Object.keys(run.changes).length ? "" : `preset ${run.preset}`));
-  const [keep, use, base, drop] = [...row.querySelectorAll(".run-buttons button")].map((button) => /** @type {HTMLButtonElement} */ (button));
+  const [keep, use, base, drop] = [...row.querySelectorAll(".run-buttons button")].map(
+    (button) => /** @type {HTMLButtonElement} */ (button),
+  );
   keep.disabled = run.kept;
   use.disabled = isNow;
   base.disabled = isBase;
   drop.disabled = isNow || isBase;
   drop.setAttribute("aria-label", `Forget run ${run.name || run.id}`);
-  text($(".facts", HTMLElement, row), run.phase === "done" ? (run.seconds === null ? "" : `${run.seconds.toFixed(run.seconds < 10 ? 1 : 0)} s`) : run.note || `${Math.round((100 * run.done) / Math.max(1, run.total))} %`);
+  text(
+    $(".facts", HTMLElement, row),
+    run.phase === "done"
+      ? run.seconds === null
+        ? ""
+        : `${run.seconds.toFixed(run.seconds < 10 ? 1 : 0)} s`
+      : run.note || `${Math.round((100 * run.done) / Math.max(1, run.total))} %`,
+  );
 }
 
 /** What the shown run changes against the compared one. */
 function showComparison() {
-  const drive = get("drive"), found = drive?.comparison;
+  const drive = get("drive"),
+    found = drive?.comparison;
   if (!drive || !found) {
-    return comparison.replaceChildren(el("p", { class: "facts pad", textContent: get("state")?.live ? NO_DRIVE : "Change a parameter: the whole recording is computed again and compared here." }));
+    return comparison.replaceChildren(
+      el("p", {
+        class: "facts pad",
+        textContent: get("state")?.live
+          ? NO_DRIVE
+          : "Change a parameter: the whole recording is computed again and compared here.",
+      }),
+    );
   }
-  const sentences = Object.entries(found.first).slice(0, 3).map(([at, words]) => el("li", { textContent: `frame ${Number(at) + 1}: ${words}` }));
+  const sentences = Object.entries(found.first)
+    .slice(0, 3)
+    .map(([at, words]) => el("li", { textContent: `frame ${Number(at) + 1}: ${words}` }));
   comparison.replaceChildren(
-    el("div", { class: "run-top" }, el("b", { textContent: found.frames_differing ? `${found.frames_differing} of ${drive.count} frames differ` : "No frame differs" }), el("span", { class: "spacer" }),
-      el("button", { type: "button", textContent: "↑", title: "Difference before (Shift X)", aria: { label: "Difference before" }, onclick: () => toDifference(-1) }),
-      el("button", { type: "button", textContent: "↓", title: "Next difference (X)", aria: { label: "Next difference" }, onclick: () => toDifference(1) })),
-    el("ul", {}, ...sentences), metricsTable(found));
+    el(
+      "div",
+      { class: "run-top" },
+      el("b", {
+        textContent: found.frames_differing
+          ? `${found.frames_differing} of ${drive.count} frames differ`
+          : "No frame differs",
+      }),
+      el("span", { class: "spacer" }),
+      el("button", {
+        type: "button",
+        textContent: "↑",
+        title: "Difference before (Shift X)",
+        aria: { label: "Difference before" },
+        onclick: () => toDifference(-1),
+      }),
+      el("button", {
+        type: "button",
+        textContent: "↓",
+        title: "Next difference (X)",
+        aria: { label: "Next difference" },
+        onclick: () => toDifference(1),
+      }),
+    ),
+    el("ul", {}, ...sentences),
+    metricsTable(found),
+  );
 }

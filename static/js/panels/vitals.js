@@ -17,8 +17,16 @@ const values = {};
 let painted = [];
 
 export function setUp() {
-  $("#vitals").append(...ITEMS.map(([key, label, title, className]) =>
-    el("div", { title, class: className }, el("dt", { textContent: label }), (values[key] = el("dd", { textContent: "–" })))));
+  $("#vitals").append(
+    ...ITEMS.map(([key, label, title, className]) =>
+      el(
+        "div",
+        { title, class: className },
+        el("dt", { textContent: label }),
+        (values[key] = el("dd", { textContent: "–" })),
+      ),
+    ),
+  );
   on(["frame"], () => requestAnimationFrame(afterPaint));
   on(["state"], showSkipped);
   showSkipped();
@@ -33,7 +41,9 @@ function afterPaint() {
   text(values.line, num(frame.result.timing_ms.total, 1));
   text(values.net, num(frame.detectMs, 0));
   const { timing_ms: stages } = frame.result;
-  $("#vitals").title = Object.entries(stages).map(([stage, ms]) => `${stage} ${num(ms, 2)} ms`).join("\n");
+  $("#vitals").title = Object.entries(stages)
+    .map(([stage, ms]) => `${stage} ${num(ms, 2)} ms`)
+    .join("\n");
 }
 
 /** Whoever is spared nothing needs no word of it. */

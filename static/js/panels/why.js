@@ -11,12 +11,24 @@ import { gateRow, kindOf, quantity, showGate } from "./gate_rows.js";
 /** @typedef {import("../core/types.js").Ranked} Ranked */
 /** @typedef {import("../core/types.js").Result} Result */
 
-const number = el("b", { class: "id" }), source = el("span", { class: "pill" }), lead = el("span", { class: "pill cipv", textContent: "CIPV" });
-const type = el("span"), verdict = el("p", { class: "verdict", aria: { live: "polite" } });
-const gates = el("div", { class: "gates" }), ranking = el("div", { class: "ranking" });
+const number = el("b", { class: "id" }),
+  source = el("span", { class: "pill" }),
+  lead = el("span", { class: "pill cipv", textContent: "CIPV" });
+const type = el("span"),
+  verdict = el("p", { class: "verdict", aria: { live: "polite" } });
+const gates = el("div", { class: "gates" }),
+  ranking = el("div", { class: "ranking" });
 const candidates = new LongList(ranking, (/** @type {Ranked} */ { id }) => id, rankedRow, showRanked);
 const rankingTitle = el("h3", { textContent: "Ranking of candidates" });
-const content = el("div", { class: "why-content" }, el("div", { class: "line" }, number, source, lead, type), verdict, gates, rankingTitle, ranking);
+const content = el(
+  "div",
+  { class: "why-content" },
+  el("div", { class: "line" }, number, source, lead, type),
+  verdict,
+  gates,
+  rankingTitle,
+  ranking,
+);
 const nothing = el("p", { class: "facts pad", textContent: "Nothing is shown yet." });
 
 export function setUp() {
@@ -36,7 +48,10 @@ function update() {
   content.hidden = !item;
   nothing.hidden = Boolean(item);
   text($("#why-facts"), item ? (isLead ? "why it is the CIPV" : "why it is not the CIPV") : "");
-  text(nothing, id === null ? "No CIPV in this frame. Select an object to see what stopped it." : `#${id} is not in this frame.`);
+  text(
+    nothing,
+    id === null ? "No CIPV in this frame. Select an object to see what stopped it." : `#${id} is not in this frame.`,
+  );
   const ranked = display.ranking ?? [];
   const list = isLead || !item ? ranked : [];
   rankingTitle.hidden = list.length === 0;
@@ -49,7 +64,15 @@ function update() {
   mark(source, "source", item.source);
   lead.hidden = !isLead;
   text(type, `${item.type ?? "obstacle"}${item.distance_m === null ? "" : ` at ${num(item.distance_m)} m`}`);
-  text(verdict, sentence(result, ranked.find((each) => each.id === id), item.id, isLead));
+  text(
+    verdict,
+    sentence(
+      result,
+      ranked.find((each) => each.id === id),
+      item.id,
+      isLead,
+    ),
+  );
   keyed(gates, failedFirst(item.gates), (gate) => gate.name, gateRow, showGate);
 }
 
@@ -77,8 +100,14 @@ function measured({ stopped_by, value, limit }) {
 }
 
 function rankedRow() {
-  return el("button", { type: "button", class: "ranked" },
-    el("span", { class: "order" }), el("b"), el("span", { class: "far" }), el("span", { class: "what" }));
+  return el(
+    "button",
+    { type: "button", class: "ranked" },
+    el("span", { class: "order" }),
+    el("b"),
+    el("span", { class: "far" }),
+    el("span", { class: "what" }),
+  );
 }
 
 /** @param {HTMLElement} row @param {Ranked} ranked */

@@ -39,7 +39,8 @@ export function chosen() {
 }
 
 function reflect() {
-  const clip = get("clip"), times = get("drive")?.t_s;
+  const clip = get("clip"),
+    times = get("drive")?.t_s;
   $("#clip-clear").hidden = !clip;
   const lasts = clip && times?.length ? ` · ${clock(times[clip.last] - times[clip.first])}` : "";
   text($("#clip-facts"), clip ? `frames ${clip.first + 1}–${clip.last + 1}${lasts}` : "");

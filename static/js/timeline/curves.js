@@ -1,4 +1,5 @@
 /** The curves below the ribbon: what each shows, in which unit and on which scale, and how it is drawn. */
+import { memory } from "../core/dom.js";
 import { num, ttc } from "../core/format.js";
 
 /** @typedef {import("../drive/types.js").Columns} Columns */
@@ -11,16 +12,99 @@ import { num, ttc } from "../core/format.js";
 
 /** low and high: what the scale reaches at least; most: what is higher is drawn there. words: how its value is said, else with so many digits. also: a second, fainter line. */
 export const CURVES = /** @type {Curve[]} */ ([
-  { key: "distance_m", label: "Distance", unit: "m", title: "Distance to the CIPV's nearest point", factor: 1, low: 0, high: 20, digits: 1, role: "cipv" },
-  { key: "closing_speed_mps", label: "Closing", unit: "km/h", title: "Closing speed of the CIPV: positive while the gap shrinks", factor: 3.6, low: -5, high: 5, digits: 1, role: "cipv" },
-  { key: "ttc_s", label: "TTC", unit: "s", title: "Time to collision with the CIPV, at most 15 s; the line is the 2.5 s limit", factor: 1, low: 0, high: 5, most: 15, digits: 1, words: ttc, role: "cipv", limit: 2.5 },
-  { key: "path_offset_m", label: "Offset", unit: "m", title: "The CIPV's offset from the middle of the path, left is up", factor: 1, low: -1, high: 1, digits: 2, role: "cipv" },
-  { key: "desired_speed_mps", label: "Desired", unit: "km/h", title: "Speed that ACC asks for, over our own speed", factor: 3.6, low: 0, high: 30, digits: 0, role: "path", also: "speed_mps" },
-  { key: "brake", label: "Brake", unit: "%", title: "Brake pedal", factor: 100, low: 0, high: 100, digits: 0, role: "warning", isArea: true },
+  {
+    key: "distance_m",
+    label: "Distance",
+    unit: "m",
+    title: "Distance to the CIPV's nearest point",
+    factor: 1,
+    low: 0,
+    high: 20,
+    digits: 1,
+    role: "cipv",
+  },
+  {
+    key: "closing_speed_mps",
+    label: "Closing",
+    unit: "km/h",
+    title: "Closing speed of the CIPV: positive while the gap shrinks",
+    factor: 3.6,
+    low: -5,
+    high: 5,
+    digits: 1,
+    role: "cipv",
+  },
+  {
+    key: "ttc_s",
+    label: "TTC",
+    unit: "s",
+    title: "Time to collision with the CIPV, at most 15 s; the line is the 2.5 s limit",
+    factor: 1,
+    low: 0,
+    high: 5,
+    most: 15,
+    digits: 1,
+    words: ttc,
+    role: "cipv",
+    limit: 2.5,
+  },
+  {
+    key: "path_offset_m",
+    label: "Offset",
+    unit: "m",
+    title: "The CIPV's offset from the middle of the path, left is up",
+    factor: 1,
+    low: -1,
+    high: 1,
+    digits: 2,
+    role: "cipv",
+  },
+  {
+    key: "desired_speed_mps",
+    label: "Desired",
+    unit: "km/h",
+    title: "Speed that ACC asks for, over our own speed",
+    factor: 3.6,
+    low: 0,
+    high: 30,
+    digits: 0,
+    role: "path",
+    also: "speed_mps",
+  },
+  {
+    key: "brake",
+    label: "Brake",
+    unit: "%",
+    title: "Brake pedal",
+    factor: 100,
+    low: 0,
+    high: 100,
+    digits: 0,
+    role: "warning",
+    isArea: true,
+  },
 ]);
 
+/** Keys of the curves that are shown; the browser remembers them. */
+const shown = new Set(
+  memory.read(
+    "curves",
+    CURVES.map(({ key }) => key),
+  ),
+);
+
+/** @param {Curve} curve */
+export const isShown = ({ key }) => shown.has(key);
+
+/** Show a curve, or hide it. @param {Curve} curve */
+export function toggleCurve({ key }) {
+  if (!shown.delete(key)) shown.add(key);
+  memory.write("curves", [...shown]);
+}
+
 /** A value as it is said beside the curve. @param {Curve} curve @param {number} value in the column's own unit */
-export const said = ({ factor, digits, unit, words }, value) => `${words ? words(value * factor) : num(value * factor, digits)} ${unit}`;
+export const said = ({ factor, digits, unit, words }, value) =>
+  `${words ? words(value * factor) : num(value * factor, digits)} ${unit}`;
 
 /**
  * The scale that all of these values fit on.
@@ -60,12 +144,14 @@ export function traceLine(ctx, value, samples, span, y) {
     column = null;
   };
   for (let i = 0; i < samples.count; i++) {
-    const index = samples.index(i), now = index < span.first - 1 || index > span.end ? null : value(i);
+    const index = samples.index(i),
+      now = index < span.first - 1 || index > span.end ? null : value(i);
     if (now === null || !samples.joined(i)) {
       end();
       if (now === null) continue;
     }
-    const x = Math.round(span.middle(index)), v = y(now);
+    const x = Math.round(span.middle(index)),
+      v = y(now);
     const open = /** @type {Column|null} */ (column);
     if (open?.x === x) {
       column = { x, top: Math.min(open.top, v), bottom: Math.max(open.bottom, v), last: v };

@@ -19,7 +19,8 @@ import { drawTape, measure } from "./measuring_tape.js";
 /** @typedef {(ctx: CanvasRenderingContext2D, frame: Frame, place: Place) => void} Layer */
 
 const UNSEEN = -32768;
-const PICK_PX = 8, HOLD_PX = 16;
+const PICK_PX = 8,
+  HOLD_PX = 16;
 
 const canvas = $("#camera", HTMLCanvasElement);
 const raster = new DotRaster();
@@ -42,18 +43,30 @@ const X = (/** @type {number} */ u) => laid.x + u * laid.scale;
 const Y = (/** @type {number} */ v) => laid.y + v * laid.scale;
 
 export function setUp() {
-  const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "align", "tape", "labeling", "track", "draft", "projected"], draw);
+  const invalidate = paint(
+    ["frame", "layers", "colorBy", "selection", "theme", "align", "tape", "labeling", "track", "draft", "projected"],
+    draw,
+  );
   surface = new Surface(canvas, invalidate, "panel");
   showPictureAt(canvas.clientWidth * devicePixelRatio); // it is no wider than its pane
-  canvas.addEventListener("click", (event) => !get("align")?.on && !get("labeling")?.on && !get("taping") && select(objectAt(event.offsetX, event.offsetY)));
-  followHover(canvas, (u, v) => (get("align")?.on || get("labeling")?.on ? null : objectAt(u, v)), () => (get("labeling")?.tool ? "crosshair" : ""));
+  canvas.addEventListener(
+    "click",
+    (event) =>
+      !get("align")?.on && !get("labeling")?.on && !get("taping") && select(objectAt(event.offsetX, event.offsetY)),
+  );
+  followHover(
+    canvas,
+    (u, v) => (get("align")?.on || get("labeling")?.on ? null : objectAt(u, v)),
+    () => (get("labeling")?.tool ? "crosshair" : ""),
+  );
   followTape();
   on(["taping"], () => (canvas.style.cursor = get("taping") ? "crosshair" : ""));
 }
 
 function draw() {
   if (surface.isHidden) return;
-  const frame = get("frame"), ctx = surface.begin();
+  const frame = get("frame"),
+    ctx = surface.begin();
   if (!frame) return;
   describe(frame);
   if (!frame.picture) return message(ctx, "No camera picture in this frame");
@@ -63,7 +76,8 @@ function draw() {
   ctx.beginPath();
   ctx.rect(laid.x, laid.y, width * laid.scale, height * laid.scale);
   ctx.clip();
-  const align = get("align"), blend = align?.on ? align.blend : null;
+  const align = get("align"),
+    blend = align?.on ? align.blend : null;
   if (blend !== null) ctx.globalAlpha = Math.min(1, 2 * (1 - blend));
   if (frame.bitmap) ctx.drawImage(frame.bitmap, laid.x, laid.y, width * laid.scale, height * laid.scale);
   else message(ctx, "The picture of this frame could not be decoded");
@@ -81,7 +95,8 @@ function draw() {
 
 /** @param {CanvasRenderingContext2D} ctx @param {Frame} frame */
 function drawBelief(ctx, frame) {
-  const layers = get("layers") ?? {}, { display, result } = frame;
+  const layers = get("layers") ?? {},
+    { display, result } = frame;
   if (layers.path && display.path) drawPath(ctx, display.path, X, Y);
   if (layers.points) drawPoints(ctx, frame);
   if (layers.lanes && display.lanes) for (const lane of [display.lanes.left, display.lanes.right]) drawLane(ctx, lane);
@@ -89,7 +104,10 @@ function drawBelief(ctx, frame) {
   const hasObjects = !get("labeling")?.on || get("labeling")?.hasObjects;
   const chosen = hasObjects ? result.objects.find(({ id }) => id === get("selection")) : undefined;
   if (chosen) {
-    for (const [boxes, role] of /** @type {const} */ ([[display.lidar_boxes, "lidar"], [display.vision_boxes, "vision"]])) {
+    for (const [boxes, role] of /** @type {const} */ ([
+      [display.lidar_boxes, "lidar"],
+      [display.vision_boxes, "vision"],
+    ])) {
       if (boxes[chosen.id]) drawBox(ctx, boxes[chosen.id], onPicture(role), 1.5, X, Y);
     }
   }
@@ -104,7 +122,8 @@ function drawBelief(ctx, frame) {
 /** Fit the picture into the pane, and without a height chosen by a person the pane around the picture.
  * @param {{width: number, height: number}} picture */
 function layOut({ width, height }) {
-  const aspect = (width / height).toFixed(3), workspace = $("#workspace");
+  const aspect = (width / height).toFixed(3),
+    workspace = $("#workspace");
   if (workspace.style.getPropertyValue("--aspect") !== aspect) workspace.style.setProperty("--aspect", aspect);
   const scale = Math.min(surface.width / width, surface.height / height);
   laid = { x: (surface.width - width * scale) / 2, y: (surface.height - height * scale) / 2, scale };
@@ -123,14 +142,17 @@ function describe({ result: { sensors }, picture }) {
 function drawPoints(ctx, frame) {
   const { count, uv, kind, picture } = frame;
   if (!picture) return;
-  const { width, height } = picture, { scale } = laid;
+  const { width, height } = picture,
+    { scale } = laid;
   const colors = tints(frame, get("colorBy")?.camera ?? "range", onPicture, 0.7);
   raster.begin(width * scale, height * scale);
   for (const isGround of [true, false]) {
     const size = isGround ? 1 : 2;
     for (let i = 0; i < count; i++) {
-      const u = uv[2 * i], v = uv[2 * i + 1];
-      if ((kind[i] === GROUND) === isGround && u >= 0 && v >= 0 && u < width && v < height) raster.dot(u * scale, v * scale, size, colors[i]);
+      const u = uv[2 * i],
+        v = uv[2 * i + 1];
+      if ((kind[i] === GROUND) === isGround && u >= 0 && v >= 0 && u < width && v < height)
+        raster.dot(u * scale, v * scale, size, colors[i]);
     }
   }
   raster.drawOn(ctx, laid.x, laid.y);
@@ -140,7 +162,10 @@ function drawPoints(ctx, frame) {
 function drawLane(ctx, lane) {
   const seen = lane.filter((pixel) => pixel !== null);
   if (seen.length < 2) return;
-  for (const [tint, width] of /** @type {[string, number][]} */ ([["rgb(0 0 0 / .55)", 5], [onPicture("lane"), 2.5]])) {
+  for (const [tint, width] of /** @type {[string, number][]} */ ([
+    ["rgb(0 0 0 / .55)", 5],
+    [onPicture("lane"), 2.5],
+  ])) {
     ctx.strokeStyle = tint;
     ctx.lineWidth = width;
     ctx.beginPath();
@@ -162,18 +187,33 @@ function message(ctx, words) {
 function objectAt(px, py) {
   const frame = get("frame");
   if (!frame) return null;
-  const u = (px - laid.x) / laid.scale, v = (py - laid.y) / laid.scale;
+  const u = (px - laid.x) / laid.scale,
+    v = (py - laid.y) / laid.scale;
   const area = (/** @type {number[]} */ [x1, y1, x2, y2]) => (x2 - x1) * (y2 - y1);
   const hit = frame.result.objects
     .map(({ id }) => ({ id, box: frame.display.vision_boxes[id] ?? frame.display.lidar_boxes[id] }))
     .filter(({ box }) => box && u >= box[0] - 3 && u <= box[2] + 3 && v >= box[1] - 3 && v <= box[3] + 3)
     .sort((a, b) => area(a.box) - area(b.box))[0];
-  return hit?.id ?? ownerOf(frame, pointAt(frame, u, v, PICK_PX, (i) => frame.owner[i] > 0));
+  return (
+    hit?.id ??
+    ownerOf(
+      frame,
+      pointAt(frame, u, v, PICK_PX, (i) => frame.owner[i] > 0),
+    )
+  );
 }
 
 /** @param {Frame} frame @param {number} u @param {number} v @param {number} reach pixels of the canvas @param {(i: number) => boolean} [counts] */
 function pointAt({ count, uv }, u, v, reach, counts = () => true) {
-  return nearestPoint(count, (i) => uv[2 * i] !== UNSEEN && counts(i), (i) => uv[2 * i], (i) => uv[2 * i + 1], u, v, reach / laid.scale);
+  return nearestPoint(
+    count,
+    (i) => uv[2 * i] !== UNSEEN && counts(i),
+    (i) => uv[2 * i],
+    (i) => uv[2 * i + 1],
+    u,
+    v,
+    reach / laid.scale,
+  );
 }
 
 /** A drag measures from the LiDAR point near its start to the one near its end. */

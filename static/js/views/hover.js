@@ -28,7 +28,8 @@ export function followHover(canvas, objectAt, cursorAt = () => "") {
 /** @param {import("../core/types.js").FusedObject} item */
 function wordsOf(item) {
   const parts = [`#${item.id} ${item.type ?? "obstacle"} · ${item.carried ? "carried" : item.source}`];
-  if (item.distance_m !== null) parts.push(`${num(item.distance_m)} m${item.distance_sigma_m === null ? "" : ` ± ${num(item.distance_sigma_m)}`}`);
+  if (item.distance_m !== null)
+    parts.push(`${num(item.distance_m)} m${item.distance_sigma_m === null ? "" : ` ± ${num(item.distance_sigma_m)}`}`);
   const speed = item.velocity_mps ? kmh(item.velocity_mps[0]) : null;
   if (speed !== null) parts.push(`${signed(speed)} km/h relative`);
   if (item.ttc_s !== null) parts.push(`TTC ${num(item.ttc_s)} s`);

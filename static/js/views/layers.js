@@ -23,8 +23,16 @@ const CHIPS = {
   ],
 };
 const DEFAULTS = {
-  points: true, cuboids: true, lidarBoxes: false, visionBoxes: true, path: true, lanes: true,
-  planPoints: true, velocity: true, trails: false, planPath: true,
+  points: true,
+  cuboids: true,
+  lidarBoxes: false,
+  visionBoxes: true,
+  path: true,
+  lanes: true,
+  planPoints: true,
+  velocity: true,
+  trails: false,
+  planPath: true,
 };
 /** @type {Record<View, import("./drawing/point_colors.js").ColorBy>} */
 const DEFAULT_COLORS = { camera: "range", plan: "object" };
@@ -36,10 +44,28 @@ export function setUp() {
   set("colorBy", { ...DEFAULT_COLORS, ...memory.read("colorBy", {}) });
   for (const view of /** @type {View[]} */ (["camera", "plan"])) {
     const buttons = CHIPS[view].map(([key, label, title, role]) =>
-      el("button", { type: "button", title, data: { layer: key }, style: { "--chip": `var(--cipv-${role})` }, onclick: () => toggle(key) }, label));
+      el(
+        "button",
+        {
+          type: "button",
+          title,
+          data: { layer: key },
+          style: { "--chip": `var(--cipv-${role})` },
+          onclick: () => toggle(key),
+        },
+        label,
+      ),
+    );
     const [bar, canvas] = PLACES[view];
     $(bar).append(...buttons);
-    $(canvas).after(el("div", { class: "view-tools", data: { view }, aria: { role: "group", label: `Tools of the ${view}` } }, colorChoice(view), tapeButton()));
+    $(canvas).after(
+      el(
+        "div",
+        { class: "view-tools", data: { view }, aria: { role: "group", label: `Tools of the ${view}` } },
+        colorChoice(view),
+        tapeButton(),
+      ),
+    );
   }
   on(["layers"], reflect);
   on(["frame"], showLaneChip);
@@ -60,19 +86,25 @@ export function toggle(key) {
 }
 
 function reflect() {
-  for (const button of document.querySelectorAll("[data-layer]")) press(button, get("layers")?.[/** @type {HTMLElement} */ (button).dataset.layer ?? ""] === true);
+  for (const button of document.querySelectorAll("[data-layer]"))
+    press(button, get("layers")?.[/** @type {HTMLElement} */ (button).dataset.layer ?? ""] === true);
 }
 
 /** The chip of lanes is there only where a lane detector runs. */
 function showLaneChip() {
-  const hasLanes = Boolean(get("frame")?.display.plan_lanes), chip = $("[data-layer=lanes]");
+  const hasLanes = Boolean(get("frame")?.display.plan_lanes),
+    chip = $("[data-layer=lanes]");
   if (chip.hidden === hasLanes) chip.hidden = !hasLanes;
 }
 
 /** @param {View} view */
 function colorChoice(view) {
   const options = COLOR_BY.map(([by, label, title]) => el("option", { value: by, textContent: label, title }));
-  const choice = el("select", { class: "color-by", aria: { label: `Colour points of the ${view} by` }, title: "Colour points by" }, ...options);
+  const choice = el(
+    "select",
+    { class: "color-by", aria: { label: `Colour points of the ${view} by` }, title: "Colour points by" },
+    ...options,
+  );
   const show = () => (choice.value = get("colorBy")?.[view] ?? DEFAULT_COLORS[view]);
   choice.addEventListener("change", () => {
     const chosen = { ...DEFAULT_COLORS, ...get("colorBy"), [view]: choice.value };
@@ -86,7 +118,12 @@ function colorChoice(view) {
 }
 
 function tapeButton() {
-  const button = el("button", { type: "button", textContent: "Tape", title: "Measuring tape: drag between two places (or drag with Shift)", onclick: toggleTape });
+  const button = el("button", {
+    type: "button",
+    textContent: "Tape",
+    title: "Measuring tape: drag between two places (or drag with Shift)",
+    onclick: toggleTape,
+  });
   on(["taping"], () => press(button, get("taping") === true));
   press(button, false);
   return button;

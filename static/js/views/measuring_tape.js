@@ -21,7 +21,9 @@ export function measure(from, to) {
 
 /** "12.34 m", and how much of it is along and across. @param {Tape} tape */
 export function tapeWords({ from, to }) {
-  const along = to.x - from.x, left = to.y - from.y, up = from.z === null || to.z === null ? 0 : to.z - from.z;
+  const along = to.x - from.x,
+    left = to.y - from.y,
+    up = from.z === null || to.z === null ? 0 : to.z - from.z;
   const parts = [`${num(Math.abs(along), 2)} along`, `${num(Math.abs(left), 2)} across`];
   if (from.z !== null && to.z !== null) parts.push(`${num(Math.abs(up), 2)} up`);
   return `${num(Math.hypot(along, left, up), 2)} m  (${parts.join(", ")})`;
@@ -32,14 +34,22 @@ export function tapeWords({ from, to }) {
  * @param {Tape} tape @param {import("./drawing/text_labels.js").Labels} labels
  */
 export function drawTape(ctx, [x1, y1], [x2, y2], tape, labels) {
-  const length = Math.hypot(x2 - x1, y2 - y1) || 1, nx = (-(y2 - y1) / length) * CAP_PX, ny = ((x2 - x1) / length) * CAP_PX;
-  for (const [tint, width] of /** @type {[string, number][]} */ ([["rgb(0 0 0 / .7)", 4], [TINT, 1.8]])) {
+  const length = Math.hypot(x2 - x1, y2 - y1) || 1,
+    nx = (-(y2 - y1) / length) * CAP_PX,
+    ny = ((x2 - x1) / length) * CAP_PX;
+  for (const [tint, width] of /** @type {[string, number][]} */ ([
+    ["rgb(0 0 0 / .7)", 4],
+    [TINT, 1.8],
+  ])) {
     ctx.strokeStyle = tint;
     ctx.lineWidth = width;
     ctx.beginPath();
     ctx.moveTo(x1, y1);
     ctx.lineTo(x2, y2);
-    for (const [x, y] of [[x1, y1], [x2, y2]]) {
+    for (const [x, y] of [
+      [x1, y1],
+      [x2, y2],
+    ]) {
       ctx.moveTo(x - nx, y - ny);
       ctx.lineTo(x + nx, y + ny);
     }

@@ -44,33 +44,67 @@ export function addMode(added) {
 const modeNow = () => (mode?.isOn() ? mode : null);
 
 export function setUp() {
-  const invalidate = paint(["frame", "layers", "colorBy", "selection", "theme", "tape", "labeling", "labels", "labelFrames", "track", "draft", "drawnPath"], draw);
+  const invalidate = paint(
+    [
+      "frame",
+      "layers",
+      "colorBy",
+      "selection",
+      "theme",
+      "tape",
+      "labeling",
+      "labels",
+      "labelFrames",
+      "track",
+      "draft",
+      "drawnPath",
+    ],
+    draw,
+  );
   surface = new Surface(canvas, invalidate, "panel");
   view = new Viewport(canvas, {
     changed: () => {
       reflect();
       invalidate();
     },
-    clicked: (place) => (get("taping") ? set("tape", null) : modeNow() ? modeNow()?.clicked(place) : select(objectAt(place))),
+    clicked: (place) =>
+      get("taping") ? set("tape", null) : modeNow() ? modeNow()?.clicked(place) : select(objectAt(place)),
     hasKeys: () => !modeNow(),
-    takes: (from, event) => (get("taping") || event.shiftKey ? measuring(from) : modeNow()?.takes(from, view.scale) ?? null),
+    takes: (from, event) =>
+      get("taping") || event.shiftKey ? measuring(from) : (modeNow()?.takes(from, view.scale) ?? null),
   });
-  followHover(canvas, (u, v) => (modeNow() ? null : objectAt(view.place(u, v))), (u, v) => modeNow()?.cursorAt(view.place(u, v), view.scale) ?? "");
-  const views = /** @type {const} */ ([["ahead", "Ahead", "The road ahead (double click)"], ["around", "Around", "50 m on every side"]]);
-  for (const [name, label, title] of views) addTool("plan", el("button", { type: "button", textContent: label, title, data: { view: name }, onclick: () => view.show(name) }));
+  followHover(
+    canvas,
+    (u, v) => (modeNow() ? null : objectAt(view.place(u, v))),
+    (u, v) => modeNow()?.cursorAt(view.place(u, v), view.scale) ?? "",
+  );
+  const views = /** @type {const} */ ([
+    ["ahead", "Ahead", "The road ahead (double click)"],
+    ["around", "Around", "50 m on every side"],
+  ]);
+  for (const [name, label, title] of views)
+    addTool(
+      "plan",
+      el("button", { type: "button", textContent: label, title, data: { view: name }, onclick: () => view.show(name) }),
+    );
   reflect();
 }
 
 /** @param {Place} from @returns {Drag} */
-const measuring = (from) => ({ moved: (to) => measure({ ...from, z: null, u: null, v: null }, { ...to, z: null, u: null, v: null }) });
+const measuring = (from) => ({
+  moved: (to) => measure({ ...from, z: null, u: null, v: null }, { ...to, z: null, u: null, v: null }),
+});
 
 function reflect() {
-  for (const button of document.querySelectorAll(".view-tools [data-view]")) press(button, /** @type {HTMLElement} */ (button).dataset.view === view.view);
+  for (const button of document.querySelectorAll(".view-tools [data-view]"))
+    press(button, /** @type {HTMLElement} */ (button).dataset.view === view.view);
 }
 
 function draw() {
   if (surface.isHidden) return;
-  const ctx = surface.begin(), frame = get("frame"), layers = get("layers") ?? {};
+  const ctx = surface.begin(),
+    frame = get("frame"),
+    layers = get("layers") ?? {};
   view.resize(surface);
   drawGrid(ctx);
   const labels = new Labels(ctx, surface.width);
@@ -83,12 +117,14 @@ function draw() {
   }
   drawEgo(ctx);
   const tape = get("tape");
-  if (tape) drawTape(ctx, [view.u(tape.from.y), view.v(tape.from.x)], [view.u(tape.to.y), view.v(tape.to.x)], tape, labels);
+  if (tape)
+    drawTape(ctx, [view.u(tape.from.y), view.v(tape.from.x)], [view.u(tape.to.y), view.v(tape.to.x)], tape, labels);
 }
 
 /** @param {CanvasRenderingContext2D} ctx */
 function drawGrid(ctx) {
-  const u = view.u(0), v = view.v(0);
+  const u = view.u(0),
+    v = view.v(0);
   ctx.strokeStyle = color("grid");
   ctx.fillStyle = ui("dim");
   ctx.lineWidth = 1;
@@ -110,12 +146,14 @@ function drawGrid(ctx) {
 
 /** Ground and loose points first, clusters larger and over them. @param {CanvasRenderingContext2D} ctx @param {Frame} frame */
 function drawPoints(ctx, frame) {
-  const { count, xyz, kind } = frame, colors = tints(frame, get("colorBy")?.plan ?? "object", color, 0.55);
+  const { count, xyz, kind } = frame,
+    colors = tints(frame, get("colorBy")?.plan ?? "object", color, 0.55);
   raster.begin(surface.width, surface.height);
   for (const isCluster of [false, true]) {
     const size = isCluster ? 2 : 1;
     for (let i = 0; i < count; i++) {
-      if ((kind[i] === CLUSTER) === isCluster) raster.dot(view.u(xyz[3 * i + 1] / 100), view.v(xyz[3 * i] / 100), size, colors[i]);
+      if ((kind[i] === CLUSTER) === isCluster)
+        raster.dot(view.u(xyz[3 * i + 1] / 100), view.v(xyz[3 * i] / 100), size, colors[i]);
     }
   }
   raster.drawOn(ctx);
@@ -133,11 +171,15 @@ function drawLanes(ctx, lanes) {
 
 /** @param {CanvasRenderingContext2D} ctx @param {Frame} frame @param {Record<string, boolean>} layers @param {Labels} labels */
 function drawObjects(ctx, frame, layers, labels) {
-  const { result } = frame, lead = result.cipv?.id ?? null, next = result.next_cipv?.id ?? null, chosen = get("selection");
+  const { result } = frame,
+    lead = result.cipv?.id ?? null,
+    next = result.next_cipv?.id ?? null,
+    chosen = get("selection");
   const important = (/** @type {FusedObject} */ item) => item.id === lead || item.id === chosen || item.id === next;
   const order = result.objects.filter((item) => item.bev).sort((a, b) => Number(important(a)) - Number(important(b)));
   for (const item of order) {
-    const tint = color(roleOf(item, lead)), isNamed = important(item) || (!item.carried && (item.source !== "L" || item.in_path));
+    const tint = color(roleOf(item, lead)),
+      isNamed = important(item) || (!item.carried && (item.source !== "L" || item.in_path));
     if (layers.trails && isNamed) drawTrail(ctx, view, item.id, tint);
     ctx.fillStyle = ctx.strokeStyle = tint;
     drawOutline(ctx, view, item, important(item), item.id === lead);
@@ -149,19 +191,25 @@ function drawObjects(ctx, frame, layers, labels) {
     if (item.id === next) drawRing(ctx, view, item, color("cipv"), [4, 4]);
   }
   const selected = order.find(({ id }) => id === chosen);
-  if (selected) drawInPlan(ctx, frame, selected, labels, { u: (y) => view.u(y), v: (x) => view.v(x), scale: view.scale });
+  if (selected)
+    drawInPlan(ctx, frame, selected, labels, { u: (y) => view.u(y), v: (x) => view.v(x), scale: view.scale });
   for (const item of order.reverse()) {
     if (!item.bev || (!important(item) && (item.carried || (item.source === "L" && !item.in_path)))) continue;
-    const u = Math.max(...item.bev.map(([, y]) => view.u(y))) + 3, v = Math.min(...item.bev.map(([x]) => view.v(x))) + 14;
-    const distance = item.distance_m === null ? "" : ` ${num(item.distance_m)}`, isLead = item.id === lead;
-    const words = isLead ? `CIPV #${item.id} ${distance} m` : `${item.id === next ? "next " : ""}#${item.id}${distance}`;
+    const u = Math.max(...item.bev.map(([, y]) => view.u(y))) + 3,
+      v = Math.min(...item.bev.map(([x]) => view.v(x))) + 14;
+    const distance = item.distance_m === null ? "" : ` ${num(item.distance_m)}`,
+      isLead = item.id === lead;
+    const words = isLead
+      ? `CIPV #${item.id} ${distance} m`
+      : `${item.id === next ? "next " : ""}#${item.id}${distance}`;
     labels.put(words, u, v, onPicture(roleOf(item, lead)), isLead ? "strong" : important(item) ? "must" : "weak");
   }
 }
 
 /** Our own car: the origin is at its front bumper or just behind it. @param {CanvasRenderingContext2D} ctx */
 function drawEgo(ctx) {
-  const w = 1.8 * view.scale, l = 4.4 * view.scale;
+  const w = 1.8 * view.scale,
+    l = 4.4 * view.scale;
   ctx.fillStyle = color("ego");
   ctx.globalAlpha = 0.9;
   ctx.beginPath();
@@ -178,11 +226,27 @@ function objectAt({ x, y }) {
   let best = null;
   for (const { id, bev } of frame.result.objects) {
     if (!bev) continue;
-    const xs = bev.map((p) => p[0]), ys = bev.map((p) => p[1]);
-    const dx = Math.max(Math.min(...xs) - x, 0, x - Math.max(...xs)), dy = Math.max(Math.min(...ys) - y, 0, y - Math.max(...ys));
+    const xs = bev.map((p) => p[0]),
+      ys = bev.map((p) => p[1]);
+    const dx = Math.max(Math.min(...xs) - x, 0, x - Math.max(...xs)),
+      dy = Math.max(Math.min(...ys) - y, 0, y - Math.max(...ys));
     const away = Math.hypot(dx, dy) * view.scale;
     if (away < PICK_PX && (!best || away < best.away)) best = { id, away };
   }
   const { count, xyz, owner } = frame;
-  return best?.id ?? ownerOf(frame, nearestPoint(count, (i) => owner[i] > 0, (i) => xyz[3 * i] / 100, (i) => xyz[3 * i + 1] / 100, x, y, PICK_PX / view.scale));
+  return (
+    best?.id ??
+    ownerOf(
+      frame,
+      nearestPoint(
+        count,
+        (i) => owner[i] > 0,
+        (i) => xyz[3 * i] / 100,
+        (i) => xyz[3 * i + 1] / 100,
+        x,
+        y,
+        PICK_PX / view.scale,
+      ),
+    )
+  );
 }

@@ -27,19 +27,51 @@ const saved = () => memory.read("layouts", {});
 
 function fill() {
   const hidden = get("layout")?.hidden ?? [];
-  const panes = Object.entries(PANES).map(([pane, label]) => el("label", { class: "item" },
-    el("input", { type: "checkbox", checked: !hidden.includes(/** @type {Pane} */ (pane)), onchange: () => toggle(/** @type {Pane} */ (pane)) }), label));
+  const panes = Object.entries(PANES).map(([pane, label]) =>
+    el(
+      "label",
+      { class: "item" },
+      el("input", {
+        type: "checkbox",
+        checked: !hidden.includes(/** @type {Pane} */ (pane)),
+        onchange: () => toggle(/** @type {Pane} */ (pane)),
+      }),
+      label,
+    ),
+  );
   const name = el("input", { type: "text", placeholder: "Name", maxLength: 40, aria: { label: "Name of the layout" } });
-  const form = el("form", { class: "menu-row", onsubmit: (/** @type {Event} */ event) => save(event, name.value) }, name, el("button", { textContent: "Save" }));
-  return [el("h3", { textContent: "Panes" }), ...panes, el("h3", { textContent: "Layouts" }),
-    ...Object.entries(BUILT_IN).map(([key, layout]) => item(key, layout)), ...Object.entries(saved()).map(([key, layout]) => item(key, layout, true)), form];
+  const form = el(
+    "form",
+    { class: "menu-row", onsubmit: (/** @type {Event} */ event) => save(event, name.value) },
+    name,
+    el("button", { textContent: "Save" }),
+  );
+  return [
+    el("h3", { textContent: "Panes" }),
+    ...panes,
+    el("h3", { textContent: "Layouts" }),
+    ...Object.entries(BUILT_IN).map(([key, layout]) => item(key, layout)),
+    ...Object.entries(saved()).map(([key, layout]) => item(key, layout, true)),
+    form,
+  ];
 }
 
 /** @param {string} name @param {Saved} layout @param {boolean} [isOwn] */
 function item(name, layout, isOwn = false) {
   const use = el("button", { type: "button", class: "item", textContent: name, onclick: () => apply(layout) });
   if (!isOwn) return use;
-  return el("div", { class: "menu-row" }, use, el("button", { type: "button", class: "drop", textContent: "✕", aria: { label: `Delete the layout ${name}` }, onclick: () => forget(name) }));
+  return el(
+    "div",
+    { class: "menu-row" },
+    use,
+    el("button", {
+      type: "button",
+      class: "drop",
+      textContent: "✕",
+      aria: { label: `Delete the layout ${name}` },
+      onclick: () => forget(name),
+    }),
+  );
 }
 
 /** @param {Saved} layout */

@@ -38,7 +38,8 @@ export function close() {
 
 /** @param {HTMLElement} button */
 function place(button) {
-  const at = button.getBoundingClientRect(), own = menu.getBoundingClientRect();
+  const at = button.getBoundingClientRect(),
+    own = menu.getBoundingClientRect();
   const below = at.bottom + GAP_PX;
   menu.style.left = `${Math.max(GAP_PX, Math.min(at.right - own.width, innerWidth - own.width - GAP_PX))}px`;
   menu.style.top = `${below + own.height > innerHeight ? Math.max(GAP_PX, at.top - own.height - GAP_PX) : below}px`;

@@ -15,7 +15,14 @@ import { showRerun } from "./rerun_tab.js";
  */
 
 /** @type {Record<Pane, string>} in the order of their menu */
-export const PANES = { camera: "Camera", plan: "Plan, 3D, rerun", objects: "Objects", why: "Why", params: "Parameters", timeline: "Timeline" };
+export const PANES = {
+  camera: "Camera",
+  plan: "Plan, 3D, rerun",
+  objects: "Objects",
+  why: "Why",
+  params: "Parameters",
+  timeline: "Timeline",
+};
 /** What a pane with the whole workspace lies over. @type {Pane[]} */
 const COVERED = ["camera", "plan", "objects"];
 /** @type {Layout} */
@@ -31,9 +38,12 @@ export function setUp() {
   NARROW.addEventListener("change", () => showInspector(!NARROW.matches));
   for (const button of document.querySelectorAll("[data-grow]")) {
     if (button.matches(".grow")) button.append(icon("grow"));
-    button.addEventListener("click", () => grow(/** @type {Pane} */ (/** @type {HTMLElement} */ (button).dataset.grow)));
+    button.addEventListener("click", () =>
+      grow(/** @type {Pane} */ (/** @type {HTMLElement} */ (button).dataset.grow)),
+    );
   }
-  for (const button of plansTabs()) button.addEventListener("click", () => showTab(/** @type {Tab} */ (button.dataset.tab)));
+  for (const button of plansTabs())
+    button.addEventListener("click", () => showTab(/** @type {Tab} */ (button.dataset.tab)));
   $(".bev-pane .tabs").addEventListener("keydown", onTabKey);
   $("#params-button").addEventListener("click", toggleInspector);
   on(["layout"], reflect);
@@ -41,7 +51,8 @@ export function setUp() {
 }
 
 /** @returns {HTMLElement[]} */
-const plansTabs = () => [...document.querySelectorAll(".bev-pane [data-tab]")].map((tab) => /** @type {HTMLElement} */ (tab));
+const plansTabs = () =>
+  [...document.querySelectorAll(".bev-pane [data-tab]")].map((tab) => /** @type {HTMLElement} */ (tab));
 const layout = () => get("layout") ?? EVERYTHING;
 
 /** @param {Partial<Layout>} changes */
@@ -98,19 +109,24 @@ function reflect() {
   }
   for (const node of document.querySelectorAll(".column")) {
     const column = /** @type {HTMLElement} */ (node);
-    const panes = [...column.querySelectorAll("[data-pane]")].map((pane) => !(/** @type {HTMLElement} */ (pane).hidden));
+    const panes = [...column.querySelectorAll("[data-pane]")].map(
+      (pane) => !(/** @type {HTMLElement} */ (pane).hidden),
+    );
     column.hidden = !panes.some(Boolean);
     $(".gutter", HTMLElement, column).hidden = !panes.every(Boolean);
   }
   hideGutters();
-  for (const button of document.querySelectorAll("[data-grow]")) press(button, /** @type {HTMLElement} */ (button).dataset.grow === grown);
+  for (const button of document.querySelectorAll("[data-grow]"))
+    press(button, /** @type {HTMLElement} */ (button).dataset.grow === grown);
   press($("#params-button"), root.dataset.inspect !== "closed");
   reflectTab(tab);
 }
 
 /** A gutter between a pane and nothing moves nothing. */
 function hideGutters() {
-  const plan = $(".bev-pane"), main = $(".main-column"), side = $("#side");
+  const plan = $(".bev-pane"),
+    main = $(".main-column"),
+    side = $("#side");
   $("[data-gutter=plan]").hidden = plan.hidden || main.hidden;
   $("[data-gutter=side]").hidden = side.hidden || (plan.hidden && main.hidden);
   $("[data-gutter=timeline]").hidden = $(".timeline-pane").hidden;
@@ -135,7 +151,8 @@ function onTabKey(event) {
   const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
   if (!by) return;
   event.preventDefault();
-  const tabs = plansTabs(), at = tabs.findIndex((tab) => tab.dataset.tab === layout().tab);
+  const tabs = plansTabs(),
+    at = tabs.findIndex((tab) => tab.dataset.tab === layout().tab);
   const next = tabs[(at + by + tabs.length) % tabs.length];
   showTab(/** @type {Tab} */ (next.dataset.tab));
   next.focus();

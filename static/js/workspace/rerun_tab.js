@@ -21,7 +21,10 @@ async function load(body, from) {
     const query = new URLSearchParams({ compact: String(Number(body.clientWidth < NARROW_PX)) });
     if (from !== undefined) query.set("first", String(from));
     const { url, first, last } = await request(`api/rerun/open?${query}`);
-    body.replaceChildren(bar(body, `frames ${first + 1} to ${last + 1} of ${get("state")?.count ?? 0}`), el("iframe", { src: url, title: "rerun", class: "below-bar" }));
+    body.replaceChildren(
+      bar(body, `frames ${first + 1} to ${last + 1} of ${get("state")?.count ?? 0}`),
+      el("iframe", { src: url, title: "rerun", class: "below-bar" }),
+    );
   } catch (problem) {
     note.textContent = /** @type {Error} */ (problem).message;
     body.append(bar(body, ""));
@@ -30,9 +33,29 @@ async function load(body, from) {
 
 /** @param {HTMLElement} body @param {string} what is open */
 function bar(body, what) {
-  const save = el("a", { href: "api/rerun.rrd", textContent: "Save .rrd", title: "For the native viewer: 100 frames around this one" });
+  const save = el("a", {
+    href: "api/rerun.rrd",
+    textContent: "Save .rrd",
+    title: "For the native viewer: 100 frames around this one",
+  });
   save.setAttribute("download", "");
-  return el("div", { class: "rerun-bar" }, el("span", { class: "facts", textContent: what }), el("span", { class: "spacer" }), save,
-    el("button", { type: "button", textContent: "Start", title: "Open it from the start on", onclick: () => load(body, 0) }),
-    el("button", { type: "button", textContent: "Here", title: "Open it from the shown frame on", onclick: () => load(body) }));
+  return el(
+    "div",
+    { class: "rerun-bar" },
+    el("span", { class: "facts", textContent: what }),
+    el("span", { class: "spacer" }),
+    save,
+    el("button", {
+      type: "button",
+      textContent: "Start",
+      title: "Open it from the start on",
+      onclick: () => load(body, 0),
+    }),
+    el("button", {
+      type: "button",
+      textContent: "Here",
+      title: "Open it from the shown frame on",
+      onclick: () => load(body),
+    }),
+  );
 }

@@ -33,7 +33,9 @@ export function setUp() {
 
 /** @returns {string} */
 export function link() {
-  const state = get("state"), params = get("params"), selection = get("selection");
+  const state = get("state"),
+    params = get("params"),
+    selection = get("selection");
   const query = new URLSearchParams();
   if (state?.uri) query.set("uri", state.uri);
   query.set("frame", String(get("scrub") ?? state?.index ?? 0));
@@ -51,8 +53,16 @@ export function link() {
 export function parse(hash) {
   const query = new URLSearchParams(hash.replace(/^#/, ""));
   if (!query.has("uri") && !query.has("frame")) return null;
-  const whole = (/** @type {string} */ name) => (/^\d{1,9}$/.test(query.get(name) ?? "") ? Number(query.get(name)) : null);
-  return { uri: query.get("uri"), index: whole("frame"), selection: whole("select"), preset: query.get("preset"), values: object(query.get("params")) ?? {}, layout: layouts.checked(object(query.get("layout"))) };
+  const whole = (/** @type {string} */ name) =>
+    /^\d{1,9}$/.test(query.get(name) ?? "") ? Number(query.get(name)) : null;
+  return {
+    uri: query.get("uri"),
+    index: whole("frame"),
+    selection: whole("select"),
+    preset: query.get("preset"),
+    values: object(query.get("params")) ?? {},
+    layout: layouts.checked(object(query.get("layout"))),
+  };
 }
 
 /** @param {string|null} json @returns {any} */
@@ -103,7 +113,9 @@ async function apply(shared, agreed = false) {
   if (shared.layout) layouts.apply(shared.layout);
   if (shared.preset) {
     const body = { preset: shared.preset, values: shared.values };
-    await request("api/params", "POST", body).catch((problem) => show("This link's parameters do not fit", problem.message));
+    await request("api/params", "POST", body).catch((problem) =>
+      show("This link's parameters do not fit", problem.message),
+    );
   }
   if (shared.index !== null && !get("state")?.live) {
     playback({ playing: false }); // it leads to a moment, which playing would leave at once
@@ -114,7 +126,8 @@ async function apply(shared, agreed = false) {
 
 /** What the link would do to more than this page, in words. @param {Shared} shared @returns {Promise<string[]>} */
 async function whatItChanges(shared) {
-  const state = get("state"), changes = [];
+  const state = get("state"),
+    changes = [];
   const opens = shared.uri && shared.uri !== state?.uri;
   if (opens && !BUILT_IN.test(shared.uri ?? "")) changes.push(`open ${shared.uri}`);
   if (opens && state?.live) changes.push("let go of the live sensors");
@@ -137,8 +150,11 @@ function ask(changes, shared) {
     dialog.close();
     apply(shared, true);
   });
-  dialog.replaceChildren(el("h2", { textContent: "This link wants to" }), el("ul", {}, ...changes.map((words) => el("li", {}, el("code", { textContent: words })))),
-    el("form", { class: "dialog-buttons", method: "dialog" }, yes, el("button", { textContent: "Stay here" })));
+  dialog.replaceChildren(
+    el("h2", { textContent: "This link wants to" }),
+    el("ul", {}, ...changes.map((words) => el("li", {}, el("code", { textContent: words })))),
+    el("form", { class: "dialog-buttons", method: "dialog" }, yes, el("button", { textContent: "Stay here" })),
+  );
   dialog.showModal();
 }
 
@@ -159,7 +175,11 @@ async function open(uri, shared) {
 /** @param {string} title @param {string} words */
 function show(title, words) {
   const field = el("input", { type: "text", value: words, readOnly: true, aria: { label: title } });
-  dialog.replaceChildren(el("h2", { textContent: title }), field, el("form", { class: "dialog-buttons", method: "dialog" }, el("button", { textContent: "Close" })));
+  dialog.replaceChildren(
+    el("h2", { textContent: title }),
+    field,
+    el("form", { class: "dialog-buttons", method: "dialog" }, el("button", { textContent: "Close" })),
+  );
   dialog.showModal();
   field.select();
 }

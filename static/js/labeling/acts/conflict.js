@@ -12,42 +12,93 @@ import { based } from "./revisions.js";
  * @param {any} theirs the item as it is now @returns {Promise<Act|null>}
  */
 export async function choose(act, sentence, item, theirs) {
-  const place = typeof act.track === "number" && typeof act.frame === "number" ? await placeOf(act.track, act.frame) : null;
-  const body = el("div", {}, el("p", { textContent: sentence }),
-    el("div", { class: "conflict" }, side("Yours", act), side("Theirs", { ...theirs, cuboid: place?.cuboid, bbox: place?.bbox })));
+  const place =
+    typeof act.track === "number" && typeof act.frame === "number" ? await placeOf(act.track, act.frame) : null;
+  const body = el(
+    "div",
+    {},
+    el("p", { textContent: sentence }),
+    el(
+      "div",
+      { class: "conflict" },
+      side("Yours", act),
+      side("Theirs", { ...theirs, cuboid: place?.cuboid, bbox: place?.bbox }),
+    ),
+  );
   return open("Two people changed the same label", body, null, [
     ["Take theirs", null],
-    ["Keep mine", () => based(act, (ref) => (ref.kind === item.kind && ref.id === item.id ? theirs.revision : ref.revision))],
+    [
+      "Keep mine",
+      () => based(act, (ref) => (ref.kind === item.kind && ref.id === item.id ? theirs.revision : ref.revision)),
+    ],
   ]);
 }
 
 /** Where the server has a track now. @param {number} track @param {number} frame @returns {Promise<import("../state/types.js").LabelSighting|null>} */
 async function placeOf(track, frame) {
   /** @type {import("../state/types.js").SightingsAnswer} */
-  const { sightings } = await request(`api/labels/frames?first=${frame}&last=${frame}`).catch(() => ({ sightings: {} }));
+  const { sightings } = await request(`api/labels/frames?first=${frame}&last=${frame}`).catch(() => ({
+    sightings: {},
+  }));
   return sightings[frame]?.find((each) => each.track === track) ?? null;
 }
 
 /** What a person does not choose by. */
-const HIDDEN = ["kind", "id", "track", "range", "items", "tracks", "revision", "interpolate", "sightings", "origin", "keyframes"];
+const HIDDEN = [
+  "kind",
+  "id",
+  "track",
+  "range",
+  "items",
+  "tracks",
+  "revision",
+  "interpolate",
+  "sightings",
+  "origin",
+  "keyframes",
+];
 
 /** Counted from 1 where people read them. */
 const FRAMES = ["frame", "first", "last"];
 
 /** What an act is about, where its kind does not say it to people. @type {Record<string, string>} */
-const ACTS = { set_sighting: "where it is", drop_keyframe: "no keyframe", drop_sightings: "not here", size_along: "its size", refit: "laid on points", relabel: "its class", trim_lead: "the range's end" };
+const ACTS = {
+  set_sighting: "where it is",
+  drop_keyframe: "no keyframe",
+  drop_sightings: "not here",
+  size_along: "its size",
+  refit: "laid on points",
+  relabel: "its class",
+  trim_lead: "the range's end",
+};
 
 /** @param {string} title @param {Record<string, any>} item */
 function side(title, item) {
-  const rows = Object.entries(item).filter(([key, value]) => !HIDDEN.includes(key) && value !== null && value !== undefined && value !== "");
-  return el("div", {}, el("h3", { textContent: item.kind ? `${title}: ${ACTS[item.kind] ?? item.kind.replaceAll("_", " ")}` : title }), el("dl", { class: "facts-list" }, ...rows.flatMap(([key, value]) => [
-    el("dt", { textContent: ({ bbox: "box" })[key] ?? key.replaceAll("_", " ") }), el("dd", { textContent: words(FRAMES.includes(key) ? value + 1 : value) })])));
+  const rows = Object.entries(item).filter(
+    ([key, value]) => !HIDDEN.includes(key) && value !== null && value !== undefined && value !== "",
+  );
+  return el(
+    "div",
+    {},
+    el("h3", { textContent: item.kind ? `${title}: ${ACTS[item.kind] ?? item.kind.replaceAll("_", " ")}` : title }),
+    el(
+      "dl",
+      { class: "facts-list" },
+      ...rows.flatMap(([key, value]) => [
+        el("dt", { textContent: { bbox: "box" }[key] ?? key.replaceAll("_", " ") }),
+        el("dd", { textContent: words(FRAMES.includes(key) ? value + 1 : value) }),
+      ]),
+    ),
+  );
 }
 
 /** @param {any} value @returns {string} */
 function words(value) {
   if (typeof value === "number") return String(Math.round(value * 100) / 100);
   if (Array.isArray(value)) return value.length > 8 ? `${value.length} of them` : value.map(words).join(", ");
-  if (value && typeof value === "object") return Object.entries(value).map(([key, inner]) => `${key.replace("_rad", "")} ${words(inner)}`).join(" · ");
+  if (value && typeof value === "object")
+    return Object.entries(value)
+      .map(([key, inner]) => `${key.replace("_rad", "")} ${words(inner)}`)
+      .join(" · ");
   return String(value);
 }

@@ -13,27 +13,45 @@ import { boxOf } from "../views/picture_drawing.js";
 /** @typedef {import("../../core/types.js").Point2} Point2 */
 /** @typedef {import("../state/types.js").Box} Box */
 
-const AHEAD_M = 20, PATH_M = 40, STEP_M = 1, BEND_M = 0.25, SHIFT_M = 0.1;
+const AHEAD_M = 20,
+  PATH_M = 40,
+  STEP_M = 1,
+  BEND_M = 0.25,
+  SHIFT_M = 0.1;
 /** Of a box that nothing says anything of, and of a step: shares of the picture's width. */
-const BOX_SHARE = 0.06, STEP_SHARE = 0.002;
+const BOX_SHARE = 0.06,
+  STEP_SHARE = 0.002;
 
 /** The middle of the pipeline's path, or of straight ahead where it has none. @returns {Point2[]} */
 function middleOfPath() {
   const center = get("frame")?.result.path?.center ?? [];
-  return center.length > 1 ? center : [[0, 0], [PATH_M, 0]];
+  return center.length > 1
+    ? center
+    : [
+        [0, 0],
+        [PATH_M, 0],
+      ];
 }
 
 /** A point of a line at a distance ahead. @param {Point2[]} line @param {number} x */
 function lateral(line, x) {
-  const after = Math.min(Math.max(1, line.findIndex((point) => point[0] >= x)), line.length - 1);
-  const [x1, y1] = line[after - 1], [x2, y2] = line[after];
+  const after = Math.min(
+    Math.max(
+      1,
+      line.findIndex((point) => point[0] >= x),
+    ),
+    line.length - 1,
+  );
+  const [x1, y1] = line[after - 1],
+    [x2, y2] = line[after];
   return x2 === x1 ? y1 : y1 + ((y2 - y1) * (x - x1)) / (x2 - x1);
 }
 
 /** A vehicle of the class that the bar says, in our path ahead. */
 export async function placeAhead() {
   setTool(null);
-  const label = newLabel(), at = { x: AHEAD_M, y: lateral(middleOfPath(), AHEAD_M) };
+  const label = newLabel(),
+    at = { x: AHEAD_M, y: lateral(middleOfPath(), AHEAD_M) };
   const cuboid = drawn(at, at, label, groundAt(get("frame")?.display.ground ?? null, at));
   const answer = await act({ kind: "add_track", label, frame: shown(), cuboid, bbox: null });
   const made = answer?.changed?.tracks[0]?.id;
@@ -42,7 +60,8 @@ export async function placeAhead() {
 
 /** The selected label's cuboid in our path ahead: where nothing says how far it is, arrows do. */
 export function cuboidAhead() {
-  const track = chosen(), at = { x: AHEAD_M, y: lateral(middleOfPath(), AHEAD_M) };
+  const track = chosen(),
+    at = { x: AHEAD_M, y: lateral(middleOfPath(), AHEAD_M) };
   if (!track) return say("Select a label first");
   setTool(null);
   draft.hold(track.id, { cuboid: drawn(at, at, track.label, groundAt(get("frame")?.display.ground ?? null, at)) });
@@ -68,18 +87,23 @@ function pictureWidth() {
 
 /** @returns {Box|null} */
 function middleBox() {
-  const picture = get("frame")?.picture, width = pictureWidth();
+  const picture = get("frame")?.picture,
+    width = pictureWidth();
   if (!picture || !width) return null;
-  const u = width / 2, v = picture.height / picture.scale / 2, half = (width * BOX_SHARE) / 2;
+  const u = width / 2,
+    v = picture.height / picture.scale / 2,
+    half = (width * BOX_SHARE) / 2;
   return [u - half, v - half, u + half, v + half];
 }
 
 /** Move the box of the selected label, or with `isSize` its right and lower side. @param {number} du @param {number} dv steps @param {boolean} isSize */
 export function changeBox(du, dv, isSize) {
-  const track = chosen(), step = (pictureWidth() ?? 0) * STEP_SHARE;
+  const track = chosen(),
+    step = (pictureWidth() ?? 0) * STEP_SHARE;
   const box = track && (draft.presentOf(track.id)?.bbox ?? boxAround());
   if (!track || !box) return;
-  const [x1, y1, x2, y2] = box, [dx, dy] = [du * step, dv * step];
+  const [x1, y1, x2, y2] = box,
+    [dx, dy] = [du * step, dv * step];
   const [left, top] = isSize ? [x1, y1] : [x1 + dx, y1 + dy];
   draft.hold(track.id, { bbox: [left, top, Math.max(left + 1, x2 + dx), Math.max(top + 1, y2 + dy)] });
   draft.release();
@@ -89,20 +113,29 @@ export function changeBox(du, dv, isSize) {
 function drawnMiddle() {
   const lines = get("drawnPath");
   if (lines) return lines.left.map(([x, y], i) => [(x + lines.right[i][0]) / 2, (y + lines.right[i][1]) / 2]);
-  const line = middleOfPath(), last = Math.max(STEP_M, line[line.length - 1][0]);
+  const line = middleOfPath(),
+    last = Math.max(STEP_M, line[line.length - 1][0]);
   return Array.from({ length: Math.floor(last / STEP_M) + 1 }, (_, i) => [i * STEP_M, lateral(line, i * STEP_M)]);
 }
 
 /** Bend the path's far end aside, or with `isWhole` move all of it; to the left is positive. @param {number} steps @param {boolean} isWhole */
 export function bendPath(steps, isWhole) {
-  const middle = drawnMiddle(), length = middle[middle.length - 1][0] || 1;
-  set("drawnPath", sides(middle.map(([x, y]) => [x, y + (isWhole ? steps * SHIFT_M : steps * BEND_M * (x / length) ** 2)])));
+  const middle = drawnMiddle(),
+    length = middle[middle.length - 1][0] || 1;
+  set(
+    "drawnPath",
+    sides(middle.map(([x, y]) => [x, y + (isWhole ? steps * SHIFT_M : steps * BEND_M * (x / length) ** 2)])),
+  );
 }
 
 /** @param {1|-1} direction longer or shorter by a metre */
 export function lengthenPath(direction) {
-  const middle = drawnMiddle(), [[x1, y1], [x2, y2]] = middle.slice(-2);
-  set("drawnPath", sides(direction > 0 ? [...middle, [2 * x2 - x1, 2 * y2 - y1]] : middle.slice(0, Math.max(2, middle.length - 1))));
+  const middle = drawnMiddle(),
+    [[x1, y1], [x2, y2]] = middle.slice(-2);
+  set(
+    "drawnPath",
+    sides(direction > 0 ? [...middle, [2 * x2 - x1, 2 * y2 - y1]] : middle.slice(0, Math.max(2, middle.length - 1))),
+  );
 }
 
 /** The path as it is drawn, or as the pipeline says. */

@@ -67,11 +67,14 @@ export function newId() {
   const bytes = crypto.getRandomValues(new Uint8Array(16));
   bytes[6] = (bytes[6] & 0x0f) | 0x40;
   bytes[8] = (bytes[8] & 0x3f) | 0x80;
-  return [...bytes].map((byte, i) => ([4, 6, 8, 10].includes(i) ? "-" : "") + byte.toString(16).padStart(2, "0")).join("");
+  return [...bytes]
+    .map((byte, i) => ([4, 6, 8, 10].includes(i) ? "-" : "") + byte.toString(16).padStart(2, "0"))
+    .join("");
 }
 
 /** @param {Act} a @param {Act} b */
-const isSameShape = (a, b) => a.kind === "set_sighting" && b.kind === a.kind && a.track === b.track && a.frame === b.frame;
+const isSameShape = (a, b) =>
+  a.kind === "set_sighting" && b.kind === a.kind && a.track === b.track && a.frame === b.frame;
 
 /** Send what waits; also once more what could not be sent. */
 export async function send() {
@@ -81,9 +84,14 @@ export async function send() {
     for (let next = queue[0]; next; next = queue[0]) {
       tell("saving");
       /** @type {ActAnswer|Error} */
-      const answer = await request(next.path, "POST", next.path.endsWith("/act") ? { ...next.body, act: next.act } : next.body).catch((error) => error);
+      const answer = await request(
+        next.path,
+        "POST",
+        next.path.endsWith("/act") ? { ...next.body, act: next.act } : next.body,
+      ).catch((error) => error);
       const refusal = answer instanceof Refused && !AWAY.includes(answer.status) ? answer : null;
-      if (answer instanceof Error && !refusal) return tell("failed", answer instanceof Refused ? answer.message : "the server cannot be reached");
+      if (answer instanceof Error && !refusal)
+        return tell("failed", answer instanceof Refused ? answer.message : "the server cannot be reached");
       queue.shift();
       if (refusal) await refused(next, refusal);
       else settle(next, /** @type {ActAnswer} */ (answer));

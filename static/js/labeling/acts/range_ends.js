@@ -17,7 +17,8 @@ const GRAB_PX = 6;
 function ends() {
   /** @type {Map<number, End>} */
   const found = new Map();
-  const at = (/** @type {number} */ border) => found.get(border) ?? found.set(border, { at: border, before: null, after: null }).get(border);
+  const at = (/** @type {number} */ border) =>
+    found.get(border) ?? found.set(border, { at: border, before: null, after: null }).get(border);
   for (const range of get("labels")?.leads ?? []) {
     if (range.state === "rejected") continue;
     Object.assign(/** @type {End} */ (at(range.first)), { after: range });
@@ -27,7 +28,8 @@ function ends() {
 }
 
 /** @param {Iterable<End>} among @param {(end: End) => number} away @returns {End|null} */
-const nearest = (among, away) => [...among].reduce((/** @type {End|null} */ best, end) => (best && away(best) <= away(end) ? best : end), null);
+const nearest = (among, away) =>
+  [...among].reduce((/** @type {End|null} */ best, end) => (best && away(best) <= away(end) ? best : end), null);
 
 /** The end that a hand at a pixel column takes hold of. A narrow range can still be pressed in its middle.
  * @param {import("../../timeline/span.js").Span} span @param {number} x @returns {End|null} */
@@ -74,14 +76,18 @@ export function dragEnd(span, end) {
 async function keep(held) {
   const { range, first, last } = held;
   set("trimmed", held);
-  if (first !== range.first || last !== range.last) await act({ kind: "trim_lead", range: range.id, revision: range.revision, first, last });
+  if (first !== range.first || last !== range.last)
+    await act({ kind: "trim_lead", range: range.id, revision: range.revision, first, last });
   if (get("trimmed") === held) set("trimmed", null);
 }
 
 /** The nearest beginning, or end, of a range comes to the shown frame. @param {"after"|"before"} side of the border that the range is on */
 export function bringHere(side) {
   const to = side === "after" ? shown() : shown() + 1;
-  const end = nearest([...ends().values()].filter((each) => each[side]), ({ at }) => Math.abs(at - to));
+  const end = nearest(
+    [...ends().values()].filter((each) => each[side]),
+    ({ at }) => Math.abs(at - to),
+  );
   if (!end) return set("said", "Nobody leads yet: mark frames (I, O), then say who leads there (C)");
   const held = trimmed(end, to);
   if (held) keep(held);

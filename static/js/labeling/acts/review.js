@@ -28,19 +28,30 @@ async function begin() {
 
 /** The next label that nobody has reviewed, also of this frame. @param {1|-1} direction */
 export async function nextUnreviewed(direction) {
-  const item = get("labeling")?.item, after = item ? `&after_kind=${item.kind}&after_id=${item.id}` : "";
+  const item = get("labeling")?.item,
+    after = item ? `&after_kind=${item.kind}&after_id=${item.id}` : "";
   await step(get("scrub") ?? shown(), direction, after, true);
 }
 
 /** @param {number} frame @param {1|-1} direction @param {string} after @param {boolean} [isLast] whether it is said when there is none @returns {Promise<boolean>} */
 async function step(frame, direction, after, isLast = false) {
-  const found = await ahead("unreviewed", Math.max(-1, frame), direction, `${after}&person=${encodeURIComponent(knownName())}`);
+  const found = await ahead(
+    "unreviewed",
+    Math.max(-1, frame),
+    direction,
+    `${after}&person=${encodeURIComponent(knownName())}`,
+  );
   if (found instanceof Error) {
     say(found.message);
     return true;
   }
   if (found.frame === null || !found.item) {
-    if (isLast) say(found.left ? `${found.left} are left to review, ${direction > 0 ? "before" : "after"} this frame` : "Nothing of others is left to review");
+    if (isLast)
+      say(
+        found.left
+          ? `${found.left} are left to review, ${direction > 0 ? "before" : "after"} this frame`
+          : "Nothing of others is left to review",
+      );
     return false;
   }
   set("track", found.item.kind === "track" ? found.item.id : null);
@@ -52,14 +63,32 @@ async function step(frame, direction, after, isLast = false) {
 
 /** What is reviewed now: the selected track, else what the review has come to, else who leads here. @returns {Target|null} */
 export function target() {
-  const track = chosen(), labels = get("labels"), item = get("labeling")?.item;
+  const track = chosen(),
+    labels = get("labels"),
+    item = get("labeling")?.item;
   if (track) return { ref: refOf(track), name: nameOf(track), comment: track.comment };
   const path = item?.kind === "path" ? labels?.paths.find(({ id }) => id === item.id) : null;
   const event = item?.kind === "event" ? labels?.events.find(({ id }) => id === item.id) : null;
-  if (path) return { ref: { kind: "path", id: path.id, revision: path.revision }, name: `the path of frame ${path.frame + 1}`, comment: path.comment };
-  if (event) return { ref: { kind: "event", id: event.id, revision: event.revision }, name: `${event.kind.replace("_", "-")} in frame ${event.frame + 1}`, comment: event.comment };
+  if (path)
+    return {
+      ref: { kind: "path", id: path.id, revision: path.revision },
+      name: `the path of frame ${path.frame + 1}`,
+      comment: path.comment,
+    };
+  if (event)
+    return {
+      ref: { kind: "event", id: event.id, revision: event.revision },
+      name: `${event.kind.replace("_", "-")} in frame ${event.frame + 1}`,
+      comment: event.comment,
+    };
   const lead = leadAt(shown());
-  return lead && { ref: { kind: "lead", id: lead.id, revision: lead.revision }, name: `lead ${leadName(lead.lead)}, frames ${lead.first + 1}–${lead.last + 1}`, comment: lead.comment };
+  return (
+    lead && {
+      ref: { kind: "lead", id: lead.id, revision: lead.revision },
+      name: `lead ${leadName(lead.lead)}, frames ${lead.first + 1}–${lead.last + 1}`,
+      comment: lead.comment,
+    }
+  );
 }
 
 /** Another person has made it, and it is right. */
@@ -72,7 +101,12 @@ export async function reviewOk() {
 export async function sendBack() {
   const under = target();
   if (!under) return say("Nothing is selected, and nobody leads here");
-  const comment = await ask("Send back", el("p", { textContent: `${under.name} goes back to who labelled it.` }), "Comment", under.comment);
+  const comment = await ask(
+    "Send back",
+    el("p", { textContent: `${under.name} goes back to who labelled it.` }),
+    "Comment",
+    under.comment,
+  );
   if (comment && (await act({ kind: "send_back", items: [under.ref], comment })) && isReviewing()) await goOn();
 }
 

@@ -15,13 +15,20 @@ export const tagFrames = (tag, isOn) => over((frames) => act({ kind: "tag", ...f
 /** Every vehicle of the marked frames is labelled; where that is said of all of them already, it is taken back. Scores
  * count no frame in which a vehicle is only proposed: that is said at once. */
 export async function toggleWhole() {
-  const frames = span(), isOn = !isSaid(WHOLE_TAG, frames);
-  const answer = await tagFrames(WHOLE_TAG, isOn), left = isOn && answer ? proposedIn(frames) : 0;
-  if (answer && left) set("said", `${answer.what}; ${left} ${left === 1 ? "track is" : "tracks are"} still proposed there`);
+  const frames = span(),
+    isOn = !isSaid(WHOLE_TAG, frames);
+  const answer = await tagFrames(WHOLE_TAG, isOn),
+    left = isOn && answer ? proposedIn(frames) : 0;
+  if (answer && left)
+    set("said", `${answer.what}; ${left} ${left === 1 ? "track is" : "tracks are"} still proposed there`);
 }
 
 /** @param {{first: number, last: number}} frames */
-const proposedIn = (frames) => [...(get("labels")?.tracks.values() ?? [])].filter(({ state, first, last }) => state === "proposed" && first !== null && last !== null && first <= frames.last && last >= frames.first).length;
+const proposedIn = (frames) =>
+  [...(get("labels")?.tracks.values() ?? [])].filter(
+    ({ state, first, last }) =>
+      state === "proposed" && first !== null && last !== null && first <= frames.last && last >= frames.first,
+  ).length;
 
 /** Take a word back: in the marked frames, or wherever this range says it. @param {FrameTag} range */
 export function takeBack({ tag, first, last }) {
@@ -32,12 +39,14 @@ export function takeBack({ tag, first, last }) {
 /** Whether a word is said of all these frames. @param {string} tag @param {{first: number, last: number}} frames */
 export function isSaid(tag, { first, last }) {
   let next = first;
-  for (const range of rangesOf(tag).sort((a, b) => a.first - b.first)) if (range.first <= next) next = Math.max(next, range.last + 1);
+  for (const range of rangesOf(tag).sort((a, b) => a.first - b.first))
+    if (range.first <= next) next = Math.max(next, range.last + 1);
   return next > last;
 }
 
 /** @param {number} frame @returns {FrameTag[]} */
-export const tagsAt = (frame) => (get("labels")?.tags ?? []).filter(({ first, last }) => first <= frame && frame <= last);
+export const tagsAt = (frame) =>
+  (get("labels")?.tags ?? []).filter(({ first, last }) => first <= frame && frame <= last);
 
 /** @param {string} tag @returns {FrameTag[]} */
 export const rangesOf = (tag) => (get("labels")?.tags ?? []).filter((range) => range.tag === tag);

@@ -24,23 +24,87 @@ let ended = null;
 /** The frame that what is said is about: it stays until the person goes on from there. */
 let about = -1;
 
-const where = el("span", { class: "facts where" }), leads = el("span", { class: "joined leads", aria: { role: "group", label: "Who leads" } });
-const saved = el("span", { class: "saved", aria: { role: "status" } }), again = el("button", { type: "button", textContent: "Retry", hidden: true, onclick: send }), discarded = el("button", { type: "button", textContent: "Discard", title: "Give up what is not saved", hidden: true, onclick: discard });
+const where = el("span", { class: "facts where" }),
+  leads = el("span", { class: "joined leads", aria: { role: "group", label: "Who leads" } });
+const saved = el("span", { class: "saved", aria: { role: "status" } }),
+  again = el("button", { type: "button", textContent: "Retry", hidden: true, onclick: send }),
+  discarded = el("button", {
+    type: "button",
+    textContent: "Discard",
+    title: "Give up what is not saved",
+    hidden: true,
+    onclick: discard,
+  });
 const said = el("span", { class: "facts said", aria: { role: "status" } });
-const task = el("span", { class: "task", hidden: true }, el("progress", { max: 1, aria: { label: "Progress" } }), el("span", { class: "facts" }));
+const task = el(
+  "span",
+  { class: "task", hidden: true },
+  el("progress", { max: 1, aria: { label: "Progress" } }),
+  el("span", { class: "facts" }),
+);
 const name = el("button", { type: "button", class: "quiet", title: "Who labels" });
-const back = el("button", { type: "button", class: "icon-button", textContent: "↶", aria: { label: "Undo your last change" }, title: "Undo (Ctrl Z)", onclick: undo });
-const forth = el("button", { type: "button", class: "icon-button", textContent: "↷", aria: { label: "Redo" }, title: "Redo (Ctrl Shift Z)", onclick: redo });
-const fresh = el("button", { type: "button", class: "toggle fresh", textContent: "New", title: "New label: drag in the plan, drag or click in the picture, or Enter (G)", onclick: () => setTool("new") });
+const back = el("button", {
+  type: "button",
+  class: "icon-button",
+  textContent: "↶",
+  aria: { label: "Undo your last change" },
+  title: "Undo (Ctrl Z)",
+  onclick: undo,
+});
+const forth = el("button", {
+  type: "button",
+  class: "icon-button",
+  textContent: "↷",
+  aria: { label: "Redo" },
+  title: "Redo (Ctrl Shift Z)",
+  onclick: redo,
+});
+const fresh = el("button", {
+  type: "button",
+  class: "toggle fresh",
+  textContent: "New",
+  title: "New label: drag in the plan, drag or click in the picture, or Enter (G)",
+  onclick: () => setTool("new"),
+});
 
-const reviewToggle = el("button", { type: "button", class: "toggle", textContent: "Review", title: "Go through what others stand behind (Shift R)", onclick: review.toggleReview });
-const under = el("span", { class: "under" }), reviewed = el("span", { class: "reviewing", hidden: true },
-  el("b", { textContent: "Review" }), under,
-  el("button", { type: "button", textContent: "Right", title: "It is right, and the next (A)", onclick: review.reviewOk }),
-  el("button", { type: "button", textContent: "Send back", title: "With a comment, and the next (R)", onclick: review.sendBack }),
-  el("button", { type: "button", textContent: "Next", title: "Leave it (N)", onclick: () => review.nextUnreviewed(1) }));
+const reviewToggle = el("button", {
+  type: "button",
+  class: "toggle",
+  textContent: "Review",
+  title: "Go through what others stand behind (Shift R)",
+  onclick: review.toggleReview,
+});
+const under = el("span", { class: "under" }),
+  reviewed = el(
+    "span",
+    { class: "reviewing", hidden: true },
+    el("b", { textContent: "Review" }),
+    under,
+    el("button", {
+      type: "button",
+      textContent: "Right",
+      title: "It is right, and the next (A)",
+      onclick: review.reviewOk,
+    }),
+    el("button", {
+      type: "button",
+      textContent: "Send back",
+      title: "With a comment, and the next (R)",
+      onclick: review.sendBack,
+    }),
+    el("button", {
+      type: "button",
+      textContent: "Next",
+      title: "Leave it (N)",
+      onclick: () => review.nextUnreviewed(1),
+    }),
+  );
 
-const kind = el("select", { class: "kind", aria: { label: "Class of new labels" }, title: "Class of new labels" }, ...CLASSES.map((label) => el("option", { value: label, textContent: label })));
+const kind = el(
+  "select",
+  { class: "kind", aria: { label: "Class of new labels" }, title: "Class of new labels" },
+  ...CLASSES.map((label) => el("option", { value: label, textContent: label })),
+);
 
 export function setUp() {
   kind.value = newLabel();
@@ -53,15 +117,46 @@ export function setUp() {
     reflect();
   });
   const next = (/** @type {string} */ words, /** @type {string} */ title, /** @type {commands.Wanted} */ what) =>
-    el("button", { type: "button", class: what === "sent_back" ? "rarely" : "", textContent: words, title, onclick: () => commands.goTo(what, 1) });
-  $("#label-bar").append(el("div", { class: "label-row" },
-    el("b", { textContent: "Lead" }), leads, where,
-    el("b", { textContent: "Next" }), el("span", { class: "joined", aria: { role: "group", label: "Go to the next" } }, next("Unlabelled", "Next frame in which something is unlabelled (N)", "unlabelled"),
-      next("Disagreement", "Next disagreement of labels and pipeline (V)", "disagreement"), next("Proposed", "Next proposal (B)", "proposed"), next("Sent back", "Next label that was sent back (Y)", "sent_back")),
-    fresh, kind, reviewToggle, el("span", { class: "spacer" }), back, forth, name),
-  el("div", { class: "label-row label-line" }, reviewed, said, task, saved, again, discarded));
-  $("#label-keys").append(el("span", {}, el("kbd", { textContent: "?" }), " all keys"), ...labelKeys().flatMap(({ bindings }) => bindings).filter(({ brief }) => brief).map(({ shown: keys, brief }) =>
-    el("span", {}, el("kbd", { textContent: keys }), ` ${brief}`)));
+    el("button", {
+      type: "button",
+      class: what === "sent_back" ? "rarely" : "",
+      textContent: words,
+      title,
+      onclick: () => commands.goTo(what, 1),
+    });
+  $("#label-bar").append(
+    el(
+      "div",
+      { class: "label-row" },
+      el("b", { textContent: "Lead" }),
+      leads,
+      where,
+      el("b", { textContent: "Next" }),
+      el(
+        "span",
+        { class: "joined", aria: { role: "group", label: "Go to the next" } },
+        next("Unlabelled", "Next frame in which something is unlabelled (N)", "unlabelled"),
+        next("Disagreement", "Next disagreement of labels and pipeline (V)", "disagreement"),
+        next("Proposed", "Next proposal (B)", "proposed"),
+        next("Sent back", "Next label that was sent back (Y)", "sent_back"),
+      ),
+      fresh,
+      kind,
+      reviewToggle,
+      el("span", { class: "spacer" }),
+      back,
+      forth,
+      name,
+    ),
+    el("div", { class: "label-row label-line" }, reviewed, said, task, saved, again, discarded),
+  );
+  $("#label-keys").append(
+    el("span", {}, el("kbd", { textContent: "?" }), " all keys"),
+    ...labelKeys()
+      .flatMap(({ bindings }) => bindings)
+      .filter(({ brief }) => brief)
+      .map(({ shown: keys, brief }) => el("span", {}, el("kbd", { textContent: keys }), ` ${brief}`)),
+  );
   paint(["labeling", "labels", "labelFrames", "frame", "track", "marked", "draft"], reflect);
   on(["saving", "said", "link"], reflectSaving);
   on(["state"], reflectTask);
@@ -79,17 +174,45 @@ function reflect() {
   if (!get("labeling")?.on) return;
   mark($("#label-bar"), "frame", String(shown()));
   if (!isKnown(shown())) return;
-  const range = leadAt(shown()), marked = get("marked");
-  const here = present().map(({ track }) => trackOf(track)).filter((track) => track !== null && track.state !== "rejected");
-  const numbers = here.map((track) => /** @type {import("../state/types.js").LabelTrack} */ (track).id).sort((a, b) => a - b);
-  const shownLeads = /** @type {Lead[]} */ ([...(typeof range?.lead === "number" && !numbers.includes(range.lead) ? [range.lead] : []), ...numbers]).slice(0, MOST_LEADS);
-  keyed(leads, /** @type {Lead[]} */ ([...shownLeads, "none", "unknown"]), String, (lead) => el("button", { type: "button", textContent: leadName(lead), onclick: () => span.choose(lead) }), (button, lead) => {
-    press(button, range?.lead === lead);
-    button.classList.toggle("is-proposed", range?.lead === lead && range.state === "proposed");
-    button.title = range?.lead === lead && range.state === "proposed" && !marked ? `Accept it: ${leadName(lead)} in frames ${range.first + 1}–${range.last + 1}` : lead === "none" ? "Nobody leads (0)" : lead === "unknown" ? "One can't tell who leads (U)" : `#${lead} leads (type its number)`;
-  });
+  const range = leadAt(shown()),
+    marked = get("marked");
+  const here = present()
+    .map(({ track }) => trackOf(track))
+    .filter((track) => track !== null && track.state !== "rejected");
+  const numbers = here
+    .map((track) => /** @type {import("../state/types.js").LabelTrack} */ (track).id)
+    .sort((a, b) => a - b);
+  const shownLeads = /** @type {Lead[]} */ ([
+    ...(typeof range?.lead === "number" && !numbers.includes(range.lead) ? [range.lead] : []),
+    ...numbers,
+  ]).slice(0, MOST_LEADS);
+  keyed(
+    leads,
+    /** @type {Lead[]} */ ([...shownLeads, "none", "unknown"]),
+    String,
+    (lead) => el("button", { type: "button", textContent: leadName(lead), onclick: () => span.choose(lead) }),
+    (button, lead) => {
+      press(button, range?.lead === lead);
+      button.classList.toggle("is-proposed", range?.lead === lead && range.state === "proposed");
+      button.title =
+        range?.lead === lead && range.state === "proposed" && !marked
+          ? `Accept it: ${leadName(lead)} in frames ${range.first + 1}–${range.last + 1}`
+          : lead === "none"
+            ? "Nobody leads (0)"
+            : lead === "unknown"
+              ? "One can't tell who leads (U)"
+              : `#${lead} leads (type its number)`;
+    },
+  );
   const { first, last } = span.span();
-  text(where, marked ? `frames ${first + 1}–${last + 1}${marked.typed ? ` · #${marked.typed}…` : ""}` : range ? rangeWords(range) : "nobody has said");
+  text(
+    where,
+    marked
+      ? `frames ${first + 1}–${last + 1}${marked.typed ? ` · #${marked.typed}…` : ""}`
+      : range
+        ? rangeWords(range)
+        : "nobody has said",
+  );
   press(reviewToggle, review.isReviewing());
   reviewed.hidden = !review.isReviewing();
   text(under, review.target()?.name ?? "nothing");
@@ -105,16 +228,29 @@ function rangeWords({ state, first, last, comment, reviewer }) {
 }
 
 function reflectSaving() {
-  const saving = get("saving"), at = saving?.at_ms ? new Date(saving.at_ms).toLocaleTimeString("en-GB") : "";
+  const saving = get("saving"),
+    at = saving?.at_ms ? new Date(saving.at_ms).toLocaleTimeString("en-GB") : "";
   saved.dataset.state = saving?.state ?? "";
-  text(saved, !saving ? "" : saving.state === "saving" ? "saving…" : saving.state === "failed" ? `not saved: ${saving.problem}` : at ? `saved ${at}` : "");
+  text(
+    saved,
+    !saving
+      ? ""
+      : saving.state === "saving"
+        ? "saving…"
+        : saving.state === "failed"
+          ? `not saved: ${saving.problem}`
+          : at
+            ? `saved ${at}`
+            : "",
+  );
   again.hidden = discarded.hidden = saving?.state !== "failed";
   text(said, get("said") ?? "");
   said.title = get("said") ?? "";
 }
 
 function reflectTask() {
-  const state = get("state"), current = state?.labels?.task ?? null;
+  const state = get("state"),
+    current = state?.labels?.task ?? null;
   ended ??= current && !current.running ? current.id : -1;
   const isFailed = Boolean(current?.error) && current?.id !== ended;
   task.hidden = !current?.running && !isFailed;
@@ -127,5 +263,8 @@ function reflectTask() {
   const bar = $("progress", HTMLProgressElement, task);
   bar.hidden = !current.running;
   bar.value = current.total ? current.done / current.total : 0;
-  text($(".facts", HTMLElement, task), isFailed ? `${current.what} failed: ${current.error}` : `${current.what} ${current.done}/${current.total}`);
+  text(
+    $(".facts", HTMLElement, task),
+    isFailed ? `${current.what} failed: ${current.error}` : `${current.what} ${current.done}/${current.total}`,
+  );
 }

@@ -9,7 +9,10 @@ const dialog = $("#label-dialog", HTMLDialogElement);
  */
 export function ask(title, words, label, value) {
   const input = el("input", { type: "text", value, maxLength: 200, required: true, aria: { label } });
-  return open(title, words, input, [["Cancel", null], ["OK", () => input.value.trim() || null]]);
+  return open(title, words, input, [
+    ["Cancel", null],
+    ["OK", () => input.value.trim() || null],
+  ]);
 }
 
 /**
@@ -21,15 +24,18 @@ export function open(title, words, field, ways) {
   return new Promise((done) => {
     /** @type {T|null} */
     let answer = null;
-    const buttons = ways.map(([label, act], place) => el("button", {
-      type: place === ways.length - 1 ? "submit" : "button", textContent: label,
-      onclick: (/** @type {Event} */ event) => {
-        if (place === ways.length - 1 && !form.checkValidity()) return;
-        event.preventDefault();
-        answer = act?.() ?? null;
-        dialog.close();
-      },
-    }));
+    const buttons = ways.map(([label, act], place) =>
+      el("button", {
+        type: place === ways.length - 1 ? "submit" : "button",
+        textContent: label,
+        onclick: (/** @type {Event} */ event) => {
+          if (place === ways.length - 1 && !form.checkValidity()) return;
+          event.preventDefault();
+          answer = act?.() ?? null;
+          dialog.close();
+        },
+      }),
+    );
     const form = el("form", { method: "dialog" }, words, field, el("div", { class: "dialog-buttons" }, ...buttons));
     dialog.setAttribute("aria-label", title);
     dialog.replaceChildren(el("h2", { textContent: title }), form);

@@ -11,20 +11,50 @@ import { personName } from "../state/person.js";
 
 /** As `pipeline/labels/formats/registry.py` names them. */
 const FORMATS = [
-  ["native", "CIPV Studio", "everything"], ["mcap", "MCAP session", "the recording's labels as a channel"], ["openlabel", "OpenLABEL", "ASAM OpenLABEL 1.0"], ["nuscenes", "nuScenes", "JSON tables"],
-  ["kitti", "KITTI object", "one file a frame"], ["kitti-tracking", "KITTI tracking", "one file"], ["coco", "COCO", "boxes in pictures"], ["csv", "CSV", "the lead of each frame"],
+  ["native", "CIPV Studio", "everything"],
+  ["mcap", "MCAP session", "the recording's labels as a channel"],
+  ["openlabel", "OpenLABEL", "ASAM OpenLABEL 1.0"],
+  ["nuscenes", "nuScenes", "JSON tables"],
+  ["kitti", "KITTI object", "one file a frame"],
+  ["kitti-tracking", "KITTI tracking", "one file"],
+  ["coco", "COCO", "boxes in pictures"],
+  ["csv", "CSV", "the lead of each frame"],
 ];
 
-const versions = el("div", { class: "open-list" }), problem = el("p", { class: "params-error", aria: { role: "alert" } });
-const which = el("select", { aria: { label: "Format of the file" } }, ...FORMATS.map(([key, words]) => el("option", { value: key, textContent: words })));
+const versions = el("div", { class: "open-list" }),
+  problem = el("p", { class: "params-error", aria: { role: "alert" } });
+const which = el(
+  "select",
+  { aria: { label: "Format of the file" } },
+  ...FORMATS.map(([key, words]) => el("option", { value: key, textContent: words })),
+);
 const file = el("input", { type: "file", aria: { label: "File with labels" } });
-const freezeName = el("input", { type: "text", maxLength: 60, placeholder: "Name of the version", required: true, aria: { label: "Name of the version" } });
+const freezeName = el("input", {
+  type: "text",
+  maxLength: 60,
+  placeholder: "Name of the version",
+  required: true,
+  aria: { label: "Name of the version" },
+});
 
 /** @returns {HTMLElement} */
 export function exportButton() {
-  const button = el("button", { type: "button", textContent: "Export ▾", aria: { haspopup: "menu" }, title: "The labels as a file" });
+  const button = el("button", {
+    type: "button",
+    textContent: "Export ▾",
+    aria: { haspopup: "menu" },
+    title: "The labels as a file",
+  });
   attachMenu(button, "Export labels", () => {
-    const rows = FORMATS.map(([key, words, about]) => ({ key, node: el("a", { class: "item", href: `api/labels/export?format=${key}&version=working` }, el("b", { textContent: words }), el("span", { class: "facts", textContent: about })) }));
+    const rows = FORMATS.map(([key, words, about]) => ({
+      key,
+      node: el(
+        "a",
+        { class: "item", href: `api/labels/export?format=${key}&version=working` },
+        el("b", { textContent: words }),
+        el("span", { class: "facts", textContent: about }),
+      ),
+    }));
     for (const { key, node } of rows) {
       node.setAttribute("download", "");
       tellLoss(key, node);
@@ -48,22 +78,44 @@ async function tellLoss(key, node) {
 export function setUp(parent) {
   parent.append(
     problem,
-    el("h3", { textContent: "Proposals" }), el("button", { type: "button", textContent: "Take the pipeline's output (P)", onclick: propose }),
-    el("h3", { textContent: "Import" }), el("button", { type: "button", textContent: "The truth that came with the recording", onclick: () => act({ kind: "import", what: "truth" }) }),
+    el("h3", { textContent: "Proposals" }),
+    el("button", { type: "button", textContent: "Take the pipeline's output (P)", onclick: propose }),
+    el("h3", { textContent: "Import" }),
+    el("button", {
+      type: "button",
+      textContent: "The truth that came with the recording",
+      onclick: () => act({ kind: "import", what: "truth" }),
+    }),
     el("form", { onsubmit: upload }, which, file, el("button", { textContent: "Import the file" })),
-    el("h3", { textContent: "Versions" }), versions, el("form", { class: "menu-row", onsubmit: freeze }, freezeName, el("button", { textContent: "Freeze" })));
+    el("h3", { textContent: "Versions" }),
+    versions,
+    el("form", { class: "menu-row", onsubmit: freeze }, freezeName, el("button", { textContent: "Freeze" })),
+  );
 }
 
 /** Read the versions again. */
 export async function look() {
   /** @type {Version[]} */
   const found = await request("api/labels/versions").catch(() => []);
-  versions.replaceChildren(...found.map(({ name, person, t_unix_ms, tracks, frames }) => {
-    const link = el("a", { href: `api/labels/versions/${encodeURIComponent(name)}`, textContent: name });
-    link.setAttribute("download", `${name}.json`);
-    return el("p", {}, link, el("span", { class: "facts", textContent: ` ${tracks} tracks in ${frames} frames · ${person}, ${new Date(t_unix_ms).toLocaleString("en-GB")}` }));
-  }));
-  if (!found.length) versions.replaceChildren(el("p", { class: "facts", textContent: "None yet. A version keeps the labels as they are now, under a name." }));
+  versions.replaceChildren(
+    ...found.map(({ name, person, t_unix_ms, tracks, frames }) => {
+      const link = el("a", { href: `api/labels/versions/${encodeURIComponent(name)}`, textContent: name });
+      link.setAttribute("download", `${name}.json`);
+      return el(
+        "p",
+        {},
+        link,
+        el("span", {
+          class: "facts",
+          textContent: ` ${tracks} tracks in ${frames} frames · ${person}, ${new Date(t_unix_ms).toLocaleString("en-GB")}`,
+        }),
+      );
+    }),
+  );
+  if (!found.length)
+    versions.replaceChildren(
+      el("p", { class: "facts", textContent: "None yet. A version keeps the labels as they are now, under a name." }),
+    );
 }
 
 /** @param {Event} event */
@@ -79,12 +131,18 @@ async function freeze(event) {
 /** @param {Event} event */
 async function upload(event) {
   event.preventDefault();
-  const given = file.files?.[0], person = await personName(), drive = get("labels")?.drive;
+  const given = file.files?.[0],
+    person = await personName(),
+    drive = get("labels")?.drive;
   if (!given || person === null || !drive) return;
   await attempt(async () => {
     const query = new URLSearchParams({ format: which.value, person, drive });
     const address = new URL(`api/labels/import?${query}`, document.baseURI);
-    const response = await fetch(address, { method: "POST", body: given, headers: { "content-type": "application/octet-stream" } });
+    const response = await fetch(address, {
+      method: "POST",
+      body: given,
+      headers: { "content-type": "application/octet-stream" },
+    });
     if (!response.ok) throw new Refused(response.status, await response.json().catch(() => null));
     say(`Importing ${given.name}`);
   });
@@ -93,8 +151,11 @@ async function upload(event) {
 /** @param {() => Promise<unknown>} what @returns {Promise<boolean>} whether it was done */
 async function attempt(what) {
   text(problem, "");
-  return what().then(() => true, (error) => {
-    text(problem, error.message);
-    return false;
-  });
+  return what().then(
+    () => true,
+    (error) => {
+      text(problem, error.message);
+      return false;
+    },
+  );
 }

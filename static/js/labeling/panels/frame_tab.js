@@ -10,11 +10,24 @@ import { Past } from "./history_list.js";
 import { span } from "../state/marked_frames.js";
 import { isSaid, KNOWN_TAGS, tagFrames, tagsAt, takeBack, toggleWhole, WHOLE_TAG } from "../acts/tags.js";
 
-const list = el("div", { class: "moment-list" }), pasts = el("div", { class: "moment-pasts" }), pastTitle = el("h3", { textContent: "History" });
+const list = el("div", { class: "moment-list" }),
+  pasts = el("div", { class: "moment-pasts" }),
+  pastTitle = el("h3", { textContent: "History" });
 const word = el("input", { type: "text", maxLength: 40, placeholder: "Tag", aria: { label: "Tag of these frames" } });
-const pathWords = el("span", { class: "facts" }), noPath = el("button", { type: "button", textContent: "Take back", onclick: () => act({ kind: "remove_path", frame: shown() }) });
+const pathWords = el("span", { class: "facts" }),
+  noPath = el("button", {
+    type: "button",
+    textContent: "Take back",
+    onclick: () => act({ kind: "remove_path", frame: shown() }),
+  });
 
-const whole = el("button", { type: "button", class: "toggle", textContent: "All labelled", title: "Every vehicle is labelled, in the marked frames or in this one (Shift W)", onclick: toggleWhole });
+const whole = el("button", {
+  type: "button",
+  class: "toggle",
+  textContent: "All labelled",
+  title: "Every vehicle is labelled, in the marked frames or in this one (Shift W)",
+  onclick: toggleWhole,
+});
 const title = el("h3", {});
 
 /** @param {HTMLElement} parent */
@@ -22,9 +35,36 @@ export function setUp(parent) {
   const known = el("datalist", { id: "known-tags" }, ...KNOWN_TAGS.map((value) => el("option", { value })));
   word.setAttribute("list", "known-tags");
   const form = el("form", { class: "menu-row", onsubmit: addTag }, word, el("button", { textContent: "Add" }), whole);
-  const event = (/** @type {string} */ kind, /** @type {string} */ words) => el("button", { type: "button", textContent: words, title: "An event of this frame, about the selected track, or who leads here", onclick: () => addEvent(kind) });
-  const draw = el("button", { type: "button", textContent: "Draw the path", title: "Drag along the middle of our path in the plan (Shift P)", onclick: () => setTool("path") });
-  parent.append(title, el("div", { class: "moment-buttons" }, event("cut_in", "Cut-in"), event("cut_out", "Cut-out"), draw, noPath, pathWords), form, known, list, pastTitle, pasts);
+  const event = (/** @type {string} */ kind, /** @type {string} */ words) =>
+    el("button", {
+      type: "button",
+      textContent: words,
+      title: "An event of this frame, about the selected track, or who leads here",
+      onclick: () => addEvent(kind),
+    });
+  const draw = el("button", {
+    type: "button",
+    textContent: "Draw the path",
+    title: "Drag along the middle of our path in the plan (Shift P)",
+    onclick: () => setTool("path"),
+  });
+  parent.append(
+    title,
+    el(
+      "div",
+      { class: "moment-buttons" },
+      event("cut_in", "Cut-in"),
+      event("cut_out", "Cut-out"),
+      draw,
+      noPath,
+      pathWords,
+    ),
+    form,
+    known,
+    list,
+    pastTitle,
+    pasts,
+  );
   paint(["labels", "frame", "labeling", "marked"], show);
 }
 
@@ -42,10 +82,12 @@ function addTag(event) {
 const framesWords = ({ first, last }) => (first === last ? `frame ${first + 1}` : `frames ${first + 1}–${last + 1}`);
 
 /** What a second person has said of it. @param {{comment: string, reviewer: string}} label */
-const reviewWords = ({ comment, reviewer }) => (comment ? `, sent back: ${comment}` : reviewer ? `, reviewed by ${reviewer}` : "");
+const reviewWords = ({ comment, reviewer }) =>
+  comment ? `, sent back: ${comment}` : reviewer ? `, reviewed by ${reviewer}` : "";
 
 function show() {
-  const labels = get("labels"), here = shown();
+  const labels = get("labels"),
+    here = shown();
   if (!labels || !get("labeling")?.on) return;
   const path = labels.paths.find(({ frame, state }) => frame === here && state !== "rejected");
   text(title, get("marked") ? `This frame, and marked: ${framesWords(span())}` : "This frame");
@@ -54,15 +96,40 @@ function show() {
   text(pathWords, path ? `path ${path.state}${reviewWords(path)}` : "");
   /** @type {Row[]} */
   const rows = [
-    ...tagsAt(here).map((each) => ({ key: `tag ${each.id} ${each.revision}`, frame: each.first, words: `${each.tag} · ${framesWords(each)}`, drop: () => takeBack(each) })),
-    ...labels.events.filter(({ state }) => state !== "rejected").map((each) => ({
-      key: `event ${each.id}`, frame: each.frame, words: `${each.kind.replace("_", "-")} ${each.tracks.map((id) => `#${id}`).join(" ")} · frame ${each.frame + 1}${reviewWords(each)}`,
-      drop: () => act({ kind: "remove", items: [{ kind: "event", id: each.id, revision: each.revision }] }),
+    ...tagsAt(here).map((each) => ({
+      key: `tag ${each.id} ${each.revision}`,
+      frame: each.first,
+      words: `${each.tag} · ${framesWords(each)}`,
+      drop: () => takeBack(each),
     })),
+    ...labels.events
+      .filter(({ state }) => state !== "rejected")
+      .map((each) => ({
+        key: `event ${each.id}`,
+        frame: each.frame,
+        words: `${each.kind.replace("_", "-")} ${each.tracks.map((id) => `#${id}`).join(" ")} · frame ${each.frame + 1}${reviewWords(each)}`,
+        drop: () => act({ kind: "remove", items: [{ kind: "event", id: each.id, revision: each.revision }] }),
+      })),
   ];
-  keyed(list, rows, ({ key }) => key, ({ frame, drop, words }) => el("div", { class: "moment-row" },
-    el("button", { type: "button", class: "quiet", onclick: () => seekTo(frame) }), el("button", { type: "button", class: "drop", textContent: "✕", aria: { label: `Remove ${words}` }, onclick: drop })),
-  (node, { words }) => text(/** @type {HTMLElement} */ (node.firstElementChild), words));
+  keyed(
+    list,
+    rows,
+    ({ key }) => key,
+    ({ frame, drop, words }) =>
+      el(
+        "div",
+        { class: "moment-row" },
+        el("button", { type: "button", class: "quiet", onclick: () => seekTo(frame) }),
+        el("button", {
+          type: "button",
+          class: "drop",
+          textContent: "✕",
+          aria: { label: `Remove ${words}` },
+          onclick: drop,
+        }),
+      ),
+    (node, { words }) => text(/** @type {HTMLElement} */ (node.firstElementChild), words),
+  );
   showPasts(labels, here);
 }
 
@@ -72,10 +139,36 @@ function show() {
 function showPasts(labels, here) {
   /** @type {Dated[]} */
   const found = [
-    ...labels.leads.filter(({ first, last }) => first <= here && here <= last).map(({ id, revision, lead, first, last }) => ({ kind: /** @type {const} */ ("lead"), id, revision, words: `lead ${leadName(lead)} · ${framesWords({ first, last })}` })),
-    ...labels.paths.filter(({ frame }) => frame === here).map(({ id, revision, state }) => ({ kind: /** @type {const} */ ("path"), id, revision, words: `path · ${state}` })),
-    ...labels.events.filter(({ frame }) => frame === here).map(({ id, revision, kind, state }) => ({ kind: /** @type {const} */ ("event"), id, revision, words: `${kind.replace("_", "-")} · ${state}` })),
-    ...tagsAt(here).map((each) => ({ kind: /** @type {const} */ ("tag"), id: each.id, revision: each.revision, words: `${each.tag} · ${framesWords(each)}` })),
+    ...labels.leads
+      .filter(({ first, last }) => first <= here && here <= last)
+      .map(({ id, revision, lead, first, last }) => ({
+        kind: /** @type {const} */ ("lead"),
+        id,
+        revision,
+        words: `lead ${leadName(lead)} · ${framesWords({ first, last })}`,
+      })),
+    ...labels.paths
+      .filter(({ frame }) => frame === here)
+      .map(({ id, revision, state }) => ({
+        kind: /** @type {const} */ ("path"),
+        id,
+        revision,
+        words: `path · ${state}`,
+      })),
+    ...labels.events
+      .filter(({ frame }) => frame === here)
+      .map(({ id, revision, kind, state }) => ({
+        kind: /** @type {const} */ ("event"),
+        id,
+        revision,
+        words: `${kind.replace("_", "-")} · ${state}`,
+      })),
+    ...tagsAt(here).map((each) => ({
+      kind: /** @type {const} */ ("tag"),
+      id: each.id,
+      revision: each.revision,
+      words: `${each.tag} · ${framesWords(each)}`,
+    })),
   ];
   pastTitle.hidden = !found.length;
   keyed(pasts, found, ({ kind, id }) => `${kind} ${id}`, createPast, updatePast);
@@ -86,7 +179,8 @@ const held = new WeakMap();
 
 /** @param {Dated} item */
 function createPast(item) {
-  const past = new Past(), node = el("details", { data: { kind: item.kind } }, el("summary", {}), past.node);
+  const past = new Past(),
+    node = el("details", { data: { kind: item.kind } }, el("summary", {}), past.node);
   held.set(node, { past, item });
   node.addEventListener("toggle", () => lookBack(node));
   return node;

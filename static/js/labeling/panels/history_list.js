@@ -28,11 +28,24 @@ export class Past {
   /** @param {import("../state/types.js").PastAct[]} acts @param {number} most */
   #show(acts, most) {
     const rest = acts.length - most;
-    this.node.replaceChildren(el("ol", {}, ...acts.slice(0, most).map(row)),
-      rest > 0 ? el("button", { type: "button", class: "quiet", textContent: `${rest} earlier`, onclick: () => this.#show(acts, acts.length) }) : "");
+    this.node.replaceChildren(
+      el("ol", {}, ...acts.slice(0, most).map(row)),
+      rest > 0
+        ? el("button", {
+            type: "button",
+            class: "quiet",
+            textContent: `${rest} earlier`,
+            onclick: () => this.#show(acts, acts.length),
+          })
+        : "",
+    );
   }
 }
 
 /** @param {import("../state/types.js").PastAct} act */
-const row = ({ what, note, person, t_unix_ms, undone }) => el("li", { class: undone ? "is-undone" : "", title: new Date(t_unix_ms).toLocaleString("en-GB") },
-  `${new Date(t_unix_ms).toLocaleTimeString("en-GB")} ${person}: ${what}${note ? `; ${note}` : ""}${undone ? " (undone)" : ""}`);
+const row = ({ what, note, person, t_unix_ms, undone }) =>
+  el(
+    "li",
+    { class: undone ? "is-undone" : "", title: new Date(t_unix_ms).toLocaleString("en-GB") },
+    `${new Date(t_unix_ms).toLocaleTimeString("en-GB")} ${person}: ${what}${note ? `; ${note}` : ""}${undone ? " (undone)" : ""}`,
+  );

@@ -13,13 +13,16 @@ let body = null;
 let known = "";
 
 export const look = newestOnly(async () => {
-  const state = get("state"), key = `${state?.uri} ${state?.labels?.revision} ${state?.drive.run} ${state?.drive.done}`;
+  const state = get("state"),
+    key = `${state?.uri} ${state?.labels?.revision} ${state?.drive.run} ${state?.drive.done}`;
   if (!body || !isSeen() || !state?.labels || key === known) return;
   /** @type {Score|Error} */
   const score = await request("api/labels/score").catch((error) => error);
   known = score instanceof Error ? "" : key;
   body.dataset.revision = score instanceof Error ? "" : String(score.revision);
-  body.replaceChildren(score instanceof Error ? el("p", { class: "facts pad", textContent: score.message }) : found(score));
+  body.replaceChildren(
+    score instanceof Error ? el("p", { class: "facts pad", textContent: score.message }) : found(score),
+  );
 });
 
 const isSeen = () => get("labeling")?.on === true && body !== null && !body.hidden;
@@ -32,33 +35,95 @@ export function setUp(parent) {
 
 /** @param {Score} score */
 function found(score) {
-  if (!score.metrics.length && !score.notes.length) return el("p", { class: "facts pad", textContent: "Nothing is accepted yet: accept tracks and leads, and the present run is judged against them." });
-  const runs = get("state")?.drive, isAlone = !runs?.base || runs.base === runs.run;
+  if (!score.metrics.length && !score.notes.length)
+    return el("p", {
+      class: "facts pad",
+      textContent: "Nothing is accepted yet: accept tracks and leads, and the present run is judged against them.",
+    });
+  const runs = get("state")?.drive,
+    isAlone = !runs?.base || runs.base === runs.run;
   const notes = el("ul", { class: "notes" }, ...score.notes.map((words) => el("li", { textContent: words })));
-  return el("div", { class: "comparison" }, el("b", { textContent: "The present run against the labels" }), notes,
-    score.metrics.length ? metricsTable({ ...score, truth: "labels" }, isAlone) : el("p", { class: "facts", textContent: "No frame can be judged yet." }),
-    score.worst.length ? worstFrames(score.worst) : null, score.errors.length ? errorsTable(score.errors) : null);
+  return el(
+    "div",
+    { class: "comparison" },
+    el("b", { textContent: "The present run against the labels" }),
+    notes,
+    score.metrics.length
+      ? metricsTable({ ...score, truth: "labels" }, isAlone)
+      : el("p", { class: "facts", textContent: "No frame can be judged yet." }),
+    score.worst.length ? worstFrames(score.worst) : null,
+    score.errors.length ? errorsTable(score.errors) : null,
+  );
 }
 
-const VERDICTS = { correct: "the lead", none: "none leads", missed: "lead missed", false: "CIPV without a lead", wrong: "wrong vehicle, or too far off" };
+const VERDICTS = {
+  correct: "the lead",
+  none: "none leads",
+  missed: "lead missed",
+  false: "CIPV without a lead",
+  wrong: "wrong vehicle, or too far off",
+};
 
 /** @param {import("../state/types.js").BadFrame[]} worst */
 function worstFrames(worst) {
-  return el("section", {}, el("h3", { textContent: "Worst frames" }), el("div", { class: "worst" }, ...worst.map(({ frame, verdict, truth_m, error_m }) =>
-    el("button", { type: "button", class: "quiet", title: "Go to this frame", data: { frame, verdict }, onclick: () => seekTo(frame) },
-      el("b", { textContent: `${frame + 1}` }), el("span", { textContent: VERDICTS[verdict] }), el("span", { textContent: truth_m === null ? "" : `at ${num(truth_m)} m` }), el("span", { textContent: error_m === null ? "" : `${signed(error_m, 2)} m` })))));
+  return el(
+    "section",
+    {},
+    el("h3", { textContent: "Worst frames" }),
+    el(
+      "div",
+      { class: "worst" },
+      ...worst.map(({ frame, verdict, truth_m, error_m }) =>
+        el(
+          "button",
+          {
+            type: "button",
+            class: "quiet",
+            title: "Go to this frame",
+            data: { frame, verdict },
+            onclick: () => seekTo(frame),
+          },
+          el("b", { textContent: `${frame + 1}` }),
+          el("span", { textContent: VERDICTS[verdict] }),
+          el("span", { textContent: truth_m === null ? "" : `at ${num(truth_m)} m` }),
+          el("span", { textContent: error_m === null ? "" : `${signed(error_m, 2)} m` }),
+        ),
+      ),
+    ),
+  );
 }
 
 const ERRORS = /** @type {const} */ (["distance", "lateral", "longitudinal", "speed"]);
 
 /** The paper's Table 4: of each error the mean size, below it the smallest and the largest. @param {import("../state/types.js").ScoreErrors[]} rows */
 function errorsTable(rows) {
-  const head = ["", "n", "distance", "lateral", "longit.", "speed"].map((words) => el("th", { scope: "col", textContent: words }));
-  const body = rows.map((row) => el("tr", { data: { vehicles: row.vehicles, seen: row.seen_by } }, el("th", { scope: "row", textContent: row.seen_by === "any" ? row.vehicles : row.seen_by }),
-    el("td", { textContent: `${row.count}` }), ...ERRORS.map((name) => sizes(row[name]))));
-  return el("section", {}, el("h3", { textContent: "Errors by distance and by sensor" }), el("table", { class: "metrics errors" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...body)),
-    el("p", { class: "facts", textContent: "Of each range all vehicles, then those seen by both sensors (VL), by camera (V) or by LiDAR (L) alone. Mean size of the error in m, of speed in m/s; below it the smallest to the largest. Distance: to the nearest point. Lateral, longitudinal: of the nearest face's middle." }));
+  const head = ["", "n", "distance", "lateral", "longit.", "speed"].map((words) =>
+    el("th", { scope: "col", textContent: words }),
+  );
+  const body = rows.map((row) =>
+    el(
+      "tr",
+      { data: { vehicles: row.vehicles, seen: row.seen_by } },
+      el("th", { scope: "row", textContent: row.seen_by === "any" ? row.vehicles : row.seen_by }),
+      el("td", { textContent: `${row.count}` }),
+      ...ERRORS.map((name) => sizes(row[name])),
+    ),
+  );
+  return el(
+    "section",
+    {},
+    el("h3", { textContent: "Errors by distance and by sensor" }),
+    el("table", { class: "metrics errors" }, el("thead", {}, el("tr", {}, ...head)), el("tbody", {}, ...body)),
+    el("p", {
+      class: "facts",
+      textContent:
+        "Of each range all vehicles, then those seen by both sensors (VL), by camera (V) or by LiDAR (L) alone. Mean size of the error in m, of speed in m/s; below it the smallest to the largest. Distance: to the nearest point. Lateral, longitudinal: of the nearest face's middle.",
+    }),
+  );
 }
 
 /** @param {import("../state/types.js").Sizes|null} found */
-const sizes = (found) => found ? el("td", {}, num(found.mae, 2), el("small", { textContent: `${num(found.min, 2)}–${num(found.max, 2)}` })) : el("td", { textContent: DASH });
+const sizes = (found) =>
+  found
+    ? el("td", {}, num(found.mae, 2), el("small", { textContent: `${num(found.min, 2)}–${num(found.max, 2)}` }))
+    : el("td", { textContent: DASH });

@@ -14,11 +14,22 @@ import { isReviewing } from "../acts/review.js";
 
 /** A list longer than this is for the search of the frames, not for reading. */
 const MOST = 100;
-const WHICH = /** @type {[Which, string, string][]} */ ([["here", "Here", "Labels of this frame"], ["open", "To do", "Proposed, or sent back; in a review: not reviewed"], ["all", "All", "Every track of the drive"]]);
+const WHICH = /** @type {[Which, string, string][]} */ ([
+  ["here", "Here", "Labels of this frame"],
+  ["open", "To do", "Proposed, or sent back; in a review: not reviewed"],
+  ["all", "All", "Every track of the drive"],
+]);
 
 const body = el("div", { class: "track-list", tabIndex: -1, aria: { role: "listbox", label: "Tracks" } });
 const nothing = el("p", { class: "facts pad", hidden: true });
-const begin = el("button", { type: "button", class: "begin", textContent: "Propose", title: "Take the pipeline's output as proposals (P)", hidden: true, onclick: propose });
+const begin = el("button", {
+  type: "button",
+  class: "begin",
+  textContent: "Propose",
+  title: "Take the pipeline's output as proposals (P)",
+  hidden: true,
+  onclick: propose,
+});
 const count = el("span", { class: "facts" });
 const list = new LongList(body, (/** @type {LabelTrack} */ { id }) => id, create, update);
 /** @type {Which} */
@@ -26,8 +37,19 @@ let which = memory.read("labelTracks", "here");
 
 /** @param {HTMLElement} parent */
 export function setUp(parent) {
-  const buttons = WHICH.map(([key, words, title]) => el("button", { type: "button", textContent: words, title, data: { which: key }, onclick: () => choose(key) }));
-  parent.append(el("div", { class: "list-bar" }, el("div", { class: "joined", aria: { role: "group", label: "Which tracks" } }, ...buttons), el("span", { class: "spacer" }), count), body);
+  const buttons = WHICH.map(([key, words, title]) =>
+    el("button", { type: "button", textContent: words, title, data: { which: key }, onclick: () => choose(key) }),
+  );
+  parent.append(
+    el(
+      "div",
+      { class: "list-bar" },
+      el("div", { class: "joined", aria: { role: "group", label: "Which tracks" } }, ...buttons),
+      el("span", { class: "spacer" }),
+      count,
+    ),
+    body,
+  );
   body.append(nothing, begin);
   body.addEventListener("click", (event) => pick(within(event, ".track-row")));
   const reflect = paintAfter(["labels", "labelFrames", "frame", "track", "labeling", "draft"], show);
@@ -53,7 +75,8 @@ export function setUp(parent) {
 
 /** @returns {LabelTrack[]} */
 function fitting() {
-  const tracks = [...(get("labels")?.tracks.values() ?? [])], here = new Set(present().map(({ track }) => track));
+  const tracks = [...(get("labels")?.tracks.values() ?? [])],
+    here = new Set(present().map(({ track }) => track));
   if (which === "here") return tracks.filter(({ id }) => here.has(id)).sort((a, b) => a.id - b.id);
   if (which === "open") return tracks.filter(isReviewing() ? isUnreviewed : isOpen).sort((a, b) => a.id - b.id);
   return tracks.sort((a, b) => a.id - b.id);
@@ -65,13 +88,22 @@ const isOpen = ({ state, comment }) => state === "proposed" || (Boolean(comment)
 const isUnreviewed = ({ state, reviewer }) => (state === "accepted" || state === "corrected") && !reviewer;
 
 function emptyWords() {
-  if (!get("labels")?.tracks.size) return "Nothing is labelled yet. Let the pipeline propose what it sees (P), or draw the first label (G).";
+  if (!get("labels")?.tracks.size)
+    return "Nothing is labelled yet. Let the pipeline propose what it sees (P), or draw the first label (G).";
   return which === "open" ? "Nothing is left to do." : "Nothing is labelled in this frame.";
 }
 
 function create() {
   const part = (/** @type {string} */ name) => el("span", { class: name });
-  return el("button", { type: "button", class: "track-row", aria: { role: "option" } }, part("mark"), el("b"), part("what"), part("frames"), part("who"));
+  return el(
+    "button",
+    { type: "button", class: "track-row", aria: { role: "option" } },
+    part("mark"),
+    el("b"),
+    part("what"),
+    part("frames"),
+    part("who"),
+  );
 }
 
 /** @param {HTMLElement} row @param {LabelTrack} track */
@@ -80,10 +112,22 @@ function update(row, { id, label, state, first, last, keyframes, origin, comment
   row.dataset.state = comment && state === "proposed" ? "sent-back" : state;
   const [mark, name, what, frames, who] = [...row.children];
   text(name, `#${id}`);
-  text(mark, reviewer ? "✓✓" : row.dataset.state === "sent-back" ? "↩" : { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state]);
+  text(
+    mark,
+    reviewer
+      ? "✓✓"
+      : row.dataset.state === "sent-back"
+        ? "↩"
+        : { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state],
+  );
   mark.setAttribute("aria-label", reviewer ? "reviewed" : row.dataset.state === "sent-back" ? "sent back" : state);
   text(what, label);
-  text(frames, first === null || last === null ? "nowhere" : `${first + 1}–${last + 1}${keyframes.length ? ` · ${keyframes.length} key` : ""}`);
+  text(
+    frames,
+    first === null || last === null
+      ? "nowhere"
+      : `${first + 1}–${last + 1}${keyframes.length ? ` · ${keyframes.length} key` : ""}`,
+  );
   text(who, reviewer || (origin.maker === "person" ? origin.name : origin.maker));
   row.title = `${state}${comment ? `, sent back: ${comment}` : ""}; made by ${origin.name || origin.maker}${reviewer ? `, reviewed by ${reviewer}` : ""}${origin.how ? `; ${origin.how}` : ""}`;
 }
@@ -95,5 +139,6 @@ function pick(row) {
   if (get("labeling")?.tool === "merge") return mergeWith(track.id);
   set("track", track.id);
   const here = shown();
-  if (track.first !== null && track.last !== null && (here < track.first || here > track.last)) seekTo(here < track.first ? track.first : track.last);
+  if (track.first !== null && track.last !== null && (here < track.first || here > track.last))
+    seekTo(here < track.first ? track.first : track.last);
 }

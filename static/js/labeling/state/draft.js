@@ -35,21 +35,31 @@ export const present = () => presentIn(shown());
 
 /** @param {number} frame @returns {LabelSighting[]} */
 function presentIn(frame) {
-  const draft = get("draft"), known = sightingsAt(frame);
+  const draft = get("draft"),
+    known = sightingsAt(frame);
   if (!draft || draft.frame !== frame || draft.track === null) return known;
   const held = { track: draft.track, cuboid: draft.cuboid, bbox: draft.bbox, keyframe: true };
   return [...known.filter(({ track }) => track !== held.track), held];
 }
 
 /** @param {number|null} track @returns {LabelSighting|null} */
-export const presentOf = (track) => (track === null ? null : present().find((each) => each.track === track) ?? null);
+export const presentOf = (track) => (track === null ? null : (present().find((each) => each.track === track) ?? null));
 
 /** Draw a track's label otherwise than it is held. @param {number} track @param {{cuboid?: Cuboid|null, bbox?: Box|null}} shape @param {number} [frame] */
 export function hold(track, shape, frame = shown()) {
-  const draft = get("draft"), before = presentIn(frame).find((each) => each.track === track);
+  const draft = get("draft"),
+    before = presentIn(frame).find((each) => each.track === track);
   const isSame = draft?.track === track && draft.frame === frame;
-  const revision = isSame ? draft.revision : trackOf(track)?.revision ?? 0;
-  set("draft", { track, frame, revision, cuboid: before?.cuboid ?? null, bbox: before?.bbox ?? null, ...shape, settled: null });
+  const revision = isSame ? draft.revision : (trackOf(track)?.revision ?? 0);
+  set("draft", {
+    track,
+    frame,
+    revision,
+    cuboid: before?.cuboid ?? null,
+    bbox: before?.bbox ?? null,
+    ...shape,
+    settled: null,
+  });
 }
 
 /** Send what is held. A hand that has taken hold of it again meanwhile goes on from what its own act left. */

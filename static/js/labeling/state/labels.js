@@ -22,16 +22,29 @@ import { get } from "../../core/store.js";
 let loads = 0;
 
 /** @param {string} uri @param {string} drive @returns {Labels} */
-export const nothing = (uri, drive) => ({ revision: 0, uri, drive, load: ++loads, tracks: new Map(), leads: [], paths: [], events: [], tags: [] });
+export const nothing = (uri, drive) => ({
+  revision: 0,
+  uri,
+  drive,
+  load: ++loads,
+  tracks: new Map(),
+  leads: [],
+  paths: [],
+  events: [],
+  tags: [],
+});
 
 /** What is held, with what changed. @param {Labels} before @param {LabelsAnswer} answer @returns {Labels} */
 export function merged(before, answer) {
-  const gone = (/** @type {ItemKind} */ kind) => new Set(answer.removed.filter((each) => each.kind === kind).map(({ id }) => id));
+  const gone = (/** @type {ItemKind} */ kind) =>
+    new Set(answer.removed.filter((each) => each.kind === kind).map(({ id }) => id));
   const tracks = new Map(before.tracks);
   for (const id of gone("track")) tracks.delete(id);
   for (const track of answer.tracks) tracks.set(track.id, track);
   return {
-    ...before, revision: answer.revision, tracks,
+    ...before,
+    revision: answer.revision,
+    tracks,
     leads: joined(before.leads, answer.leads, gone("lead")).sort((a, b) => a.first - b.first),
     paths: joined(before.paths, answer.paths, gone("path")),
     events: joined(before.events, answer.events, gone("event")),
@@ -46,12 +59,14 @@ function joined(before, changed, gone) {
 }
 
 /** @param {number|null} id */
-export const trackOf = (id) => (id === null ? null : get("labels")?.tracks.get(id) ?? null);
+export const trackOf = (id) => (id === null ? null : (get("labels")?.tracks.get(id) ?? null));
 
 export const chosen = () => trackOf(get("track"));
 
 /** Who leads at a frame; null where nobody has said. Rejected ranges say nothing. @param {number} frame */
-export const leadAt = (frame) => get("labels")?.leads.find(({ first, last, state }) => first <= frame && frame <= last && state !== "rejected") ?? null;
+export const leadAt = (frame) =>
+  get("labels")?.leads.find(({ first, last, state }) => first <= frame && frame <= last && state !== "rejected") ??
+  null;
 
 /** The frame that is shown: what a person sees is what an act is about. */
 export const shown = () => get("frame")?.state.index ?? 0;

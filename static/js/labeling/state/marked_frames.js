@@ -25,7 +25,10 @@ export function end() {
 /** What can be said of what is marked. */
 export function tellMarked() {
   const { first, last } = span();
-  set("said", `Frames ${first + 1}–${last + 1} are marked: say who leads there (C, its number), that all is labelled (Shift W), or a tag (Frame)`);
+  set(
+    "said",
+    `Frames ${first + 1}–${last + 1} are marked: say who leads there (C, its number), that all is labelled (Shift W), or a tag (Frame)`,
+  );
 }
 
 /** @param {number} first @param {number} last */
@@ -39,7 +42,8 @@ export function forget() {
 
 /** What would be painted: what is marked, to the shown frame where its other end is not; else the shown frame alone. @returns {{first: number, last: number}} */
 export function span() {
-  const { first, last } = marked(), ends = [first ?? shown(), last ?? shown()];
+  const { first, last } = marked(),
+    ends = [first ?? shown(), last ?? shown()];
   return { first: Math.min(...ends), last: Math.max(...ends) };
 }
 
@@ -48,7 +52,8 @@ export const paint = (lead) => over((frames) => act({ kind: "set_lead", ...frame
 
 /** Say who leads in the marked frames or in this one; who is proposed here, and nothing is marked: in the whole range. @param {Lead} lead */
 export function choose(lead) {
-  const range = leadAt(shown()), isProposed = range?.lead === lead && range.state === "proposed";
+  const range = leadAt(shown()),
+    isProposed = range?.lead === lead && range.state === "proposed";
   return isProposed && !get("marked") ? judge("accept") : paint(lead);
 }
 
@@ -58,7 +63,8 @@ export const clear = () => over((frames) => act({ kind: "clear_lead", ...frames 
 /** Do something to the marked frames. The mark goes at once, so that the next act is not about it; what was refused brings it back.
  * @template T @param {(frames: {first: number, last: number}) => Promise<T>} what @returns {Promise<T>} */
 export async function over(what) {
-  const held = get("marked"), frames = span();
+  const held = get("marked"),
+    frames = span();
   forget();
   const answer = await what(frames);
   if (!answer && held && !get("marked")) set("marked", held);
@@ -72,7 +78,9 @@ export async function over(what) {
 export function type(digit) {
   const typed = marked().typed + digit;
   if (typed === "0") return paint("none");
-  const fitting = [...(get("labels")?.tracks.values() ?? [])].filter(({ id, state }) => state !== "rejected" && String(id).startsWith(typed));
+  const fitting = [...(get("labels")?.tracks.values() ?? [])].filter(
+    ({ id, state }) => state !== "rejected" && String(id).startsWith(typed),
+  );
   if (!fitting.length) return set("marked", { ...marked(), typed: "" });
   if (fitting.length === 1 && String(fitting[0].id) === typed) return paint(fitting[0].id);
   set("marked", { ...marked(), typed });

@@ -35,7 +35,8 @@ export function toggle() {
 /** @type {Record<string, string>} */
 const HINTS = {
   new: "A new label: drag it in the plan, drag a box or press on it in the picture, or Enter. Esc lets go",
-  shape: "Its shape: drag it in the plan, drag a box around it in the picture, Enter for a box, or G for a cuboid. Esc lets go",
+  shape:
+    "Its shape: drag it in the plan, drag a box around it in the picture, Enter for a box, or G for a cuboid. Esc lets go",
   path: "Our path: drag along its middle in the plan, or bend the pipeline's by arrows; Enter keeps it. Esc lets go",
 };
 

@@ -15,7 +15,12 @@ export async function personName() {
 
 /** @returns {Promise<string|null>} */
 export function askName() {
-  asking ??= ask("Who labels?", el("p", { class: "facts", textContent: "Every label keeps the name of who made it." }), "Name", knownName()).then((name) => {
+  asking ??= ask(
+    "Who labels?",
+    el("p", { class: "facts", textContent: "Every label keeps the name of who made it." }),
+    "Name",
+    knownName(),
+  ).then((name) => {
     asking = null;
     if (name) {
       memory.write("person", name);

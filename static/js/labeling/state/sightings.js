@@ -7,7 +7,9 @@ import { shown } from "./labels.js";
 /** @typedef {{revision: number, byFrame: Record<string, LabelSighting[]>}} Chunk */
 
 /** Frames in one request; fewer where many are labelled in each, so that an answer stays small. How many stretches are kept. */
-const CHUNKS = [20, 10, 5, 2, 1], MOST_SIGHTINGS = 1500, KEPT = 24;
+const CHUNKS = [20, 10, 5, 2, 1],
+  MOST_SIGHTINGS = 1500,
+  KEPT = 24;
 let size = CHUNKS[0];
 
 /** By their number, the one used last at the end. @type {Map<number, Chunk>} */
@@ -16,7 +18,8 @@ const chunks = new Map();
 const fetchChunk = newestOnly(async (/** @type {number} */ number) => {
   const labels = get("labels");
   if (!labels || isFresh(number)) return;
-  const asked = size, last = Math.min((get("state")?.count ?? 1) - 1, (number + 1) * size - 1);
+  const asked = size,
+    last = Math.min((get("state")?.count ?? 1) - 1, (number + 1) * size - 1);
   /** @type {import("./types.js").SightingsAnswer|null} */
   const answer = await request(`api/labels/frames?first=${number * size}&last=${last}`).catch(() => null);
   if (!answer || get("labels")?.load !== labels.load || asked !== size) return;
@@ -37,10 +40,12 @@ export function setUp() {
     if (labels && get("labeling")?.on) look(shown());
   });
   // what a person goes to is asked for right after the frame itself: the two are there together
-  on(["scrub"], () => queueMicrotask(() => {
-    const going = get("scrub");
-    if (going !== null && get("labels") && get("labeling")?.on) look(going);
-  }));
+  on(["scrub"], () =>
+    queueMicrotask(() => {
+      const going = get("scrub");
+      if (going !== null && get("labels") && get("labeling")?.on) look(going);
+    }),
+  );
 }
 
 let weighed = { labels: /** @type {import("./labels.js").Labels|null} */ (null), size };
@@ -57,9 +62,16 @@ function sizeFor(labels) {
 
 /** @param {number} frame */
 function look(frame) {
-  const number = Math.floor(frame / size), isNearEnd = frame % size >= size - Math.max(1, size / 4);
+  const number = Math.floor(frame / size),
+    isNearEnd = frame % size >= size - Math.max(1, size / 4);
   if (!isFresh(number)) fetchChunk(number);
-  else if (isNearEnd && get("state")?.playing && (number + 1) * size < (get("state")?.count ?? 0) && !isFresh(number + 1)) fetchChunk(number + 1);
+  else if (
+    isNearEnd &&
+    get("state")?.playing &&
+    (number + 1) * size < (get("state")?.count ?? 0) &&
+    !isFresh(number + 1)
+  )
+    fetchChunk(number + 1);
 }
 
 /** @param {number} number */

@@ -8,18 +8,23 @@ import { merged, nothing } from "./labels.js";
 /** The recording that what is held is about. @type {string|null} */
 let uri = null;
 
-const refresh = newestOnly(async (/** @type {boolean} */ isWhole) => {
-  const state = get("state"), held = get("labels");
-  if (!state?.labels || !state.uri) return;
-  /** @type {LabelsAnswer|null} */
-  const answer = await request(`api/labels?since=${isWhole ? 0 : held?.revision ?? 0}`).catch(() => null);
-  if (!answer || get("state")?.uri !== state.uri) return;
-  const now = get("labels"), isOther = held !== null && (answer.drive.id !== held.drive || answer.revision < held.revision);
-  if (isOther) set("draft", null);
-  if (isWhole || !held) set("labels", merged(nothing(state.uri, answer.drive.id), answer));
-  else if (isOther) refresh(true);
-  else if (now && answer.revision > now.revision) set("labels", merged(now, answer));
-}, (waiting, newer) => waiting || newer);
+const refresh = newestOnly(
+  async (/** @type {boolean} */ isWhole) => {
+    const state = get("state"),
+      held = get("labels");
+    if (!state?.labels || !state.uri) return;
+    /** @type {LabelsAnswer|null} */
+    const answer = await request(`api/labels?since=${isWhole ? 0 : (held?.revision ?? 0)}`).catch(() => null);
+    if (!answer || get("state")?.uri !== state.uri) return;
+    const now = get("labels"),
+      isOther = held !== null && (answer.drive.id !== held.drive || answer.revision < held.revision);
+    if (isOther) set("draft", null);
+    if (isWhole || !held) set("labels", merged(nothing(state.uri, answer.drive.id), answer));
+    else if (isOther) refresh(true);
+    else if (now && answer.revision > now.revision) set("labels", merged(now, answer));
+  },
+  (waiting, newer) => waiting || newer,
+);
 
 export function setUp() {
   on(["state", "labeling"], follow);
@@ -31,7 +36,8 @@ export function setUp() {
 function follow() {
   const state = get("state");
   if (!state) return;
-  if (uri !== null && state.uri !== uri) for (const key of /** @type {const} */ (["labels", "track", "draft", "marked", "trimmed"])) set(key, null);
+  if (uri !== null && state.uri !== uri)
+    for (const key of /** @type {const} */ (["labels", "track", "draft", "marked", "trimmed"])) set(key, null);
   uri = state.uri;
   if (!state.labels || !get("labeling")?.on) return;
   if (!get("labels") || state.labels.revision > (get("labels")?.revision ?? 0)) refresh(false);
@@ -40,7 +46,8 @@ function follow() {
 /** What an act changed; when others acted in between, theirs is fetched too. @param {LabelsAnswer} changed */
 export function accept(changed) {
   const labels = get("labels");
-  if (labels && labels.drive === changed.drive.id && changed.revision === labels.revision + 1) set("labels", merged(labels, changed));
+  if (labels && labels.drive === changed.drive.id && changed.revision === labels.revision + 1)
+    set("labels", merged(labels, changed));
   else if (labels && changed.revision > labels.revision) refresh(false);
 }
 

@@ -8,19 +8,24 @@ import { knownName } from "./person.js";
 /** @returns {Promise<Steps>} */
 async function ask() {
   const since = get("state")?.labels?.revision ?? 0;
-  const { drive, can_undo, can_redo } = await request(`api/labels?since=${since}&person=${encodeURIComponent(knownName())}`);
+  const { drive, can_undo, can_redo } = await request(
+    `api/labels?since=${since}&person=${encodeURIComponent(knownName())}`,
+  );
   return { drive: drive.id, can_undo, can_redo };
 }
 
 const look = newestOnly(async () => {
-  const uri = get("state")?.uri, steps = await ask().catch(() => null);
+  const uri = get("state")?.uri,
+    steps = await ask().catch(() => null);
   if (get("state")?.uri === uri) set("steps", steps);
 });
 
 export function setUp() {
-  let uri = "", seen = "";
+  let uri = "",
+    seen = "";
   on(["state", "person", "link"], () => {
-    const state = get("state"), key = JSON.stringify([state?.uri, state?.labels?.revision, get("link")?.since, knownName()]);
+    const state = get("state"),
+      key = JSON.stringify([state?.uri, state?.labels?.revision, get("link")?.since, knownName()]);
     if (!state || key === seen) return;
     seen = key;
     if (state.uri !== uri) set("steps", null);
@@ -32,5 +37,12 @@ export function setUp() {
 /** The drive that an act of now is about; null where nothing can be labelled. @returns {Promise<string|null>} */
 export async function driveNow() {
   if (!get("state")?.labels) return null;
-  return get("labels")?.drive ?? get("steps")?.drive ?? ask().then(({ drive }) => drive, () => null);
+  return (
+    get("labels")?.drive ??
+    get("steps")?.drive ??
+    ask().then(
+      ({ drive }) => drive,
+      () => null,
+    )
+  );
 }

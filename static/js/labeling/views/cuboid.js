@@ -6,11 +6,21 @@
 /** What a hand holds: the whole, the knob before the front, or an edge. @typedef {"move"|"turn"|"front"|"rear"|"left"|"right"} Grip */
 
 /** Half lengths and half widths to the corners: front left, front right, rear right, rear left. */
-const CORNERS = [[0.5, 0.5], [0.5, -0.5], [-0.5, -0.5], [-0.5, 0.5]];
+const CORNERS = [
+  [0.5, 0.5],
+  [0.5, -0.5],
+  [-0.5, -0.5],
+  [-0.5, 0.5],
+];
 const SMALLEST_M = 0.2;
 /** What a new cuboid of a class is, where a hand says no more: length, width, height, as in pipeline/fusion/vehicle_sizes.py. @type {Record<string, [number, number, number]>} */
 const TYPICAL_M = {
-  car: [4.5, 1.8, 1.5], truck: [8, 2.5, 3.2], bus: [11, 2.55, 3.2], motorcycle: [2.1, 0.8, 1.5], bicycle: [1.8, 0.6, 1.7], person: [0.6, 0.6, 1.75],
+  car: [4.5, 1.8, 1.5],
+  truck: [8, 2.5, 3.2],
+  bus: [11, 2.55, 3.2],
+  motorcycle: [2.1, 0.8, 1.5],
+  bicycle: [1.8, 0.6, 1.7],
+  person: [0.6, 0.6, 1.75],
 };
 export const CLASSES = Object.keys(TYPICAL_M);
 /** A drag shorter than this says where a cuboid is, not how long it is or where it heads. */
@@ -18,13 +28,17 @@ const SAYS_FROM_M = 1;
 
 /** The ego place of a point of the cuboid. @param {Cuboid} cuboid @param {number} along @param {number} across @returns {Point2} */
 function placeOf({ center: [x, y], yaw_rad }, along, across) {
-  const c = Math.cos(yaw_rad), s = Math.sin(yaw_rad);
+  const c = Math.cos(yaw_rad),
+    s = Math.sin(yaw_rad);
   return [x + along * c - across * s, y + along * s + across * c];
 }
 
 /** A place along and across the cuboid, from its middle. @param {Cuboid} cuboid @param {Place} place */
 function own({ center, yaw_rad }, { x, y }) {
-  const c = Math.cos(yaw_rad), s = Math.sin(yaw_rad), dx = x - center[0], dy = y - center[1];
+  const c = Math.cos(yaw_rad),
+    s = Math.sin(yaw_rad),
+    dx = x - center[0],
+    dy = y - center[1];
   return { along: dx * c + dy * s, across: dy * c - dx * s };
 }
 
@@ -60,9 +74,11 @@ function edgeAt(at, size, reach) {
  * @param {number} beyond where the knob is, metres before the front @returns {Grip|null}
  */
 export function gripAt(cuboid, place, reach, beyond) {
-  const { along, across } = own(cuboid, place), [length, width] = cuboid.size;
+  const { along, across } = own(cuboid, place),
+    [length, width] = cuboid.size;
   if (Math.hypot(along - length / 2 - beyond, across) <= reach * 1.3) return "turn";
-  const end = edgeAt(along, length, reach), side = edgeAt(across, width, reach);
+  const end = edgeAt(along, length, reach),
+    side = edgeAt(across, width, reach);
   if (end === null || side === null) return null;
   if (end) return end > 0 ? "front" : "rear";
   if (side) return side > 0 ? "left" : "right";
@@ -70,15 +86,23 @@ export function gripAt(cuboid, place, reach, beyond) {
 }
 
 /** @param {Cuboid} cuboid @param {number} dx @param {number} dy @returns {Cuboid} */
-export const moved = (cuboid, dx, dy) => ({ ...cuboid, center: [cuboid.center[0] + dx, cuboid.center[1] + dy, cuboid.center[2]] });
+export const moved = (cuboid, dx, dy) => ({
+  ...cuboid,
+  center: [cuboid.center[0] + dx, cuboid.center[1] + dy, cuboid.center[2]],
+});
 
 /** @param {Cuboid} cuboid @param {number} by_rad @returns {Cuboid} */
-export const turned = (cuboid, by_rad) => ({ ...cuboid, yaw_rad: Math.atan2(Math.sin(cuboid.yaw_rad + by_rad), Math.cos(cuboid.yaw_rad + by_rad)) });
+export const turned = (cuboid, by_rad) => ({
+  ...cuboid,
+  yaw_rad: Math.atan2(Math.sin(cuboid.yaw_rad + by_rad), Math.cos(cuboid.yaw_rad + by_rad)),
+});
 
 /** The held edge brought to a place, and the opposite face left where it is. @param {Cuboid} cuboid @param {Grip} grip @param {Place} place @returns {Cuboid} */
 function resized(cuboid, grip, place) {
-  const axis = grip === "front" || grip === "rear" ? 0 : 1, sign = grip === "front" || grip === "left" ? 1 : -1;
-  const at = own(cuboid, place), reached = sign * (axis === 0 ? at.along : at.across);
+  const axis = grip === "front" || grip === "rear" ? 0 : 1,
+    sign = grip === "front" || grip === "left" ? 1 : -1;
+  const at = own(cuboid, place),
+    reached = sign * (axis === 0 ? at.along : at.across);
   const size = /** @type {[number, number, number]} */ ([...cuboid.size]);
   size[axis] = Math.max(SMALLEST_M, reached + cuboid.size[axis] / 2);
   const shift = (sign * (size[axis] - cuboid.size[axis])) / 2;
@@ -92,7 +116,8 @@ function resized(cuboid, grip, place) {
  */
 export function dragged(cuboid, grip, from, to) {
   if (grip === "move") return moved(cuboid, to.x - from.x, to.y - from.y);
-  if (grip === "turn") return turned(cuboid, Math.atan2(to.y - cuboid.center[1], to.x - cuboid.center[0]) - cuboid.yaw_rad);
+  if (grip === "turn")
+    return turned(cuboid, Math.atan2(to.y - cuboid.center[1], to.x - cuboid.center[0]) - cuboid.yaw_rad);
   return resized(cuboid, grip, to);
 }
 
@@ -101,9 +126,12 @@ export function dragged(cuboid, grip, from, to) {
  * @param {Place} from @param {Place} to @param {string} label @param {number} ground_m z of the ground there @returns {Cuboid}
  */
 export function drawn(from, to, label, ground_m) {
-  const [length, width, height] = TYPICAL_M[label] ?? TYPICAL_M.car, far = Math.hypot(to.x - from.x, to.y - from.y);
-  const says = far >= SAYS_FROM_M, yaw_rad = says ? Math.atan2(to.y - from.y, to.x - from.x) : 0;
-  const size = /** @type {[number, number, number]} */ ([says ? far : length, width, height]), z = ground_m + height / 2;
+  const [length, width, height] = TYPICAL_M[label] ?? TYPICAL_M.car,
+    far = Math.hypot(to.x - from.x, to.y - from.y);
+  const says = far >= SAYS_FROM_M,
+    yaw_rad = says ? Math.atan2(to.y - from.y, to.x - from.x) : 0;
+  const size = /** @type {[number, number, number]} */ ([says ? far : length, width, height]),
+    z = ground_m + height / 2;
   if (says) return { center: [(from.x + to.x) / 2, (from.y + to.y) / 2, z], size, yaw_rad };
   return { center: [from.x + length / 2, from.y, z], size, yaw_rad };
 }
@@ -115,7 +143,8 @@ const FARTHEST_M = 300;
 
 /** @param {import("../../core/types.js").GroundPlanes|null} ground @param {number} x @returns {number} which plane it is there */
 function planeAt(ground, x) {
-  const after = ground?.edges.findIndex((edge) => edge > x) ?? -1, count = ground?.planes.length ?? 0;
+  const after = ground?.edges.findIndex((edge) => edge > x) ?? -1,
+    count = ground?.planes.length ?? 0;
   return after < 0 ? count - 1 : Math.min(count, Math.max(1, after)) - 1;
 }
 
@@ -125,9 +154,11 @@ function planeAt(ground, x) {
  * @returns {Point2|null}
  */
 export function seenOn(ground, [x, y, z], [dx, dy, dz], above) {
-  const planes = ground?.planes.length ? ground.planes : [FLAT], isKnown = planes[0] !== FLAT;
+  const planes = ground?.planes.length ? ground.planes : [FLAT],
+    isKnown = planes[0] !== FLAT;
   const met = planes.flatMap(([a, b, c, d], i) => {
-    const t = -(a * x + b * y + c * (z - above) + d) / (a * dx + b * dy + c * dz), at = x + t * dx;
+    const t = -(a * x + b * y + c * (z - above) + d) / (a * dx + b * dy + c * dz),
+      at = x + t * dx;
     return t > 0 && (!isKnown || planeAt(ground, at) === i) && Math.hypot(at, y + t * dy) < FARTHEST_M ? [t] : [];
   });
   const t = Math.min(...met);

@@ -19,8 +19,11 @@ export function drawing(from) {
   const middle = [[from.x, from.y]];
   return {
     moved: ({ x, y }) => {
-      const [lastX, lastY] = middle[middle.length - 1], far = Math.hypot(x - lastX, y - lastY), steps = Math.floor(far / STEP_M);
-      for (let i = 1; i <= steps; i++) middle.push([lastX + ((x - lastX) * i * STEP_M) / far, lastY + ((y - lastY) * i * STEP_M) / far]);
+      const [lastX, lastY] = middle[middle.length - 1],
+        far = Math.hypot(x - lastX, y - lastY),
+        steps = Math.floor(far / STEP_M);
+      for (let i = 1; i <= steps; i++)
+        middle.push([lastX + ((x - lastX) * i * STEP_M) / far, lastY + ((y - lastY) * i * STEP_M) / far]);
       set("drawnPath", sides(middle));
     },
     ended: async () => {
@@ -37,16 +40,20 @@ export function drawing(from) {
 /** Lines half a corridor to the left and to the right of a middle. @param {Point2[]} middle @returns {{left: Point2[], right: Point2[]}} */
 export function sides(middle) {
   const half = Number(get("params")?.values["path.half_width_m"] ?? 1.5);
-  const shifted = (/** @type {number} */ by) => middle.map(([x, y], i) => {
-    const [x1, y1] = middle[Math.max(0, i - 1)], [x2, y2] = middle[Math.min(middle.length - 1, i + 1)], length = Math.hypot(x2 - x1, y2 - y1) || 1;
-    return /** @type {Point2} */ ([x - (by * (y2 - y1)) / length, y + (by * (x2 - x1)) / length]);
-  });
+  const shifted = (/** @type {number} */ by) =>
+    middle.map(([x, y], i) => {
+      const [x1, y1] = middle[Math.max(0, i - 1)],
+        [x2, y2] = middle[Math.min(middle.length - 1, i + 1)],
+        length = Math.hypot(x2 - x1, y2 - y1) || 1;
+      return /** @type {Point2} */ ([x - (by * (y2 - y1)) / length, y + (by * (x2 - x1)) / length]);
+    });
   return { left: shifted(half), right: shifted(-half) };
 }
 
 /** The labelled path of the shown frame, and one under a hand. @param {CanvasRenderingContext2D} ctx @param {Viewport} view */
 export function drawPathLabel(ctx, view) {
-  const held = get("labels")?.paths.find(({ frame, state }) => frame === shown() && state !== "rejected"), drawn = get("drawnPath") ?? held;
+  const held = get("labels")?.paths.find(({ frame, state }) => frame === shown() && state !== "rejected"),
+    drawn = get("drawnPath") ?? held;
   if (!drawn) return;
   ctx.strokeStyle = color("path");
   ctx.lineWidth = 2.5;

@@ -17,7 +17,8 @@ import * as road from "./road_drag.js";
 /** Which sides of a box move: left, top, right, bottom. @typedef {[boolean, boolean, boolean, boolean]} Sides */
 /** @typedef {{from?: Pixel, moved: (to: Pixel) => void, ended: (isClick: boolean) => void}} Drag */
 
-const REACH_PX = 6, CLICK_PX = 4;
+const REACH_PX = 6,
+  CLICK_PX = 4;
 const canvas = $("#camera", HTMLCanvasElement);
 
 export function setUp() {
@@ -56,18 +57,21 @@ function pixelAt({ offsetX, offsetY }) {
 
 /** @param {Pixel} from @returns {Drag|null} */
 function takes(from) {
-  const tool = get("labeling")?.tool, track = chosen()?.id ?? null;
+  const tool = get("labeling")?.tool,
+    track = chosen()?.id ?? null;
   if (tool === "new") return drawing(from, (bbox) => lift(bbox ? { bbox } : { pixel: [from.u, from.v] }));
   if (tool === "shape" && track !== null) return drawing(from, (bbox) => (bbox ? shape(track, bbox) : drop()));
   if (track === null) return null;
-  const box = presentOf(track)?.bbox, sides = box ? sidesAt(box, from, REACH_PX * perPane()) : null;
+  const box = presentOf(track)?.bbox,
+    sides = box ? sidesAt(box, from, REACH_PX * perPane()) : null;
   if (!sides || sides.every(Boolean)) {
     const onRoad = road.takes(track, from);
     if (onRoad) return { ...onRoad, ended: (isClick) => (isClick ? clicked(from) : onRoad.ended()) };
   }
   if (!box || !sides) return null;
   return {
-    from, moved: (to) => hold(track, { bbox: stretched(box, sides, to.u - from.u, to.v - from.v) }),
+    from,
+    moved: (to) => hold(track, { bbox: stretched(box, sides, to.u - from.u, to.v - from.v) }),
     ended: (isClick) => (isClick ? clicked(from) : release()),
   };
 }
@@ -112,14 +116,16 @@ export function sidesAt([x1, y1, x2, y2], { u, v }, reach) {
 }
 
 /** @param {Box} box @param {Sides} sides @param {number} du @param {number} dv @returns {Box} */
-export const stretched = (box, sides, du, dv) => ordered(/** @type {Box} */ (box.map((value, i) => (sides[i] ? value + (i % 2 ? dv : du) : value))));
+export const stretched = (box, sides, du, dv) =>
+  ordered(/** @type {Box} */ (box.map((value, i) => (sides[i] ? value + (i % 2 ? dv : du) : value))));
 
 /** @param {Box} box @returns {Box} */
 const ordered = ([a, b, c, d]) => [Math.min(a, c), Math.min(b, d), Math.max(a, c), Math.max(b, d)];
 
 /** @param {Pixel} pixel */
 function clicked({ u, v }) {
-  const area = (/** @type {Box} */ [x1, y1, x2, y2]) => (x2 - x1) * (y2 - y1), reach = REACH_PX * perPane();
+  const area = (/** @type {Box} */ [x1, y1, x2, y2]) => (x2 - x1) * (y2 - y1),
+    reach = REACH_PX * perPane();
   const hits = present().flatMap(({ track }) => {
     const box = lookOf(track, true) && boxOf(track);
     return box && sidesAt(box, { u, v }, reach) ? [{ track, box }] : [];

@@ -28,11 +28,21 @@ export function drawInPlan(ctx, view, tags) {
   const chosen = labels.find(({ look }) => look.isChosen);
   if (chosen) drawHandles(ctx, view, chosen.cuboid);
   for (const { cuboid, look, tint } of labels.sort((a, b) => Number(b.look.isChosen) - Number(a.look.isChosen))) {
-    const corners = footprint(cuboid), u = Math.max(...corners.map(([, y]) => view.u(y))) + 4, v = Math.min(...corners.map(([x]) => view.v(x))) + 14;
+    const corners = footprint(cuboid),
+      u = Math.max(...corners.map(([, y]) => view.u(y))) + 4,
+      v = Math.min(...corners.map(([x]) => view.v(x))) + 14;
     tags.put(look.name, u, v, look.isChosen ? "#fff" : tint, look.isLead ? "strong" : look.isChosen ? "must" : "weak");
   }
   const draft = get("draft");
-  if (draft?.track === null && draft.cuboid) drawOne(ctx, view, draft.cuboid, true, { tint: ui("accent"), dash: [], width: 2.5, isLead: false, isChosen: true, name: "" });
+  if (draft?.track === null && draft.cuboid)
+    drawOne(ctx, view, draft.cuboid, true, {
+      tint: ui("accent"),
+      dash: [],
+      width: 2.5,
+      isLead: false,
+      isChosen: true,
+      name: "",
+    });
 }
 
 /** @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {Cuboid} cuboid @param {boolean} isKeyframe @param {import("./style.js").Look} look */
@@ -57,13 +67,17 @@ function drawOne(ctx, view, cuboid, isKeyframe, look) {
 
 /** @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {Cuboid} cuboid */
 function drawHandles(ctx, view, cuboid) {
-  const corners = footprint(cuboid), at = knob(cuboid, KNOB_PX / view.scale);
+  const corners = footprint(cuboid),
+    at = knob(cuboid, KNOB_PX / view.scale);
   ctx.strokeStyle = ui("text");
   ctx.fillStyle = ui("panel");
   ctx.lineWidth = 1.5;
   trace(ctx, view, [nose(cuboid), at]);
   ctx.stroke();
-  const edges = corners.map(([x, y], place) => /** @type {[number, number]} */ ([(x + corners[(place + 1) % 4][0]) / 2, (y + corners[(place + 1) % 4][1]) / 2]));
+  const edges = corners.map(
+    ([x, y], place) =>
+      /** @type {[number, number]} */ ([(x + corners[(place + 1) % 4][0]) / 2, (y + corners[(place + 1) % 4][1]) / 2]),
+  );
   for (const [x, y] of [...edges, at]) {
     ctx.beginPath();
     ctx.arc(view.u(y), view.v(x), HANDLE_PX, 0, 2 * Math.PI);

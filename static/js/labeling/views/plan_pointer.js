@@ -20,9 +20,10 @@ const REACH_PX = 6;
 export function takes(from, scale) {
   if (!isOn()) return null;
   const tool = get("labeling")?.tool;
-  if (tool === "new" || tool === "shape") return drawing(from, tool === "shape" ? chosen()?.id ?? null : null);
+  if (tool === "new" || tool === "shape") return drawing(from, tool === "shape" ? (chosen()?.id ?? null) : null);
   if (tool === "path") return path.drawing(from);
-  const track = get("track"), cuboid = presentOf(track)?.cuboid;
+  const track = get("track"),
+    cuboid = presentOf(track)?.cuboid;
   const grip = cuboid ? gripAt(cuboid, from, REACH_PX / scale, KNOB_PX / scale) : null;
   if (track === null || !cuboid || !grip) return null;
   return { moved: (to) => hold(track, { cuboid: dragged(cuboid, grip, from, to) }), ended: release, cancelled: drop };
@@ -33,13 +34,17 @@ export function cursorAt(place, scale) {
   if (get("labeling")?.tool) return "crosshair";
   const cuboid = presentOf(get("track"))?.cuboid;
   const grip = cuboid ? gripAt(cuboid, place, REACH_PX / scale, KNOB_PX / scale) : null;
-  if (grip) return { move: "move", turn: "grab", front: "ns-resize", rear: "ns-resize", left: "ew-resize", right: "ew-resize" }[grip];
+  if (grip)
+    return { move: "move", turn: "grab", front: "ns-resize", rear: "ns-resize", left: "ew-resize", right: "ew-resize" }[
+      grip
+    ];
   return labelAt(place) === null ? "" : "pointer";
 }
 
 /** @param {Place} from @param {number|null} track whose shape it is; null of a new one @returns {Drag} */
 function drawing(from, track) {
-  const ground_m = groundAt(get("frame")?.display.ground ?? null, from), label = trackOf(track)?.label ?? newLabel();
+  const ground_m = groundAt(get("frame")?.display.ground ?? null, from),
+    label = trackOf(track)?.label ?? newLabel();
   const shape = (/** @type {Place} */ to) => drawn(from, to, label, ground_m);
   const show = (/** @type {Place} */ to) => {
     if (track !== null) hold(track, { cuboid: shape(to) });
@@ -47,7 +52,8 @@ function drawing(from, track) {
   };
   show(from);
   return {
-    moved: show, cancelled: drop,
+    moved: show,
+    cancelled: drop,
     ended: () => {
       setTool(null);
       if (track !== null) release();
@@ -79,6 +85,7 @@ export function clicked(place) {
 /** The smallest label at a place. @param {Place} place @returns {number|null} */
 function labelAt(place) {
   const hits = present().filter(({ cuboid, track }) => cuboid && contains(cuboid, place) && lookOf(track, false));
-  const area = (/** @type {import("../state/types.js").LabelSighting} */ { cuboid }) => (cuboid ? cuboid.size[0] * cuboid.size[1] : 0);
+  const area = (/** @type {import("../state/types.js").LabelSighting} */ { cuboid }) =>
+    cuboid ? cuboid.size[0] * cuboid.size[1] : 0;
   return hits.sort((a, b) => area(a) - area(b))[0]?.track ?? null;
 }

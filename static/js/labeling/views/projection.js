@@ -11,10 +11,15 @@ import { isOn } from "../state/mode.js";
 export const NEW = -1;
 
 const project = newestOnly(async (/** @type {{frame: number, cuboids: Map<number, Cuboid>}} */ { frame, cuboids }) => {
-  const answer = cuboids.size ? await request("api/project", "POST", { cuboids: [...cuboids.values()] }).catch(() => null) : { pixels: [] };
+  const answer = cuboids.size
+    ? await request("api/project", "POST", { cuboids: [...cuboids.values()] }).catch(() => null)
+    : { pixels: [] };
   if (!answer) return;
   const places = answer.pixels ?? [];
-  set("projected", { frame, pixels: new Map([...cuboids.keys()].flatMap((id, place) => (places[place] ? [[id, places[place]]] : []))) });
+  set("projected", {
+    frame,
+    pixels: new Map([...cuboids.keys()].flatMap((id, place) => (places[place] ? [[id, places[place]]] : []))),
+  });
 });
 
 /** More cuboids than this nobody can tell apart in a picture: the nearest ones, and the selected one. */
@@ -23,14 +28,22 @@ const MOST = 150;
 /** @param {[number, Cuboid][]} cuboids @returns {[number, Cuboid][]} */
 function nearest(cuboids) {
   if (cuboids.length <= MOST) return cuboids;
-  const away = (/** @type {[number, Cuboid]} */ [id, { center: [x, y] }]) => (id === get("track") ? -1 : x < 0 ? Infinity : Math.hypot(x, y));
+  const away = (
+    /** @type {[number, Cuboid]} */ [
+      id,
+      {
+        center: [x, y],
+      },
+    ],
+  ) => (id === get("track") ? -1 : x < 0 ? Infinity : Math.hypot(x, y));
   return cuboids.sort((a, b) => away(a) - away(b)).slice(0, MOST);
 }
 
 export function setUp() {
   on(["frame", "labels", "labelFrames", "draft", "labeling"], () => {
     if (!isOn() || !get("labels")) return;
-    const draft = get("draft"), frame = shown();
+    const draft = get("draft"),
+      frame = shown();
     /** @type {[number, Cuboid][]} */
     const cuboids = nearest(present().flatMap(({ track, cuboid }) => (cuboid ? [[track, cuboid]] : [])));
     if (draft?.track === null && draft.cuboid && draft.frame === frame) cuboids.push([NEW, draft.cuboid]);

@@ -13,7 +13,8 @@ export function setUp() {
 }
 
 function offer() {
-  const track = get("track"), isSeen = isOn() && get("layout")?.tab === "3d";
+  const track = get("track"),
+    isSeen = isOn() && get("layout")?.tab === "3d";
   const cuboid = isSeen ? presentOf(track)?.cuboid : null;
   tell("held", track !== null && cuboid ? { track, frame: shown(), cuboid } : null);
 }

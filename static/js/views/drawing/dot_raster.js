@@ -14,7 +14,8 @@ export class DotRaster {
   /** Begin with nothing on it. @param {number} width @param {number} height CSS pixels */
   begin(width, height) {
     this.#ratio = window.devicePixelRatio || 1;
-    const w = Math.max(1, Math.round(width * this.#ratio)), h = Math.max(1, Math.round(height * this.#ratio));
+    const w = Math.max(1, Math.round(width * this.#ratio)),
+      h = Math.max(1, Math.round(height * this.#ratio));
     if (this.#image.width !== w || this.#image.height !== h) {
       this.#canvas.width = w;
       this.#canvas.height = h;
@@ -28,7 +29,8 @@ export class DotRaster {
   dot(x, y, size, colour) {
     const side = Math.max(1, Math.round(size * this.#ratio));
     const { width, height } = this.#image;
-    const left = Math.round(x * this.#ratio - side / 2), top = Math.round(y * this.#ratio - side / 2);
+    const left = Math.round(x * this.#ratio - side / 2),
+      top = Math.round(y * this.#ratio - side / 2);
     if (left < 0 || top < 0 || left + side > width || top + side > height) return;
     for (let row = top * width + left, i = 0; i < side; i++, row += width) {
       for (let j = 0; j < side; j++) this.#pixels[row + j] = colour;

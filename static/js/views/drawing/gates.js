@@ -9,7 +9,8 @@ import { middle } from "./trails.js";
 /** @typedef {import("./text_labels.js").Labels} Labels */
 /** @typedef {{u: (y: number) => number, v: (x: number) => number, scale: number}} Plan */
 
-const PASSED = "#4ade80", FAILED = "#ff6b6b";
+const PASSED = "#4ade80",
+  FAILED = "#ff6b6b";
 const TICK_PX = 7;
 
 /** @param {Gate} gate */
@@ -33,18 +34,29 @@ export function failedWords(item) {
  * @param {(u: number) => number} X @param {(v: number) => number} Y
  */
 export function drawInPicture(ctx, { display }, item, labels, X, Y) {
-  const vision = display.vision_boxes[item.id], lidar = display.lidar_boxes[item.id], iou = gateOf(item, "iou");
+  const vision = display.vision_boxes[item.id],
+    lidar = display.lidar_boxes[item.id],
+    iou = gateOf(item, "iou");
   if (vision && lidar && iou && iou.value !== null) {
-    const x1 = Math.max(vision[0], lidar[0]), y1 = Math.max(vision[1], lidar[1]);
-    const x2 = Math.min(vision[2], lidar[2]), y2 = Math.min(vision[3], lidar[3]);
+    const x1 = Math.max(vision[0], lidar[0]),
+      y1 = Math.max(vision[1], lidar[1]);
+    const x2 = Math.min(vision[2], lidar[2]),
+      y2 = Math.min(vision[3], lidar[3]);
     ctx.fillStyle = tintOf(iou);
     ctx.globalAlpha = 0.22;
     if (x2 > x1 && y2 > y1) ctx.fillRect(X(x1), Y(y1), X(x2) - X(x1), Y(y2) - Y(y1));
     ctx.globalAlpha = 1;
     const below = Y(Math.max(vision[3], lidar[3])) + 20;
-    labels.put(`IoU ${num(iou.value, 2)} ${iou.passed ? "≥" : "<"} ${num(iou.limit, 2)}`, X(Math.min(vision[0], lidar[0])), below, tintOf(iou), "must");
+    labels.put(
+      `IoU ${num(iou.value, 2)} ${iou.passed ? "≥" : "<"} ${num(iou.limit, 2)}`,
+      X(Math.min(vision[0], lidar[0])),
+      below,
+      tintOf(iou),
+      "must",
+    );
   }
-  const words = failedWords(item), anchor = vision ?? lidar;
+  const words = failedWords(item),
+    anchor = vision ?? lidar;
   if (words && anchor) labels.put(words, X(anchor[0]), Y(anchor[3]) + 20, FAILED, "must");
 }
 
@@ -83,11 +95,17 @@ function drawOffset(ctx, center, item, labels, plan) {
  */
 function drawRange(ctx, item, seen, labels, plan) {
   if (!seen || !item.closest_point || item.source !== "VL") return;
-  const gate = gateOf(item, "range_sigmas"), [x, y] = item.closest_point;
-  const reach = seen.sigma_m * (gate?.limit ?? 1), bearing = Math.atan2(y, x), half = Math.max(0.04, 2.5 / Math.hypot(x, y));
+  const gate = gateOf(item, "range_sigmas"),
+    [x, y] = item.closest_point;
+  const reach = seen.sigma_m * (gate?.limit ?? 1),
+    bearing = Math.atan2(y, x),
+    half = Math.max(0.04, 2.5 / Math.hypot(x, y));
   // on the canvas x is up and y is left: bearing b is the angle −π/2 − b
-  const from = -Math.PI / 2 - bearing - half, to = -Math.PI / 2 - bearing + half;
-  const tint = gate ? tintOf(gate) : "#22d3ee", u = plan.u(0), v = plan.v(0);
+  const from = -Math.PI / 2 - bearing - half,
+    to = -Math.PI / 2 - bearing + half;
+  const tint = gate ? tintOf(gate) : "#22d3ee",
+    u = plan.u(0),
+    v = plan.v(0);
   ctx.beginPath();
   ctx.arc(u, v, Math.max(0, seen.distance_m - reach) * plan.scale, from, to);
   ctx.arc(u, v, (seen.distance_m + reach) * plan.scale, to, from, true);
@@ -114,10 +132,14 @@ function drawRange(ctx, item, seen, labels, plan) {
 function footOf(center, [px, py]) {
   let best = { away: Infinity, foot: center[0], left: /** @type {Point2} */ ([0, 1]) };
   for (let i = 1; i < center.length; i++) {
-    const [ax, ay] = center[i - 1], dx = center[i][0] - ax, dy = center[i][1] - ay, length = Math.hypot(dx, dy);
+    const [ax, ay] = center[i - 1],
+      dx = center[i][0] - ax,
+      dy = center[i][1] - ay,
+      length = Math.hypot(dx, dy);
     if (length === 0) continue;
     const share = Math.min(1, Math.max(0, ((px - ax) * dx + (py - ay) * dy) / length ** 2));
-    const foot = /** @type {Point2} */ ([ax + share * dx, ay + share * dy]), away = Math.hypot(px - foot[0], py - foot[1]);
+    const foot = /** @type {Point2} */ ([ax + share * dx, ay + share * dy]),
+      away = Math.hypot(px - foot[0], py - foot[1]);
     if (away < best.away) best = { away, foot, left: [-dy / length, dx / length] };
   }
   return best;

@@ -9,14 +9,18 @@
  * @param {number} u @param {number} v @param {number} reach pixels
  */
 export function nearestPoint(count, counts, across, down, u, v, reach) {
-  let best = -1, least = reach * reach;
+  let best = -1,
+    least = reach * reach;
   for (let i = 0; i < count; i++) {
     if (!counts(i)) continue;
-    const du = across(i) - u, dv = down(i) - v, away = du * du + dv * dv;
+    const du = across(i) - u,
+      dv = down(i) - v,
+      away = du * du + dv * dv;
     if (away < least) [best, least] = [i, away];
   }
   return best;
 }
 
 /** Whose a point is. @param {Frame} frame @param {number} i @returns {number|null} */
-export const ownerOf = ({ owner, result }, i) => (i < 0 || owner[i] === 0 ? null : result.objects[owner[i] - 1]?.id ?? null);
+export const ownerOf = ({ owner, result }, i) =>
+  i < 0 || owner[i] === 0 ? null : (result.objects[owner[i] - 1]?.id ?? null);

@@ -8,7 +8,20 @@ import { get } from "../../core/store.js";
 /** @typedef {import("../../core/types.js").Pixels} Pixels */
 /** @typedef {(pixel: number) => number} Axis  from a pixel of the picture to one of the canvas */
 
-const EDGES = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [0, 4], [1, 5], [2, 6], [3, 7]];
+const EDGES = [
+  [0, 1],
+  [1, 2],
+  [2, 3],
+  [3, 0],
+  [4, 5],
+  [5, 6],
+  [6, 7],
+  [7, 4],
+  [0, 4],
+  [1, 5],
+  [2, 6],
+  [3, 7],
+];
 
 /**
  * @param {CanvasRenderingContext2D} ctx @param {{left: Pixels, right: Pixels}} path
@@ -16,7 +29,8 @@ const EDGES = [[0, 1], [1, 2], [2, 3], [3, 0], [4, 5], [5, 6], [6, 7], [7, 4], [
  */
 export function drawPath(ctx, path, X, Y) {
   const known = (/** @type {Pixels} */ side) => side.filter((pixel) => pixel !== null);
-  const left = known(path.left), right = known(path.right);
+  const left = known(path.left),
+    right = known(path.right);
   if (left.length + right.length < 3) return;
   const trace = (/** @type {import("../../core/types.js").Point2[]} */ pixels) => {
     ctx.beginPath();
@@ -41,15 +55,20 @@ export function drawPath(ctx, path, X, Y) {
  * @param {import("./text_labels.js").Labels} labels @param {Axis} X @param {Axis} Y
  */
 export function drawObjects(ctx, { result, display }, layers, labels, X, Y) {
-  const lead = result.cipv?.id ?? null, next = result.next_cipv?.id ?? null, chosen = get("selection");
+  const lead = result.cipv?.id ?? null,
+    next = result.next_cipv?.id ?? null,
+    chosen = get("selection");
   const farFirst = [...result.objects].sort((a, b) => (b.distance_m ?? 1e9) - (a.distance_m ?? 1e9));
   for (const item of farFirst) {
     const strong = item.id === lead || item.id === chosen;
     const tint = onPicture(roleOf(item, lead));
-    const vision = display.vision_boxes[item.id], lidar = display.lidar_boxes[item.id], corners = display.cuboids[item.id];
+    const vision = display.vision_boxes[item.id],
+      lidar = display.lidar_boxes[item.id],
+      corners = display.cuboids[item.id];
     ctx.globalAlpha = item.carried ? 0.5 : 1;
     ctx.setLineDash(item.carried ? [4, 3] : []);
-    if (layers.cuboids && corners) drawCuboid(ctx, corners, strong ? tint : onPicture("lidar"), strong ? 2.5 : 1.2, X, Y);
+    if (layers.cuboids && corners)
+      drawCuboid(ctx, corners, strong ? tint : onPicture("lidar"), strong ? 2.5 : 1.2, X, Y);
     if (layers.lidarBoxes && lidar) drawBox(ctx, lidar, onPicture("lidar"), 1, X, Y);
     if (layers.visionBoxes && vision) drawBox(ctx, vision, strong ? tint : onPicture("vision"), strong ? 3 : 1.5, X, Y);
     if (strong && !vision && lidar) drawBox(ctx, lidar, tint, 2.5, X, Y);
@@ -58,14 +77,22 @@ export function drawObjects(ctx, { result, display }, layers, labels, X, Y) {
     ctx.globalAlpha = 1;
   }
   for (const item of farFirst.reverse()) {
-    const vision = display.vision_boxes[item.id], anchor = vision ?? display.lidar_boxes[item.id];
-    const isLead = item.id === lead, isNext = item.id === next;
+    const vision = display.vision_boxes[item.id],
+      anchor = vision ?? display.lidar_boxes[item.id];
+    const isLead = item.id === lead,
+      isNext = item.id === next;
     if (!anchor || !(isLead || isNext || item.id === chosen || deservesTag(item))) continue;
     const isShown = vision ? layers.visionBoxes : layers.cuboids || layers.lidarBoxes;
     if (!isShown && !isLead) continue;
     const name = isLead ? `CIPV #${item.id}` : `${isNext ? "next " : ""}#${item.id} ${item.type ?? ""}`.trim();
     const words = item.distance_m === null ? name : `${name}  ${num(item.distance_m)} m`;
-    labels.put(words, X(anchor[0]), Y(anchor[1]), onPicture(roleOf(item, lead)), isLead ? "strong" : isNext || item.id === chosen ? "must" : "weak");
+    labels.put(
+      words,
+      X(anchor[0]),
+      Y(anchor[1]),
+      onPicture(roleOf(item, lead)),
+      isLead ? "strong" : isNext || item.id === chosen ? "must" : "weak",
+    );
   }
 }
 
@@ -92,7 +119,8 @@ export function drawCuboid(ctx, corners, tint, width, X, Y) {
   ctx.lineWidth = width;
   ctx.beginPath();
   for (const [a, b] of EDGES) {
-    const from = corners[a], to = corners[b];
+    const from = corners[a],
+      to = corners[b];
     if (!from || !to) continue;
     ctx.moveTo(X(from[0]), Y(from[1]));
     ctx.lineTo(X(to[0]), Y(to[1]));

@@ -6,7 +6,8 @@ import { middle, trailOf } from "./trails.js";
 /** @typedef {import("../../core/types.js").FusedObject} FusedObject */
 /** Where a place of the plan is drawn. @typedef {Pick<import("./viewport.js").Viewport, "u"|"v"|"scale">} Viewport */
 
-const SLOWEST_MPS = 0.5, HEAD_PX = 6;
+const SLOWEST_MPS = 0.5,
+  HEAD_PX = 6;
 
 /** @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {Point2[]} line */
 export function trace(ctx, view, line) {
@@ -21,7 +22,8 @@ export function drawPath(ctx, view, path) {
   const sigma = sigmaAlong(path.sigma_m);
   ctx.globalAlpha = 0.1;
   for (const side of [path.left, path.right]) {
-    const moved = (/** @type {number} */ sign) => side.map(([x, y]) => /** @type {Point2} */ ([x, y + sign * sigma(x)]));
+    const moved = (/** @type {number} */ sign) =>
+      side.map(([x, y]) => /** @type {Point2} */ ([x, y + sign * sigma(x)]));
     trace(ctx, view, [...moved(1), ...moved(-1).reverse()]);
     ctx.closePath();
     ctx.fill();
@@ -47,13 +49,16 @@ export function drawPath(ctx, view, path) {
 /** Standard deviation of the path's place at a distance ahead, between and beyond the distances where it is known.
  * @param {Record<string, number|null>} sigmas @returns {(x: number) => number} */
 function sigmaAlong(sigmas) {
-  const known = Object.entries(sigmas).flatMap(([at, sigma]) => (sigma === null ? [] : [[Number(at), sigma]])).sort(([a], [b]) => a - b);
+  const known = Object.entries(sigmas)
+    .flatMap(([at, sigma]) => (sigma === null ? [] : [[Number(at), sigma]]))
+    .sort(([a], [b]) => a - b);
   if (!known.length) return () => 0;
   return (x) => {
     const after = known.findIndex(([at]) => at >= x);
     if (after === 0) return known[0][1];
     if (after < 0) return known[known.length - 1][1];
-    const [x0, s0] = known[after - 1], [x1, s1] = known[after];
+    const [x0, s0] = known[after - 1],
+      [x1, s1] = known[after];
     return s0 + ((s1 - s0) * (x - x0)) / (x1 - x0);
   };
 }
@@ -75,18 +80,27 @@ export function drawOutline(ctx, view, item, isImportant, isLead) {
 /** One sigma of the distance, along the line of sight. @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {FusedObject} item */
 export function drawSigma(ctx, view, item) {
   if (!item.distance_sigma_m || !item.closest_point || (item.distance_m ?? 0) < 0.1) return;
-  const [x, y] = item.closest_point, share = item.distance_sigma_m / Math.hypot(x, y);
+  const [x, y] = item.closest_point,
+    share = item.distance_sigma_m / Math.hypot(x, y);
   ctx.lineWidth = 1;
-  trace(ctx, view, [[x * (1 - share), y * (1 - share)], [x * (1 + share), y * (1 + share)]]);
+  trace(ctx, view, [
+    [x * (1 - share), y * (1 - share)],
+    [x * (1 + share), y * (1 + share)],
+  ]);
   ctx.stroke();
 }
 
 /** Where it will be relative to us in one second. @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {FusedObject} item */
 export function drawArrow(ctx, view, item) {
   if (!item.velocity_mps || !item.bev) return;
-  const [vx, vy] = item.velocity_mps, [x, y] = middle(item.bev);
+  const [vx, vy] = item.velocity_mps,
+    [x, y] = middle(item.bev);
   if (Math.hypot(vx, vy) < SLOWEST_MPS) return;
-  const u0 = view.u(y), v0 = view.v(x), u1 = view.u(y + vy), v1 = view.v(x + vx), turn = Math.atan2(v1 - v0, u1 - u0);
+  const u0 = view.u(y),
+    v0 = view.v(x),
+    u1 = view.u(y + vy),
+    v1 = view.v(x + vx),
+    turn = Math.atan2(v1 - v0, u1 - u0);
   ctx.lineWidth = 1.5;
   ctx.beginPath();
   ctx.moveTo(u0, v0);
@@ -114,7 +128,10 @@ export function drawTrail(ctx, view, id, tint) {
 /** A frame around an object. @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {FusedObject} item @param {string} tint @param {number[]} [dash] */
 export function drawRing(ctx, view, { bev }, tint, dash = []) {
   if (!bev) return;
-  const us = bev.map(([, y]) => view.u(y)), vs = bev.map(([x]) => view.v(x)), left = Math.min(...us), top = Math.min(...vs);
+  const us = bev.map(([, y]) => view.u(y)),
+    vs = bev.map(([x]) => view.v(x)),
+    left = Math.min(...us),
+    top = Math.min(...vs);
   ctx.strokeStyle = tint;
   ctx.lineWidth = 1.5;
   ctx.setLineDash(dash);

@@ -21,20 +21,42 @@ export const COLOR_BY = [
 export const GROUND = 0;
 export const CLUSTER = 2;
 const KIND_ROLES = ["ground", "unclustered", "cluster", "dropped"];
-const HEIGHT_M = [-0.3, 3], AGE_MS = 100, UNKNOWN_AGE = 255;
+const HEIGHT_M = [-0.3, 3],
+  AGE_MS = 100,
+  UNKNOWN_AGE = 255;
 
 /** Dark blue over green to yellow: even steps of lightness, so that more always looks more. */
-const STOPS = [[70, 30, 110], [60, 90, 160], [40, 150, 150], [90, 200, 110], [200, 225, 60], [255, 240, 120]];
-const RAMP = ramp(STOPS, 256), RANGE_RAMP = spread(RANGE_COLORS, 256);
+const STOPS = [
+  [70, 30, 110],
+  [60, 90, 160],
+  [40, 150, 150],
+  [90, 200, 110],
+  [200, 225, 60],
+  [255, 240, 120],
+];
+const RAMP = ramp(STOPS, 256),
+  RANGE_RAMP = spread(RANGE_COLORS, 256);
 /** Far apart in hue; neither the green nor the magenta that mean something. */
-const HUES = [[255, 160, 60], [90, 190, 255], [240, 220, 90], [200, 140, 255], [120, 220, 220], [255, 120, 110], [170, 200, 120], [140, 150, 255], [230, 170, 200], [200, 180, 140]];
+const HUES = [
+  [255, 160, 60],
+  [90, 190, 255],
+  [240, 220, 90],
+  [200, 140, 255],
+  [120, 220, 220],
+  [255, 120, 110],
+  [170, 200, 120],
+  [140, 150, 255],
+  [230, 170, 200],
+  [200, 180, 140],
+];
 
 /**
  * (count) colours as `DotRaster` takes them; the road's points are fainter.
  * @param {Frame} frame @param {ColorBy} by @param {Shade} shade @param {number} [groundAlpha] @returns {Uint32Array}
  */
 export function tints(frame, by, shade, groundAlpha = 0.6) {
-  const { count, kind } = frame, found = new Uint32Array(count);
+  const { count, kind } = frame,
+    found = new Uint32Array(count);
   const colorOf = MODES[by](frame, shade);
   const faint = (Math.round(groundAlpha * 255) << 24) >>> 0;
   for (let i = 0; i < count; i++) {
@@ -48,7 +70,8 @@ export function tints(frame, by, shade, groundAlpha = 0.6) {
 /** @type {Record<ColorBy, (frame: Frame, shade: Shade) => Colorer>} */
 const MODES = {
   object({ kind, owner, result }, shade) {
-    const lead = result.cipv?.id ?? null, loose = KIND_ROLES.map((role) => rgba(shade(role), 0.8));
+    const lead = result.cipv?.id ?? null,
+      loose = KIND_ROLES.map((role) => rgba(shade(role), 0.8));
     const owned = [rgba(shade("cluster")), ...result.objects.map((item) => rgba(shade(roleOf(item, lead))))];
     return (i) => (kind[i] === CLUSTER ? owned[owner[i]] : loose[kind[i]]);
   },
@@ -57,12 +80,20 @@ const MODES = {
     return (i) => RANGE_RAMP[level(Math.sqrt(xyz[3 * i] ** 2 + xyz[3 * i + 1] ** 2) / perStep)];
   },
   height({ xyz, display }) {
-    const [low, high] = HEIGHT_M, floor = groundOf(display.ground);
-    return (i) => RAMP[level((xyz[3 * i + 2] / 100 - floor(xyz[3 * i] / 100, xyz[3 * i + 1] / 100) - low) / (high - low))];
+    const [low, high] = HEIGHT_M,
+      floor = groundOf(display.ground);
+    return (i) =>
+      RAMP[level((xyz[3 * i + 2] / 100 - floor(xyz[3 * i] / 100, xyz[3 * i + 1] / 100) - low) / (high - low))];
   },
-  intensity: ({ intensity }) => (i) => RAMP[level(Math.sqrt(intensity[i] / 255))],
+  intensity:
+    ({ intensity }) =>
+    (i) =>
+      RAMP[level(Math.sqrt(intensity[i] / 255))],
   ring({ ring }) {
-    const most = Math.max(1, ring.reduce((a, b) => Math.max(a, b), 0));
+    const most = Math.max(
+      1,
+      ring.reduce((a, b) => Math.max(a, b), 0),
+    );
     return (i) => RAMP[level(ring[i] / most)];
   },
   cluster({ kind, owner, result }, shade) {
@@ -71,7 +102,9 @@ const MODES = {
     return (i) => (kind[i] === CLUSTER ? owned[owner[i]] : loose[kind[i]]);
   },
   ground({ kind }, shade) {
-    const road = rgba(shade("path")), rest = rgba(shade("cluster")), dropped = rgba(shade("dropped"), 0.8);
+    const road = rgba(shade("path")),
+      rest = rgba(shade("cluster")),
+      dropped = rgba(shade("dropped"), 0.8);
     return (i) => (kind[i] === GROUND ? road : kind[i] === 3 ? dropped : rest);
   },
   age({ age }, shade) {
@@ -103,7 +136,8 @@ function packed([r, g, b]) {
 /** @param {number[][]} stops @param {number} count */
 function ramp(stops, count) {
   return Array.from({ length: count }, (_, i) => {
-    const at = (i / (count - 1)) * (stops.length - 1), low = Math.min(Math.floor(at), stops.length - 2);
+    const at = (i / (count - 1)) * (stops.length - 1),
+      low = Math.min(Math.floor(at), stops.length - 2);
     return packed(stops[low].map((c, k) => Math.round(c + (stops[low + 1][k] - c) * (at - low))));
   });
 }

@@ -38,7 +38,8 @@ export class Surface {
   /** The context, in CSS pixels, with nothing drawn. */
   begin() {
     this.ratio = window.devicePixelRatio || 1;
-    const width = Math.round(this.width * this.ratio), height = Math.round(this.height * this.ratio);
+    const width = Math.round(this.width * this.ratio),
+      height = Math.round(this.height * this.ratio);
     if (this.#canvas.width !== width || this.#canvas.height !== height) {
       this.#canvas.width = width;
       this.#canvas.height = height;

@@ -19,12 +19,18 @@ export class Labels {
    * @param {string} words @param {number} x @param {number} y @param {string} tint @param {Weight} [weight]
    */
   put(words, x, y, tint, weight = "weak") {
-    const { ctx } = this, strong = weight === "strong";
+    const { ctx } = this,
+      strong = weight === "strong";
     const h = strong ? HEIGHT + 4 : HEIGHT;
     ctx.font = `${strong ? "700 13px" : "600 11px"} system-ui, "DejaVu Sans", sans-serif`;
     const w = ctx.measureText(words).width + 10;
     const right = this.width - w - 2;
-    const at = { x: Math.max(2, Math.min(x, right)), y: Math.max(this.top + 2, Math.min(y - h - 1, this.bottom - h - 2)), w, h };
+    const at = {
+      x: Math.max(2, Math.min(x, right)),
+      y: Math.max(this.top + 2, Math.min(y - h - 1, this.bottom - h - 2)),
+      w,
+      h,
+    };
     for (let tries = 0; this.#overlaps(at); tries++) {
       if (tries === 3 && weight === "weak") return;
       if (tries === 12) break;

@@ -1,12 +1,15 @@
 /** Where each object was, relative to us, over the last seconds. */
 import { get, on } from "../../core/store.js";
 
-const KEPT_S = 3, JUMP_S = 1;
+const KEPT_S = 3,
+  JUMP_S = 1;
 
 /** @typedef {import("../../core/types.js").Point2} Point2 */
 /** @type {Map<number, {t: number, at: Point2}[]>} */
 const trails = new Map();
-let uri = "", shownAt = 0, sequence = -1;
+let uri = "",
+  shownAt = 0,
+  sequence = -1;
 
 export function setUp() {
   on(["frame"], remember);
@@ -23,7 +26,8 @@ function remember() {
   [uri, shownAt, sequence] = [frame.state.uri ?? "", t, frame.state.sequence];
   for (const { id, bev } of frame.result.objects) {
     if (!bev) continue;
-    const trail = trails.get(id) ?? [], last = trail.at(-1);
+    const trail = trails.get(id) ?? [],
+      last = trail.at(-1);
     if (last?.t === t) trail.pop();
     trail.push({ t, at: middle(bev) });
     trails.set(id, trail);
@@ -35,4 +39,7 @@ function remember() {
 }
 
 /** @param {Point2[]} corners @returns {Point2} */
-export const middle = (corners) => [corners.reduce((sum, [x]) => sum + x, 0) / corners.length, corners.reduce((sum, [, y]) => sum + y, 0) / corners.length];
+export const middle = (corners) => [
+  corners.reduce((sum, [x]) => sum + x, 0) / corners.length,
+  corners.reduce((sum, [, y]) => sum + y, 0) / corners.length,
+];

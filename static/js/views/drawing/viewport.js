@@ -107,13 +107,15 @@ export class Viewport {
     /** @type {{u: number, v: number, x: number, y: number, place: Place, drag: Drag|null, moved: boolean}|null} */
     let start = null;
     this.#canvas.addEventListener("pointerdown", (event) => {
-      const { offsetX: u, offsetY: v } = event, place = this.place(u, v);
+      const { offsetX: u, offsetY: v } = event,
+        place = this.place(u, v);
       start = { u, v, x: this.x, y: this.y, place, drag: this.#hand.takes(place, event), moved: false };
       this.#canvas.setPointerCapture(event.pointerId);
     });
     this.#canvas.addEventListener("pointermove", (event) => {
       if (!start) return;
-      const du = event.offsetX - start.u, dv = event.offsetY - start.v;
+      const du = event.offsetX - start.u,
+        dv = event.offsetY - start.v;
       start.moved ||= Math.hypot(du, dv) >= DRAG_FROM_PX;
       if (!start.moved) return;
       if (start.drag) return start.drag.moved(this.place(event.offsetX, event.offsetY));

@@ -7,8 +7,11 @@ import { chosen } from "./clip.js";
 /** @typedef {import("../drive/types.js").Job} Job */
 
 const KINDS = [
-  ["mcap", "MCAP", "what the sensors gave and what the line made of it"], ["rrd", "rerun .rrd", "for the rerun viewer"],
-  ["mp4", "MP4", "the camera with overlay"], ["csv", "CSV", "one row a frame"], ["html", "HTML report", "one page"],
+  ["mcap", "MCAP", "what the sensors gave and what the line made of it"],
+  ["rrd", "rerun .rrd", "for the rerun viewer"],
+  ["mp4", "MP4", "the camera with overlay"],
+  ["csv", "CSV", "one row a frame"],
+  ["html", "HTML report", "one page"],
 ];
 const POLL_MS = 300;
 
@@ -27,9 +30,22 @@ export function setUp() {
 
 function fill() {
   const { first, last } = chosen();
-  const kinds = KINDS.map(([kind, label, words]) => el("button", { type: "button", class: "item", onclick: () => begin(kind) }, el("b", { textContent: label }), el("span", { class: "facts", textContent: ` ${words}` })));
+  const kinds = KINDS.map(([kind, label, words]) =>
+    el(
+      "button",
+      { type: "button", class: "item", onclick: () => begin(kind) },
+      el("b", { textContent: label }),
+      el("span", { class: "facts", textContent: ` ${words}` }),
+    ),
+  );
   const complaint = problem ? [el("p", { class: "params-error", textContent: problem })] : [];
-  return [el("h3", { textContent: `Export frames ${first + 1} to ${last + 1}` }), ...kinds, ...complaint, ...(jobs.length ? [el("h3", { textContent: "Files" })] : []), ...jobs.map(row)];
+  return [
+    el("h3", { textContent: `Export frames ${first + 1} to ${last + 1}` }),
+    ...kinds,
+    ...complaint,
+    ...(jobs.length ? [el("h3", { textContent: "Files" })] : []),
+    ...jobs.map(row),
+  ];
 }
 
 /** @param {string} kind */
@@ -53,7 +69,13 @@ async function look() {
 /** @param {Job} job */
 function row(job) {
   const words = job.file ?? `${job.kind} ${job.first + 1}–${job.last + 1}`;
-  const drop = el("button", { type: "button", class: "drop", textContent: "✕", aria: { label: `Forget ${words}` }, onclick: () => request(`api/jobs/${job.id}`, "DELETE").then(look, look) });
+  const drop = el("button", {
+    type: "button",
+    class: "drop",
+    textContent: "✕",
+    aria: { label: `Forget ${words}` },
+    onclick: () => request(`api/jobs/${job.id}`, "DELETE").then(look, look),
+  });
   return el("div", { class: "menu-row job" }, job.state === "done" ? download(job, words) : progress(job, words), drop);
 }
 
@@ -61,7 +83,12 @@ function row(job) {
 function download(job, words) {
   const link = el("a", { href: `api/jobs/${job.id}/file`, textContent: words });
   link.setAttribute("download", job.file ?? "");
-  return el("span", { class: "grow-1" }, link, el("span", { class: "facts", textContent: job.bytes === null ? "" : ` ${size(job.bytes)}` }));
+  return el(
+    "span",
+    { class: "grow-1" },
+    link,
+    el("span", { class: "facts", textContent: job.bytes === null ? "" : ` ${size(job.bytes)}` }),
+  );
 }
 
 /** @param {Job} job @param {string} words */
@@ -69,7 +96,13 @@ function progress(job, words) {
   const isOver = job.state === "failed" || job.state === "cancelled";
   const state = isOver ? `${job.state}${job.note ? `: ${job.note}` : ""}` : job.note;
   const bar = el("progress", { max: 1, value: job.progress, aria: { label: words } });
-  return el("span", { class: "grow-1" }, words, el("span", { class: isOver ? "params-error" : "facts", textContent: ` ${state}` }), isOver ? null : bar);
+  return el(
+    "span",
+    { class: "grow-1" },
+    words,
+    el("span", { class: isOver ? "params-error" : "facts", textContent: ` ${state}` }),
+    isOver ? null : bar,
+  );
 }
 
 /** @param {number} bytes */

@@ -5,7 +5,7 @@ import { seekTo } from "../drive/seek.js";
 import { clock } from "../core/format.js";
 import { refused } from "../panels/notices.js";
 import { get, on, paint, set } from "../core/store.js";
-import { nameOf, tintOf } from "./flags.js";
+import { nameOf, tintOf } from "./lanes/flags.js";
 
 /** @typedef {import("../drive/types.js").DriveEvent} DriveEvent */
 
@@ -45,12 +45,29 @@ function nothing() {
 
 /** @param {DriveEvent} event */
 function rowOf(event) {
-  const go = el("button", { type: "button", class: "event", title: event.text, style: { "--flag": tintOf(event) }, onclick: () => jump(event) },
-    el("i"), el("span", { class: "when", textContent: clock(event.t_s) }), el("b", { textContent: nameOf(event) }), el("span", { class: "what", textContent: event.text }));
+  const go = el(
+    "button",
+    {
+      type: "button",
+      class: "event",
+      title: event.text,
+      style: { "--flag": tintOf(event) },
+      onclick: () => jump(event),
+    },
+    el("i"),
+    el("span", { class: "when", textContent: clock(event.t_s) }),
+    el("b", { textContent: nameOf(event) }),
+    el("span", { class: "what", textContent: event.text }),
+  );
   go.disabled = get("state")?.live === true; // there is no way back
   if (event.mark === null) return go;
-  const remove = el("button", { type: "button", class: "drop", textContent: "✕", aria: { label: `Remove the mark at ${clock(event.t_s)}` },
-    onclick: () => request(`api/marks/${event.mark}`, "DELETE").catch(refused) });
+  const remove = el("button", {
+    type: "button",
+    class: "drop",
+    textContent: "✕",
+    aria: { label: `Remove the mark at ${clock(event.t_s)}` },
+    onclick: () => request(`api/marks/${event.mark}`, "DELETE").catch(refused),
+  });
   return el("div", { class: "event-row" }, go, remove);
 }
 
@@ -61,7 +78,8 @@ function jump({ index, ids }) {
 }
 
 function reflect() {
-  const state = get("state"), index = state?.live ? null : state?.index;
+  const state = get("state"),
+    index = state?.live ? null : state?.index;
   for (const { event, row } of rows) {
     const isHere = event.index === index;
     if (row.classList.contains("is-here") === isHere) continue;

@@ -1,12 +1,14 @@
 /** The ribbon: who was the CIPV at each frame. Coloured by id; hatched by which sensors it was made of. */
+import { ui } from "../../core/colors.js";
+import { get } from "../../core/store.js";
 
-/** @typedef {import("../drive/types.js").Series} Series */
-/** @typedef {import("./span.js").Span} Span */
-/** @typedef {{top: number, height: number}} Row */
+/** @typedef {import("../../drive/types.js").Series} Series */
+/** @typedef {import("../span.js").Span} Span */
 /** @typedef {{first: number, end: number, id: number|null, source: string|null, carried: boolean}} Stretch */
 
 /** Degrees of hue from one lead to the next: the golden angle keeps the first dozens apart. */
-const HUE_STEP = 137.508, FIRST_HUE = 190;
+const HUE_STEP = 137.508,
+  FIRST_HUE = 190;
 const HATCH_PX = 6;
 /** Narrower stretches get no number. */
 const NUMBER_FROM_PX = 24;
@@ -36,7 +38,9 @@ export function stretches({ done, columns }) {
   /** @type {Stretch[]} */
   const found = [];
   for (let i = 0; i < done; i++) {
-    const id = columns.cipv_id[i], source = columns.source[i], carried = columns.carried[i] === true;
+    const id = columns.cipv_id[i],
+      source = columns.source[i],
+      carried = columns.carried[i] === true;
     const last = found.at(-1);
     if (last && last.id === id && last.source === source && last.carried === carried) last.end = i + 1;
     else found.push({ first: i, end: i + 1, id, source, carried });
@@ -44,23 +48,24 @@ export function stretches({ done, columns }) {
   return found;
 }
 
-/**
- * @param {CanvasRenderingContext2D} ctx @param {Series} series @param {Span} span @param {Row} row
- * @param {{isLight: boolean, empty: string, chosen: number|null, ring: string}} look
- */
-export function drawRibbon(ctx, series, span, row, look) {
-  ctx.fillStyle = look.empty;
+/** @typedef {{isLight: boolean, chosen: number|null, ring: string}} Look */
+
+/** @param {CanvasRenderingContext2D} ctx @param {Series} series @param {import("./registry.js").Place} place */
+export function drawRibbon(ctx, series, { span, row, isLight }) {
+  const look = { isLight, chosen: get("selection"), ring: ui("text") };
+  ctx.fillStyle = ui("raised");
   ctx.fillRect(span.left, row.top, span.width, row.height);
   for (const stretch of stretches(series)) {
     if (stretch.id === null || stretch.end <= span.first || stretch.first >= span.end) continue;
-    const x = Math.max(span.left, span.x(stretch.first)), width = Math.max(1, Math.min(span.left + span.width, span.x(stretch.end)) - x);
+    const x = Math.max(span.left, span.x(stretch.first)),
+      width = Math.max(1, Math.min(span.left + span.width, span.x(stretch.end)) - x);
     drawStretch(ctx, { ...stretch, id: stretch.id }, { x, width, ...row }, look);
   }
 }
 
 /**
  * @param {CanvasRenderingContext2D} ctx @param {{id: number, source: string|null, carried: boolean}} stretch
- * @param {{x: number, width: number, top: number, height: number}} box @param {{isLight: boolean, chosen: number|null, ring: string}} look
+ * @param {{x: number, width: number, top: number, height: number}} box @param {Look} look
  */
 function drawStretch(ctx, { id, source, carried }, box, look) {
   ctx.globalAlpha = carried ? 0.4 : 1;
