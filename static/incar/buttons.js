@@ -33,7 +33,10 @@ function markMoment() {
   ask(request("api/marks", "POST", { text: "" }), marked, "Not marked");
 }
 
-/** Live sensors count no frames that anybody could go to: their marks are kept by time. @param {{index: number, t_s: number, in_session: boolean}} made */
+/**
+ * Live sensors count no frames that anybody could go to: their marks are kept by time.
+ * @param {{index: number, t_s: number, in_session: boolean}} made
+ */
 function marked({ index, t_s, in_session }) {
   if (!get("state")?.live) return `Marked, frame ${index + 1}`;
   return `Marked at ${clock(t_s)}${in_session ? "" : ", not recorded"}`;

@@ -1,4 +1,6 @@
-/** The road ahead from above: our path, vehicles, the one ahead, and whatever ACC reacts to, at the edge when beyond it. */
+/**
+ * The road ahead from above: our path, vehicles, the one ahead, and whatever ACC reacts to, at the edge when beyond it.
+ */
 import { color } from "../js/core/colors.js";
 import { $ } from "../js/core/dom.js";
 import { drawOutline, drawPath } from "../js/views/drawing/plan.js";
@@ -71,7 +73,12 @@ function drawRings(ctx, view) {
   }
 }
 
-/** A ring large enough to be seen; a dot at the edge for what lies beyond it. @param {CanvasRenderingContext2D} ctx @param {number} u @param {number} v */
+/**
+ * A ring large enough to be seen; a dot at the edge for what lies beyond it.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {number} u
+ * @param {number} v
+ */
 function drawMarker(ctx, u, v) {
   const x = Math.max(EDGE_PX, Math.min(surface.width - EDGE_PX, u)),
     y = Math.max(EDGE_PX, Math.min(surface.height - EDGE_PX, v));

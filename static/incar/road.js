@@ -66,7 +66,12 @@ function sayNoPicture(ctx) {
   ctx.textAlign = "start";
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {Frame} frame @param {(u: number) => number} X @param {(v: number) => number} Y */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Frame} frame
+ * @param {(u: number) => number} X
+ * @param {(v: number) => number} Y
+ */
 function drawObjects(ctx, { result, display }, X, Y) {
   const lead = result.cipv?.id ?? null,
     acted = reactsTo(result),
@@ -93,7 +98,13 @@ function drawObjects(ctx, { result, display }, X, Y) {
   }
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {string} words @param {number} x @param {number} y of its lower left corner @param {string} tint */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {string} words
+ * @param {number} x
+ * @param {number} y of its lower left corner
+ * @param {string} tint
+ */
 function drawTag(ctx, words, x, y, tint) {
   ctx.font = `700 ${TAG_PX}px system-ui, "DejaVu Sans", sans-serif`;
   const width = ctx.measureText(words).width + 16,

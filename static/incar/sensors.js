@@ -26,7 +26,10 @@ function update() {
     streams = get("state")?.streams ?? {};
   if (!frame) return;
   const { sensors, ego } = frame.result;
-  /** What the frame has of each; an age alone does not tell, a recording may know no times. @type {Record<string, boolean>} */
+  /**
+   * What the frame has of each; an age alone does not tell, a recording may know no times.
+   * @type {Record<string, boolean>}
+   */
   const held = { lidar: Boolean(sensors.lidar?.points), camera: frame.picture !== null, ego: ego !== null };
   const keys = Object.keys(NAMES).filter((key) => key in held || key in streams);
   keyed(
@@ -38,7 +41,12 @@ function update() {
   );
 }
 
-/** @param {string} key @param {boolean} isHeld by the frame @param {Record<string, any>|undefined} stream @returns {Sensor} */
+/**
+ * @param {string} key
+ * @param {boolean} isHeld by the frame
+ * @param {Record<string, any>|undefined} stream
+ * @returns {Sensor}
+ */
 function look(key, isHeld, stream) {
   if (stream) {
     /** @type {Health} */

@@ -1,7 +1,7 @@
 /**
- * Alignment mode: LiDAR and picture are laid over each other by hand. Dragging shifts the cloud, the wheel scales it, and
- * every move is a change of the alignment's parameters: the server projects, as always. What fits automatically belongs
- * beside the score, in the bar.
+ * Alignment mode: LiDAR and picture are laid over each other by hand. Dragging shifts the cloud, the wheel scales it,
+ * and every move is a change of the alignment's parameters: the server projects, as always. What fits automatically
+ * belongs beside the score, in the bar.
  */
 import { newestOnly, request } from "../core/api.js";
 import { $, el, press, text } from "../core/dom.js";

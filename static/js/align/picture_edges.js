@@ -12,7 +12,11 @@ const canvas = document.createElement("canvas");
 const ctx = context(canvas, { willReadFrequently: true });
 let known = "";
 
-/** @param {CanvasRenderingContext2D} target @param {Frame} frame @param {{x: number, y: number, scale: number}} place */
+/**
+ * @param {CanvasRenderingContext2D} target
+ * @param {Frame} frame
+ * @param {{x: number, y: number, scale: number}} place
+ */
 export function drawEdges(target, frame, place) {
   const { bitmap, picture, state } = frame;
   if (!bitmap || !picture) return;

@@ -7,7 +7,9 @@ const RETRY_MS = [300, 600, 1200, 2500, 5000];
 /** The server makes pictures in steps of this width (app/streaming/picture.py): within one there is nothing to tell. */
 const WIDTH_STEP_PX = 160;
 
-/** Nothing at all for this long, not even an answer to a ping: the connection is gone, whatever the system still says. */
+/**
+ * Nothing at all for this long, not even an answer to a ping: the connection is gone, whatever the system still says.
+ */
 const SILENT_MS = 3 * PING_MS;
 
 /** Server clock minus ours, milliseconds; null until it has told. @type {number|null} */
@@ -43,7 +45,10 @@ export function showPictureAt(width) {
   if (steps > 0) tell("picture_px", steps * WIDTH_STEP_PX);
 }
 
-/** @typedef {number|boolean|null|{track: number, frame: number, cuboid: import("../labeling/state/types.js").Cuboid}} Told */
+/**
+ * @typedef {number|boolean|null|{track: number, frame: number, cuboid: import("../labeling/state/types.js").Cuboid}}
+ *   Told
+ */
 
 /** Let the server know something about this page, now and after every reconnection; once for each value.
  * @param {string} name @param {Told} value */
@@ -95,7 +100,12 @@ export function connect() {
   };
 }
 
-/** @typedef {{type: string, state: import("./types.js").State, id: number|null, ping: number, server_unix_ms: number} & import("../labeling/views/three.js").Dragged} Message */
+/**
+ * @typedef
+ *   {{type: string, state: import("./types.js").State, id: number|null, ping: number, server_unix_ms: number} &
+ *   import("../labeling/views/three.js").Dragged}
+ *   Message
+ */
 /** @param {Message} message @param {number} number */
 function onText(message, number) {
   if (message.type === "state") {

@@ -41,7 +41,11 @@ export function el(tag, props = {}, ...children) {
   return node;
 }
 
-/** Set text only when it differs: the table asks for this hundreds of times a second. @param {Node} node @param {string} value */
+/**
+ * Set text only when it differs: the table asks for this hundreds of times a second.
+ * @param {Node} node
+ * @param {string} value
+ */
 export function text(node, value) {
   if (node.textContent !== value) node.textContent = value;
 }
@@ -55,11 +59,15 @@ export function mark(node, name, value) {
 const kept = new WeakMap();
 
 /**
- * Children of `parent`, one an item, in the items' order. A child is made once and changed after that, so that it is not
- * replaced under a finger while frames go by.
- * @template T @template {HTMLElement} N
- * @param {HTMLElement} parent @param {T[]} items @param {(item: T) => string} keyOf
- * @param {(item: T) => N} create @param {(node: N, item: T) => void} update
+ * Children of `parent`, one an item, in the items' order. A child is made once and changed after that, so that it is
+ * not replaced under a finger while frames go by.
+ * @template T
+ * @template {HTMLElement} N
+ * @param {HTMLElement} parent
+ * @param {T[]} items
+ * @param {(item: T) => string} keyOf
+ * @param {(item: T) => N} create
+ * @param {(node: N, item: T) => void} update
  */
 export function keyed(parent, items, keyOf, create, update) {
   const before = kept.get(parent) ?? new Map(),
@@ -80,7 +88,11 @@ export function press(button, pressed) {
   button.setAttribute("aria-pressed", String(pressed));
 }
 
-/** The element a listener was called for, when it is inside one that matches. @param {Event} event @param {string} selector */
+/**
+ * The element a listener was called for, when it is inside one that matches.
+ * @param {Event} event
+ * @param {string} selector
+ */
 export function within(event, selector) {
   return event.target instanceof Element ? /** @type {HTMLElement|null} */ (event.target.closest(selector)) : null;
 }

@@ -5,9 +5,9 @@ import { mark } from "./dom.js";
 const REST_AFTER_MS = 300;
 
 /**
- * Rows in their items' order. A row belongs to a place: it is made once and says another item when the order changes, which
- * costs less than moving it. Rows in sight do so at once, the others when the list has not changed for a while; until then
- * the list is `aria-busy`. Each row's `data-id` is its item's, always.
+ * Rows in their items' order. A row belongs to a place: it is made once and says another item when the order changes,
+ * which costs less than moving it. Rows in sight do so at once, the others when the list has not changed for a while;
+ * until then the list is `aria-busy`. Each row's `data-id` is its item's, always.
  * @template T
  */
 export class LongList {
@@ -50,7 +50,11 @@ export class LongList {
     if (this.#tellBusy()) this.#rest = setTimeout(() => this.#renewAll(), REST_AFTER_MS);
   }
 
-  /** The row of the item with a key; null where there is none. @param {string|number} key @returns {HTMLElement|null} */
+  /**
+   * The row of the item with a key; null where there is none.
+   * @param {string|number} key
+   * @returns {HTMLElement|null}
+   */
   rowOf(key) {
     const place = this.#items.findIndex((item) => this.#keyOf(item) === key);
     return this.#rows[place]?.node ?? null;

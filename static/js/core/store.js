@@ -5,37 +5,43 @@
  * @typedef {object} Values
  * @property {import("./types.js").State} state
  * @property {import("./types.js").Frame} frame
- * @property {number} selection  id of the object selected everywhere
+ * @property {number} selection id of the object selected everywhere
  * @property {Record<string, boolean>} layers
  * @property {Record<"camera"|"plan", import("../views/drawing/point_colors.js").ColorBy>} colorBy
- * @property {boolean} taping  whether a drag measures
- * @property {import("../views/measuring_tape.js").Tape} tape  what was measured
+ * @property {boolean} taping whether a drag measures
+ * @property {import("../views/measuring_tape.js").Tape} tape what was measured
  * @property {{status: "live"|"lost", since: number}} link
  * @property {import("./types.js").ParamsAnswer} params
  * @property {string} theme
- * @property {import("../drive/types.js").Drive} drive  the whole recording, as the timeline shows it
- * @property {import("../drive/types.js").ObjectCurve} curve  the selected object over the recording
- * @property {number} scrub  the frame asked for and not shown yet
- * @property {{first: number, last: number}} clip  what is marked for export
+ * @property {import("../drive/types.js").Drive} drive the whole recording, as the timeline shows it
+ * @property {import("../drive/types.js").ObjectCurve} curve the selected object over the recording
+ * @property {number} scrub the frame asked for and not shown yet
+ * @property {{first: number, last: number}} clip what is marked for export
  * @property {import("../workspace/panes.js").Layout} layout
- * @property {{on: boolean, blend: number, edges: boolean}} align  alignment mode
- * @property {number} lanes  how many lanes the timeline has
- * @property {Labeling} labeling  the mode in which people label
+ * @property {{on: boolean, blend: number, edges: boolean}} align alignment mode
+ * @property {number} lanes how many lanes the timeline has
+ * @property {Labeling} labeling the mode in which people label
  * @property {import("../labeling/state/labels.js").Labels} labels
- * @property {number} labelFrames  grows when what is labelled in some frames has come
- * @property {number} track  id of the selected label
- * @property {import("../labeling/state/draft.js").Draft} draft  a label under a hand, or on its way to the server
- * @property {import("../labeling/state/marked_frames.js").Marked} marked  the frames that a lead is painted over
- * @property {import("../labeling/acts/range_ends.js").Trimmed} trimmed  a lead range whose end is under a hand
+ * @property {number} labelFrames grows when what is labelled in some frames has come
+ * @property {number} track id of the selected label
+ * @property {import("../labeling/state/draft.js").Draft} draft a label under a hand, or on its way to the server
+ * @property {import("../labeling/state/marked_frames.js").Marked} marked the frames that a lead is painted over
+ * @property {import("../labeling/acts/range_ends.js").Trimmed} trimmed a lead range whose end is under a hand
  * @property {import("../labeling/acts/queue.js").Saving} saving
- * @property {import("../labeling/views/three.js").Dragged} dragged  the selected label under a hand in the 3D view
- * @property {string} person  who labels, once it was said here
+ * @property {import("../labeling/views/three.js").Dragged} dragged the selected label under a hand in the 3D view
+ * @property {string} person who labels, once it was said here
  * @property {import("../labeling/state/undo_state.js").Steps} steps
- * @property {string} said  what the labeling mode has to say
+ * @property {string} said what the labeling mode has to say
  * @property {import("../labeling/views/projection.js").Projected} projected
- * @property {{left: import("./types.js").Point2[], right: import("./types.js").Point2[]}} drawnPath  a path under a hand
+ * @property {{left: import("./types.js").Point2[], right: import("./types.js").Point2[]}} drawnPath a path under a hand
  */
-/** @typedef {{on: boolean, tool: null|"new"|"shape"|"merge"|"path", from: number|null, hasObjects: boolean, review: boolean, item: {kind: import("../labeling/state/types.js").ItemKind, id: number}|null}} Labeling  tool: what the next drag or click does; from: the track that is merged with another; hasObjects: whether the pipeline's objects are drawn; review: whether others' labels are looked through; item: which one now */
+/**
+ * @typedef
+ *   {{on: boolean, tool: null|"new"|"shape"|"merge"|"path", from: number|null, hasObjects: boolean, review: boolean,
+ *   item: {kind: import("../labeling/state/types.js").ItemKind, id: number}|null}}
+ *   Labeling tool: what the next drag or click does; from: the track that is merged with another; hasObjects: whether
+ *   the pipeline's objects are drawn; review: whether others' labels are looked through; item: which one now
+ */
 /** @typedef {keyof Values} Key */
 
 /** @type {Partial<Values>} */
@@ -76,9 +82,10 @@ export function paint(keys, draw) {
 }
 
 /**
- * Like `paint`, one painted frame later: for what many words say, as a table does. Having those laid out takes longer than
- * the views take to draw, and nobody reads that fast. While a drive plays, with everything else.
- * @param {Key[]} keys @param {() => void} draw
+ * Like `paint`, one painted frame later: for what many words say, as a table does. Having those laid out takes longer
+ * than the views take to draw, and nobody reads that fast. While a drive plays, with everything else.
+ * @param {Key[]} keys
+ * @param {() => void} draw
  */
 export function paintAfter(keys, draw) {
   const invalidate = () => {

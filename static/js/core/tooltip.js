@@ -1,4 +1,7 @@
-/** One tooltip for the page: help that appears on hover and on keyboard focus, and what lies under the pointer in a view. */
+/**
+ * One tooltip for the page: help that appears on hover and on keyboard focus, and what lies under the pointer in a
+ * view.
+ */
 import { $ } from "./dom.js";
 
 const GAP_PX = 6,

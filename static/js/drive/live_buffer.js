@@ -40,7 +40,10 @@ let uri = null;
 /** @type {number[]} */
 let times = [];
 let columns = empty();
-/** @type {DriveEvent[]} another array only when there are other marks: their index goes on changing with the frames let go of */
+/**
+ * @type {DriveEvent[]} another array only when there are other marks: their index goes on changing with the frames let
+ *   go of
+ */
 let marks = [];
 let known = "";
 

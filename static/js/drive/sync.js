@@ -57,7 +57,9 @@ async function fetchAll() {
 
 /**
  * What is held of a run, and what the server has beyond it.
- * @param {number} run @param {string} path @returns {Promise<[Series, number[]]>} the series, and the frames' times where they came
+ * @param {number} run
+ * @param {string} path
+ * @returns {Promise<[Series, number[]]>} the series, and the frames' times where they came
  */
 async function fetchSeries(run, path) {
   const from = held[run]?.done ?? 0;
@@ -78,7 +80,13 @@ function extended({ run, columns }, more) {
   return { run, done: more.done, columns: Object.fromEntries(joined) };
 }
 
-/** Events, and how the two runs differ. @param {Drive|null} before @param {Series} now @param {Series|null} base @returns {Promise<Findings>} */
+/**
+ * Events, and how the two runs differ.
+ * @param {Drive|null} before
+ * @param {Series} now
+ * @param {Series|null} base
+ * @returns {Promise<Findings>}
+ */
 async function findings(before, now, base) {
   const isSame = before?.now?.run === now.run && before.base?.run === base?.run;
   if (isSame && get("state")?.drive.running && performance.now() - foundAt_ms < FINDINGS_PAUSE_MS) return before;

@@ -19,11 +19,23 @@ import { grow, nextTab, toggle, toggleInspector, toggleTab } from "../workspace/
 import { share } from "../workspace/share_link.js";
 import { toggleTheme } from "../workspace/theme.js";
 
-/** keys: as `nameOf` in keyboard.js gives them; isOn: when it counts, of several of one key the first that does. A binding without words is said by another one.
- * @typedef {{keys: string[], shown: string, words: string, act: () => unknown, isOn?: () => boolean}} Binding */
-/** mode: whose keys they are; they go before the page's own while it is on. @typedef {{title: string, mode?: string, bindings: Binding[]}} Group */
+/**
+ * keys: as `nameOf` in keyboard.js gives them; isOn: when it counts, of several of one key the first that does. A
+ * binding without words is said by another one.
+ * @typedef {{keys: string[], shown: string, words: string, act: () => unknown, isOn?: () => boolean}} Binding
+ */
+/**
+ * mode: whose keys they are; they go before the page's own while it is on.
+ * @typedef {{title: string, mode?: string, bindings: Binding[]}} Group
+ */
 
-/** @param {string} keys one or more, apart by spaces @param {string} shown @param {string} words @param {() => void} act @returns {Binding} */
+/**
+ * @param {string} keys one or more, apart by spaces
+ * @param {string} shown
+ * @param {string} words
+ * @param {() => void} act
+ * @returns {Binding}
+ */
 const key = (keys, shown, words, act) => ({ keys: keys.split(" "), shown, words, act });
 const last = () => Math.max(0, (get("state")?.count ?? 1) - 1);
 

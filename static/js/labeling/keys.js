@@ -10,23 +10,42 @@ import * as span from "./state/marked_frames.js";
 import { toggleWhole } from "./acts/tags.js";
 
 /** @typedef {import("../keys/keymap.js").Binding} Binding */
-/** `brief`: the words of the strip below the timeline; what has none is only in the help. @typedef {Binding & {brief?: string}} LabelBinding */
+/**
+ * `brief`: the words of the strip below the timeline; what has none is only in the help.
+ * @typedef {Binding & {brief?: string}} LabelBinding
+ */
 
 const STEP_M = 0.1,
   FAR_M = 1,
   TURN_DEG = 1,
   FAR_DEG = 10;
 
-/** @param {string} keys @param {string} shown @param {string} words @param {() => unknown} act @param {string} [brief] @returns {LabelBinding} */
+/**
+ * @param {string} keys
+ * @param {string} shown
+ * @param {string} words
+ * @param {() => unknown} act
+ * @param {string} [brief]
+ * @returns {LabelBinding}
+ */
 const key = (keys, shown, words, act, brief) => ({ keys: keys.split(" "), shown, words, act, brief, isOn });
 
-/** Arrows move the selected cuboid; with none they go through the frames, as without the mode. @param {LabelBinding} binding @returns {LabelBinding} */
+/**
+ * Arrows move the selected cuboid; with none they go through the frames, as without the mode.
+ * @param {LabelBinding} binding
+ * @returns {LabelBinding}
+ */
 const selected = (binding) => ({
   ...binding,
   isOn: () => isOn() && get("track") !== null && !["shape", "path"].includes(get("labeling")?.tool ?? ""),
 });
 
-/** While something is to be drawn. @param {import("../core/store.js").Labeling["tool"]} tool @param {LabelBinding} binding @returns {LabelBinding} */
+/**
+ * While something is to be drawn.
+ * @param {import("../core/store.js").Labeling["tool"]} tool
+ * @param {LabelBinding} binding
+ * @returns {LabelBinding}
+ */
 const during = (tool, binding) => ({ ...binding, isOn: () => isOn() && get("labeling")?.tool === tool });
 
 /** While others' labels are looked through. @param {LabelBinding} binding @returns {LabelBinding} */
@@ -35,7 +54,13 @@ const reviewing = (binding) => ({ ...binding, isOn: review.isReviewing });
 /** After which keys the arrows are a tool's. */
 const BEGINS = { shape: "Shift G", path: "Shift P" };
 
-/** The four arrows, each alone and with Shift. @param {"shape"|"path"} tool @param {string} words @param {(right: number, up: number, isShift: boolean) => unknown} act @returns {LabelBinding[]} */
+/**
+ * The four arrows, each alone and with Shift.
+ * @param {"shape"|"path"} tool
+ * @param {string} words
+ * @param {(right: number, up: number, isShift: boolean) => unknown} act
+ * @returns {LabelBinding[]}
+ */
 const arrows = (tool, words, act) =>
   /** @type {[string, number, number][]} */ ([
     ["Left", -1, 0],
@@ -55,7 +80,14 @@ const arrows = (tool, words, act) =>
     ),
   ]);
 
-/** A pair of keys, the second with Shift for the other direction. @param {string} letter @param {string} words @param {(direction: 1|-1) => unknown} act @param {string} [brief] @returns {LabelBinding[]} */
+/**
+ * A pair of keys, the second with Shift for the other direction.
+ * @param {string} letter
+ * @param {string} words
+ * @param {(direction: 1|-1) => unknown} act
+ * @param {string} [brief]
+ * @returns {LabelBinding[]}
+ */
 const pair = (letter, words, act, brief) => [
   key(letter.toLowerCase(), letter, words, () => act(1), brief),
   key(`Shift+${letter}`, `Shift ${letter}`, `${words}, backwards`, () => act(-1)),

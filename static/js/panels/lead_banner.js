@@ -1,4 +1,6 @@
-/** The answer, large: which vehicle, how far, how fast the gap shrinks, how long that lasts, and what ACC makes of it. */
+/**
+ * The answer, large: which vehicle, how far, how fast the gap shrinks, how long that lasts, and what ACC makes of it.
+ */
 import { get, on } from "../core/store.js";
 import { $, el, mark, text } from "../core/dom.js";
 import { DASH, kmh, num, signed, ttc as ttcWords } from "../core/format.js";

@@ -10,7 +10,11 @@ const JUDGES = {
   simulator: "the simulator's truth",
 };
 
-/** @param {Pick<import("../drive/types.js").Comparison, "metrics"|"truth"|"judged">} comparison @param {boolean} [isAlone] there is nothing to compare with: one column @returns {HTMLElement} */
+/**
+ * @param {Pick<import("../drive/types.js").Comparison, "metrics"|"truth"|"judged">} comparison
+ * @param {boolean} [isAlone] there is nothing to compare with: one column
+ * @returns {HTMLElement}
+ */
 export function metricsTable({ metrics, truth, judged }, isAlone = false) {
   const judge = truth
     ? `Judged in ${judged} ${judged === 1 ? "frame" : "frames"} against ${JUDGES[truth]}`

@@ -18,8 +18,11 @@ export function setUp() {
   setInterval(update, 1000);
 }
 
-/** Say what the server refused of what a hand asked for. That it cannot be reached at all is said for as long as it holds.
- * @param {unknown} error */
+/**
+ * Say what the server refused of what a hand asked for. That it cannot be reached at all is said for as long as it
+ * holds.
+ * @param {unknown} error
+ */
 export function refused(error) {
   if (!(error instanceof Refused)) return;
   refusal = { words: error.message, until: Date.now() + REFUSAL_MS };

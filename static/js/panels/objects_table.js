@@ -100,7 +100,11 @@ export function setUp() {
   reflectSort();
 }
 
-/** m/s towards us along the line to its nearest point, as the banner shows it. @param {FusedObject} o @returns {number | null} */
+/**
+ * m/s towards us along the line to its nearest point, as the banner shows it.
+ * @param {FusedObject} o
+ * @returns {number | null}
+ */
 function closing(o) {
   if (!o.velocity_mps || !o.closest_point || !o.distance_m) return null;
   return -(o.closest_point[0] * o.velocity_mps[0] + o.closest_point[1] * o.velocity_mps[1]) / o.distance_m;
@@ -158,7 +162,11 @@ function update() {
   text($("#object-facts"), `${objects.length}: ${count("VL")} VL · ${count("V")} V · ${count("L")} L`);
 }
 
-/** The CIPV, then what is in the path, then what a camera sees, then the rest; nearer first among equals. @param {FusedObject} item @param {number|undefined} lead */
+/**
+ * The CIPV, then what is in the path, then what a camera sees, then the rest; nearer first among equals.
+ * @param {FusedObject} item
+ * @param {number|undefined} lead
+ */
 function relevance(item, lead) {
   const group = item.id === lead ? 0 : item.in_path ? 1 : item.source !== "L" && !item.carried ? 2 : 3;
   return group * 1000 + Math.min(item.distance_m ?? 999, 999);

@@ -7,7 +7,10 @@ const AROUND = 2;
 
 /** @typedef {import("../core/types.js").Param} Param */
 /** @typedef {import("../core/types.js").ParamValue} ParamValue */
-/** `isFinal` is false while a slider is being dragged. @typedef {(value: ParamValue, isFinal: boolean) => void} Change */
+/**
+ * `isFinal` is false while a slider is being dragged.
+ * @typedef {(value: ParamValue, isFinal: boolean) => void} Change
+ */
 /** @typedef {{node: HTMLElement, show: (value: any, effective: number|null) => void}} Input */
 
 /**
@@ -55,7 +58,12 @@ export function control(name, param, change) {
   return {
     node,
     help: param.help,
-    /** @param {ParamValue} value @param {ParamValue} preset @param {number|null} effective what null stands for @param {boolean} idle */
+    /**
+     * @param {ParamValue} value
+     * @param {ParamValue} preset
+     * @param {number|null} effective what null stands for
+     * @param {boolean} idle
+     */
     show(value, preset, effective, idle) {
       base = preset;
       const now = JSON.stringify([value, preset, effective, idle]);

@@ -1,4 +1,6 @@
-/** Undo and redo: one history of labels, parameters and calibration. It is the server's; a person takes back their own. */
+/**
+ * Undo and redo: one history of labels, parameters and calibration. It is the server's; a person takes back their own.
+ */
 import { $ } from "../core/dom.js";
 import { move } from "../labeling/acts/queue.js";
 import { settled } from "./params.js";
@@ -14,7 +16,9 @@ export function setUp() {
 export const undo = () => settled().then(() => move("undo")); // not before the change that it is to take back
 export const redo = () => settled().then(() => move("redo"));
 
-/** What this person can take back or do again: of labels and parameters together, where the recording can be labelled. */
+/**
+ * What this person can take back or do again: of labels and parameters together, where the recording can be labelled.
+ */
 export const possible = () => (get("state")?.labels ? get("steps") : get("params"));
 
 function reflect() {

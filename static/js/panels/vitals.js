@@ -1,4 +1,6 @@
-/** How fresh and how fast: from result made to painted, frames painted a second, what the stages took, what was skipped. */
+/**
+ * How fresh and how fast: from result made to painted, frames painted a second, what the stages took, what was skipped.
+ */
 import { serverNow } from "../core/connection.js";
 import { $, el, text } from "../core/dom.js";
 import { num } from "../core/format.js";

@@ -1,5 +1,7 @@
-/** Why the selected object, or else the CIPV, is what it is. For the CIPV: how all candidates rank. For another: the one
- * gate that stopped it. */
+/**
+ * Why the selected object, or else the CIPV, is what it is. For the CIPV: how all candidates rank. For another: the one
+ * gate that stopped it.
+ */
 import { cipvId } from "../core/colors.js";
 import { $, el, keyed, mark, text, within } from "../core/dom.js";
 import { DASH, num } from "../core/format.js";
@@ -84,7 +86,13 @@ function hideObject(hidden) {
   for (const node of [number.parentElement, verdict, gates]) if (node) node.hidden = hidden;
 }
 
-/** The reason, with the number and limit of the gate that stopped it. @param {Result} result @param {Ranked|undefined} ranked @param {number} id @param {boolean} isLead */
+/**
+ * The reason, with the number and limit of the gate that stopped it.
+ * @param {Result} result
+ * @param {Ranked|undefined} ranked
+ * @param {number} id
+ * @param {boolean} isLead
+ */
 function sentence({ cipv, rejected }, ranked, id, isLead) {
   if (isLead) return cipv?.reason ?? "";
   const reason = ranked?.reason ?? rejected.find((each) => each.id === id)?.reason ?? "";
@@ -92,7 +100,10 @@ function sentence({ cipv, rejected }, ranked, id, isLead) {
   return `Not the CIPV: ${reason}${measured(ranked)}.`;
 }
 
-/** @param {Ranked} ranked @returns {string} " (off the path's middle 2.31 m, limit 1.5 m)"; empty where the reason has the number */
+/**
+ * @param {Ranked} ranked
+ * @returns {string} " (off the path's middle 2.31 m, limit 1.5 m)"; empty where the reason has the number
+ */
 function measured({ stopped_by, value, limit }) {
   const kind = kindOf(stopped_by ?? "");
   if (value === null || limit === null || kind.test !== "most") return "";

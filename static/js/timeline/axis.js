@@ -37,7 +37,12 @@ export function drawAxis(ctx, size, span, rows) {
   }
 }
 
-/** Which part of the recording is shown, unless it is all of it. @param {CanvasRenderingContext2D} ctx @param {Span} span @param {Rows} rows */
+/**
+ * Which part of the recording is shown, unless it is all of it.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Span} span
+ * @param {Rows} rows
+ */
 export function drawBar(ctx, span, { bar }) {
   if (span.isWhole) return;
   ctx.fillStyle = ui("raised");

@@ -5,12 +5,23 @@ import { num, ttc } from "../core/format.js";
 /** @typedef {import("../drive/types.js").Columns} Columns */
 /** @typedef {import("./span.js").Span} Span */
 /** @typedef {{top: number, height: number}} Row */
-/** @typedef {{key: keyof Columns, unit: string, label: string, title: string, factor: number, low: number, high: number,
- *   most?: number, digits: number, words?: (value: number) => string, role: string, also?: keyof Columns, isArea?: boolean, limit?: number}} Curve */
+/**
+ * @typedef
+ *   {{key: keyof Columns, unit: string, label: string, title: string, factor: number, low: number, high: number,
+ *   most?: number, digits: number, words?: (value: number) => string, role: string, also?: keyof Columns, isArea?:
+ *   boolean, limit?: number}}
+ *   Curve
+ */
 
-/** The pixel column that a line is in: the rows it covers there, and where it stands. @typedef {{x: number, top: number, bottom: number, last: number}} Column */
+/**
+ * The pixel column that a line is in: the rows it covers there, and where it stands.
+ * @typedef {{x: number, top: number, bottom: number, last: number}} Column
+ */
 
-/** low and high: what the scale reaches at least; most: what is higher is drawn there. words: how its value is said, else with so many digits. also: a second, fainter line. */
+/**
+ * low and high: what the scale reaches at least; most: what is higher is drawn there. words: how its value is said,
+ * else with so many digits. also: a second, fainter line.
+ */
 export const CURVES = /** @type {Curve[]} */ ([
   {
     key: "distance_m",
@@ -127,8 +138,10 @@ export function scaleOf({ low, high, most, factor }, lines) {
  * frames share a pixel column, the line covers their whole range once, so that an hour costs no more than a minute.
  * @param {CanvasRenderingContext2D} ctx
  * @param {(i: number) => number|null} value of the i-th sample, in the curve's unit
- * @param {{count: number, index: (i: number) => number, joined: (i: number) => boolean}} samples `joined`: sample i goes on from i − 1
- * @param {Span} span @param {(value: number) => number} y
+ * @param {{count: number, index: (i: number) => number, joined: (i: number) => boolean}} samples `joined`: sample i
+ *   goes on from i − 1
+ * @param {Span} span
+ * @param {(value: number) => number} y
  */
 export function traceLine(ctx, value, samples, span, y) {
   ctx.beginPath();
@@ -167,7 +180,12 @@ export function traceLine(ctx, value, samples, span, y) {
   end();
 }
 
-/** @param {Row} row @param {{low: number, high: number}} scale @param {number} [most] @returns {(value: number) => number} */
+/**
+ * @param {Row} row
+ * @param {{low: number, high: number}} scale
+ * @param {number} [most]
+ * @returns {(value: number) => number}
+ */
 export function yOf({ top, height }, { low, high }, most = Infinity) {
   const room = height - 6;
   return (value) => top + 3 + room - ((Math.min(value, most) - low) / (high - low || 1)) * room;

@@ -17,7 +17,11 @@ const placer = (span, rows, isLight) => {
 
 /**
  * What stays while the cursor moves: axis and lanes. Drawn when data change.
- * @param {CanvasRenderingContext2D} ctx @param {Size} size @param {Span} span @param {Rows} rows @param {boolean} isLight
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Size} size
+ * @param {Span} span
+ * @param {Rows} rows
+ * @param {boolean} isLight
  */
 export function drawBack(ctx, size, span, rows, isLight) {
   const drive = get("drive"),
@@ -46,7 +50,13 @@ export function drawFront(ctx, size, span, rows, hover, isLight) {
   if (hover !== null && hover !== here()) drawLine(ctx, span, hover, rows.axis.height, size.height);
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {Span} span @param {number} index @param {number} top @param {number} bottom */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Span} span
+ * @param {number} index
+ * @param {number} top
+ * @param {number} bottom
+ */
 function drawLine(ctx, span, index, top, bottom) {
   const x = Math.round(span.middle(index));
   if (!span.holds(x)) return;
@@ -54,7 +64,13 @@ function drawLine(ctx, span, index, top, bottom) {
   ctx.fillRect(x - 0.5, top, 1.5, bottom - top);
 }
 
-/** What is outside the marked clip is dimmed. @param {CanvasRenderingContext2D} ctx @param {{height: number}} size @param {Span} span @param {Rows} rows */
+/**
+ * What is outside the marked clip is dimmed.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {{height: number}} size
+ * @param {Span} span
+ * @param {Rows} rows
+ */
 function drawClip(ctx, { height }, span, rows) {
   const clip = get("clip");
   if (!clip) return;

@@ -1,5 +1,7 @@
-/** The timeline: the whole recording at a glance. What changes at different times is drawn apart: the recording, what a hand put
- * onto it, and what moves with the frame. */
+/**
+ * The timeline: the whole recording at a glance. What changes at different times is drawn apart: the recording, what a
+ * hand put onto it, and what moves with the frame.
+ */
 import { ui } from "../core/colors.js";
 import { $, el, press, text } from "../core/dom.js";
 import { here } from "../drive/seek.js";
@@ -91,7 +93,9 @@ function chip(curve) {
   return button;
 }
 
-/** As last drawn: the values ask ten times a second, and asking the page for sizes and styles makes it lay itself out. */
+/**
+ * As last drawn: the values ask ten times a second, and asking the page for sizes and styles makes it lay itself out.
+ */
 let shared = shareOut(0, []);
 let isLight = false;
 const rows = () => shared;

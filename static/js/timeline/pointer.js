@@ -10,7 +10,10 @@ const CLICK_PX = 4;
 const ZOOM_PER_PX = 0.0018;
 const GRAB_PX = 8;
 
-/** What a drag does on the way, and when it ends: by the hand that lets go, or because something else took over. @typedef {((x: number, dx: number) => void) & {ended?: (isKept: boolean) => void}} Act */
+/**
+ * What a drag does on the way, and when it ends: by the hand that lets go, or because something else took over.
+ * @typedef {((x: number, dx: number) => void) & {ended?: (isKept: boolean) => void}} Act
+ */
 /**
  * @typedef {object} Hand
  * @property {Span} span
@@ -105,7 +108,10 @@ function onWheel({ span, zoomed }, event) {
 }
 
 /**
- * @param {Hand} hand @param {{x: number, y: number}[]} fingers both, after the move @param {{x: number}} was @param {{x: number, y: number}} now the one that moved
+ * @param {Hand} hand
+ * @param {{x: number, y: number}[]} fingers both, after the move
+ * @param {{x: number}} was
+ * @param {{x: number, y: number}} now the one that moved
  */
 function pinch({ span, zoomed }, fingers, was, now) {
   const other = fingers.find(({ x }) => x !== now.x) ?? now;

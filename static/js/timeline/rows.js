@@ -9,9 +9,11 @@ const AXIS_PX = 15,
   GAP_PX = 4;
 
 /**
- * Lanes of height 0 are left out. Growing lanes share the height that is left; the last ones are left out when each would
- * get less than its least height.
- * @param {number} height @param {Lane[]} lanes @returns {Rows}
+ * Lanes of height 0 are left out. Growing lanes share the height that is left; the last ones are left out when each
+ * would get less than its least height.
+ * @param {number} height
+ * @param {Lane[]} lanes
+ * @returns {Rows}
  */
 export function shareOut(height, lanes) {
   let top = 0;

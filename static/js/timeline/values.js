@@ -1,5 +1,8 @@
-/** What of the timeline moves with the frame: the names of its rows with the values at a frame, and the cursor. They are small
- * and apart from the rest, so that ten times a second little is drawn and nothing large is put on the screen again. */
+/**
+ * What of the timeline moves with the frame: the names of its rows with the values at a frame, and the cursor. They are
+ * small and apart from the rest, so that ten times a second little is drawn and nothing large is put on the screen
+ * again.
+ */
 import { ui } from "../core/colors.js";
 
 /** @typedef {import("./rows.js").Rows} Rows */
@@ -22,7 +25,12 @@ export function drawValues(ctx, rows, index, isLight, edge) {
   ctx.textBaseline = "alphabetic";
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {import("./lanes/registry.js").Label} said @param {import("./rows.js").Row} row @param {number} edge */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {import("./lanes/registry.js").Label} said
+ * @param {import("./rows.js").Row} row
+ * @param {number} edge
+ */
 function label(ctx, { name, value, tint }, row, edge) {
   const y = row.top + row.height / 2;
   ctx.fillStyle = ui("dim");
@@ -35,7 +43,12 @@ function label(ctx, { name, value, tint }, row, edge) {
   ctx.fillText(value, edge - 8, y);
 }
 
-/** Put the cursor onto a frame; out of sight when that is not shown. @param {HTMLElement} cursor @param {import("./span.js").Span} span @param {number} index */
+/**
+ * Put the cursor onto a frame; out of sight when that is not shown.
+ * @param {HTMLElement} cursor
+ * @param {import("./span.js").Span} span
+ * @param {number} index
+ */
 export function moveCursor(cursor, span, index) {
   const x = Math.round(span.middle(index));
   cursor.hidden = !span.holds(x);

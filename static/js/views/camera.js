@@ -31,7 +31,11 @@ let laid = { x: 0, y: 0, scale: 1 };
 /** Under the points and boxes, and over them. @type {{under: Layer[], over: Layer[]}} */
 const extra = { under: [], over: [] };
 
-/** Have something drawn over the picture. @param {Layer} draw @param {keyof typeof extra} [where] of points and boxes */
+/**
+ * Have something drawn over the picture.
+ * @param {Layer} draw
+ * @param {keyof typeof extra} [where] of points and boxes
+ */
 export function addLayer(draw, where = "under") {
   extra[where].push(draw);
 }
@@ -183,7 +187,11 @@ function message(ctx, words) {
   ctx.textAlign = "start";
 }
 
-/** The smallest box under a pixel of the canvas, else the owner of the nearest point. @param {number} px @param {number} py */
+/**
+ * The smallest box under a pixel of the canvas, else the owner of the nearest point.
+ * @param {number} px
+ * @param {number} py
+ */
 function objectAt(px, py) {
   const frame = get("frame");
   if (!frame) return null;
@@ -203,7 +211,13 @@ function objectAt(px, py) {
   );
 }
 
-/** @param {Frame} frame @param {number} u @param {number} v @param {number} reach pixels of the canvas @param {(i: number) => boolean} [counts] */
+/**
+ * @param {Frame} frame
+ * @param {number} u
+ * @param {number} v
+ * @param {number} reach pixels of the canvas
+ * @param {(i: number) => boolean} [counts]
+ */
 function pointAt({ count, uv }, u, v, reach, counts = () => true) {
   return nearestPoint(
     count,

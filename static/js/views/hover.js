@@ -4,7 +4,8 @@ import { get } from "../core/store.js";
 import { hideTip, tipAt } from "../core/tooltip.js";
 
 /**
- * @param {HTMLCanvasElement} canvas @param {(u: number, v: number) => number|null} objectAt its id, by a pixel of the canvas
+ * @param {HTMLCanvasElement} canvas
+ * @param {(u: number, v: number) => number|null} objectAt its id, by a pixel of the canvas
  * @param {(u: number, v: number) => string} [cursorAt] the pointer's look where there is no object
  */
 export function followHover(canvas, objectAt, cursorAt = () => "") {

@@ -2,7 +2,10 @@
 import { num } from "../core/format.js";
 import { get, set } from "../core/store.js";
 
-/** @typedef {{x: number, y: number, z: number|null, u: number|null, v: number|null}} Spot  ego metres; pixels of the picture where it was set there */
+/**
+ * @typedef {{x: number, y: number, z: number|null, u: number|null, v: number|null}} Spot ego metres; pixels of the
+ *   picture where it was set there
+ */
 /** @typedef {{from: Spot, to: Spot, frame: number}} Tape */
 
 const TINT = "#ffd84d";

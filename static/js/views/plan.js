@@ -29,9 +29,14 @@ const raster = new DotRaster();
 let surface;
 /** @type {Viewport} */
 let view;
-/** A mode that lays its own drawing over the plan, and whose hand goes first.
- * @typedef {{isOn: () => boolean, draw: (ctx: CanvasRenderingContext2D, view: Viewport, labels: Labels) => void,
- *   takes: (from: Place, scale: number) => Drag|null, clicked: (place: Place) => void, cursorAt: (place: Place, scale: number) => string}} PlanMode */
+/**
+ * A mode that lays its own drawing over the plan, and whose hand goes first.
+ * @typedef
+ *   {{isOn: () => boolean, draw: (ctx: CanvasRenderingContext2D, view: Viewport, labels: Labels) => void, takes:
+ *   (from: Place, scale: number) => Drag|null, clicked: (place: Place) => void, cursorAt: (place: Place, scale:
+ *   number) => string}}
+ *   PlanMode
+ */
 /** @type {PlanMode|null} */
 let mode = null;
 
@@ -144,7 +149,11 @@ function drawGrid(ctx) {
   ctx.setLineDash([]);
 }
 
-/** Ground and loose points first, clusters larger and over them. @param {CanvasRenderingContext2D} ctx @param {Frame} frame */
+/**
+ * Ground and loose points first, clusters larger and over them.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Frame} frame
+ */
 function drawPoints(ctx, frame) {
   const { count, xyz, kind } = frame,
     colors = tints(frame, get("colorBy")?.plan ?? "object", color, 0.55);
@@ -159,7 +168,10 @@ function drawPoints(ctx, frame) {
   raster.drawOn(ctx);
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {{left: import("../core/types.js").Point2[], right: import("../core/types.js").Point2[]}} lanes */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {{left: import("../core/types.js").Point2[], right: import("../core/types.js").Point2[]}} lanes
+ */
 function drawLanes(ctx, lanes) {
   ctx.strokeStyle = color("lane");
   ctx.lineWidth = 2;
@@ -169,7 +181,12 @@ function drawLanes(ctx, lanes) {
   }
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {Frame} frame @param {Record<string, boolean>} layers @param {Labels} labels */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Frame} frame
+ * @param {Record<string, boolean>} layers
+ * @param {Labels} labels
+ */
 function drawObjects(ctx, frame, layers, labels) {
   const { result } = frame,
     lead = result.cipv?.id ?? null,
@@ -218,7 +235,10 @@ function drawEgo(ctx) {
   ctx.globalAlpha = 1;
 }
 
-/** The object whose footprint or point is nearest to a place, within a few pixels. @param {{x: number, y: number}} place */
+/**
+ * The object whose footprint or point is nearest to a place, within a few pixels.
+ * @param {{x: number, y: number}} place
+ */
 function objectAt({ x, y }) {
   const frame = get("frame");
   if (!frame) return null;

@@ -7,7 +7,10 @@ import { get } from "../core/store.js";
 /** A pane narrower than this shows one view at a time below the camera. */
 const NARROW_PX = 900;
 
-/** @param {HTMLElement} body the pane that the viewer is put into, once there is one; a press of its button opens it anew */
+/**
+ * @param {HTMLElement} body the pane that the viewer is put into, once there is one; a press of its button opens it
+ *   anew
+ */
 export async function showRerun(body) {
   if (!body.querySelector("iframe")) await load(body);
 }

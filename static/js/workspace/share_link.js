@@ -102,8 +102,10 @@ function begin() {
 }
 
 /**
- * A link may come from anywhere, a hostile page too: what it would change for others happens only when a person says so.
- * @param {Shared} shared @param {boolean} [agreed]
+ * A link may come from anywhere, a hostile page too: what it would change for others happens only when a person says
+ * so.
+ * @param {Shared} shared
+ * @param {boolean} [agreed]
  */
 async function apply(shared, agreed = false) {
   const { uri } = shared;

@@ -98,7 +98,11 @@ export const keyframe = () =>
     draft.release();
   });
 
-/** @param {number} id @param {number} frame @returns {Promise<Pick<import("../state/types.js").LabelSighting, "cuboid"|"bbox">|null>} */
+/**
+ * @param {number} id
+ * @param {number} frame
+ * @returns {Promise<Pick<import("../state/types.js").LabelSighting, "cuboid"|"bbox">|null>}
+ */
 async function nearestShape(id, frame) {
   /** @type {{sightings: (import("../state/types.js").LabelSighting & {frame: number})[]}} */
   const { sightings } = await request(`api/labels/tracks/${id}`).catch(() => ({ sightings: [] }));
@@ -151,7 +155,12 @@ export function addEvent(event) {
   return act({ kind: "add_event", frame: shown(), event, tracks: typeof track === "number" ? [track] : [] });
 }
 
-/** Go where there is something to do; where that is one label, it is selected, and the next are first the others of its frame. @param {Wanted} what @param {1|-1} direction */
+/**
+ * Go where there is something to do; where that is one label, it is selected, and the next are first the others of its
+ * frame.
+ * @param {Wanted} what
+ * @param {1|-1} direction
+ */
 export async function goTo(what, direction) {
   const isOfLabels = what === "proposed" || what === "sent_back",
     track = get("track");
@@ -168,6 +177,13 @@ export async function goTo(what, direction) {
   say(found.why);
 }
 
-/** Where there is something to do beyond a frame. @param {Wanted} what @param {number} frame @param {1|-1} direction @param {string} [more] of the query @returns {Promise<import("../state/types.js").Found|Error>} */
+/**
+ * Where there is something to do beyond a frame.
+ * @param {Wanted} what
+ * @param {number} frame
+ * @param {1|-1} direction
+ * @param {string} [more] of the query
+ * @returns {Promise<import("../state/types.js").Found|Error>}
+ */
 export const ahead = (what, frame, direction, more = "") =>
   request(`api/labels/next?what=${what}&frame=${frame}&direction=${direction}${more}`).catch((error) => error);

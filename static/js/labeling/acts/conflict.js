@@ -8,8 +8,11 @@ import { based } from "./revisions.js";
 
 /**
  * The act to send instead, based on what the other person left; null to let theirs stand.
- * @param {Act} act @param {string} sentence what the server says @param {{kind: import("../state/types.js").ItemKind, id: number}} item which they changed
- * @param {any} theirs the item as it is now @returns {Promise<Act|null>}
+ * @param {Act} act
+ * @param {string} sentence what the server says
+ * @param {{kind: import("../state/types.js").ItemKind, id: number}} item which they changed
+ * @param {any} theirs the item as it is now
+ * @returns {Promise<Act|null>}
  */
 export async function choose(act, sentence, item, theirs) {
   const place =
@@ -34,7 +37,12 @@ export async function choose(act, sentence, item, theirs) {
   ]);
 }
 
-/** Where the server has a track now. @param {number} track @param {number} frame @returns {Promise<import("../state/types.js").LabelSighting|null>} */
+/**
+ * Where the server has a track now.
+ * @param {number} track
+ * @param {number} frame
+ * @returns {Promise<import("../state/types.js").LabelSighting|null>}
+ */
 async function placeOf(track, frame) {
   /** @type {import("../state/types.js").SightingsAnswer} */
   const { sightings } = await request(`api/labels/frames?first=${frame}&last=${frame}`).catch(() => ({

@@ -96,7 +96,12 @@ function middleBox() {
   return [u - half, v - half, u + half, v + half];
 }
 
-/** Move the box of the selected label, or with `isSize` its right and lower side. @param {number} du @param {number} dv steps @param {boolean} isSize */
+/**
+ * Move the box of the selected label, or with `isSize` its right and lower side.
+ * @param {number} du
+ * @param {number} dv steps
+ * @param {boolean} isSize
+ */
 export function changeBox(du, dv, isSize) {
   const track = chosen(),
     step = (pictureWidth() ?? 0) * STEP_SHARE;
@@ -118,7 +123,11 @@ function drawnMiddle() {
   return Array.from({ length: Math.floor(last / STEP_M) + 1 }, (_, i) => [i * STEP_M, lateral(line, i * STEP_M)]);
 }
 
-/** Bend the path's far end aside, or with `isWhole` move all of it; to the left is positive. @param {number} steps @param {boolean} isWhole */
+/**
+ * Bend the path's far end aside, or with `isWhole` move all of it; to the left is positive.
+ * @param {number} steps
+ * @param {boolean} isWhole
+ */
 export function bendPath(steps, isWhole) {
   const middle = drawnMiddle(),
     length = middle[middle.length - 1][0] || 1;

@@ -13,8 +13,14 @@ import { driveNow } from "../state/undo_state.js";
 
 /** @typedef {import("../state/types.js").Act} Act */
 /** @typedef {import("../state/types.js").ActAnswer} ActAnswer */
-/** at_ms: when the server last said that something is on disk; problem: why the next is not. @typedef {{state: "saved"|"saving"|"failed", at_ms: number|null, problem: string}} Saving */
-/** What is sent. drive: null where nothing can be labelled. @typedef {{person: string, drive: string|null, act_id: string, act?: Act}} Body */
+/**
+ * at_ms: when the server last said that something is on disk; problem: why the next is not.
+ * @typedef {{state: "saved"|"saving"|"failed", at_ms: number|null, problem: string}} Saving
+ */
+/**
+ * What is sent. drive: null where nothing can be labelled.
+ * @typedef {{person: string, drive: string|null, act_id: string, act?: Act}} Body
+ */
 /** @typedef {{act: Act, path: string, body: Body, done: (answer: ActAnswer|null) => void}} Waiting */
 
 /** Of a server that is not there now, or of what stands before it: it may be sent once more. */
@@ -40,7 +46,10 @@ export async function act(act) {
   return person === null ? null : put(act, "api/labels/act", person);
 }
 
-/** The last act of this person taken back, or done again. Who has no name yet changed parameters alone. @param {"undo"|"redo"} direction */
+/**
+ * The last act of this person taken back, or done again. Who has no name yet changed parameters alone.
+ * @param {"undo"|"redo"} direction
+ */
 export const move = (direction) => put({ kind: direction }, `api/labels/${direction}`, knownName());
 
 /** @param {Act} act @param {string} path @param {string} person @returns {Promise<ActAnswer|null>} */
@@ -109,7 +118,11 @@ export function discard() {
   data.look();
 }
 
-/** The server will not do it: of two people's changes the person here chooses, of all else it is said why. @param {Waiting} waiting @param {Refused} refusal */
+/**
+ * The server will not do it: of two people's changes the person here chooses, of all else it is said why.
+ * @param {Waiting} waiting
+ * @param {Refused} refusal
+ */
 async function refused(waiting, refusal) {
   const { detail, item, theirs } = refusal.answer ?? {};
   data.look(); // this page may have been behind, or the server half way through
@@ -125,7 +138,11 @@ async function refused(waiting, refusal) {
 /** @param {Saving["state"]} state */
 const tell = (state, problem = "") => set("saving", { state, at_ms: savedAt_ms, problem });
 
-/** What has only begun (proposals, imports) and what changed nothing is not said to be saved. @param {Waiting} waiting @param {ActAnswer} answer */
+/**
+ * What has only begun (proposals, imports) and what changed nothing is not said to be saved.
+ * @param {Waiting} waiting
+ * @param {ActAnswer} answer
+ */
 function settle({ act, done }, answer) {
   if (answer.act != null) savedAt_ms = Date.now();
   tell("saved");

@@ -1,6 +1,6 @@
 /**
- * The ends of lead ranges: dragged on the timeline, or brought to the shown frame by a key. Where two ranges touch there is
- * one end, and whichever way it goes, one of them grows into the other.
+ * The ends of lead ranges: dragged on the timeline, or brought to the shown frame by a key. Where two ranges touch
+ * there is one end, and whichever way it goes, one of them grows into the other.
  */
 import { seekTo } from "../../drive/seek.js";
 import { get, set } from "../../core/store.js";
@@ -8,7 +8,10 @@ import { act } from "./queue.js";
 import { shown } from "../state/labels.js";
 
 /** @typedef {import("../state/types.js").LeadRange} LeadRange */
-/** `at`: a border between frames, the number of the frame after it. @typedef {{at: number, before: LeadRange|null, after: LeadRange|null}} End */
+/**
+ * `at`: a border between frames, the number of the frame after it.
+ * @typedef {{at: number, before: LeadRange|null, after: LeadRange|null}} End
+ */
 /** A range as it is to be. @typedef {{range: LeadRange, first: number, last: number}} Trimmed */
 
 const GRAB_PX = 6;
@@ -41,7 +44,12 @@ export function endAt(span, x) {
   return Math.abs(span.x(end.at) - x) <= Math.min(GRAB_PX, width / 4) ? end : null;
 }
 
-/** What becomes of it at another border: the range is never shorter than a frame. @param {End} end @param {number} to @returns {Trimmed|null} null where nothing changes */
+/**
+ * What becomes of it at another border: the range is never shorter than a frame.
+ * @param {End} end
+ * @param {number} to
+ * @returns {Trimmed|null} null where nothing changes
+ */
 export function trimmed({ at, before, after }, to) {
   const range = after && (to < at || !before) ? after : before;
   if (!range || to === at) return null;
@@ -49,8 +57,13 @@ export function trimmed({ at, before, after }, to) {
   return { range, first: range.first, last: Math.max(to - 1, range.first) };
 }
 
-/** A drag from an end: the timeline shows what it would become, until the hand lets go. Who lets go of it (Escape) meanwhile leaves all as it was.
- * @param {import("../../timeline/span.js").Span} span @param {End} end @returns {import("../../timeline/pointer.js").Act} */
+/**
+ * A drag from an end: the timeline shows what it would become, until the hand lets go. Who lets go of it (Escape)
+ * meanwhile leaves all as it was.
+ * @param {import("../../timeline/span.js").Span} span
+ * @param {End} end
+ * @returns {import("../../timeline/pointer.js").Act}
+ */
 export function dragEnd(span, end) {
   /** @type {Trimmed|null} */
   let held = null;
@@ -81,7 +94,10 @@ async function keep(held) {
   if (get("trimmed") === held) set("trimmed", null);
 }
 
-/** The nearest beginning, or end, of a range comes to the shown frame. @param {"after"|"before"} side of the border that the range is on */
+/**
+ * The nearest beginning, or end, of a range comes to the shown frame.
+ * @param {"after"|"before"} side of the border that the range is on
+ */
 export function bringHere(side) {
   const to = side === "after" ? shown() : shown() + 1;
   const end = nearest(

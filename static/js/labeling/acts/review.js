@@ -12,7 +12,10 @@ import { chosen, leadAt, leadName, nameOf, shown } from "../state/labels.js";
 import { setItem, setReview } from "../state/mode.js";
 import { knownName } from "../state/person.js";
 
-/** What is judged, by which name, and why it was sent back before. @typedef {{ref: import("../state/types.js").ItemRef, name: string, comment: string}} Target */
+/**
+ * What is judged, by which name, and why it was sent back before.
+ * @typedef {{ref: import("../state/types.js").ItemRef, name: string, comment: string}} Target
+ */
 
 export const isReviewing = () => get("labeling")?.on === true && get("labeling")?.review === true;
 
@@ -33,7 +36,13 @@ export async function nextUnreviewed(direction) {
   await step(get("scrub") ?? shown(), direction, after, true);
 }
 
-/** @param {number} frame @param {1|-1} direction @param {string} after @param {boolean} [isLast] whether it is said when there is none @returns {Promise<boolean>} */
+/**
+ * @param {number} frame
+ * @param {1|-1} direction
+ * @param {string} after
+ * @param {boolean} [isLast] whether it is said when there is none
+ * @returns {Promise<boolean>}
+ */
 async function step(frame, direction, after, isLast = false) {
   const found = await ahead(
     "unreviewed",
@@ -61,7 +70,10 @@ async function step(frame, direction, after, isLast = false) {
   return true;
 }
 
-/** What is reviewed now: the selected track, else what the review has come to, else who leads here. @returns {Target|null} */
+/**
+ * What is reviewed now: the selected track, else what the review has come to, else who leads here.
+ * @returns {Target|null}
+ */
 export function target() {
   const track = chosen(),
     labels = get("labels"),

@@ -24,7 +24,12 @@ export function refsOf(act) {
   return [...one, ...range, ...two, ...(act.items ?? [])];
 }
 
-/** The act, based on other revisions of its items. @param {Act} act @param {(ref: ItemRef) => number} revisionOf @returns {Act} */
+/**
+ * The act, based on other revisions of its items.
+ * @param {Act} act
+ * @param {(ref: ItemRef) => number} revisionOf
+ * @returns {Act}
+ */
 export function based(act, revisionOf) {
   /** @type {Act} */
   const copy = { ...act };

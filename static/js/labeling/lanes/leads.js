@@ -1,4 +1,7 @@
-/** The labelled lead of each frame. A drag along it marks frames, or moves the end of a range; a click selects the track. */
+/**
+ * The labelled lead of each frame. A drag along it marks frames, or moves the end of a range; a click selects the
+ * track.
+ */
 import { ui } from "../../core/colors.js";
 import { DASH } from "../../core/format.js";
 import { get, set } from "../../core/store.js";
@@ -60,7 +63,12 @@ function leadSelected() {
   return track !== null;
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {LeadRange} range @param {{x: number, width: number, top: number, height: number}} box @param {boolean} isLight */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {LeadRange} range
+ * @param {{x: number, width: number, top: number, height: number}} box
+ * @param {boolean} isLight
+ */
 function drawRange(ctx, { lead, state }, box, isLight) {
   const tint = typeof lead === "number" ? colorOf(lead, isLight) : ui("dim");
   ctx.fillStyle = ctx.strokeStyle = tint;
@@ -78,14 +86,24 @@ function drawRange(ctx, { lead, state }, box, isLight) {
   ctx.textBaseline = "alphabetic";
 }
 
-/** Nobody has looked at it yet. @param {CanvasRenderingContext2D} ctx @param {{x: number, width: number, top: number, height: number}} box */
+/**
+ * Nobody has looked at it yet.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {{x: number, width: number, top: number, height: number}} box
+ */
 function hatch(ctx, { x, width, top, height }) {
   ctx.fillStyle = ui("warn");
   for (let at = x; at < x + width; at += HATCH_PX)
     ctx.fillRect(at, top + height - 2, Math.min(HATCH_PX - 2, x + width - at), 2);
 }
 
-/** A range whose end is under a hand, as it would be; what it leaves is empty. @param {CanvasRenderingContext2D} ctx @param {Span} span @param {Row} row @param {boolean} isLight */
+/**
+ * A range whose end is under a hand, as it would be; what it leaves is empty.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Span} span
+ * @param {Row} row
+ * @param {boolean} isLight
+ */
 function drawTrimmed(ctx, span, row, isLight) {
   const held = get("trimmed");
   if (!held) return;

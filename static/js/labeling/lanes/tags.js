@@ -25,7 +25,11 @@ const tagLane = (place) => ({
 export const tags = Array.from({ length: MOST_LANES }, (_, place) => tagLane(place));
 export const topTagKey = tags[0].key;
 
-/** What stands in each row of tags: a word, and in the last all that have no room; where there are none yet, a row to mark frames in. @returns {{name: string, words: string[]}[]} */
+/**
+ * What stands in each row of tags: a word, and in the last all that have no room; where there are none yet, a row to
+ * mark frames in.
+ * @returns {{name: string, words: string[]}[]}
+ */
 function contents() {
   const words = saidTags(),
     rest = words.slice(MOST_LANES - 1);

@@ -1,4 +1,7 @@
-/** Labels as files: export with what a format cannot hold said by name, import, the truth that came with the recording, and versions. */
+/**
+ * Labels as files: export with what a format cannot hold said by name, import, the truth that came with the recording,
+ * and versions.
+ */
 import { Refused, request } from "../../core/api.js";
 import { el, text } from "../../core/dom.js";
 import { get } from "../../core/store.js";

@@ -1,4 +1,7 @@
-/** What is said of the shown frame as a whole: events, tags, the path where the pipeline's is wrong; and what was done to each. */
+/**
+ * What is said of the shown frame as a whole: events, tags, the path where the pipeline's is wrong; and what was done
+ * to each.
+ */
 import { el, keyed, press, text } from "../../core/dom.js";
 import { seekTo } from "../../drive/seek.js";
 import { get, paint } from "../../core/store.js";
@@ -135,7 +138,11 @@ function show() {
 
 /** @typedef {{kind: import("../state/types.js").ItemKind, id: number, revision: number, words: string}} Dated */
 
-/** Who leads, path, events and tags of a frame, each with what was done to it. @param {import("../state/labels.js").Labels} labels @param {number} here */
+/**
+ * Who leads, path, events and tags of a frame, each with what was done to it.
+ * @param {import("../state/labels.js").Labels} labels
+ * @param {number} here
+ */
 function showPasts(labels, here) {
   /** @type {Dated[]} */
   const found = [

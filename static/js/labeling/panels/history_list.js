@@ -13,7 +13,12 @@ export class Past {
   node = el("div", { class: "past facts" });
   #key = "";
 
-  /** Show a label's acts; they are asked for again when it is another, or has changed. @param {ItemKind} kind @param {number} id @param {number} revision */
+  /**
+   * Show a label's acts; they are asked for again when it is another, or has changed.
+   * @param {ItemKind} kind
+   * @param {number} id
+   * @param {number} revision
+   */
   async look(kind, id, revision) {
     const key = `${kind} ${id} ${revision}`;
     if (key === this.#key) return;

@@ -95,7 +95,10 @@ function worstFrames(worst) {
 
 const ERRORS = /** @type {const} */ (["distance", "lateral", "longitudinal", "speed"]);
 
-/** The paper's Table 4: of each error the mean size, below it the smallest and the largest. @param {import("../state/types.js").ScoreErrors[]} rows */
+/**
+ * The paper's Table 4: of each error the mean size, below it the smallest and the largest.
+ * @param {import("../state/types.js").ScoreErrors[]} rows
+ */
 function errorsTable(rows) {
   const head = ["", "n", "distance", "lateral", "longit.", "speed"].map((words) =>
     el("th", { scope: "col", textContent: words }),

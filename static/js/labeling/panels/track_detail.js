@@ -86,7 +86,10 @@ function show() {
   text(facts, placeWords(track, presentOf(track.id)));
 }
 
-/** @param {import("../state/types.js").LabelTrack} track @param {import("../state/types.js").LabelSighting|null} sighting */
+/**
+ * @param {import("../state/types.js").LabelTrack} track
+ * @param {import("../state/types.js").LabelSighting|null} sighting
+ */
 function placeWords({ keyframes, origin }, sighting) {
   if (!sighting) return "not in this frame";
   const kind = sighting.keyframe

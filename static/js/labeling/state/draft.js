@@ -1,4 +1,7 @@
-/** A label under a hand: drawn at once in every view, sent when the hand lets go, dropped when the server's own has come. */
+/**
+ * A label under a hand: drawn at once in every view, sent when the hand lets go, dropped when the server's own has
+ * come.
+ */
 import { get, on, set } from "../../core/store.js";
 import { act } from "../acts/queue.js";
 import { knownUpTo, sightingsAt } from "./sightings.js";
@@ -24,7 +27,11 @@ export function setUp() {
   });
 }
 
-/** It has become an act: it is shown until the server's own has come, which may be before the act's answer. @param {Draft} draft @param {number} act */
+/**
+ * It has become an act: it is shown until the server's own has come, which may be before the act's answer.
+ * @param {Draft} draft
+ * @param {number} act
+ */
 export function settle(draft, act) {
   const isHeld = knownUpTo(draft.frame) >= act;
   if (!isHeld || get("draft")) set("draft", isHeld ? null : { ...draft, settled: act });
@@ -45,7 +52,12 @@ function presentIn(frame) {
 /** @param {number|null} track @returns {LabelSighting|null} */
 export const presentOf = (track) => (track === null ? null : (present().find((each) => each.track === track) ?? null));
 
-/** Draw a track's label otherwise than it is held. @param {number} track @param {{cuboid?: Cuboid|null, bbox?: Box|null}} shape @param {number} [frame] */
+/**
+ * Draw a track's label otherwise than it is held.
+ * @param {number} track
+ * @param {{cuboid?: Cuboid|null, bbox?: Box|null}} shape
+ * @param {number} [frame]
+ */
 export function hold(track, shape, frame = shown()) {
   const draft = get("draft"),
     before = presentIn(frame).find((each) => each.track === track);

@@ -3,7 +3,10 @@ import { get, set } from "../../core/store.js";
 import { act } from "../acts/queue.js";
 import { leadAt, shown, trackOf } from "./labels.js";
 
-/** `typed`: the first digits of a lead's number. @typedef {{first: number|null, last: number|null, typed: string}} Marked */
+/**
+ * `typed`: the first digits of a lead's number.
+ * @typedef {{first: number|null, last: number|null, typed: string}} Marked
+ */
 /** @typedef {import("./types.js").Lead} Lead */
 
 const NONE = { first: null, last: null, typed: "" };
@@ -40,7 +43,10 @@ export function forget() {
   if (get("marked")) set("marked", null);
 }
 
-/** What would be painted: what is marked, to the shown frame where its other end is not; else the shown frame alone. @returns {{first: number, last: number}} */
+/**
+ * What would be painted: what is marked, to the shown frame where its other end is not; else the shown frame alone.
+ * @returns {{first: number, last: number}}
+ */
 export function span() {
   const { first, last } = marked(),
     ends = [first ?? shown(), last ?? shown()];
@@ -50,7 +56,10 @@ export function span() {
 /** Say who leads in the marked frames. @param {Lead} lead */
 export const paint = (lead) => over((frames) => act({ kind: "set_lead", ...frames, lead }));
 
-/** Say who leads in the marked frames or in this one; who is proposed here, and nothing is marked: in the whole range. @param {Lead} lead */
+/**
+ * Say who leads in the marked frames or in this one; who is proposed here, and nothing is marked: in the whole range.
+ * @param {Lead} lead
+ */
 export function choose(lead) {
   const range = leadAt(shown()),
     isProposed = range?.lead === lead && range.state === "proposed";
@@ -60,8 +69,13 @@ export function choose(lead) {
 /** Say that nobody has said who leads there. */
 export const clear = () => over((frames) => act({ kind: "clear_lead", ...frames }));
 
-/** Do something to the marked frames. The mark goes at once, so that the next act is not about it; what was refused brings it back.
- * @template T @param {(frames: {first: number, last: number}) => Promise<T>} what @returns {Promise<T>} */
+/**
+ * Do something to the marked frames. The mark goes at once, so that the next act is not about it; what was refused
+ * brings it back.
+ * @template T
+ * @param {(frames: {first: number, last: number}) => Promise<T>} what
+ * @returns {Promise<T>}
+ */
 export async function over(what) {
   const held = get("marked"),
     frames = span();
@@ -72,7 +86,8 @@ export async function over(what) {
 }
 
 /**
- * A digit of the lead's number. It is taken as soon as no other track's number begins like it; Enter takes what is typed.
+ * A digit of the lead's number. It is taken as soon as no other track's number begins like it; Enter takes what is
+ * typed.
  * @param {string} digit
  */
 export function type(digit) {

@@ -1,4 +1,7 @@
-/** What is labelled in the frames around the shown one. A drive may hold a hundred thousand labels: only these are fetched. */
+/**
+ * What is labelled in the frames around the shown one. A drive may hold a hundred thousand labels: only these are
+ * fetched.
+ */
 import { newestOnly, request } from "../../core/api.js";
 import { get, on, set } from "../../core/store.js";
 import { shown } from "./labels.js";
@@ -6,7 +9,10 @@ import { shown } from "./labels.js";
 /** @typedef {import("./types.js").LabelSighting} LabelSighting */
 /** @typedef {{revision: number, byFrame: Record<string, LabelSighting[]>}} Chunk */
 
-/** Frames in one request; fewer where many are labelled in each, so that an answer stays small. How many stretches are kept. */
+/**
+ * Frames in one request; fewer where many are labelled in each, so that an answer stays small. How many stretches are
+ * kept.
+ */
 const CHUNKS = [20, 10, 5, 2, 1],
   MOST_SIGHTINGS = 1500,
   KEPT = 24;
@@ -84,10 +90,17 @@ function keep(number, chunk) {
   if (chunks.size > KEPT) chunks.delete([...chunks.keys()][0]);
 }
 
-/** What is labelled in a frame, as far as it is known here; while a change is being fetched, what was. @param {number} frame @returns {LabelSighting[]} */
+/**
+ * What is labelled in a frame, as far as it is known here; while a change is being fetched, what was.
+ * @param {number} frame
+ * @returns {LabelSighting[]}
+ */
 export const sightingsAt = (frame) => chunks.get(Math.floor(frame / size))?.byFrame[frame] ?? [];
 
-/** Whether anything is known of a frame yet; until then what is listed of the frame before stays. @param {number} frame */
+/**
+ * Whether anything is known of a frame yet; until then what is listed of the frame before stays.
+ * @param {number} frame
+ */
 export const isKnown = (frame) => chunks.has(Math.floor(frame / size));
 
 /** Up to which act the labels of a frame are known. @param {number} frame */

@@ -1,45 +1,39 @@
 /**
- * Shapes of labels as the server sends them (app/routes/, pipeline/labels/model.py). `tests/app/page/test_page_types.py` holds
- * every key here against real messages.
- *
+ * Shapes of labels as the server sends them (app/routes/, pipeline/labels/model.py).
+ * `tests/app/page/test_page_types.py` holds every key here against real messages.
  * @typedef {"proposed"|"accepted"|"corrected"|"rejected"} LabelState
- * @typedef {number|"none"|"unknown"} Lead  a track, nothing ahead in the path, or one can't tell
+ * @typedef {number|"none"|"unknown"} Lead a track, nothing ahead in the path, or one can't tell
  * @typedef {"track"|"lead"|"path"|"event"|"tag"} ItemKind
- * @typedef {[number, number, number, number]} Box  x1 y1 x2 y2, pixels of the camera's own picture
- *
- * @typedef {object} Cuboid  ego frame, metres and radians
+ * @typedef {[number, number, number, number]} Box x1 y1 x2 y2, pixels of the camera's own picture
+ * @typedef {object} Cuboid ego frame, metres and radians
  * @property {[number, number, number]} center
  * @property {[number, number, number]} size
  * @property {number} yaw_rad
- *
  * @typedef {object} LabelOrigin
  * @property {"pipeline"|"person"|"import"} maker
  * @property {string} name
  * @property {number} t_unix_ms
  * @property {string|null} params
  * @property {string|null} calibration
- * @property {string} how  what its place was measured by, where a person only pointed at it
- *
+ * @property {string} how what its place was measured by, where a person only pointed at it
  * @typedef {object} LabelTrack
  * @property {number} id
  * @property {number} revision
  * @property {string} label
  * @property {LabelState} state
  * @property {LabelOrigin} origin
- * @property {string} comment  why it was sent back
- * @property {string} reviewer  who found it right, another than who made it; "" while nobody has
- * @property {number|null} first  null of a track that is nowhere
+ * @property {string} comment why it was sent back
+ * @property {string} reviewer who found it right, another than who made it; "" while nobody has
+ * @property {number|null} first null of a track that is nowhere
  * @property {number|null} last
  * @property {number[]} keyframes
  * @property {number} sightings
- *
- * @typedef {object} LabelSighting  of one frame
+ * @typedef {object} LabelSighting of one frame
  * @property {number} track
  * @property {Cuboid|null} cuboid
  * @property {Box|null} bbox
  * @property {boolean} keyframe
- *
- * @typedef {object} LeadRange  both ends included
+ * @typedef {object} LeadRange both ends included
  * @property {number} id
  * @property {number} revision
  * @property {number} first
@@ -49,7 +43,6 @@
  * @property {LabelOrigin} origin
  * @property {string} comment
  * @property {string} reviewer
- *
  * @typedef {object} EventLabel
  * @property {number} id
  * @property {number} revision
@@ -60,15 +53,13 @@
  * @property {LabelOrigin} origin
  * @property {string} comment
  * @property {string} reviewer
- *
- * @typedef {object} FrameTag  both ends included
+ * @typedef {object} FrameTag both ends included
  * @property {number} id
  * @property {number} revision
  * @property {number} first
  * @property {number} last
  * @property {string} tag
  * @property {LabelOrigin} origin
- *
  * @typedef {object} PathLabel
  * @property {number} id
  * @property {number} revision
@@ -79,21 +70,18 @@
  * @property {LabelOrigin} origin
  * @property {string} comment
  * @property {string} reviewer
- *
  * @typedef {object} LabelTask
- * @property {number} id  the 202 of who began it has the same
+ * @property {number} id the 202 of who began it has the same
  * @property {"propose"|"import"} what
  * @property {number} done
  * @property {number} total
  * @property {string} note
- * @property {string|null} error  why it failed
- * @property {boolean} running  false: it stays until the next one begins
- *
- * @typedef {object} LabelsState  in the stream's state
- * @property {number} revision  how many acts the drive has seen
+ * @property {string|null} error why it failed
+ * @property {boolean} running false: it stays until the next one begins
+ * @typedef {object} LabelsState in the stream's state
+ * @property {number} revision how many acts the drive has seen
  * @property {LabelTask|null} task
- *
- * @typedef {object} LabelsAnswer  what changed since a revision
+ * @typedef {object} LabelsAnswer what changed since a revision
  * @property {number} revision
  * @property {{id: string, uri: string, count: number}} drive
  * @property {LabelTrack[]} tracks
@@ -102,50 +90,43 @@
  * @property {EventLabel[]} events
  * @property {FrameTag[]} tags
  * @property {{kind: ItemKind, id: number}[]} removed
- *
  * @typedef {object} SightingsAnswer
  * @property {number} revision
- * @property {Record<string, LabelSighting[]>} sightings  by frame
- *
+ * @property {Record<string, LabelSighting[]>} sightings by frame
  * @typedef {object} ActAnswer
  * @property {number} revision
- * @property {number|null} act  null when nothing changed
- * @property {string} what  in a few words
+ * @property {number|null} act null when nothing changed
+ * @property {string} what in a few words
  * @property {LabelsAnswer|null} changed
  * @property {string} note
- *
- * @typedef {object} Found  where there is something to do
+ * @typedef {object} Found where there is something to do
  * @property {number|null} frame
  * @property {string} why
- * @property {{kind: ItemKind, id: number}|null} item  what it is about, where that is one label
- * @property {number} left  such places in the whole drive
- *
+ * @property {{kind: ItemKind, id: number}|null} item what it is about, where that is one label
+ * @property {number} left such places in the whole drive
  * @typedef {object} PastAct
  * @property {number} act
  * @property {string} what
- * @property {string} note  what there was to say about it
+ * @property {string} note what there was to say about it
  * @property {string} person
  * @property {number} t_unix_ms
  * @property {any} before
  * @property {any} after
  * @property {boolean} undone
- *
  * @typedef {object} Version
  * @property {string} name
  * @property {string} person
  * @property {number} t_unix_ms
  * @property {number} tracks
  * @property {number} frames
- *
  * @typedef {object} Score
  * @property {number} revision
  * @property {number} run
- * @property {number} judged  frames in which the labels say who leads
+ * @property {number} judged frames in which the labels say who leads
  * @property {import("../../drive/types.js").Metric[]} metrics
- * @property {string[]} notes  what does not count, and why
- * @property {ScoreErrors[]} errors  by range and by sensor
- * @property {BadFrame[]} worst  the worst first
- *
+ * @property {string[]} notes what does not count, and why
+ * @property {ScoreErrors[]} errors by range and by sensor
+ * @property {BadFrame[]} worst the worst first
  * @typedef {object} ScoreErrors
  * @property {string} vehicles
  * @property {string} seen_by
@@ -154,19 +135,16 @@
  * @property {Sizes|null} lateral
  * @property {Sizes|null} longitudinal
  * @property {Sizes|null} speed
- *
- * @typedef {object} Sizes  of errors, m or m/s
+ * @typedef {object} Sizes of errors, m or m/s
  * @property {number} min
  * @property {number} max
  * @property {number} mae
- *
  * @typedef {object} BadFrame
  * @property {number} frame
  * @property {"correct"|"none"|"missed"|"false"|"wrong"} verdict
  * @property {number|null} truth_m
  * @property {number|null} error_m
- *
  * @typedef {{kind: ItemKind, id: number, revision: number}} ItemRef
- * @typedef {{kind: string, [field: string]: any}} Act  one change, as POST /api/labels/act takes it
+ * @typedef {{kind: string, [field: string]: any}} Act one change, as POST /api/labels/act takes it
  */
 export {};

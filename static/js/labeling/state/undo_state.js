@@ -1,4 +1,7 @@
-/** What the person at this page can take back or do again, and which drive it is about: the server's answer to them alone. */
+/**
+ * What the person at this page can take back or do again, and which drive it is about: the server's answer to them
+ * alone.
+ */
 import { newestOnly, request } from "../../core/api.js";
 import { get, on, set } from "../../core/store.js";
 import { knownName } from "./person.js";

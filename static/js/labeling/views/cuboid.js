@@ -3,7 +3,10 @@
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
 /** @typedef {import("../../views/drawing/viewport.js").Place} Place */
 /** @typedef {import("../../core/types.js").Point2} Point2 */
-/** What a hand holds: the whole, the knob before the front, or an edge. @typedef {"move"|"turn"|"front"|"rear"|"left"|"right"} Grip */
+/**
+ * What a hand holds: the whole, the knob before the front, or an edge.
+ * @typedef {"move"|"turn"|"front"|"rear"|"left"|"right"} Grip
+ */
 
 /** Half lengths and half widths to the corners: front left, front right, rear right, rear left. */
 const CORNERS = [
@@ -13,7 +16,11 @@ const CORNERS = [
   [-0.5, 0.5],
 ];
 const SMALLEST_M = 0.2;
-/** What a new cuboid of a class is, where a hand says no more: length, width, height, as in pipeline/fusion/vehicle_sizes.py. @type {Record<string, [number, number, number]>} */
+/**
+ * What a new cuboid of a class is, where a hand says no more: length, width, height, as in
+ * pipeline/fusion/vehicle_sizes.py.
+ * @type {Record<string, [number, number, number]>}
+ */
 const TYPICAL_M = {
   car: [4.5, 1.8, 1.5],
   truck: [8, 2.5, 3.2],
@@ -26,7 +33,13 @@ export const CLASSES = Object.keys(TYPICAL_M);
 /** A drag shorter than this says where a cuboid is, not how long it is or where it heads. */
 const SAYS_FROM_M = 1;
 
-/** The ego place of a point of the cuboid. @param {Cuboid} cuboid @param {number} along @param {number} across @returns {Point2} */
+/**
+ * The ego place of a point of the cuboid.
+ * @param {Cuboid} cuboid
+ * @param {number} along
+ * @param {number} across
+ * @returns {Point2}
+ */
 function placeOf({ center: [x, y], yaw_rad }, along, across) {
   const c = Math.cos(yaw_rad),
     s = Math.sin(yaw_rad);
@@ -45,7 +58,11 @@ function own({ center, yaw_rad }, { x, y }) {
 /** @param {Cuboid} cuboid @returns {Point2[]} front left, front right, rear right, rear left */
 export const footprint = (cuboid) => CORNERS.map(([l, w]) => placeOf(cuboid, l * cuboid.size[0], w * cuboid.size[1]));
 
-/** Where the knob is that turns it: `beyond` before the middle of its front. @param {Cuboid} cuboid @param {number} beyond metres */
+/**
+ * Where the knob is that turns it: `beyond` before the middle of its front.
+ * @param {Cuboid} cuboid
+ * @param {number} beyond metres
+ */
 export const knob = (cuboid, beyond) => placeOf(cuboid, cuboid.size[0] / 2 + beyond, 0);
 
 /** The middle of its front. @param {Cuboid} cuboid */
@@ -58,9 +75,11 @@ export function contains(cuboid, place) {
 }
 
 /**
- * Which edge of one axis is held: the one ahead (1), behind (−1), none (0), or beyond both (null). Of what is thin, seen
- * from afar, the middle stays to be held.
- * @param {number} at from the middle @param {number} size @param {number} reach
+ * Which edge of one axis is held: the one ahead (1), behind (−1), none (0), or beyond both (null). Of what is thin,
+ * seen from afar, the middle stays to be held.
+ * @param {number} at from the middle
+ * @param {number} size
+ * @param {number} reach
  */
 function edgeAt(at, size, reach) {
   const away = Math.abs(at);
@@ -97,7 +116,13 @@ export const turned = (cuboid, by_rad) => ({
   yaw_rad: Math.atan2(Math.sin(cuboid.yaw_rad + by_rad), Math.cos(cuboid.yaw_rad + by_rad)),
 });
 
-/** The held edge brought to a place, and the opposite face left where it is. @param {Cuboid} cuboid @param {Grip} grip @param {Place} place @returns {Cuboid} */
+/**
+ * The held edge brought to a place, and the opposite face left where it is.
+ * @param {Cuboid} cuboid
+ * @param {Grip} grip
+ * @param {Place} place
+ * @returns {Cuboid}
+ */
 function resized(cuboid, grip, place) {
   const axis = grip === "front" || grip === "rear" ? 0 : 1,
     sign = grip === "front" || grip === "left" ? 1 : -1;
@@ -112,7 +137,11 @@ function resized(cuboid, grip, place) {
 
 /**
  * What a drag makes of a cuboid.
- * @param {Cuboid} cuboid as it was when it was taken hold of @param {Grip} grip @param {Place} from @param {Place} to @returns {Cuboid}
+ * @param {Cuboid} cuboid as it was when it was taken hold of
+ * @param {Grip} grip
+ * @param {Place} from
+ * @param {Place} to
+ * @returns {Cuboid}
  */
 export function dragged(cuboid, grip, from, to) {
   if (grip === "move") return moved(cuboid, to.x - from.x, to.y - from.y);
@@ -122,8 +151,13 @@ export function dragged(cuboid, grip, from, to) {
 }
 
 /**
- * A new cuboid, drawn from the middle of its rear to the middle of its front; a short drag takes what its class usually is.
- * @param {Place} from @param {Place} to @param {string} label @param {number} ground_m z of the ground there @returns {Cuboid}
+ * A new cuboid, drawn from the middle of its rear to the middle of its front; a short drag takes what its class usually
+ * is.
+ * @param {Place} from
+ * @param {Place} to
+ * @param {string} label
+ * @param {number} ground_m z of the ground there
+ * @returns {Cuboid}
  */
 export function drawn(from, to, label, ground_m) {
   const [length, width, height] = TYPICAL_M[label] ?? TYPICAL_M.car,
@@ -141,7 +175,11 @@ const FLAT = [0, 0, 1, 0];
 /** What looks farther than this looks at the horizon. */
 const FARTHEST_M = 300;
 
-/** @param {import("../../core/types.js").GroundPlanes|null} ground @param {number} x @returns {number} which plane it is there */
+/**
+ * @param {import("../../core/types.js").GroundPlanes|null} ground
+ * @param {number} x
+ * @returns {number} which plane it is there
+ */
 function planeAt(ground, x) {
   const after = ground?.edges.findIndex((edge) => edge > x) ?? -1,
     count = ground?.planes.length ?? 0;
@@ -150,7 +188,10 @@ function planeAt(ground, x) {
 
 /**
  * The nearest place at which a ray meets the ground; null where it looks beyond it.
- * @param {import("../../core/types.js").GroundPlanes|null} ground @param {number[]} start @param {number[]} toward @param {number} above metres over the ground that are meant
+ * @param {import("../../core/types.js").GroundPlanes|null} ground
+ * @param {number[]} start
+ * @param {number[]} toward
+ * @param {number} above metres over the ground that are meant
  * @returns {Point2|null}
  */
 export function seenOn(ground, [x, y, z], [dx, dy, dz], above) {
@@ -165,7 +206,11 @@ export function seenOn(ground, [x, y, z], [dx, dy, dz], above) {
   return met.length ? [x + t * dx, y + t * dy] : null;
 }
 
-/** Height of the ground at a place; 0 where no sweep shows it. @param {import("../../core/types.js").GroundPlanes|null} ground @param {Place} place */
+/**
+ * Height of the ground at a place; 0 where no sweep shows it.
+ * @param {import("../../core/types.js").GroundPlanes|null} ground
+ * @param {Place} place
+ */
 export function groundAt(ground, { x, y }) {
   if (!ground?.planes.length) return 0;
   const [a, b, c, d] = ground.planes[planeAt(ground, x)];

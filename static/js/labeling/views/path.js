@@ -1,4 +1,7 @@
-/** The ego path by hand, where the pipeline's is wrong: a drag along its middle; it is as wide as the pipeline's corridor. */
+/**
+ * The ego path by hand, where the pipeline's is wrong: a drag along its middle; it is as wide as the pipeline's
+ * corridor.
+ */
 import { color } from "../../core/colors.js";
 import { trace } from "../../views/drawing/plan.js";
 import { get, set } from "../../core/store.js";
@@ -37,7 +40,11 @@ export function drawing(from) {
   };
 }
 
-/** Lines half a corridor to the left and to the right of a middle. @param {Point2[]} middle @returns {{left: Point2[], right: Point2[]}} */
+/**
+ * Lines half a corridor to the left and to the right of a middle.
+ * @param {Point2[]} middle
+ * @returns {{left: Point2[], right: Point2[]}}
+ */
 export function sides(middle) {
   const half = Number(get("params")?.values["path.half_width_m"] ?? 1.5);
   const shifted = (/** @type {number} */ by) =>
@@ -50,7 +57,11 @@ export function sides(middle) {
   return { left: shifted(half), right: shifted(-half) };
 }
 
-/** The labelled path of the shown frame, and one under a hand. @param {CanvasRenderingContext2D} ctx @param {Viewport} view */
+/**
+ * The labelled path of the shown frame, and one under a hand.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Viewport} view
+ */
 export function drawPathLabel(ctx, view) {
   const held = get("labels")?.paths.find(({ frame, state }) => frame === shown() && state !== "rejected"),
     drawn = get("drawnPath") ?? held;

@@ -50,7 +50,11 @@ export function drawInPicture(ctx, frame, place) {
 const isIn = ([x1, y1, x2, y2], { width, height, scale }) =>
   x1 * scale < width && y1 * scale < height && x2 > 0 && y2 > 0;
 
-/** The box around what of a cuboid the picture shows; null for nothing. @param {import("../../core/types.js").Pixels} corners @returns {Box|null} */
+/**
+ * The box around what of a cuboid the picture shows; null for nothing.
+ * @param {import("../../core/types.js").Pixels} corners
+ * @returns {Box|null}
+ */
 export function boundsOf(corners) {
   const seen = corners.filter((pixel) => pixel !== null);
   if (seen.length < 2) return null;

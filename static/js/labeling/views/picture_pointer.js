@@ -1,4 +1,6 @@
-/** The hand on the picture while labeling: it selects labels, draws and changes boxes, and points at what was missed. */
+/**
+ * The hand on the picture while labeling: it selects labels, draws and changes boxes, and points at what was missed.
+ */
 import { place } from "../../views/camera.js";
 import { $ } from "../../core/dom.js";
 import { get, set } from "../../core/store.js";
@@ -76,7 +78,12 @@ function takes(from) {
   };
 }
 
-/** A box being drawn. @param {Pixel} from @param {(bbox: Box|null) => void} done null after a press without a drag @returns {Drag} */
+/**
+ * A box being drawn.
+ * @param {Pixel} from
+ * @param {(bbox: Box|null) => void} done null after a press without a drag
+ * @returns {Drag}
+ */
 function drawing(from, done) {
   /** @type {Box} */
   let box = [from.u, from.v, from.u, from.v];
@@ -93,7 +100,10 @@ function drawing(from, done) {
   };
 }
 
-/** A new track from what the picture shows: the server says what it is made of. @param {{bbox: Box}|{pixel: number[]}} from */
+/**
+ * A new track from what the picture shows: the server says what it is made of.
+ * @param {{bbox: Box}|{pixel: number[]}} from
+ */
 async function lift(from) {
   const answer = await act({ kind: "lift", frame: shown(), label: newLabel(), ...from });
   drop();
@@ -108,7 +118,13 @@ function shape(track, bbox) {
   release();
 }
 
-/** Which sides of the box a pixel holds; all of them inside it, null outside. @param {Box} box @param {Pixel} pixel @param {number} reach @returns {Sides|null} */
+/**
+ * Which sides of the box a pixel holds; all of them inside it, null outside.
+ * @param {Box} box
+ * @param {Pixel} pixel
+ * @param {number} reach
+ * @returns {Sides|null}
+ */
 export function sidesAt([x1, y1, x2, y2], { u, v }, reach) {
   if (u < x1 - reach || u > x2 + reach || v < y1 - reach || v > y2 + reach) return null;
   const near = /** @type {Sides} */ ([u - x1 < reach, v - y1 < reach, x2 - u < reach, y2 - v < reach]);

@@ -45,7 +45,13 @@ export function drawInPlan(ctx, view, tags) {
     });
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {Cuboid} cuboid @param {boolean} isKeyframe @param {import("./style.js").Look} look */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Viewport} view
+ * @param {Cuboid} cuboid
+ * @param {boolean} isKeyframe
+ * @param {import("./style.js").Look} look
+ */
 function drawOne(ctx, view, cuboid, isKeyframe, look) {
   ctx.strokeStyle = ctx.fillStyle = look.tint;
   trace(ctx, view, footprint(cuboid));

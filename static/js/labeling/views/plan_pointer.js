@@ -16,7 +16,12 @@ import { KNOB_PX } from "./plan_drawing.js";
 
 const REACH_PX = 6;
 
-/** What a drag from here does; null when it is the plan that moves. @param {Place} from @param {number} scale pixels per metre @returns {Drag|null} */
+/**
+ * What a drag from here does; null when it is the plan that moves.
+ * @param {Place} from
+ * @param {number} scale pixels per metre
+ * @returns {Drag|null}
+ */
 export function takes(from, scale) {
   if (!isOn()) return null;
   const tool = get("labeling")?.tool;
@@ -29,7 +34,12 @@ export function takes(from, scale) {
   return { moved: (to) => hold(track, { cuboid: dragged(cuboid, grip, from, to) }), ended: release, cancelled: drop };
 }
 
-/** What the hand would hold, for the pointer's look. @param {Place} place @param {number} scale @returns {string} a CSS cursor, "" for none */
+/**
+ * What the hand would hold, for the pointer's look.
+ * @param {Place} place
+ * @param {number} scale
+ * @returns {string} a CSS cursor, "" for none
+ */
 export function cursorAt(place, scale) {
   if (get("labeling")?.tool) return "crosshair";
   const cuboid = presentOf(get("track"))?.cuboid;

@@ -1,4 +1,7 @@
-/** Where the shown labels lie in the picture. The server projects, as always; a cuboid under a hand is asked for as it moves. */
+/**
+ * Where the shown labels lie in the picture. The server projects, as always; a cuboid under a hand is asked for as it
+ * moves.
+ */
 import { newestOnly, request } from "../../core/api.js";
 import { get, on, set } from "../../core/store.js";
 import { present } from "../state/draft.js";
@@ -6,7 +9,10 @@ import { shown } from "../state/labels.js";
 import { isOn } from "../state/mode.js";
 
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
-/** By track; −1 is a new one. Pixels of the camera's own picture. @typedef {{frame: number, pixels: Map<number, import("../../core/types.js").Pixels>}} Projected */
+/**
+ * By track; −1 is a new one. Pixels of the camera's own picture.
+ * @typedef {{frame: number, pixels: Map<number, import("../../core/types.js").Pixels>}} Projected
+ */
 
 export const NEW = -1;
 

@@ -1,4 +1,6 @@
-/** A cuboid dragged over the road in the picture, held by the middle of its foot. The server says where a pixel looks. */
+/**
+ * A cuboid dragged over the road in the picture, held by the middle of its foot. The server says where a pixel looks.
+ */
 import { newestOnly, request } from "../../core/api.js";
 import { get } from "../../core/store.js";
 import { groundAt, seenOn } from "./cuboid.js";
@@ -9,7 +11,11 @@ import { boundsOf } from "./picture_drawing.js";
 /** @typedef {import("./picture_pointer.js").Pixel} Pixel */
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
 
-/** What a drag of a track's cuboid does; null where the pixel is not on it. @param {number} track @param {Pixel} from */
+/**
+ * What a drag of a track's cuboid does; null where the pixel is not on it.
+ * @param {number} track
+ * @param {Pixel} from
+ */
 export function takes(track, from) {
   const projected = get("projected"),
     corners = projected?.frame === shown() ? projected.pixels.get(track) : undefined;
@@ -53,7 +59,11 @@ export function takes(track, from) {
   };
 }
 
-/** Where the diagonals of its bottom cross: the middle, in whatever perspective. @param {import("../../core/types.js").Pixels} corners @returns {Pixel|null} */
+/**
+ * Where the diagonals of its bottom cross: the middle, in whatever perspective.
+ * @param {import("../../core/types.js").Pixels} corners
+ * @returns {Pixel|null}
+ */
 function middleOf([a, b, c, d]) {
   if (!a || !b || !c || !d) return null;
   const [px, py] = [c[0] - a[0], c[1] - a[1]],

@@ -5,7 +5,10 @@ import { hold, presentOf, release } from "../state/draft.js";
 import { shown, trackOf } from "../state/labels.js";
 import { isOn } from "../state/mode.js";
 
-/** frame: that the hand sees, whatever is shown by now. @typedef {{track: number, frame: number, cuboid: import("../state/types.js").Cuboid, ended: boolean}} Dragged */
+/**
+ * frame: that the hand sees, whatever is shown by now.
+ * @typedef {{track: number, frame: number, cuboid: import("../state/types.js").Cuboid, ended: boolean}} Dragged
+ */
 
 export function setUp() {
   on(["track", "draft", "labelFrames", "frame", "labeling", "layout"], offer);

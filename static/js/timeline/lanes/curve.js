@@ -1,4 +1,6 @@
-/** A curve of the CIPV, ACC or our own speed over the drive: the current run, the compared one and the selected object. */
+/**
+ * A curve of the CIPV, ACC or our own speed over the drive: the current run, the compared one and the selected object.
+ */
 import { color, ui } from "../../core/colors.js";
 import { DASH } from "../../core/format.js";
 import { get } from "../../core/store.js";
@@ -60,9 +62,19 @@ function drawCurve(ctx, span, row, curve, now, base) {
   }
 }
 
-/** @typedef {{count: number, index: (i: number) => number, joined: (i: number) => boolean, value: (i: number) => number|null}} Samples */
+/**
+ * @typedef
+ *   {{count: number, index: (i: number) => number, joined: (i: number) => boolean, value: (i: number) => number|null}}
+ *   Samples
+ */
 
-/** A column as samples; the CIPV's figures do not go on from one object to the next. @param {Series} series @param {keyof Columns} key @param {number} factor @returns {Samples} */
+/**
+ * A column as samples; the CIPV's figures do not go on from one object to the next.
+ * @param {Series} series
+ * @param {keyof Columns} key
+ * @param {number} factor
+ * @returns {Samples}
+ */
 function ofSeries({ done, columns }, key, factor) {
   const values = /** @type {(number|null)[]} */ (columns[key]),
     ids = columns.cipv_id;
@@ -76,7 +88,10 @@ function ofSeries({ done, columns }, key, factor) {
 }
 
 /**
- * @param {CanvasRenderingContext2D} ctx @param {Samples} samples @param {Span} span @param {(value: number) => number} y
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Samples} samples
+ * @param {Span} span
+ * @param {(value: number) => number} y
  * @param {{style: string, width: number, alpha?: number}} pen
  */
 function stroke(ctx, samples, span, y, { style, width, alpha = 1 }) {
@@ -89,7 +104,13 @@ function stroke(ctx, samples, span, y, { style, width, alpha = 1 }) {
   ctx.globalAlpha = 1;
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {Samples} samples @param {Span} span @param {(value: number) => number} y @param {string} tint */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Samples} samples
+ * @param {Span} span
+ * @param {(value: number) => number} y
+ * @param {string} tint
+ */
 function fillArea(ctx, samples, span, y, tint) {
   ctx.fillStyle = tint;
   ctx.globalAlpha = 0.35;

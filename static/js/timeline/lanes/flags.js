@@ -52,7 +52,12 @@ export const flags = {
   },
 };
 
-/** The event whose flag is under a pixel column. @param {DriveEvent[]} events @param {import("../span.js").Span} span @param {number} x */
+/**
+ * The event whose flag is under a pixel column.
+ * @param {DriveEvent[]} events
+ * @param {import("../span.js").Span} span
+ * @param {number} x
+ */
 function flagAt(events, span, x) {
   const REACH_PX = 9;
   const near = events

@@ -23,7 +23,12 @@ export const lead = {
   click: (span, x) => selectLead(get("drive")?.now, span.index(x)),
 };
 
-/** A line through the frames that are not computed yet. @param {CanvasRenderingContext2D} ctx @param {Place} place @param {number} done */
+/**
+ * A line through the frames that are not computed yet.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Place} place
+ * @param {number} done
+ */
 function drawPending(ctx, { span, row }, done) {
   if (done >= span.count) return;
   const x = Math.max(span.left, span.x(done)),

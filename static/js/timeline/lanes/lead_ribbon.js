@@ -16,7 +16,10 @@ const NUMBER_FROM_PX = 24;
 /** Which lead of the recording an id is: the first, the second … @type {Map<number, number>} */
 let places = new Map();
 
-/** Give every lead its colour, the compared run's first, so that those of both keep theirs. @param {(Series|null)[]} runs */
+/**
+ * Give every lead its colour, the compared run's first, so that those of both keep theirs.
+ * @param {(Series|null)[]} runs
+ */
 export function colorLeads(runs) {
   places = new Map();
   for (const series of runs) {
@@ -89,7 +92,10 @@ function drawStretch(ctx, { id, source, carried }, box, look) {
 
 /**
  * A plain ground under a number that stands on a hatch.
- * @param {CanvasRenderingContext2D} ctx @param {string} words @param {{x: number, top: number, height: number}} box @param {string} tint
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {string} words
+ * @param {{x: number, top: number, height: number}} box
+ * @param {string} tint
  */
 function plate(ctx, words, box, tint) {
   const { fillStyle } = ctx;
@@ -98,7 +104,12 @@ function plate(ctx, words, box, tint) {
   ctx.fillStyle = fillStyle;
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {{x: number, width: number, top: number, height: number}} box @param {1|-1} lean @param {boolean} isLight */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {{x: number, width: number, top: number, height: number}} box
+ * @param {1|-1} lean
+ * @param {boolean} isLight
+ */
 function hatch(ctx, box, lean, isLight) {
   ctx.save();
   ctx.beginPath();

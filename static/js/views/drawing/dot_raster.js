@@ -25,7 +25,13 @@ export class DotRaster {
     this.#pixels.fill(0);
   }
 
-  /** A square around (x, y), in a colour of `rgba`. @param {number} x @param {number} y @param {number} size CSS pixels @param {number} colour */
+  /**
+   * A square around (x, y), in a colour of `rgba`.
+   * @param {number} x
+   * @param {number} y
+   * @param {number} size CSS pixels
+   * @param {number} colour
+   */
   dot(x, y, size, colour) {
     const side = Math.max(1, Math.round(size * this.#ratio));
     const { width, height } = this.#image;

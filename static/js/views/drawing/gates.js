@@ -62,14 +62,24 @@ export function drawInPicture(ctx, { display }, item, labels, X, Y) {
 
 /**
  * In the plan: how far it is from the path's middle against the limit, and the range at which the camera alone saw it.
- * @param {CanvasRenderingContext2D} ctx @param {Frame} frame @param {FusedObject} item @param {Labels} labels @param {Plan} plan
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Frame} frame
+ * @param {FusedObject} item
+ * @param {Labels} labels
+ * @param {Plan} plan
  */
 export function drawInPlan(ctx, { result, display }, item, labels, plan) {
   drawOffset(ctx, result.path.center, item, labels, plan);
   drawRange(ctx, item, display.vision_ranges[item.id], labels, plan);
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {Point2[]} center @param {FusedObject} item @param {Labels} labels @param {Plan} plan */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Point2[]} center
+ * @param {FusedObject} item
+ * @param {Labels} labels
+ * @param {Plan} plan
+ */
 function drawOffset(ctx, center, item, labels, plan) {
   const gate = gateOf(item, "path_offset");
   if (!gate || gate.limit === null || item.path_offset_m === null || !item.bev || center.length < 2) return;
@@ -90,8 +100,11 @@ function drawOffset(ctx, center, item, labels, plan) {
 
 /**
  * The band of ranges that the gate allows around what the camera measured.
- * @param {CanvasRenderingContext2D} ctx @param {FusedObject} item @param {{distance_m: number, sigma_m: number}|undefined} seen
- * @param {Labels} labels @param {Plan} plan
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {FusedObject} item
+ * @param {{distance_m: number, sigma_m: number}|undefined} seen
+ * @param {Labels} labels
+ * @param {Plan} plan
  */
 function drawRange(ctx, item, seen, labels, plan) {
   if (!seen || !item.closest_point || item.source !== "VL") return;
@@ -128,7 +141,12 @@ function drawRange(ctx, item, seen, labels, plan) {
   labels.put(tested, plan.u(far * Math.sin(bearing)) + 8, plan.v(far * Math.cos(bearing)), tint, "must");
 }
 
-/** The path's nearest place, and the direction to its left there. @param {Point2[]} center @param {Point2} place @returns {{foot: Point2, left: Point2}} */
+/**
+ * The path's nearest place, and the direction to its left there.
+ * @param {Point2[]} center
+ * @param {Point2} place
+ * @returns {{foot: Point2, left: Point2}}
+ */
 function footOf(center, [px, py]) {
   let best = { away: Infinity, foot: center[0], left: /** @type {Point2} */ ([0, 1]) };
   for (let i = 1; i < center.length; i++) {
@@ -153,7 +171,13 @@ function line(ctx, [x1, y1], [x2, y2]) {
   ctx.stroke();
 }
 
-/** A stroke along the path. @param {CanvasRenderingContext2D} ctx @param {[number, number]} at @param {Point2} left @param {number} half pixels */
+/**
+ * A stroke along the path.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {[number, number]} at
+ * @param {Point2} left
+ * @param {number} half pixels
+ */
 function tick(ctx, [u, v], [lx, ly], half) {
   // along the path is the left direction turned back by a quarter: ego (ly, −lx), on the canvas (lx, −ly)
   line(ctx, [u - lx * half, v + ly * half], [u + lx * half, v - ly * half]);

@@ -99,7 +99,14 @@ export function drawObjects(ctx, { result, display }, layers, labels, X, Y) {
 /** Roadside returns and what is only carried along would bury the picture in tags. @param {FusedObject} item */
 const deservesTag = (item) => !item.carried && (item.source !== "L" || item.in_path);
 
-/** @param {CanvasRenderingContext2D} ctx @param {number[]} box @param {string} tint @param {number} width @param {Axis} X @param {Axis} Y */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {number[]} box
+ * @param {string} tint
+ * @param {number} width
+ * @param {Axis} X
+ * @param {Axis} Y
+ */
 export function drawBox(ctx, [x1, y1, x2, y2], tint, width, X, Y) {
   ctx.strokeStyle = tint;
   ctx.lineWidth = width;
@@ -113,7 +120,14 @@ function drawHalo(ctx, [x1, y1, x2, y2], X, Y) {
   ctx.strokeRect(X(x1) - 4, Y(y1) - 4, X(x2) - X(x1) + 8, Y(y2) - Y(y1) + 8);
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {Pixels} corners @param {string} tint @param {number} width @param {Axis} X @param {Axis} Y */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Pixels} corners
+ * @param {string} tint
+ * @param {number} width
+ * @param {Axis} X
+ * @param {Axis} Y
+ */
 export function drawCuboid(ctx, corners, tint, width, X, Y) {
   ctx.strokeStyle = tint;
   ctx.lineWidth = width;

@@ -15,7 +15,12 @@ export function trace(ctx, view, line) {
   line.forEach(([x, y], i) => (i ? ctx.lineTo(view.u(y), view.v(x)) : ctx.moveTo(view.u(y), view.v(x))));
 }
 
-/** The corridor, and softly one sigma to either side of its edges. @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {import("../../core/types.js").Path} path */
+/**
+ * The corridor, and softly one sigma to either side of its edges.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Viewport} view
+ * @param {import("../../core/types.js").Path} path
+ */
 export function drawPath(ctx, view, path) {
   if (path.left.length < 2) return;
   ctx.fillStyle = ctx.strokeStyle = color("path");
@@ -63,7 +68,13 @@ function sigmaAlong(sigmas) {
   };
 }
 
-/** @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {FusedObject} item @param {boolean} isImportant @param {boolean} isLead */
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Viewport} view
+ * @param {FusedObject} item
+ * @param {boolean} isImportant
+ * @param {boolean} isLead
+ */
 export function drawOutline(ctx, view, item, isImportant, isLead) {
   if (!item.bev) return;
   trace(ctx, view, item.bev);
@@ -77,7 +88,12 @@ export function drawOutline(ctx, view, item, isImportant, isLead) {
   ctx.setLineDash([]);
 }
 
-/** One sigma of the distance, along the line of sight. @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {FusedObject} item */
+/**
+ * One sigma of the distance, along the line of sight.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Viewport} view
+ * @param {FusedObject} item
+ */
 export function drawSigma(ctx, view, item) {
   if (!item.distance_sigma_m || !item.closest_point || (item.distance_m ?? 0) < 0.1) return;
   const [x, y] = item.closest_point,
@@ -90,7 +106,12 @@ export function drawSigma(ctx, view, item) {
   ctx.stroke();
 }
 
-/** Where it will be relative to us in one second. @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {FusedObject} item */
+/**
+ * Where it will be relative to us in one second.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Viewport} view
+ * @param {FusedObject} item
+ */
 export function drawArrow(ctx, view, item) {
   if (!item.velocity_mps || !item.bev) return;
   const [vx, vy] = item.velocity_mps,
@@ -112,7 +133,13 @@ export function drawArrow(ctx, view, item) {
   ctx.stroke();
 }
 
-/** Fading towards the past. @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {number} id @param {string} tint */
+/**
+ * Fading towards the past.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Viewport} view
+ * @param {number} id
+ * @param {string} tint
+ */
 export function drawTrail(ctx, view, id, tint) {
   const trail = trailOf(id);
   ctx.strokeStyle = tint;
@@ -125,7 +152,14 @@ export function drawTrail(ctx, view, id, tint) {
   ctx.globalAlpha = 1;
 }
 
-/** A frame around an object. @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {FusedObject} item @param {string} tint @param {number[]} [dash] */
+/**
+ * A frame around an object.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Viewport} view
+ * @param {FusedObject} item
+ * @param {string} tint
+ * @param {number[]} [dash]
+ */
 export function drawRing(ctx, view, { bev }, tint, dash = []) {
   if (!bev) return;
   const us = bev.map(([, y]) => view.u(y)),

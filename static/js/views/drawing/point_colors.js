@@ -113,7 +113,11 @@ const MODES = {
   },
 };
 
-/** Height of the road under a place. @param {import("../../core/types.js").GroundPlanes|null} ground @returns {(x: number, y: number) => number} */
+/**
+ * Height of the road under a place.
+ * @param {import("../../core/types.js").GroundPlanes|null} ground
+ * @returns {(x: number, y: number) => number}
+ */
 function groundOf(ground) {
   if (!ground) return () => 0;
   const { edges, planes } = ground;

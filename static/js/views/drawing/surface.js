@@ -16,9 +16,10 @@ export class Surface {
   #ground;
 
   /**
-   * @param {HTMLCanvasElement} canvas @param {() => void} changed called when it has another size
-   * @param {string|null} ground colour of the page that it is drawn on; nothing shines through then, and what lies behind needs
-   * no painting. Null is a sheet to see through
+   * @param {HTMLCanvasElement} canvas
+   * @param {() => void} changed called when it has another size
+   * @param {string|null} ground colour of the page that it is drawn on; nothing shines through then, and what lies
+   *   behind needs no painting. Null is a sheet to see through
    */
   constructor(canvas, changed, ground = null) {
     this.#canvas = canvas;

@@ -1,10 +1,18 @@
 /** Text tags on a canvas that keep out of each other's way. */
 
 const HEIGHT = 16;
-/** "strong" is filled and drawn wherever it must, "must" finds a place, "weak" is left out where there is none. @typedef {"strong"|"must"|"weak"} Weight */
+/**
+ * "strong" is filled and drawn wherever it must, "must" finds a place, "weak" is left out where there is none.
+ * @typedef {"strong"|"must"|"weak"} Weight
+ */
 
 export class Labels {
-  /** @param {CanvasRenderingContext2D} ctx @param {number} width of the canvas, CSS pixels @param {number} top @param {number} bottom between which it is written */
+  /**
+   * @param {CanvasRenderingContext2D} ctx
+   * @param {number} width of the canvas, CSS pixels
+   * @param {number} top
+   * @param {number} bottom between which it is written
+   */
   constructor(ctx, width, top = 0, bottom = Infinity) {
     this.ctx = ctx;
     this.width = width;

@@ -1,18 +1,25 @@
-/** The part of the plan that a pane shows: x up, y left, metres. A named view follows the pane's size until a person moves it. */
+/**
+ * The part of the plan that a pane shows: x up, y left, metres. A named view follows the pane's size until a person
+ * moves it.
+ */
 
 /** @typedef {{x: number, y: number}} Place */
 /** @typedef {"ahead"|"around"} View */
-/** What each view holds, metres: ahead, from behind our bumper to the farthest lead that matters, with the neighbouring lanes. */
+/**
+ * What each view holds, metres: ahead, from behind our bumper to the farthest lead that matters, with the neighbouring
+ * lanes.
+ */
 const VIEWS = { ahead: { from: -5, to: 74, half: 13 }, around: { from: -50, to: 50, half: 50 } };
 const SCALE_LIMITS = [1.5, 200];
 const DRAG_FROM_PX = 4;
 
 /**
- * @typedef {object} Hand  what a hand on the plan may do
- * @property {() => void} changed  the view has moved
+ * @typedef {object} Hand what a hand on the plan may do
+ * @property {() => void} changed the view has moved
  * @property {(place: Place) => void} clicked
- * @property {() => boolean} hasKeys  whether keys zoom now; a mode may mean them otherwise
- * @property {(from: Place, event: PointerEvent) => Drag|null} takes  what a drag from here does; null when it moves the plan
+ * @property {() => boolean} hasKeys whether keys zoom now; a mode may mean them otherwise
+ * @property {(from: Place, event: PointerEvent) => Drag|null} takes what a drag from here does; null when it moves the
+ *   plan
  */
 /**
  * @typedef {object} Drag
