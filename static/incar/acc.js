@@ -40,7 +40,7 @@ function update() {
   mark(band, "state", acc?.state ?? "off");
   if (path.getAttribute("d") !== looks.shape) path.setAttribute("d", looks.shape);
   text(word, acc ? ACC_WORDS[acc.state] : "ACC off");
-  text(reason, acc ? acc.reason : "own speed is unknown");
+  text(reason, acc ? acc.reason : "ego speed unknown");
   speeds.hidden = !ego && !acc;
   text(own, ego ? num(kmh(ego.speed_mps), 0) : DASH);
   text(desired, acc ? num(kmh(acc.desired_speed_mps), 0) : DASH);

@@ -25,12 +25,12 @@ function toggleRecording() {
   ask(
     request("api/recording", "POST", { on: begins }),
     () => (begins ? "Recording" : "Recording saved"),
-    begins ? "Not recorded" : "Not saved",
+    begins ? "Recording failed" : "Not saved",
   );
 }
 
 function markMoment() {
-  ask(request("api/marks", "POST", { text: "" }), marked, "Not marked");
+  ask(request("api/marks", "POST", { text: "" }), marked, "Mark failed");
 }
 
 /**
@@ -44,9 +44,7 @@ function marked({ index, t_s, in_session }) {
 
 /** @param {Promise<any>} asked @param {(given: any) => string} done @param {string} refused */
 async function ask(asked, done, refused) {
-  const late = new Promise((_, reject) =>
-    setTimeout(() => reject(new Error("the server does not answer")), PATIENCE_MS),
-  );
+  const late = new Promise((_, reject) => setTimeout(() => reject(new Error("no response from server")), PATIENCE_MS));
   try {
     say(done(await Promise.race([asked, late])), "done");
   } catch (error) {
@@ -76,7 +74,7 @@ function show() {
     words,
     isOn() && recording ? `${clock(recording.seconds)}${recording.dropped ? ` −${recording.dropped}` : ""}` : "Record",
   );
-  record.setAttribute("aria-label", isOn() ? "End the recording" : "Record");
+  record.setAttribute("aria-label", isOn() ? "Stop recording" : "Record");
   if (recording?.error && recording.error !== toldError) say(`Recording ended: ${recording.error}`, "refused");
   toldError = recording?.error ?? "";
 }

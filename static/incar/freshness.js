@@ -86,8 +86,8 @@ function look() {
 function reasonOf(kind) {
   const age = ageMs(),
     state = get("state");
-  if (kind === "paused") return state?.live ? "this is not now" : "";
+  if (kind === "paused") return state?.live ? "not live" : "";
   if (kind === "waiting") return state?.busy ?? "for the first frame";
   const since = age === null ? "" : `last frame ${num(age / 1000)} s ago`;
-  return kind === "lost" ? `trying again · ${since}` : since;
+  return kind === "lost" ? `reconnecting · ${since}` : since;
 }

@@ -27,10 +27,7 @@ function update() {
   if (!result) return;
   const { cipv } = result,
     item = result.objects.find(({ id }) => id === cipv?.id);
-  text(
-    name,
-    cipv ? `${item?.type ?? "obstacle"} ahead${item?.carried ? ", not seen now" : ""}` : "No vehicle in our path",
-  );
+  text(name, cipv ? `${item?.type ?? "obstacle"} ahead${item?.carried ? ", not detected" : ""}` : "No vehicle in path");
   text(distance, num(cipv?.distance_m, (cipv?.distance_m ?? 0) < TENTHS_BELOW_M ? 1 : 0));
   updateClosing(kmh(cipv?.closing_speed_mps));
   const left_s = cipv?.ttc_s ?? null;

@@ -62,7 +62,7 @@ function sayNoPicture(ctx) {
   ctx.fillStyle = "#9aa4b2";
   ctx.font = "600 20px system-ui, sans-serif";
   ctx.textAlign = "center";
-  ctx.fillText("No camera picture", surface.width / 2, surface.height / 2);
+  ctx.fillText("No camera image", surface.width / 2, surface.height / 2);
   ctx.textAlign = "start";
 }
 

@@ -7,10 +7,10 @@ import { get, on } from "../js/core/store.js";
 /** @typedef {{key: string, health: Health, detail: string}} Sensor */
 
 /** @type {Record<string, string>} */
-const NAMES = { lidar: "LiDAR", camera: "Camera", ego: "Own speed", gnss: "GNSS" };
+const NAMES = { lidar: "LiDAR", camera: "Camera", ego: "Ego speed", gnss: "GNSS" };
 /** @type {Record<Health, {shape: string, word: string}>} */
 const LOOKS = {
-  ok: { shape: "M12 3a9 9 0 1 0 .1 0z", word: "works" },
+  ok: { shape: "M12 3a9 9 0 1 0 .1 0z", word: "OK" },
   stale: { shape: "M12 3 22 21H2z", word: "late" },
   gone: { shape: "M5 2 12 9l7-7 3 3-7 7 7 7-3 3-7-7-7 7-3-3 7-7-7-7z", word: "missing" },
 };

@@ -35,7 +35,7 @@ import * as share from "./workspace/share_link.js";
 import * as theme from "./workspace/theme.js";
 
 for (const part of [theme, panes, gutters, layers, trails, three, seek, shuttle, drive, live, object]) part.setUp();
-// words before canvases: a canvas that writes has the page laid out first, and again for every word that changes after it
+// text before canvases: a canvas that measures text forces a layout, and each later change of text another one
 for (const part of [banner, objects, why, transport, notices, vitals, camera, bev, timeline, exporting]) part.setUp();
 for (const part of [params, history, runs, align, labeling, sources, layouts, share, keyboard]) part.setUp();
 $("#help-button").addEventListener("click", help.show);

@@ -83,7 +83,7 @@ def test_a_moment_marked_in_the_car_is_on_the_dashboards_timeline(open_page: Ope
     page = open_page(address=site.address)
     until(page, "get('drive')?.count > 3")
     expect(page.locator("#events-list")).to_have_text(
-        "Marks of this drive appear here. Events are looked for in recordings."
+        "Marks appear here. Events are detected in recordings only."
     )
     assert page.context.browser is not None
     display = page.context.browser.new_page()

@@ -105,7 +105,7 @@ def test_views_have_numbers_and_are_remembered(open_page: OpenPage):
     expect(page.locator(".table-pane")).to_be_hidden()
     expect(page.locator(".camera-pane")).to_be_visible()
     page.locator("#layout-button").click()
-    page.get_by_label("Name of the layout").fill("bare")
+    page.get_by_label("Layout name").fill("bare")
     page.get_by_role("button", name="Save").click()
     page.locator("#menu").get_by_role("button", name="Everything").click()
     expect(page.locator(".table-pane")).to_be_visible()
@@ -187,7 +187,7 @@ def test_a_parameter_is_found_by_its_name_and_by_words(open_page: OpenPage):
 def test_an_address_that_could_not_be_opened_is_there_to_be_mended(open_page: OpenPage):
     page = open_page()
     page.route("**/api/source", lambda route: route.fulfill(status=202, body="{}"))
-    address = page.get_by_label("Address of a recording")
+    address = page.get_by_label("Recording URI")
     for typed, offered in (("sim:strait", "sim:straight"), ("sim:cut_in", "sim:strait")):
         page.keyboard.press("f")
         expect(address).to_have_value(offered)
@@ -226,7 +226,7 @@ def test_a_gate_leads_to_the_parameter_behind_its_limit(open_page: OpenPage, sit
     page = open_page()
     wait_for_frame(page, START)
     camera = pixels(page, "#camera")
-    page.locator("#why .gate", has_text="Off the path's middle").click()
+    page.locator("#why .gate", has_text="Path offset").click()
     focused = page.locator("[data-param='path.half_width_m'] input[type=range]")
     expect(focused).to_be_focused()
     page.keyboard.press("ArrowRight")

@@ -20,8 +20,8 @@ const bar = $("#align-bar"),
   button = $("#align-button");
 const score = el("b", {
   class: "score",
-  title: "How well the LiDAR's depth edges lie on the picture's edges",
-  textContent: "looking …",
+  title: "How well LiDAR depth edges match image edges",
+  textContent: "computing …",
 });
 const how = el("span", { class: "facts" });
 
@@ -70,7 +70,7 @@ function reflect() {
   const isAngular = get("params")?.values["alignment.model"] === "angular";
   text(
     how,
-    isAngular ? "Drag: origin · wheel: h_res and v_res · shift wheel: v_res" : "Drag: yaw and pitch · wheel: roll",
+    isAngular ? "Drag: origin · scroll: h_res and v_res · Shift + scroll: v_res" : "Drag: yaw and pitch · scroll: roll",
   );
   for (const choice of bar.querySelectorAll("[data-model]"))
     press(choice, /** @type {HTMLElement} */ (choice).dataset.model === get("params")?.values["alignment.model"]);
@@ -89,14 +89,14 @@ function blendSlider() {
     max: "1",
     step: "0.01",
     value: String(OFF.blend),
-    aria: { label: "Blend of picture and cloud" },
+    aria: { label: "Blend image and point cloud" },
   });
   range.addEventListener("input", () => set("align", { ...(get("align") ?? OFF), blend: Number(range.value) }));
-  return el("label", { class: "blend" }, "Picture", range, "Cloud");
+  return el("label", { class: "blend" }, "Image", range, "Points");
 }
 
 function edgesButton() {
-  const edges = el("button", { type: "button", textContent: "Edges", title: "Edges of the picture" });
+  const edges = el("button", { type: "button", textContent: "Edges", title: "Show image edges" });
   edges.addEventListener("click", () => set("align", { ...(get("align") ?? OFF), edges: !get("align")?.edges }));
   on(["align"], () => press(edges, get("align")?.edges === true));
   return edges;

@@ -119,7 +119,7 @@ function ask() {
 function turn() {
   isAsked = false;
   run(due);
-  if (hasWaited || get("state")?.playing) run(after); // of a drive that plays nobody waits for one frame: all at once costs less
+  if (hasWaited || get("state")?.playing) run(after); // during playback, drawing everything at once costs less
   hasWaited = after.size > 0;
   if (hasWaited) ask();
 }

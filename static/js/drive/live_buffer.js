@@ -8,7 +8,7 @@ import { get, on, set } from "../core/store.js";
 /** @typedef {import("./types.js").DriveEvent} DriveEvent */
 
 /** Why what asks for a recording is not to be had. */
-export const NO_DRIVE = "Live sensors have no whole drive: record them, then open the session.";
+export const NO_DRIVE = "Not available with live sensors. Record a session, then open it.";
 
 const MOST_FRAMES = 1200;
 const SAME_S = 0.001;

@@ -3,13 +3,13 @@ import { $, el } from "../core/dom.js";
 import { keymap } from "./keymap.js";
 
 const COLORS = [
-  ["cipv", "CIPV: the closest vehicle in our path"],
-  ["fused", "VL: camera and LiDAR agree"],
-  ["vision", "V: the camera's boxes"],
-  ["lidar", "L: LiDAR's boxes"],
-  ["path", "our path"],
+  ["cipv", "CIPV: closest in-path vehicle"],
+  ["fused", "VL: camera and LiDAR"],
+  ["vision", "V: camera only"],
+  ["lidar", "L: LiDAR only"],
+  ["path", "ego path"],
   ["ground", "ground points"],
-  ["cluster", "clusters of no object yet"],
+  ["cluster", "unassigned clusters"],
 ];
 const dialog = $("#help-dialog", HTMLDialogElement);
 
@@ -24,24 +24,27 @@ export function show() {
         {},
         el("h2", { textContent: "Colours" }),
         ...COLORS.map(shade),
-        el("p", { class: "facts", textContent: "Dashed: carried, not seen in this frame." }),
-        el("p", { class: "facts", textContent: "Ribbon: plain VL, hatched upwards V, downwards L, faint carried." }),
+        el("p", { class: "facts", textContent: "Dashed: carried (not detected in this frame)." }),
+        el("p", { class: "facts", textContent: "Timeline: solid VL, hatched up V, hatched down L, faint carried." }),
       ),
       el(
         "div",
         {},
-        el("h2", { textContent: "Hand" }),
-        el("p", { textContent: "Plan: wheel zooms, dragging moves, double click fits." }),
+        el("h2", { textContent: "Mouse and touch" }),
+        el("p", { textContent: "Plan: scroll to zoom, drag to pan, double-click to reset." }),
         el("p", {
           textContent:
-            "Timeline: press or drag to go there, wheel zooms, shift and wheel moves along, double click fits.",
+            "Timeline: click or drag to seek, scroll to zoom, Shift + scroll to pan, double-click to show all.",
         }),
         el("p", {
           textContent:
-            "3D: dragging turns, wheel zooms, right drag moves; W A S D Q E and the arrows fly. Every other key does what it does everywhere; Esc gives them all back to the page.",
+            "3D: drag to orbit, scroll to zoom, right-drag to pan; W A S D Q E and arrow keys fly. " +
+            "Other shortcuts work as usual; Esc returns all keys to the page.",
         }),
-        el("h2", { textContent: "In the car" }),
-        el("p", {}, el("a", { href: "drive/", textContent: "Display for a small screen, by touch" })),
+        el("h2", { textContent: "Documentation" }),
+        el("p", {}, link("help/", "Help: how to use CIPV Studio")),
+        el("h2", { textContent: "In-vehicle display" }),
+        el("p", {}, link("drive/", "Touch display for small screens")),
       ),
     ),
     el("form", { method: "dialog" }, el("button", { textContent: "Close" })),
@@ -49,6 +52,9 @@ export function show() {
   dialog.showModal();
   dialog.scrollTop = 0; // what can be focused first is far below
 }
+
+/** A link that opens in a new tab. @param {string} href @param {string} words */
+const link = (href, words) => el("a", { href, target: "_blank", rel: "noopener", textContent: words });
 
 /** What can be done now comes first. @returns {import("./keymap.js").Group[]} */
 const groups = () => [...keymap()].sort((a, b) => Number(isIdle(a)) - Number(isIdle(b)));

@@ -15,16 +15,16 @@ import { reveal } from "./params.js";
 /** @type {Record<string, Kind>} */
 const KINDS = {
   iou: { label: "Box overlap (IoU)", test: "least", param: "fusion.min_iou" },
-  range_sigmas: { label: "Distances disagree", test: "most", unit: "σ", param: "fusion.range_gate_sigmas" },
-  class_size: { label: "Length for its class", test: "most", unit: "m", param: "fusion.size_gate" },
-  vehicle_class: { label: "A vehicle by class", test: "flag" },
+  range_sigmas: { label: "Range difference", test: "most", unit: "σ", param: "fusion.range_gate_sigmas" },
+  class_size: { label: "Length for class", test: "most", unit: "m", param: "fusion.size_gate" },
+  vehicle_class: { label: "Vehicle class", test: "flag" },
   distance_known: { label: "Distance known", test: "flag", unit: "m" },
-  hits: { label: "Times seen", test: "least", param: "cipv.confirm_hits" },
-  seen: { label: "Measured now", test: "flag", param: "cipv.carried_may_become_lead" },
-  size: { label: "Size of a vehicle", test: "flag", unit: "m", param: "cipv.max_size_m" },
+  hits: { label: "Detections", test: "least", param: "cipv.confirm_hits" },
+  seen: { label: "Detected in this frame", test: "flag", param: "cipv.carried_may_become_lead" },
+  size: { label: "Vehicle size", test: "flag", unit: "m", param: "cipv.max_size_m" },
   ahead: { label: "Ahead of the bumper", test: "least", unit: "m" },
-  path_offset: { label: "Off the path's middle", test: "most", unit: "m", param: "path.half_width_m" },
-  path_sigma: { label: "Place uncertain by", test: "most", unit: "m", param: "cipv.max_sigma_m" },
+  path_offset: { label: "Path offset", test: "most", unit: "m", param: "path.half_width_m" },
+  path_sigma: { label: "Position uncertainty", test: "most", unit: "m", param: "cipv.max_sigma_m" },
 };
 /** How far a bar reaches beyond the larger of value and limit. */
 const HEADROOM = 1.2;
@@ -42,7 +42,7 @@ const digits = (value) => (Number.isInteger(value) ? 0 : Math.abs(value) < 10 ? 
 /** An empty row for a gate; `showGate` fills it. @param {Gate} gate */
 export function gateRow({ name }) {
   const { label, param } = kindOf(name);
-  const title = param ? `Limit set by ${param}: press to go there` : label;
+  const title = param ? `Limit set by ${param}; click to edit` : label;
   const row = el(
     "button",
     { type: "button", class: "gate", title, disabled: !param, onclick: () => param && reveal(param)?.focus() },

@@ -88,8 +88,8 @@ function update() {
 function whyNone(result) {
   const n = result.rejected.length;
   return n
-    ? `${n} object${n > 1 ? "s" : ""} considered; the reasons are in the table.`
-    : "Nothing was seen in this frame.";
+    ? `${n} object${n > 1 ? "s" : ""} rejected; see the objects table for reasons.`
+    : "No objects in this frame.";
 }
 
 /** @param {Result} result */
@@ -103,7 +103,7 @@ function updateAcc({ acc: command, ego }) {
     pedals[pedal].fill.style.setProperty("--part", `${100 * (value ?? 0)}%`);
     text(pedals[pedal].value, value === null ? DASH : `${Math.round(100 * value)} %`);
   }
-  say(note, command ? command.reason : "Own speed is unknown.");
+  say(note, command ? command.reason : "Ego speed unknown.");
 }
 
 /** Words that may be cut off, so they are the tooltip too. @param {HTMLElement} node @param {string} words */

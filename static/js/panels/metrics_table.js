@@ -5,9 +5,9 @@ import { DASH, num, signed } from "../core/format.js";
 /** @typedef {import("../drive/types.js").Metric} Metric */
 
 const JUDGES = {
-  labels: "what people labelled here",
-  recording: "the labels that come with the recording",
-  simulator: "the simulator's truth",
+  labels: "labels made here",
+  recording: "labels of the recording",
+  simulator: "simulator ground truth",
 };
 
 /**
@@ -17,8 +17,8 @@ const JUDGES = {
  */
 export function metricsTable({ metrics, truth, judged }, isAlone = false) {
   const judge = truth
-    ? `Judged in ${judged} ${judged === 1 ? "frame" : "frames"} against ${JUDGES[truth]}`
-    : "Without labels: what needs none";
+    ? `Evaluated on ${judged} ${judged === 1 ? "frame" : "frames"} against ${JUDGES[truth]}`
+    : "No labels: metrics that need none";
   const head = (isAlone ? [] : ["", "before", "after", "change"]).map((words) =>
     el("th", { scope: "col", textContent: words }),
   );

@@ -54,7 +54,7 @@ function lost(link) {
   return [
     {
       level: "error",
-      text: `Connection lost ${seconds} s ago. What you see is old; trying to reach the server again.`,
+      text: `Connection lost ${seconds} s ago. The view is out of date; reconnecting.`,
       fixed: true,
     },
   ];

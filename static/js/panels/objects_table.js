@@ -20,54 +20,60 @@ const COLUMNS = [
   {
     key: "id",
     label: "#",
-    help: "Number of the object; it keeps it while it is tracked",
+    help: "Object ID, stable while the object is tracked",
     words: (o) => `#${o.id}`,
     by: (o) => o.id,
   },
-  { key: "source", label: "Seen", help: "V camera, L LiDAR, VL both", words: (o) => o.source, by: (o) => o.source },
+  {
+    key: "source",
+    label: "Seen",
+    help: "Seen by: V camera, L LiDAR, VL both",
+    words: (o) => o.source,
+    by: (o) => o.source,
+  },
   {
     key: "type",
     label: "Class",
-    help: "What the detector calls it, and its score",
+    help: "Detector class and score",
     words: (o) => (o.type ? `${o.type} ${num(o.type_score, 2)}` : DASH),
     by: (o) => o.type ?? "~",
   },
   {
     key: "distance",
     label: "Distance",
-    help: "To its nearest point, with one sigma, metres",
+    help: "Distance to the nearest point ± 1σ, in metres",
     words: distance,
     by: (o) => o.distance_m ?? Infinity,
   },
   {
     key: "velocity",
     label: "Closing",
-    help: "Closing speed, km/h: positive while the gap shrinks",
+    help: "Closing speed in km/h: positive while the gap shrinks",
     words: (o) => signed(kmh(closing(o))),
     by: (o) => -(closing(o) ?? -Infinity),
   },
   {
     key: "ttc",
     label: "TTC",
-    help: "Time to collision, seconds; a dash when the gap does not shrink",
+    help: "Time to collision in seconds; – while the gap is not shrinking",
     words: (o) => num(o.ttc_s),
     by: (o) => o.ttc_s ?? Infinity,
   },
   {
     key: "offset",
     label: "Offset",
-    help: "From the middle of the path, metres to the left or right",
+    help: "Lateral offset from the path centre, metres left (L) or right (R)",
     words: (o) => side(o.path_offset_m),
     by: (o) => Math.abs(o.path_offset_m ?? Infinity),
   },
   {
     key: "inPath",
     label: "In path",
-    help: "Inside our corridor, and how probable its sightings so far make that: yes from 50 % on",
+    help: "In the path corridor, with its filtered probability: yes from 50%",
     words: inPath,
     by: (o) => -(o.in_path_probability ?? Number(o.in_path)),
   },
-  { key: "hits", label: "Hits", help: "Sightings so far", words: (o) => String(o.hits), by: (o) => -o.hits },
+  { key: "hits", label: "Hits", help: "Number of detections so far", words: (o) => String(o.hits), by: (o) => -o.hits },
   {
     key: "points",
     label: "Points",
@@ -90,7 +96,7 @@ export function setUp() {
   const last = el(
     "th",
     { scope: "col", class: "left reason" },
-    el("button", { type: "button", textContent: "Why, or why not", disabled: true }),
+    el("button", { type: "button", textContent: "Reason", disabled: true }),
   );
   $("#objects thead").append(el("tr", {}, ...COLUMNS.map(heading), last));
   paintAfter(["frame", "selection"], update);
@@ -185,7 +191,7 @@ function fill(row, { item, why }) {
   for (const { key, words } of COLUMNS) text(cells[key], words(item));
   mark(cells.source, "source", item.source);
   cells.inPath.className = item.in_path ? "yes" : "no";
-  const words = item.carried ? `carried, not seen in this frame · ${why}` : why;
+  const words = item.carried ? `carried, not detected in this frame · ${why}` : why;
   if (reason.title === words) return;
   text(reason, words);
   reason.title = words;

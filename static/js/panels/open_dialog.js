@@ -28,7 +28,7 @@ export async function open() {
     name: "uri",
     value: wanted ?? current ?? "",
     placeholder: "pcap:<file>, rosbag:<path>, kitti:<folder>, sim:<scenario>",
-    aria: { label: "Address of a recording" },
+    aria: { label: "Recording URI" },
     spellcheck: false,
   });
   const form = el("form", { class: "open-row", method: "dialog" }, field, el("button", { textContent: "Open" }));

@@ -31,13 +31,13 @@ export function control(name, param, change) {
     class: "auto",
     textContent: "auto",
     hidden: true,
-    title: "Taken from the recording's calibration, or the detector's own",
+    title: "Default from the recording's calibration or the detector",
   });
   const reset = el("button", {
     type: "button",
     class: "reset",
     textContent: "↺",
-    title: "Back to the preset's value",
+    title: "Reset to the preset value",
     aria: { label: `Reset ${words(param.key)}` },
   });
   const label = el("label", { htmlFor: id, textContent: words(param.key) });
@@ -94,7 +94,7 @@ function slider(id, param, change) {
     step,
     min: String(low),
     max: String(high),
-    aria: { label: `${words(param.key)}, number` },
+    aria: { label: `${words(param.key)}, value` },
   });
   const read = (/** @type {string} */ text) => (param.kind === "integer" ? Math.round(Number(text)) : Number(text));
   range.addEventListener("input", () => {

@@ -36,7 +36,7 @@ const search = el("input", {
 const nothing = el("p", {
   class: "facts",
   aria: { role: "status" },
-  textContent: "No parameter is called or explained so.",
+  textContent: "No matching parameters.",
   hidden: true,
 });
 /** @type {Map<string, ReturnType<typeof control>>} */
@@ -61,7 +61,7 @@ export function setUp() {
   const download = el("a", {
     href: "api/params.yaml",
     textContent: "Save preset",
-    title: "A file for `cipv run --params FILE`",
+    title: "YAML file for `cipv run --params FILE`",
   });
   download.setAttribute("download", "cipv-params.yaml");
   presets.addEventListener("change", () => choosePreset(presets.value));
@@ -77,7 +77,7 @@ export function setUp() {
         el("button", {
           type: "button",
           textContent: "Reset",
-          title: "Every parameter back to the preset's value",
+          title: "Reset all parameters to the preset values",
           onclick: () => choosePreset(presets.value),
         }),
         download,

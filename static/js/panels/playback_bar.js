@@ -12,29 +12,29 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 
 const playIcon = icon("play"),
   pauseIcon = icon("pause");
-const back = button("Step back", "One frame back (←)", () => playback({ step: -1 }), icon("back"));
-const play = button("Play", "Play or pause (space)", togglePlay, playIcon, pauseIcon);
-const next = button("Step forward", "One frame on (→)", () => playback({ step: 1 }), icon("next"));
-const name = el("span", { class: "name", title: "The recording's own name of this frame" });
+const back = button("Step back", "Previous frame (←)", () => playback({ step: -1 }), icon("back"));
+const play = button("Play", "Play or pause (Space)", togglePlay, playIcon, pauseIcon);
+const next = button("Step forward", "Next frame (→)", () => playback({ step: 1 }), icon("next"));
+const name = el("span", { class: "name", title: "Frame name in the recording" });
 const count = el("span", { class: "dim" });
 const time = el("span");
 const provisional = el("span", {
   class: "tag",
   textContent: "provisional",
-  title: "The whole recording is still being computed: numbers of objects may change",
+  title: "The whole drive is still being computed; object IDs may change",
   hidden: true,
 });
 const live = el("span", { class: "tag live", textContent: "LIVE", title: NO_DRIVE, hidden: true });
 const speed = el(
   "select",
-  { title: "Speed ([ and ])", aria: { label: "Speed" } },
+  { title: "Playback speed ([ and ])", aria: { label: "Playback speed" } },
   ...SPEEDS.map((s) => el("option", { value: String(s), textContent: `${s}×` })),
 );
 const loop = el("button", {
   type: "button",
   class: "toggle",
-  textContent: "Repeat",
-  title: "Start again at the end (R)",
+  textContent: "Loop",
+  title: "Loop playback (R)",
   onclick: toggleLoop,
 });
 

@@ -34,6 +34,6 @@ function show(button, words) {
   text(words, isOn() && recording ? `${clock(recording.seconds)}${lost}` : "Record");
   button.title =
     recording?.error ??
-    (problem || (recording ? `Recording into ${recording.file}; press to end` : "Record a session"));
-  button.setAttribute("aria-label", isOn() ? "End the recording" : "Record");
+    (problem || (recording ? `Recording into ${recording.file}; click to stop` : "Record a session"));
+  button.setAttribute("aria-label", isOn() ? "Stop recording" : "Record");
 }

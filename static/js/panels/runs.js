@@ -62,12 +62,12 @@ function show() {
 
 /** @param {Run} run */
 function rowOf({ id }) {
-  const name = el("input", { type: "text", class: "run-name", maxLength: 60, aria: { label: "Name of the run" } });
+  const name = el("input", { type: "text", class: "run-name", maxLength: 60, aria: { label: "Run name" } });
   name.addEventListener("change", () => act(`${id}/keep`, "POST", { name: name.value.trim() }));
   const yaml = el("a", {
     href: `api/runs/${id}/params.yaml`,
     textContent: "YAML",
-    title: "A file for `cipv run --params`",
+    title: "YAML file for `cipv run --params`",
   });
   yaml.setAttribute("download", `cipv-run-${id}.yaml`);
   const button = (/** @type {string} */ words, /** @type {string} */ title, /** @type {() => void} */ onclick) =>
@@ -80,14 +80,14 @@ function rowOf({ id }) {
     el(
       "div",
       { class: "run-buttons" },
-      button("Keep", "Keep this run; an unkept one goes when newer ones come", () =>
+      button("Keep", "Keep this run; unsaved runs are discarded", () =>
         act(`${id}/keep`, "POST", { name: name.value.trim() }),
       ),
-      button("Use", "Take its parameters", () => act(`${id}/use`)),
-      button("Compare", "Compare against this run", () => act(`${id}/base`)),
+      button("Use", "Use these parameters", () => act(`${id}/use`)),
+      button("Compare", "Compare with this run", () => act(`${id}/base`)),
       yaml,
       el("span", { class: "facts" }),
-      button("✕", "Forget this run", () => act(String(id), "DELETE")),
+      button("✕", "Delete run", () => act(String(id), "DELETE")),
     ),
   );
 }
@@ -112,7 +112,7 @@ function showRun(row, run) {
   use.disabled = isNow;
   base.disabled = isBase;
   drop.disabled = isNow || isBase;
-  drop.setAttribute("aria-label", `Forget run ${run.name || run.id}`);
+  drop.setAttribute("aria-label", `Delete run ${run.name || run.id}`);
   text(
     $(".facts", HTMLElement, row),
     run.phase === "done"
@@ -133,7 +133,7 @@ function showComparison() {
         class: "facts pad",
         textContent: get("state")?.live
           ? NO_DRIVE
-          : "Change a parameter: the whole recording is computed again and compared here.",
+          : "Change a parameter to recompute the whole drive and compare the results here.",
       }),
     );
   }
@@ -147,14 +147,14 @@ function showComparison() {
       el("b", {
         textContent: found.frames_differing
           ? `${found.frames_differing} of ${drive.count} frames differ`
-          : "No frame differs",
+          : "No frames differ",
       }),
       el("span", { class: "spacer" }),
       el("button", {
         type: "button",
         textContent: "↑",
-        title: "Difference before (Shift X)",
-        aria: { label: "Difference before" },
+        title: "Previous difference (Shift X)",
+        aria: { label: "Previous difference" },
         onclick: () => toDifference(-1),
       }),
       el("button", {

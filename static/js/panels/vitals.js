@@ -7,11 +7,16 @@ import { num } from "../core/format.js";
 import { get, on } from "../core/store.js";
 
 const ITEMS = [
-  ["fps", "fps", "Frames painted in the last second", ""],
-  ["age", "age", "Milliseconds from the result made to the frame painted", ""],
-  ["line", "line", "Milliseconds that the stages took, without the network", "optional"],
-  ["net", "net", "Milliseconds of the network; 0 when its boxes were cached", "optional"],
-  ["skipped", "skipped", "Frames since the opening that came faster than they could be computed or shown", ""],
+  ["fps", "fps", "Frames drawn in the last second", ""],
+  ["age", "age", "Latency from result to screen, in milliseconds", ""],
+  ["line", "line", "Pipeline time per frame without the detector, in milliseconds", "optional"],
+  ["net", "net", "Detector time per frame in milliseconds; 0 if cached", "optional"],
+  [
+    "skipped",
+    "skipped",
+    "Frames skipped since opening because they arrived faster than they could be processed or drawn",
+    "",
+  ],
 ];
 /** @type {Record<string, HTMLElement>} */
 const values = {};

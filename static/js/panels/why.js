@@ -21,7 +21,7 @@ const type = el("span"),
 const gates = el("div", { class: "gates" }),
   ranking = el("div", { class: "ranking" });
 const candidates = new LongList(ranking, (/** @type {Ranked} */ { id }) => id, rankedRow, showRanked);
-const rankingTitle = el("h3", { textContent: "Ranking of candidates" });
+const rankingTitle = el("h3", { textContent: "Candidate ranking" });
 const content = el(
   "div",
   { class: "why-content" },
@@ -31,7 +31,7 @@ const content = el(
   rankingTitle,
   ranking,
 );
-const nothing = el("p", { class: "facts pad", textContent: "Nothing is shown yet." });
+const nothing = el("p", { class: "facts pad", textContent: "No frame yet." });
 
 export function setUp() {
   content.hidden = true;
@@ -49,10 +49,12 @@ function update() {
   const isLead = id !== null && result.cipv?.id === id;
   content.hidden = !item;
   nothing.hidden = Boolean(item);
-  text($("#why-facts"), item ? (isLead ? "why it is the CIPV" : "why it is not the CIPV") : "");
+  text($("#why-facts"), item ? (isLead ? "why this is the CIPV" : "why this is not the CIPV") : "");
   text(
     nothing,
-    id === null ? "No CIPV in this frame. Select an object to see what stopped it." : `#${id} is not in this frame.`,
+    id === null
+      ? "No CIPV in this frame. Select an object to see why it was rejected."
+      : `#${id} is not in this frame.`,
   );
   const ranked = display.ranking ?? [];
   const list = isLead || !item ? ranked : [];

@@ -39,8 +39,8 @@ function build() {
 
 function nothing() {
   const state = get("state");
-  if (state?.live) return "Marks of this drive appear here. Events are looked for in recordings.";
-  return state?.drive?.running ? "Looking …" : "No events in this recording.";
+  if (state?.live) return "Marks appear here. Events are detected in recordings only.";
+  return state?.drive?.running ? "Searching …" : "No events in this recording.";
 }
 
 /** @param {DriveEvent} event */
@@ -65,7 +65,7 @@ function rowOf(event) {
     type: "button",
     class: "drop",
     textContent: "✕",
-    aria: { label: `Remove the mark at ${clock(event.t_s)}` },
+    aria: { label: `Remove mark at ${clock(event.t_s)}` },
     onclick: () => request(`api/marks/${event.mark}`, "DELETE").catch(refused),
   });
   return el("div", { class: "event-row" }, go, remove);

@@ -7,11 +7,11 @@ import { chosen } from "./clip.js";
 /** @typedef {import("../drive/types.js").Job} Job */
 
 const KINDS = [
-  ["mcap", "MCAP", "what the sensors gave and what the line made of it"],
+  ["mcap", "MCAP", "sensor data and results"],
   ["rrd", "rerun .rrd", "for the rerun viewer"],
-  ["mp4", "MP4", "the camera with overlay"],
-  ["csv", "CSV", "one row a frame"],
-  ["html", "HTML report", "one page"],
+  ["mp4", "MP4", "camera with overlay"],
+  ["csv", "CSV", "one row per frame"],
+  ["html", "HTML report", "single page"],
 ];
 const POLL_MS = 300;
 
@@ -73,7 +73,7 @@ function row(job) {
     type: "button",
     class: "drop",
     textContent: "✕",
-    aria: { label: `Forget ${words}` },
+    aria: { label: `Remove ${words}` },
     onclick: () => request(`api/jobs/${job.id}`, "DELETE").then(look, look),
   });
   return el("div", { class: "menu-row job" }, job.state === "done" ? download(job, words) : progress(job, words), drop);

@@ -146,6 +146,9 @@ function hovered(index) {
   redrawValues();
 }
 
+/** @param {number} done @param {number} total */
+const percent = (done, total) => `${Math.round((100 * done) / Math.max(1, total))}%`;
+
 /** How far the computing has come, and how much the two runs differ. */
 function describe() {
   const state = get("state")?.drive,
@@ -158,15 +161,13 @@ function describe() {
   $(".timeline-pane").setAttribute("aria-busy", String(!isWhole));
   const words = [];
   if (state?.running)
-    words.push(
-      `${state.phase === "detect" ? "detecting" : "computing"} ${Math.round((100 * state.done) / Math.max(1, state.total))} %`,
-    );
+    words.push(`${state.phase === "detect" ? "detecting" : "computing"} ${percent(state.done, state.total)}`);
   if (state?.note) words.push(state.note);
   if (drive?.comparison)
     words.push(
       drive.comparison.frames_differing
         ? `${num(drive.comparison.frames_differing, 0)} of ${drive.count} frames differ`
-        : "no frame differs",
+        : "no frames differ",
     );
   text($("#timeline-facts"), words.join(" · "));
   $("#timeline-facts").style.color = drive?.comparison?.frames_differing ? ui("warn") : "";

@@ -73,7 +73,7 @@ function draw() {
     ctx = surface.begin();
   if (!frame) return;
   describe(frame);
-  if (!frame.picture) return message(ctx, "No camera picture in this frame");
+  if (!frame.picture) return message(ctx, "No camera image in this frame");
   layOut(frame.picture);
   const { width, height } = frame.picture;
   ctx.save();
@@ -84,7 +84,7 @@ function draw() {
     blend = align?.on ? align.blend : null;
   if (blend !== null) ctx.globalAlpha = Math.min(1, 2 * (1 - blend));
   if (frame.bitmap) ctx.drawImage(frame.bitmap, laid.x, laid.y, width * laid.scale, height * laid.scale);
-  else message(ctx, "The picture of this frame could not be decoded");
+  else message(ctx, "Could not decode the camera image of this frame");
   ctx.globalAlpha = 1;
   for (const layer of extra.under) layer(ctx, frame, laid);
   if (blend === null) drawBelief(ctx, frame);
@@ -138,7 +138,7 @@ function layOut({ width, height }) {
 function describe({ result: { sensors }, picture }) {
   const facts = picture ? [`${picture.full_width}×${Math.round(picture.height / picture.scale)}`] : [];
   if (sensors.lidar?.points) facts.push(`${sensors.lidar.points.toLocaleString("en")} points`);
-  if (sensors.camera?.skew_ms) facts.push(`camera ${num(sensors.camera.skew_ms, 0)} ms after LiDAR`);
+  if (sensors.camera?.skew_ms) facts.push(`camera–LiDAR skew ${num(sensors.camera.skew_ms, 0)} ms`);
   text($("#camera-facts"), facts.join(" · "));
 }
 

@@ -34,6 +34,6 @@ function wordsOf(item) {
   const speed = item.velocity_mps ? kmh(item.velocity_mps[0]) : null;
   if (speed !== null) parts.push(`${signed(speed)} km/h relative`);
   if (item.ttc_s !== null) parts.push(`TTC ${num(item.ttc_s)} s`);
-  if (item.in_path_probability !== null) parts.push(`in path ${Math.round(100 * item.in_path_probability)} %`);
+  if (item.in_path_probability !== null) parts.push(`in path ${Math.round(100 * item.in_path_probability)}%`);
   return parts.join(" · ");
 }

@@ -8,18 +8,18 @@ import { toggleTape } from "./measuring_tape.js";
 /** @type {Record<View, [string, string, string, string][]>} key, label, what it is, palette role; by view */
 const CHIPS = {
   camera: [
-    ["points", "Points", "LiDAR points in the picture", "path"],
+    ["points", "Points", "LiDAR points projected into the image", "path"],
     ["cuboids", "Cuboids", "Cuboids of LiDAR objects", "lidar"],
-    ["lidarBoxes", "L boxes", "Image boxes around the cuboids, as fusion compares them", "lidar"],
-    ["visionBoxes", "V boxes", "The detector's tracked boxes", "vision"],
-    ["path", "Path", "The corridor laid on the ground", "path"],
-    ["lanes", "Lanes", "The ego lane's lines, as they are believed", "lane"],
+    ["lidarBoxes", "L boxes", "LiDAR boxes in the image, as used by fusion", "lidar"],
+    ["visionBoxes", "V boxes", "Tracked detector boxes", "vision"],
+    ["path", "Path", "Path corridor on the ground", "path"],
+    ["lanes", "Lanes", "Estimated ego-lane lines", "lane"],
   ],
   plan: [
-    ["planPoints", "Points", "LiDAR points from above", "cluster"],
-    ["velocity", "Motion", "Where each object will be relative to us in one second", "fused"],
-    ["trails", "Trails", "Where each object was relative to us in the last three seconds", "fused"],
-    ["planPath", "Path", "The corridor with one sigma of its sides, and the ego lane's lines", "path"],
+    ["planPoints", "Points", "LiDAR points", "cluster"],
+    ["velocity", "Motion", "Relative motion over the next second", "fused"],
+    ["trails", "Trails", "Relative positions over the last 3 seconds", "fused"],
+    ["planPath", "Path", "Path corridor with 1σ of its edges, and ego-lane lines", "path"],
   ],
 };
 const DEFAULTS = {
@@ -61,7 +61,7 @@ export function setUp() {
     $(canvas).after(
       el(
         "div",
-        { class: "view-tools", data: { view }, aria: { role: "group", label: `Tools of the ${view}` } },
+        { class: "view-tools", data: { view }, aria: { role: "group", label: `${view} tools` } },
         colorChoice(view),
         tapeButton(),
       ),
@@ -102,7 +102,7 @@ function colorChoice(view) {
   const options = COLOR_BY.map(([by, label, title]) => el("option", { value: by, textContent: label, title }));
   const choice = el(
     "select",
-    { class: "color-by", aria: { label: `Colour points of the ${view} by` }, title: "Colour points by" },
+    { class: "color-by", aria: { label: `Colour ${view} points by` }, title: "Colour points by" },
     ...options,
   );
   const show = () => (choice.value = get("colorBy")?.[view] ?? DEFAULT_COLORS[view]);
@@ -121,7 +121,7 @@ function tapeButton() {
   const button = el("button", {
     type: "button",
     textContent: "Tape",
-    title: "Measuring tape: drag between two places (or drag with Shift)",
+    title: "Measuring tape: drag between two points (or Shift + drag)",
     onclick: toggleTape,
   });
   on(["taping"], () => press(button, get("taping") === true));

@@ -84,8 +84,8 @@ export function setUp() {
     (u, v) => modeNow()?.cursorAt(view.place(u, v), view.scale) ?? "",
   );
   const views = /** @type {const} */ ([
-    ["ahead", "Ahead", "The road ahead (double click)"],
-    ["around", "Around", "50 m on every side"],
+    ["ahead", "Ahead", "View the road ahead (double-click)"],
+    ["around", "Around", "View 50 m in every direction"],
   ]);
   for (const [name, label, title] of views)
     addTool(

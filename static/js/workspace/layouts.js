@@ -39,7 +39,7 @@ function fill() {
       label,
     ),
   );
-  const name = el("input", { type: "text", placeholder: "Name", maxLength: 40, aria: { label: "Name of the layout" } });
+  const name = el("input", { type: "text", placeholder: "Name", maxLength: 40, aria: { label: "Layout name" } });
   const form = el(
     "form",
     { class: "menu-row", onsubmit: (/** @type {Event} */ event) => save(event, name.value) },
@@ -68,7 +68,7 @@ function item(name, layout, isOwn = false) {
       type: "button",
       class: "drop",
       textContent: "✕",
-      aria: { label: `Delete the layout ${name}` },
+      aria: { label: `Delete layout ${name}` },
       onclick: () => forget(name),
     }),
   );

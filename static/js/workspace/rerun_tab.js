@@ -39,7 +39,7 @@ function bar(body, what) {
   const save = el("a", {
     href: "api/rerun.rrd",
     textContent: "Save .rrd",
-    title: "For the native viewer: 100 frames around this one",
+    title: "100 frames around this one, for the native viewer",
   });
   save.setAttribute("download", "");
   return el(
@@ -51,13 +51,13 @@ function bar(body, what) {
     el("button", {
       type: "button",
       textContent: "Start",
-      title: "Open it from the start on",
+      title: "Open from the start",
       onclick: () => load(body, 0),
     }),
     el("button", {
       type: "button",
       textContent: "Here",
-      title: "Open it from the shown frame on",
+      title: "Open from the current frame",
       onclick: () => load(body),
     }),
   );

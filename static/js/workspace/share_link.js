@@ -116,7 +116,7 @@ async function apply(shared, agreed = false) {
   if (shared.preset) {
     const body = { preset: shared.preset, values: shared.values };
     await request("api/params", "POST", body).catch((problem) =>
-      show("This link's parameters do not fit", problem.message),
+      show("This link has invalid parameters", problem.message),
     );
   }
   if (shared.index !== null && !get("state")?.live) {
@@ -132,14 +132,14 @@ async function whatItChanges(shared) {
     changes = [];
   const opens = shared.uri && shared.uri !== state?.uri;
   if (opens && !BUILT_IN.test(shared.uri ?? "")) changes.push(`open ${shared.uri}`);
-  if (opens && state?.live) changes.push("let go of the live sensors");
-  if (opens && state?.recording) changes.push("end the recording");
+  if (opens && state?.live) changes.push("disconnect the live sensors");
+  if (opens && state?.recording) changes.push("stop recording");
   if (shared.preset) {
     /** @type {{preset: string, values: Record<string, ParamValue>, base: Record<string, ParamValue>}} */
     const now = await request("api/params");
     const wanted = { ...now.base, ...shared.values };
     const differing = Object.keys(wanted).filter((name) => wanted[name] !== now.values[name]);
-    if (shared.preset !== now.preset) changes.push(`take the preset ${shared.preset}`);
+    if (shared.preset !== now.preset) changes.push(`use preset ${shared.preset}`);
     else if (differing.length) changes.push(`change ${differing.join(", ")}`);
   }
   return changes;
@@ -147,15 +147,15 @@ async function whatItChanges(shared) {
 
 /** @param {string[]} changes @param {Shared} shared */
 function ask(changes, shared) {
-  const yes = el("button", { type: "button", textContent: "Follow it" });
+  const yes = el("button", { type: "button", textContent: "Continue" });
   yes.addEventListener("click", () => {
     dialog.close();
     apply(shared, true);
   });
   dialog.replaceChildren(
-    el("h2", { textContent: "This link wants to" }),
+    el("h2", { textContent: "This link will" }),
     el("ul", {}, ...changes.map((words) => el("li", {}, el("code", { textContent: words })))),
-    el("form", { class: "dialog-buttons", method: "dialog" }, yes, el("button", { textContent: "Stay here" })),
+    el("form", { class: "dialog-buttons", method: "dialog" }, yes, el("button", { textContent: "Cancel" })),
   );
   dialog.showModal();
 }

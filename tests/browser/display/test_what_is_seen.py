@@ -31,7 +31,7 @@ def test_a_sensor_that_fails_is_seen_by_colour_word_and_shape(open_display: Open
     page = open_display(site.address)
     expect(page.locator("#sensors li")).to_have_count(3)
     works, late, own_speed, gone = page.evaluate(STREAMS)
-    assert [works[0], late[0], own_speed[0], gone[0]] == ["LiDAR10 Hz", "Camerastale", "Own speed", "GNSSsilent"]
+    assert [works[0], late[0], own_speed[0], gone[0]] == ["LiDAR10 Hz", "Camerastale", "Ego speed", "GNSSsilent"]
     for column in (1, 2):
         assert len({works[column], late[column], gone[column]}) == 3
 

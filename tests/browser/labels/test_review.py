@@ -37,7 +37,7 @@ def test_labels_and_who_leads_are_found_right_or_sent_back_one_after_the_other(h
     dialog = page.get_by_role("dialog", name="Send back")
     dialog.get_by_label("Comment").fill("it begins later")
     dialog.get_by_role("button", name="OK").click()
-    expect(said).to_contain_text("Nothing of others is left to review")
+    expect(said).to_contain_text("No labels from others left to review")
     (lead,) = labels.everything["leads"]
     assert (lead["state"], lead["comment"], lead["reviewer"]) == ("proposed", "it begins later", "")
     expect(page.locator("#label-bar .where")).to_have_text(f"sent back {START + 3}–{START + 7}: it begins later")

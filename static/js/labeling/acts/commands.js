@@ -37,7 +37,7 @@ export function propose() {
 export function judge(kind) {
   const track = chosen();
   if (track) act({ kind, items: [refOf(track)] });
-  else if (!span.judge(kind)) say("Nothing is selected, and nobody leads here");
+  else if (!span.judge(kind)) say("No label selected, and no lead in this frame");
 }
 
 /** Everything of the shown frame that nobody has looked at: its tracks and its lead. */
@@ -50,7 +50,7 @@ export function acceptHere() {
   const items = tracks.map((track) => refOf(/** @type {LabelTrack} */ (track)));
   if (lead?.state === "proposed") items.push({ kind: "lead", id: lead.id, revision: lead.revision });
   if (items.length) act({ kind: "accept", items });
-  else say("Nothing here is proposed");
+  else say("No proposals in this frame");
 }
 
 /** The next or the previous label of the shown frame. @param {1|-1} direction */
@@ -75,7 +75,7 @@ function change(how) {
   const track = chosen(),
     cuboid = draft.presentOf(track?.id ?? null)?.cuboid;
   if (!track) return say("Select a label first");
-  if (!cuboid) return say(`#${track.id} has no cuboid in this frame: draw it (Shift G)`);
+  if (!cuboid) return say(`#${track.id} has no cuboid in this frame; draw one (Shift G)`);
   draft.hold(track.id, { cuboid: how(cuboid) });
   draft.release();
 }
@@ -93,7 +93,7 @@ export const keyframe = () =>
   withTrack(async ({ id }) => {
     const frame = shown(),
       shape = draft.presentOf(id) ?? (await nearestShape(id, frame));
-    if (!shape || shown() !== frame) return say(`#${id} is nowhere yet: draw it`);
+    if (!shape || shown() !== frame) return say(`#${id} has no shape yet; draw one`);
     draft.hold(id, { cuboid: shape.cuboid, bbox: shape.bbox });
     draft.release();
   });
@@ -113,7 +113,7 @@ export const sizeAlong = () =>
   withTrack(({ id, revision }) => {
     const size = draft.presentOf(id)?.cuboid?.size;
     if (size) act({ kind: "size_along", track: id, revision, size });
-    else say(`#${id} has no cuboid in this frame: draw it (Shift G)`);
+    else say(`#${id} has no cuboid in this frame; draw one (Shift G)`);
   });
 
 /** The vehicle is not there, in the marked frames or in this one. */
@@ -136,14 +136,14 @@ export const merge = () =>
   withTrack(({ id }) => {
     setTool("merge");
     if (get("labeling")?.tool === "merge")
-      say(`Which one is #${id} too? Press it, or . until it is selected, then Enter`);
+      say(`Click the label to merge with #${id}, or select it with . and press Enter`);
   });
 
 /** The track that the merging began with is this one too. @param {number} other */
 export function mergeWith(other) {
   const a = trackOf(get("labeling")?.from ?? null),
     b = trackOf(other);
-  if (!a || !b || a === b) return say("Select the other label: press it, or .");
+  if (!a || !b || a === b) return say("Select the other label: click it, or press .");
   setTool(null);
   set("track", a.id);
   act({ kind: "merge", tracks: [a, b].map(({ id, revision }) => ({ id, revision })) });

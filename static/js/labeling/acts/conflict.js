@@ -29,7 +29,7 @@ export async function choose(act, sentence, item, theirs) {
     ),
   );
   return open("Two people changed the same label", body, null, [
-    ["Take theirs", null],
+    ["Use theirs", null],
     [
       "Keep mine",
       () => based(act, (ref) => (ref.kind === item.kind && ref.id === item.id ? theirs.revision : ref.revision)),
@@ -71,13 +71,13 @@ const FRAMES = ["frame", "first", "last"];
 
 /** What an act is about, where its kind does not say it to people. @type {Record<string, string>} */
 const ACTS = {
-  set_sighting: "where it is",
+  set_sighting: "position",
   drop_keyframe: "no keyframe",
   drop_sightings: "not here",
-  size_along: "its size",
-  refit: "laid on points",
-  relabel: "its class",
-  trim_lead: "the range's end",
+  size_along: "size",
+  refit: "fit to points",
+  relabel: "class",
+  trim_lead: "range end",
 };
 
 /** @param {string} title @param {Record<string, any>} item */
@@ -103,7 +103,7 @@ function side(title, item) {
 /** @param {any} value @returns {string} */
 function words(value) {
   if (typeof value === "number") return String(Math.round(value * 100) / 100);
-  if (Array.isArray(value)) return value.length > 8 ? `${value.length} of them` : value.map(words).join(", ");
+  if (Array.isArray(value)) return value.length > 8 ? `${value.length} items` : value.map(words).join(", ");
   if (value && typeof value === "object")
     return Object.entries(value)
       .map(([key, inner]) => `${key.replace("_rad", "")} ${words(inner)}`)

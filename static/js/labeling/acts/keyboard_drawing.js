@@ -73,7 +73,7 @@ export function boxAround() {
   const track = chosen();
   if (!track) return say("Select a label first");
   const bbox = boxOf(track.id) ?? middleBox();
-  if (!bbox) return say("This frame has no picture");
+  if (!bbox) return say("This frame has no image");
   draft.hold(track.id, { bbox });
   draft.release();
   return bbox;

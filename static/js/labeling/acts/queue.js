@@ -56,7 +56,7 @@ export const move = (direction) => put({ kind: direction }, `api/labels/${direct
 async function put(act, path, person) {
   const drive = await driveNow();
   if (drive === null && get("state")?.labels) {
-    set("said", "Nothing was done: the server cannot be reached");
+    set("said", "Not saved: cannot reach the server");
     return null;
   }
   return new Promise((done) => {
@@ -100,7 +100,7 @@ export async function send() {
       ).catch((error) => error);
       const refusal = answer instanceof Refused && !AWAY.includes(answer.status) ? answer : null;
       if (answer instanceof Error && !refusal)
-        return tell("failed", answer instanceof Refused ? answer.message : "the server cannot be reached");
+        return tell("failed", answer instanceof Refused ? answer.message : "cannot reach the server");
       queue.shift();
       if (refusal) await refused(next, refusal);
       else settle(next, /** @type {ActAnswer} */ (answer));
@@ -146,7 +146,7 @@ const tell = (state, problem = "") => set("saving", { state, at_ms: savedAt_ms, 
 function settle({ act, done }, answer) {
   if (answer.act != null) savedAt_ms = Date.now();
   tell("saved");
-  const how = { undo: "undone: ", redo: "done again: " }[act.kind] ?? "";
+  const how = { undo: "undone: ", redo: "redone: " }[act.kind] ?? "";
   set("said", how + [answer.what, answer.note].filter(Boolean).join(": "));
   if (answer.changed) {
     for (const later of queue) later.act = rebased(later.act, act, answer);

@@ -104,8 +104,8 @@ export function bringHere(side) {
     [...ends().values()].filter((each) => each[side]),
     ({ at }) => Math.abs(at - to),
   );
-  if (!end) return set("said", "Nobody leads yet: mark frames (I, O), then say who leads there (C)");
+  if (!end) return set("said", "No lead ranges yet. Mark frames (I, O), then set the lead (C)");
   const held = trimmed(end, to);
   if (held) keep(held);
-  else set("said", `The lead ${side === "after" ? "begins" : "ends"} here already`);
+  else set("said", `The lead already ${side === "after" ? "starts" : "ends"} here`);
 }

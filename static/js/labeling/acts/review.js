@@ -58,8 +58,8 @@ async function step(frame, direction, after, isLast = false) {
     if (isLast)
       say(
         found.left
-          ? `${found.left} are left to review, ${direction > 0 ? "before" : "after"} this frame`
-          : "Nothing of others is left to review",
+          ? `${found.left} left to review ${direction > 0 ? "before" : "after"} this frame`
+          : "No labels from others left to review",
       );
     return false;
   }
@@ -84,7 +84,7 @@ export function target() {
   if (path)
     return {
       ref: { kind: "path", id: path.id, revision: path.revision },
-      name: `the path of frame ${path.frame + 1}`,
+      name: `path in frame ${path.frame + 1}`,
       comment: path.comment,
     };
   if (event)
@@ -106,16 +106,16 @@ export function target() {
 /** Another person has made it, and it is right. */
 export async function reviewOk() {
   const under = target();
-  if (!under) return say("Nothing is selected, and nobody leads here");
+  if (!under) return say("No label selected, and no lead in this frame");
   if ((await act({ kind: "review_ok", items: [under.ref] })) && isReviewing()) await goOn();
 }
 
 export async function sendBack() {
   const under = target();
-  if (!under) return say("Nothing is selected, and nobody leads here");
+  if (!under) return say("No label selected, and no lead in this frame");
   const comment = await ask(
     "Send back",
-    el("p", { textContent: `${under.name} goes back to who labelled it.` }),
+    el("p", { textContent: `${under.name} goes back to its annotator.` }),
     "Comment",
     under.comment,
   );

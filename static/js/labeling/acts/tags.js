@@ -20,7 +20,7 @@ export async function toggleWhole() {
   const answer = await tagFrames(WHOLE_TAG, isOn),
     left = isOn && answer ? proposedIn(frames) : 0;
   if (answer && left)
-    set("said", `${answer.what}; ${left} ${left === 1 ? "track is" : "tracks are"} still proposed there`);
+    set("said", `${answer.what}; ${left} ${left === 1 ? "track is" : "tracks are"} still proposed in these frames`);
 }
 
 /** @param {{first: number, last: number}} frames */

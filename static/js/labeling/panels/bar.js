@@ -25,13 +25,13 @@ let ended = null;
 let about = -1;
 
 const where = el("span", { class: "facts where" }),
-  leads = el("span", { class: "joined leads", aria: { role: "group", label: "Who leads" } });
+  leads = el("span", { class: "joined leads", aria: { role: "group", label: "Lead" } });
 const saved = el("span", { class: "saved", aria: { role: "status" } }),
   again = el("button", { type: "button", textContent: "Retry", hidden: true, onclick: send }),
   discarded = el("button", {
     type: "button",
     textContent: "Discard",
-    title: "Give up what is not saved",
+    title: "Discard unsaved changes",
     hidden: true,
     onclick: discard,
   });
@@ -42,7 +42,7 @@ const task = el(
   el("progress", { max: 1, aria: { label: "Progress" } }),
   el("span", { class: "facts" }),
 );
-const name = el("button", { type: "button", class: "quiet", title: "Who labels" });
+const name = el("button", { type: "button", class: "quiet", title: "Annotator" });
 const back = el("button", {
   type: "button",
   class: "icon-button",
@@ -63,7 +63,7 @@ const fresh = el("button", {
   type: "button",
   class: "toggle fresh",
   textContent: "New",
-  title: "New label: drag in the plan, drag or click in the picture, or Enter (G)",
+  title: "New label: drag in the plan, drag or click in the image, or press Enter (G)",
   onclick: () => setTool("new"),
 });
 
@@ -71,7 +71,7 @@ const reviewToggle = el("button", {
   type: "button",
   class: "toggle",
   textContent: "Review",
-  title: "Go through what others stand behind (Shift R)",
+  title: "Review labels made by others (Shift R)",
   onclick: review.toggleReview,
 });
 const under = el("span", { class: "under" }),
@@ -82,20 +82,20 @@ const under = el("span", { class: "under" }),
     under,
     el("button", {
       type: "button",
-      textContent: "Right",
-      title: "It is right, and the next (A)",
+      textContent: "Approve",
+      title: "Approve and go to next (A)",
       onclick: review.reviewOk,
     }),
     el("button", {
       type: "button",
       textContent: "Send back",
-      title: "With a comment, and the next (R)",
+      title: "Send back with a comment and go to next (R)",
       onclick: review.sendBack,
     }),
     el("button", {
       type: "button",
-      textContent: "Next",
-      title: "Leave it (N)",
+      textContent: "Skip",
+      title: "Skip (N)",
       onclick: () => review.nextUnreviewed(1),
     }),
   );
@@ -134,11 +134,11 @@ export function setUp() {
       el("b", { textContent: "Next" }),
       el(
         "span",
-        { class: "joined", aria: { role: "group", label: "Go to the next" } },
-        next("Unlabelled", "Next frame in which something is unlabelled (N)", "unlabelled"),
-        next("Disagreement", "Next disagreement of labels and pipeline (V)", "disagreement"),
+        { class: "joined", aria: { role: "group", label: "Go to next" } },
+        next("Unlabelled", "Next unlabelled frame (N)", "unlabelled"),
+        next("Disagreement", "Next disagreement between labels and pipeline (V)", "disagreement"),
         next("Proposed", "Next proposal (B)", "proposed"),
-        next("Sent back", "Next label that was sent back (Y)", "sent_back"),
+        next("Sent back", "Next label sent back (Y)", "sent_back"),
       ),
       fresh,
       kind,
@@ -151,7 +151,7 @@ export function setUp() {
     el("div", { class: "label-row label-line" }, reviewed, said, task, saved, again, discarded),
   );
   $("#label-keys").append(
-    el("span", {}, el("kbd", { textContent: "?" }), " all keys"),
+    el("span", {}, el("kbd", { textContent: "?" }), " all shortcuts"),
     ...labelKeys()
       .flatMap(({ bindings }) => bindings)
       .filter(({ brief }) => brief)
@@ -198,10 +198,10 @@ function reflect() {
         range?.lead === lead && range.state === "proposed" && !marked
           ? `Accept it: ${leadName(lead)} in frames ${range.first + 1}–${range.last + 1}`
           : lead === "none"
-            ? "Nobody leads (0)"
+            ? "No lead (0)"
             : lead === "unknown"
-              ? "One can't tell who leads (U)"
-              : `#${lead} leads (type its number)`;
+              ? "Lead unclear (U)"
+              : `Set #${lead} as lead (type its number)`;
     },
   );
   const { first, last } = span.span();
@@ -211,7 +211,7 @@ function reflect() {
       ? `frames ${first + 1}–${last + 1}${marked.typed ? ` · #${marked.typed}…` : ""}`
       : range
         ? rangeWords(range)
-        : "nobody has said",
+        : "lead not labelled",
   );
   press(reviewToggle, review.isReviewing());
   reviewed.hidden = !review.isReviewing();

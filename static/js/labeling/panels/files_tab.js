@@ -14,30 +14,30 @@ import { personName } from "../state/person.js";
 
 /** As `pipeline/labels/formats/registry.py` names them. */
 const FORMATS = [
-  ["native", "CIPV Studio", "everything"],
-  ["mcap", "MCAP session", "the recording's labels as a channel"],
+  ["native", "CIPV Studio", "all labels"],
+  ["mcap", "MCAP session", "labels as a channel"],
   ["openlabel", "OpenLABEL", "ASAM OpenLABEL 1.0"],
   ["nuscenes", "nuScenes", "JSON tables"],
-  ["kitti", "KITTI object", "one file a frame"],
-  ["kitti-tracking", "KITTI tracking", "one file"],
-  ["coco", "COCO", "boxes in pictures"],
-  ["csv", "CSV", "the lead of each frame"],
+  ["kitti", "KITTI object", "one file per frame"],
+  ["kitti-tracking", "KITTI tracking", "single file"],
+  ["coco", "COCO", "image boxes"],
+  ["csv", "CSV", "lead per frame"],
 ];
 
 const versions = el("div", { class: "open-list" }),
   problem = el("p", { class: "params-error", aria: { role: "alert" } });
 const which = el(
   "select",
-  { aria: { label: "Format of the file" } },
+  { aria: { label: "File format" } },
   ...FORMATS.map(([key, words]) => el("option", { value: key, textContent: words })),
 );
-const file = el("input", { type: "file", aria: { label: "File with labels" } });
+const file = el("input", { type: "file", aria: { label: "Label file" } });
 const freezeName = el("input", {
   type: "text",
   maxLength: 60,
-  placeholder: "Name of the version",
+  placeholder: "Version name",
   required: true,
-  aria: { label: "Name of the version" },
+  aria: { label: "Version name" },
 });
 
 /** @returns {HTMLElement} */
@@ -46,7 +46,7 @@ export function exportButton() {
     type: "button",
     textContent: "Export ▾",
     aria: { haspopup: "menu" },
-    title: "The labels as a file",
+    title: "Export labels to a file",
   });
   attachMenu(button, "Export labels", () => {
     const rows = FORMATS.map(([key, words, about]) => ({
@@ -82,14 +82,14 @@ export function setUp(parent) {
   parent.append(
     problem,
     el("h3", { textContent: "Proposals" }),
-    el("button", { type: "button", textContent: "Take the pipeline's output (P)", onclick: propose }),
+    el("button", { type: "button", textContent: "Propose labels from the pipeline (P)", onclick: propose }),
     el("h3", { textContent: "Import" }),
     el("button", {
       type: "button",
-      textContent: "The truth that came with the recording",
+      textContent: "Ground truth of the recording",
       onclick: () => act({ kind: "import", what: "truth" }),
     }),
-    el("form", { onsubmit: upload }, which, file, el("button", { textContent: "Import the file" })),
+    el("form", { onsubmit: upload }, which, file, el("button", { textContent: "Import file" })),
     el("h3", { textContent: "Versions" }),
     versions,
     el("form", { class: "menu-row", onsubmit: freeze }, freezeName, el("button", { textContent: "Freeze" })),
@@ -110,16 +110,19 @@ export async function look() {
         link,
         el("span", {
           class: "facts",
-          textContent: ` ${tracks} tracks in ${frames} frames · ${person}, ${new Date(t_unix_ms).toLocaleString("en-GB")}`,
+          textContent: ` ${tracks} tracks in ${frames} frames · ${person}, ${dateWords(t_unix_ms)}`,
         }),
       );
     }),
   );
   if (!found.length)
     versions.replaceChildren(
-      el("p", { class: "facts", textContent: "None yet. A version keeps the labels as they are now, under a name." }),
+      el("p", { class: "facts", textContent: "No versions yet. A version is a named snapshot of the labels." }),
     );
 }
+
+/** Date and time of day. @param {number} t_unix_ms */
+const dateWords = (t_unix_ms) => new Date(t_unix_ms).toLocaleString("en-GB");
 
 /** @param {Event} event */
 async function freeze(event) {

@@ -16,11 +16,11 @@ import { isSaid, KNOWN_TAGS, tagFrames, tagsAt, takeBack, toggleWhole, WHOLE_TAG
 const list = el("div", { class: "moment-list" }),
   pasts = el("div", { class: "moment-pasts" }),
   pastTitle = el("h3", { textContent: "History" });
-const word = el("input", { type: "text", maxLength: 40, placeholder: "Tag", aria: { label: "Tag of these frames" } });
+const word = el("input", { type: "text", maxLength: 40, placeholder: "Tag", aria: { label: "Tag for these frames" } });
 const pathWords = el("span", { class: "facts" }),
   noPath = el("button", {
     type: "button",
-    textContent: "Take back",
+    textContent: "Remove path",
     onclick: () => act({ kind: "remove_path", frame: shown() }),
   });
 
@@ -28,7 +28,7 @@ const whole = el("button", {
   type: "button",
   class: "toggle",
   textContent: "All labelled",
-  title: "Every vehicle is labelled, in the marked frames or in this one (Shift W)",
+  title: "All vehicles are labelled in this frame or the marked frames (Shift W)",
   onclick: toggleWhole,
 });
 const title = el("h3", {});
@@ -42,13 +42,13 @@ export function setUp(parent) {
     el("button", {
       type: "button",
       textContent: words,
-      title: "An event of this frame, about the selected track, or who leads here",
+      title: "Add an event to this frame for the selected track or the lead",
       onclick: () => addEvent(kind),
     });
   const draw = el("button", {
     type: "button",
-    textContent: "Draw the path",
-    title: "Drag along the middle of our path in the plan (Shift P)",
+    textContent: "Draw path",
+    title: "Drag along the path centre in the plan (Shift P)",
     onclick: () => setTool("path"),
   });
   parent.append(
@@ -88,12 +88,15 @@ const framesWords = ({ first, last }) => (first === last ? `frame ${first + 1}` 
 const reviewWords = ({ comment, reviewer }) =>
   comment ? `, sent back: ${comment}` : reviewer ? `, reviewed by ${reviewer}` : "";
 
+/** "cut-in #3 #4". @param {import("../state/types.js").EventLabel} event */
+const eventWords = ({ kind, tracks }) => [kind.replace("_", "-"), ...tracks.map((id) => `#${id}`)].join(" ");
+
 function show() {
   const labels = get("labels"),
     here = shown();
   if (!labels || !get("labeling")?.on) return;
   const path = labels.paths.find(({ frame, state }) => frame === here && state !== "rejected");
-  text(title, get("marked") ? `This frame, and marked: ${framesWords(span())}` : "This frame");
+  text(title, get("marked") ? `This frame and marked ${framesWords(span())}` : "This frame");
   press(whole, isSaid(WHOLE_TAG, span()));
   noPath.hidden = !path;
   text(pathWords, path ? `path ${path.state}${reviewWords(path)}` : "");
@@ -110,7 +113,7 @@ function show() {
       .map((each) => ({
         key: `event ${each.id}`,
         frame: each.frame,
-        words: `${each.kind.replace("_", "-")} ${each.tracks.map((id) => `#${id}`).join(" ")} · frame ${each.frame + 1}${reviewWords(each)}`,
+        words: `${eventWords(each)} · frame ${each.frame + 1}${reviewWords(each)}`,
         drop: () => act({ kind: "remove", items: [{ kind: "event", id: each.id, revision: each.revision }] }),
       })),
   ];

@@ -52,5 +52,6 @@ const row = ({ what, note, person, t_unix_ms, undone }) =>
   el(
     "li",
     { class: undone ? "is-undone" : "", title: new Date(t_unix_ms).toLocaleString("en-GB") },
-    `${new Date(t_unix_ms).toLocaleTimeString("en-GB")} ${person}: ${what}${note ? `; ${note}` : ""}${undone ? " (undone)" : ""}`,
+    `${new Date(t_unix_ms).toLocaleTimeString("en-GB")} ${person}: ${[what, note].filter(Boolean).join("; ")}`,
+    undone ? " (undone)" : "",
   );

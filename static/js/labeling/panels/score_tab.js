@@ -38,7 +38,7 @@ function found(score) {
   if (!score.metrics.length && !score.notes.length)
     return el("p", {
       class: "facts pad",
-      textContent: "Nothing is accepted yet: accept tracks and leads, and the present run is judged against them.",
+      textContent: "Nothing accepted yet. Accept tracks and leads to score the current run against them.",
     });
   const runs = get("state")?.drive,
     isAlone = !runs?.base || runs.base === runs.run;
@@ -46,22 +46,22 @@ function found(score) {
   return el(
     "div",
     { class: "comparison" },
-    el("b", { textContent: "The present run against the labels" }),
+    el("b", { textContent: "Current run against labels" }),
     notes,
     score.metrics.length
       ? metricsTable({ ...score, truth: "labels" }, isAlone)
-      : el("p", { class: "facts", textContent: "No frame can be judged yet." }),
+      : el("p", { class: "facts", textContent: "No frames can be scored yet." }),
     score.worst.length ? worstFrames(score.worst) : null,
     score.errors.length ? errorsTable(score.errors) : null,
   );
 }
 
 const VERDICTS = {
-  correct: "the lead",
-  none: "none leads",
-  missed: "lead missed",
-  false: "CIPV without a lead",
-  wrong: "wrong vehicle, or too far off",
+  correct: "correct lead",
+  none: "correctly no lead",
+  missed: "missed lead",
+  false: "false lead",
+  wrong: "wrong vehicle or distance",
 };
 
 /** @param {import("../state/types.js").BadFrame[]} worst */
@@ -120,7 +120,9 @@ function errorsTable(rows) {
     el("p", {
       class: "facts",
       textContent:
-        "Of each range all vehicles, then those seen by both sensors (VL), by camera (V) or by LiDAR (L) alone. Mean size of the error in m, of speed in m/s; below it the smallest to the largest. Distance: to the nearest point. Lateral, longitudinal: of the nearest face's middle.",
+        "Per distance range: all vehicles, then by source (VL, V, L). Mean absolute error in m (speed: m/s), " +
+        "with minimum–maximum below. Distance to the nearest point; lateral and longitudinal error at the centre " +
+        "of the nearest face.",
     }),
   );
 }

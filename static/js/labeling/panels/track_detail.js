@@ -47,21 +47,16 @@ export function setUp(parent) {
       { class: "detail-buttons" },
       button("Accept", "A", "Accept the whole track", () => commands.judge("accept")),
       button("Reject", "R", "Reject the whole track", () => commands.judge("reject")),
-      button("Send back", "H", "Send it back with a comment", review.sendBack),
-      button("Reviewed", "Shift H", "A second person finds it right", review.reviewOk),
+      button("Send back", "H", "Send back with a comment", review.sendBack),
+      button("Reviewed", "Shift H", "Approve as a second annotator", review.reviewOk),
       button("Snap", "S", "Fit the cuboid to the points", commands.snap),
-      button("Size along", "W", "This size along the whole track", commands.sizeAlong),
-      button("Keyframe", "K", "It is right in this frame", commands.keyframe),
-      button("Draw", "Shift G", "Draw its shape in this frame", () => setTool("shape")),
-      button("Not here", "Del", "It is not there in this frame, or in the marked ones", commands.notHere),
-      button("Split", "X", "From this frame on it is another", commands.splitHere),
-      button(
-        "Merge",
-        "M",
-        "Merge it with the label that is pressed next, or selected by . and taken by Enter",
-        commands.merge,
-      ),
-      button("Remove", "Shift Del", "Remove the track", commands.removeTrack),
+      button("Size along", "W", "Apply this size to the whole track", commands.sizeAlong),
+      button("Keyframe", "K", "Set a keyframe in this frame", commands.keyframe),
+      button("Draw", "Shift G", "Draw the shape in this frame", () => setTool("shape")),
+      button("Not here", "Del", "Remove from this frame or the marked frames", commands.notHere),
+      button("Split", "X", "Split the track from this frame on", commands.splitHere),
+      button("Merge", "M", "Merge with another label: click it, or select it with . and press Enter", commands.merge),
+      button("Remove", "Shift Del", "Delete the track", commands.removeTrack),
     ),
     past.node,
   );
@@ -82,7 +77,7 @@ function show() {
   state.dataset.state = track.state;
   if (document.activeElement !== classes) classes.value = track.label;
   text(comment, track.comment ? `Sent back: ${track.comment}` : "");
-  text(how, track.origin.how ? `${track.origin.name} pointed at it: ${track.origin.how}` : "");
+  text(how, track.origin.how ? `Placed by ${track.origin.name}: ${track.origin.how}` : "");
   text(facts, placeWords(track, presentOf(track.id)));
 }
 
@@ -95,16 +90,18 @@ function placeWords({ keyframes, origin }, sighting) {
   const kind = sighting.keyframe
     ? "keyframe"
     : keyframes.length
-      ? "follows its keyframes"
+      ? "interpolated between keyframes"
       : origin.maker === "pipeline"
-        ? "as the pipeline saw it"
+        ? "as proposed by the pipeline"
         : "no keyframe";
   if (!sighting.cuboid)
-    return `${kind} · box in the picture only: no LiDAR points tell where it is, and its height in the picture does so too roughly. Draw its cuboid (Shift G); where points are seen in its box, S lays it on them`;
+    return `${kind} · image box only, no LiDAR points. Draw a cuboid (Shift G), or fit one to points in the box (S)`;
   const {
     center: [x, y],
     size,
     yaw_rad,
   } = sighting.cuboid;
-  return `${kind} · ${num(x, 2)} m ahead, ${num(Math.abs(y), 2)} ${y >= 0 ? "left" : "right"} · ${size.map((each) => num(each, 1)).join(" × ")} m · ${num((yaw_rad * 180) / Math.PI, 0)}°${sighting.bbox ? "" : ` · box ${DASH}`}`;
+  const place = `${num(x, 2)} m ahead, ${num(Math.abs(y), 2)} m ${y >= 0 ? "left" : "right"}`;
+  const dimensions = `${size.map((each) => num(each, 1)).join(" × ")} m · ${num((yaw_rad * 180) / Math.PI, 0)}°`;
+  return `${kind} · ${place} · ${dimensions}${sighting.bbox ? "" : ` · box ${DASH}`}`;
 }

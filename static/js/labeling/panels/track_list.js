@@ -15,9 +15,9 @@ import { isReviewing } from "../acts/review.js";
 /** A list longer than this is for the search of the frames, not for reading. */
 const MOST = 100;
 const WHICH = /** @type {[Which, string, string][]} */ ([
-  ["here", "Here", "Labels of this frame"],
-  ["open", "To do", "Proposed, or sent back; in a review: not reviewed"],
-  ["all", "All", "Every track of the drive"],
+  ["here", "Here", "Labels in this frame"],
+  ["open", "To do", "Proposed or sent back; in review: not yet reviewed"],
+  ["all", "All", "All tracks in the drive"],
 ]);
 
 const body = el("div", { class: "track-list", tabIndex: -1, aria: { role: "listbox", label: "Tracks" } });
@@ -26,7 +26,7 @@ const begin = el("button", {
   type: "button",
   class: "begin",
   textContent: "Propose",
-  title: "Take the pipeline's output as proposals (P)",
+  title: "Propose labels from the pipeline (P)",
   hidden: true,
   onclick: propose,
 });
@@ -88,9 +88,8 @@ const isOpen = ({ state, comment }) => state === "proposed" || (Boolean(comment)
 const isUnreviewed = ({ state, reviewer }) => (state === "accepted" || state === "corrected") && !reviewer;
 
 function emptyWords() {
-  if (!get("labels")?.tracks.size)
-    return "Nothing is labelled yet. Let the pipeline propose what it sees (P), or draw the first label (G).";
-  return which === "open" ? "Nothing is left to do." : "Nothing is labelled in this frame.";
+  if (!get("labels")?.tracks.size) return "No labels yet. Propose labels from the pipeline (P), or draw one (G).";
+  return which === "open" ? "Nothing left to do." : "No labels in this frame.";
 }
 
 function create() {
@@ -125,11 +124,12 @@ function update(row, { id, label, state, first, last, keyframes, origin, comment
   text(
     frames,
     first === null || last === null
-      ? "nowhere"
+      ? "no frames"
       : `${first + 1}–${last + 1}${keyframes.length ? ` · ${keyframes.length} key` : ""}`,
   );
   text(who, reviewer || (origin.maker === "person" ? origin.name : origin.maker));
-  row.title = `${state}${comment ? `, sent back: ${comment}` : ""}; made by ${origin.name || origin.maker}${reviewer ? `, reviewed by ${reviewer}` : ""}${origin.how ? `; ${origin.how}` : ""}`;
+  const made = `made by ${origin.name || origin.maker}${reviewer ? `, reviewed by ${reviewer}` : ""}`;
+  row.title = [`${state}${comment ? `, sent back: ${comment}` : ""}`, made, origin.how].filter(Boolean).join("; ");
 }
 
 /** Select it, and where it is not in this frame, go where it is. @param {HTMLElement|null} row */

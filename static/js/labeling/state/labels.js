@@ -75,4 +75,4 @@ export const shown = () => get("frame")?.state.index ?? 0;
 export const nameOf = (track) => (track ? `#${track.id} ${track.label}` : "nothing");
 
 /** @param {import("./types.js").Lead} lead */
-export const leadName = (lead) => (lead === "none" ? "none" : lead === "unknown" ? "can't tell" : `#${lead}`);
+export const leadName = (lead) => (lead === "none" ? "none" : lead === "unknown" ? "unclear" : `#${lead}`);

@@ -30,7 +30,7 @@ export function tellMarked() {
   const { first, last } = span();
   set(
     "said",
-    `Frames ${first + 1}–${last + 1} are marked: say who leads there (C, its number), that all is labelled (Shift W), or a tag (Frame)`,
+    `Frames ${first + 1}–${last + 1} marked: set the lead (C or number), all labelled (Shift W), or tag (Frame tab)`,
   );
 }
 

@@ -34,10 +34,9 @@ export function toggle() {
 
 /** @type {Record<string, string>} */
 const HINTS = {
-  new: "A new label: drag it in the plan, drag a box or press on it in the picture, or Enter. Esc lets go",
-  shape:
-    "Its shape: drag it in the plan, drag a box around it in the picture, Enter for a box, or G for a cuboid. Esc lets go",
-  path: "Our path: drag along its middle in the plan, or bend the pipeline's by arrows; Enter keeps it. Esc lets go",
+  new: "New label: drag in the plan, drag a box or click in the image, or press Enter. Esc cancels",
+  shape: "Shape: drag in the plan, drag a box in the image, Enter for a box, G for a cuboid. Esc cancels",
+  path: "Path: drag along its centre in the plan, or bend it with arrows; Enter keeps it. Esc cancels",
 };
 
 /** What the next drag or click does, which is said. @param {import("../../core/store.js").Labeling["tool"]} tool */

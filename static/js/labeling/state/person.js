@@ -16,8 +16,8 @@ export async function personName() {
 /** @returns {Promise<string|null>} */
 export function askName() {
   asking ??= ask(
-    "Who labels?",
-    el("p", { class: "facts", textContent: "Every label keeps the name of who made it." }),
+    "Your name",
+    el("p", { class: "facts", textContent: "Stored with every label you make." }),
     "Name",
     knownName(),
   ).then((name) => {

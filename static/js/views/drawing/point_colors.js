@@ -8,14 +8,14 @@ import { pack, rgba } from "./dot_raster.js";
 
 /** @type {[ColorBy, string, string][]} name, label, what it shows */
 export const COLOR_BY = [
-  ["object", "Object", "What sees it: magenta LiDAR, violet both, green the CIPV"],
-  ["range", "Range", `Near is warm, far is cold: 0 to ${RANGE_MAX_M} m`],
-  ["height", "Height", "Over the fitted ground: −0.3 to 3 m"],
-  ["intensity", "Intensity", "How much of the beam came back"],
-  ["ring", "Ring", "The laser that measured it, lowest to highest"],
-  ["cluster", "Cluster", "One colour an object, the same while it is tracked"],
-  ["ground", "Ground", "What was taken for the road, and what was not"],
-  ["age", "Age", "How long before the sweep's newest point: 0 to 100 ms"],
+  ["object", "Object", "By source: magenta LiDAR, violet both, green CIPV"],
+  ["range", "Range", `Distance, warm (near) to cold (far): 0 to ${RANGE_MAX_M} m`],
+  ["height", "Height", "Height above the fitted ground: −0.3 to 3 m"],
+  ["intensity", "Intensity", "Return intensity"],
+  ["ring", "Ring", "Laser ring, lowest to highest"],
+  ["cluster", "Cluster", "One colour per tracked object"],
+  ["ground", "Ground", "Ground and non-ground points"],
+  ["age", "Age", "Age relative to the newest point of the sweep: 0 to 100 ms"],
 ];
 
 export const GROUND = 0;
