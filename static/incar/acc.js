@@ -1,4 +1,4 @@
-/** What ACC and emergency braking do: a colour, a word and a shape, so that none of them has to be read alone. */
+/** ACC and emergency-braking state, shown redundantly by colour, word and shape. */
 import { $, mark, text } from "../js/core/dom.js";
 import { DASH, kmh, num } from "../js/core/format.js";
 import { get, on } from "../js/core/store.js";
@@ -8,7 +8,7 @@ import { ACC_WORDS } from "../js/core/urgency.js";
 
 const TRIANGLE = "M24 6 45 42H3z M24 19v11 M24 36v.5",
   OCTAGON = "M15 3h18l12 12v18L33 45H15L3 33V15z M15 24h18";
-/** Tone of the band, and the shape in it. @type {Record<AccState|"off", {tone: string, shape: string}>} */
+/** Colour tone of the band, and its icon. @type {Record<AccState|"off", {tone: string, shape: string}>} */
 const LOOKS = {
   off: { tone: "off", shape: "M24 5a19 19 0 1 0 .1 0z M12 36 36 12" },
   cruise: { tone: "calm", shape: "M24 5a19 19 0 1 0 .1 0z M24 25 33 14" },
@@ -46,8 +46,11 @@ function update() {
   text(desired, acc ? num(kmh(acc.desired_speed_mps), 0) : DASH);
 }
 
-/** Id of the object that ACC slows down for, null for none. @param {import("../js/core/types.js").Result} result */
+/** Id of the object that ACC slows down for, or null. @param {import("../js/core/types.js").Result} result */
 export const reactsTo = ({ acc }) => acc?.object_id ?? null;
 
-/** Whether it acts on that object rather than just follow it. @param {import("../js/core/types.js").Result} result */
+/**
+ * Whether ACC warns or brakes for that object, rather than just following it.
+ * @param {import("../js/core/types.js").Result} result
+ */
 export const isAlarmed = ({ acc }) => ["warn", "partial_brake", "full_brake"].includes(acc?.state ?? "");

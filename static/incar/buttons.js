@@ -1,4 +1,4 @@
-/** Record, and mark this moment. Each press is answered in words, also when it is refused. */
+/** The Record and Mark buttons. Every press gets a written response, including failures. */
 import { request } from "../js/core/api.js";
 import { $, mark, press, text } from "../js/core/dom.js";
 import { clock } from "../js/core/format.js";
@@ -34,7 +34,7 @@ function markMoment() {
 }
 
 /**
- * Live sensors count no frames that anybody could go to: their marks are kept by time.
+ * Live sensors have no frame numbers to seek to, so their marks are stored by time.
  * @param {{index: number, t_s: number, in_session: boolean}} made
  */
 function marked({ index, t_s, in_session }) {
@@ -48,7 +48,7 @@ async function ask(asked, done, refused) {
   try {
     say(done(await Promise.race([asked, late])), "done");
   } catch (error) {
-    // a browser's own words for a lost connection say nothing to a driver
+    // the browser's own error message for a lost connection means nothing to a driver
     say(
       `${refused}: ${error instanceof TypeError ? "no connection" : error instanceof Error ? error.message : error}`,
       "refused",

@@ -1,4 +1,4 @@
-/** Whether what is shown is now. What is too old is covered, so that nobody drives by it. */
+/** Covers the display when its data is stale, so that nobody drives by it. */
 import { isClockKnown, serverNow } from "../js/core/connection.js";
 import { $, mark, text } from "../js/core/dom.js";
 import { num } from "../js/core/format.js";
@@ -9,7 +9,7 @@ import { get, on } from "../js/core/store.js";
 /** @typedef {"fresh"|"paused"|"stale"|"lost"|"waiting"} Kind */
 
 const CHECK_MS = 50;
-/** A frame may be missed, a second one not. */
+/** One missed frame is tolerated, two are not. */
 const FRAMES = 3,
   LEAST_MS = 300,
   DEFAULT_HZ = 10;
@@ -19,7 +19,7 @@ const root = document.documentElement,
   cover = $("#cover"),
   word = $("#cover-word"),
   why = $("#cover-why");
-/** The page's own clock when the frame came and when playing went on: it never jumps, as clocks of the day do. */
+/** Monotonic page time when the frame arrived and when playback resumed; wall clocks may jump. */
 let cameAt = -Infinity,
   wentOnAt = -Infinity;
 let wasPlaying = false;
@@ -29,7 +29,7 @@ let frame = null;
 export function setUp() {
   on(["frame"], () => {
     const now = get("frame");
-    // the frame that is sent again after a reconnection, or drawn again with other parameters, is no newer for that
+    // a frame resent after a reconnection, or redrawn with other parameters, is not newer
     if (now?.madeUnixMs !== frame?.madeUnixMs) cameAt = performance.now();
     frame = now;
     look();
@@ -46,13 +46,15 @@ export function setUp() {
   look();
 }
 
-/** How old a frame may be, milliseconds. @param {State} state */
+/** Maximum age of a frame, in milliseconds. @param {State} state */
 export function mayBeMs({ rate_hz, speed, live }) {
   return Math.max(LEAST_MS, (FRAMES * 1000) / ((rate_hz || DEFAULT_HZ) * (live ? 1 : speed)));
 }
 
-/** How old the shown frame is: by the server's clock, and no younger than it has been here. Null while there is none or
- * the server's clock is not known yet. */
+/**
+ * Age of the current frame: by the server's clock, and at least the time since it arrived. Null while there is no frame
+ * or the server's clock is unknown.
+ */
 export function ageMs() {
   if (!frame || !isClockKnown()) return null;
   return Math.max(serverNow() - frame.madeUnixMs, performance.now() - cameAt);

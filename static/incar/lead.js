@@ -1,12 +1,12 @@
-/** The vehicle ahead in large numerals: how far, how fast the gap changes, how long that lasts. */
+/** The vehicle ahead in large digits: distance, closing speed, time to collision. */
 import { $, mark, text } from "../js/core/dom.js";
 import { DASH, kmh, num, ttc as ttcWords } from "../js/core/format.js";
 import { get, on } from "../js/core/store.js";
 import { urgencyOf } from "../js/core/urgency.js";
 
-/** The bar is full at 0 s and empty from here on; its two lines are where warning and danger begin (incar.css). */
+/** The bar is full at 0 s and empty from this TTC on; its two lines mark the warning and danger limits (incar.css). */
 const BAR_S = 8;
-/** Nearer than this a tenth of a metre matters. */
+/** Below this distance, tenths of a metre are shown. */
 const TENTHS_BELOW_M = 20;
 const SAME_SPEED_KMH = 0.5;
 

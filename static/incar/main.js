@@ -1,4 +1,4 @@
-/** The display in the car: each part draws from the store, and one of them watches that what is drawn is not old. */
+/** The in-vehicle display: each part draws from the store, and `freshness` covers stale data. */
 import { connect } from "../js/core/connection.js";
 import * as acc from "./acc.js";
 import * as awake from "./wake_lock.js";

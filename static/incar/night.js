@@ -1,4 +1,4 @@
-/** Night is dark and dim. As the system says, until a person chooses. */
+/** Night mode, dark and dim. Follows the system until the user chooses. */
 import { forget } from "../js/core/colors.js";
 import { $, memory, press } from "../js/core/dom.js";
 import { set } from "../js/core/store.js";

@@ -1,5 +1,6 @@
 /**
- * The road ahead from above: our path, vehicles, the one ahead, and whatever ACC reacts to, at the edge when beyond it.
+ * Plan view of the road ahead: ego path, vehicles, the lead and what ACC reacts to, clamped to the edge when out of
+ * range.
  */
 import { color } from "../js/core/colors.js";
 import { $ } from "../js/core/dom.js";
@@ -74,7 +75,7 @@ function drawRings(ctx, view) {
 }
 
 /**
- * A ring large enough to be seen; a dot at the edge for what lies beyond it.
+ * A ring of visible size, or a dot at the edge for objects out of range.
  * @param {CanvasRenderingContext2D} ctx
  * @param {number} u
  * @param {number} v

@@ -1,4 +1,4 @@
-/** The camera: our path, the vehicle ahead, and whatever else ACC reacts to. */
+/** The camera image with the ego path, the lead and whatever else ACC reacts to. */
 import { showPictureAt } from "../js/core/connection.js";
 import { onPicture, ui } from "../js/core/colors.js";
 import { $, text } from "../js/core/dom.js";
@@ -35,7 +35,7 @@ function draw() {
   if (!frame) return;
   if (!frame.picture || !frame.bitmap) return sayNoPicture(ctx);
   const { width, height } = frame.picture;
-  // the picture fills the pane; what is cut off is at its sides, where no lead is
+  // fill the pane; only the sides are cropped, where no lead can be
   const scale = Math.max(
     Math.min(surface.width / width, surface.height / height),
     Math.min(surface.height / height, (1.5 * surface.width) / width),

@@ -1,4 +1,4 @@
-/** How the sensors do: live ones by their streams, those of a recording by what the frame has of them. */
+/** Sensor health: from the streams of live sensors, or from the contents of a recorded frame. */
 import { $, el, keyed, mark, text } from "../js/core/dom.js";
 import { num } from "../js/core/format.js";
 import { get, on } from "../js/core/store.js";
@@ -27,7 +27,7 @@ function update() {
   if (!frame) return;
   const { sensors, ego } = frame.result;
   /**
-   * What the frame has of each; an age alone does not tell, a recording may know no times.
+   * What the frame contains. Ages alone are not enough: a recording may have no timestamps.
    * @type {Record<string, boolean>}
    */
   const held = { lidar: Boolean(sensors.lidar?.points), camera: frame.picture !== null, ego: ego !== null };

@@ -1,4 +1,4 @@
-/** The screen stays on while the page is seen, where the browser lets a page ask for that. */
+/** Keeps the screen on while the page is visible, where the browser supports it. */
 
 export function setUp() {
   document.addEventListener("visibilitychange", ask);
@@ -7,5 +7,5 @@ export function setUp() {
 
 function ask() {
   if (document.visibilityState !== "visible" || !("wakeLock" in navigator)) return;
-  navigator.wakeLock.request("screen").catch(() => {}); // a low battery refuses; the page is the same without
+  navigator.wakeLock.request("screen").catch(() => {}); // refused on low battery, for example; not essential
 }

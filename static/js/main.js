@@ -1,4 +1,4 @@
-/** CIPV Studio's page: the panes, then the stream. */
+/** Entry point: sets up the panes, then connects the stream. */
 import * as align from "./align/mode.js";
 import * as banner from "./panels/lead_banner.js";
 import * as bev from "./views/plan.js";

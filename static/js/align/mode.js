@@ -1,7 +1,6 @@
 /**
- * Alignment mode: LiDAR and picture are laid over each other by hand. Dragging shifts the cloud, the wheel scales it,
- * and every move is a change of the alignment's parameters: the server projects, as always. What fits automatically
- * belongs beside the score, in the bar.
+ * Alignment mode: align LiDAR and camera manually. Dragging shifts the point cloud and scrolling scales it. Every move
+ * changes the alignment parameters; the server does the projection.
  */
 import { newestOnly, request } from "../core/api.js";
 import { $, el, press, text } from "../core/dom.js";
@@ -12,7 +11,7 @@ import { drawEdges } from "./picture_edges.js";
 import { addLayer } from "../views/camera.js";
 import { grow } from "../workspace/panes.js";
 
-/** Between two scores while the hand moves: each costs the server a tenth of a second. */
+/** Pause between two scores during a drag: each takes the server 0.1 s. */
 const PAUSE_MS = 250;
 const OFF = { on: false, blend: 0.5, edges: true };
 

@@ -1,10 +1,10 @@
-/** The picture's edges, drawn over it: where brightness changes most, the LiDAR's depth edges should lie. */
+/** Image edges as an overlay: LiDAR depth edges should coincide with them. */
 import { context } from "../core/dom.js";
 
 /** @typedef {import("../core/types.js").Frame} Frame */
 
 const WIDTH_PX = 800;
-/** The strongest share of all pixels may be drawn; of a broad edge, its ridge is. */
+/** Share of the strongest pixels that are candidates; only the ridge of a wide edge is drawn. */
 const SHARE = 0.12;
 const TINT = [255, 240, 120];
 
@@ -28,7 +28,7 @@ export function drawEdges(target, frame, place) {
   target.drawImage(canvas, place.x, place.y, picture.width * place.scale, picture.height * place.scale);
 }
 
-/** Leave the edges on the canvas. @param {ImageBitmap} bitmap */
+/** Draw the edges onto the offscreen canvas. @param {ImageBitmap} bitmap */
 function find(bitmap) {
   const width = Math.min(WIDTH_PX, bitmap.width),
     height = Math.max(1, Math.round((bitmap.height * width) / bitmap.width));
@@ -54,7 +54,7 @@ function brightness(rgba) {
 }
 
 /**
- * Sobel's gradient: its strength (both directions' sizes together), and how far it is to the next pixel along it.
+ * Sobel gradient: L1 magnitude, and the index offset to the next pixel along its main direction.
  * @param {Float32Array} grey @param {number} width @param {number} height
  */
 function gradient(grey, width, height) {

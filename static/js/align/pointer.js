@@ -1,4 +1,4 @@
-/** The hand on the picture while aligning: what a drag or a turn of the wheel changes. */
+/** Pointer input on the camera in alignment mode: maps drags and scrolling to parameters. */
 import { place } from "../views/camera.js";
 import { change } from "../panels/params.js";
 import { get } from "../core/store.js";
@@ -7,7 +7,7 @@ import { get } from "../core/store.js";
 
 const SCALE_PER_PX = 0.0002,
   ROLL_PER_PX_DEG = 0.004;
-/** A turning wheel has ended when it rests this long. */
+/** Scrolling has ended after this pause. */
 const REST_MS = 400;
 
 /** @param {HTMLCanvasElement} canvas @param {() => boolean} isOn */
@@ -45,7 +45,7 @@ export function followHand(canvas, isOn) {
   );
 }
 
-/** The alignment's numbers as they are, whether set or taken from the calibration. @returns {Values} */
+/** Current alignment values, whether set or taken from the calibration. @returns {Values} */
 function present() {
   const params = get("params");
   const names = ["h_res_deg", "v_res_deg", "cx_px", "cy_px", "yaw_deg", "pitch_deg", "roll_deg"];
@@ -60,8 +60,12 @@ function present() {
 const isAngular = () => get("params")?.values["alignment.model"] === "angular";
 
 /**
- * The cloud moved by so many pixels of the pane. A mount turned left lets the cloud move right; turned down, up.
- * @param {Values} from @param {number} dx @param {number} dy @returns {Values}
+ * Parameters for a point cloud shifted by so many canvas pixels. Yawing the mount left moves the cloud right; pitching
+ * it down moves the cloud up.
+ * @param {Values} from
+ * @param {number} dx
+ * @param {number} dy
+ * @returns {Values}
  */
 function shifted(from, dx, dy) {
   const perPixel = 1 / (place().scale * (get("frame")?.picture?.scale ?? 1));

@@ -1,9 +1,9 @@
-/** Requests to the server. What moves fast (sliders) goes through `newestOnly`. */
+/** Requests to the server. High-rate input (sliders) goes through `newestOnly`. */
 
-/** Every page of the server has the same root, wherever it lies itself. */
+/** Root of the server, whichever page this is. */
 const ROOT = new URL("../../", import.meta.url);
 
-/** What the server refused, in its own sentence. */
+/** A request that the server refused; the message is the server's. */
 export class Refused extends Error {
   /** @param {number} status @param {any} answer */
   constructor(status, answer) {
@@ -14,7 +14,7 @@ export class Refused extends Error {
 }
 
 /**
- * The server's answer; rejects with `Refused`, or a TypeError when it could not be reached.
+ * Returns the server's JSON response. Throws `Refused`, or a TypeError if the server cannot be reached.
  * @param {string} path @param {string} [method] @param {unknown} [body] @returns {Promise<any>}
  */
 export async function request(path, method = "GET", body = undefined) {
@@ -34,15 +34,15 @@ export async function request(path, method = "GET", body = undefined) {
 const newerOf = (_, newer) => newer;
 
 /**
- * One request at a time; while it is under way only the newest of the next ones is kept.
+ * Limits requests to one at a time; of those made meanwhile, only the newest is sent.
  * @template T
  * @param {(body: T) => Promise<void>} send
- * @param {(waiting: T, newer: T) => T} merge  what to keep of two that wait
+ * @param {(waiting: T, newer: T) => T} merge  merges two waiting bodies
  */
 export function newestOnly(send, merge = newerOf) {
   let busy = false,
     hasWaiting = false;
-  /** @type {T|undefined} undefined is a body too */
+  /** @type {T|undefined} undefined is a valid body */
   let waiting;
   let idle = Promise.resolve();
   /** @param {T} body @returns {Promise<void>} */
@@ -58,7 +58,7 @@ export function newestOnly(send, merge = newerOf) {
       if (goesOn) await work(next);
     }
   }
-  /** Settled once this and whatever waits with it was answered. @param {T} body */
+  /** Resolves once this request, and those merged with it, were answered. @param {T} body */
   return function submit(body) {
     if (busy) {
       waiting = hasWaiting ? merge(/** @type {T} */ (waiting), body) : body;

@@ -8,10 +8,10 @@ const cache = new Map();
 /** A role's colour for this theme. @param {string} role */
 export const color = (role) => read(`--cipv-${role}`);
 
-/** A role's colour over a photograph. @param {string} role */
+/** A role's colour on camera images. @param {string} role */
 export const onPicture = (role) => read(`--picture-${role}`);
 
-/** A colour of the page itself. @param {string} name */
+/** A colour of the page theme. @param {string} name */
 export const ui = (name) => read(`--${name}`);
 
 export function forget() {
@@ -30,10 +30,10 @@ function read(name) {
 /** @param {import("./types.js").FusedObject} item @param {number|null} cipvId */
 export const roleOf = (item, cipvId) => (item.id === cipvId ? "cipv" : ROLE_OF_SOURCE[item.source]);
 
-/** The CIPV's id in the shown frame. */
+/** Id of the CIPV in the current frame. */
 export const cipvId = () => get("frame")?.result.cipv?.id ?? null;
 
-/** Near is warm, far is cold; no green and no magenta, which mean something. */
+/** Warm is near, cold is far; green and magenta are reserved. */
 const STOPS = [
   [255, 86, 56],
   [255, 160, 30],

@@ -1,34 +1,34 @@
-/** The stream: newest frame in, reconnecting for ever, and the server's clock. */
+/** The frame stream: keeps only the newest frame, reconnects forever and tracks the server's clock. */
 import { decode } from "./protocol.js";
 import { drawNow, get, set } from "./store.js";
 
 const PING_MS = 2000;
 const RETRY_MS = [300, 600, 1200, 2500, 5000];
-/** The server makes pictures in steps of this width (app/streaming/picture.py): within one there is nothing to tell. */
+/** The server scales images in steps of this width (app/streaming/picture.py). */
 const WIDTH_STEP_PX = 160;
 
 /**
- * Nothing at all for this long, not even an answer to a ping: the connection is gone, whatever the system still says.
+ * Without any message for this long, not even a pong, the connection counts as lost.
  */
 const SILENT_MS = 3 * PING_MS;
 
-/** Server clock minus ours, milliseconds; null until it has told. @type {number|null} */
+/** Server clock minus local clock, milliseconds; null until known. @type {number|null} */
 let clockOffset = null;
 let attempts = 0;
 let lastSequence = -1;
 let isFirst = true;
-/** Messages so far: of a frame's state and one told on its own, the one that came later holds. */
+/** Messages received so far: the newer of a frame's state and a separate state message wins. */
 let received = 0;
 let stateNumber = 0;
 /** @typedef {{buffer: ArrayBuffer, number: number, done: () => void}} Received */
 /** @type {Received|null} */
 let waiting = null;
 let decoding = false;
-/** The picture of the frame that is shown. @type {Uint8Array<ArrayBuffer>} */
+/** JPEG of the current frame. @type {Uint8Array<ArrayBuffer>} */
 let shownJpeg = new Uint8Array();
 /** @type {WebSocket|null} */
 let socket = null;
-/** What the server was told about this page. @type {Map<string, Told>} */
+/** What the server knows about this page. @type {Map<string, Told>} */
 const told = new Map();
 
 /** The server's clock now, Unix milliseconds. */
@@ -36,10 +36,10 @@ export function serverNow() {
   return Date.now() + (clockOffset ?? 0);
 }
 
-/** Whether the server has told its clock; until then ours stands in. */
+/** Whether the server's clock is known; until then the local clock is used. */
 export const isClockKnown = () => clockOffset !== null;
 
-/** Say how wide the picture is shown: no wider one has to be sent. @param {number} width device pixels */
+/** Tell the server the displayed image width, so that it sends no larger one. @param {number} width device pixels */
 export function showPictureAt(width) {
   const steps = Math.ceil(width / WIDTH_STEP_PX);
   if (steps > 0) tell("picture_px", steps * WIDTH_STEP_PX);
@@ -50,7 +50,7 @@ export function showPictureAt(width) {
  *   Told
  */
 
-/** Let the server know something about this page, now and after every reconnection; once for each value.
+/** Tell the server something about this page, now and after each reconnection. Sent only when the value changes.
  * @param {string} name @param {Told} value */
 export function tell(name, value) {
   if (JSON.stringify(told.get(name)) === JSON.stringify(value)) return;
@@ -66,7 +66,7 @@ export function connect() {
   const opened = new WebSocket(url);
   socket = opened;
   opened.binaryType = "arraybuffer";
-  /** Since when something was asked and nothing at all has come; null when nothing is owed. @type {number|null} */
+  /** When the oldest unanswered request was sent; null if none is pending. @type {number|null} */
   let owedSince = performance.now();
   const ping = () => {
     if (owedSince !== null && performance.now() - owedSince > SILENT_MS) return lose();
@@ -77,7 +77,7 @@ export function connect() {
   const pinging = setInterval(ping, PING_MS);
   const lose = () => {
     opened.onopen = opened.onmessage = opened.onclose = null;
-    opened.close(); // without a network it would be "closing" for long: nobody waits for it
+    opened.close(); // without a network, closing takes long; do not wait
     clearInterval(pinging);
     if (attempts === 0) set("link", { status: "lost", since: Date.now() });
     setTimeout(connect, RETRY_MS[Math.min(attempts++, RETRY_MS.length - 1)]);
@@ -117,7 +117,7 @@ function onText(message, number) {
   if (message.type === "pong") clockOffset = message.server_unix_ms - (Date.now() + message.ping) / 2;
 }
 
-/** Keep only the newest message while a picture is being decoded. @param {Received} message */
+/** Keep only the newest message while an image is being decoded. @param {Received} message */
 async function onBinary(message) {
   waiting?.done();
   waiting = message;
@@ -138,7 +138,7 @@ async function onBinary(message) {
 async function show({ buffer, number, done }) {
   const { frame, jpeg } = decode(buffer);
   if (frame.state.sequence < lastSequence) return done();
-  frame.isLate = isFirst || frame.state.sequence === lastSequence; // sent once more, as for a wider picture
+  frame.isLate = isFirst || frame.state.sequence === lastSequence; // resent, for example with a wider image
   lastSequence = frame.state.sequence;
   isFirst = false;
   const before = get("frame");
@@ -156,10 +156,10 @@ async function show({ buffer, number, done }) {
   });
 }
 
-/** @param {Uint8Array<ArrayBuffer>} jpeg @returns {Promise<ImageBitmap|null>} null when it is none */
+/** @param {Uint8Array<ArrayBuffer>} jpeg @returns {Promise<ImageBitmap|null>} null if it cannot be decoded */
 const bitmapOf = (jpeg) => createImageBitmap(new Blob([jpeg], { type: "image/jpeg" })).catch(() => null);
 
-/** Whether it is the picture that is shown already, as while a slider moves on a paused frame.
+/** Whether two JPEGs are identical, as when a parameter changes on a paused frame.
  * @param {Uint8Array} jpeg @param {Uint8Array} shown */
 function isSame(jpeg, shown) {
   return jpeg.length === shown.length && jpeg.every((byte, i) => byte === shown[i]);

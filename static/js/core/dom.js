@@ -1,7 +1,7 @@
 /** Small helpers to find, build and change elements. */
 
 /**
- * The element that a selector names; throws when there is none or it is of another kind.
+ * The element that matches a selector. Throws if there is none, or it is of another type.
  * @template {Element} [T=HTMLElement]
  * @param {string} selector
  * @param {new () => T} [kind]
@@ -42,7 +42,7 @@ export function el(tag, props = {}, ...children) {
 }
 
 /**
- * Set text only when it differs: the table asks for this hundreds of times a second.
+ * Set text only if it differs: the table calls this hundreds of times a second.
  * @param {Node} node
  * @param {string} value
  */
@@ -50,7 +50,7 @@ export function text(node, value) {
   if (node.textContent !== value) node.textContent = value;
 }
 
-/** Set a data attribute only when it differs. @param {HTMLElement} node @param {string} name @param {string} value */
+/** Set a data attribute only if it differs. @param {HTMLElement} node @param {string} name @param {string} value */
 export function mark(node, name, value) {
   if (node.dataset[name] !== value) node.dataset[name] = value;
 }
@@ -59,8 +59,8 @@ export function mark(node, name, value) {
 const kept = new WeakMap();
 
 /**
- * Children of `parent`, one an item, in the items' order. A child is made once and changed after that, so that it is
- * not replaced under a finger while frames go by.
+ * Keep one child of `parent` per item, in order. Children are updated rather than recreated, so that none is replaced
+ * while it is being pressed.
  * @template T
  * @template {HTMLElement} N
  * @param {HTMLElement} parent
@@ -89,7 +89,7 @@ export function press(button, pressed) {
 }
 
 /**
- * The element a listener was called for, when it is inside one that matches.
+ * The closest ancestor of an event's target that matches a selector.
  * @param {Event} event
  * @param {string} selector
  */
@@ -104,7 +104,7 @@ export function context(canvas, settings) {
   return ctx;
 }
 
-/** Remember a setting of this browser; a browser that refuses storage simply forgets. */
+/** Settings stored in this browser. Without storage, they are lost. */
 export const memory = {
   /** @template T @param {string} key @param {T} fallback @returns {T} */
   read(key, fallback) {
@@ -119,7 +119,7 @@ export const memory = {
     try {
       localStorage.setItem(`cipv.${key}`, JSON.stringify(value));
     } catch {
-      // storage is off
+      // storage is disabled
     }
   },
 };

@@ -1,4 +1,4 @@
-/** Numbers as people read them. What is unknown is a dash. */
+/** Number formatting. Unknown values are shown as a dash. */
 
 export const DASH = "–";
 
@@ -12,7 +12,7 @@ export function num(value, digits = 1) {
         .replace("-", "−");
 }
 
-/** With its sign, unless it is shown as 0. @param {number|null|undefined} value @param {number} [digits] */
+/** With a plus sign if positive. @param {number|null|undefined} value @param {number} [digits] */
 export function signed(value, digits = 1) {
   const isPositive = value !== null && value !== undefined && Number(value.toFixed(digits)) > 0;
   return `${isPositive ? "+" : ""}${num(value, digits)}`;
@@ -23,13 +23,13 @@ export const kmh = (mps) => (mps === null || mps === undefined ? null : mps * 3.
 
 const LONG_S = 60;
 
-/** Time to collision: nobody reads tenths of minutes. @param {number|null|undefined} seconds */
+/** Time to collision; long times are capped. @param {number|null|undefined} seconds */
 export const ttc = (seconds) => ((seconds ?? 0) > LONG_S ? `> ${LONG_S}` : num(seconds));
 
 /** Seconds as m:ss.s @param {number} seconds */
 export function clock(seconds) {
   const tenths = Math.round(10 * seconds),
-    minutes = Math.floor(tenths / 600); // rounded first: 59.97 s is 1:00.0
+    minutes = Math.floor(tenths / 600); // round first: 59.97 s is 1:00.0
   return `${minutes}:${((tenths - 600 * minutes) / 10).toFixed(1).padStart(4, "0")}`;
 }
 

@@ -1,4 +1,4 @@
-/** The few icons of the page, drawn here so that no font is needed. */
+/** Inline SVG icons, so that no icon font is needed. */
 
 const PATHS = {
   play: "M4 2.5v11l9-5.5z",

@@ -1,13 +1,13 @@
-/** A list that is longer than the box it scrolls in. */
+/** A long list that scrolls. */
 import { mark } from "./dom.js";
 
-/** Ten frames a second leave no time for rows that nobody sees. */
+/** At ten frames a second there is no time to update rows out of sight. */
 const REST_AFTER_MS = 300;
 
 /**
- * Rows in their items' order. A row belongs to a place: it is made once and says another item when the order changes,
- * which costs less than moving it. Rows in sight do so at once, the others when the list has not changed for a while;
- * until then the list is `aria-busy`. Each row's `data-id` is its item's, always.
+ * Rows are bound to positions: when the order changes, a row shows another item, which is cheaper than moving elements.
+ * Visible rows update at once, others when the list has not changed for a while; until then the list is `aria-busy`.
+ * Each row's `data-id` is always up to date.
  * @template T
  */
 export class LongList {
@@ -51,7 +51,7 @@ export class LongList {
   }
 
   /**
-   * The row of the item with a key; null where there is none.
+   * The row of the item with a key, or null.
    * @param {string|number} key
    * @returns {HTMLElement|null}
    */
@@ -89,7 +89,7 @@ export class LongList {
     this.#tellBusy();
   }
 
-  /** @returns {boolean} whether some rows are still to be renewed */
+  /** @returns {boolean} whether some rows are outdated */
   #tellBusy() {
     const isBusy = this.#rows.some(({ isOld }) => isOld);
     if (this.#parent.ariaBusy !== String(isBusy)) this.#parent.ariaBusy = String(isBusy);

@@ -5,7 +5,7 @@ const utf8 = new TextDecoder();
 const pad4 = (n) => (n + 3) & ~3;
 
 /**
- * Take one binary message apart (layout: app/streaming/encode.py). Arrays are views into the message, not copies.
+ * Decode one binary message (layout: app/streaming/encode.py). Arrays are views into the message, not copies.
  * @param {ArrayBuffer} buffer @returns {{frame: Frame, jpeg: Uint8Array<ArrayBuffer>}}
  */
 export function decode(buffer) {
@@ -14,7 +14,7 @@ export function decode(buffer) {
   const jpeg = new Uint8Array(buffer, 4 + headerLength, header.picture?.bytes ?? 0);
   const count = header.points;
   let end = 4 + headerLength + pad4(jpeg.length);
-  /** Where the next array of so many bytes begins. @param {number} bytes */
+  /** Offset of the next array of so many bytes. @param {number} bytes */
   const next = (bytes) => (end += bytes) - bytes;
   const frame = {
     madeUnixMs: header.made_unix_ms,

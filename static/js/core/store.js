@@ -1,7 +1,7 @@
-/** The page's only state. A pane subscribes to the keys it draws; whoever learns something sets a key. */
+/** The page's state. Panes subscribe to the keys that they draw. */
 
 /**
- * Null until first set.
+ * Values are null until first set.
  * @typedef {object} Values
  * @property {import("./types.js").State} state
  * @property {import("./types.js").Frame} frame
@@ -15,32 +15,32 @@
  * @property {string} theme
  * @property {import("../drive/types.js").Drive} drive the whole recording, as the timeline shows it
  * @property {import("../drive/types.js").ObjectCurve} curve the selected object over the recording
- * @property {number} scrub the frame asked for and not shown yet
+ * @property {number} scrub the requested frame, until it is shown
  * @property {{first: number, last: number}} clip what is marked for export
  * @property {import("../workspace/panes.js").Layout} layout
  * @property {{on: boolean, blend: number, edges: boolean}} align alignment mode
  * @property {number} lanes how many lanes the timeline has
- * @property {Labeling} labeling the mode in which people label
+ * @property {Labeling} labeling state of the labeling mode
  * @property {import("../labeling/state/labels.js").Labels} labels
- * @property {number} labelFrames grows when what is labelled in some frames has come
+ * @property {number} labelFrames incremented when labels of some frames have arrived
  * @property {number} track id of the selected label
- * @property {import("../labeling/state/draft.js").Draft} draft a label under a hand, or on its way to the server
- * @property {import("../labeling/state/marked_frames.js").Marked} marked the frames that a lead is painted over
- * @property {import("../labeling/acts/range_ends.js").Trimmed} trimmed a lead range whose end is under a hand
+ * @property {import("../labeling/state/draft.js").Draft} draft a label being edited or saved
+ * @property {import("../labeling/state/marked_frames.js").Marked} marked frames marked for labeling
+ * @property {import("../labeling/acts/range_ends.js").Trimmed} trimmed a lead range being resized
  * @property {import("../labeling/acts/queue.js").Saving} saving
- * @property {import("../labeling/views/three.js").Dragged} dragged the selected label under a hand in the 3D view
- * @property {string} person who labels, once it was said here
+ * @property {import("../labeling/views/three.js").Dragged} dragged the selected label being dragged in the 3D view
+ * @property {string} person name of the annotator, once known
  * @property {import("../labeling/state/undo_state.js").Steps} steps
- * @property {string} said what the labeling mode has to say
+ * @property {string} said status message of the labeling mode
  * @property {import("../labeling/views/projection.js").Projected} projected
- * @property {{left: import("./types.js").Point2[], right: import("./types.js").Point2[]}} drawnPath a path under a hand
+ * @property {{left: import("./types.js").Point2[], right: import("./types.js").Point2[]}} drawnPath a path being drawn
  */
 /**
  * @typedef
  *   {{on: boolean, tool: null|"new"|"shape"|"merge"|"path", from: number|null, hasObjects: boolean, review: boolean,
  *   item: {kind: import("../labeling/state/types.js").ItemKind, id: number}|null}}
- *   Labeling tool: what the next drag or click does; from: the track that is merged with another; hasObjects: whether
- *   the pipeline's objects are drawn; review: whether others' labels are looked through; item: which one now
+ *   Labeling tool: what the next drag or click does; from: the track to merge; hasObjects: whether pipeline objects are
+ *   drawn; review: whether review is on; item: the label under review
  */
 /** @typedef {keyof Values} Key */
 
@@ -48,7 +48,7 @@
 const values = {};
 /** @type {Map<Key, Set<(value: any) => void>>} */
 const listeners = new Map();
-/** What is to be drawn: at the next turn of the screen, and one turn after that. @type {Set<() => void>} */
+/** Callbacks for the next animation frame, and for the one after. @type {Set<() => void>} */
 const due = new Set();
 /** @type {Set<() => void>} */
 const after = new Set();
@@ -74,7 +74,7 @@ export function on(keys, listener) {
   }
 }
 
-/** Like `on`, at most once per painted frame: for what draws. @param {Key[]} keys @param {() => void} draw */
+/** Like `on`, but at most once per animation frame, for drawing. @param {Key[]} keys @param {() => void} draw */
 export function paint(keys, draw) {
   const invalidate = painter(draw);
   on(keys, invalidate);
@@ -82,8 +82,8 @@ export function paint(keys, draw) {
 }
 
 /**
- * Like `paint`, one painted frame later: for what many words say, as a table does. Having those laid out takes longer
- * than the views take to draw, and nobody reads that fast. While a drive plays, with everything else.
+ * Like `paint`, but one animation frame later, for text-heavy parts such as tables, whose layout takes longer than
+ * drawing the views. During playback, together with everything else.
  * @param {Key[]} keys
  * @param {() => void} draw
  */
@@ -96,7 +96,7 @@ export function paintAfter(keys, draw) {
   return invalidate;
 }
 
-/** A function that has `draw` run once before the next paint, however often it is called. @param {() => void} draw */
+/** Returns a function that schedules `draw` for the next animation frame. @param {() => void} draw */
 export function painter(draw) {
   return () => {
     due.add(draw);
@@ -104,8 +104,7 @@ export function painter(draw) {
   };
 }
 
-/** Draw what is due without waiting for the screen's next turn, which then only has to show it. A page that nobody sees
- * waits until somebody does. */
+/** Draw now instead of at the next animation frame. Does nothing while the page is hidden. */
 export function drawNow() {
   if (!document.hidden) run(due);
 }
@@ -132,12 +131,12 @@ function run(draws) {
     try {
       draw();
     } catch (error) {
-      reportError(error); // one view that fails takes no other with it
+      reportError(error); // an error in one view must not stop the others
     }
   }
 }
 
-/** Select an object everywhere; selecting it again takes the selection away. @param {number|null} id */
+/** Select an object in all views; selecting it again deselects it. @param {number|null} id */
 export function select(id) {
   set("selection", id === null || id === get("selection") ? null : id);
 }

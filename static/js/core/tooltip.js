@@ -1,6 +1,5 @@
 /**
- * One tooltip for the page: help that appears on hover and on keyboard focus, and what lies under the pointer in a
- * view.
+ * The page's tooltip: help on hover, and what lies under the pointer in a view.
  */
 import { $ } from "./dom.js";
 
@@ -16,7 +15,7 @@ export function attachTooltip(node, words) {
   field?.addEventListener("focusout", hideTip);
 }
 
-/** Beside the pointer. @param {number} x @param {number} y @param {string} words */
+/** Show a tooltip beside the pointer. @param {number} x @param {number} y @param {string} words */
 export function tipAt(x, y, words) {
   show({ left: x + POINTER_PX, top: y, bottom: y + POINTER_PX }, words);
 }

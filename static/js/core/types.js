@@ -1,6 +1,6 @@
 /**
- * Shapes of what the server sends. `tests/app/page/test_page_types.py` holds every key here against real messages.
- * The message is laid out in app/streaming/encode.py, the result in the contract, the drive in app/routes/.
+ * Types of server messages. `tests/app/page/test_page_types.py` checks every key against real messages.
+ * The binary layout is in app/streaming/encode.py, routes are in app/web/routes/.
  *
  * @typedef {[number, number]} Point2
  * @typedef {(Point2|null)[]} Pixels
@@ -66,7 +66,7 @@
  * @property {number} accelerator
  * @property {number} brake
  * @property {string} reason
- * @property {number|null} object_id  what it slows down for
+ * @property {number|null} object_id  object it slows down for
  *
  * @typedef {object} Result
  * @property {number} version
@@ -114,7 +114,7 @@
  * @property {DriveState} drive
  * @property {boolean} can_undo
  * @property {boolean} can_redo
- * @property {import("../labeling/state/types.js").LabelsState|null} labels  null where nothing can be labelled
+ * @property {import("../labeling/state/types.js").LabelsState|null} labels  null if labeling is unavailable
  *
  * @typedef {object} RecordingState
  * @property {string} file
@@ -142,7 +142,7 @@
  * @property {{left: Pixels, right: Pixels}|null} lanes
  * @property {{left: Point2[], right: Point2[]}|null} plan_lanes
  * @property {GroundPlanes|null} ground
- * @property {Record<string, {distance_m: number, sigma_m: number}>} vision_ranges  what the camera alone measured
+ * @property {Record<string, {distance_m: number, sigma_m: number}>} vision_ranges  camera-only range estimates
  * @property {Ranked[]} ranking
  *
  * @typedef {object} GroundPlanes  n·p + d = 0 between neighbouring edges of x
@@ -158,7 +158,7 @@
  * @property {number|null} limit
  * @property {string} reason
  *
- * @typedef {object} Picture  as sent; scale is sent pixels per pixel of the camera's picture
+ * @typedef {object} Picture  as sent; scale: sent pixels per camera pixel
  * @property {number} width
  * @property {number} height
  * @property {number} scale

@@ -1,4 +1,4 @@
-/** How urgent it is: the shades of time to collision, and the words for what ACC does. */
+/** Urgency levels of time to collision, and names of ACC states. */
 
 export const TTC_DANGER_S = 2.5,
   TTC_WARN_S = 5;

@@ -1,4 +1,4 @@
-/** From event to event, and from difference to difference. */
+/** Jumps between events, and between differences. */
 import { get } from "../core/store.js";
 import { here, seekTo } from "./seek.js";
 
@@ -15,7 +15,7 @@ export function toEvent(direction) {
   );
 }
 
-/** To the start of a stretch in which the two runs differ. @param {1|-1} direction */
+/** Go to the start of a range in which the two runs differ. @param {1|-1} direction */
 export function toDifference(direction) {
   go(
     (get("drive")?.comparison?.differing ?? []).map(([first]) => first),

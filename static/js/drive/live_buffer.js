@@ -1,5 +1,7 @@
-/** Live sensors have no whole recording: the timeline shows the last minutes as they came, and then lets go of them. Of
- * events there are marks alone, which the server keeps. */
+/**
+ * Live sensors have no whole drive, so the timeline shows a ring buffer of the last minutes. The only events are marks,
+ * which the server keeps.
+ */
 import { newestOnly, request } from "../core/api.js";
 import { get, on, set } from "../core/store.js";
 
@@ -7,7 +9,7 @@ import { get, on, set } from "../core/store.js";
 /** @typedef {import("../core/types.js").Frame} Frame */
 /** @typedef {import("./types.js").DriveEvent} DriveEvent */
 
-/** Why what asks for a recording is not to be had. */
+/** Shown where a feature needs a recording. */
 export const NO_DRIVE = "Not available with live sensors. Record a session, then open it.";
 
 const MOST_FRAMES = 1200;
@@ -41,8 +43,7 @@ let uri = null;
 let times = [];
 let columns = empty();
 /**
- * @type {DriveEvent[]} another array only when there are other marks: their index goes on changing with the frames let
- *   go of
+ * @type {DriveEvent[]} replaced only when marks change; their index changes as old frames are dropped
  */
 let marks = [];
 let known = "";
@@ -103,7 +104,7 @@ function remember() {
   });
 }
 
-/** The frame at a time; of one that is not held any more, far before all. @param {number} t_s */
+/** The frame at a time; −Infinity if it was dropped. @param {number} t_s */
 function placeOf(t_s) {
   return t_s < times[0] - SAME_S ? -Infinity : times.findLastIndex((time) => time <= t_s + SAME_S);
 }

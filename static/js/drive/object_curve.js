@@ -1,11 +1,11 @@
-/** The selected object over the whole recording, for the charts. */
+/** The selected object over the whole drive, for the curves. */
 import { newestOnly, request } from "../core/api.js";
 import { get, on, set } from "../core/store.js";
 
 let known = "";
 
 const fetchCurve = newestOnly(async (/** @type {{id: number, run: number}} */ { id, run }) => {
-  const curve = await request(`api/drive/object/${id}`).catch(() => null); // by its number the run may be gone by now
+  const curve = await request(`api/drive/object/${id}`).catch(() => null); // the run may have been deleted meanwhile
   if (get("selection") === id) set("curve", curve?.run === run ? curve : null);
 });
 

@@ -1,4 +1,4 @@
-/** The whole recording as far as the server has computed it. What is new is fetched when the state says so. */
+/** Keeps the drive's columns, events and comparison in sync with the server. */
 import { newestOnly, request } from "../core/api.js";
 import { get, on, set } from "../core/store.js";
 
@@ -6,12 +6,12 @@ import { get, on, set } from "../core/store.js";
 /** @typedef {import("./types.js").Drive} Drive */
 /** @typedef {Pick<Drive, "events"|"comparison">} Findings */
 
-/** While a run is under way, columns are fetched no more often than this, and what is found in them less often. */
+/** Minimum interval between fetches during a run: of columns, and of events and comparison. */
 const PAUSE_MS = 200,
   FINDINGS_PAUSE_MS = 1000;
 
 let known = "";
-/** @type {Record<number, Series>} the runs shown, by number */
+/** @type {Record<number, Series>} the current and the compared run, by number */
 let held = {};
 let foundAt_ms = -Infinity;
 
@@ -56,10 +56,10 @@ async function fetchAll() {
 }
 
 /**
- * What is held of a run, and what the server has beyond it.
+ * Extend a run's known columns by what the server has since computed.
  * @param {number} run
  * @param {string} path
- * @returns {Promise<[Series, number[]]>} the series, and the frames' times where they came
+ * @returns {Promise<[Series, number[]]>} the series, and the times of its frames if they were sent
  */
 async function fetchSeries(run, path) {
   const from = held[run]?.done ?? 0;
@@ -81,7 +81,7 @@ function extended({ run, columns }, more) {
 }
 
 /**
- * Events, and how the two runs differ.
+ * Fetch the events, and the comparison of the two runs.
  * @param {Drive|null} before
  * @param {Series} now
  * @param {Series|null} base
@@ -93,7 +93,7 @@ async function findings(before, now, base) {
   foundAt_ms = performance.now();
   const [{ events }, compared] = await Promise.all([
     request("api/drive/events"),
-    base ? request("api/compare").catch(() => null) : null, // by numbers one may be gone by now
+    base ? request("api/compare").catch(() => null) : null, // a run may have been deleted meanwhile
   ]);
   return { events, comparison: compared?.base === base?.run && compared?.run === now.run ? compared : null };
 }

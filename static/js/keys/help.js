@@ -1,4 +1,4 @@
-/** What the keys do and what the colours mean. */
+/** The help overlay: keyboard shortcuts, colours and links. */
 import { $, el } from "../core/dom.js";
 import { keymap } from "./keymap.js";
 
@@ -50,16 +50,16 @@ export function show() {
     el("form", { method: "dialog" }, el("button", { textContent: "Close" })),
   );
   dialog.showModal();
-  dialog.scrollTop = 0; // what can be focused first is far below
+  dialog.scrollTop = 0; // the first focusable element is at the bottom
 }
 
 /** A link that opens in a new tab. @param {string} href @param {string} words */
 const link = (href, words) => el("a", { href, target: "_blank", rel: "noopener", textContent: words });
 
-/** What can be done now comes first. @returns {import("./keymap.js").Group[]} */
+/** Active shortcuts come first. @returns {import("./keymap.js").Group[]} */
 const groups = () => [...keymap()].sort((a, b) => Number(isIdle(a)) - Number(isIdle(b)));
 
-/** Whether it belongs to a mode that is off. @param {import("./keymap.js").Group} group */
+/** Whether a group belongs to an inactive mode. @param {import("./keymap.js").Group} group */
 const isIdle = ({ mode, bindings }) => mode !== undefined && bindings.every(({ isOn }) => isOn && !isOn());
 
 /** @param {import("./keymap.js").Group} group */

@@ -1,8 +1,8 @@
-/** Keys of the whole page (keymap.js); not while somebody types, and a focused slider keeps its arrows. */
+/** Global keyboard shortcuts (keymap.js). Ignored while typing; a focused slider keeps its arrow keys. */
 import { $ } from "../core/dom.js";
 import { keymap } from "./keymap.js";
 
-/** What the 3D view is flown through with, whatever is held besides (viser's CAMERA_MOVEMENT_KEYS): it keeps these. */
+/** Camera movement keys of the 3D view (viser's CAMERA_MOVEMENT_KEYS), with any modifier. */
 const FLYING = new Set([
   "KeyW",
   "KeyA",
@@ -27,7 +27,7 @@ export function setUp() {
     binding.act();
   };
   document.addEventListener("keydown", act);
-  // the 3D view is a page of its own, of our origin: its keys are heard there
+  // the 3D view is a same-origin iframe, so listen in it too
   $("#three-body").addEventListener(
     "load",
     ({ target }) => target instanceof HTMLIFrameElement && hearIn(target, act),
@@ -43,13 +43,16 @@ function hearIn(view, act) {
   });
 }
 
-/** From now on keys are the page's. @param {HTMLIFrameElement} view */
+/** Return keyboard focus to the page. @param {HTMLIFrameElement} view */
 function giveBack(view) {
   view.blur();
   window.focus();
 }
 
-/** "Shift+1" whatever the keyboard prints there, "Ctrl+z", "?", "Space". @param {KeyboardEvent} event */
+/**
+ * Key name, independent of keyboard layout for digits: "Shift+1", "Ctrl+z", "?", "Space".
+ * @param {KeyboardEvent} event
+ */
 function nameOf({ key, code, shiftKey, ctrlKey, metaKey }) {
   const digit = /^Digit(\d)$/.exec(code)?.[1];
   const bare =
@@ -58,7 +61,7 @@ function nameOf({ key, code, shiftKey, ctrlKey, metaKey }) {
   return `${ctrlKey || metaKey ? "Ctrl+" : ""}${isSaid ? "Shift+" : ""}${bare}`;
 }
 
-/** True when the focused element means the key for itself. @param {KeyboardEvent} event */
+/** Whether the focused element handles the key itself. @param {KeyboardEvent} event */
 function isTaken({ target, key, ctrlKey, metaKey }) {
   if (document.querySelector("dialog[open]") || (key === "Escape" && document.querySelector(":popover-open")))
     return true;

@@ -1,4 +1,4 @@
-/** Every key of the page: what it does, and the words that the help shows. The one table of both. */
+/** All keyboard shortcuts: their actions and their help texts. */
 import { toggleAlign } from "../align/mode.js";
 import { playback } from "../core/api.js";
 import { toDifference, toEvent } from "../drive/jumps.js";
@@ -20,17 +20,17 @@ import { share } from "../workspace/share_link.js";
 import { toggleTheme } from "../workspace/theme.js";
 
 /**
- * keys: as `nameOf` in keyboard.js gives them; isOn: when it counts, of several of one key the first that does. A
- * binding without words is said by another one.
+ * keys: as `nameOf` in keyboard.js returns them; isOn: whether the binding is active, the first active one wins.
+ * Bindings without words are not listed in the help.
  * @typedef {{keys: string[], shown: string, words: string, act: () => unknown, isOn?: () => boolean}} Binding
  */
 /**
- * mode: whose keys they are; they go before the page's own while it is on.
+ * mode: keys of a mode take precedence while it is on.
  * @typedef {{title: string, mode?: string, bindings: Binding[]}} Group
  */
 
 /**
- * @param {string} keys one or more, apart by spaces
+ * @param {string} keys separated by spaces
  * @param {string} shown
  * @param {string} words
  * @param {() => void} act

@@ -1,4 +1,4 @@
-/** Keys of the labeling mode. They go before the page's own while it is on. */
+/** Keyboard shortcuts of the labeling mode. They take precedence while it is on. */
 import { playback } from "../core/api.js";
 import { get } from "../core/store.js";
 import * as byKeys from "./acts/keyboard_drawing.js";
@@ -11,7 +11,7 @@ import { toggleWhole } from "./acts/tags.js";
 
 /** @typedef {import("../keys/keymap.js").Binding} Binding */
 /**
- * `brief`: the words of the strip below the timeline; what has none is only in the help.
+ * `brief`: text in the strip below the timeline; without it, a binding is only listed in the help.
  * @typedef {Binding & {brief?: string}} LabelBinding
  */
 
@@ -31,7 +31,7 @@ const STEP_M = 0.1,
 const key = (keys, shown, words, act, brief) => ({ keys: keys.split(" "), shown, words, act, brief, isOn });
 
 /**
- * Arrows move the selected cuboid; with none they go through the frames, as without the mode.
+ * Active while a track is selected; otherwise arrow keys step through frames as usual.
  * @param {LabelBinding} binding
  * @returns {LabelBinding}
  */
@@ -41,21 +41,21 @@ const selected = (binding) => ({
 });
 
 /**
- * While something is to be drawn.
+ * Active while a tool is on.
  * @param {import("../core/store.js").Labeling["tool"]} tool
  * @param {LabelBinding} binding
  * @returns {LabelBinding}
  */
 const during = (tool, binding) => ({ ...binding, isOn: () => isOn() && get("labeling")?.tool === tool });
 
-/** While others' labels are looked through. @param {LabelBinding} binding @returns {LabelBinding} */
+/** Active during review. @param {LabelBinding} binding @returns {LabelBinding} */
 const reviewing = (binding) => ({ ...binding, isOn: review.isReviewing });
 
-/** After which keys the arrows are a tool's. */
+/** Keys that start a tool with arrow keys. */
 const BEGINS = { shape: "Shift G", path: "Shift P" };
 
 /**
- * The four arrows, each alone and with Shift.
+ * Bindings for the four arrow keys, with and without Shift.
  * @param {"shape"|"path"} tool
  * @param {string} words
  * @param {(right: number, up: number, isShift: boolean) => unknown} act
@@ -81,7 +81,7 @@ const arrows = (tool, words, act) =>
   ]);
 
 /**
- * A pair of keys, the second with Shift for the other direction.
+ * A pair of bindings, the second with Shift for the other direction.
  * @param {string} letter
  * @param {string} words
  * @param {(direction: 1|-1) => unknown} act

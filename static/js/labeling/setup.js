@@ -1,4 +1,4 @@
-/** The labeling mode's parts, put together. */
+/** Sets up the labeling mode. */
 import { addMode } from "../views/plan.js";
 import { addLayer } from "../views/camera.js";
 import { addLane } from "../timeline/lanes/registry.js";
@@ -24,5 +24,5 @@ export function setUp() {
   for (const part of [mode, acts, data, steps, frames, draft, projection, three, bar, panel, pictureHand]) part.setUp();
   addMode({ isOn: mode.isOn, draw: drawInPlan, ...planHand });
   addLayer(drawInPicture, "over");
-  for (const lane of [...tags, leads, track]) addLane(lane, "lead"); // above what the pipeline says
+  for (const lane of [...tags, leads, track]) addLane(lane, "lead"); // above the pipeline's lead
 }

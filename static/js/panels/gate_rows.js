@@ -1,4 +1,4 @@
-/** Gates as a person reads them: a name, the number, its limit, a bar, and the parameter that sets the limit. */
+/** Gate rows: name, value, limit, bar, and the parameter that sets the limit. */
 import { el, mark, text } from "../core/dom.js";
 import { DASH, num } from "../core/format.js";
 import { reveal } from "./params.js";
@@ -7,7 +7,7 @@ import { reveal } from "./params.js";
 /**
  * @typedef {object} Kind
  * @property {string} label
- * @property {"least"|"most"|"flag"} test  what passes: at least the limit, at most, or yes
+ * @property {"least"|"most"|"flag"} test  passes if at least the limit, at most the limit, or true
  * @property {string} [unit]
  * @property {string} [param]  the parameter behind the limit
  */
@@ -26,7 +26,7 @@ const KINDS = {
   path_offset: { label: "Path offset", test: "most", unit: "m", param: "path.half_width_m" },
   path_sigma: { label: "Position uncertainty", test: "most", unit: "m", param: "cipv.max_sigma_m" },
 };
-/** How far a bar reaches beyond the larger of value and limit. */
+/** Bar range relative to the larger of value and limit. */
 const HEADROOM = 1.2;
 
 /** @param {string} name @returns {Kind} */
@@ -74,7 +74,7 @@ export function showGate(row, gate) {
   bar.style.setProperty("--limit", `${(100 * (gate.limit ?? 0)) / most}%`);
 }
 
-/** Between number and limit; a dash where the gate weighed more than the two. @param {Kind} kind @param {Gate} gate */
+/** Comparison sign; a dash if the gate depends on more than value and limit. @param {Kind} kind @param {Gate} gate */
 function signOf({ test }, { value, limit, passed }) {
   if (test === "flag" || limit === null) return "";
   const holds = value !== null && (test === "least" ? value >= limit : value <= limit);

@@ -1,5 +1,5 @@
 /**
- * The answer, large: which vehicle, how far, how fast the gap shrinks, how long that lasts, and what ACC makes of it.
+ * The lead banner: CIPV, distance, closing speed, time to collision and ACC state.
  */
 import { get, on } from "../core/store.js";
 import { $, el, mark, text } from "../core/dom.js";
@@ -106,7 +106,7 @@ function updateAcc({ acc: command, ego }) {
   say(note, command ? command.reason : "Ego speed unknown.");
 }
 
-/** Words that may be cut off, so they are the tooltip too. @param {HTMLElement} node @param {string} words */
+/** Text that may be truncated, repeated as a tooltip. @param {HTMLElement} node @param {string} words */
 function say(node, words) {
   if (node.title === words) return;
   text(node, words);

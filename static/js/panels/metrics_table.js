@@ -1,4 +1,4 @@
-/** Figures before and after: what got better, and what worse. */
+/** Table of metrics before and after, coloured by improvement. */
 import { el } from "../core/dom.js";
 import { DASH, num, signed } from "../core/format.js";
 
@@ -12,7 +12,7 @@ const JUDGES = {
 
 /**
  * @param {Pick<import("../drive/types.js").Comparison, "metrics"|"truth"|"judged">} comparison
- * @param {boolean} [isAlone] there is nothing to compare with: one column
+ * @param {boolean} [isAlone] a single column, without comparison
  * @returns {HTMLElement}
  */
 export function metricsTable({ metrics, truth, judged }, isAlone = false) {

@@ -1,13 +1,13 @@
-/** What a person must know: a missing detector, degraded frames, a lost connection. */
+/** Notices: missing detector, degraded frames, lost connection, refused requests. */
 import { Refused } from "../core/api.js";
 import { $, el, text } from "../core/dom.js";
 import { get, on } from "../core/store.js";
 
-/** @typedef {import("../core/types.js").Notice & {fixed?: boolean}} Shown  fixed: it goes by itself, not by hand */
+/** @typedef {import("../core/types.js").Notice & {fixed?: boolean}} Shown  fixed: cannot be dismissed */
 
 /** @type {Set<string>} */
 const dismissed = new Set();
-/** A refusal is read and gone. */
+/** How long a refusal is shown. */
 const REFUSAL_MS = 10_000;
 let shown = "";
 /** @type {{words: string, until: number}|null} */
@@ -19,8 +19,7 @@ export function setUp() {
 }
 
 /**
- * Say what the server refused of what a hand asked for. That it cannot be reached at all is said for as long as it
- * holds.
+ * Show a refused request. Connection loss has a notice of its own.
  * @param {unknown} error
  */
 export function refused(error) {
@@ -36,7 +35,7 @@ function update() {
   text($("#link"), { live: "live", lost: "connection lost", connecting: "connecting" }[link?.status ?? "connecting"]);
   const busy = get("state")?.busy;
   $("#busy").hidden = !busy;
-  document.documentElement.toggleAttribute("data-busy", Boolean(busy)); // what the other panes show is of before
+  document.documentElement.toggleAttribute("data-busy", Boolean(busy)); // other panes show outdated content
   text($("#busy"), busy ?? "");
   const notices = [...lost(link), ...ofHand(), ...standing(), ...ofFrame()].filter(
     ({ text: words }) => !dismissed.has(words),
@@ -66,7 +65,7 @@ function ofHand() {
   return refusal ? [{ level: "error", text: refusal.words }] : [];
 }
 
-/** What holds for the whole recording; plain information shares one line. @returns {Shown[]} */
+/** Notices about the whole recording; information is merged into one line. @returns {Shown[]} */
 function standing() {
   const notices = get("state")?.notices ?? [];
   const infos = notices.filter(({ level }) => level === "info").map(({ text: words }) => words);
@@ -74,7 +73,7 @@ function standing() {
   return infos.length ? [...rest, { level: "info", text: infos.join(" · ") }] : rest;
 }
 
-/** What the shown frame lacks; it goes with the frame. @returns {Shown[]} */
+/** Notes of the current frame. @returns {Shown[]} */
 function ofFrame() {
   return (get("frame")?.result.notes ?? []).map((words) => ({ level: "warning", text: words, fixed: true }));
 }

@@ -1,4 +1,4 @@
-/** The table of fused objects: one row each, sorted, with the reason why it is the CIPV or why not. */
+/** The table of fused objects, with the reason why each is or is not the CIPV. */
 import { cipvId } from "../core/colors.js";
 import { $, el, mark, text, within } from "../core/dom.js";
 import { DASH, kmh, num, side, signed } from "../core/format.js";
@@ -11,8 +11,8 @@ import { get, on, paintAfter, select, set } from "../core/store.js";
  * @property {string} key
  * @property {string} label
  * @property {string} help
- * @property {(o: FusedObject) => string} words  what a cell says
- * @property {(o: FusedObject) => string|number} by  what it is sorted by
+ * @property {(o: FusedObject) => string} words  cell text
+ * @property {(o: FusedObject) => string|number} by  sort key
  */
 
 /** @type {Column[]} */
@@ -84,9 +84,9 @@ const COLUMNS = [
 ];
 const TEXTS = new Set(["id", "source", "type"]);
 
-/** Null key: what matters first. @type {{key: string|null, down: boolean}} */
+/** A null key sorts by relevance. @type {{key: string|null, down: boolean}} */
 let sort = { key: null, down: false };
-/** An object, and why it is the CIPV or why not. @typedef {{item: FusedObject, why: string}} Row */
+/** An object, and the reason why it is or is not the CIPV. @typedef {{item: FusedObject, why: string}} Row */
 /** @type {WeakMap<HTMLElement, {cells: Record<string, HTMLElement>, reason: HTMLElement}>} */
 const parts = new WeakMap();
 const body = $("#objects tbody"),
@@ -107,7 +107,7 @@ export function setUp() {
 }
 
 /**
- * m/s towards us along the line to its nearest point, as the banner shows it.
+ * Closing speed in m/s along the line of sight, as in the banner.
  * @param {FusedObject} o
  * @returns {number | null}
  */
@@ -169,7 +169,7 @@ function update() {
 }
 
 /**
- * The CIPV, then what is in the path, then what a camera sees, then the rest; nearer first among equals.
+ * Sort key: CIPV, in path, seen by camera, rest; by distance within each group.
  * @param {FusedObject} item
  * @param {number|undefined} lead
  */

@@ -1,11 +1,11 @@
-/** The dialog that opens another recording. */
+/** The dialog for opening another recording. */
 import { request } from "../core/api.js";
 import { $, el, text } from "../core/dom.js";
 import { refused } from "./notices.js";
 import { get, on } from "../core/store.js";
 
 const dialog = $("#source-dialog", HTMLDialogElement);
-/** What was asked for and could not be opened: a typing mistake is mended, not typed again. @type {string|null} */
+/** The last URI that could not be opened, so that a typo can be corrected. @type {string|null} */
 let wanted = null;
 /** @type {string|null|undefined} */
 let openUri;

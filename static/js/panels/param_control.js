@@ -1,8 +1,8 @@
-/** One parameter: its name, its slider, number box, switch or choice, and a way back to the preset's value. */
+/** Control of one parameter: name, input, and reset to the preset value. */
 import { el, press } from "../core/dom.js";
 import { attachTooltip } from "../core/tooltip.js";
 
-/** A slider of a number that is null by default spans this much around what the recording says. */
+/** Slider range of a parameter that is null by default, relative to its effective value. */
 const AROUND = 2;
 
 /** @typedef {import("../core/types.js").Param} Param */
@@ -20,7 +20,7 @@ const AROUND = 2;
  */
 export function control(name, param, change) {
   const id = `param-${name}`;
-  /** What it shows, as the server said it; empty once a hand has moved it. */
+  /** Last state from the server; empty after user input. */
   let shown = "";
   const moved = (/** @type {ParamValue} */ value, /** @type {boolean} */ isFinal) => {
     shown = "";
@@ -61,14 +61,14 @@ export function control(name, param, change) {
     /**
      * @param {ParamValue} value
      * @param {ParamValue} preset
-     * @param {number|null} effective what null stands for
+     * @param {number|null} effective value used if null
      * @param {boolean} idle
      */
     show(value, preset, effective, idle) {
       base = preset;
       const now = JSON.stringify([value, preset, effective, idle]);
       if (now === shown) return;
-      shown = node.contains(document.activeElement) ? "" : now; // what is under a hand keeps what the hand gave it
+      shown = node.contains(document.activeElement) ? "" : now; // do not overwrite a focused input
       node.classList.toggle("is-changed", value !== preset);
       node.classList.toggle("is-idle", idle);
       auto.hidden = value !== null;

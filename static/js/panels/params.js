@@ -1,4 +1,4 @@
-/** The panel of parameters, made from what the server declares. Every change is sent at once, the newest only. */
+/** The parameter panel, built from the server's schema. Changes are sent at once, newest only. */
 import { newestOnly, request } from "../core/api.js";
 import { $, el, memory, text } from "../core/dom.js";
 import { control } from "./param_control.js";
@@ -12,7 +12,7 @@ import { toggle } from "../workspace/panes.js";
 
 const OPEN_AT_FIRST = ["alignment", "cluster"];
 const FIRST_SECTION = "alignment";
-/** Moving one of these means: use the model that it belongs to. @type {Record<string, string>} */
+/** Changing one of these parameters selects its model. @type {Record<string, string>} */
 const MODEL_OF = {
   "alignment.h_res_deg": "angular",
   "alignment.v_res_deg": "angular",
@@ -54,7 +54,7 @@ const submit = newestOnly(
 );
 
 let told = Promise.resolve();
-/** Once the server has answered every change so far. */
+/** Resolves once the server has answered all changes so far. */
 export const settled = () => told;
 
 export function setUp() {
@@ -90,10 +90,10 @@ export function setUp() {
   );
   on(["state"], refreshIfForeign);
   on(["params"], () => (knownRevision = Math.max(knownRevision, get("params")?.revision ?? -1)));
-  paintAfter(["params"], show); // a hundred controls: the frame that a change makes goes first
+  paintAfter(["params"], show); // there are a hundred controls: draw the frame first
 }
 
-/** Another browser, the 3D view or another recording changed what is true: read it again. */
+/** Reload after changes by another browser, the 3D view or another recording. */
 function refreshIfForeign() {
   const state = get("state");
   if (!state || state.frame === null || (state.params_revision <= knownRevision && state.uri === knownUri)) return;
@@ -162,9 +162,10 @@ function build({ sections: described, presets: names }) {
 }
 
 /**
- * Change parameters by their dotted names. While a hand still moves, `isFinal` is false: the shown frame follows, and
- * the whole recording waits for the last value.
- * @param {Record<string, ParamValue>} changes @param {boolean} isFinal
+ * Change parameters by dotted name. While input continues, `isFinal` is false: only the current frame is recomputed,
+ * the whole drive waits for the final value.
+ * @param {Record<string, ParamValue>} changes
+ * @param {boolean} isFinal
  */
 export function change(changes, isFinal) {
   const model = Object.entries(changes)
@@ -173,7 +174,7 @@ export function change(changes, isFinal) {
   told = submit({ changes: { ...changes, ...(model ? { "alignment.model": model } : {}) }, final: isFinal });
 }
 
-/** Show one parameter. @param {string} name @returns {HTMLElement|null} its control */
+/** Reveal one parameter. @param {string} name @returns {HTMLElement|null} its control */
 export function reveal(name) {
   toggle("params", true);
   $("#tab-params").click();
@@ -200,10 +201,10 @@ function rememberOpen() {
   );
 }
 
-/** As names and words are compared: `z_weight` is found by "z weight" and the other way round. @param {string} text */
+/** Normalise text for search: "z weight" finds `z_weight` and vice versa. @param {string} text */
 const plain = (text) => text.replaceAll("_", " ").toLowerCase();
 
-/** Show what matches the words, with its sections open. */
+/** Show matching parameters and open their sections. */
 function filter() {
   const words = plain(search.value).split(/\s+/).filter(Boolean);
   const remembered = new Set(memory.read("sections", OPEN_AT_FIRST));

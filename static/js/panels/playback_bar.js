@@ -1,4 +1,4 @@
-/** Play, step, speed and repeat. The bar asks; the stream answers. Going to a frame is the timeline's. */
+/** Playback bar: play, step, speed, loop and record. */
 import { playback } from "../core/api.js";
 import { $, el, press, text } from "../core/dom.js";
 import { NO_DRIVE } from "../drive/live_buffer.js";
@@ -75,7 +75,7 @@ function update() {
   pauseIcon.classList.toggle("is-off", !state.playing);
   play.setAttribute("aria-label", state.playing ? "Pause" : "Play");
   const frame = get("frame")?.state,
-    at = frame?.uri === state.uri ? frame : state; // named is what is drawn
+    at = frame?.uri === state.uri ? frame : state; // name of the displayed frame
   text(name, at.frame ?? "");
   text(count, has && !state.live ? `${at.index + 1}/${state.count}` : "");
   text(time, state.live ? clock(at.time_s) : `${clock(at.time_s)} / ${clock(state.duration_s)}`);

@@ -1,4 +1,4 @@
-/** The button that records what comes in and what is made of it into a session. */
+/** The button that records sensor data and results into a session. */
 import { request } from "../core/api.js";
 import { el, press, text } from "../core/dom.js";
 import { clock } from "../core/format.js";

@@ -1,4 +1,4 @@
-/** Runs of the whole recording with different parameters: keep, name, compare, take back. Below them, what changed. */
+/** Runs of the whole drive with different parameters: keep, name, compare and delete; with the comparison on top. */
 import { newestOnly, request } from "../core/api.js";
 import { $, el, keyed, text } from "../core/dom.js";
 import { toDifference } from "../drive/jumps.js";
@@ -123,7 +123,7 @@ function showRun(row, run) {
   );
 }
 
-/** What the shown run changes against the compared one. */
+/** Comparison of the current run with the base run. */
 function showComparison() {
   const drive = get("drive"),
     found = drive?.comparison;

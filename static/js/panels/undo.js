@@ -1,5 +1,5 @@
 /**
- * Undo and redo: one history of labels, parameters and calibration. It is the server's; a person takes back their own.
+ * Undo and redo: one history of labels, parameters and calibration on the server, per person.
  */
 import { $ } from "../core/dom.js";
 import { move } from "../labeling/acts/queue.js";
@@ -12,12 +12,12 @@ export function setUp() {
   on(["state", "steps", "params"], reflect);
 }
 
-/** A key is not held back by what this page knows, which may be a moment old: the server says when there is nothing. */
-export const undo = () => settled().then(() => move("undo")); // not before the change that it is to take back
+/** Shortcuts are always sent, since this page may be outdated; the server reports if there is nothing to undo. */
+export const undo = () => settled().then(() => move("undo")); // after pending changes
 export const redo = () => settled().then(() => move("redo"));
 
 /**
- * What this person can take back or do again: of labels and parameters together, where the recording can be labelled.
+ * What this person can undo or redo: labels and parameters, or parameters alone if labeling is unavailable.
  */
 export const possible = () => (get("state")?.labels ? get("steps") : get("params"));
 

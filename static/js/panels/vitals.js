@@ -1,5 +1,5 @@
 /**
- * How fresh and how fast: from result made to painted, frames painted a second, what the stages took, what was skipped.
+ * Timing: frame rate, latency, stage and detector times, skipped frames.
  */
 import { serverNow } from "../core/connection.js";
 import { $, el, text } from "../core/dom.js";
@@ -53,7 +53,7 @@ function afterPaint() {
     .join("\n");
 }
 
-/** Whoever is spared nothing needs no word of it. */
+/** Hidden unless frames were skipped. */
 function showSkipped() {
   const skipped = get("state")?.skipped ?? 0;
   text(values.skipped, String(skipped));

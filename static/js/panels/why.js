@@ -1,6 +1,6 @@
 /**
- * Why the selected object, or else the CIPV, is what it is. For the CIPV: how all candidates rank. For another: the one
- * gate that stopped it.
+ * Explains the selected object, or else the CIPV: for the CIPV the ranking of all candidates, for others the gate that
+ * rejected them.
  */
 import { cipvId } from "../core/colors.js";
 import { $, el, keyed, mark, text, within } from "../core/dom.js";
@@ -80,7 +80,7 @@ function update() {
   keyed(gates, failedFirst(item.gates), (gate) => gate.name, gateRow, showGate);
 }
 
-/** What stopped it must be seen without scrolling; otherwise in the order they are asked. @param {Gate[]} all */
+/** Failed gates first, so that they are visible without scrolling. @param {Gate[]} all */
 const failedFirst = (all) => [...all].sort((a, b) => Number(a.passed) - Number(b.passed));
 
 /** @param {boolean} hidden */
@@ -89,7 +89,7 @@ function hideObject(hidden) {
 }
 
 /**
- * The reason, with the number and limit of the gate that stopped it.
+ * The reason, with value and limit of the failed gate.
  * @param {Result} result
  * @param {Ranked|undefined} ranked
  * @param {number} id

@@ -10,7 +10,7 @@ import { get } from "../core/store.js";
 const FONT = '10px system-ui, "DejaVu Sans", sans-serif';
 const TICK_STEPS_S = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1200, 3600];
 const TICK_FROM_PX = 70;
-/** Where a recording has gaps, its seconds lie nearer to each other. */
+/** Minimum tick spacing: seconds are closer together where a recording has gaps. */
 const TICK_APART_PX = 46;
 
 /** @param {CanvasRenderingContext2D} ctx @param {Size} size @param {Span} span @param {Rows} rows */

@@ -1,4 +1,4 @@
-/** Marking a stretch of the recording: in, out, and none. */
+/** Marking a clip: in, out, clear. */
 import { $, text } from "../core/dom.js";
 import { here } from "../drive/seek.js";
 import { clock } from "../core/format.js";
@@ -33,7 +33,7 @@ export function clear() {
   if (get("clip")) set("clip", null);
 }
 
-/** What would be exported: the marked stretch, else everything. @returns {{first: number, last: number}} */
+/** The clip, else the whole drive. @returns {{first: number, last: number}} */
 export function chosen() {
   return get("clip") ?? { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
 }

@@ -1,4 +1,4 @@
-/** The curves below the ribbon: what each shows, in which unit and on which scale, and how it is drawn. */
+/** Definitions of the timeline's curves, and their scaling and tracing. */
 import { memory } from "../core/dom.js";
 import { num, ttc } from "../core/format.js";
 
@@ -14,13 +14,13 @@ import { num, ttc } from "../core/format.js";
  */
 
 /**
- * The pixel column that a line is in: the rows it covers there, and where it stands.
+ * A pixel column of a line: its vertical extent, and its last value.
  * @typedef {{x: number, top: number, bottom: number, last: number}} Column
  */
 
 /**
- * low and high: what the scale reaches at least; most: what is higher is drawn there. words: how its value is said,
- * else with so many digits. also: a second, fainter line.
+ * low and high: minimum range of the scale; most: values are clipped here; words: formatter, else fixed digits; also: a
+ * second, fainter line.
  */
 export const CURVES = /** @type {Curve[]} */ ([
   {
@@ -113,12 +113,12 @@ export function toggleCurve({ key }) {
   memory.write("curves", [...shown]);
 }
 
-/** A value as it is said beside the curve. @param {Curve} curve @param {number} value in the column's own unit */
+/** Formatted value with its unit. @param {Curve} curve @param {number} value in the column's unit */
 export const said = ({ factor, digits, unit, words }, value) =>
   `${words ? words(value * factor) : num(value * factor, digits)} ${unit}`;
 
 /**
- * The scale that all of these values fit on.
+ * The scale that fits all values.
  * @param {Curve} curve @param {(number|null)[][]} lines in the columns' own unit @returns {{low: number, high: number}}
  */
 export function scaleOf({ low, high, most, factor }, lines) {
@@ -134,8 +134,8 @@ export function scaleOf({ low, high, most, factor }, lines) {
 }
 
 /**
- * A line through what is known; it is broken where nothing is, and where one object gives way to another. Where several
- * frames share a pixel column, the line covers their whole range once, so that an hour costs no more than a minute.
+ * Trace a line through known values, with breaks at unknown values and object changes. Frames that share a pixel column
+ * are merged into their range, so that long drives draw as fast as short ones.
  * @param {CanvasRenderingContext2D} ctx
  * @param {(i: number) => number|null} value of the i-th sample, in the curve's unit
  * @param {{count: number, index: (i: number) => number, joined: (i: number) => boolean}} samples `joined`: sample i

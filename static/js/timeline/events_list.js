@@ -1,4 +1,4 @@
-/** The list of events; a click goes there, and what is at the shown frame stands out. */
+/** The list of events. A click seeks to an event; events at the current frame are highlighted. */
 import { request } from "../core/api.js";
 import { $, el, text } from "../core/dom.js";
 import { seekTo } from "../drive/seek.js";
@@ -21,7 +21,7 @@ export function setUp() {
   $("#mark-button").addEventListener("click", addMark);
 }
 
-/** Mark the shown frame. */
+/** Mark the current frame. */
 export function addMark() {
   request("api/marks", "POST", { index: get("state")?.index ?? 0, text: "" }).catch(refused);
 }
@@ -59,7 +59,7 @@ function rowOf(event) {
     el("b", { textContent: nameOf(event) }),
     el("span", { class: "what", textContent: event.text }),
   );
-  go.disabled = get("state")?.live === true; // there is no way back
+  go.disabled = get("state")?.live === true; // live data cannot be rewound
   if (event.mark === null) return go;
   const remove = el("button", {
     type: "button",
@@ -71,7 +71,7 @@ function rowOf(event) {
   return el("div", { class: "event-row" }, go, remove);
 }
 
-/** To the event, with the object it is about selected. @param {DriveEvent} event */
+/** Seek to an event and select its object. @param {DriveEvent} event */
 function jump({ index, ids }) {
   seekTo(index);
   if (ids.length) set("selection", ids[0]);

@@ -1,4 +1,4 @@
-/** The menu that exports the marked clip, or everything; made in the background, with its progress. */
+/** The export menu for the clip or the whole drive, with background jobs and their progress. */
 import { request } from "../core/api.js";
 import { $, el, text } from "../core/dom.js";
 import { attachMenu, refill } from "../workspace/menu.js";
@@ -55,7 +55,7 @@ async function begin(kind) {
   look();
 }
 
-/** Show how the jobs do, again and again while one is under way. */
+/** Poll the jobs while any is active. */
 async function look() {
   clearTimeout(timer);
   const answer = await request("api/jobs").catch(() => ({ jobs }));

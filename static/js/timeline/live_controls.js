@@ -1,4 +1,4 @@
-/** What asks for a recording can do nothing with live sensors: it is off, and says why. */
+/** Disables controls that need a recording while live sensors are shown. */
 import { $ } from "../core/dom.js";
 import { NO_DRIVE } from "../drive/live_buffer.js";
 import { get, on } from "../core/store.js";

@@ -1,6 +1,6 @@
 /**
- * The timeline: the whole recording at a glance. What changes at different times is drawn apart: the recording, what a
- * hand put onto it, and what moves with the frame.
+ * The timeline of the whole drive. Three canvases are redrawn independently: the drive, pointer edits, and what moves
+ * with the frame.
  */
 import { ui } from "../core/colors.js";
 import { $, el, press, text } from "../core/dom.js";
@@ -68,7 +68,7 @@ function watchLanes() {
 /** How many frames there are to show. */
 const frames = () => Math.max(1, (get("state")?.live ? get("drive")?.count : get("state")?.count) ?? 1);
 
-/** Show the whole recording. */
+/** Show the whole drive. */
 export function fit() {
   span.fit();
   redraw();
@@ -94,7 +94,7 @@ function chip(curve) {
 }
 
 /**
- * As last drawn: the values ask ten times a second, and asking the page for sizes and styles makes it lay itself out.
+ * Layout as last drawn: reading sizes and styles ten times a second would force page layouts.
  */
 let shared = shareOut(0, []);
 let isLight = false;
@@ -149,7 +149,7 @@ function hovered(index) {
 /** @param {number} done @param {number} total */
 const percent = (done, total) => `${Math.round((100 * done) / Math.max(1, total))}%`;
 
-/** How far the computing has come, and how much the two runs differ. */
+/** Show progress of the run, and how many frames differ. */
 function describe() {
   const state = get("state")?.drive,
     drive = get("drive");

@@ -1,4 +1,4 @@
-/** The hand on the timeline: press or drag to go to a frame, wheel to zoom, shift or two fingers to move along. */
+/** Pointer input on the timeline: click or drag to seek, scroll to zoom, Shift + scroll or two fingers to pan. */
 import { seekTo } from "../drive/seek.js";
 import { get, set } from "../core/store.js";
 import { laneAt } from "./rows.js";
@@ -11,7 +11,7 @@ const ZOOM_PER_PX = 0.0018;
 const GRAB_PX = 8;
 
 /**
- * What a drag does on the way, and when it ends: by the hand that lets go, or because something else took over.
+ * Drag handler: called on each move, and `ended` on release or cancellation.
  * @typedef {((x: number, dx: number) => void) & {ended?: (isKept: boolean) => void}} Act
  */
 /**
@@ -109,9 +109,9 @@ function onWheel({ span, zoomed }, event) {
 
 /**
  * @param {Hand} hand
- * @param {{x: number, y: number}[]} fingers both, after the move
+ * @param {{x: number, y: number}[]} fingers after the move
  * @param {{x: number}} was
- * @param {{x: number, y: number}} now the one that moved
+ * @param {{x: number, y: number}} now the finger that moved
  */
 function pinch({ span, zoomed }, fingers, was, now) {
   const other = fingers.find(({ x }) => x !== now.x) ?? now;

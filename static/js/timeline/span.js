@@ -1,4 +1,4 @@
-/** The stretch of the recording that the timeline shows, in frames. The whole of it until a person zooms. */
+/** The range of frames that the timeline shows; the whole drive until zoomed. */
 
 const SMALLEST = 8;
 

@@ -1,7 +1,6 @@
 /**
- * What of the timeline moves with the frame: the names of its rows with the values at a frame, and the cursor. They are
- * small and apart from the rest, so that ten times a second little is drawn and nothing large is put on the screen
- * again.
+ * What moves with the frame: lane names with current values, and the cursor. Kept on a small canvas of their own, since
+ * they are redrawn ten times a second.
  */
 import { ui } from "../core/colors.js";
 
@@ -44,7 +43,7 @@ function label(ctx, { name, value, tint }, row, edge) {
 }
 
 /**
- * Put the cursor onto a frame; out of sight when that is not shown.
+ * Move the cursor to a frame; hidden if that is out of view.
  * @param {HTMLElement} cursor
  * @param {import("./span.js").Span} span
  * @param {number} index

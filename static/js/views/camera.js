@@ -1,4 +1,4 @@
-/** The camera pane: the picture, and over it what the line made of it. Nothing is projected here. */
+/** The camera pane: the image with the pipeline's output as overlay. All projection is done by the server. */
 import { onPicture } from "../core/colors.js";
 import { showPictureAt } from "../core/connection.js";
 import { $, text } from "../core/dom.js";
@@ -26,21 +26,21 @@ const canvas = $("#camera", HTMLCanvasElement);
 const raster = new DotRaster();
 /** @type {Surface} */
 let surface;
-/** Where the picture lies in the pane. @type {Place} */
+/** Position of the image in the pane. @type {Place} */
 let laid = { x: 0, y: 0, scale: 1 };
-/** Under the points and boxes, and over them. @type {{under: Layer[], over: Layer[]}} */
+/** Extra layers, below and above points and boxes. @type {{under: Layer[], over: Layer[]}} */
 const extra = { under: [], over: [] };
 
 /**
- * Have something drawn over the picture.
+ * Add a layer to the camera image.
  * @param {Layer} draw
- * @param {keyof typeof extra} [where] of points and boxes
+ * @param {keyof typeof extra} [where] below or above points and boxes
  */
 export function addLayer(draw, where = "under") {
   extra[where].push(draw);
 }
 
-/** Where the picture lies: canvas pixel = x + u·scale, for a pixel u of the sent picture. @returns {Place} */
+/** Position of the image: canvas pixel = x + u·scale, for a pixel u of the sent image. @returns {Place} */
 export const place = () => laid;
 
 const X = (/** @type {number} */ u) => laid.x + u * laid.scale;
@@ -52,7 +52,7 @@ export function setUp() {
     draw,
   );
   surface = new Surface(canvas, invalidate, "panel");
-  showPictureAt(canvas.clientWidth * devicePixelRatio); // it is no wider than its pane
+  showPictureAt(canvas.clientWidth * devicePixelRatio); // at most as wide as its pane
   canvas.addEventListener(
     "click",
     (event) =>
@@ -123,7 +123,7 @@ function drawBelief(ctx, frame) {
   }
 }
 
-/** Fit the picture into the pane, and without a height chosen by a person the pane around the picture.
+/** Fit the image into the pane, and the pane's default height to the image.
  * @param {{width: number, height: number}} picture */
 function layOut({ width, height }) {
   const aspect = (width / height).toFixed(3),
@@ -142,7 +142,7 @@ function describe({ result: { sensors }, picture }) {
   text($("#camera-facts"), facts.join(" · "));
 }
 
-/** Ground fainter and smaller, what stands on it over it. @param {CanvasRenderingContext2D} ctx @param {Frame} frame */
+/** Ground points first, smaller and fainter. @param {CanvasRenderingContext2D} ctx @param {Frame} frame */
 function drawPoints(ctx, frame) {
   const { count, uv, kind, picture } = frame;
   if (!picture) return;
@@ -230,7 +230,7 @@ function pointAt({ count, uv }, u, v, reach, counts = () => true) {
   );
 }
 
-/** A drag measures from the LiDAR point near its start to the one near its end. */
+/** A drag measures between the LiDAR points nearest to its start and end. */
 function followTape() {
   /** @type {import("./measuring_tape.js").Spot|null} */
   let from = null;

@@ -1,4 +1,4 @@
-/** What the pointer is over in a view: a few words beside it, and a hand where a click selects. */
+/** Hover: tooltip and cursor for the object under the pointer. */
 import { kmh, num, signed } from "../core/format.js";
 import { get } from "../core/store.js";
 import { hideTip, tipAt } from "../core/tooltip.js";
@@ -6,7 +6,7 @@ import { hideTip, tipAt } from "../core/tooltip.js";
 /**
  * @param {HTMLCanvasElement} canvas
  * @param {(u: number, v: number) => number|null} objectAt its id, by a pixel of the canvas
- * @param {(u: number, v: number) => string} [cursorAt] the pointer's look where there is no object
+ * @param {(u: number, v: number) => string} [cursorAt] cursor where there is no object
  */
 export function followHover(canvas, objectAt, cursorAt = () => "") {
   let asked = false;

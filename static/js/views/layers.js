@@ -1,4 +1,4 @@
-/** What each view draws, and what its points are coloured by; it remembers. */
+/** Layer toggles and point colours of the views, stored in this browser. */
 import { $, el, memory, press } from "../core/dom.js";
 import { COLOR_BY } from "./drawing/point_colors.js";
 import { get, on, set } from "../core/store.js";
@@ -36,7 +36,7 @@ const DEFAULTS = {
 };
 /** @type {Record<View, import("./drawing/point_colors.js").ColorBy>} */
 const DEFAULT_COLORS = { camera: "range", plan: "object" };
-/** Where a view's chips and its tools go. @type {Record<View, [string, string]>} */
+/** Containers of a view's chips and tools. @type {Record<View, [string, string]>} */
 const PLACES = { camera: ["#camera-layers", "#camera"], plan: ["#bev-layers", "#bev"] };
 
 export function setUp() {
@@ -72,7 +72,7 @@ export function setUp() {
   reflect();
 }
 
-/** Add a tool of one view. @param {View} view @param {HTMLElement} tool */
+/** Add a tool to a view. @param {View} view @param {HTMLElement} tool */
 export function addTool(view, tool) {
   $(`.view-tools[data-view=${view}]`).append(tool);
 }
@@ -90,7 +90,7 @@ function reflect() {
     press(button, get("layers")?.[/** @type {HTMLElement} */ (button).dataset.layer ?? ""] === true);
 }
 
-/** The chip of lanes is there only where a lane detector runs. */
+/** The lanes chip is shown only with a lane detector. */
 function showLaneChip() {
   const hasLanes = Boolean(get("frame")?.display.plan_lanes),
     chip = $("[data-layer=lanes]");

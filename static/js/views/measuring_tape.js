@@ -1,10 +1,10 @@
-/** The measuring tape: two places and how far apart they are. In the picture it holds on to LiDAR points. */
+/** The measuring tape between two places. In the camera view it snaps to LiDAR points. */
 import { num } from "../core/format.js";
 import { get, set } from "../core/store.js";
 
 /**
- * @typedef {{x: number, y: number, z: number|null, u: number|null, v: number|null}} Spot ego metres; pixels of the
- *   picture where it was set there
+ * @typedef {{x: number, y: number, z: number|null, u: number|null, v: number|null}} Spot ego metres; u, v: image pixels
+ *   if set in the camera view
  */
 /** @typedef {{from: Spot, to: Spot, frame: number}} Tape */
 
@@ -22,7 +22,7 @@ export function measure(from, to) {
   set("tape", { from, to, frame: get("frame")?.state.sequence ?? 0 });
 }
 
-/** "12.34 m", and how much of it is along and across. @param {Tape} tape */
+/** "12.34 m (… along, … across)". @param {Tape} tape */
 export function tapeWords({ from, to }) {
   const along = to.x - from.x,
     left = to.y - from.y,

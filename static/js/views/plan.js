@@ -1,4 +1,4 @@
-/** The plan view: ego frame from above, x up and y left, in metres. */
+/** The plan view: the ego frame from above, x up and y left, in metres. */
 import { color, onPicture, roleOf, ui } from "../core/colors.js";
 import { $, el, press } from "../core/dom.js";
 import { drawInPlan } from "./drawing/gates.js";
@@ -30,7 +30,7 @@ let surface;
 /** @type {Viewport} */
 let view;
 /**
- * A mode that lays its own drawing over the plan, and whose hand goes first.
+ * A mode that draws over the plan view and handles its pointer input first.
  * @typedef
  *   {{isOn: () => boolean, draw: (ctx: CanvasRenderingContext2D, view: Viewport, labels: Labels) => void, takes:
  *   (from: Place, scale: number) => Drag|null, clicked: (place: Place) => void, cursorAt: (place: Place, scale:
@@ -45,7 +45,7 @@ export function addMode(added) {
   mode = added;
 }
 
-/** The mode, while it is on. */
+/** The active mode, or null. */
 const modeNow = () => (mode?.isOn() ? mode : null);
 
 export function setUp() {
@@ -150,7 +150,7 @@ function drawGrid(ctx) {
 }
 
 /**
- * Ground and loose points first, clusters larger and over them.
+ * Clusters are drawn last and larger.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Frame} frame
  */
@@ -223,7 +223,7 @@ function drawObjects(ctx, frame, layers, labels) {
   }
 }
 
-/** Our own car: the origin is at its front bumper or just behind it. @param {CanvasRenderingContext2D} ctx */
+/** The ego vehicle: the origin is at its front bumper or just behind it. @param {CanvasRenderingContext2D} ctx */
 function drawEgo(ctx) {
   const w = 1.8 * view.scale,
     l = 4.4 * view.scale;

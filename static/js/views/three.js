@@ -1,4 +1,4 @@
-/** What the server's 3D view has to know of this page: what is selected, and whether anybody sees it. */
+/** Tells the server's 3D view what is selected, and whether it is visible. */
 import { tell } from "../core/connection.js";
 import { $ } from "../core/dom.js";
 import { get, on } from "../core/store.js";

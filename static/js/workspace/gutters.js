@@ -1,10 +1,10 @@
-/** Panes that can be resized by dragging between them, or with the arrow keys. Sizes belong to the layout. */
+/** Gutters for resizing panes, by drag or arrow keys. Sizes belong to the layout. */
 import { $ } from "../core/dom.js";
 import { get, on } from "../core/store.js";
 import { change } from "./panes.js";
 
 /**
- * The custom property a gutter sets, the size from the pointer's place, and its limits.
+ * A gutter: the CSS property it sets, the size for a pointer position, and its limits.
  * @typedef {object} Gutter
  * @property {string} property
  * @property {(x: number, y: number) => number} size

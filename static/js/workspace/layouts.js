@@ -1,4 +1,4 @@
-/** Layouts: panes, sizes, layers. A few come with the page; a person saves others in this browser. */
+/** Layouts: panes, sizes and layers. Built-in ones, and those saved in this browser. */
 import { $, el, memory } from "../core/dom.js";
 import { get, set } from "../core/store.js";
 import { attachMenu, close, refill } from "./menu.js";
@@ -81,7 +81,7 @@ export function apply({ layers, ...panes }) {
   close();
 }
 
-/** What of an object from outside is a layout; null for none. @param {any} given @returns {Saved|null} */
+/** Validate a layout from an untrusted object; null if there is none. @param {any} given @returns {Saved|null} */
 export function checked(given) {
   if (!given) return null;
   /** @type {Saved} */
@@ -94,12 +94,12 @@ export function checked(given) {
   return layout;
 }
 
-/** The entries whose value fits. @param {any} given @param {(value: unknown) => boolean} fits @returns {any} */
+/** Entries whose value fits. @param {any} given @param {(value: unknown) => boolean} fits @returns {any} */
 function only(given, fits) {
   return Object.fromEntries(Object.entries(given ?? {}).filter(([, value]) => fits(value)));
 }
 
-/** What `apply` takes back. @returns {Saved} */
+/** The current layout, as `apply` takes it. @returns {Saved} */
 export function current() {
   return { ...(get("layout") ?? EVERYTHING), layers: get("layers") ?? {} };
 }

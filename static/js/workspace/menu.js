@@ -1,4 +1,4 @@
-/** One menu for the page: it opens below its button, and closes by itself. */
+/** The page's popup menu, shown below its button. */
 import { $ } from "../core/dom.js";
 
 const GAP_PX = 4;
@@ -7,7 +7,7 @@ const menu = $("#menu");
 let owner = null;
 
 /**
- * @param {HTMLElement} button @param {string} label @param {() => (Node|string)[]} fill called at every opening
+ * @param {HTMLElement} button @param {string} label @param {() => (Node|string)[]} fill called on every opening
  */
 export function attachMenu(button, label, fill) {
   button.setAttribute("aria-expanded", "false");
@@ -25,7 +25,7 @@ export function attachMenu(button, label, fill) {
   });
 }
 
-/** Show other contents while it is open. @param {HTMLElement} button @param {() => (Node|string)[]} fill */
+/** Replace the contents while open. @param {HTMLElement} button @param {() => (Node|string)[]} fill */
 export function refill(button, fill) {
   if (owner !== button || !menu.matches(":popover-open")) return;
   menu.replaceChildren(...fill());

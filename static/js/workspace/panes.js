@@ -1,4 +1,4 @@
-/** Which panes are shown, which one has the whole workspace, and which tab the plan's pane shows. */
+/** Visible panes, the maximized pane, and the tab of the plan pane. */
 import { $, el, memory, press } from "../core/dom.js";
 import { icon } from "../core/icons.js";
 import { get, on, set } from "../core/store.js";
@@ -11,7 +11,7 @@ import { showRerun } from "./rerun_tab.js";
  * @property {Pane[]} hidden
  * @property {Pane|null} grown
  * @property {Tab} tab
- * @property {Record<string, number>} sizes  pixels by gutter; what is absent is fitted
+ * @property {Record<string, number>} sizes  pixels by gutter; missing ones are automatic
  */
 
 /** @type {Record<Pane, string>} in the order of their menu */
@@ -23,12 +23,12 @@ export const PANES = {
   params: "Parameters",
   timeline: "Timeline",
 };
-/** What a pane with the whole workspace lies over. @type {Pane[]} */
+/** Panes covered by a maximized pane. @type {Pane[]} */
 const COVERED = ["camera", "plan", "objects"];
 /** @type {Layout} */
 export const EVERYTHING = { hidden: [], grown: null, tab: "plan", sizes: {} };
 
-/** Below this width the inspector lies over the panes, so it starts closed. */
+/** Below this width the inspector overlays the panes, so it starts closed. */
 const NARROW = matchMedia("(max-width: 1180px)");
 const root = document.documentElement;
 
@@ -68,7 +68,7 @@ export function toggle(pane, shown = layout().hidden.includes(pane)) {
   if (shown && (pane === "why" || pane === "params")) showInspector(true);
 }
 
-/** Show a tab of the plan's pane; when it is shown already, hide the pane. @param {Tab} tab */
+/** Show a tab of the plan pane; if already shown, hide the pane. @param {Tab} tab */
 export function toggleTab(tab) {
   if (layout().tab === tab) return toggle("plan");
   toggle("plan", true);
@@ -84,7 +84,7 @@ export function nextTab() {
   showTab(layout().tab === "plan" ? "3d" : "plan");
 }
 
-/** Give a pane the whole workspace, or take it back. @param {Pane} pane */
+/** Maximize a pane, or restore it. @param {Pane} pane */
 export function grow(pane) {
   const grown = layout().grown === pane ? null : pane;
   change({ grown, hidden: grown ? layout().hidden.filter((key) => key !== pane) : layout().hidden });
@@ -122,7 +122,7 @@ function reflect() {
   reflectTab(tab);
 }
 
-/** A gutter between a pane and nothing moves nothing. */
+/** Hide gutters that have nothing to resize. */
 function hideGutters() {
   const plan = $(".bev-pane"),
     main = $(".main-column"),
@@ -132,7 +132,7 @@ function hideGutters() {
   $("[data-gutter=timeline]").hidden = $(".timeline-pane").hidden;
 }
 
-/** The 3D view and rerun are loaded when they are first looked at. @param {Tab} shown */
+/** Show a tab; the 3D view and rerun are loaded on first use. @param {Tab} shown */
 function reflectTab(shown) {
   for (const button of plansTabs()) {
     const isShown = button.dataset.tab === shown;

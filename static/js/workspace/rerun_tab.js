@@ -1,21 +1,20 @@
-/** This drive at this moment in rerun's own viewer, whose files our server serves. */
+/** The current recording in rerun's web viewer, served by this server. */
 import { request } from "../core/api.js";
 import { el } from "../core/dom.js";
 import { NO_DRIVE } from "../drive/live_buffer.js";
 import { get } from "../core/store.js";
 
-/** A pane narrower than this shows one view at a time below the camera. */
+/** Narrower panes use the compact blueprint. */
 const NARROW_PX = 900;
 
 /**
- * @param {HTMLElement} body the pane that the viewer is put into, once there is one; a press of its button opens it
- *   anew
+ * @param {HTMLElement} body container of the viewer
  */
 export async function showRerun(body) {
   if (!body.querySelector("iframe")) await load(body);
 }
 
-/** @param {HTMLElement} body @param {number} [from] frame; else the shown one */
+/** @param {HTMLElement} body @param {number} [from] first frame; else the current one */
 async function load(body, from) {
   if (get("state")?.live) return void body.replaceChildren(el("p", { class: "facts pad", textContent: NO_DRIVE }));
   const note = el("p", { class: "busy", textContent: "Opening rerun …" });
@@ -34,7 +33,7 @@ async function load(body, from) {
   }
 }
 
-/** @param {HTMLElement} body @param {string} what is open */
+/** @param {HTMLElement} body @param {string} what what is open */
 function bar(body, what) {
   const save = el("a", {
     href: "api/rerun.rrd",

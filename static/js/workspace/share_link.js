@@ -1,6 +1,6 @@
 /**
- * A link to what is on the screen: recording, frame, selection, parameters, layout. It is the address's hash, which no
- * server sees. A link is applied once and then taken off the address, so that a reload does not turn back time.
+ * Links to the current view: recording, frame, selection, parameters, layout. Stored in the URL hash, which is not sent
+ * to servers. A link is applied once and then removed from the URL, so that a reload does not go back.
  */
 import { playback, request } from "../core/api.js";
 import { $, el } from "../core/dom.js";
@@ -21,7 +21,7 @@ import * as layouts from "./layouts.js";
  */
 
 const SAID_MS = 1500;
-/** The built-in drives read no file. */
+/** Built-in simulations, which read no files. */
 const BUILT_IN = /^sim:\w+$/;
 const dialog = $("#link-dialog", HTMLDialogElement);
 
@@ -49,7 +49,7 @@ export function link() {
   return `${location.origin}${location.pathname}#${query}`;
 }
 
-/** @param {string} hash @returns {Shared|null} null when it is no link of ours */
+/** @param {string} hash @returns {Shared|null} null if it is not a shared link */
 export function parse(hash) {
   const query = new URLSearchParams(hash.replace(/^#/, ""));
   if (!query.has("uri") && !query.has("frame")) return null;
@@ -87,7 +87,7 @@ export async function share() {
   }
 }
 
-/** Take a link off the address, and apply it once the state is known. */
+/** Remove a link from the URL, and apply it once the state is known. */
 function begin() {
   const shared = parse(location.hash);
   if (!shared) return;
@@ -102,8 +102,7 @@ function begin() {
 }
 
 /**
- * A link may come from anywhere, a hostile page too: what it would change for others happens only when a person says
- * so.
+ * Links are untrusted: changes that affect others need the user's consent.
  * @param {Shared} shared
  * @param {boolean} [agreed]
  */
@@ -120,13 +119,13 @@ async function apply(shared, agreed = false) {
     );
   }
   if (shared.index !== null && !get("state")?.live) {
-    playback({ playing: false }); // it leads to a moment, which playing would leave at once
+    playback({ playing: false }); // pause, or playback would leave the linked frame at once
     seekTo(shared.index);
   }
   set("selection", shared.selection);
 }
 
-/** What the link would do to more than this page, in words. @param {Shared} shared @returns {Promise<string[]>} */
+/** Describe what the link would change beyond this page. @param {Shared} shared @returns {Promise<string[]>} */
 async function whatItChanges(shared) {
   const state = get("state"),
     changes = [];

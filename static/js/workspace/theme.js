@@ -1,4 +1,4 @@
-/** Dark or light: as the system says, until a person chooses. */
+/** Dark or light theme: follows the system until the user chooses. */
 import { forget } from "../core/colors.js";
 import { $, memory } from "../core/dom.js";
 import { set } from "../core/store.js";

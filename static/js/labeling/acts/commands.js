@@ -1,4 +1,4 @@
-/** What keys and buttons of the labeling mode do: each is one act about the selected track or the shown frame. */
+/** Commands of the labeling mode. Each is one act on the selected track or the current frame. */
 import { request } from "../../core/api.js";
 import { seekTo } from "../../drive/seek.js";
 import { get, set } from "../../core/store.js";
@@ -13,10 +13,10 @@ import * as span from "../state/marked_frames.js";
 /** @typedef {import("../state/types.js").ItemRef} ItemRef */
 /** @typedef {"unlabelled"|"disagreement"|"proposed"|"sent_back"|"unreviewed"} Wanted */
 
-/** A sentence for the person, where something could not be done. @param {string} words */
+/** Show a status message. @param {string} words */
 export const say = (words) => set("said", words);
 
-/** Do something with the selected track, or say that none is selected. @param {(track: LabelTrack) => unknown} what */
+/** Run a command on the selected track; without one, say so. @param {(track: LabelTrack) => unknown} what */
 function withTrack(what) {
   const track = chosen();
   if (track) what(track);
@@ -26,21 +26,24 @@ function withTrack(what) {
 /** @param {LabelTrack} track @returns {ItemRef} */
 export const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
 
-/** The pipeline's output becomes proposals, in the marked frames or in all. */
+/** Propose labels from the pipeline, in the marked frames or in all frames. */
 export function propose() {
   const isMarked = get("marked") !== null,
     whole = { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
   return span.over((frames) => act({ kind: "propose", ...(isMarked ? frames : whole), from: "run" }));
 }
 
-/** Accept or reject the selected track whole; without one, who leads here. @param {"accept"|"reject"} kind */
+/**
+ * Accept or reject the selected track; without a selection, the lead range at this frame.
+ * @param {"accept"|"reject"} kind
+ */
 export function judge(kind) {
   const track = chosen();
   if (track) act({ kind, items: [refOf(track)] });
   else if (!span.judge(kind)) say("No label selected, and no lead in this frame");
 }
 
-/** Everything of the shown frame that nobody has looked at: its tracks and its lead. */
+/** Accept all proposals in the current frame: tracks and lead. */
 export function acceptHere() {
   const lead = leadAt(shown());
   const tracks = draft
@@ -53,7 +56,7 @@ export function acceptHere() {
   else say("No proposals in this frame");
 }
 
-/** The next or the previous label of the shown frame. @param {1|-1} direction */
+/** Select the next or previous label of the current frame. @param {1|-1} direction */
 export function selectNext(direction) {
   const ids = draft
     .present()
@@ -88,7 +91,7 @@ export const dropKeyframe = () =>
 export const removeTrack = () =>
   withTrack((track) => act({ kind: "remove", items: [refOf(track)] }).then((answer) => answer && set("track", null)));
 
-/** Hold the label where it is in this frame; where it is not yet, it begins with the shape of its nearest frame. */
+/** Set a keyframe. If the label is not in this frame, it takes the shape of the nearest frame that has one. */
 export const keyframe = () =>
   withTrack(async ({ id }) => {
     const frame = shown(),
@@ -116,7 +119,7 @@ export const sizeAlong = () =>
     else say(`#${id} has no cuboid in this frame; draw one (Shift G)`);
   });
 
-/** The vehicle is not there, in the marked frames or in this one. */
+/** Remove the track from the marked frames, or from this frame. */
 export const notHere = () =>
   withTrack(({ id, revision }) =>
     span.over((frames) => act({ kind: "drop_sightings", track: id, revision, ...frames })),
@@ -131,7 +134,7 @@ export const nextClass = (direction) =>
 /** @param {string} label */
 export const relabel = (label) => withTrack(({ id, revision }) => act({ kind: "relabel", track: id, revision, label }));
 
-/** Begin to merge the selected track: with the label that is pressed next, or with the one that is selected then. */
+/** Start merging the selected track with the label that is clicked or selected next. */
 export const merge = () =>
   withTrack(({ id }) => {
     setTool("merge");
@@ -139,7 +142,7 @@ export const merge = () =>
       say(`Click the label to merge with #${id}, or select it with . and press Enter`);
   });
 
-/** The track that the merging began with is this one too. @param {number} other */
+/** Finish the merge with this track. @param {number} other */
 export function mergeWith(other) {
   const a = trackOf(get("labeling")?.from ?? null),
     b = trackOf(other);
@@ -149,15 +152,14 @@ export function mergeWith(other) {
   act({ kind: "merge", tracks: [a, b].map(({ id, revision }) => ({ id, revision })) });
 }
 
-/** An event of this frame, about the selected track or else who leads here. @param {string} event */
+/** Add an event to this frame, for the selected track or else the lead. @param {string} event */
 export function addEvent(event) {
   const track = chosen()?.id ?? leadAt(shown())?.lead;
   return act({ kind: "add_event", frame: shown(), event, tracks: typeof track === "number" ? [track] : [] });
 }
 
 /**
- * Go where there is something to do; where that is one label, it is selected, and the next are first the others of its
- * frame.
+ * Go to the next open item. If it is a single label, select it; other labels of the same frame come next.
  * @param {Wanted} what
  * @param {1|-1} direction
  */
@@ -178,7 +180,7 @@ export async function goTo(what, direction) {
 }
 
 /**
- * Where there is something to do beyond a frame.
+ * Find the next open item after or before a frame.
  * @param {Wanted} what
  * @param {number} frame
  * @param {1|-1} direction

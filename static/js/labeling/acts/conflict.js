@@ -1,4 +1,4 @@
-/** Two people changed the same label: both versions side by side, and the person chooses. */
+/** Conflict dialog: two people changed the same label; shows both versions and lets the user choose. */
 import { request } from "../../core/api.js";
 import { el } from "../../core/dom.js";
 import { open } from "../panels/dialogs.js";
@@ -7,7 +7,7 @@ import { based } from "./revisions.js";
 /** @typedef {import("../state/types.js").Act} Act */
 
 /**
- * The act to send instead, based on what the other person left; null to let theirs stand.
+ * Returns the act rebased on the other person's change, or null to keep theirs.
  * @param {Act} act
  * @param {string} sentence what the server says
  * @param {{kind: import("../state/types.js").ItemKind, id: number}} item which they changed
@@ -38,7 +38,7 @@ export async function choose(act, sentence, item, theirs) {
 }
 
 /**
- * Where the server has a track now.
+ * The server's current version of a track in a frame.
  * @param {number} track
  * @param {number} frame
  * @returns {Promise<import("../state/types.js").LabelSighting|null>}
@@ -51,7 +51,7 @@ async function placeOf(track, frame) {
   return sightings[frame]?.find((each) => each.track === track) ?? null;
 }
 
-/** What a person does not choose by. */
+/** Fields that are not shown. */
 const HIDDEN = [
   "kind",
   "id",
@@ -66,10 +66,10 @@ const HIDDEN = [
   "keyframes",
 ];
 
-/** Counted from 1 where people read them. */
+/** Fields displayed counting from 1. */
 const FRAMES = ["frame", "first", "last"];
 
-/** What an act is about, where its kind does not say it to people. @type {Record<string, string>} */
+/** Display names of acts. @type {Record<string, string>} */
 const ACTS = {
   set_sighting: "position",
   drop_keyframe: "no keyframe",

@@ -1,4 +1,4 @@
-/** What is drawn without a pointer: a new cuboid ahead, a box around a label, our path. Arrows put it right. */
+/** Drawing by keyboard: a new cuboid ahead, a box around a label, the ego path. Adjusted with arrow keys. */
 import { get, set } from "../../core/store.js";
 import { act } from "./queue.js";
 import { say } from "./commands.js";
@@ -18,11 +18,11 @@ const AHEAD_M = 20,
   STEP_M = 1,
   BEND_M = 0.25,
   SHIFT_M = 0.1;
-/** Of a box that nothing says anything of, and of a step: shares of the picture's width. */
+/** Size of a default box, and of a step, as a share of the image width. */
 const BOX_SHARE = 0.06,
   STEP_SHARE = 0.002;
 
-/** The middle of the pipeline's path, or of straight ahead where it has none. @returns {Point2[]} */
+/** Centre line of the pipeline's path, or straight ahead without one. @returns {Point2[]} */
 function middleOfPath() {
   const center = get("frame")?.result.path?.center ?? [];
   return center.length > 1
@@ -33,7 +33,7 @@ function middleOfPath() {
       ];
 }
 
-/** A point of a line at a distance ahead. @param {Point2[]} line @param {number} x */
+/** Lateral position of a line at a distance ahead. @param {Point2[]} line @param {number} x */
 function lateral(line, x) {
   const after = Math.min(
     Math.max(
@@ -47,7 +47,7 @@ function lateral(line, x) {
   return x2 === x1 ? y1 : y1 + ((y2 - y1) * (x - x1)) / (x2 - x1);
 }
 
-/** A vehicle of the class that the bar says, in our path ahead. */
+/** Add a vehicle of the class chosen in the bar, in the path ahead. */
 export async function placeAhead() {
   setTool(null);
   const label = newLabel(),
@@ -58,7 +58,7 @@ export async function placeAhead() {
   if (made !== undefined) set("track", made);
 }
 
-/** The selected label's cuboid in our path ahead: where nothing says how far it is, arrows do. */
+/** Place a cuboid for the selected label in the path ahead; its distance is adjusted with arrow keys. */
 export function cuboidAhead() {
   const track = chosen(),
     at = { x: AHEAD_M, y: lateral(middleOfPath(), AHEAD_M) };
@@ -68,7 +68,7 @@ export function cuboidAhead() {
   draft.release();
 }
 
-/** The box of the selected label is where its cuboid is in the picture; in the middle where it has none. */
+/** Add an image box around the projected cuboid of the selected label, or in the image centre without one. */
 export function boxAround() {
   const track = chosen();
   if (!track) return say("Select a label first");
@@ -79,7 +79,7 @@ export function boxAround() {
   return bbox;
 }
 
-/** @returns {number|null} width of the camera's own picture */
+/** @returns {number|null} width of the full camera image, pixels */
 function pictureWidth() {
   const picture = get("frame")?.picture;
   return picture ? picture.width / picture.scale : null;
@@ -97,7 +97,7 @@ function middleBox() {
 }
 
 /**
- * Move the box of the selected label, or with `isSize` its right and lower side.
+ * Move the box of the selected label, or with `isSize` its right and bottom edges.
  * @param {number} du
  * @param {number} dv steps
  * @param {boolean} isSize
@@ -114,7 +114,7 @@ export function changeBox(du, dv, isSize) {
   draft.release();
 }
 
-/** @returns {Point2[]} a point every metre: of what is drawn, else of the pipeline's path */
+/** @returns {Point2[]} one point per metre, of the drawn path or else the pipeline's */
 function drawnMiddle() {
   const lines = get("drawnPath");
   if (lines) return lines.left.map(([x, y], i) => [(x + lines.right[i][0]) / 2, (y + lines.right[i][1]) / 2]);
@@ -124,7 +124,7 @@ function drawnMiddle() {
 }
 
 /**
- * Bend the path's far end aside, or with `isWhole` move all of it; to the left is positive.
+ * Bend the far end of the path, or with `isWhole` shift the whole path; positive is left.
  * @param {number} steps
  * @param {boolean} isWhole
  */
@@ -137,7 +137,7 @@ export function bendPath(steps, isWhole) {
   );
 }
 
-/** @param {1|-1} direction longer or shorter by a metre */
+/** @param {1|-1} direction lengthen or shorten by 1 m */
 export function lengthenPath(direction) {
   const middle = drawnMiddle(),
     [[x1, y1], [x2, y2]] = middle.slice(-2);
@@ -147,7 +147,7 @@ export function lengthenPath(direction) {
   );
 }
 
-/** The path as it is drawn, or as the pipeline says. */
+/** Save the drawn path, or else the pipeline's. */
 export async function keepPath() {
   const lines = get("drawnPath") ?? sides(drawnMiddle());
   setTool(null);

@@ -1,7 +1,7 @@
 /**
- * Acts on their way to the server: one after the other, so that each is based on what the one before it left. What is
- * said to be saved is what the server has answered. Each has an id of its own: one whose answer was lost is sent once
- * more, and done once.
+ * Queue of acts to the server. They are sent one at a time, each based on the result of the one before. Only what the
+ * server confirmed counts as saved. Each act has a unique id, so that resending one whose answer was lost applies it
+ * once.
  */
 import { Refused, request } from "../../core/api.js";
 import { get, on, set } from "../../core/store.js";
@@ -14,22 +14,22 @@ import { driveNow } from "../state/undo_state.js";
 /** @typedef {import("../state/types.js").Act} Act */
 /** @typedef {import("../state/types.js").ActAnswer} ActAnswer */
 /**
- * at_ms: when the server last said that something is on disk; problem: why the next is not.
+ * at_ms: time of the last confirmed save; problem: why the next one failed.
  * @typedef {{state: "saved"|"saving"|"failed", at_ms: number|null, problem: string}} Saving
  */
 /**
- * What is sent. drive: null where nothing can be labelled.
+ * Request body. drive: null if labeling is unavailable.
  * @typedef {{person: string, drive: string|null, act_id: string, act?: Act}} Body
  */
 /** @typedef {{act: Act, path: string, body: Body, done: (answer: ActAnswer|null) => void}} Waiting */
 
-/** Of a server that is not there now, or of what stands before it: it may be sent once more. */
+/** HTTP statuses of an unavailable server or proxy: the act may be resent. */
 const AWAY = [502, 503, 504];
 
-/** @type {Waiting[]} the first is under way, or waits for the server to be reached */
+/** @type {Waiting[]} the first is in flight, or waits for the server */
 const queue = [];
 let busy = false;
-/** When the server last answered that something is on disk. @type {number|null} */
+/** Time of the last confirmed save. @type {number|null} */
 let savedAt_ms = null;
 
 export function setUp() {
@@ -38,7 +38,7 @@ export function setUp() {
 }
 
 /**
- * Do something to the labels. The answer, or null when it was refused or given up.
+ * Apply an act to the labels. Returns the server's answer, or null if it was refused or discarded.
  * @param {Act} act @returns {Promise<ActAnswer|null>}
  */
 export async function act(act) {
@@ -47,7 +47,7 @@ export async function act(act) {
 }
 
 /**
- * The last act of this person taken back, or done again. Who has no name yet changed parameters alone.
+ * Undo or redo this person's last act. Without a name, only parameter changes can be undone.
  * @param {"undo"|"redo"} direction
  */
 export const move = (direction) => put({ kind: direction }, `api/labels/${direction}`, knownName());
@@ -62,7 +62,7 @@ async function put(act, path, person) {
   return new Promise((done) => {
     const last = queue.at(-1);
     if (last && queue.length > 1 && isSameShape(last.act, act)) {
-      last.done(null); // another nudge of the same cuboid, before the one before it went out
+      last.done(null); // supersedes an unsent change of the same cuboid
       queue.pop();
     }
     queue.push({ act, path, body: { person, drive, act_id: newId() }, done });
@@ -70,7 +70,7 @@ async function put(act, path, person) {
   });
 }
 
-/** A UUID of version 4. A page that came over plain HTTP from another machine has no `randomUUID`. @returns {string} */
+/** A version 4 UUID. `randomUUID` is missing on plain HTTP pages from other hosts. @returns {string} */
 export function newId() {
   if (crypto.randomUUID) return crypto.randomUUID();
   const bytes = crypto.getRandomValues(new Uint8Array(16));
@@ -85,7 +85,7 @@ export function newId() {
 const isSameShape = (a, b) =>
   a.kind === "set_sighting" && b.kind === a.kind && a.track === b.track && a.frame === b.frame;
 
-/** Send what waits; also once more what could not be sent. */
+/** Send waiting acts, including those that failed to send. */
 export async function send() {
   if (busy) return;
   busy = true;
@@ -110,7 +110,7 @@ export async function send() {
   }
 }
 
-/** Give up everything that is not saved; what the server has is shown again. */
+/** Discard all unsaved acts and show the server's state. */
 export function discard() {
   if (busy) return;
   for (const { done } of queue.splice(0)) done(null);
@@ -119,13 +119,13 @@ export function discard() {
 }
 
 /**
- * The server will not do it: of two people's changes the person here chooses, of all else it is said why.
+ * Handle a refused act: on a conflict the user chooses a version, otherwise the reason is shown.
  * @param {Waiting} waiting
  * @param {Refused} refusal
  */
 async function refused(waiting, refusal) {
   const { detail, item, theirs } = refusal.answer ?? {};
-  data.look(); // this page may have been behind, or the server half way through
+  data.look(); // this page may be behind the server
   if (item && theirs) {
     const mine = await choose(waiting.act, detail, item, theirs);
     if (mine) return queue.unshift({ ...waiting, act: mine, body: { ...waiting.body, act_id: newId() } });
@@ -139,7 +139,7 @@ async function refused(waiting, refusal) {
 const tell = (state, problem = "") => set("saving", { state, at_ms: savedAt_ms, problem });
 
 /**
- * What has only begun (proposals, imports) and what changed nothing is not said to be saved.
+ * Handle an answer. Background tasks (proposals, imports) and acts without effect do not count as saved.
  * @param {Waiting} waiting
  * @param {ActAnswer} answer
  */

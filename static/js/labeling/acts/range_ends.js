@@ -1,6 +1,6 @@
 /**
- * The ends of lead ranges: dragged on the timeline, or brought to the shown frame by a key. Where two ranges touch
- * there is one end, and whichever way it goes, one of them grows into the other.
+ * Moving the ends of lead ranges, by dragging on the timeline or by key. Adjacent ranges share one end: moving it
+ * extends one range into the other.
  */
 import { seekTo } from "../../drive/seek.js";
 import { get, set } from "../../core/store.js";
@@ -9,10 +9,10 @@ import { shown } from "../state/labels.js";
 
 /** @typedef {import("../state/types.js").LeadRange} LeadRange */
 /**
- * `at`: a border between frames, the number of the frame after it.
+ * `at`: a border between frames, as the number of the frame after it.
  * @typedef {{at: number, before: LeadRange|null, after: LeadRange|null}} End
  */
-/** A range as it is to be. @typedef {{range: LeadRange, first: number, last: number}} Trimmed */
+/** A range with its new ends. @typedef {{range: LeadRange, first: number, last: number}} Trimmed */
 
 const GRAB_PX = 6;
 
@@ -34,7 +34,7 @@ function ends() {
 const nearest = (among, away) =>
   [...among].reduce((/** @type {End|null} */ best, end) => (best && away(best) <= away(end) ? best : end), null);
 
-/** The end that a hand at a pixel column takes hold of. A narrow range can still be pressed in its middle.
+/** The end that can be grabbed at a pixel column. Narrow ranges remain clickable in the middle.
  * @param {import("../../timeline/span.js").Span} span @param {number} x @returns {End|null} */
 export function endAt(span, x) {
   const end = nearest(ends().values(), ({ at }) => Math.abs(span.x(at) - x));
@@ -45,10 +45,10 @@ export function endAt(span, x) {
 }
 
 /**
- * What becomes of it at another border: the range is never shorter than a frame.
+ * The range after moving an end to another border; it keeps at least one frame.
  * @param {End} end
  * @param {number} to
- * @returns {Trimmed|null} null where nothing changes
+ * @returns {Trimmed|null} null if nothing changes
  */
 export function trimmed({ at, before, after }, to) {
   const range = after && (to < at || !before) ? after : before;
@@ -58,8 +58,7 @@ export function trimmed({ at, before, after }, to) {
 }
 
 /**
- * A drag from an end: the timeline shows what it would become, until the hand lets go. Who lets go of it (Escape)
- * meanwhile leaves all as it was.
+ * A drag of an end, previewed on the timeline. Escape cancels it.
  * @param {import("../../timeline/span.js").Span} span
  * @param {End} end
  * @returns {import("../../timeline/pointer.js").Act}
@@ -85,7 +84,7 @@ export function dragEnd(span, end) {
   return Object.assign(along, { ended });
 }
 
-/** It is shown as it is to be until the server has said what it is. @param {Trimmed} held */
+/** Save the new range; the preview stays until the server answers. @param {Trimmed} held */
 async function keep(held) {
   const { range, first, last } = held;
   set("trimmed", held);
@@ -95,8 +94,8 @@ async function keep(held) {
 }
 
 /**
- * The nearest beginning, or end, of a range comes to the shown frame.
- * @param {"after"|"before"} side of the border that the range is on
+ * Move the nearest start or end of a range to the current frame.
+ * @param {"after"|"before"} side side of the border on which the range lies
  */
 export function bringHere(side) {
   const to = side === "after" ? shown() : shown() + 1;

@@ -1,6 +1,6 @@
 /**
- * Review: a second person goes through what others stand behind, one label after the other, tracks and who leads alike,
- * finds it right or sends it back with a comment. What is right carries that person's name.
+ * Review: a second person goes through labels made by others, one by one, and approves each or sends it back with a
+ * comment. Approved labels carry the reviewer's name.
  */
 import { el } from "../../core/dom.js";
 import { seekTo } from "../../drive/seek.js";
@@ -13,7 +13,7 @@ import { setItem, setReview } from "../state/mode.js";
 import { knownName } from "../state/person.js";
 
 /**
- * What is judged, by which name, and why it was sent back before.
+ * The label under review, its display name, and the comment if it was sent back before.
  * @typedef {{ref: import("../state/types.js").ItemRef, name: string, comment: string}} Target
  */
 
@@ -24,12 +24,12 @@ export function toggleReview() {
   if (isReviewing()) begin();
 }
 
-/** The first that waits, from the shown frame on; else from the start. */
+/** Go to the first unreviewed label from the current frame on, else from the start. */
 async function begin() {
   if (!(await step(shown() - 1, 1, ""))) await step(-1, 1, "", true);
 }
 
-/** The next label that nobody has reviewed, also of this frame. @param {1|-1} direction */
+/** Go to the next unreviewed label, in this frame or beyond. @param {1|-1} direction */
 export async function nextUnreviewed(direction) {
   const item = get("labeling")?.item,
     after = item ? `&after_kind=${item.kind}&after_id=${item.id}` : "";
@@ -40,7 +40,7 @@ export async function nextUnreviewed(direction) {
  * @param {number} frame
  * @param {1|-1} direction
  * @param {string} after
- * @param {boolean} [isLast] whether it is said when there is none
+ * @param {boolean} [isLast] whether to report that there is none
  * @returns {Promise<boolean>}
  */
 async function step(frame, direction, after, isLast = false) {
@@ -71,7 +71,7 @@ async function step(frame, direction, after, isLast = false) {
 }
 
 /**
- * What is reviewed now: the selected track, else what the review has come to, else who leads here.
+ * The label under review: the selected track, else the current review item, else the lead range at this frame.
  * @returns {Target|null}
  */
 export function target() {
@@ -103,7 +103,7 @@ export function target() {
   );
 }
 
-/** Another person has made it, and it is right. */
+/** Approve the label under review. */
 export async function reviewOk() {
   const under = target();
   if (!under) return say("No label selected, and no lead in this frame");
@@ -122,7 +122,7 @@ export async function sendBack() {
   if (comment && (await act({ kind: "send_back", items: [under.ref], comment })) && isReviewing()) await goOn();
 }
 
-/** What was said stays readable beside what comes next. */
+/** Go to the next label; the last message stays visible beside the new one. */
 async function goOn() {
   const done = get("said");
   setItem(null);

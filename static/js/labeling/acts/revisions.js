@@ -1,4 +1,4 @@
-/** Which items an act is about, and on which of their revisions it is based. */
+/** Items and revisions that an act refers to. */
 
 /** @typedef {import("../state/types.js").Act} Act */
 /** @typedef {import("../state/types.js").ItemRef} ItemRef */
@@ -25,7 +25,7 @@ export function refsOf(act) {
 }
 
 /**
- * The act, based on other revisions of its items.
+ * Returns the act with other revisions of its items.
  * @param {Act} act
  * @param {(ref: ItemRef) => number} revisionOf
  * @returns {Act}
@@ -47,9 +47,12 @@ export function based(act, revisionOf) {
 }
 
 /**
- * An act that waited while this page's own earlier one changed its items: it is based on what that one left. Changes by
- * others stay a conflict; an undo or redo is refused where there are any.
- * @param {Act} act @param {Act} earlier @param {ActAnswer} answer to the earlier one @returns {Act}
+ * Rebase a waiting act on the result of an earlier one from this page. Changes by others remain conflicts; undo and
+ * redo are refused if there are any.
+ * @param {Act} act
+ * @param {Act} earlier
+ * @param {ActAnswer} answer to the earlier one
+ * @returns {Act}
  */
 export function rebased(act, earlier, answer) {
   const sent = refsOf(earlier),

@@ -56,7 +56,7 @@ export const leads = {
   cursor: (span, x) => (endAt(span, x) ? "ew-resize" : ""),
 };
 
-/** The selected track leads in the frames that a drag has marked. @returns {boolean} whether one is selected */
+/** Set the selected track as lead in the marked frames. @returns {boolean} whether one is selected */
 function leadSelected() {
   const track = get("track");
   if (track !== null) paint(track);
@@ -87,7 +87,7 @@ function drawRange(ctx, { lead, state }, box, isLight) {
 }
 
 /**
- * Nobody has looked at it yet.
+ * Hatching of a proposal.
  * @param {CanvasRenderingContext2D} ctx
  * @param {{x: number, width: number, top: number, height: number}} box
  */
@@ -98,7 +98,7 @@ function hatch(ctx, { x, width, top, height }) {
 }
 
 /**
- * A range whose end is under a hand, as it would be; what it leaves is empty.
+ * Preview of a range being resized.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Span} span
  * @param {Row} row

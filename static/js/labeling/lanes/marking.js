@@ -4,7 +4,7 @@ import { markAll, tellMarked } from "../state/marked_frames.js";
 
 /**
  * @param {import("../../timeline/span.js").Span} span @param {number} from frame
- * @param {() => boolean} [use] uses what is marked, when the drag ends; false when the frames only stay marked
+ * @param {() => boolean} [use] called when the drag ends; returns false to leave the frames marked
  * @returns {import("../../timeline/pointer.js").Act}
  */
 export function dragMarks(span, from, use = () => false) {

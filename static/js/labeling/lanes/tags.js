@@ -1,4 +1,4 @@
-/** Which frames are tagged, by word. A drag along a lane marks frames. */
+/** Tagged frames, one lane per tag. A drag along a lane marks frames. */
 import { ui } from "../../core/colors.js";
 import { get } from "../../core/store.js";
 import { rangesOf, saidTags, WHOLE_TAG } from "../acts/tags.js";
@@ -26,8 +26,7 @@ export const tags = Array.from({ length: MOST_LANES }, (_, place) => tagLane(pla
 export const topTagKey = tags[0].key;
 
 /**
- * What stands in each row of tags: a word, and in the last all that have no room; where there are none yet, a row to
- * mark frames in.
+ * Tags per lane: one each, and all remaining ones in the last. Without tags, one empty lane for marking frames.
  * @returns {{name: string, words: string[]}[]}
  */
 function contents() {

@@ -1,4 +1,4 @@
-/** Where the selected track is, with its keyframes. */
+/** Extent of the selected track, with its keyframes. */
 import { color, ui } from "../../core/colors.js";
 import { get } from "../../core/store.js";
 import { chosen } from "../state/labels.js";

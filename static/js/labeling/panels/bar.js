@@ -1,4 +1,4 @@
-/** The labeling mode's bar: who leads here, where to go next, and what is saved. Below the timeline: its keys. */
+/** The labeling bar (lead, navigation, save state), and the shortcuts below the timeline. */
 import { $, el, keyed, mark, press, text } from "../../core/dom.js";
 import { get, on, paint, set } from "../../core/store.js";
 import { possible, redo, undo } from "../../panels/undo.js";
@@ -17,11 +17,11 @@ import * as span from "../state/marked_frames.js";
 
 /** @typedef {import("../state/types.js").Lead} Lead */
 
-/** As many labels of the frame can be chosen as its lead in the bar; the rest by number. */
+/** Maximum number of lead buttons in the bar; other tracks are chosen by typing their number. */
 const MOST_LEADS = 7;
-/** The task whose end has been said, or was over before this page came. @type {number|null} */
+/** The last task whose end was reported, or that ended before this page loaded. @type {number|null} */
 let ended = null;
-/** The frame that what is said is about: it stays until the person goes on from there. */
+/** Frame of the status message; it is cleared when the user moves on. */
 let about = -1;
 
 const where = el("span", { class: "facts where" }),

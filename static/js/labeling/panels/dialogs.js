@@ -1,10 +1,10 @@
-/** Small questions of the labeling mode, in one dialog. */
+/** Dialogs of the labeling mode. */
 import { $, el } from "../../core/dom.js";
 
 const dialog = $("#label-dialog", HTMLDialogElement);
 
 /**
- * Ask for a line of text; null when the person thinks better of it.
+ * Ask for a line of text; null if cancelled.
  * @param {string} title @param {Node} words @param {string} label @param {string} value @returns {Promise<string|null>}
  */
 export function ask(title, words, label, value) {
@@ -16,7 +16,7 @@ export function ask(title, words, label, value) {
 }
 
 /**
- * Let the person choose between a few ways on; the last button is the form's own. Null when the dialog is closed.
+ * Show a dialog with a choice of buttons; the last one submits the form. Null if closed.
  * @template T @param {string} title @param {Node} words @param {Node|null} field
  * @param {[string, (() => T|null)|null][]} ways @returns {Promise<T|null>}
  */

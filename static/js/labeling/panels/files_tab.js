@@ -1,6 +1,5 @@
 /**
- * Labels as files: export with what a format cannot hold said by name, import, the truth that came with the recording,
- * and versions.
+ * Label files: export (with what each format loses), import, ground truth of the recording, and versions.
  */
 import { Refused, request } from "../../core/api.js";
 import { el, text } from "../../core/dom.js";
@@ -12,7 +11,7 @@ import { personName } from "../state/person.js";
 
 /** @typedef {import("../state/types.js").Version} Version */
 
-/** As `pipeline/labels/formats/registry.py` names them. */
+/** Formats in `pipeline/labels/formats/registry.py`: key, name, contents. */
 const FORMATS = [
   ["native", "CIPV Studio", "all labels"],
   ["mcap", "MCAP session", "labels as a channel"],
@@ -96,7 +95,7 @@ export function setUp(parent) {
   );
 }
 
-/** Read the versions again. */
+/** Reload the versions. */
 export async function look() {
   /** @type {Version[]} */
   const found = await request("api/labels/versions").catch(() => []);
@@ -154,7 +153,7 @@ async function upload(event) {
   });
 }
 
-/** @param {() => Promise<unknown>} what @returns {Promise<boolean>} whether it was done */
+/** @param {() => Promise<unknown>} what @returns {Promise<boolean>} whether it succeeded */
 async function attempt(what) {
   text(problem, "");
   return what().then(

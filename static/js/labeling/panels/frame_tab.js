@@ -1,6 +1,5 @@
 /**
- * What is said of the shown frame as a whole: events, tags, the path where the pipeline's is wrong; and what was done
- * to each.
+ * Labels of the current frame as a whole: events, tags and the ego path, each with its history.
  */
 import { el, keyed, press, text } from "../../core/dom.js";
 import { seekTo } from "../../drive/seek.js";
@@ -84,7 +83,7 @@ function addTag(event) {
 /** @param {{first: number, last: number}} range */
 const framesWords = ({ first, last }) => (first === last ? `frame ${first + 1}` : `frames ${first + 1}–${last + 1}`);
 
-/** What a second person has said of it. @param {{comment: string, reviewer: string}} label */
+/** Review state. @param {{comment: string, reviewer: string}} label */
 const reviewWords = ({ comment, reviewer }) =>
   comment ? `, sent back: ${comment}` : reviewer ? `, reviewed by ${reviewer}` : "";
 
@@ -142,7 +141,7 @@ function show() {
 /** @typedef {{kind: import("../state/types.js").ItemKind, id: number, revision: number, words: string}} Dated */
 
 /**
- * Who leads, path, events and tags of a frame, each with what was done to it.
+ * Lead, path, events and tags of a frame, each with its history.
  * @param {import("../state/labels.js").Labels} labels
  * @param {number} here
  */
@@ -203,7 +202,7 @@ function updatePast(node, item) {
   lookBack(node);
 }
 
-/** Its acts, while they are seen. @param {HTMLDetailsElement} node */
+/** Load the history while it is open. @param {HTMLDetailsElement} node */
 function lookBack(node) {
   const { past, item } = /** @type {{past: Past, item: Dated}} */ (held.get(node));
   if (node.open) past.look(item.kind, item.id, item.revision);

@@ -1,20 +1,20 @@
-/** What was done to a label, newest first: who, when, what. */
+/** History of a label, newest first: who, when, what. */
 import { request } from "../../core/api.js";
 import { el } from "../../core/dom.js";
 
 /** @typedef {import("../state/types.js").ItemKind} ItemKind */
 
-/** Acts that are shown before one asks for all. */
+/** Acts shown at first. */
 const MOST = 6;
 
-/** A list that tells the acts of one label. */
+/** A list of the acts on one label. */
 export class Past {
   /** @type {HTMLElement} */
   node = el("div", { class: "past facts" });
   #key = "";
 
   /**
-   * Show a label's acts; they are asked for again when it is another, or has changed.
+   * Show a label's history; fetched again only if the label is another one or has changed.
    * @param {ItemKind} kind
    * @param {number} id
    * @param {number} revision

@@ -1,4 +1,4 @@
-/** The labels' panel in the inspector's column: tracks and the selected one, the score, and files. */
+/** The labels panel in the inspector column: tracks, frame, score and files. */
 import { $, el } from "../../core/dom.js";
 import * as detail from "./track_detail.js";
 import * as files from "./files_tab.js";

@@ -1,4 +1,4 @@
-/** The present run against the labels: live after each act. */
+/** Score of the current run against the labels, updated after each act. */
 import { newestOnly, request } from "../../core/api.js";
 import { el } from "../../core/dom.js";
 import { seekTo } from "../../drive/seek.js";
@@ -96,7 +96,7 @@ function worstFrames(worst) {
 const ERRORS = /** @type {const} */ (["distance", "lateral", "longitudinal", "speed"]);
 
 /**
- * The paper's Table 4: of each error the mean size, below it the smallest and the largest.
+ * Table 4 of the paper: mean absolute error, with minimum and maximum below.
  * @param {import("../state/types.js").ScoreErrors[]} rows
  */
 function errorsTable(rows) {

@@ -1,4 +1,4 @@
-/** The selected track: what can be done with it, its place in this frame, and its history. */
+/** Details of the selected track: actions, position in this frame, history. */
 import { el, text } from "../../core/dom.js";
 import { DASH, num } from "../../core/format.js";
 import { on, paint } from "../../core/store.js";

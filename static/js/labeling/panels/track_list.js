@@ -1,4 +1,4 @@
-/** The list of labelled tracks: state, class, frames, and who made them. */
+/** The list of labelled tracks: state, class, frames, author. */
 import { el, memory, press, text, within } from "../../core/dom.js";
 import { seekTo } from "../../drive/seek.js";
 import { LongList } from "../../core/long_list.js";
@@ -12,7 +12,7 @@ import { isReviewing } from "../acts/review.js";
 /** @typedef {import("../state/types.js").LabelTrack} LabelTrack */
 /** @typedef {"here"|"open"|"all"} Which */
 
-/** A list longer than this is for the search of the frames, not for reading. */
+/** Maximum number of rows. */
 const MOST = 100;
 const WHICH = /** @type {[Which, string, string][]} */ ([
   ["here", "Here", "Labels in this frame"],
@@ -59,7 +59,7 @@ export function setUp(parent) {
     memory.write("labelTracks", key);
     reflect();
   }
-  /** What is shown now. */
+  /** Redraw the list. */
   function show() {
     if (!get("labeling")?.on) return;
     for (const button of buttons) press(button, button.dataset.which === which);
@@ -132,7 +132,7 @@ function update(row, { id, label, state, first, last, keyframes, origin, comment
   row.title = [`${state}${comment ? `, sent back: ${comment}` : ""}`, made, origin.how].filter(Boolean).join("; ");
 }
 
-/** Select it, and where it is not in this frame, go where it is. @param {HTMLElement|null} row */
+/** Select a track, and seek to it if it is not in this frame. @param {HTMLElement|null} row */
 function pick(row) {
   const track = trackOf(Number(row?.dataset.id ?? -1));
   if (!track) return;

@@ -1,6 +1,5 @@
 /**
- * A label under a hand: drawn at once in every view, sent when the hand lets go, dropped when the server's own has
- * come.
+ * The label being edited: drawn at once in every view, sent on release, dropped when the server's version arrives.
  */
 import { get, on, set } from "../../core/store.js";
 import { act } from "../acts/queue.js";
@@ -12,12 +11,12 @@ import { shown, trackOf } from "./labels.js";
 /** @typedef {import("./types.js").LabelSighting} LabelSighting */
 /**
  * @typedef {object} Draft
- * @property {number|null} track  null of a new one
+ * @property {number|null} track  null for a new one
  * @property {number} frame
- * @property {number} revision  of the track when it was taken hold of
+ * @property {number} revision  of the track when editing began
  * @property {Cuboid|null} cuboid
  * @property {Box|null} bbox
- * @property {number|null} settled  the act that it became
+ * @property {number|null} settled  revision of the act that saved it
  */
 
 export function setUp() {
@@ -28,7 +27,7 @@ export function setUp() {
 }
 
 /**
- * It has become an act: it is shown until the server's own has come, which may be before the act's answer.
+ * The draft was saved. It stays visible until the server's version has arrived, possibly before the act's answer.
  * @param {Draft} draft
  * @param {number} act
  */
@@ -37,7 +36,7 @@ export function settle(draft, act) {
   if (!isHeld || get("draft")) set("draft", isHeld ? null : { ...draft, settled: act });
 }
 
-/** Everything that is labelled in the shown frame, as it looks now. @returns {LabelSighting[]} */
+/** All labels of the current frame, including the draft. @returns {LabelSighting[]} */
 export const present = () => presentIn(shown());
 
 /** @param {number} frame @returns {LabelSighting[]} */
@@ -53,7 +52,7 @@ function presentIn(frame) {
 export const presentOf = (track) => (track === null ? null : (present().find((each) => each.track === track) ?? null));
 
 /**
- * Draw a track's label otherwise than it is held.
+ * Change a track's label in the draft.
  * @param {number} track
  * @param {{cuboid?: Cuboid|null, bbox?: Box|null}} shape
  * @param {number} [frame]
@@ -74,7 +73,7 @@ export function hold(track, shape, frame = shown()) {
   });
 }
 
-/** Send what is held. A hand that has taken hold of it again meanwhile goes on from what its own act left. */
+/** Send the draft. If it is edited again meanwhile, editing continues from the saved revision. */
 export async function release() {
   const draft = get("draft");
   if (!draft || draft.track === null || draft.settled !== null) return;
@@ -88,7 +87,7 @@ export async function release() {
   else set("draft", null);
 }
 
-/** Let go of it without a trace. */
+/** Discard the draft. */
 export function drop() {
   set("draft", null);
 }

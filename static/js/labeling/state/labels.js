@@ -1,4 +1,4 @@
-/** The labels as this page knows them: one value in the store, replaced as a whole when something changed. */
+/** The labels known to this page, as one immutable value in the store. */
 import { get } from "../../core/store.js";
 
 /** @typedef {import("./types.js").LabelTrack} LabelTrack */
@@ -11,7 +11,7 @@ import { get } from "../../core/store.js";
  * @property {number} revision
  * @property {string} uri
  * @property {string} drive  of its content
- * @property {number} load  grows whenever everything was fetched anew: nothing that was known before holds
+ * @property {number} load  incremented on a full reload, which invalidates everything before
  * @property {Map<number, LabelTrack>} tracks
  * @property {LeadRange[]} leads  by first frame
  * @property {import("./types.js").PathLabel[]} paths
@@ -34,7 +34,7 @@ export const nothing = (uri, drive) => ({
   tags: [],
 });
 
-/** What is held, with what changed. @param {Labels} before @param {LabelsAnswer} answer @returns {Labels} */
+/** Merge changes into the known labels. @param {Labels} before @param {LabelsAnswer} answer @returns {Labels} */
 export function merged(before, answer) {
   const gone = (/** @type {ItemKind} */ kind) =>
     new Set(answer.removed.filter((each) => each.kind === kind).map(({ id }) => id));
@@ -63,12 +63,12 @@ export const trackOf = (id) => (id === null ? null : (get("labels")?.tracks.get(
 
 export const chosen = () => trackOf(get("track"));
 
-/** Who leads at a frame; null where nobody has said. Rejected ranges say nothing. @param {number} frame */
+/** The lead range at a frame, or null. Rejected ranges are ignored. @param {number} frame */
 export const leadAt = (frame) =>
   get("labels")?.leads.find(({ first, last, state }) => first <= frame && frame <= last && state !== "rejected") ??
   null;
 
-/** The frame that is shown: what a person sees is what an act is about. */
+/** The displayed frame, which acts refer to. */
 export const shown = () => get("frame")?.state.index ?? 0;
 
 /** @param {LabelTrack|null} track */

@@ -1,10 +1,10 @@
-/** The frames that a lead is painted over: marked at their start and at their end, or by a drag along the ribbon. */
+/** The marked frames: by start and end, or by a drag on the timeline. */
 import { get, set } from "../../core/store.js";
 import { act } from "../acts/queue.js";
 import { leadAt, shown, trackOf } from "./labels.js";
 
 /**
- * `typed`: the first digits of a lead's number.
+ * `typed`: digits of a lead's number typed so far.
  * @typedef {{first: number|null, last: number|null, typed: string}} Marked
  */
 /** @typedef {import("./types.js").Lead} Lead */
@@ -25,7 +25,7 @@ export function end() {
   tellMarked();
 }
 
-/** What can be said of what is marked. */
+/** Show what can be done with the marked frames. */
 export function tellMarked() {
   const { first, last } = span();
   set(
@@ -44,7 +44,8 @@ export function forget() {
 }
 
 /**
- * What would be painted: what is marked, to the shown frame where its other end is not; else the shown frame alone.
+ * The frames that a command applies to: the marked ones, with the current frame as a missing end, else the current
+ * frame.
  * @returns {{first: number, last: number}}
  */
 export function span() {
@@ -53,11 +54,12 @@ export function span() {
   return { first: Math.min(...ends), last: Math.max(...ends) };
 }
 
-/** Say who leads in the marked frames. @param {Lead} lead */
+/** Set the lead in the marked frames. @param {Lead} lead */
 export const paint = (lead) => over((frames) => act({ kind: "set_lead", ...frames, lead }));
 
 /**
- * Say who leads in the marked frames or in this one; who is proposed here, and nothing is marked: in the whole range.
+ * Set the lead in the marked frames or in this one. If the lead is proposed and nothing is marked, accept its whole
+ * range.
  * @param {Lead} lead
  */
 export function choose(lead) {
@@ -66,12 +68,11 @@ export function choose(lead) {
   return isProposed && !get("marked") ? judge("accept") : paint(lead);
 }
 
-/** Say that nobody has said who leads there. */
+/** Clear the lead label of the marked frames. */
 export const clear = () => over((frames) => act({ kind: "clear_lead", ...frames }));
 
 /**
- * Do something to the marked frames. The mark goes at once, so that the next act is not about it; what was refused
- * brings it back.
+ * Apply a command to the marked frames. The mark is cleared at once and restored if the command is refused.
  * @template T
  * @param {(frames: {first: number, last: number}) => Promise<T>} what
  * @returns {Promise<T>}
@@ -86,8 +87,7 @@ export async function over(what) {
 }
 
 /**
- * A digit of the lead's number. It is taken as soon as no other track's number begins like it; Enter takes what is
- * typed.
+ * Type a digit of the lead's number. It applies as soon as it is unambiguous; Enter confirms earlier.
  * @param {string} digit
  */
 export function type(digit) {
@@ -101,7 +101,7 @@ export function type(digit) {
   set("marked", { ...marked(), typed });
 }
 
-/** Take the number that is typed. @returns {boolean} whether one was */
+/** Apply the typed number. @returns {boolean} whether one was */
 export function enter() {
   const track = trackOf(Number(marked().typed));
   if (!marked().typed || !track) return false;
@@ -109,7 +109,7 @@ export function enter() {
   return true;
 }
 
-/** The lead here is right, or is not. @param {"accept"|"reject"} kind */
+/** Accept or reject the lead range at this frame. @param {"accept"|"reject"} kind */
 export function judge(kind) {
   const range = leadAt(shown());
   return range ? act({ kind, items: [{ kind: "lead", id: range.id, revision: range.revision }] }) : null;

@@ -1,4 +1,4 @@
-/** The labeling mode: the pipeline's output becomes proposals, a person makes them true. */
+/** The labeling mode: the pipeline proposes labels, people correct them. */
 import { playback } from "../../core/api.js";
 import { $, press } from "../../core/dom.js";
 import { get, on, set } from "../../core/store.js";
@@ -27,8 +27,8 @@ export function toggle() {
   set("marked", null);
   set("trimmed", null);
   if (!isOn()) return;
-  if (get("state")?.playing) playback({ playing: false }); // what is labelled is what is shown
-  togglePane("params", true); // the labels' panel stands in the inspector's column
+  if (get("state")?.playing) playback({ playing: false }); // labels refer to the displayed frame
+  togglePane("params", true); // the labels panel is in the inspector column
   personName();
 }
 
@@ -39,7 +39,10 @@ const HINTS = {
   path: "Path: drag along its centre in the plan, or bend it with arrows; Enter keeps it. Esc cancels",
 };
 
-/** What the next drag or click does, which is said. @param {import("../../core/store.js").Labeling["tool"]} tool */
+/**
+ * Choose what the next drag or click does, and show a hint.
+ * @param {import("../../core/store.js").Labeling["tool"]} tool
+ */
 export function setTool(tool) {
   const next = get("labeling")?.tool === tool ? null : tool;
   if (next === "shape" && get("track") === null) return set("said", "Select a label first");
@@ -48,7 +51,7 @@ export function setTool(tool) {
   if (next === null) set("drawnPath", null);
 }
 
-/** Which label of others is looked at; null for none. @param {import("../../core/store.js").Labeling["item"]} item */
+/** Set the label under review, or null. @param {import("../../core/store.js").Labeling["item"]} item */
 export const setItem = (item) => change({ item });
 
 /** @param {boolean} review */
@@ -58,7 +61,7 @@ export function toggleObjects() {
   change({ hasObjects: !get("labeling")?.hasObjects });
 }
 
-/** Let go of one thing, the newest first. @returns {boolean} whether there was one */
+/** Cancel one thing, the most recent first. @returns {boolean} whether there was something to cancel */
 export function cancel() {
   if (get("trimmed")) set("trimmed", null);
   else if (get("labeling")?.tool) setTool(null);

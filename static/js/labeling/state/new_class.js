@@ -1,4 +1,4 @@
-/** The class that a new label gets: chosen in the bar, and remembered. */
+/** Class of new labels, chosen in the bar and stored in this browser. */
 import { memory } from "../../core/dom.js";
 import { CLASSES } from "../views/cuboid.js";
 

@@ -1,4 +1,4 @@
-/** Who labels. Asked once, kept in this browser, and changed by pressing the name. */
+/** Name of the annotator. Asked once and stored in this browser; click the name to change it. */
 import { el, memory } from "../../core/dom.js";
 import { set } from "../../core/store.js";
 import { ask } from "../panels/dialogs.js";
@@ -8,7 +8,7 @@ let asking = null;
 
 export const knownName = () => memory.read("person", "");
 
-/** The person's name, asked for when it is not known; null when nobody wants to say. @returns {Promise<string|null>} */
+/** The annotator's name, asked for if unknown; null if cancelled. @returns {Promise<string|null>} */
 export async function personName() {
   return knownName() || askName();
 }

@@ -1,6 +1,5 @@
 /**
- * What is labelled in the frames around the shown one. A drive may hold a hundred thousand labels: only these are
- * fetched.
+ * Label shapes around the current frame. A drive may hold a hundred thousand, so only nearby ones are fetched.
  */
 import { newestOnly, request } from "../../core/api.js";
 import { get, on, set } from "../../core/store.js";
@@ -10,15 +9,14 @@ import { shown } from "./labels.js";
 /** @typedef {{revision: number, byFrame: Record<string, LabelSighting[]>}} Chunk */
 
 /**
- * Frames in one request; fewer where many are labelled in each, so that an answer stays small. How many stretches are
- * kept.
+ * Frames per request, fewer in dense drives to keep answers small; number of cached chunks.
  */
 const CHUNKS = [20, 10, 5, 2, 1],
   MOST_SIGHTINGS = 1500,
   KEPT = 24;
 let size = CHUNKS[0];
 
-/** By their number, the one used last at the end. @type {Map<number, Chunk>} */
+/** By chunk number, most recently used last. @type {Map<number, Chunk>} */
 const chunks = new Map();
 
 const fetchChunk = newestOnly(async (/** @type {number} */ number) => {
@@ -45,7 +43,7 @@ export function setUp() {
     }
     if (labels && get("labeling")?.on) look(shown());
   });
-  // what a person goes to is asked for right after the frame itself: the two are there together
+  // request labels of a seek target right after the frame, so that both arrive together
   on(["scrub"], () =>
     queueMicrotask(() => {
       const going = get("scrub");
@@ -56,7 +54,7 @@ export function setUp() {
 
 let weighed = { labels: /** @type {import("./labels.js").Labels|null} */ (null), size };
 
-/** How many frames a request is for. @param {import("./labels.js").Labels} labels */
+/** Frames per request. @param {import("./labels.js").Labels} labels */
 function sizeFor(labels) {
   if (weighed.labels === labels) return weighed.size;
   let sightings = 0;
@@ -91,17 +89,17 @@ function keep(number, chunk) {
 }
 
 /**
- * What is labelled in a frame, as far as it is known here; while a change is being fetched, what was.
+ * Known label shapes of a frame; possibly outdated while a change is being fetched.
  * @param {number} frame
  * @returns {LabelSighting[]}
  */
 export const sightingsAt = (frame) => chunks.get(Math.floor(frame / size))?.byFrame[frame] ?? [];
 
 /**
- * Whether anything is known of a frame yet; until then what is listed of the frame before stays.
+ * Whether the labels of a frame have been loaded.
  * @param {number} frame
  */
 export const isKnown = (frame) => chunks.has(Math.floor(frame / size));
 
-/** Up to which act the labels of a frame are known. @param {number} frame */
+/** Revision up to which the labels of a frame are known. @param {number} frame */
 export const knownUpTo = (frame) => chunks.get(Math.floor(frame / size))?.revision ?? -1;

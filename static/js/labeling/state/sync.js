@@ -1,11 +1,11 @@
-/** Keeping up with the server: what changed is fetched when the stream's state says that something has. */
+/** Syncs labels with the server: fetches changes when the stream's state announces a new revision. */
 import { newestOnly, request } from "../../core/api.js";
 import { get, on, set } from "../../core/store.js";
 import { merged, nothing } from "./labels.js";
 
 /** @typedef {import("./types.js").LabelsAnswer} LabelsAnswer */
 
-/** The recording that what is held is about. @type {string|null} */
+/** URI of the recording that the known labels belong to. @type {string|null} */
 let uri = null;
 
 const refresh = newestOnly(
@@ -28,11 +28,11 @@ const refresh = newestOnly(
 
 export function setUp() {
   on(["state", "labeling"], follow);
-  // the server that answers after a break may be another one, with another database
+  // after a reconnection, the server may have another database
   on(["link"], () => get("link")?.status === "live" && get("labels") && refresh(true));
 }
 
-/** Labels are looked at when a person labels; until then nothing is fetched. */
+/** Labels are fetched only in the labeling mode. */
 function follow() {
   const state = get("state");
   if (!state) return;
@@ -43,7 +43,7 @@ function follow() {
   if (!get("labels") || state.labels.revision > (get("labels")?.revision ?? 0)) refresh(false);
 }
 
-/** What an act changed; when others acted in between, theirs is fetched too. @param {LabelsAnswer} changed */
+/** Apply what an act changed, and fetch changes by others. @param {LabelsAnswer} changed */
 export function accept(changed) {
   const labels = get("labels");
   if (labels && labels.drive === changed.drive.id && changed.revision === labels.revision + 1)
@@ -51,5 +51,5 @@ export function accept(changed) {
   else if (labels && changed.revision > labels.revision) refresh(false);
 }
 
-/** Ask again, whatever is known. */
+/** Force a refresh. */
 export const look = () => refresh(false);

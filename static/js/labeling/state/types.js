@@ -1,10 +1,10 @@
 /**
- * Shapes of labels as the server sends them (app/routes/, pipeline/labels/model.py).
- * `tests/app/page/test_page_types.py` holds every key here against real messages.
+ * Types of label messages (app/web/routes/, pipeline/labels/model.py). `tests/app/page/test_page_types.py` checks every
+ * key against real messages.
  * @typedef {"proposed"|"accepted"|"corrected"|"rejected"} LabelState
- * @typedef {number|"none"|"unknown"} Lead a track, nothing ahead in the path, or one can't tell
+ * @typedef {number|"none"|"unknown"} Lead a track, no lead, or lead unclear
  * @typedef {"track"|"lead"|"path"|"event"|"tag"} ItemKind
- * @typedef {[number, number, number, number]} Box x1 y1 x2 y2, pixels of the camera's own picture
+ * @typedef {[number, number, number, number]} Box x1 y1 x2 y2, pixels of the full camera image
  * @typedef {object} Cuboid ego frame, metres and radians
  * @property {[number, number, number]} center
  * @property {[number, number, number]} size
@@ -15,7 +15,7 @@
  * @property {number} t_unix_ms
  * @property {string|null} params
  * @property {string|null} calibration
- * @property {string} how what its place was measured by, where a person only pointed at it
+ * @property {string} how how its position was measured, if a person only pointed at it
  * @typedef {object} LabelTrack
  * @property {number} id
  * @property {number} revision
@@ -23,8 +23,8 @@
  * @property {LabelState} state
  * @property {LabelOrigin} origin
  * @property {string} comment why it was sent back
- * @property {string} reviewer who found it right, another than who made it; "" while nobody has
- * @property {number|null} first null of a track that is nowhere
+ * @property {string} reviewer who approved it, other than its author; "" if not reviewed
+ * @property {number|null} first null if the track is in no frame
  * @property {number|null} last
  * @property {number[]} keyframes
  * @property {number} sightings
@@ -71,15 +71,15 @@
  * @property {string} comment
  * @property {string} reviewer
  * @typedef {object} LabelTask
- * @property {number} id the 202 of who began it has the same
+ * @property {number} id same id as in the 202 response that started it
  * @property {"propose"|"import"} what
  * @property {number} done
  * @property {number} total
  * @property {string} note
  * @property {string|null} error why it failed
- * @property {boolean} running false: it stays until the next one begins
+ * @property {boolean} running false: finished, kept until the next one starts
  * @typedef {object} LabelsState in the stream's state
- * @property {number} revision how many acts the drive has seen
+ * @property {number} revision number of acts on the drive
  * @property {LabelTask|null} task
  * @typedef {object} LabelsAnswer what changed since a revision
  * @property {number} revision
@@ -102,12 +102,12 @@
  * @typedef {object} Found where there is something to do
  * @property {number|null} frame
  * @property {string} why
- * @property {{kind: ItemKind, id: number}|null} item what it is about, where that is one label
- * @property {number} left such places in the whole drive
+ * @property {{kind: ItemKind, id: number}|null} item the label, if it is a single one
+ * @property {number} left number of open items in the whole drive
  * @typedef {object} PastAct
  * @property {number} act
  * @property {string} what
- * @property {string} note what there was to say about it
+ * @property {string} note remark
  * @property {string} person
  * @property {number} t_unix_ms
  * @property {any} before
@@ -122,9 +122,9 @@
  * @typedef {object} Score
  * @property {number} revision
  * @property {number} run
- * @property {number} judged frames in which the labels say who leads
+ * @property {number} judged frames with a labelled lead
  * @property {import("../../drive/types.js").Metric[]} metrics
- * @property {string[]} notes what does not count, and why
+ * @property {string[]} notes what is not scored, and why
  * @property {ScoreErrors[]} errors by range and by sensor
  * @property {BadFrame[]} worst the worst first
  * @typedef {object} ScoreErrors

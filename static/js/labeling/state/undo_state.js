@@ -1,6 +1,5 @@
 /**
- * What the person at this page can take back or do again, and which drive it is about: the server's answer to them
- * alone.
+ * Undo and redo state of this person, and the drive it refers to.
  */
 import { newestOnly, request } from "../../core/api.js";
 import { get, on, set } from "../../core/store.js";
@@ -37,7 +36,7 @@ export function setUp() {
   });
 }
 
-/** The drive that an act of now is about; null where nothing can be labelled. @returns {Promise<string|null>} */
+/** The drive that an act refers to; null if labeling is unavailable. @returns {Promise<string|null>} */
 export async function driveNow() {
   if (!get("state")?.labels) return null;
   return (

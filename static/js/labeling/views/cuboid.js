@@ -1,10 +1,10 @@
-/** A cuboid under a hand, seen from above: what of it is held, and what it becomes. Pure: metres in, metres out. */
+/** Editing a cuboid seen from above: grips and their effects. Pure functions, in metres. */
 
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
 /** @typedef {import("../../views/drawing/viewport.js").Place} Place */
 /** @typedef {import("../../core/types.js").Point2} Point2 */
 /**
- * What a hand holds: the whole, the knob before the front, or an edge.
+ * What is dragged: the whole cuboid, the rotation knob, or an edge.
  * @typedef {"move"|"turn"|"front"|"rear"|"left"|"right"} Grip
  */
 
@@ -17,8 +17,7 @@ const CORNERS = [
 ];
 const SMALLEST_M = 0.2;
 /**
- * What a new cuboid of a class is, where a hand says no more: length, width, height, as in
- * pipeline/fusion/vehicle_sizes.py.
+ * Default size of a new cuboid: length, width, height, as in pipeline/fusion/vehicle_sizes.py.
  * @type {Record<string, [number, number, number]>}
  */
 const TYPICAL_M = {
@@ -30,11 +29,11 @@ const TYPICAL_M = {
   person: [0.6, 0.6, 1.75],
 };
 export const CLASSES = Object.keys(TYPICAL_M);
-/** A drag shorter than this says where a cuboid is, not how long it is or where it heads. */
+/** A shorter drag sets only the position, not length and heading. */
 const SAYS_FROM_M = 1;
 
 /**
- * The ego place of a point of the cuboid.
+ * Ego coordinates of a point given in the cuboid's frame.
  * @param {Cuboid} cuboid
  * @param {number} along
  * @param {number} across
@@ -46,7 +45,7 @@ function placeOf({ center: [x, y], yaw_rad }, along, across) {
   return [x + along * c - across * s, y + along * s + across * c];
 }
 
-/** A place along and across the cuboid, from its middle. @param {Cuboid} cuboid @param {Place} place */
+/** Coordinates of a place in the cuboid's frame. @param {Cuboid} cuboid @param {Place} place */
 function own({ center, yaw_rad }, { x, y }) {
   const c = Math.cos(yaw_rad),
     s = Math.sin(yaw_rad),
@@ -59,13 +58,13 @@ function own({ center, yaw_rad }, { x, y }) {
 export const footprint = (cuboid) => CORNERS.map(([l, w]) => placeOf(cuboid, l * cuboid.size[0], w * cuboid.size[1]));
 
 /**
- * Where the knob is that turns it: `beyond` before the middle of its front.
+ * Position of the rotation knob, `beyond` metres ahead of the front.
  * @param {Cuboid} cuboid
  * @param {number} beyond metres
  */
 export const knob = (cuboid, beyond) => placeOf(cuboid, cuboid.size[0] / 2 + beyond, 0);
 
-/** The middle of its front. @param {Cuboid} cuboid */
+/** Centre of the front edge. @param {Cuboid} cuboid */
 export const nose = (cuboid) => knob(cuboid, 0);
 
 /** @param {Cuboid} cuboid @param {Place} place */
@@ -75,8 +74,8 @@ export function contains(cuboid, place) {
 }
 
 /**
- * Which edge of one axis is held: the one ahead (1), behind (−1), none (0), or beyond both (null). Of what is thin,
- * seen from afar, the middle stays to be held.
+ * Which edge along one axis is grabbed: positive side (1), negative side (−1), none (0), or outside (null). The middle
+ * of a thin cuboid stays grabbable.
  * @param {number} at from the middle
  * @param {number} size
  * @param {number} reach
@@ -88,9 +87,9 @@ function edgeAt(at, size, reach) {
 }
 
 /**
- * What of the cuboid is under a place; null for nothing of it.
- * @param {Cuboid} cuboid @param {Place} place @param {number} reach how far an edge or the knob is felt, metres
- * @param {number} beyond where the knob is, metres before the front @returns {Grip|null}
+ * The grip at a place, or null.
+ * @param {Cuboid} cuboid @param {Place} place @param {number} reach tolerance around an edge or the knob, metres
+ * @param {number} beyond distance of the knob from the front, metres @returns {Grip|null}
  */
 export function gripAt(cuboid, place, reach, beyond) {
   const { along, across } = own(cuboid, place),
@@ -117,7 +116,7 @@ export const turned = (cuboid, by_rad) => ({
 });
 
 /**
- * The held edge brought to a place, and the opposite face left where it is.
+ * Move the grabbed edge to a place; the opposite face stays fixed.
  * @param {Cuboid} cuboid
  * @param {Grip} grip
  * @param {Place} place
@@ -136,8 +135,8 @@ function resized(cuboid, grip, place) {
 }
 
 /**
- * What a drag makes of a cuboid.
- * @param {Cuboid} cuboid as it was when it was taken hold of
+ * The cuboid after a drag.
+ * @param {Cuboid} cuboid at the start of the drag
  * @param {Grip} grip
  * @param {Place} from
  * @param {Place} to
@@ -151,12 +150,11 @@ export function dragged(cuboid, grip, from, to) {
 }
 
 /**
- * A new cuboid, drawn from the middle of its rear to the middle of its front; a short drag takes what its class usually
- * is.
+ * A new cuboid, drawn from rear centre to front centre; a short drag uses the default size of its class.
  * @param {Place} from
  * @param {Place} to
  * @param {string} label
- * @param {number} ground_m z of the ground there
+ * @param {number} ground_m ground height there
  * @returns {Cuboid}
  */
 export function drawn(from, to, label, ground_m) {
@@ -170,15 +168,15 @@ export function drawn(from, to, label, ground_m) {
   return { center: [from.x + length / 2, from.y, z], size, yaw_rad };
 }
 
-/** Where nothing shows the ground. @type {[number, number, number, number]} */
+/** Ground plane if none was fitted. @type {[number, number, number, number]} */
 const FLAT = [0, 0, 1, 0];
-/** What looks farther than this looks at the horizon. */
+/** Maximum distance of a ray's ground intersection. */
 const FARTHEST_M = 300;
 
 /**
  * @param {import("../../core/types.js").GroundPlanes|null} ground
  * @param {number} x
- * @returns {number} which plane it is there
+ * @returns {number} index of the ground plane there
  */
 function planeAt(ground, x) {
   const after = ground?.edges.findIndex((edge) => edge > x) ?? -1,
@@ -187,11 +185,11 @@ function planeAt(ground, x) {
 }
 
 /**
- * The nearest place at which a ray meets the ground; null where it looks beyond it.
+ * The nearest ground intersection of a ray, or null.
  * @param {import("../../core/types.js").GroundPlanes|null} ground
  * @param {number[]} start
  * @param {number[]} toward
- * @param {number} above metres over the ground that are meant
+ * @param {number} above height above ground, metres
  * @returns {Point2|null}
  */
 export function seenOn(ground, [x, y, z], [dx, dy, dz], above) {
@@ -207,7 +205,7 @@ export function seenOn(ground, [x, y, z], [dx, dy, dz], above) {
 }
 
 /**
- * Height of the ground at a place; 0 where no sweep shows it.
+ * Ground height at a place; 0 if unknown.
  * @param {import("../../core/types.js").GroundPlanes|null} ground
  * @param {Place} place
  */

@@ -1,6 +1,5 @@
 /**
- * The ego path by hand, where the pipeline's is wrong: a drag along its middle; it is as wide as the pipeline's
- * corridor.
+ * Drawing the ego path manually: a drag along its centre line, with the width of the pipeline's corridor.
  */
 import { color } from "../../core/colors.js";
 import { trace } from "../../views/drawing/plan.js";
@@ -13,10 +12,10 @@ import { setTool } from "../state/mode.js";
 /** @typedef {import("../../views/drawing/viewport.js").Place} Place */
 /** @typedef {import("../../views/drawing/viewport.js").Viewport} Viewport */
 
-/** A point of the line every so many metres of the drag. */
+/** Spacing of the points of a drawn path. */
 const STEP_M = 1;
 
-/** The drag that draws it. @param {Place} from @returns {import("../../views/drawing/viewport.js").Drag} */
+/** The drag that draws a path. @param {Place} from @returns {import("../../views/drawing/viewport.js").Drag} */
 export function drawing(from) {
   /** @type {Point2[]} */
   const middle = [[from.x, from.y]];
@@ -41,7 +40,7 @@ export function drawing(from) {
 }
 
 /**
- * Lines half a corridor to the left and to the right of a middle.
+ * Left and right boundaries, half a corridor width from a centre line.
  * @param {Point2[]} middle
  * @returns {{left: Point2[], right: Point2[]}}
  */
@@ -58,7 +57,7 @@ export function sides(middle) {
 }
 
 /**
- * The labelled path of the shown frame, and one under a hand.
+ * Draw the labelled path of the current frame, or the one being drawn.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Viewport} view
  */

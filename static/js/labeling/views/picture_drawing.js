@@ -1,4 +1,4 @@
-/** Labels over the picture: all twelve edges of each cuboid, the selected one's box, and names. */
+/** Labels in the camera image: cuboid edges, boxes and names. */
 import { drawBox, drawCuboid } from "../../views/drawing/picture.js";
 import { get } from "../../core/store.js";
 import { presentOf, present } from "../state/draft.js";
@@ -51,7 +51,7 @@ const isIn = ([x1, y1, x2, y2], { width, height, scale }) =>
   x1 * scale < width && y1 * scale < height && x2 > 0 && y2 > 0;
 
 /**
- * The box around what of a cuboid the picture shows; null for nothing.
+ * Bounding box of the visible corners of a cuboid, or null.
  * @param {import("../../core/types.js").Pixels} corners
  * @returns {Box|null}
  */
@@ -63,7 +63,7 @@ export function boundsOf(corners) {
   return [Math.min(...us), Math.min(...vs), Math.max(...us), Math.max(...vs)];
 }
 
-/** Where a label is in the picture: its box, else around its cuboid. @param {number} track @returns {Box|null} */
+/** Image box of a label: its own, else around its cuboid. @param {number} track @returns {Box|null} */
 export function boxOf(track) {
   const corners = get("projected")?.pixels.get(track);
   return presentOf(track)?.bbox ?? (corners ? boundsOf(corners) : null);

@@ -1,5 +1,5 @@
 /**
- * The hand on the picture while labeling: it selects labels, draws and changes boxes, and points at what was missed.
+ * Pointer input on the camera in labeling mode: select labels, draw and edit boxes, point at missed vehicles.
  */
 import { place } from "../../views/camera.js";
 import { $ } from "../../core/dom.js";
@@ -15,7 +15,7 @@ import { boxOf } from "./picture_drawing.js";
 import * as road from "./road_drag.js";
 
 /** @typedef {import("../state/types.js").Box} Box */
-/** A pixel of the camera's own picture. @typedef {{u: number, v: number}} Pixel */
+/** A pixel of the full camera image. @typedef {{u: number, v: number}} Pixel */
 /** Which sides of a box move: left, top, right, bottom. @typedef {[boolean, boolean, boolean, boolean]} Sides */
 /** @typedef {{from?: Pixel, moved: (to: Pixel) => void, ended: (isClick: boolean) => void}} Drag */
 
@@ -49,7 +49,7 @@ export function setUp() {
   });
 }
 
-/** Pixels of the camera's own picture per pixel of the pane. */
+/** Camera pixels per canvas pixel. */
 const perPane = () => 1 / (place().scale * (get("frame")?.picture?.scale ?? 1));
 
 /** @param {PointerEvent} event @returns {Pixel} */
@@ -79,9 +79,9 @@ function takes(from) {
 }
 
 /**
- * A box being drawn.
+ * A drag that draws a box.
  * @param {Pixel} from
- * @param {(bbox: Box|null) => void} done null after a press without a drag
+ * @param {(bbox: Box|null) => void} done null after a click
  * @returns {Drag}
  */
 function drawing(from, done) {
@@ -101,7 +101,7 @@ function drawing(from, done) {
 }
 
 /**
- * A new track from what the picture shows: the server says what it is made of.
+ * Create a track from an image box or pixel; the server finds its cuboid.
  * @param {{bbox: Box}|{pixel: number[]}} from
  */
 async function lift(from) {
@@ -119,7 +119,7 @@ function shape(track, bbox) {
 }
 
 /**
- * Which sides of the box a pixel holds; all of them inside it, null outside.
+ * Sides of the box grabbed at a pixel: all of them inside, null outside.
  * @param {Box} box
  * @param {Pixel} pixel
  * @param {number} reach

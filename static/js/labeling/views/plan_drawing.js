@@ -1,4 +1,4 @@
-/** Labels in the plan: footprints, and handles on the selected one. */
+/** Labels in the plan view: footprints, and handles of the selected one. */
 import { ui } from "../../core/colors.js";
 import { trace } from "../../views/drawing/plan.js";
 import { get } from "../../core/store.js";
@@ -12,7 +12,7 @@ import { drawPathLabel } from "./path.js";
 /** @typedef {import("../../views/drawing/viewport.js").Viewport} Viewport */
 /** @typedef {import("../../views/drawing/text_labels.js").Labels} Tags */
 
-/** How far before the front the knob is that turns a cuboid. */
+/** Distance of the rotation knob from the front. */
 export const KNOB_PX = 16;
 const HANDLE_PX = 3.5;
 

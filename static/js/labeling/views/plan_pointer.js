@@ -1,4 +1,4 @@
-/** The hand on the plan while labeling: it selects, moves, turns and resizes cuboids, and draws new ones. */
+/** Pointer input on the plan view in labeling mode: select, move, rotate, resize and draw cuboids. */
 import { get, set } from "../../core/store.js";
 import { act } from "../acts/queue.js";
 import { mergeWith } from "../acts/commands.js";
@@ -17,7 +17,7 @@ import { KNOB_PX } from "./plan_drawing.js";
 const REACH_PX = 6;
 
 /**
- * What a drag from here does; null when it is the plan that moves.
+ * What a drag from here does; null to pan the view.
  * @param {Place} from
  * @param {number} scale pixels per metre
  * @returns {Drag|null}
@@ -35,7 +35,7 @@ export function takes(from, scale) {
 }
 
 /**
- * What the hand would hold, for the pointer's look.
+ * Cursor for the grip under the pointer.
  * @param {Place} place
  * @param {number} scale
  * @returns {string} a CSS cursor, "" for none
@@ -51,7 +51,7 @@ export function cursorAt(place, scale) {
   return labelAt(place) === null ? "" : "pointer";
 }
 
-/** @param {Place} from @param {number|null} track whose shape it is; null of a new one @returns {Drag} */
+/** @param {Place} from @param {number|null} track track to draw, or null for a new one @returns {Drag} */
 function drawing(from, track) {
   const ground_m = groundAt(get("frame")?.display.ground ?? null, from),
     label = trackOf(track)?.label ?? newLabel();
@@ -72,7 +72,7 @@ function drawing(from, track) {
   };
 }
 
-/** Make the drawn cuboid a new track. @param {string} label */
+/** Add the drawn cuboid as a new track. @param {string} label */
 async function add(label) {
   const draft = get("draft");
   if (!draft?.cuboid) return;
@@ -85,7 +85,7 @@ async function add(label) {
   if (made) set("track", made.id);
 }
 
-/** A press selects what is there, or is what the tool asks for. @param {Place} place */
+/** A click selects the label at a place, or completes a merge. @param {Place} place */
 export function clicked(place) {
   const id = labelAt(place);
   if (get("labeling")?.tool === "merge" && id !== null) mergeWith(id);

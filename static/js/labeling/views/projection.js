@@ -1,6 +1,5 @@
 /**
- * Where the shown labels lie in the picture. The server projects, as always; a cuboid under a hand is asked for as it
- * moves.
+ * Projects the current labels into the image. The server does the projection, also during a drag.
  */
 import { newestOnly, request } from "../../core/api.js";
 import { get, on, set } from "../../core/store.js";
@@ -28,7 +27,7 @@ const project = newestOnly(async (/** @type {{frame: number, cuboids: Map<number
   });
 });
 
-/** More cuboids than this nobody can tell apart in a picture: the nearest ones, and the selected one. */
+/** Maximum number of projected cuboids: the nearest ones, and the selected one. */
 const MOST = 150;
 
 /** @param {[number, Cuboid][]} cuboids @returns {[number, Cuboid][]} */

@@ -1,5 +1,5 @@
 /**
- * A cuboid dragged over the road in the picture, held by the middle of its foot. The server says where a pixel looks.
+ * Dragging a cuboid over the road in the camera image, by its base centre. The server provides the viewing rays.
  */
 import { newestOnly, request } from "../../core/api.js";
 import { get } from "../../core/store.js";
@@ -12,7 +12,7 @@ import { boundsOf } from "./picture_drawing.js";
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
 
 /**
- * What a drag of a track's cuboid does; null where the pixel is not on it.
+ * A drag of a track's cuboid, or null if the pixel is not on it.
  * @param {number} track
  * @param {Pixel} from
  */
@@ -60,7 +60,7 @@ export function takes(track, from) {
 }
 
 /**
- * Where the diagonals of its bottom cross: the middle, in whatever perspective.
+ * Base centre: the intersection of the diagonals, which is perspective-correct.
  * @param {import("../../core/types.js").Pixels} corners
  * @returns {Pixel|null}
  */

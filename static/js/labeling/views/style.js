@@ -1,11 +1,11 @@
-/** How a label looks: its colour says what it is worth, its line how sure one is. */
+/** Drawing style of a label: colour by role, line style by state. */
 import { color, onPicture, ui } from "../../core/colors.js";
 import { get } from "../../core/store.js";
 import { leadAt, shown, trackOf } from "../state/labels.js";
 
 /** @typedef {{tint: string, dash: number[], width: number, isLead: boolean, isChosen: boolean, name: string}} Look */
 
-/** @param {number} id @param {boolean} isOnPicture @returns {Look|null} null for what is not to be seen */
+/** @param {number} id @param {boolean} isOnPicture @returns {Look|null} null if hidden */
 export function lookOf(id, isOnPicture) {
   const track = trackOf(id),
     isChosen = id === get("track");

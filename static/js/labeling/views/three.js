@@ -1,4 +1,4 @@
-/** The selected label in the 3D view: the server shows handles there, and tells this page how a hand drags them. */
+/** The selected label in the 3D view: the server draws handles and reports their drags. */
 import { tell } from "../../core/connection.js";
 import { get, on } from "../../core/store.js";
 import { hold, presentOf, release } from "../state/draft.js";
@@ -6,7 +6,7 @@ import { shown, trackOf } from "../state/labels.js";
 import { isOn } from "../state/mode.js";
 
 /**
- * frame: that the hand sees, whatever is shown by now.
+ * frame: the one being dragged in, which may not be the current one.
  * @typedef {{track: number, frame: number, cuboid: import("../state/types.js").Cuboid, ended: boolean}} Dragged
  */
 

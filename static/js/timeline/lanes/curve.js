@@ -69,7 +69,7 @@ function drawCurve(ctx, span, row, curve, now, base) {
  */
 
 /**
- * A column as samples; the CIPV's figures do not go on from one object to the next.
+ * A column as samples; CIPV values are not joined across object changes.
  * @param {Series} series
  * @param {keyof Columns} key
  * @param {number} factor

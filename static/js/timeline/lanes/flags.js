@@ -1,4 +1,4 @@
-/** Events on the timeline: a flag each, and what their kinds are called. */
+/** Events as flags on the timeline, and the names of event kinds. */
 import { color, ui } from "../../core/colors.js";
 import { get } from "../../core/store.js";
 import { seekTo } from "../../drive/seek.js";

@@ -1,4 +1,4 @@
-/** The ribbon: who was the CIPV at each frame. Coloured by id; hatched by which sensors it was made of. */
+/** A ribbon of the CIPV per frame, coloured by id and hatched by source. */
 import { ui } from "../../core/colors.js";
 import { get } from "../../core/store.js";
 
@@ -10,14 +10,14 @@ import { get } from "../../core/store.js";
 const HUE_STEP = 137.508,
   FIRST_HUE = 190;
 const HATCH_PX = 6;
-/** Narrower stretches get no number. */
+/** Minimum width for a label. */
 const NUMBER_FROM_PX = 24;
 
-/** Which lead of the recording an id is: the first, the second … @type {Map<number, number>} */
+/** Order in which leads appear, by id. @type {Map<number, number>} */
 let places = new Map();
 
 /**
- * Give every lead its colour, the compared run's first, so that those of both keep theirs.
+ * Assign colours to leads, the compared run's first, so that both runs share them.
  * @param {(Series|null)[]} runs
  */
 export function colorLeads(runs) {
@@ -34,7 +34,7 @@ export function colorOf(id, isLight) {
 }
 
 /**
- * Neighbouring frames with the same lead, seen the same way.
+ * Consecutive frames with the same lead and source.
  * @param {Series} series @returns {Stretch[]}
  */
 export function stretches({ done, columns }) {
@@ -91,7 +91,7 @@ function drawStretch(ctx, { id, source, carried }, box, look) {
 }
 
 /**
- * A plain ground under a number that stands on a hatch.
+ * A plain background for a label on hatching.
  * @param {CanvasRenderingContext2D} ctx
  * @param {string} words
  * @param {{x: number, top: number, height: number}} box

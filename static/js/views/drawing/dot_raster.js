@@ -1,6 +1,5 @@
 /**
- * Thousands of dots, written straight into pixels and put on a canvas at once. One fillRect each would take tens of
- * milliseconds where the canvas is drawn without a graphics card.
+ * Draws thousands of dots by writing pixels directly. One fillRect each would take tens of milliseconds without a GPU.
  */
 import { context } from "../../core/dom.js";
 
@@ -11,7 +10,7 @@ export class DotRaster {
   #pixels = new Uint32Array(this.#image.data.buffer);
   #ratio = 1;
 
-  /** Begin with nothing on it. @param {number} width @param {number} height CSS pixels */
+  /** Clear the raster. @param {number} width @param {number} height CSS pixels */
   begin(width, height) {
     this.#ratio = window.devicePixelRatio || 1;
     const w = Math.max(1, Math.round(width * this.#ratio)),
@@ -43,7 +42,7 @@ export class DotRaster {
     }
   }
 
-  /** Put the dots onto a canvas, its upper left corner at (x, y). @param {CanvasRenderingContext2D} ctx */
+  /** Draw the dots onto a canvas, with the top left corner at (x, y). @param {CanvasRenderingContext2D} ctx */
   drawOn(ctx, x = 0, y = 0) {
     this.#ctx.putImageData(this.#image, 0, 0);
     ctx.drawImage(this.#canvas, x, y, this.#image.width / this.#ratio, this.#image.height / this.#ratio);

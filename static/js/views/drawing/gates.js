@@ -1,4 +1,4 @@
-/** Why, drawn: the tests of the selected object where they were made, with the number and its limit. */
+/** Draws the gates of the selected object in the views, with value and limit. */
 import { num } from "../../core/format.js";
 import { middle } from "./trails.js";
 
@@ -19,7 +19,7 @@ const tintOf = (gate) => (gate.passed ? PASSED : FAILED);
 /** @param {FusedObject} item @param {string} name */
 const gateOf = (item, name) => item.gates.find((gate) => gate.name === name) ?? null;
 
-/** The first test that an object failed, in words; null when it passed all. @param {FusedObject} item */
+/** The first failed gate of an object as text, or null. @param {FusedObject} item */
 export function failedWords(item) {
   const gate = item.gates.find(({ passed }) => !passed);
   if (!gate) return null;
@@ -29,7 +29,7 @@ export function failedWords(item) {
 }
 
 /**
- * In the picture: how much the boxes of both sensors overlap, and what the object failed.
+ * In the camera view: the overlap of both sensors' boxes, and the first failed gate.
  * @param {CanvasRenderingContext2D} ctx @param {Frame} frame @param {FusedObject} item @param {Labels} labels
  * @param {(u: number) => number} X @param {(v: number) => number} Y
  */
@@ -61,7 +61,7 @@ export function drawInPicture(ctx, { display }, item, labels, X, Y) {
 }
 
 /**
- * In the plan: how far it is from the path's middle against the limit, and the range at which the camera alone saw it.
+ * In the plan view: the path offset with its limit, and the camera-only range estimate.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Frame} frame
  * @param {FusedObject} item
@@ -99,7 +99,7 @@ function drawOffset(ctx, center, item, labels, plan) {
 }
 
 /**
- * The band of ranges that the gate allows around what the camera measured.
+ * The range band that the gate accepts around the camera's estimate.
  * @param {CanvasRenderingContext2D} ctx
  * @param {FusedObject} item
  * @param {{distance_m: number, sigma_m: number}|undefined} seen
@@ -142,7 +142,7 @@ function drawRange(ctx, item, seen, labels, plan) {
 }
 
 /**
- * The path's nearest place, and the direction to its left there.
+ * The nearest point of the path, and the unit vector to its left.
  * @param {Point2[]} center
  * @param {Point2} place
  * @returns {{foot: Point2, left: Point2}}
@@ -172,7 +172,7 @@ function line(ctx, [x1, y1], [x2, y2]) {
 }
 
 /**
- * A stroke along the path.
+ * A tick mark along the path direction.
  * @param {CanvasRenderingContext2D} ctx
  * @param {[number, number]} at
  * @param {Point2} left

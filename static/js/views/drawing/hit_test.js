@@ -1,10 +1,10 @@
-/** What lies under a pixel of a view: the nearest point, the nearest object. */
+/** Hit tests: the nearest point, and the object it belongs to. */
 
 /** @typedef {import("../../core/types.js").Frame} Frame */
 
 /**
- * The point whose place in a view is nearest to a pixel; −1 when none is near enough.
- * @param {number} count @param {(i: number) => boolean} counts which points to look at
+ * Index of the point nearest to a pixel; −1 if none is within reach.
+ * @param {number} count @param {(i: number) => boolean} counts which points to consider
  * @param {(i: number) => number} across @param {(i: number) => number} down their pixels
  * @param {number} u @param {number} v @param {number} reach pixels
  */
@@ -21,6 +21,6 @@ export function nearestPoint(count, counts, across, down, u, v, reach) {
   return best;
 }
 
-/** Whose a point is. @param {Frame} frame @param {number} i @returns {number|null} */
+/** Id of the object that a point belongs to, or null. @param {Frame} frame @param {number} i @returns {number|null} */
 export const ownerOf = ({ owner, result }, i) =>
   i < 0 || owner[i] === 0 ? null : (result.objects[owner[i] - 1]?.id ?? null);

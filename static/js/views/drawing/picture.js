@@ -1,4 +1,4 @@
-/** Over the picture: the corridor, and each object's boxes, cuboid and name. */
+/** Camera overlay: path corridor, and boxes, cuboid and name of each object. */
 import { onPicture, roleOf } from "../../core/colors.js";
 import { num } from "../../core/format.js";
 import { get } from "../../core/store.js";
@@ -6,7 +6,7 @@ import { get } from "../../core/store.js";
 /** @typedef {import("../../core/types.js").Frame} Frame */
 /** @typedef {import("../../core/types.js").FusedObject} FusedObject */
 /** @typedef {import("../../core/types.js").Pixels} Pixels */
-/** @typedef {(pixel: number) => number} Axis  from a pixel of the picture to one of the canvas */
+/** @typedef {(pixel: number) => number} Axis  maps an image pixel to a canvas pixel */
 
 const EDGES = [
   [0, 1],
@@ -96,7 +96,7 @@ export function drawObjects(ctx, { result, display }, layers, labels, X, Y) {
   }
 }
 
-/** Roadside returns and what is only carried along would bury the picture in tags. @param {FusedObject} item */
+/** No tags for roadside returns and carried objects: they would clutter the image. @param {FusedObject} item */
 const deservesTag = (item) => !item.carried && (item.source !== "L" || item.in_path);
 
 /**

@@ -1,10 +1,13 @@
-/** The parts of the plan view, each drawn with the colours that the context has. */
+/** Drawing functions of the plan view. */
 import { color } from "../../core/colors.js";
 import { middle, trailOf } from "./trails.js";
 
 /** @typedef {import("../../core/types.js").Point2} Point2 */
 /** @typedef {import("../../core/types.js").FusedObject} FusedObject */
-/** Where a place of the plan is drawn. @typedef {Pick<import("./viewport.js").Viewport, "u"|"v"|"scale">} Viewport */
+/**
+ * Maps ego coordinates to canvas pixels.
+ * @typedef {Pick<import("./viewport.js").Viewport, "u"|"v"|"scale">} Viewport
+ */
 
 const SLOWEST_MPS = 0.5,
   HEAD_PX = 6;
@@ -16,7 +19,7 @@ export function trace(ctx, view, line) {
 }
 
 /**
- * The corridor, and softly one sigma to either side of its edges.
+ * The path corridor, with 1σ around its edges.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Viewport} view
  * @param {import("../../core/types.js").Path} path
@@ -51,7 +54,7 @@ export function drawPath(ctx, view, path) {
   ctx.globalAlpha = 1;
 }
 
-/** Standard deviation of the path's place at a distance ahead, between and beyond the distances where it is known.
+/** Interpolated lateral standard deviation of the path at a distance ahead.
  * @param {Record<string, number|null>} sigmas @returns {(x: number) => number} */
 function sigmaAlong(sigmas) {
   const known = Object.entries(sigmas)
@@ -89,7 +92,7 @@ export function drawOutline(ctx, view, item, isImportant, isLead) {
 }
 
 /**
- * One sigma of the distance, along the line of sight.
+ * ±1σ of the distance, along the line of sight.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Viewport} view
  * @param {FusedObject} item
@@ -107,7 +110,7 @@ export function drawSigma(ctx, view, item) {
 }
 
 /**
- * Where it will be relative to us in one second.
+ * Relative motion over the next second.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Viewport} view
  * @param {FusedObject} item
@@ -134,7 +137,7 @@ export function drawArrow(ctx, view, item) {
 }
 
 /**
- * Fading towards the past.
+ * A trail that fades towards the past.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Viewport} view
  * @param {number} id
@@ -153,7 +156,7 @@ export function drawTrail(ctx, view, id, tint) {
 }
 
 /**
- * A frame around an object.
+ * A rectangle around an object.
  * @param {CanvasRenderingContext2D} ctx
  * @param {Viewport} view
  * @param {FusedObject} item

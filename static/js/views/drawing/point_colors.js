@@ -1,4 +1,4 @@
-/** What LiDAR points can be coloured by: one packed colour a point, for either view. */
+/** Colour modes of LiDAR points: one packed colour per point. */
 import { RANGE_COLORS, RANGE_MAX_M, roleOf } from "../../core/colors.js";
 import { pack, rgba } from "./dot_raster.js";
 
@@ -25,7 +25,7 @@ const HEIGHT_M = [-0.3, 3],
   AGE_MS = 100,
   UNKNOWN_AGE = 255;
 
-/** Dark blue over green to yellow: even steps of lightness, so that more always looks more. */
+/** Dark blue over green to yellow, with perceptually even lightness. */
 const STOPS = [
   [70, 30, 110],
   [60, 90, 160],
@@ -36,7 +36,7 @@ const STOPS = [
 ];
 const RAMP = ramp(STOPS, 256),
   RANGE_RAMP = spread(RANGE_COLORS, 256);
-/** Far apart in hue; neither the green nor the magenta that mean something. */
+/** Distinct hues, without the reserved green and magenta. */
 const HUES = [
   [255, 160, 60],
   [90, 190, 255],
@@ -51,7 +51,7 @@ const HUES = [
 ];
 
 /**
- * (count) colours as `DotRaster` takes them; the road's points are fainter.
+ * Colours (count) for `DotRaster`; ground points are fainter.
  * @param {Frame} frame @param {ColorBy} by @param {Shade} shade @param {number} [groundAlpha] @returns {Uint32Array}
  */
 export function tints(frame, by, shade, groundAlpha = 0.6) {
@@ -114,7 +114,7 @@ const MODES = {
 };
 
 /**
- * Height of the road under a place.
+ * Ground height function.
  * @param {import("../../core/types.js").GroundPlanes|null} ground
  * @returns {(x: number, y: number) => number}
  */

@@ -1,7 +1,6 @@
 /**
- * A canvas as large as its box, at the screen's resolution. It is drawn by the processor: a picture, some lines and
- * thousands of dots ten times a second are quick there, and where a page is composed without a graphics card they cost
- * half of what they do as textures. Its size comes from an observer: asking for it would have the page laid out anew.
+ * A canvas that fills its box at screen resolution. It is CPU-rendered (`willReadFrequently`), which costs half as much
+ * as a texture on machines without a GPU. Its size comes from an observer, which avoids forced layouts.
  */
 import { ui } from "../../core/colors.js";
 import { context } from "../../core/dom.js";
@@ -17,9 +16,8 @@ export class Surface {
 
   /**
    * @param {HTMLCanvasElement} canvas
-   * @param {() => void} changed called when it has another size
-   * @param {string|null} ground colour of the page that it is drawn on; nothing shines through then, and what lies
-   *   behind needs no painting. Null is a sheet to see through
+   * @param {() => void} changed called when the size has changed
+   * @param {string|null} ground background colour, which makes the canvas opaque; null for a transparent one
    */
   constructor(canvas, changed, ground = null) {
     this.#canvas = canvas;
@@ -36,7 +34,7 @@ export class Surface {
     return this.width === 0 || this.height === 0;
   }
 
-  /** The context, in CSS pixels, with nothing drawn. */
+  /** Clear the canvas; returns its context, in CSS pixels. */
   begin() {
     this.ratio = window.devicePixelRatio || 1;
     const width = Math.round(this.width * this.ratio),
@@ -51,7 +49,7 @@ export class Surface {
     return this.#ctx;
   }
 
-  /** Whole device pixels: part of a column would keep some of what was. @param {number} width @param {number} height */
+  /** Clear whole device pixels: partial ones would leave residue. @param {number} width @param {number} height */
   #wipe(width, height) {
     if (this.#ground === null) return this.#ctx.clearRect(0, 0, width, height);
     this.#ctx.fillStyle = ui(this.#ground);

@@ -1,8 +1,8 @@
-/** Text tags on a canvas that keep out of each other's way. */
+/** Text labels on a canvas that avoid overlaps. */
 
 const HEIGHT = 16;
 /**
- * "strong" is filled and drawn wherever it must, "must" finds a place, "weak" is left out where there is none.
+ * "strong" labels are filled and always drawn, "must" labels are always drawn, "weak" ones only if there is room.
  * @typedef {"strong"|"must"|"weak"} Weight
  */
 
@@ -11,7 +11,7 @@ export class Labels {
    * @param {CanvasRenderingContext2D} ctx
    * @param {number} width of the canvas, CSS pixels
    * @param {number} top
-   * @param {number} bottom between which it is written
+   * @param {number} bottom vertical limits
    */
   constructor(ctx, width, top = 0, bottom = Infinity) {
     this.ctx = ctx;
@@ -23,7 +23,7 @@ export class Labels {
   }
 
   /**
-   * A tag whose lower left corner is at (x, y), moved up until it is free.
+   * Draw a label with its bottom left corner at (x, y), moved up to avoid others.
    * @param {string} words @param {number} x @param {number} y @param {string} tint @param {Weight} [weight]
    */
   put(words, x, y, tint, weight = "weak") {

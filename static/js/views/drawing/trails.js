@@ -1,4 +1,4 @@
-/** Where each object was, relative to us, over the last seconds. */
+/** Trails: relative positions of each object over the last seconds. */
 import { get, on } from "../../core/store.js";
 
 const KEPT_S = 3,

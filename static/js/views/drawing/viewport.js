@@ -1,31 +1,29 @@
 /**
- * The part of the plan that a pane shows: x up, y left, metres. A named view follows the pane's size until a person
- * moves it.
+ * Viewport of the plan view: x up, y left, in metres. A named view follows the pane's size until the user pans or
+ * zooms.
  */
 
 /** @typedef {{x: number, y: number}} Place */
 /** @typedef {"ahead"|"around"} View */
 /**
- * What each view holds, metres: ahead, from behind our bumper to the farthest lead that matters, with the neighbouring
- * lanes.
+ * Extent of each view in metres. "ahead" covers the farthest relevant lead and the adjacent lanes.
  */
 const VIEWS = { ahead: { from: -5, to: 74, half: 13 }, around: { from: -50, to: 50, half: 50 } };
 const SCALE_LIMITS = [1.5, 200];
 const DRAG_FROM_PX = 4;
 
 /**
- * @typedef {object} Hand what a hand on the plan may do
- * @property {() => void} changed the view has moved
+ * @typedef {object} Hand pointer input handlers
+ * @property {() => void} changed the viewport has changed
  * @property {(place: Place) => void} clicked
- * @property {() => boolean} hasKeys whether keys zoom now; a mode may mean them otherwise
- * @property {(from: Place, event: PointerEvent) => Drag|null} takes what a drag from here does; null when it moves the
- *   plan
+ * @property {() => boolean} hasKeys whether keys zoom; a mode may use them otherwise
+ * @property {(from: Place, event: PointerEvent) => Drag|null} takes what a drag from here does; null to pan
  */
 /**
  * @typedef {object} Drag
  * @property {(to: Place) => void} moved
- * @property {() => void} [ended]  the hand let go after a move
- * @property {() => void} [cancelled]  it never moved, or was taken away
+ * @property {() => void} [ended]  released after a move
+ * @property {() => void} [cancelled]  released without a move, or cancelled
  */
 
 export class Viewport {
@@ -35,7 +33,7 @@ export class Viewport {
   y = 0;
   width = 1;
   height = 1;
-  /** Null once a person has moved it. @type {View|null} */
+  /** Null once the user has panned or zoomed. @type {View|null} */
   view = "ahead";
   #canvas;
   #hand;
