@@ -173,7 +173,7 @@ def test_times_and_values_are_said_as_people_read_them(open_page: OpenPage):
 
 def test_a_parameter_is_found_by_its_name_and_by_words(open_page: OpenPage):
     page = open_page()
-    weight, nothing = page.locator("[data-param='cluster.z_weight']"), page.get_by_text("No parameter is called")
+    weight, nothing = page.locator("[data-param='cluster.z_weight']"), page.get_by_text("No matching parameters")
     for typed in ("cluster.z_weight", "z weight", "Z_Weight"):
         page.get_by_label("Search parameters").fill(typed)
         expect(weight).to_be_visible()
@@ -207,7 +207,7 @@ def test_the_3d_view_keeps_the_keys_that_fly_and_leaves_the_page_the_others(open
     page.keyboard.press("d")
     page.keyboard.press("?")
     dialog = page.get_by_role("dialog")
-    expect(dialog).to_contain_text("Esc gives them all back to the page")
+    expect(dialog).to_contain_text("Esc returns all keys to the page")
     assert page.evaluate(theme) == before, "D flies"
     dialog.get_by_role("button", name="Close").click()
     view.locator("input").click()

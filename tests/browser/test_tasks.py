@@ -179,7 +179,7 @@ def test_a_moment_is_marked_and_found_again(page: Page):
     wait_for_frame(page, 10)
     mark.click()
     wait_for_frame(page, START)
-    page.locator("#events").get_by_role("button", name="Remove the mark").click()
+    page.locator("#events").get_by_role("button", name="Remove mark").click()
     expect(mark).to_have_count(0)
 
 

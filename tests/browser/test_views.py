@@ -59,7 +59,7 @@ def opened(open_page: OpenPage) -> Page:
 @pytest.mark.parametrize(("view", "canvas"), [("camera", "#camera"), ("plan", "#bev")])
 def test_points_take_every_colour_that_is_offered(open_page: OpenPage, view: str, canvas: str):
     page = opened(open_page)
-    choice = page.get_by_label(f"Colour points of the {view} by")
+    choice = page.get_by_label(f"Colour {view} points by")
     choice.select_option("age")
     looks = [pixels(page, canvas)]
     for by in COLOURS:
@@ -200,7 +200,9 @@ def test_trails_follow_what_is_played(open_page: OpenPage):
     assert repainted(page, "#bev", before)
     page.keyboard.press("Home")
     wait_for_frame(page, 0)
-    assert page.evaluate("async () => (await import('/js/views/drawing/trails.js')).trailOf(1).length") <= 1, "a jump ends them"
+    assert page.evaluate("async () => (await import('/js/views/drawing/trails.js')).trailOf(1).length") <= 1, (
+        "a jump ends them"
+    )
 
 
 def test_the_plan_shows_all_around_and_ahead_again(open_page: OpenPage):

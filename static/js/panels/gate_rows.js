@@ -22,7 +22,7 @@ const KINDS = {
   hits: { label: "Detections", test: "least", param: "cipv.confirm_hits" },
   seen: { label: "Detected in this frame", test: "flag", param: "cipv.carried_may_become_lead" },
   size: { label: "Vehicle size", test: "flag", unit: "m", param: "cipv.max_size_m" },
-  ahead: { label: "Ahead of the bumper", test: "least", unit: "m" },
+  ahead: { label: "Ahead of bumper", test: "least", unit: "m" },
   path_offset: { label: "Path offset", test: "most", unit: "m", param: "path.half_width_m" },
   path_sigma: { label: "Position uncertainty", test: "most", unit: "m", param: "cipv.max_sigma_m" },
 };

@@ -101,7 +101,7 @@ function updateAcc({ acc: command, ego }) {
   for (const pedal of /** @type {const} */ (["accelerator", "brake"])) {
     const value = command?.[pedal] ?? null;
     pedals[pedal].fill.style.setProperty("--part", `${100 * (value ?? 0)}%`);
-    text(pedals[pedal].value, value === null ? DASH : `${Math.round(100 * value)} %`);
+    text(pedals[pedal].value, value === null ? DASH : `${Math.round(100 * value)}%`);
   }
   say(note, command ? command.reason : "Ego speed unknown.");
 }

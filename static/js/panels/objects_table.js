@@ -124,7 +124,7 @@ function distance(o) {
 
 /** @param {FusedObject} o */
 function inPath(o) {
-  const share = o.in_path_probability === null ? "" : ` ${Math.round(100 * o.in_path_probability)} %`;
+  const share = o.in_path_probability === null ? "" : ` ${Math.round(100 * o.in_path_probability)}%`;
   return `${o.in_path ? "yes" : "no"}${share}`;
 }
 

@@ -119,7 +119,7 @@ function showRun(row, run) {
       ? run.seconds === null
         ? ""
         : `${run.seconds.toFixed(run.seconds < 10 ? 1 : 0)} s`
-      : run.note || `${Math.round((100 * run.done) / Math.max(1, run.total))} %`,
+      : run.note || `${Math.round((100 * run.done) / Math.max(1, run.total))}%`,
   );
 }
 

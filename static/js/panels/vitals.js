@@ -9,8 +9,8 @@ import { get, on } from "../core/store.js";
 const ITEMS = [
   ["fps", "fps", "Frames drawn in the last second", ""],
   ["age", "age", "Latency from result to screen, in milliseconds", ""],
-  ["line", "line", "Pipeline time per frame without the detector, in milliseconds", "optional"],
-  ["net", "net", "Detector time per frame in milliseconds; 0 if cached", "optional"],
+  ["line", "pipeline", "Pipeline time per frame without the detector, in milliseconds", "optional"],
+  ["net", "detector", "Detector time per frame in milliseconds; 0 if cached", "optional"],
   [
     "skipped",
     "skipped",

@@ -1,5 +1,6 @@
 /** Definitions of the timeline's curves, and their scaling and tracing. */
 import { memory } from "../core/dom.js";
+import { get } from "../core/store.js";
 import { num, ttc } from "../core/format.js";
 
 /** @typedef {import("../drive/types.js").Columns} Columns */
@@ -106,6 +107,16 @@ const shown = new Set(
 
 /** @param {Curve} curve */
 export const isShown = ({ key }) => shown.has(key);
+
+/** Whether the drive has values for a curve, or may still get some. @param {Curve} curve */
+export function hasData({ key, also }) {
+  const drive = get("drive"),
+    { now = null, base = null } = drive ?? {};
+  if (!drive || !now || now.done < drive.count) return true;
+  return [now, base].some((run) =>
+    [key, also].some((name) => name && run?.columns[name].some((value) => value !== null)),
+  );
+}
 
 /** Show a curve, or hide it. @param {Curve} curve */
 export function toggleCurve({ key }) {

@@ -9,7 +9,7 @@ import { clock, num } from "../core/format.js";
 import { get, on, paint, painter } from "../core/store.js";
 import { Surface } from "../views/drawing/surface.js";
 import * as clip from "./clip.js";
-import { CURVES, isShown, toggleCurve } from "./curves.js";
+import { CURVES, hasData, isShown, toggleCurve } from "./curves.js";
 import { drawBack, drawFront } from "./drawing.js";
 import * as events from "./events_list.js";
 import { nameOf } from "./lanes/flags.js";
@@ -85,6 +85,12 @@ function chip(curve) {
   const style = { "--chip": `var(--cipv-${curve.role})` };
   const button = el("button", { type: "button", textContent: curve.label, title: curve.title, style, onclick: flip });
   press(button, isShown(curve));
+  on(["drive"], () => {
+    const isEmpty = !hasData(curve);
+    if (button.disabled === isEmpty) return;
+    button.disabled = isEmpty;
+    button.title = isEmpty ? `${curve.title} (no data in this recording)` : curve.title;
+  });
   function flip() {
     toggleCurve(curve);
     press(button, isShown(curve));

@@ -9,7 +9,7 @@ import { isOn } from "../state/mode.js";
 
 /** @typedef {import("../state/types.js").Cuboid} Cuboid */
 /**
- * By track; −1 is a new one. Pixels of the camera's own picture.
+ * Pixels of the full camera image by track; −1 is a new one.
  * @typedef {{frame: number, pixels: Map<number, import("../../core/types.js").Pixels>}} Projected
  */
 

@@ -4,7 +4,7 @@
 import { color, ui } from "../../core/colors.js";
 import { DASH } from "../../core/format.js";
 import { get } from "../../core/store.js";
-import { isShown, said, scaleOf, traceLine, yOf } from "../curves.js";
+import { hasData, isShown, said, scaleOf, traceLine, yOf } from "../curves.js";
 
 /** @typedef {import("../span.js").Span} Span */
 /** @typedef {import("../rows.js").Row} Row */
@@ -16,7 +16,7 @@ const LEAST_PX = 20;
 /** @param {import("../curves.js").Curve} curve @returns {import("./registry.js").Lane} */
 export const curveLane = (curve) => ({
   key: curve.key,
-  height: () => (isShown(curve) ? LEAST_PX : 0),
+  height: () => (isShown(curve) && hasData(curve) ? LEAST_PX : 0),
   grows: true,
   isRuled: true,
   draw(ctx, { span, row }) {
