@@ -162,7 +162,8 @@ def test_the_help_tells_every_key(open_page: OpenPage):
 def test_times_and_values_are_said_as_people_read_them(open_page: OpenPage):
     told = open_page().evaluate(
         """async () => {
-          const { clock } = await import("/js/core/format.js"), { CURVES, said } = await import("/js/timeline/curves.js");
+          const { clock } = await import("/js/core/format.js");
+          const { CURVES, said } = await import("/js/timeline/curves.js");
           const of = (key) => CURVES.find((curve) => curve.key === key);
           return [clock(0), clock(59.94), clock(59.97), clock(3600), said(of("ttc_s"), 220.1), said(of("ttc_s"), 4.84),
             said(of("closing_speed_mps"), -1.5)];
