@@ -90,7 +90,7 @@ const arrows = (tool, words, act) =>
  */
 const pair = (letter, words, act, brief) => [
   key(letter.toLowerCase(), letter, words, () => act(1), brief),
-  key(`Shift+${letter}`, `Shift ${letter}`, `${words}, backwards`, () => act(-1)),
+  key(`Shift+${letter}`, `Shift ${letter}`, words.replace(/^next/, "previous"), () => act(-1)),
 ];
 
 /** @returns {{mode: string, title: string, bindings: LabelBinding[]}[]} */
@@ -116,7 +116,7 @@ export const labelKeys = () => [
       key("p", "P", "propose labels from the pipeline", commands.propose, "propose"),
       key("a", "A", "accept the selected track or the lead", () => commands.judge("accept"), "accept"),
       key("Shift+A", "Shift A", "accept all in this frame", commands.acceptHere),
-      key("r", "R", "reject it", () => commands.judge("reject"), "reject"),
+      key("r", "R", "reject the selected track or the lead", () => commands.judge("reject"), "reject"),
       ...pair("N", "next unlabelled frame", (d) => commands.goTo("unlabelled", d), "next unlabelled"),
       ...pair(
         "V",
@@ -179,7 +179,7 @@ export const labelKeys = () => [
       key("g", "G", "new label: drag in the plan, drag or click in the image, or Enter", () => setTool("new"), "new"),
       key("Shift+G", "Shift G", "draw the selected track's shape", () => setTool("shape")),
       selected(key("ArrowUp", "↑", "move forward 0.1 m; Shift: 1 m", () => commands.nudge(STEP_M, 0))),
-      selected(key("ArrowDown", "↓", "back", () => commands.nudge(-STEP_M, 0))),
+      selected(key("ArrowDown", "↓", "move back", () => commands.nudge(-STEP_M, 0))),
       selected(key("ArrowLeft", "←", "move left", () => commands.nudge(0, STEP_M))),
       selected(key("ArrowRight", "→", "move right", () => commands.nudge(0, -STEP_M))),
       selected(key("Shift+ArrowUp", "Shift ↑", "", () => commands.nudge(FAR_M, 0))),
@@ -224,8 +224,8 @@ export const labelKeys = () => [
     mode: "labeling",
     title: "Labeling: frames",
     bindings: [
-      key("f", "F", "next frame; Shift: 10 frames", () => playback({ step: 1 }), "next frame"),
-      key("d", "D", "previous frame; Shift: 10 frames", () => playback({ step: -1 }), "back"),
+      key("f", "F", "next frame; Shift: forward 10", () => playback({ step: 1 }), "next frame"),
+      key("d", "D", "previous frame; Shift: back 10", () => playback({ step: -1 }), "back"),
       key("Shift+F", "Shift F", "", () => playback({ step: 10 })),
       key("Shift+D", "Shift D", "", () => playback({ step: -10 })),
       key(
