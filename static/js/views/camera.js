@@ -138,7 +138,7 @@ function layOut({ width, height }) {
 function describe({ result: { sensors }, picture }) {
   const facts = picture ? [`${picture.full_width}×${Math.round(picture.height / picture.scale)}`] : [];
   if (sensors.lidar?.points) facts.push(`${sensors.lidar.points.toLocaleString("en")} points`);
-  if (sensors.camera?.skew_ms) facts.push(`camera–LiDAR skew ${num(sensors.camera.skew_ms, 0)} ms`);
+  if (sensors.camera?.skew_ms) facts.push(`camera skew ${num(sensors.camera.skew_ms, 0)} ms`);
   text($("#camera-facts"), facts.join(" · "));
 }
 
