@@ -75,7 +75,7 @@ def test_points_take_every_colour_that_is_offered(open_page: OpenPage, view: str
 def test_the_tape_measures_metres_in_the_plan(open_page: OpenPage):
     page = opened(open_page)
     before = pixels(page, "#bev")
-    page.get_by_role("group", name="Tools of the plan").get_by_role("button", name="Tape").click()
+    page.get_by_role("group", name="plan tools").get_by_role("button", name="Tape").click()
     drag(page, on_plan(page, 10.0, 3.0), on_plan(page, 40.0, -5.0))
     tape = of_store(page, "get('tape')")
     assert [tape["from"][axis] for axis in "xy"] == pytest.approx([10.0, 3.0], abs=0.2)
@@ -83,7 +83,7 @@ def test_the_tape_measures_metres_in_the_plan(open_page: OpenPage):
     words = page.evaluate("async (tape) => (await import('/js/views/measuring_tape.js')).tapeWords(tape)", tape)
     assert float(words.split()[0]) == pytest.approx(31.05, abs=0.3)
     assert repainted(page, "#bev", before)
-    page.get_by_role("group", name="Tools of the plan").get_by_role("button", name="Tape").click()
+    page.get_by_role("group", name="plan tools").get_by_role("button", name="Tape").click()
     assert of_store(page, "get('tape')") is None
     assert repainted(page, "#bev", before, like=True), "the plan has not moved"
 
@@ -208,7 +208,7 @@ def test_trails_follow_what_is_played(open_page: OpenPage):
 def test_the_plan_shows_all_around_and_ahead_again(open_page: OpenPage):
     page = opened(open_page)
     ahead = pixels(page, "#bev")
-    tools = page.get_by_role("group", name="Tools of the plan")
+    tools = page.get_by_role("group", name="plan tools")
     tools.get_by_role("button", name="Around").click()
     assert repainted(page, "#bev", ahead)
     expect(tools.get_by_role("button", name="Around")).to_have_attribute("aria-pressed", "true")
