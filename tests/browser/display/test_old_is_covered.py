@@ -54,7 +54,7 @@ def test_what_is_too_old_is_covered_at_once_and_comes_back(
         recording.gate.set()
     else:
         page.locator("#mark").tap()
-        expect(page.locator("#answer")).to_have_text("✕ Not marked: no connection")
+        expect(page.locator("#answer")).to_have_text("✕ Mark failed: no connection")
         site.start()
     is_now(page, "fresh")
     expect(page.locator("#distance")).to_be_visible()
