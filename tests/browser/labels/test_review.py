@@ -54,7 +54,7 @@ def test_an_event_is_reviewed_and_says_by_whom(hand: Hand, labels: Labels):
     page.get_by_role("tab", name="Frame").click()
     hand.keys("Shift+R")
     expect(page.locator(".reviewing .under")).to_have_text(f"cut-in in frame {START + 1}")
-    page.get_by_role("button", name="Right", exact=True).click()
+    page.get_by_role("button", name="Approve", exact=True).click()
     expect(page.locator(".moment-row")).to_contain_text("reviewed by Ada")
     hand.keys("Escape")
     expect(page.locator(".reviewing")).to_be_hidden()
