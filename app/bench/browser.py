@@ -22,7 +22,7 @@ _ACT_PAUSE_MS, _PATIENCE_MS = 120, 30_000
 
 _WATCH = """
 window.painted = [];
-const { get, on } = await import("/js/store.js");
+const { get, on } = await import("/js/core/store.js");
 const after = new MessageChannel();
 let shown = null;
 // the message comes after the frame's style, layout and drawing: the painters' callbacks stand before this one
@@ -50,7 +50,7 @@ _ONE_PAINTED = """(patience) => new Promise((done, fail) => {
   else window.onpainted = done;
 })"""
 _ACT = """async ([acts, pause, patience]) => {
-  const { seekTo } = await import("/js/drive/seek.js"), { get } = await import("/js/store.js");
+  const { seekTo } = await import("/js/drive/seek.js"), { get } = await import("/js/core/store.js");
   const waits = [];
   const until = (holds) => new Promise((done, fail) => {
     setTimeout(() => fail(new Error("what was asked for was not painted")), patience);

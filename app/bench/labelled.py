@@ -28,7 +28,7 @@ _BEGIN = """(person) => {
   document.querySelector("#label-button").click();
 }"""
 _ARE_THERE = """async ([count, patience]) => {
-  const { get, on } = await import("/js/store.js");
+  const { get, on } = await import("/js/core/store.js");
   await new Promise((done, fail) => {
     setTimeout(() => fail(new Error("the labels did not come")), patience);
     const look = () => (get("labels")?.tracks.size ?? 0) >= count && get("projected") && done();
@@ -37,8 +37,8 @@ _ARE_THERE = """async ([count, patience]) => {
   });
 }"""
 _SEEK = """async ([frames, pause, patience]) => {
-  const { seekTo } = await import("/js/drive/seek.js"), { get, on } = await import("/js/store.js");
-  const { isKnown } = await import("/js/labeling/frames.js");
+  const { seekTo } = await import("/js/drive/seek.js"), { get, on } = await import("/js/core/store.js");
+  const { isKnown } = await import("/js/labeling/state/sightings.js");
   const after = new MessageChannel(), waits = [];
   let holds = () => false, told = () => {};
   // the message comes after the style, layout and drawing of the animation frame that was asked for

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import socket
 from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
@@ -130,6 +131,12 @@ class Server(uvicorn.Server):
                 await asyncio.to_thread(self._on_ready, link)
 
 
+def _file_of(path: str) -> str:
+    """Path under ``static/`` of a page's address: the in-vehicle page is served as ``/drive/``."""
+    first, *rest = Path(path).parts or ("",)
+    return os.path.join("incar", *rest) if first == "drive" else path
+
+
 class _Pages(StaticFiles):
     """Static files that the browser always asks about again, so that an update is never half old. on_ask: called for
     each of them: somebody waits for a page."""
@@ -140,7 +147,7 @@ class _Pages(StaticFiles):
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         self._on_ask()
-        return await super().get_response(path, scope)
+        return await super().get_response(_file_of(path), scope)
 
     def file_response(self, *args: Any, **kwargs: Any) -> Response:
         response = super().file_response(*args, **kwargs)

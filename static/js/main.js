@@ -1,41 +1,41 @@
-/** CIPV Studio's page: the panes, then the stream. */
+/** Entry point: sets up the panes, then connects the stream. */
 import * as align from "./align/mode.js";
-import * as banner from "./banner.js";
-import * as bev from "./bev.js";
-import * as camera from "./camera.js";
-import { connect } from "./connection.js";
-import { $ } from "./dom.js";
-import * as drive from "./drive/data.js";
-import * as live from "./drive/live.js";
-import * as object from "./drive/object.js";
+import * as banner from "./panels/lead_banner.js";
+import * as bev from "./views/plan.js";
+import * as camera from "./views/camera.js";
+import { connect } from "./core/connection.js";
+import { $ } from "./core/dom.js";
+import * as drive from "./drive/sync.js";
+import * as live from "./drive/live_buffer.js";
+import * as object from "./drive/object_curve.js";
 import * as seek from "./drive/seek.js";
 import * as shuttle from "./drive/shuttle.js";
 import { toEvent } from "./drive/jumps.js";
-import * as help from "./help.js";
-import * as keyboard from "./keyboard.js";
-import * as labeling from "./labeling/start.js";
-import * as layers from "./layers.js";
-import * as notices from "./notices.js";
-import * as objects from "./objects.js";
-import * as params from "./params.js";
-import * as sources from "./sources.js";
-import * as exporting from "./timeline/export.js";
+import * as help from "./keys/help.js";
+import * as keyboard from "./keys/keyboard.js";
+import * as labeling from "./labeling/setup.js";
+import * as layers from "./views/layers.js";
+import * as notices from "./panels/notices.js";
+import * as objects from "./panels/objects_table.js";
+import * as params from "./panels/params.js";
+import * as sources from "./panels/open_dialog.js";
+import * as exporting from "./timeline/export_menu.js";
 import * as timeline from "./timeline/pane.js";
-import * as three from "./three.js";
-import * as trails from "./trails.js";
-import * as transport from "./transport.js";
-import * as vitals from "./vitals.js";
-import * as history from "./whatif/history.js";
-import * as runs from "./whatif/runs.js";
-import * as why from "./why/pane.js";
+import * as three from "./views/three.js";
+import * as trails from "./views/drawing/trails.js";
+import * as transport from "./panels/playback_bar.js";
+import * as vitals from "./panels/vitals.js";
+import * as history from "./panels/undo.js";
+import * as runs from "./panels/runs.js";
+import * as why from "./panels/why.js";
 import * as gutters from "./workspace/gutters.js";
 import * as layouts from "./workspace/layouts.js";
 import * as panes from "./workspace/panes.js";
-import * as share from "./workspace/share.js";
+import * as share from "./workspace/share_link.js";
 import * as theme from "./workspace/theme.js";
 
 for (const part of [theme, panes, gutters, layers, trails, three, seek, shuttle, drive, live, object]) part.setUp();
-// words before canvases: a canvas that writes has the page laid out first, and again for every word that changes after it
+// text before canvases: a canvas that measures text forces a layout, and each later change of text another one
 for (const part of [banner, objects, why, transport, notices, vitals, camera, bev, timeline, exporting]) part.setUp();
 for (const part of [params, history, runs, align, labeling, sources, layouts, share, keyboard]) part.setUp();
 $("#help-button").addEventListener("click", help.show);

@@ -53,7 +53,7 @@ function stayHere() {
 function watch(handle) {
   if (handle.has_panicked()) {
     canvas.hidden = true;
-    say(`rerun has stopped: ${handle.panic_message() ?? "no reason given"}`);
+    say(`rerun stopped: ${handle.panic_message() ?? "no reason given"}`);
     return;
   }
   setTimeout(watch, LOOK_EVERY_MS, handle);
@@ -79,5 +79,5 @@ async function open() {
 
 open().catch((error) => {
   canvas.hidden = true;
-  say(`rerun cannot be shown here: ${error instanceof Error ? error.message : error}`);
+  say(`Cannot show rerun: ${error instanceof Error ? error.message : error}`);
 });

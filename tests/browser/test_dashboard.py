@@ -274,7 +274,7 @@ def test_what_the_server_refuses_is_said_each_time_and_can_be_dismissed(open_pag
     before = site.engine.snapshot.uri
     for _ in range(2):
         page.locator("#source-button").click()
-        page.get_by_label("Address of a recording").fill("sim:" + "far" * 2000)
+        page.get_by_label("Recording URI").fill("sim:" + "far" * 2000)
         page.get_by_role("button", name="Open", exact=True).click()
         said = page.locator(".notice[data-level=error]")
         expect(said).to_contain_text("4096")

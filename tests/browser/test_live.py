@@ -48,7 +48,7 @@ def until(page: Page, holds: str, gives: str = "get('frame').state.sequence") ->
     """Wait until something holds of the store, and what it gives then: both are expressions of ``get``."""
     return page.evaluate(
         f"""async () => {{
-          const {{ get, on }} = await import('/js/store.js');
+          const {{ get, on }} = await import('/js/core/store.js');
           const holds = () => {holds};
           if (!holds()) await new Promise((done) => on(['frame', 'drive', 'state'], () => holds() && done()));
           return {gives};
@@ -82,9 +82,7 @@ def test_a_moment_marked_in_the_car_is_on_the_dashboards_timeline(open_page: Ope
     site, _ = car
     page = open_page(address=site.address)
     until(page, "get('drive')?.count > 3")
-    expect(page.locator("#events-list")).to_have_text(
-        "Marks of this drive appear here. Events are looked for in recordings."
-    )
+    expect(page.locator("#events-list")).to_have_text("Marks appear here. Events are detected in recordings only.")
     assert page.context.browser is not None
     display = page.context.browser.new_page()
     display.goto(f"{site.address}/drive/")
@@ -99,7 +97,7 @@ def test_a_moment_marked_in_the_car_is_on_the_dashboards_timeline(open_page: Ope
     times = until(page, "true", "get('drive').t_s")
     assert times[at["index"]] == pytest.approx(at["t_s"], abs=0.2), "its flag is where it was"
     expect(row.locator(".event")).to_be_disabled()
-    row.get_by_role("button", name="Remove the mark").click()
+    row.get_by_role("button", name="Remove mark").click()
     expect(row).to_have_count(0)
 
 
@@ -109,7 +107,7 @@ def test_what_live_sensors_cannot_do_is_off_and_says_why(open_page: OpenPage, ca
     until(page, "get('drive')?.count > 3")
     for part in ("#export-button", "#clip-in", "#clip-out", "#event-back", "#event-next"):
         expect(page.locator(part)).to_be_disabled()
-        expect(page.locator(part)).to_have_attribute("title", re.compile("record them, then open the session"))
+        expect(page.locator(part)).to_have_attribute("title", re.compile("Record a session, then open it"))
     page.keyboard.press("i")
     assert until(page, "true", "get('clip')") is None
     page.get_by_role("tab", name="Runs").click()

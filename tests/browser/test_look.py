@@ -105,7 +105,7 @@ def test_views_have_numbers_and_are_remembered(open_page: OpenPage):
     expect(page.locator(".table-pane")).to_be_hidden()
     expect(page.locator(".camera-pane")).to_be_visible()
     page.locator("#layout-button").click()
-    page.get_by_label("Name of the layout").fill("bare")
+    page.get_by_label("Layout name").fill("bare")
     page.get_by_role("button", name="Save").click()
     page.locator("#menu").get_by_role("button", name="Everything").click()
     expect(page.locator(".table-pane")).to_be_visible()
@@ -162,7 +162,8 @@ def test_the_help_tells_every_key(open_page: OpenPage):
 def test_times_and_values_are_said_as_people_read_them(open_page: OpenPage):
     told = open_page().evaluate(
         """async () => {
-          const { clock } = await import("/js/format.js"), { CURVES, said } = await import("/js/timeline/curves.js");
+          const { clock } = await import("/js/core/format.js");
+          const { CURVES, said } = await import("/js/timeline/curves.js");
           const of = (key) => CURVES.find((curve) => curve.key === key);
           return [clock(0), clock(59.94), clock(59.97), clock(3600), said(of("ttc_s"), 220.1), said(of("ttc_s"), 4.84),
             said(of("closing_speed_mps"), -1.5)];
@@ -173,7 +174,7 @@ def test_times_and_values_are_said_as_people_read_them(open_page: OpenPage):
 
 def test_a_parameter_is_found_by_its_name_and_by_words(open_page: OpenPage):
     page = open_page()
-    weight, nothing = page.locator("[data-param='cluster.z_weight']"), page.get_by_text("No parameter is called")
+    weight, nothing = page.locator("[data-param='cluster.z_weight']"), page.get_by_text("No matching parameters")
     for typed in ("cluster.z_weight", "z weight", "Z_Weight"):
         page.get_by_label("Search parameters").fill(typed)
         expect(weight).to_be_visible()
@@ -187,7 +188,7 @@ def test_a_parameter_is_found_by_its_name_and_by_words(open_page: OpenPage):
 def test_an_address_that_could_not_be_opened_is_there_to_be_mended(open_page: OpenPage):
     page = open_page()
     page.route("**/api/source", lambda route: route.fulfill(status=202, body="{}"))
-    address = page.get_by_label("Address of a recording")
+    address = page.get_by_label("Recording URI")
     for typed, offered in (("sim:strait", "sim:straight"), ("sim:cut_in", "sim:strait")):
         page.keyboard.press("f")
         expect(address).to_have_value(offered)
@@ -207,7 +208,7 @@ def test_the_3d_view_keeps_the_keys_that_fly_and_leaves_the_page_the_others(open
     page.keyboard.press("d")
     page.keyboard.press("?")
     dialog = page.get_by_role("dialog")
-    expect(dialog).to_contain_text("Esc gives them all back to the page")
+    expect(dialog).to_contain_text("Esc returns all keys to the page")
     assert page.evaluate(theme) == before, "D flies"
     dialog.get_by_role("button", name="Close").click()
     view.locator("input").click()
@@ -226,7 +227,7 @@ def test_a_gate_leads_to_the_parameter_behind_its_limit(open_page: OpenPage, sit
     page = open_page()
     wait_for_frame(page, START)
     camera = pixels(page, "#camera")
-    page.locator("#why .gate", has_text="Off the path's middle").click()
+    page.locator("#why .gate", has_text="Path offset").click()
     focused = page.locator("[data-param='path.half_width_m'] input[type=range]")
     expect(focused).to_be_focused()
     page.keyboard.press("ArrowRight")
@@ -242,7 +243,7 @@ def test_live_sensors_draw_what_came_and_let_go_of_the_oldest(open_page: OpenPag
     ribbon = pixels(page, "#timeline-back")
     counts, at, transport = page.evaluate(
         """async () => {
-          const { get, set } = await import("/js/store.js");
+          const { get, set } = await import("/js/core/store.js");
           const frame = get("frame"), counts = [];
           for (let k = 0; k < 1300; k++) {
             const state = { ...frame.state, live: true, uri: "live:car.yaml", time_s: k / 10, count: 0, index: k };

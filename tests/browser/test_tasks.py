@@ -54,7 +54,7 @@ def test_find_where_the_lead_changed_and_say_why(page: Page, site: Site):
 
     stopped = next(each for each in result.rejected if not each.reason.startswith("behind"))
     page.locator(f"#objects tr[data-id='{stopped.id}']").click()
-    expect(page.locator("#why-facts")).to_have_text("why it is not the CIPV")
+    expect(page.locator("#why-facts")).to_have_text("why this is not the CIPV")
     expect(page.locator("#why .verdict")).to_contain_text(f"Not the CIPV: {stopped.reason}")
     gates = next(item.gates for item in result.objects if item.id == stopped.id)
     failed = sum(not gate.passed for gate in gates)
@@ -85,8 +85,8 @@ def test_a_changed_threshold_is_seen_at_once_and_over_the_whole_drive(page: Page
     page.keyboard.press("Shift+X")
     wait_for_frame(page, [first for first, _ in comparison["differing"] if first < COUNT - 1][-1])
 
-    page.locator(".run.is-now").get_by_label("Name of the run").fill("wide corridor")
-    page.locator(".run.is-now").get_by_label("Name of the run").blur()
+    page.locator(".run.is-now").get_by_label("Run name").fill("wide corridor")
+    page.locator(".run.is-now").get_by_label("Run name").blur()
     expect(page.locator(".run.is-now .tag")).to_contain_text("kept")
     page.keyboard.press("Control+z")
     site.engine.wait_for(lambda s: s.params == Params(), WAIT_S)
@@ -95,7 +95,7 @@ def test_a_changed_threshold_is_seen_at_once_and_over_the_whole_drive(page: Page
     page.keyboard.press("Control+Shift+Z")
     site.engine.wait_for(lambda s: s.params.path.half_width_m == WIDE["path.half_width_m"], WAIT_S)
     kept = page.locator(".run", has=page.locator(".run-top .tag", has_text="kept"))
-    expect(kept.get_by_label("Name of the run")).to_have_value("wide corridor")
+    expect(kept.get_by_label("Run name")).to_have_value("wide corridor")
 
 
 def test_a_link_restores_moment_selection_parameters_and_layout(page: Page, site: Site, open_page: OpenPage):
@@ -121,7 +121,7 @@ def test_a_link_restores_moment_selection_parameters_and_layout(page: Page, site
     dialog = second.get_by_role("dialog", name="Link")
     expect(dialog).to_contain_text("change path.half_width_m")
     assert site.engine.snapshot.params == Params(), "a link changes nothing of others unasked"
-    dialog.get_by_role("button", name="Follow it").click()
+    dialog.get_by_role("button", name="Continue").click()
     wait_for_frame(second, 90)
     site.engine.wait_for(lambda s: s.params.path.half_width_m == WIDE["path.half_width_m"], WAIT_S)
     expect(second.locator(".table-pane")).to_be_hidden()
@@ -141,7 +141,7 @@ def test_a_link_to_another_file_asks_first(open_page: OpenPage, site: Site):
     page = open_page(address=f"{site.address}/#uri=kitti%3A%2Fnowhere&frame=3")
     dialog = page.get_by_role("dialog", name="Link")
     expect(dialog).to_contain_text("kitti:/nowhere")
-    dialog.get_by_role("button", name="Stay here").click()
+    dialog.get_by_role("button", name="Cancel").click()
     assert site.engine.snapshot.uri == "sim:straight"
 
 
@@ -179,7 +179,7 @@ def test_a_moment_is_marked_and_found_again(page: Page):
     wait_for_frame(page, 10)
     mark.click()
     wait_for_frame(page, START)
-    page.locator("#events").get_by_role("button", name="Remove the mark").click()
+    page.locator("#events").get_by_role("button", name="Remove mark").click()
     expect(mark).to_have_count(0)
 
 
@@ -252,7 +252,7 @@ def test_the_cloud_is_dragged_over_the_picture(page: Page, site: Site):
     page.keyboard.press("Control+z")
     site.engine.wait_for(lambda s: s.params == Params(), WAIT_S)
     blended = pixels(page, "#camera")
-    page.get_by_label("Blend of picture and cloud").fill("1")
+    page.get_by_label("Blend image and point cloud").fill("1")
     assert repainted(page, "#camera", blended)
     page.keyboard.press("a")
     expect(page.locator("#align-bar")).to_be_hidden()
@@ -264,7 +264,7 @@ def test_what_is_shown_is_recorded(page: Page, site: Site):
     assert recording is not None
     page.keyboard.press("ArrowRight")
     wait_for_frame(page, START + 1)
-    page.get_by_role("button", name="End the recording").click()
+    page.get_by_role("button", name="Stop recording").click()
     site.engine.wait_for(lambda s: s.recording is None, WAIT_S)
     assert recording.file.stat().st_size > 0
     expect(page.get_by_role("button", name="Record")).to_have_attribute("aria-pressed", "false")

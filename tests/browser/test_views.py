@@ -24,7 +24,7 @@ AHEAD_M, FROM_M, HALF_WIDTH_M = 79.0, -5.0, 13.0
 
 def of_store(page: Page, words: str) -> Any:
     """Something about the page's state: ``words`` is an expression of ``get``."""
-    return page.evaluate(f"async () => {{ const {{ get }} = await import('/js/store.js'); return {words}; }}")
+    return page.evaluate(f"async () => {{ const {{ get }} = await import('/js/core/store.js'); return {words}; }}")
 
 
 def on_plan(page: Page, x_m: float, y_m: float) -> tuple[float, float]:
@@ -37,7 +37,7 @@ def on_plan(page: Page, x_m: float, y_m: float) -> tuple[float, float]:
 def in_picture(page: Page, u: float, v: float) -> tuple[float, float]:
     """Where a pixel of the sent picture is on the screen."""
     box = box_of(page.locator("#camera"))
-    place = page.evaluate("async () => (await import('/js/camera.js')).place()")
+    place = page.evaluate("async () => (await import('/js/views/camera.js')).place()")
     return box["x"] + place["x"] + u * place["scale"], box["y"] + place["y"] + v * place["scale"]
 
 
@@ -59,7 +59,7 @@ def opened(open_page: OpenPage) -> Page:
 @pytest.mark.parametrize(("view", "canvas"), [("camera", "#camera"), ("plan", "#bev")])
 def test_points_take_every_colour_that_is_offered(open_page: OpenPage, view: str, canvas: str):
     page = opened(open_page)
-    choice = page.get_by_label(f"Colour points of the {view} by")
+    choice = page.get_by_label(f"Colour {view} points by")
     choice.select_option("age")
     looks = [pixels(page, canvas)]
     for by in COLOURS:
@@ -75,15 +75,15 @@ def test_points_take_every_colour_that_is_offered(open_page: OpenPage, view: str
 def test_the_tape_measures_metres_in_the_plan(open_page: OpenPage):
     page = opened(open_page)
     before = pixels(page, "#bev")
-    page.get_by_role("group", name="Tools of the plan").get_by_role("button", name="Tape").click()
+    page.get_by_role("group", name="plan tools").get_by_role("button", name="Tape").click()
     drag(page, on_plan(page, 10.0, 3.0), on_plan(page, 40.0, -5.0))
     tape = of_store(page, "get('tape')")
     assert [tape["from"][axis] for axis in "xy"] == pytest.approx([10.0, 3.0], abs=0.2)
     assert [tape["to"][axis] for axis in "xy"] == pytest.approx([40.0, -5.0], abs=0.2)
-    words = page.evaluate("async (tape) => (await import('/js/tape.js')).tapeWords(tape)", tape)
+    words = page.evaluate("async (tape) => (await import('/js/views/measuring_tape.js')).tapeWords(tape)", tape)
     assert float(words.split()[0]) == pytest.approx(31.05, abs=0.3)
     assert repainted(page, "#bev", before)
-    page.get_by_role("group", name="Tools of the plan").get_by_role("button", name="Tape").click()
+    page.get_by_role("group", name="plan tools").get_by_role("button", name="Tape").click()
     assert of_store(page, "get('tape')") is None
     assert repainted(page, "#bev", before, like=True), "the plan has not moved"
 
@@ -164,7 +164,7 @@ def test_a_failed_test_of_the_selected_object_is_drawn_with_its_number(open_page
     )
     first = next(gate for gate in aside.gates if not gate.passed)
     found = f"get('frame').result.objects.find(({{ id }}) => id === {aside.id})"
-    words = of_store(page, f"(await import('/js/evidence.js')).failedWords({found})")
+    words = of_store(page, f"(await import('/js/views/drawing/gates.js')).failedWords({found})")
     assert first.name.replace("_", " ") in words
     page.evaluate("""() => {
       window.written = [];
@@ -190,7 +190,7 @@ def test_trails_follow_what_is_played(open_page: OpenPage):
         wait_for_frame(page, START + step)
     lengths = page.evaluate(
         """async () => {
-          const { get } = await import("/js/store.js"), { trailOf } = await import("/js/trails.js");
+          const { get } = await import("/js/core/store.js"), { trailOf } = await import("/js/views/drawing/trails.js");
           return get("frame").result.objects.map(({ id }) => trailOf(id).length);
         }"""
     )
@@ -200,13 +200,15 @@ def test_trails_follow_what_is_played(open_page: OpenPage):
     assert repainted(page, "#bev", before)
     page.keyboard.press("Home")
     wait_for_frame(page, 0)
-    assert page.evaluate("async () => (await import('/js/trails.js')).trailOf(1).length") <= 1, "a jump ends them"
+    assert page.evaluate("async () => (await import('/js/views/drawing/trails.js')).trailOf(1).length") <= 1, (
+        "a jump ends them"
+    )
 
 
 def test_the_plan_shows_all_around_and_ahead_again(open_page: OpenPage):
     page = opened(open_page)
     ahead = pixels(page, "#bev")
-    tools = page.get_by_role("group", name="Tools of the plan")
+    tools = page.get_by_role("group", name="plan tools")
     tools.get_by_role("button", name="Around").click()
     assert repainted(page, "#bev", ahead)
     expect(tools.get_by_role("button", name="Around")).to_have_attribute("aria-pressed", "true")
@@ -225,7 +227,7 @@ def test_no_wider_picture_is_sent_than_is_shown(open_page: OpenPage, site: Site)
     assert wide > shown + WIDTH_STEP_PX
     assert page.evaluate(
         """async (least) => {
-          const { get, on } = await import("/js/store.js");
+          const { get, on } = await import("/js/core/store.js");
           if (get("frame").picture.width >= least) return true;
           return new Promise((done) => on(["frame"], () => get("frame").picture.width >= least && done(true)));
         }""",

@@ -22,8 +22,8 @@ SIZES_M: dict[str, tuple[float, float, float]] = {
     "bus": (11.5, 2.5, 3.1),
     "motorcycle": (2.2, 0.8, 1.45),
 }
-"""Length, width and height of each kind as it is simulated. These are not ``pipeline.fusion.vehicle_sizes``, which the line
-takes for what it has not measured: a drive in which the two were equal would flatter it."""
+"""Length, width and height of each kind as it is simulated. These are not ``pipeline.fusion.vehicle_sizes``, which
+the line takes for what it has not measured: a drive in which the two were equal would flatter it."""
 
 
 _SLOPE_S = 0.05

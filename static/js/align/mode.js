@@ -1,27 +1,33 @@
 /**
- * Alignment mode: LiDAR and picture are laid over each other by hand. Dragging shifts the cloud, the wheel scales it, and
- * every move is a change of the alignment's parameters: the server projects, as always. What fits automatically belongs
- * beside the score, in the bar.
+ * Alignment mode: align LiDAR and camera manually. Dragging shifts the point cloud and scrolling scales it. Every move
+ * changes the alignment parameters; the server does the projection.
  */
-import { newestOnly, request } from "../api.js";
-import { $, el, press, text } from "../dom.js";
-import { get, on, set } from "../store.js";
-import { change, reveal } from "../params.js";
-import { followHand } from "./hand.js";
-import { drawEdges } from "./edges.js";
-import { addLayer } from "../camera.js";
+import { newestOnly, request } from "../core/api.js";
+import { $, el, press, text } from "../core/dom.js";
+import { get, on, set } from "../core/store.js";
+import { change, reveal } from "../panels/params.js";
+import { followHand } from "./pointer.js";
+import { drawEdges } from "./picture_edges.js";
+import { addLayer } from "../views/camera.js";
 import { grow } from "../workspace/panes.js";
 
-/** Between two scores while the hand moves: each costs the server a tenth of a second. */
+/** Pause between two scores during a drag: each takes the server 0.1 s. */
 const PAUSE_MS = 250;
 const OFF = { on: false, blend: 0.5, edges: true };
 
-const bar = $("#align-bar"), button = $("#align-button");
-const score = el("b", { class: "score", title: "How well the LiDAR's depth edges lie on the picture's edges", textContent: "looking …" });
+const bar = $("#align-bar"),
+  button = $("#align-button");
+const score = el("b", {
+  class: "score",
+  title: "How well LiDAR depth edges match image edges",
+  textContent: "computing …",
+});
 const how = el("span", { class: "facts" });
 
 const fetchScore = newestOnly(async () => {
-  const found = /** @type {import("../types.js").AlignmentScore|Error} */ (await request("api/alignment/score").catch((error) => error));
+  const found = /** @type {import("../core/types.js").AlignmentScore|Error} */ (
+    await request("api/alignment/score").catch((error) => error)
+  );
   text(score, found instanceof Error ? "no score" : found.brief);
   score.title = found instanceof Error ? found.message : found.text;
   await new Promise((done) => setTimeout(done, PAUSE_MS));
@@ -30,7 +36,16 @@ const fetchScore = newestOnly(async () => {
 export function setUp() {
   set("align", OFF);
   button.addEventListener("click", toggleAlign);
-  bar.append(model("angular"), model("pinhole"), el("span", { class: "facts", textContent: "Match" }), score, el("span", { class: "spacer" }), how, blendSlider(), edgesButton());
+  bar.append(
+    model("angular"),
+    model("pinhole"),
+    el("span", { class: "facts", textContent: "Match" }),
+    score,
+    el("span", { class: "spacer" }),
+    how,
+    blendSlider(),
+    edgesButton(),
+  );
   followHand($("#camera", HTMLCanvasElement), isOn);
   addLayer((ctx, frame, place) => isOn() && get("align")?.edges && drawEdges(ctx, frame, place));
   on(["frame"], () => isOn() && fetchScore(undefined));
@@ -52,8 +67,12 @@ function reflect() {
   press(button, isOn());
   document.body.classList.toggle("is-aligning", isOn());
   const isAngular = get("params")?.values["alignment.model"] === "angular";
-  text(how, isAngular ? "Drag: origin · wheel: h_res and v_res · shift wheel: v_res" : "Drag: yaw and pitch · wheel: roll");
-  for (const choice of bar.querySelectorAll("[data-model]")) press(choice, /** @type {HTMLElement} */ (choice).dataset.model === get("params")?.values["alignment.model"]);
+  text(
+    how,
+    isAngular ? "Drag: origin · scroll: h_res and v_res · Shift + scroll: v_res" : "Drag: yaw and pitch · scroll: roll",
+  );
+  for (const choice of bar.querySelectorAll("[data-model]"))
+    press(choice, /** @type {HTMLElement} */ (choice).dataset.model === get("params")?.values["alignment.model"]);
 }
 
 /** @param {string} name */
@@ -63,13 +82,20 @@ function model(name) {
 }
 
 function blendSlider() {
-  const range = el("input", { type: "range", min: "0", max: "1", step: "0.01", value: String(OFF.blend), aria: { label: "Blend of picture and cloud" } });
+  const range = el("input", {
+    type: "range",
+    min: "0",
+    max: "1",
+    step: "0.01",
+    value: String(OFF.blend),
+    aria: { label: "Blend image and point cloud" },
+  });
   range.addEventListener("input", () => set("align", { ...(get("align") ?? OFF), blend: Number(range.value) }));
-  return el("label", { class: "blend" }, "Picture", range, "Cloud");
+  return el("label", { class: "blend" }, "Image", range, "Points");
 }
 
 function edgesButton() {
-  const edges = el("button", { type: "button", textContent: "Edges", title: "Edges of the picture" });
+  const edges = el("button", { type: "button", textContent: "Edges", title: "Show image edges" });
   edges.addEventListener("click", () => set("align", { ...(get("align") ?? OFF), edges: !get("align")?.edges }));
   on(["align"], () => press(edges, get("align")?.edges === true));
   return edges;

@@ -1,5 +1,5 @@
-/** From event to event, and from difference to difference. */
-import { get } from "../store.js";
+/** Jumps between events, and between differences. */
+import { get } from "../core/store.js";
 import { here, seekTo } from "./seek.js";
 
 /** @param {number[]} places ascending @param {number} from @param {1|-1} direction */
@@ -9,12 +9,18 @@ export function next(places, from, direction) {
 
 /** @param {1|-1} direction */
 export function toEvent(direction) {
-  go((get("drive")?.events ?? []).map(({ index }) => index), direction);
+  go(
+    (get("drive")?.events ?? []).map(({ index }) => index),
+    direction,
+  );
 }
 
-/** To the start of a stretch in which the two runs differ. @param {1|-1} direction */
+/** Go to the start of a range in which the two runs differ. @param {1|-1} direction */
 export function toDifference(direction) {
-  go((get("drive")?.comparison?.differing ?? []).map(([first]) => first), direction);
+  go(
+    (get("drive")?.comparison?.differing ?? []).map(([first]) => first),
+    direction,
+  );
 }
 
 /** @param {number[]} places @param {1|-1} direction */

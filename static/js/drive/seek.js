@@ -1,8 +1,8 @@
-/** Going to a frame. At most one seek is under way; of those asked for meanwhile the newest counts. */
-import { request } from "../api.js";
-import { get, on, set } from "../store.js";
+/** Seeking. At most one seek is in flight; of those requested meanwhile, the newest wins. */
+import { request } from "../core/api.js";
+import { get, on, set } from "../core/store.js";
 
-/** A server that shows another frame instead (a new recording, the end of playing) must not block seeking. */
+/** Timeout, in case the server shows another frame instead (new recording, end of playback). */
 const PATIENCE_MS = 1000;
 
 /** @type {number|null} */
@@ -15,15 +15,16 @@ export function setUp() {
   on(["frame"], () => get("frame")?.state.index === underWay && arrived());
 }
 
-/** The frame that the timeline stands at: where a seek is going, else the shown one; of live sensors the newest. */
+/** The frame of the timeline cursor: the seek target, else the current frame; with live sensors the newest. */
 export function here() {
   const state = get("state");
-  return state?.live ? Math.max(0, (get("drive")?.count ?? 1) - 1) : get("scrub") ?? state?.index ?? 0;
+  return state?.live ? Math.max(0, (get("drive")?.count ?? 1) - 1) : (get("scrub") ?? state?.index ?? 0);
 }
 
-/** @param {number} index beyond the ends is the first or last frame */
+/** @param {number} index clamped to the drive */
 export function seekTo(index) {
-  const state = get("state"), count = state?.count ?? 0;
+  const state = get("state"),
+    count = state?.count ?? 0;
   if (!count || state?.live) return;
   const target = Math.min(count - 1, Math.max(0, Math.round(index)));
   set("scrub", target);

@@ -1,10 +1,10 @@
-/** J, K and L as on a cutting table: back, stop, on; pressed again, faster. */
-import { playback } from "../api.js";
-import { get, on } from "../store.js";
+/** J, K and L as in video editors: reverse, pause, forward; again to speed up. */
+import { playback } from "../core/api.js";
+import { get, on } from "../core/store.js";
 import { seekTo } from "./seek.js";
 
 const FASTEST = 4;
-/** How often the picture moves while running backwards. */
+/** Interval between seeks in reverse. */
 const TICK_MS = 100;
 
 /** @type {{speed: number, from: number, since: number}|null} */
@@ -28,7 +28,7 @@ export function stop() {
   playback({ playing: false });
 }
 
-/** The server plays forwards only: backwards is a row of seeks, as many as it can show. */
+/** The server only plays forwards, so reverse playback is a series of seeks. */
 export function backward() {
   const state = get("state");
   if (!state?.count) return;
@@ -39,7 +39,7 @@ export function backward() {
   timer = setInterval(() => rewind(state.rate_hz), TICK_MS);
 }
 
-/** True while running backwards. */
+/** Whether reverse playback is on. */
 export const isReversing = () => reverse !== null;
 
 export function stopReverse() {

@@ -1,12 +1,10 @@
 /**
- * Shapes of a whole drive as the server sends it (app/routes/): its columns, events, runs and what is exported of it.
- * `tests/app/page/test_page_types.py` holds every key here against real messages.
- *
- * @typedef {import("../types.js").AccState} AccState
- * @typedef {import("../types.js").ParamValue} ParamValue
- * @typedef {import("../types.js").SourceKind} SourceKind
- *
- * @typedef {object} Columns  one entry a frame; the CIPV's figures are null without one
+ * Types of whole-drive messages (app/web/routes/): columns, events, runs and export jobs.
+ * `tests/app/page/test_page_types.py` checks every key against real messages.
+ * @typedef {import("../core/types.js").AccState} AccState
+ * @typedef {import("../core/types.js").ParamValue} ParamValue
+ * @typedef {import("../core/types.js").SourceKind} SourceKind
+ * @typedef {object} Columns one entry per frame; CIPV values are null without a CIPV
  * @property {(number|null)[]} cipv_id
  * @property {(SourceKind|null)[]} source
  * @property {(boolean|null)[]} carried
@@ -24,7 +22,6 @@
  * @property {string[]} gaps
  * @property {(number|null)[]} vl_disagreement_m
  * @property {number[]} notes
- *
  * @typedef {object} ColumnsAnswer
  * @property {number} run
  * @property {string} uri
@@ -33,7 +30,6 @@
  * @property {number} done
  * @property {number[]} t_s
  * @property {Columns} columns
- *
  * @typedef {object} DriveEvent
  * @property {string} kind
  * @property {number} index
@@ -42,7 +38,6 @@
  * @property {number[]} ids
  * @property {"info"|"notice"|"warning"|"alarm"} severity
  * @property {number|null} mark
- *
  * @typedef {object} ObjectCurve
  * @property {number} id
  * @property {number} run
@@ -55,7 +50,6 @@
  * @property {boolean[]} in_path
  * @property {boolean[]} carried
  * @property {(number|null)[]} vl_gap_m
- *
  * @typedef {object} Run
  * @property {number} id
  * @property {string} name
@@ -69,14 +63,12 @@
  * @property {string} note
  * @property {boolean} kept
  * @property {number|null} seconds
- *
  * @typedef {object} Metric
  * @property {string} name
  * @property {string} unit
  * @property {number|null} base
  * @property {number|null} run
  * @property {"higher"|"lower"|null} better
- *
  * @typedef {object} Comparison
  * @property {number} base
  * @property {number} run
@@ -85,9 +77,8 @@
  * @property {number} frames_differing
  * @property {Record<string, string>} first
  * @property {Metric[]} metrics
- * @property {"labels"|"recording"|"simulator"|null} truth  who judges
+ * @property {"labels"|"recording"|"simulator"|null} truth who judges
  * @property {number} judged
- *
  * @typedef {object} Job
  * @property {string} id
  * @property {string} kind
@@ -98,18 +89,16 @@
  * @property {string} note
  * @property {string|null} file
  * @property {number|null} bytes
- *
- * @typedef {object} Series  the columns of one run, as far as it has come
+ * @typedef {object} Series columns of one run, as far as computed
  * @property {number} run
  * @property {number} done
  * @property {Columns} columns
- *
- * @typedef {object} Drive  put together by drive/data.js
+ * @typedef {object} Drive assembled by drive/sync.js
  * @property {string|null} uri
  * @property {number} count
  * @property {number[]} t_s
  * @property {Series|null} now
- * @property {Series|null} base  null when there is nothing to compare
+ * @property {Series|null} base null without a comparison
  * @property {DriveEvent[]} events
  * @property {Comparison|null} comparison
  */

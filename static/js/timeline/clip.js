@@ -1,8 +1,8 @@
-/** Marking a stretch of the recording: in, out, and none. */
-import { $, text } from "../dom.js";
+/** Marking a clip: in, out, clear. */
+import { $, text } from "../core/dom.js";
 import { here } from "../drive/seek.js";
-import { clock } from "../format.js";
-import { get, on, set } from "../store.js";
+import { clock } from "../core/format.js";
+import { get, on, set } from "../core/store.js";
 
 export function setUp() {
   $("#clip-in").addEventListener("click", markIn);
@@ -33,13 +33,14 @@ export function clear() {
   if (get("clip")) set("clip", null);
 }
 
-/** What would be exported: the marked stretch, else everything. @returns {{first: number, last: number}} */
+/** The clip, else the whole drive. @returns {{first: number, last: number}} */
 export function chosen() {
   return get("clip") ?? { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
 }
 
 function reflect() {
-  const clip = get("clip"), times = get("drive")?.t_s;
+  const clip = get("clip"),
+    times = get("drive")?.t_s;
   $("#clip-clear").hidden = !clip;
   const lasts = clip && times?.length ? ` · ${clock(times[clip.last] - times[clip.first])}` : "";
   text($("#clip-facts"), clip ? `frames ${clip.first + 1}–${clip.last + 1}${lasts}` : "");

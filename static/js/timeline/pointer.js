@@ -1,10 +1,7 @@
-/** The hand on the timeline: press or drag to go to a frame, wheel to zoom, shift or two fingers to move along. */
+/** Pointer input on the timeline: click or drag to seek, scroll to zoom, Shift + scroll or two fingers to pan. */
 import { seekTo } from "../drive/seek.js";
-import { dragEnd, endAt } from "../labeling/ends.js";
-import { leadAt } from "../labeling/held.js";
-import * as marking from "../labeling/span.js";
-import { get, set } from "../store.js";
-import { flagAt } from "./flags.js";
+import { get, set } from "../core/store.js";
+import { laneAt } from "./rows.js";
 
 /** @typedef {import("./span.js").Span} Span */
 /** @typedef {import("./rows.js").Rows} Rows */
@@ -13,7 +10,10 @@ const CLICK_PX = 4;
 const ZOOM_PER_PX = 0.0018;
 const GRAB_PX = 8;
 
-/** What a drag does on the way, and when it ends: by the hand that lets go, or because something else took over. @typedef {((x: number, dx: number) => void) & {ended?: (isKept: boolean) => void}} Act */
+/**
+ * Drag handler: called on each move, and `ended` on release or cancellation.
+ * @typedef {((x: number, dx: number) => void) & {ended?: (isKept: boolean) => void}} Act
+ */
 /**
  * @typedef {object} Hand
  * @property {Span} span
@@ -42,7 +42,7 @@ export function followPointer(canvas, hand) {
   canvas.addEventListener("pointermove", (event) => {
     const was = down.get(event.pointerId);
     if (!was) {
-      canvas.style.cursor = endUnder(hand, event) ? "ew-resize" : "";
+      canvas.style.cursor = laneAt(hand.rows(), event.offsetY)?.lane.cursor?.(hand.span, event.offsetX) ?? "";
       return hand.hovered(event.offsetX >= hand.span.left ? hand.span.index(event.offsetX) : null);
     }
     down.set(event.pointerId, { x: event.offsetX, y: event.offsetY });
@@ -69,7 +69,8 @@ export function followPointer(canvas, hand) {
 
 /** What a drag that begins here does. @param {Hand} hand @param {PointerEvent} event @returns {Act} */
 function actionAt({ span, rows, zoomed }, event) {
-  const { axis, bar } = rows(), clip = get("clip");
+  const { axis, bar } = rows(),
+    clip = get("clip");
   if (event.offsetY >= bar.top && !span.isWhole) {
     return (_, dx) => {
       span.pan((dx / span.width) * span.count);
@@ -83,49 +84,18 @@ function actionAt({ span, rows, zoomed }, event) {
     };
   }
   if (clip && event.offsetY <= axis.top + axis.height) {
-    if (Math.abs(event.offsetX - span.x(clip.first)) < GRAB_PX) return (x) => set("clip", { first: Math.min(span.index(x), clip.last), last: clip.last });
-    if (Math.abs(event.offsetX - span.x(clip.last + 1)) < GRAB_PX) return (x) => set("clip", { first: clip.first, last: Math.max(span.index(x), clip.first) });
+    if (Math.abs(event.offsetX - span.x(clip.first)) < GRAB_PX)
+      return (x) => set("clip", { first: Math.min(span.index(x), clip.last), last: clip.last });
+    if (Math.abs(event.offsetX - span.x(clip.last + 1)) < GRAB_PX)
+      return (x) => set("clip", { first: clip.first, last: Math.max(span.index(x), clip.first) });
   }
-  const end = endUnder({ span, rows }, event);
-  if (end) return dragEnd(span, end);
-  const labels = rows().labels, from = span.index(event.offsetX);
-  if (isIn(labels?.leads ?? null, event.offsetY)) return marks(span, from, true);
-  if (labels?.tags.some((row) => isIn(row, event.offsetY))) return marks(span, from, false);
-  return (x) => seekTo(span.index(x));
+  const act = laneAt(rows(), event.offsetY)?.lane.press?.(span, event.offsetX);
+  return act ?? ((x) => seekTo(span.index(x)));
 }
 
-/** The end of a lead range under the pointer. @param {Pick<Hand, "span"|"rows">} hand @param {PointerEvent} event */
-const endUnder = ({ span, rows }, event) => (isIn(rows().labels?.leads ?? null, event.offsetY) ? endAt(span, event.offsetX) : null);
-
-/** A drag along the labels' ribbon marks frames; the selected track leads there when the hand lets go, along their tags it only marks. @param {Span} span @param {number} from @param {boolean} isOfLead @returns {Act} */
-function marks(span, from, isOfLead) {
-  let hasMoved = false;
-  const along = (/** @type {number} */ x) => {
-    const to = span.index(x);
-    hasMoved ||= to !== from;
-    if (hasMoved) marking.markAll(from, to);
-    seekTo(to);
-  };
-  return Object.assign(along, { ended: (/** @type {boolean} */ isKept) => {
-    if (!isKept || !hasMoved) return;
-    if (isOfLead && get("track") !== null) marking.paint(/** @type {number} */ (get("track")));
-    else marking.tellMarked();
-  } });
-}
-
-/** @param {{top: number, height: number}|null} row @param {number} y */
-const isIn = (row, y) => row !== null && y >= row.top && y < row.top + row.height;
-
-/** A click on a flag goes to its event; on a ribbon, it selects who was the CIPV there. @param {Hand} hand @param {number} x @param {number} y */
+/** What the lane under a click does with it. @param {Hand} hand @param {number} x @param {number} y */
 function click({ span, rows }, x, y) {
-  const drive = get("drive"), { flags, labels, ribbon, base } = rows();
-  const lead = isIn(labels?.leads ?? null, y) ? leadAt(span.index(x))?.lead : null;
-  if (typeof lead === "number") set("track", lead);
-  const event = isIn(flags, y) ? flagAt(drive?.events ?? [], span, x) : null;
-  if (event) seekTo(event.index);
-  const series = isIn(ribbon, y) ? drive?.now : isIn(base, y) ? drive?.base : null;
-  const id = series?.columns.cipv_id[span.index(x)];
-  if (id !== undefined && id !== null) set("selection", id);
+  laneAt(rows(), y)?.lane.click?.(span, x);
 }
 
 /** @param {Hand} hand @param {WheelEvent} event */
@@ -138,11 +108,15 @@ function onWheel({ span, zoomed }, event) {
 }
 
 /**
- * @param {Hand} hand @param {{x: number, y: number}[]} fingers both, after the move @param {{x: number}} was @param {{x: number, y: number}} now the one that moved
+ * @param {Hand} hand
+ * @param {{x: number, y: number}[]} fingers after the move
+ * @param {{x: number}} was
+ * @param {{x: number, y: number}} now the finger that moved
  */
 function pinch({ span, zoomed }, fingers, was, now) {
   const other = fingers.find(({ x }) => x !== now.x) ?? now;
-  const before = Math.abs(was.x - other.x), after = Math.abs(now.x - other.x);
+  const before = Math.abs(was.x - other.x),
+    after = Math.abs(now.x - other.x);
   if (before > 1 && after > 1) span.zoom(before / after, (now.x + other.x) / 2);
   span.pan(-(now.x - was.x) / 2 / span.perFrame);
   zoomed();

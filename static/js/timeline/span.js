@@ -1,4 +1,4 @@
-/** The stretch of the recording that the timeline shows, in frames. The whole of it until a person zooms. */
+/** The range of frames that the timeline shows; the whole drive until zoomed. */
 
 const SMALLEST = 8;
 
@@ -56,7 +56,11 @@ export class Span {
     return Math.min(this.count, Math.max(0, Math.round(this.first + (x - this.left) / this.perFrame)));
   }
 
-  /** Zoom so that what lies under a pixel column stays there. @param {number} factor above 1 shows more @param {number} x */
+  /**
+   * Zoom so that what lies under a pixel column stays there.
+   * @param {number} factor above 1 shows more
+   * @param {number} x
+   */
   zoom(factor, x) {
     const size = this.end - this.first;
     const wanted = Math.min(this.count, Math.max(Math.min(SMALLEST, this.count), size * factor));

@@ -1,10 +1,10 @@
-/** Panes that can be resized by dragging between them, or with the arrow keys. Sizes belong to the layout. */
-import { $ } from "../dom.js";
-import { get, on } from "../store.js";
+/** Gutters for resizing panes, by drag or arrow keys. Sizes belong to the layout. */
+import { $ } from "../core/dom.js";
+import { get, on } from "../core/store.js";
 import { change } from "./panes.js";
 
 /**
- * The custom property a gutter sets, the size from the pointer's place, and its limits.
+ * A gutter: the CSS property it sets, the size for a pointer position, and its limits.
  * @typedef {object} Gutter
  * @property {string} property
  * @property {(x: number, y: number) => number} size
@@ -16,11 +16,23 @@ const GAP_PX = 6;
 
 /** @type {Record<string, Gutter>} */
 const GUTTERS = {
-  camera: { property: "--camera-h", size: (_, y) => y - box(".main-column").top, limits: () => [110, box(".main-column").height - 90] },
-  plan: { property: "--bev-w", size: (x) => box(".bev-pane").right - x, limits: () => [180, box(".bev-pane").right - box("#workspace").left - 280] },
+  camera: {
+    property: "--camera-h",
+    size: (_, y) => y - box(".main-column").top,
+    limits: () => [110, box(".main-column").height - 90],
+  },
+  plan: {
+    property: "--bev-w",
+    size: (x) => box(".bev-pane").right - x,
+    limits: () => [180, box(".bev-pane").right - box("#workspace").left - 280],
+  },
   side: { property: "--side-w", size: (x) => box("#side").right - x, limits: () => [240, 560] },
   why: { property: "--why-h", size: (_, y) => y - box("#side").top, limits: () => [80, box("#side").height - 120] },
-  timeline: { property: "--timeline-h", size: (_, y) => box(".timeline-pane").bottom - y, limits: () => [84, innerHeight * 0.7] },
+  timeline: {
+    property: "--timeline-h",
+    size: (_, y) => box(".timeline-pane").bottom - y,
+    limits: () => [84, innerHeight * 0.7],
+  },
 };
 const STEP_PX = 24;
 
@@ -47,7 +59,8 @@ function reflect() {
 function start(gutter, event) {
   gutter.setPointerCapture(event.pointerId);
   gutter.classList.add("dragging");
-  const move = (/** @type {PointerEvent} */ { clientX, clientY }) => place(gutter.dataset.gutter ?? "", clientX, clientY);
+  const move = (/** @type {PointerEvent} */ { clientX, clientY }) =>
+    place(gutter.dataset.gutter ?? "", clientX, clientY);
   const end = () => {
     gutter.removeEventListener("pointermove", move);
     gutter.classList.remove("dragging");
@@ -66,7 +79,11 @@ function nudge(gutter, event) {
   event.preventDefault();
   event.stopPropagation();
   const at = gutter.getBoundingClientRect();
-  place(gutter.dataset.gutter ?? "", at.left + at.width / 2 + (isRow ? 0 : by), at.top + at.height / 2 + (isRow ? by : 0));
+  place(
+    gutter.dataset.gutter ?? "",
+    at.left + at.width / 2 + (isRow ? 0 : by),
+    at.top + at.height / 2 + (isRow ? by : 0),
+  );
 }
 
 /** @param {string} name @param {number} x @param {number} y */

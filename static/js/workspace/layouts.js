@@ -1,6 +1,6 @@
-/** Layouts: panes, sizes, layers. A few come with the page; a person saves others in this browser. */
-import { $, el, memory } from "../dom.js";
-import { get, set } from "../store.js";
+/** Layouts: panes, sizes and layers. Built-in ones, and those saved in this browser. */
+import { $, el, memory } from "../core/dom.js";
+import { get, set } from "../core/store.js";
 import { attachMenu, close, refill } from "./menu.js";
 import { EVERYTHING, PANES, change, toggle } from "./panes.js";
 
@@ -27,19 +27,51 @@ const saved = () => memory.read("layouts", {});
 
 function fill() {
   const hidden = get("layout")?.hidden ?? [];
-  const panes = Object.entries(PANES).map(([pane, label]) => el("label", { class: "item" },
-    el("input", { type: "checkbox", checked: !hidden.includes(/** @type {Pane} */ (pane)), onchange: () => toggle(/** @type {Pane} */ (pane)) }), label));
-  const name = el("input", { type: "text", placeholder: "Name", maxLength: 40, aria: { label: "Name of the layout" } });
-  const form = el("form", { class: "menu-row", onsubmit: (/** @type {Event} */ event) => save(event, name.value) }, name, el("button", { textContent: "Save" }));
-  return [el("h3", { textContent: "Panes" }), ...panes, el("h3", { textContent: "Layouts" }),
-    ...Object.entries(BUILT_IN).map(([key, layout]) => item(key, layout)), ...Object.entries(saved()).map(([key, layout]) => item(key, layout, true)), form];
+  const panes = Object.entries(PANES).map(([pane, label]) =>
+    el(
+      "label",
+      { class: "item" },
+      el("input", {
+        type: "checkbox",
+        checked: !hidden.includes(/** @type {Pane} */ (pane)),
+        onchange: () => toggle(/** @type {Pane} */ (pane)),
+      }),
+      label,
+    ),
+  );
+  const name = el("input", { type: "text", placeholder: "Name", maxLength: 40, aria: { label: "Layout name" } });
+  const form = el(
+    "form",
+    { class: "menu-row", onsubmit: (/** @type {Event} */ event) => save(event, name.value) },
+    name,
+    el("button", { textContent: "Save" }),
+  );
+  return [
+    el("h3", { textContent: "Panes" }),
+    ...panes,
+    el("h3", { textContent: "Layouts" }),
+    ...Object.entries(BUILT_IN).map(([key, layout]) => item(key, layout)),
+    ...Object.entries(saved()).map(([key, layout]) => item(key, layout, true)),
+    form,
+  ];
 }
 
 /** @param {string} name @param {Saved} layout @param {boolean} [isOwn] */
 function item(name, layout, isOwn = false) {
   const use = el("button", { type: "button", class: "item", textContent: name, onclick: () => apply(layout) });
   if (!isOwn) return use;
-  return el("div", { class: "menu-row" }, use, el("button", { type: "button", class: "drop", textContent: "✕", aria: { label: `Delete the layout ${name}` }, onclick: () => forget(name) }));
+  return el(
+    "div",
+    { class: "menu-row" },
+    use,
+    el("button", {
+      type: "button",
+      class: "drop",
+      textContent: "✕",
+      aria: { label: `Delete layout ${name}` },
+      onclick: () => forget(name),
+    }),
+  );
 }
 
 /** @param {Saved} layout */
@@ -49,7 +81,7 @@ export function apply({ layers, ...panes }) {
   close();
 }
 
-/** What of an object from outside is a layout; null for none. @param {any} given @returns {Saved|null} */
+/** Validate a layout from an untrusted object; null if there is none. @param {any} given @returns {Saved|null} */
 export function checked(given) {
   if (!given) return null;
   /** @type {Saved} */
@@ -62,12 +94,12 @@ export function checked(given) {
   return layout;
 }
 
-/** The entries whose value fits. @param {any} given @param {(value: unknown) => boolean} fits @returns {any} */
+/** Entries whose value fits. @param {any} given @param {(value: unknown) => boolean} fits @returns {any} */
 function only(given, fits) {
   return Object.fromEntries(Object.entries(given ?? {}).filter(([, value]) => fits(value)));
 }
 
-/** What `apply` takes back. @returns {Saved} */
+/** The current layout, as `apply` takes it. @returns {Saved} */
 export function current() {
   return { ...(get("layout") ?? EVERYTHING), layers: get("layers") ?? {} };
 }

@@ -1,5 +1,5 @@
-/** One menu for the page: it opens below its button, and closes by itself. */
-import { $ } from "../dom.js";
+/** The page's popup menu, shown below its button. */
+import { $ } from "../core/dom.js";
 
 const GAP_PX = 4;
 const menu = $("#menu");
@@ -7,7 +7,7 @@ const menu = $("#menu");
 let owner = null;
 
 /**
- * @param {HTMLElement} button @param {string} label @param {() => (Node|string)[]} fill called at every opening
+ * @param {HTMLElement} button @param {string} label @param {() => (Node|string)[]} fill called on every opening
  */
 export function attachMenu(button, label, fill) {
   button.setAttribute("aria-expanded", "false");
@@ -25,7 +25,7 @@ export function attachMenu(button, label, fill) {
   });
 }
 
-/** Show other contents while it is open. @param {HTMLElement} button @param {() => (Node|string)[]} fill */
+/** Replace the contents while open. @param {HTMLElement} button @param {() => (Node|string)[]} fill */
 export function refill(button, fill) {
   if (owner !== button || !menu.matches(":popover-open")) return;
   menu.replaceChildren(...fill());
@@ -38,7 +38,8 @@ export function close() {
 
 /** @param {HTMLElement} button */
 function place(button) {
-  const at = button.getBoundingClientRect(), own = menu.getBoundingClientRect();
+  const at = button.getBoundingClientRect(),
+    own = menu.getBoundingClientRect();
   const below = at.bottom + GAP_PX;
   menu.style.left = `${Math.max(GAP_PX, Math.min(at.right - own.width, innerWidth - own.width - GAP_PX))}px`;
   menu.style.top = `${below + own.height > innerHeight ? Math.max(GAP_PX, at.top - own.height - GAP_PX) : below}px`;

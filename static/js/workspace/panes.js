@@ -1,8 +1,8 @@
-/** Which panes are shown, which one has the whole workspace, and which tab the plan's pane shows. */
-import { $, el, memory, press } from "../dom.js";
-import { icon } from "../icons.js";
-import { get, on, set } from "../store.js";
-import { showRerun } from "./rerun.js";
+/** Visible panes, the maximized pane, and the tab of the plan pane. */
+import { $, el, memory, press } from "../core/dom.js";
+import { icon } from "../core/icons.js";
+import { get, on, set } from "../core/store.js";
+import { showRerun } from "./rerun_tab.js";
 
 /** @typedef {"camera"|"plan"|"objects"|"why"|"params"|"timeline"} Pane */
 /** @typedef {"plan"|"3d"|"rerun"} Tab */
@@ -11,17 +11,24 @@ import { showRerun } from "./rerun.js";
  * @property {Pane[]} hidden
  * @property {Pane|null} grown
  * @property {Tab} tab
- * @property {Record<string, number>} sizes  pixels by gutter; what is absent is fitted
+ * @property {Record<string, number>} sizes  pixels by gutter; missing ones are automatic
  */
 
 /** @type {Record<Pane, string>} in the order of their menu */
-export const PANES = { camera: "Camera", plan: "Plan, 3D, rerun", objects: "Objects", why: "Why", params: "Parameters", timeline: "Timeline" };
-/** What a pane with the whole workspace lies over. @type {Pane[]} */
+export const PANES = {
+  camera: "Camera",
+  plan: "Plan, 3D, rerun",
+  objects: "Objects",
+  why: "Why",
+  params: "Parameters",
+  timeline: "Timeline",
+};
+/** Panes covered by a maximized pane. @type {Pane[]} */
 const COVERED = ["camera", "plan", "objects"];
 /** @type {Layout} */
 export const EVERYTHING = { hidden: [], grown: null, tab: "plan", sizes: {} };
 
-/** Below this width the inspector lies over the panes, so it starts closed. */
+/** Below this width the inspector overlays the panes, so it starts closed. */
 const NARROW = matchMedia("(max-width: 1180px)");
 const root = document.documentElement;
 
@@ -31,9 +38,12 @@ export function setUp() {
   NARROW.addEventListener("change", () => showInspector(!NARROW.matches));
   for (const button of document.querySelectorAll("[data-grow]")) {
     if (button.matches(".grow")) button.append(icon("grow"));
-    button.addEventListener("click", () => grow(/** @type {Pane} */ (/** @type {HTMLElement} */ (button).dataset.grow)));
+    button.addEventListener("click", () =>
+      grow(/** @type {Pane} */ (/** @type {HTMLElement} */ (button).dataset.grow)),
+    );
   }
-  for (const button of plansTabs()) button.addEventListener("click", () => showTab(/** @type {Tab} */ (button.dataset.tab)));
+  for (const button of plansTabs())
+    button.addEventListener("click", () => showTab(/** @type {Tab} */ (button.dataset.tab)));
   $(".bev-pane .tabs").addEventListener("keydown", onTabKey);
   $("#params-button").addEventListener("click", toggleInspector);
   on(["layout"], reflect);
@@ -41,7 +51,8 @@ export function setUp() {
 }
 
 /** @returns {HTMLElement[]} */
-const plansTabs = () => [...document.querySelectorAll(".bev-pane [data-tab]")].map((tab) => /** @type {HTMLElement} */ (tab));
+const plansTabs = () =>
+  [...document.querySelectorAll(".bev-pane [data-tab]")].map((tab) => /** @type {HTMLElement} */ (tab));
 const layout = () => get("layout") ?? EVERYTHING;
 
 /** @param {Partial<Layout>} changes */
@@ -57,7 +68,7 @@ export function toggle(pane, shown = layout().hidden.includes(pane)) {
   if (shown && (pane === "why" || pane === "params")) showInspector(true);
 }
 
-/** Show a tab of the plan's pane; when it is shown already, hide the pane. @param {Tab} tab */
+/** Show a tab of the plan pane; if already shown, hide the pane. @param {Tab} tab */
 export function toggleTab(tab) {
   if (layout().tab === tab) return toggle("plan");
   toggle("plan", true);
@@ -73,7 +84,7 @@ export function nextTab() {
   showTab(layout().tab === "plan" ? "3d" : "plan");
 }
 
-/** Give a pane the whole workspace, or take it back. @param {Pane} pane */
+/** Maximize a pane, or restore it. @param {Pane} pane */
 export function grow(pane) {
   const grown = layout().grown === pane ? null : pane;
   change({ grown, hidden: grown ? layout().hidden.filter((key) => key !== pane) : layout().hidden });
@@ -98,25 +109,30 @@ function reflect() {
   }
   for (const node of document.querySelectorAll(".column")) {
     const column = /** @type {HTMLElement} */ (node);
-    const panes = [...column.querySelectorAll("[data-pane]")].map((pane) => !(/** @type {HTMLElement} */ (pane).hidden));
+    const panes = [...column.querySelectorAll("[data-pane]")].map(
+      (pane) => !(/** @type {HTMLElement} */ (pane).hidden),
+    );
     column.hidden = !panes.some(Boolean);
     $(".gutter", HTMLElement, column).hidden = !panes.every(Boolean);
   }
   hideGutters();
-  for (const button of document.querySelectorAll("[data-grow]")) press(button, /** @type {HTMLElement} */ (button).dataset.grow === grown);
+  for (const button of document.querySelectorAll("[data-grow]"))
+    press(button, /** @type {HTMLElement} */ (button).dataset.grow === grown);
   press($("#params-button"), root.dataset.inspect !== "closed");
   reflectTab(tab);
 }
 
-/** A gutter between a pane and nothing moves nothing. */
+/** Hide gutters that have nothing to resize. */
 function hideGutters() {
-  const plan = $(".bev-pane"), main = $(".main-column"), side = $("#side");
+  const plan = $(".bev-pane"),
+    main = $(".main-column"),
+    side = $("#side");
   $("[data-gutter=plan]").hidden = plan.hidden || main.hidden;
   $("[data-gutter=side]").hidden = side.hidden || (plan.hidden && main.hidden);
   $("[data-gutter=timeline]").hidden = $(".timeline-pane").hidden;
 }
 
-/** The 3D view and rerun are loaded when they are first looked at. @param {Tab} shown */
+/** Show a tab; the 3D view and rerun are loaded on first use. @param {Tab} shown */
 function reflectTab(shown) {
   for (const button of plansTabs()) {
     const isShown = button.dataset.tab === shown;
@@ -135,7 +151,8 @@ function onTabKey(event) {
   const by = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
   if (!by) return;
   event.preventDefault();
-  const tabs = plansTabs(), at = tabs.findIndex((tab) => tab.dataset.tab === layout().tab);
+  const tabs = plansTabs(),
+    at = tabs.findIndex((tab) => tab.dataset.tab === layout().tab);
   const next = tabs[(at + by + tabs.length) % tabs.length];
   showTab(/** @type {Tab} */ (next.dataset.tab));
   next.focus();

@@ -1,7 +1,7 @@
-/** Dark or light: as the system says, until a person chooses. */
-import { forget } from "../colors.js";
-import { $, memory } from "../dom.js";
-import { set } from "../store.js";
+/** Dark or light theme: follows the system until the user chooses. */
+import { forget } from "../core/colors.js";
+import { $, memory } from "../core/dom.js";
+import { set } from "../core/store.js";
 
 const root = document.documentElement;
 const SYSTEM = matchMedia("(prefers-color-scheme: light)");

@@ -14,19 +14,19 @@ LABELING = Path(__file__).resolve().parents[3] / "static" / "js" / "labeling"
 
 
 def test_a_new_cuboid_is_as_large_as_one_that_nobody_measured() -> None:
-    found = re.search(r"const TYPICAL_M = (\{.*?\});", (LABELING / "cuboid.js").read_text(), re.DOTALL)
+    found = re.search(r"const TYPICAL_M = (\{.*?\});", (LABELING / "views" / "cuboid.js").read_text(), re.DOTALL)
     assert found is not None
     table = re.sub(r",\s*\}", "}", re.sub(r"(\w+):", r'"\1":', found[1]))
     assert {name: tuple(size) for name, size in json.loads(table).items()} == USUAL_SIZE_M
 
 
 def test_every_format_can_be_chosen() -> None:
-    found = re.search(r"const FORMATS = \[(.*?)\];", (LABELING / "files.js").read_text(), re.DOTALL)
+    found = re.search(r"const FORMATS = \[(.*?)\];", (LABELING / "panels" / "files_tab.js").read_text(), re.DOTALL)
     assert found is not None
     assert set(re.findall(r'\["([a-z-]+)"', found[1])) == set(FORMATS)
 
 
 def test_the_page_offers_the_tag_of_frames_whose_vehicles_are_all_labelled() -> None:
-    found = re.search(r'const WHOLE_TAG = "([^"]+)"', (LABELING / "tags.js").read_text())
+    found = re.search(r'const WHOLE_TAG = "([^"]+)"', (LABELING / "acts" / "tags.js").read_text())
     assert found is not None
     assert found[1] == WHOLE_TAG

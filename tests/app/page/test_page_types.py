@@ -20,7 +20,7 @@ from app.web.server import create_app
 from tests.app.engine.recording_helpers import Recording
 from tests.app.web.serving import WAIT_S, running, serving
 
-TYPES = Path(__file__).resolve().parents[3] / "static" / "js" / "types.js"
+JS = Path(__file__).resolve().parents[3] / "static" / "js"
 
 
 def typedefs(text: str) -> dict[str, set[str]]:
@@ -158,13 +158,13 @@ def labelled(engine: Engine, client: httpx.Client) -> dict[str, Any]:
 MADE_BY_THE_PAGE = {"Frame", "Series", "Drive"}
 """Put together in the page from messages."""
 
-ALL_TYPES = (TYPES, TYPES.parent / "drive" / "types.js", TYPES.parent / "labeling" / "types.js")
+ALL_TYPES = (JS / "core" / "types.js", JS / "drive" / "types.js", JS / "labeling" / "state" / "types.js")
 KNOWN = {name: keys for file in ALL_TYPES for name, keys in typedefs(file.read_text(encoding="utf-8")).items()}
 
 
 @pytest.mark.parametrize("name", sorted(KNOWN.keys() - MADE_BY_THE_PAGE))
 def test_the_page_knows_every_key_and_no_other(sent: dict[str, Any], name: str):
-    assert KNOWN[name] == set(sent[name]), "say it in static/js/types.js, or its neighbour of drive/ or labeling/"
+    assert KNOWN[name] == set(sent[name]), "say it in static/js/core/types.js, or its neighbour of drive/ or labeling/"
 
 
 def test_every_kind_of_message_is_looked_at(sent: dict[str, Any]):
@@ -172,7 +172,7 @@ def test_every_kind_of_message_is_looked_at(sent: dict[str, Any]):
 
 
 def test_every_gate_has_words_and_leads_to_a_parameter_that_there_is(sent: dict[str, Any]):
-    words = (TYPES.parent / "why" / "gates.js").read_text(encoding="utf-8")
+    words = (JS / "panels" / "gate_rows.js").read_text(encoding="utf-8")
     said = set(re.findall(r"^  (\w+): \{ label:", words, re.MULTILINE))
     assert {gate["name"] for item in sent["Result"]["objects"] for gate in item["gates"]} <= said
     assert set(re.findall(r'param: "([\w.]+)"', words)) <= set(sent["ParamsAnswer"]["values"])

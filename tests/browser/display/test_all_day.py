@@ -24,7 +24,7 @@ window.WebSocket = class extends Real {
 };
 """
 FEED = """async (count) => {
-  const { on } = await import("/js/store.js");
+  const { on } = await import("/js/core/store.js");
   let came = () => {};
   if (!window.feeding) on(["frame"], () => window.feeding());
   for (let i = 0; i < count; i++) {

@@ -12,8 +12,8 @@ from tests.browser.display.conftest import OpenDisplay, is_now, keep
 COVERED_WITHIN_MS = 300
 
 WATCH = """async (within) => {
-  const { get } = await import("/js/store.js");
-  const { serverNow } = await import("/js/connection.js");
+  const { get } = await import("/js/core/store.js");
+  const { serverNow } = await import("/js/core/connection.js");
   const { mayBeMs } = await import("/drive/freshness.js");
   window.worst = { fresh: 0, covered: 0 };
   const cover = document.querySelector("#cover");
@@ -54,7 +54,7 @@ def test_what_is_too_old_is_covered_at_once_and_comes_back(
         recording.gate.set()
     else:
         page.locator("#mark").tap()
-        expect(page.locator("#answer")).to_have_text("✕ Not marked: no connection")
+        expect(page.locator("#answer")).to_have_text("✕ Mark failed: no connection")
         site.start()
     is_now(page, "fresh")
     expect(page.locator("#distance")).to_be_visible()

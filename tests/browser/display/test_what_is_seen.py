@@ -16,7 +16,7 @@ SIZES = [(1024, 600), (1280, 800), (800, 480)]
 FINGER_PX = 48
 
 STREAMS = """async () => {
-  const { get, set } = await import("/js/store.js");
+  const { get, set } = await import("/js/core/store.js");
   const stream = (state, rate_hz) => ({ state, rate_hz, age_ms: 10, jitter_ms: 1, lost: 0, note: "" });
   const streams = { lidar: stream("ok", 10), camera: stream("stale", 5), gnss: stream("silent", null) };
   set("state", { ...get("state"), streams });
@@ -31,7 +31,7 @@ def test_a_sensor_that_fails_is_seen_by_colour_word_and_shape(open_display: Open
     page = open_display(site.address)
     expect(page.locator("#sensors li")).to_have_count(3)
     works, late, own_speed, gone = page.evaluate(STREAMS)
-    assert [works[0], late[0], own_speed[0], gone[0]] == ["LiDAR10 Hz", "Camerastale", "Own speed", "GNSSsilent"]
+    assert [works[0], late[0], own_speed[0], gone[0]] == ["LiDAR10 Hz", "Camerastale", "Ego speed", "GNSSsilent"]
     for column in (1, 2):
         assert len({works[column], late[column], gone[column]}) == 3
 
@@ -97,7 +97,7 @@ def test_the_figures_are_those_of_the_result(open_display: OpenDisplay, site: Si
 
 
 SHOW = """async (change) => {
-  const { get, on, set } = await import("/js/store.js");
+  const { get, on, set } = await import("/js/core/store.js");
   const hold = () => {
     const frame = get("frame"), { result } = frame;
     if (result.acc.reason !== window.command.reason) {

@@ -14,7 +14,7 @@ from tests.browser.conftest import WAIT_MS
 from tests.browser.looks import box_of
 
 FROM_M, TO_M, HALF_M = -5.0, 74.0, 13.0
-"""What the plan shows until a person moves it (static/js/viewport.js)."""
+"""What the plan shows until a person moves it (static/js/views/drawing/viewport.js)."""
 KEYSTROKE_S = {"key": 0.28, "press": 0.20, "point": 1.10, "decide": 1.35}
 """Seconds of the keystroke-level model (Card, Moran and Newell 1980): a key, a mouse button down and up, pointing at
 something, and making up one's mind before an act. For a person's time, which no test can measure."""

@@ -136,7 +136,7 @@ def judge_the_rest(hand: Hand, labels: Labels, objects: list[tuple[TruthObject, 
         state = "accepted" if is_one else "rejected"
         labels.wait_for(lambda now, number=number, state=state: now.tracks[number]["state"] == state)
         expect(row).to_have_count(0)  # the rows below have moved up: a press now is on the one it is meant for
-    expect(page.locator(".label-tracks")).to_contain_text("Nothing is left to do.")
+    expect(page.locator(".label-tracks")).to_contain_text("Nothing left to do.")
 
 
 def on_a_vehicle(cuboid: Any, objects: tuple[TruthObject, ...]) -> bool:

@@ -58,7 +58,7 @@ def test_a_dragged_end_is_seen_on_the_way_and_escape_lets_go_of_it(hand: Hand, l
 def test_ends_come_to_the_shown_frame_by_keys(hand: Hand, labels: Labels):
     page = hand.page
     hand.keys("]")
-    expect(page.locator(".said")).to_contain_text("Nobody leads yet")
+    expect(page.locator(".said")).to_contain_text("No lead ranges yet")
     for first, last, lead in ((40, 79, "none"), (80, 120, "unknown")):
         labels.act("Ada", {"kind": "set_lead", "first": first, "last": last, "lead": lead})
     expect(page.locator(".leads button[aria-pressed=true]")).to_have_text("none")

@@ -37,7 +37,7 @@ def test_labels_and_who_leads_are_found_right_or_sent_back_one_after_the_other(h
     dialog = page.get_by_role("dialog", name="Send back")
     dialog.get_by_label("Comment").fill("it begins later")
     dialog.get_by_role("button", name="OK").click()
-    expect(said).to_contain_text("Nothing of others is left to review")
+    expect(said).to_contain_text("No labels from others left to review")
     (lead,) = labels.everything["leads"]
     assert (lead["state"], lead["comment"], lead["reviewer"]) == ("proposed", "it begins later", "")
     expect(page.locator("#label-bar .where")).to_have_text(f"sent back {START + 3}–{START + 7}: it begins later")
@@ -54,7 +54,7 @@ def test_an_event_is_reviewed_and_says_by_whom(hand: Hand, labels: Labels):
     page.get_by_role("tab", name="Frame").click()
     hand.keys("Shift+R")
     expect(page.locator(".reviewing .under")).to_have_text(f"cut-in in frame {START + 1}")
-    page.get_by_role("button", name="Right", exact=True).click()
+    page.get_by_role("button", name="Approve", exact=True).click()
     expect(page.locator(".moment-row")).to_contain_text("reviewed by Ada")
     hand.keys("Escape")
     expect(page.locator(".reviewing")).to_be_hidden()

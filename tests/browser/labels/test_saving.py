@@ -121,7 +121,7 @@ def test_the_labels_of_another_database_are_read_anew(hand: Hand, labels: Labels
     is_saved(page)
     page.evaluate(
         """async (made) => {
-          const { get, set } = await import("/js/store.js"), labels = get("labels");
+          const { get, set } = await import("/js/core/store.js"), labels = get("labels");
           const tracks = new Map(labels.tracks).set(99999, { ...labels.tracks.get(made), id: 99999 });
           set("labels", { ...labels, tracks, revision: labels.revision + 50 });
         }""",
@@ -129,7 +129,7 @@ def test_the_labels_of_another_database_are_read_anew(hand: Hand, labels: Labels
     )
     page.get_by_role("button", name="All", exact=True).click()
     expect(page.locator(".track-row[data-id='99999']")).to_be_visible()
-    page.evaluate("""async () => { (await import("/js/labeling/data.js")).look(); }""")
+    page.evaluate("""async () => { (await import("/js/labeling/state/sync.js")).look(); }""")
     expect(page.locator(".track-row[data-id='99999']")).to_have_count(0)
     expect(page.locator(f".track-row[data-id='{made}']")).to_be_visible()
 
@@ -140,7 +140,7 @@ def test_the_small_rules_of_sending(hand: Hand):
     page = hand.page
     made = page.evaluate(
         """async () => {
-          const { newId } = await import("/js/labeling/acts.js"), own = newId();
+          const { newId } = await import("/js/labeling/acts/queue.js"), own = newId();
           Object.defineProperty(crypto, "randomUUID", { value: undefined, configurable: true });
           const ids = [own, newId(), newId()];
           delete crypto.randomUUID;
@@ -153,7 +153,7 @@ def test_the_small_rules_of_sending(hand: Hand):
     )
     sent = page.evaluate(
         """async () => {
-          const { newestOnly } = await import("/js/api.js"), waits = [];
+          const { newestOnly } = await import("/js/core/api.js"), waits = [];
           let sent = 0;
           const submit = newestOnly(() => new Promise((done) => { sent += 1; waits.push(done); }));
           const first = submit(undefined);
@@ -169,7 +169,7 @@ def test_the_small_rules_of_sending(hand: Hand):
     assert sent == 2
     page.evaluate(
         """async () => {
-          const { choose } = await import("/js/labeling/conflict.js");
+          const { choose } = await import("/js/labeling/acts/conflict.js");
           const items = [{ kind: "track", id: 3, revision: 5 }, { kind: "lead", id: 3, revision: 6 }];
           const item = { kind: "track", id: 3 }, theirs = { id: 3, revision: 9, first: 27, last: 38 };
           window.chosen = choose({ kind: "accept", items }, "Bob changed #3 since", item, theirs);

@@ -53,7 +53,7 @@ def test_a_hand_in_the_3d_view_moves_it_in_every_view(hand: Hand, labels: Labels
     cuboid = labels.cuboid(made, START)
     cuboid["center"][0] -= 6.0
     dragged = """async ([track, frame, cuboid, ended]) => {
-      const { set } = await import("/js/store.js");
+      const { set } = await import("/js/core/store.js");
       set("dragged", { track, frame, cuboid, ended });
     }"""
     plan, picture = pixels(page, "#bev"), pixels(page, "#camera")
@@ -126,7 +126,7 @@ def test_a_cuboid_is_dragged_over_the_road_in_the_picture(hand: Hand, labels: La
     u, v = foot_of(labels, before)
     page.wait_for_function(
         """async ([track, frame]) => {
-          const { get } = await import("/js/store.js");
+          const { get } = await import("/js/core/store.js");
           return get("projected")?.frame === frame && get("projected").pixels.has(track);
         }""",
         arg=[made, START],
@@ -147,7 +147,7 @@ def test_a_ray_meets_the_ground_where_it_is_seen_first(hand: Hand):
     cases = [(0.1, 0.0, 15.0), (0.1, 0.5, 10.0), (0.05, 0.0, 25.0), (-0.01, 0.0, 62.5), (-0.2, 0.0, None)]
     found = hand.page.evaluate(
         """async (cases) => {
-          const { groundAt, seenOn } = await import("/js/labeling/cuboid.js");
+          const { groundAt, seenOn } = await import("/js/labeling/views/cuboid.js");
           const ground = { edges: [0, 20, 60], planes: [[0, 0, 1, 0], [-0.05, 0, 1, 1]] };
           return cases.map(([down, above]) => {
             const place = seenOn(ground, [0, 0, 1.5], [1, 0, -down], above);
@@ -206,7 +206,7 @@ def test_a_label_without_a_cuboid_says_why_and_how_to_give_it_one(hand: Hand, la
     labels.act("Ada", {"kind": "add_track", "label": "car", "frame": START, "cuboid": None, "bbox": box})
     hand.page.locator(".track-row").click()
     facts = hand.page.locator(".track-detail .facts").first
-    expect(facts).to_contain_text("no LiDAR points tell where it is")
+    expect(facts).to_contain_text("no LiDAR points")
     hand.keys("Shift+G")
     hand.drag(hand.plan(30, 3), hand.plan(34, 3))
     expect(facts).to_contain_text("m ahead")
@@ -227,7 +227,7 @@ def test_the_opposite_face_is_held_whatever_the_heading(hand: Hand):
     page = hand.page
     found = page.evaluate(
         """async (angles) => {
-          const { dragged, footprint } = await import("/js/labeling/cuboid.js");
+          const { dragged, footprint } = await import("/js/labeling/views/cuboid.js");
           const cuboid = (yaw_rad) => ({ center: [10, 0, 1], size: [4, 2, 2], yaw_rad });
           const held = { front: [2, 3], rear: [0, 1], left: [1, 2], right: [0, 3] };
           const away = [];
@@ -244,7 +244,7 @@ def test_the_opposite_face_is_held_whatever_the_heading(hand: Hand):
     assert max(found) < 1e-9
     sizes = page.evaluate(
         """async (edges) => {
-          const { dragged } = await import("/js/labeling/cuboid.js");
+          const { dragged } = await import("/js/labeling/views/cuboid.js");
           const cuboid = { center: [10, 0, 1], size: [4, 2, 2], yaw_rad: 0 };
           return edges.map(([grip, [x, y]]) => dragged(cuboid, grip, { x: 0, y: 0 }, { x, y }));
         }""",

@@ -43,10 +43,10 @@ def test_a_kept_law_is_found_again_and_says_what_it_was_fitted_to(network: Path)
         pytest.param('{"law": {}, "network_sha256": ""}', "damaged", id="numbers missing"),
         pytest.param(json.dumps({"law": asdict(LAW), "network_sha256": "00"}), "other weights", id="other weights"),
         pytest.param(
-            json.dumps({"law": asdict(LAW) | {"exponent": 1.0}, "network_sha256": ""}), "no camera", id="a rising law"
+            json.dumps({"law": asdict(LAW) | {"exponent": 1.0}, "network_sha256": ""}), "implausible", id="a rising law"
         ),
         pytest.param(
-            json.dumps({"law": asdict(LAW) | {"focal_px": float("nan")}, "network_sha256": ""}), "no camera", id="NaN"
+            json.dumps({"law": asdict(LAW) | {"focal_px": float("nan")}, "network_sha256": ""}), "implausible", id="NaN"
         ),
     ],
 )

@@ -1,0 +1,74 @@
+/** Global keyboard shortcuts (keymap.js). Ignored while typing; a focused slider keeps its arrow keys. */
+import { $ } from "../core/dom.js";
+import { keymap } from "./keymap.js";
+
+/** Camera movement keys of the 3D view (viser's CAMERA_MOVEMENT_KEYS), with any modifier. */
+const FLYING = new Set([
+  "KeyW",
+  "KeyA",
+  "KeyS",
+  "KeyD",
+  "KeyQ",
+  "KeyE",
+  "ArrowUp",
+  "ArrowDown",
+  "ArrowLeft",
+  "ArrowRight",
+]);
+
+export function setUp() {
+  const bindings = keymap().flatMap((group) => group.bindings);
+  const act = (/** @type {KeyboardEvent} */ event) => {
+    if (event.altKey || event.defaultPrevented || isTaken(event)) return;
+    const name = nameOf(event),
+      binding = bindings.find(({ keys, isOn }) => keys.includes(name) && (isOn?.() ?? true));
+    if (!binding) return;
+    event.preventDefault();
+    binding.act();
+  };
+  document.addEventListener("keydown", act);
+  // the 3D view is a same-origin iframe, so listen in it too
+  $("#three-body").addEventListener(
+    "load",
+    ({ target }) => target instanceof HTMLIFrameElement && hearIn(target, act),
+    true,
+  );
+}
+
+/** @param {HTMLIFrameElement} view @param {(event: KeyboardEvent) => void} act */
+function hearIn(view, act) {
+  view.contentDocument?.addEventListener("keydown", (event) => {
+    if (event.key === "Escape" && !event.defaultPrevented) giveBack(view);
+    else if (!FLYING.has(event.code)) act(event);
+  });
+}
+
+/** Return keyboard focus to the page. @param {HTMLIFrameElement} view */
+function giveBack(view) {
+  view.blur();
+  window.focus();
+}
+
+/**
+ * Key name, independent of keyboard layout for digits: "Shift+1", "Ctrl+z", "?", "Space".
+ * @param {KeyboardEvent} event
+ */
+function nameOf({ key, code, shiftKey, ctrlKey, metaKey }) {
+  const digit = /^Digit(\d)$/.exec(code)?.[1];
+  const bare =
+    key === " " ? "Space" : shiftKey && digit ? digit : key.length === 1 && !shiftKey ? key.toLowerCase() : key;
+  const isSaid = shiftKey && (digit !== undefined || bare.length > 1 || bare.toLowerCase() !== bare.toUpperCase());
+  return `${ctrlKey || metaKey ? "Ctrl+" : ""}${isSaid ? "Shift+" : ""}${bare}`;
+}
+
+/** Whether the focused element handles the key itself. @param {KeyboardEvent} event */
+function isTaken({ target, key, ctrlKey, metaKey }) {
+  if (document.querySelector("dialog[open]") || (key === "Escape" && document.querySelector(":popover-open")))
+    return true;
+  const focused = /** @type {Element} */ (target); // maybe another page's, whose elements are none of our HTMLElement
+  if (!("matches" in focused)) return false;
+  if (focused.matches("select, textarea, input:not([type=range]):not([type=checkbox])")) return true;
+  if (ctrlKey || metaKey) return false;
+  if (focused.matches("input[type=range]")) return key.startsWith("Arrow") || key === "Home" || key === "End";
+  return key === " " && focused.matches("button, summary, input, a");
+}

@@ -1,0 +1,191 @@
+/** Commands of the labeling mode. Each is one act on the selected track or the current frame. */
+import { request } from "../../core/api.js";
+import { seekTo } from "../../drive/seek.js";
+import { get, set } from "../../core/store.js";
+import { act } from "./queue.js";
+import { CLASSES, moved, turned } from "../views/cuboid.js";
+import * as draft from "../state/draft.js";
+import { chosen, leadAt, shown, trackOf } from "../state/labels.js";
+import { setTool } from "../state/mode.js";
+import * as span from "../state/marked_frames.js";
+
+/** @typedef {import("../state/types.js").LabelTrack} LabelTrack */
+/** @typedef {import("../state/types.js").ItemRef} ItemRef */
+/** @typedef {"unlabelled"|"disagreement"|"proposed"|"sent_back"|"unreviewed"} Wanted */
+
+/** Show a status message. @param {string} words */
+export const say = (words) => set("said", words);
+
+/** Run a command on the selected track; without one, say so. @param {(track: LabelTrack) => unknown} what */
+function withTrack(what) {
+  const track = chosen();
+  if (track) what(track);
+  else say("Select a label first");
+}
+
+/** @param {LabelTrack} track @returns {ItemRef} */
+export const refOf = ({ id, revision }) => ({ kind: "track", id, revision });
+
+/** Propose labels from the pipeline, in the marked frames or in all frames. */
+export function propose() {
+  const isMarked = get("marked") !== null,
+    whole = { first: 0, last: Math.max(0, (get("state")?.count ?? 1) - 1) };
+  return span.over((frames) => act({ kind: "propose", ...(isMarked ? frames : whole), from: "run" }));
+}
+
+/**
+ * Accept or reject the selected track; without a selection, the lead range at this frame.
+ * @param {"accept"|"reject"} kind
+ */
+export function judge(kind) {
+  const track = chosen();
+  if (track) act({ kind, items: [refOf(track)] });
+  else if (!span.judge(kind)) say("No label selected, and no lead in this frame");
+}
+
+/** Accept all proposals in the current frame: tracks and lead. */
+export function acceptHere() {
+  const lead = leadAt(shown());
+  const tracks = draft
+    .present()
+    .map(({ track }) => get("labels")?.tracks.get(track))
+    .filter((track) => track?.state === "proposed");
+  const items = tracks.map((track) => refOf(/** @type {LabelTrack} */ (track)));
+  if (lead?.state === "proposed") items.push({ kind: "lead", id: lead.id, revision: lead.revision });
+  if (items.length) act({ kind: "accept", items });
+  else say("No proposals in this frame");
+}
+
+/** Select the next or previous label of the current frame. @param {1|-1} direction */
+export function selectNext(direction) {
+  const ids = draft
+    .present()
+    .map(({ track }) => track)
+    .filter((id) => get("labels")?.tracks.get(id)?.state !== "rejected")
+    .sort((a, b) => a - b);
+  const at = ids.indexOf(get("track") ?? -1);
+  const next = at < 0 ? (direction > 0 ? 0 : ids.length - 1) : (at + direction + ids.length) % ids.length;
+  set("track", ids[next] ?? null);
+}
+
+/** @param {number} dx @param {number} dy metres, ego frame */
+export const nudge = (dx, dy) => change((cuboid) => moved(cuboid, dx, dy));
+/** @param {number} deg to the left */
+export const turn = (deg) => change((cuboid) => turned(cuboid, (deg * Math.PI) / 180));
+
+/** @param {(cuboid: import("../state/types.js").Cuboid) => import("../state/types.js").Cuboid} how */
+function change(how) {
+  const track = chosen(),
+    cuboid = draft.presentOf(track?.id ?? null)?.cuboid;
+  if (!track) return say("Select a label first");
+  if (!cuboid) return say(`#${track.id} has no cuboid in this frame; draw one (Shift G)`);
+  draft.hold(track.id, { cuboid: how(cuboid) });
+  draft.release();
+}
+
+export const snap = () => withTrack(({ id, revision }) => act({ kind: "refit", track: id, revision, frame: shown() }));
+export const splitHere = () =>
+  withTrack(({ id, revision }) => act({ kind: "split", track: id, revision, frame: shown() }));
+export const dropKeyframe = () =>
+  withTrack(({ id, revision }) => act({ kind: "drop_keyframe", track: id, revision, frame: shown() }));
+export const removeTrack = () =>
+  withTrack((track) => act({ kind: "remove", items: [refOf(track)] }).then((answer) => answer && set("track", null)));
+
+/** Set a keyframe. If the label is not in this frame, it takes the shape of the nearest frame that has one. */
+export const keyframe = () =>
+  withTrack(async ({ id }) => {
+    const frame = shown(),
+      shape = draft.presentOf(id) ?? (await nearestShape(id, frame));
+    if (!shape || shown() !== frame) return say(`#${id} has no shape yet; draw one`);
+    draft.hold(id, { cuboid: shape.cuboid, bbox: shape.bbox });
+    draft.release();
+  });
+
+/**
+ * @param {number} id
+ * @param {number} frame
+ * @returns {Promise<Pick<import("../state/types.js").LabelSighting, "cuboid"|"bbox">|null>}
+ */
+async function nearestShape(id, frame) {
+  /** @type {{sightings: (import("../state/types.js").LabelSighting & {frame: number})[]}} */
+  const { sightings } = await request(`api/labels/tracks/${id}`).catch(() => ({ sightings: [] }));
+  return sightings.sort((a, b) => Math.abs(a.frame - frame) - Math.abs(b.frame - frame))[0] ?? null;
+}
+
+export const sizeAlong = () =>
+  withTrack(({ id, revision }) => {
+    const size = draft.presentOf(id)?.cuboid?.size;
+    if (size) act({ kind: "size_along", track: id, revision, size });
+    else say(`#${id} has no cuboid in this frame; draw one (Shift G)`);
+  });
+
+/** Remove the track from the marked frames, or from this frame. */
+export const notHere = () =>
+  withTrack(({ id, revision }) =>
+    span.over((frames) => act({ kind: "drop_sightings", track: id, revision, ...frames })),
+  );
+
+/** @param {1|-1} direction */
+export const nextClass = (direction) =>
+  withTrack(({ label }) => {
+    relabel(CLASSES[(CLASSES.indexOf(label) + direction + CLASSES.length) % CLASSES.length]);
+  });
+
+/** @param {string} label */
+export const relabel = (label) => withTrack(({ id, revision }) => act({ kind: "relabel", track: id, revision, label }));
+
+/** Start merging the selected track with the label that is clicked or selected next. */
+export const merge = () =>
+  withTrack(({ id }) => {
+    setTool("merge");
+    if (get("labeling")?.tool === "merge")
+      say(`Click the label to merge with #${id}, or select it with . and press Enter`);
+  });
+
+/** Finish the merge with this track. @param {number} other */
+export function mergeWith(other) {
+  const a = trackOf(get("labeling")?.from ?? null),
+    b = trackOf(other);
+  if (!a || !b || a === b) return say("Select the other label: click it, or press .");
+  setTool(null);
+  set("track", a.id);
+  act({ kind: "merge", tracks: [a, b].map(({ id, revision }) => ({ id, revision })) });
+}
+
+/** Add an event to this frame, for the selected track or else the lead. @param {string} event */
+export function addEvent(event) {
+  const track = chosen()?.id ?? leadAt(shown())?.lead;
+  return act({ kind: "add_event", frame: shown(), event, tracks: typeof track === "number" ? [track] : [] });
+}
+
+/**
+ * Go to the next open item. If it is a single label, select it; other labels of the same frame come next.
+ * @param {Wanted} what
+ * @param {1|-1} direction
+ */
+export async function goTo(what, direction) {
+  const isOfLabels = what === "proposed" || what === "sent_back",
+    track = get("track");
+  const found = await ahead(
+    what,
+    get("scrub") ?? shown(),
+    direction,
+    isOfLabels && track !== null ? `&after_kind=track&after_id=${track}` : "",
+  );
+  if (found instanceof Error) return say(found.message);
+  if (found.frame === null) return say(`No ${what.replace("_", " ")} ${direction > 0 ? "after" : "before"} this frame`);
+  if (found.item) set("track", found.item.kind === "track" ? found.item.id : null);
+  seekTo(found.frame);
+  say(found.why);
+}
+
+/**
+ * Find the next open item after or before a frame.
+ * @param {Wanted} what
+ * @param {number} frame
+ * @param {1|-1} direction
+ * @param {string} [more] of the query
+ * @returns {Promise<import("../state/types.js").Found|Error>}
+ */
+export const ahead = (what, frame, direction, more = "") =>
+  request(`api/labels/next?what=${what}&frame=${frame}&direction=${direction}${more}`).catch((error) => error);

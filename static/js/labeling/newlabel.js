@@ -1,8 +1,0 @@
-/** The class that a new label gets: chosen in the bar, and remembered. */
-import { memory } from "../dom.js";
-import { CLASSES } from "./cuboid.js";
-
-export const newLabel = () => memory.read("newLabel", CLASSES[0]);
-
-/** @param {string} label */
-export const setNewLabel = (label) => memory.write("newLabel", label);

@@ -1,0 +1,166 @@
+/**
+ * Label files: export (with what each format loses), import, ground truth of the recording, and versions.
+ */
+import { Refused, request } from "../../core/api.js";
+import { el, text } from "../../core/dom.js";
+import { get } from "../../core/store.js";
+import { attachMenu } from "../../workspace/menu.js";
+import { act } from "../acts/queue.js";
+import { propose, say } from "../acts/commands.js";
+import { personName } from "../state/person.js";
+
+/** @typedef {import("../state/types.js").Version} Version */
+
+/** Formats in `pipeline/labels/formats/registry.py`: key, name, contents. */
+const FORMATS = [
+  ["native", "CIPV Studio", "all labels"],
+  ["mcap", "MCAP session", "labels as a channel"],
+  ["openlabel", "OpenLABEL", "ASAM OpenLABEL 1.0"],
+  ["nuscenes", "nuScenes", "JSON tables"],
+  ["kitti", "KITTI object", "one file per frame"],
+  ["kitti-tracking", "KITTI tracking", "single file"],
+  ["coco", "COCO", "image boxes"],
+  ["csv", "CSV", "lead per frame"],
+];
+
+const versions = el("div", { class: "open-list" }),
+  problem = el("p", { class: "params-error", aria: { role: "alert" } });
+const which = el(
+  "select",
+  { aria: { label: "File format" } },
+  ...FORMATS.map(([key, words]) => el("option", { value: key, textContent: words })),
+);
+const file = el("input", { type: "file", aria: { label: "Label file" } });
+const freezeName = el("input", {
+  type: "text",
+  maxLength: 60,
+  placeholder: "Version name",
+  required: true,
+  aria: { label: "Version name" },
+});
+
+/** @returns {HTMLElement} */
+export function exportButton() {
+  const button = el("button", {
+    type: "button",
+    textContent: "Export ▾",
+    aria: { haspopup: "menu" },
+    title: "Export labels to a file",
+  });
+  attachMenu(button, "Export labels", () => {
+    const rows = FORMATS.map(([key, words, about]) => ({
+      key,
+      node: el(
+        "a",
+        { class: "item", href: `api/labels/export?format=${key}&version=working` },
+        el("b", { textContent: words }),
+        el("span", { class: "facts", textContent: about }),
+      ),
+    }));
+    for (const { key, node } of rows) {
+      node.setAttribute("download", "");
+      tellLoss(key, node);
+    }
+    return [el("h3", { textContent: "Export labels" }), ...rows.map(({ node }) => node)];
+  });
+  return button;
+}
+
+/** @param {string} key @param {HTMLElement} node */
+async function tellLoss(key, node) {
+  /** @type {{lost: string[]}} */
+  const { lost } = await request(`api/labels/export/notes?format=${key}`).catch((error) => ({ lost: [error.message] }));
+  if (!lost.length) return;
+  node.title = lost.join("\n");
+  node.append(el("span", { class: "loses", textContent: `loses ${lost.length}` }));
+  node.after(el("ul", { class: "losses facts" }, ...lost.map((words) => el("li", { textContent: words }))));
+}
+
+/** @param {HTMLElement} parent */
+export function setUp(parent) {
+  parent.append(
+    problem,
+    el("h3", { textContent: "Proposals" }),
+    el("button", { type: "button", textContent: "Propose labels from the pipeline (P)", onclick: propose }),
+    el("h3", { textContent: "Import" }),
+    el("button", {
+      type: "button",
+      textContent: "Ground truth of the recording",
+      onclick: () => act({ kind: "import", what: "truth" }),
+    }),
+    el("form", { onsubmit: upload }, which, file, el("button", { textContent: "Import file" })),
+    el("h3", { textContent: "Versions" }),
+    versions,
+    el("form", { class: "menu-row", onsubmit: freeze }, freezeName, el("button", { textContent: "Freeze" })),
+  );
+}
+
+/** Reload the versions. */
+export async function look() {
+  /** @type {Version[]} */
+  const found = await request("api/labels/versions").catch(() => []);
+  versions.replaceChildren(
+    ...found.map(({ name, person, t_unix_ms, tracks, frames }) => {
+      const link = el("a", { href: `api/labels/versions/${encodeURIComponent(name)}`, textContent: name });
+      link.setAttribute("download", `${name}.json`);
+      return el(
+        "p",
+        {},
+        link,
+        el("span", {
+          class: "facts",
+          textContent: ` ${tracks} tracks in ${frames} frames · ${person}, ${dateWords(t_unix_ms)}`,
+        }),
+      );
+    }),
+  );
+  if (!found.length)
+    versions.replaceChildren(
+      el("p", { class: "facts", textContent: "No versions yet. A version is a named snapshot of the labels." }),
+    );
+}
+
+/** Date and time of day. @param {number} t_unix_ms */
+const dateWords = (t_unix_ms) => new Date(t_unix_ms).toLocaleString("en-GB");
+
+/** @param {Event} event */
+async function freeze(event) {
+  event.preventDefault();
+  const person = await personName();
+  if (person === null) return;
+  const isDone = await attempt(() => request("api/labels/versions", "POST", { name: freezeName.value.trim(), person }));
+  if (isDone) freezeName.value = "";
+  look();
+}
+
+/** @param {Event} event */
+async function upload(event) {
+  event.preventDefault();
+  const given = file.files?.[0],
+    person = await personName(),
+    drive = get("labels")?.drive;
+  if (!given || person === null || !drive) return;
+  await attempt(async () => {
+    const query = new URLSearchParams({ format: which.value, person, drive });
+    const address = new URL(`api/labels/import?${query}`, document.baseURI);
+    const response = await fetch(address, {
+      method: "POST",
+      body: given,
+      headers: { "content-type": "application/octet-stream" },
+    });
+    if (!response.ok) throw new Refused(response.status, await response.json().catch(() => null));
+    say(`Importing ${given.name}`);
+  });
+}
+
+/** @param {() => Promise<unknown>} what @returns {Promise<boolean>} whether it succeeded */
+async function attempt(what) {
+  text(problem, "");
+  return what().then(
+    () => true,
+    (error) => {
+      text(problem, error.message);
+      return false;
+    },
+  );
+}

@@ -1,0 +1,144 @@
+/** The list of labelled tracks: state, class, frames, author. */
+import { el, memory, press, text, within } from "../../core/dom.js";
+import { seekTo } from "../../drive/seek.js";
+import { LongList } from "../../core/long_list.js";
+import { get, paintAfter, set } from "../../core/store.js";
+import { mergeWith, propose } from "../acts/commands.js";
+import { present } from "../state/draft.js";
+import { isKnown } from "../state/sightings.js";
+import { shown, trackOf } from "../state/labels.js";
+import { isReviewing } from "../acts/review.js";
+
+/** @typedef {import("../state/types.js").LabelTrack} LabelTrack */
+/** @typedef {"here"|"open"|"all"} Which */
+
+/** Maximum number of rows. */
+const MOST = 100;
+const WHICH = /** @type {[Which, string, string][]} */ ([
+  ["here", "Here", "Labels in this frame"],
+  ["open", "To do", "Proposed or sent back; in review: not yet reviewed"],
+  ["all", "All", "All tracks in the drive"],
+]);
+
+const body = el("div", { class: "track-list", tabIndex: -1, aria: { role: "listbox", label: "Tracks" } });
+const nothing = el("p", { class: "facts pad", hidden: true });
+const begin = el("button", {
+  type: "button",
+  class: "begin",
+  textContent: "Propose",
+  title: "Propose labels from the pipeline (P)",
+  hidden: true,
+  onclick: propose,
+});
+const count = el("span", { class: "facts" });
+const list = new LongList(body, (/** @type {LabelTrack} */ { id }) => id, create, update);
+/** @type {Which} */
+let which = memory.read("labelTracks", "here");
+
+/** @param {HTMLElement} parent */
+export function setUp(parent) {
+  const buttons = WHICH.map(([key, words, title]) =>
+    el("button", { type: "button", textContent: words, title, data: { which: key }, onclick: () => choose(key) }),
+  );
+  parent.append(
+    el(
+      "div",
+      { class: "list-bar" },
+      el("div", { class: "joined", aria: { role: "group", label: "Which tracks" } }, ...buttons),
+      el("span", { class: "spacer" }),
+      count,
+    ),
+    body,
+  );
+  body.append(nothing, begin);
+  body.addEventListener("click", (event) => pick(within(event, ".track-row")));
+  const reflect = paintAfter(["labels", "labelFrames", "frame", "track", "labeling", "draft"], show);
+  /** @param {Which} key */
+  function choose(key) {
+    which = key;
+    memory.write("labelTracks", key);
+    reflect();
+  }
+  /** Redraw the list. */
+  function show() {
+    if (!get("labeling")?.on) return;
+    for (const button of buttons) press(button, button.dataset.which === which);
+    if (which === "here" && !isKnown(shown())) return;
+    const found = fitting();
+    text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
+    list.show(found.slice(0, MOST));
+    nothing.hidden = found.length > 0;
+    text(nothing, emptyWords());
+    begin.hidden = (get("labels")?.tracks.size ?? 0) > 0;
+  }
+}
+
+/** @returns {LabelTrack[]} */
+function fitting() {
+  const tracks = [...(get("labels")?.tracks.values() ?? [])],
+    here = new Set(present().map(({ track }) => track));
+  if (which === "here") return tracks.filter(({ id }) => here.has(id)).sort((a, b) => a.id - b.id);
+  if (which === "open") return tracks.filter(isReviewing() ? isUnreviewed : isOpen).sort((a, b) => a.id - b.id);
+  return tracks.sort((a, b) => a.id - b.id);
+}
+
+/** @param {LabelTrack} track */
+const isOpen = ({ state, comment }) => state === "proposed" || (Boolean(comment) && state !== "rejected");
+/** @param {LabelTrack} track */
+const isUnreviewed = ({ state, reviewer }) => (state === "accepted" || state === "corrected") && !reviewer;
+
+function emptyWords() {
+  if (!get("labels")?.tracks.size) return "No labels yet. Propose labels from the pipeline (P), or draw one (G).";
+  return which === "open" ? "Nothing left to do." : "No labels in this frame.";
+}
+
+function create() {
+  const part = (/** @type {string} */ name) => el("span", { class: name });
+  return el(
+    "button",
+    { type: "button", class: "track-row", aria: { role: "option" } },
+    part("mark"),
+    el("b"),
+    part("what"),
+    part("frames"),
+    part("who"),
+  );
+}
+
+/** @param {HTMLElement} row @param {LabelTrack} track */
+function update(row, { id, label, state, first, last, keyframes, origin, comment, reviewer }) {
+  row.setAttribute("aria-selected", String(id === get("track")));
+  row.dataset.state = comment && state === "proposed" ? "sent-back" : state;
+  const [mark, name, what, frames, who] = [...row.children];
+  text(name, `#${id}`);
+  text(
+    mark,
+    reviewer
+      ? "✓✓"
+      : row.dataset.state === "sent-back"
+        ? "↩"
+        : { proposed: "?", accepted: "✓", corrected: "✎", rejected: "✕" }[state],
+  );
+  mark.setAttribute("aria-label", reviewer ? "reviewed" : row.dataset.state === "sent-back" ? "sent back" : state);
+  text(what, label);
+  text(
+    frames,
+    first === null || last === null
+      ? "no frames"
+      : `${first + 1}–${last + 1}${keyframes.length ? ` · ${keyframes.length} key` : ""}`,
+  );
+  text(who, reviewer || (origin.maker === "person" ? origin.name : origin.maker));
+  const made = `made by ${origin.name || origin.maker}${reviewer ? `, reviewed by ${reviewer}` : ""}`;
+  row.title = [`${state}${comment ? `, sent back: ${comment}` : ""}`, made, origin.how].filter(Boolean).join("; ");
+}
+
+/** Select a track, and seek to it if it is not in this frame. @param {HTMLElement|null} row */
+function pick(row) {
+  const track = trackOf(Number(row?.dataset.id ?? -1));
+  if (!track) return;
+  if (get("labeling")?.tool === "merge") return mergeWith(track.id);
+  set("track", track.id);
+  const here = shown();
+  if (track.first !== null && track.last !== null && (here < track.first || here > track.last))
+    seekTo(here < track.first ? track.first : track.last);
+}

@@ -1,0 +1,28 @@
+/** Sets up the labeling mode. */
+import { addMode } from "../views/plan.js";
+import { addLayer } from "../views/camera.js";
+import { addLane } from "../timeline/lanes/registry.js";
+import * as acts from "./acts/queue.js";
+import * as bar from "./panels/bar.js";
+import * as data from "./state/sync.js";
+import * as draft from "./state/draft.js";
+import * as frames from "./state/sightings.js";
+import { leads } from "./lanes/leads.js";
+import { tags } from "./lanes/tags.js";
+import { track } from "./lanes/track.js";
+import * as mode from "./state/mode.js";
+import * as panel from "./panels/panel.js";
+import { drawInPicture } from "./views/picture_drawing.js";
+import * as pictureHand from "./views/picture_pointer.js";
+import { drawInPlan } from "./views/plan_drawing.js";
+import * as planHand from "./views/plan_pointer.js";
+import * as projection from "./views/projection.js";
+import * as steps from "./state/undo_state.js";
+import * as three from "./views/three.js";
+
+export function setUp() {
+  for (const part of [mode, acts, data, steps, frames, draft, projection, three, bar, panel, pictureHand]) part.setUp();
+  addMode({ isOn: mode.isOn, draw: drawInPlan, ...planHand });
+  addLayer(drawInPicture, "over");
+  for (const lane of [...tags, leads, track]) addLane(lane, "lead"); // above the pipeline's lead
+}

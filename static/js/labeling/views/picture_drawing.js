@@ -1,0 +1,70 @@
+/** Labels in the camera image: cuboid edges, boxes and names. */
+import { drawBox, drawCuboid } from "../../views/drawing/picture.js";
+import { get } from "../../core/store.js";
+import { presentOf, present } from "../state/draft.js";
+import { lookOf } from "./style.js";
+import { isOn } from "../state/mode.js";
+import { NEW } from "./projection.js";
+import { Labels } from "../../views/drawing/text_labels.js";
+
+/** @typedef {import("../state/types.js").Box} Box */
+/** @typedef {import("../../views/camera.js").Place} Place */
+
+const NEW_TINT = "#fff";
+
+/** @param {CanvasRenderingContext2D} ctx @param {import("../../core/types.js").Frame} frame @param {Place} place */
+export function drawInPicture(ctx, frame, place) {
+  const picture = frame.picture,
+    projected = get("projected");
+  if (!isOn() || !picture) return;
+  const scale = place.scale * picture.scale;
+  const X = (/** @type {number} */ u) => place.x + u * scale,
+    Y = (/** @type {number} */ v) => place.y + v * scale;
+  const pixels = projected?.frame === frame.state.index ? projected.pixels : new Map();
+  const tags = new Labels(ctx, place.x + picture.width * place.scale, place.y, place.y + picture.height * place.scale);
+  for (const { track, bbox } of present()) {
+    const look = lookOf(track, true),
+      corners = pixels.get(track);
+    if (!look) continue;
+    ctx.setLineDash(look.dash);
+    if (corners) drawCuboid(ctx, corners, look.tint, look.width, X, Y);
+    if (bbox && (look.isChosen || !corners)) drawBox(ctx, bbox, look.isChosen ? NEW_TINT : look.tint, 1.5, X, Y);
+    ctx.setLineDash([]);
+    const at = corners ? boundsOf(corners) : bbox;
+    if (at && isIn(at, picture))
+      tags.put(
+        look.name,
+        X(at[0]),
+        Y(at[1]),
+        look.isChosen ? NEW_TINT : look.tint,
+        look.isLead ? "strong" : look.isChosen ? "must" : "weak",
+      );
+  }
+  const fresh = pixels.get(NEW),
+    draft = get("draft");
+  if (fresh) drawCuboid(ctx, fresh, NEW_TINT, 2.5, X, Y);
+  if (draft?.track === null && draft.bbox) drawBox(ctx, draft.bbox, NEW_TINT, 2, X, Y);
+}
+
+/** @param {Box} box @param {import("../../core/types.js").Picture} picture */
+const isIn = ([x1, y1, x2, y2], { width, height, scale }) =>
+  x1 * scale < width && y1 * scale < height && x2 > 0 && y2 > 0;
+
+/**
+ * Bounding box of the visible corners of a cuboid, or null.
+ * @param {import("../../core/types.js").Pixels} corners
+ * @returns {Box|null}
+ */
+export function boundsOf(corners) {
+  const seen = corners.filter((pixel) => pixel !== null);
+  if (seen.length < 2) return null;
+  const us = seen.map(([u]) => u),
+    vs = seen.map(([, v]) => v);
+  return [Math.min(...us), Math.min(...vs), Math.max(...us), Math.max(...vs)];
+}
+
+/** Image box of a label: its own, else around its cuboid. @param {number} track @returns {Box|null} */
+export function boxOf(track) {
+  const corners = get("projected")?.pixels.get(track);
+  return presentOf(track)?.bbox ?? (corners ? boundsOf(corners) : null);
+}

@@ -1,0 +1,93 @@
+/** Labels in the plan view: footprints, and handles of the selected one. */
+import { ui } from "../../core/colors.js";
+import { trace } from "../../views/drawing/plan.js";
+import { get } from "../../core/store.js";
+import { footprint, knob, nose } from "./cuboid.js";
+import { present } from "../state/draft.js";
+import { lookOf } from "./style.js";
+import { isOn } from "../state/mode.js";
+import { drawPathLabel } from "./path.js";
+
+/** @typedef {import("../state/types.js").Cuboid} Cuboid */
+/** @typedef {import("../../views/drawing/viewport.js").Viewport} Viewport */
+/** @typedef {import("../../views/drawing/text_labels.js").Labels} Tags */
+
+/** Distance of the rotation knob from the front. */
+export const KNOB_PX = 16;
+const HANDLE_PX = 3.5;
+
+/** @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {Tags} tags */
+export function drawInPlan(ctx, view, tags) {
+  if (!isOn()) return;
+  drawPathLabel(ctx, view);
+  const labels = present().flatMap(({ track, cuboid, keyframe }) => {
+    const look = cuboid && lookOf(track, false);
+    return cuboid && look ? [{ cuboid, keyframe, look, tint: lookOf(track, true)?.tint ?? look.tint }] : [];
+  });
+  for (const { cuboid, keyframe, look } of labels) drawOne(ctx, view, cuboid, keyframe, look);
+  const chosen = labels.find(({ look }) => look.isChosen);
+  if (chosen) drawHandles(ctx, view, chosen.cuboid);
+  for (const { cuboid, look, tint } of labels.sort((a, b) => Number(b.look.isChosen) - Number(a.look.isChosen))) {
+    const corners = footprint(cuboid),
+      u = Math.max(...corners.map(([, y]) => view.u(y))) + 4,
+      v = Math.min(...corners.map(([x]) => view.v(x))) + 14;
+    tags.put(look.name, u, v, look.isChosen ? "#fff" : tint, look.isLead ? "strong" : look.isChosen ? "must" : "weak");
+  }
+  const draft = get("draft");
+  if (draft?.track === null && draft.cuboid)
+    drawOne(ctx, view, draft.cuboid, true, {
+      tint: ui("accent"),
+      dash: [],
+      width: 2.5,
+      isLead: false,
+      isChosen: true,
+      name: "",
+    });
+}
+
+/**
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Viewport} view
+ * @param {Cuboid} cuboid
+ * @param {boolean} isKeyframe
+ * @param {import("./style.js").Look} look
+ */
+function drawOne(ctx, view, cuboid, isKeyframe, look) {
+  ctx.strokeStyle = ctx.fillStyle = look.tint;
+  trace(ctx, view, footprint(cuboid));
+  ctx.closePath();
+  ctx.globalAlpha = look.isLead ? 0.35 : 0.14;
+  ctx.fill();
+  ctx.globalAlpha = 1;
+  ctx.lineWidth = look.width;
+  ctx.setLineDash(look.dash);
+  ctx.stroke();
+  ctx.setLineDash([]);
+  trace(ctx, view, [[cuboid.center[0], cuboid.center[1]], nose(cuboid)]);
+  ctx.stroke();
+  if (!isKeyframe) return;
+  ctx.beginPath();
+  ctx.arc(view.u(cuboid.center[1]), view.v(cuboid.center[0]), HANDLE_PX - 0.5, 0, 2 * Math.PI);
+  ctx.fill();
+}
+
+/** @param {CanvasRenderingContext2D} ctx @param {Viewport} view @param {Cuboid} cuboid */
+function drawHandles(ctx, view, cuboid) {
+  const corners = footprint(cuboid),
+    at = knob(cuboid, KNOB_PX / view.scale);
+  ctx.strokeStyle = ui("text");
+  ctx.fillStyle = ui("panel");
+  ctx.lineWidth = 1.5;
+  trace(ctx, view, [nose(cuboid), at]);
+  ctx.stroke();
+  const edges = corners.map(
+    ([x, y], place) =>
+      /** @type {[number, number]} */ ([(x + corners[(place + 1) % 4][0]) / 2, (y + corners[(place + 1) % 4][1]) / 2]),
+  );
+  for (const [x, y] of [...edges, at]) {
+    ctx.beginPath();
+    ctx.arc(view.u(y), view.v(x), HANDLE_PX, 0, 2 * Math.PI);
+    ctx.fill();
+    ctx.stroke();
+  }
+}

@@ -1,0 +1,31 @@
+/** Drawing style of a label: colour by role, line style by state. */
+import { color, onPicture, ui } from "../../core/colors.js";
+import { get } from "../../core/store.js";
+import { leadAt, shown, trackOf } from "../state/labels.js";
+
+/** @typedef {{tint: string, dash: number[], width: number, isLead: boolean, isChosen: boolean, name: string}} Look */
+
+/** @param {number} id @param {boolean} isOnPicture @returns {Look|null} null if hidden */
+export function lookOf(id, isOnPicture) {
+  const track = trackOf(id),
+    isChosen = id === get("track");
+  if (!track || (track.state === "rejected" && !isChosen)) return null;
+  const isLead = leadAt(shown())?.lead === id;
+  const shade = (/** @type {string} */ role) => (isOnPicture ? onPicture(role) : color(role));
+  const tint =
+    track.state === "rejected"
+      ? ui("danger")
+      : isLead
+        ? shade("cipv")
+        : track.state === "proposed"
+          ? shade("path")
+          : shade("fused");
+  return {
+    tint,
+    dash: track.state === "proposed" ? [5, 4] : track.state === "rejected" ? [2, 4] : [],
+    width: isChosen ? 2.5 : 1.5,
+    isLead,
+    isChosen,
+    name: `${isLead ? "lead " : ""}#${id} ${track.label}`,
+  };
+}

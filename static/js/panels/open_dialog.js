@@ -1,0 +1,60 @@
+/** The dialog for opening another recording. */
+import { request } from "../core/api.js";
+import { $, el, text } from "../core/dom.js";
+import { refused } from "./notices.js";
+import { get, on } from "../core/store.js";
+
+const dialog = $("#source-dialog", HTMLDialogElement);
+/** The last URI that could not be opened, so that a typo can be corrected. @type {string|null} */
+let wanted = null;
+/** @type {string|null|undefined} */
+let openUri;
+
+export function setUp() {
+  $("#source-button").addEventListener("click", open);
+  on(["state"], () => {
+    const state = get("state");
+    if (state?.uri !== openUri) wanted = null;
+    openUri = state?.uri;
+    text($("#source-title"), state?.title || state?.uri || "opening …");
+  });
+}
+
+export async function open() {
+  /** @type {{sources: {uri: string, title: string}[], open: string|null}} */
+  const { sources, open: current } = await request("api/sources").catch(() => ({ sources: [], open: null }));
+  const field = el("input", {
+    type: "text",
+    name: "uri",
+    value: wanted ?? current ?? "",
+    placeholder: "pcap:<file>, rosbag:<path>, kitti:<folder>, sim:<scenario>",
+    aria: { label: "Recording URI" },
+    spellcheck: false,
+  });
+  const form = el("form", { class: "open-row", method: "dialog" }, field, el("button", { textContent: "Open" }));
+  form.addEventListener("submit", () => choose(field.value));
+  const list = sources.map(({ uri, title }) => {
+    const button = el(
+      "button",
+      { type: "button", onclick: () => choose(uri) },
+      el("span", { textContent: title }),
+      el("code", { textContent: uri }),
+    );
+    if (uri === current) button.setAttribute("aria-current", "true");
+    return button;
+  });
+  dialog.replaceChildren(
+    el("h2", { textContent: "Open a recording" }),
+    form,
+    el("div", { class: "open-list" }, ...list),
+  );
+  dialog.showModal();
+  field.select();
+}
+
+/** @param {string} uri */
+function choose(uri) {
+  dialog.close();
+  wanted = uri.trim() || null;
+  if (uri.trim()) request("api/source", "POST", { uri }).catch(refused);
+}
