@@ -95,7 +95,9 @@ def track(
     velocity = filters.mean[:, 2:]
     if params.filter == "trajectory":
         velocity = slopes(history[:, -params.trajectory_frames :, :3])
-    sideways = rigid_sideways(history[:, -_SIDES_FRAMES:]).tolist()
+    sideways: list[float | None] = [None] * len(history)
+    if params.rigid_sideways:
+        sideways = rigid_sideways(history[:, -_SIDES_FRAMES:]).tolist()
 
     # A track that found its obstacle is updated; one that did not is carried, or dropped
     tracks, rows = [], []

@@ -108,7 +108,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "default": {},
     "paper": {
         "box": {"method": "axis_aligned"},
-        "lidar_tracking": {"filter": "trajectory"},
+        "lidar_tracking": {"filter": "trajectory", "rigid_sideways": False},
         "detection": {"car_prior": 1.0},
         "distance": {
             "coefficient": 1829.1,

@@ -104,8 +104,8 @@ class LidarTrack(NamedTuple):
     """Not seen in this frame."""
     unseen_s: float = 0.0
     """Time since it was last seen."""
-    rigid_mps: float = 0.0
-    """How fast both sides of it surely move together along ego y, relative to ego."""
+    rigid_mps: float | None = None
+    """How fast both sides of it surely move together along ego y, relative to ego; None where that is not asked."""
 
 
 @dataclass(frozen=True)

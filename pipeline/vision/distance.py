@@ -107,8 +107,9 @@ def measure(
     range_m = np.where(range_m <= params.max_m, range_m, np.nan)
     # what changes from picture to picture is the box's height; what lasts is the object's own height
     height_px = np.maximum(boxes[:, 3] - boxes[:, 1], 1.0)
-    noise_share = np.hypot(np.abs(law.exponent) * params.height_sigma_px / height_px, _NOISE_SHARE)
-    sigma_m = range_m * np.hypot(noise_share, params.size_spread)
+    pixel_share = np.abs(law.exponent) * params.height_sigma_px / height_px
+    noise_share = np.hypot(pixel_share, _NOISE_SHARE)
+    sigma_m = range_m * np.hypot(pixel_share, params.size_spread)
     if params.binning:
         range_m = np.array([binned(float(value)) for value in range_m], dtype=np.float64)
     place = np.full((len(boxes), 2), np.nan)
