@@ -74,8 +74,6 @@ def render(text: str, file: str) -> Page:
         for index, child in enumerate(children):
             if child.type == "link_open":
                 _point(child, next(each for each in children[index:] if each.type == "link_close"), file)
-            elif child.type == "image":
-                child.attrSet("loading", "lazy")
     body = _parser().renderer.render(tokens, _parser().options, {})
     title = next((each.text for each in headings if each.level == 1), file)
     body = str(body).replace("<table>", '<div class="wide"><table>').replace("</table>", "</table></div>")

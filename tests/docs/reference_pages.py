@@ -1,4 +1,4 @@
-"""Writes the reference pages that are made from the code: parameters and command line. ``make docs`` runs it.
+"""Writes what the documentation takes from the code: parameters, command line, layers. ``make docs`` runs it.
 
 It stands here and not in the program: it reads the whole command line, which only the top layer may import.
 """
@@ -6,6 +6,8 @@ It stands here and not in the program: it reads the whole command line, which on
 from __future__ import annotations
 
 import argparse
+import re
+import tomllib
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,19 +19,38 @@ from app.cli import _CONFIG, COMMANDS, _command
 from app.core.session_folder import SESSIONS
 from pipeline.params import PRESETS, Params
 
-REFERENCE = Path(__file__).resolve().parents[2] / "docs" / "reference"
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
 _MADE = "*This page is made from the code by `make docs`; change the declarations, not the page.*"
 
 
 def main() -> None:
-    """Write both pages."""
+    """Write them all."""
     for name, text in pages().items():
-        (REFERENCE / name).write_text(text, encoding="utf-8")
+        (DOCS / name).write_text(text, encoding="utf-8")
 
 
 def pages() -> dict[str, str]:
-    """File name → text."""
-    return {"parameters.md": parameters_page(), "cli.md": cli_page()}
+    """File below ``docs/`` → its text."""
+    return {
+        "reference/parameters.md": parameters_page(),
+        "reference/cli.md": cli_page(),
+        "architecture.md": with_layers((DOCS / "architecture.md").read_text(encoding="utf-8")),
+    }
+
+
+# ---------------------------------------------------------------- layers
+
+
+def with_layers(text: str) -> str:
+    """The architecture page with the layers that import-linter holds, in its blocks named ``layers <package>``."""
+    for contract in tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]:
+        if contract["type"] == "layers":
+            (package,) = contract["containers"]
+            block = "\n".join((f"```layers {package}", *contract["layers"], "```"))
+            text, count = re.subn(rf"```layers {package}\n.*?```", block, text, flags=re.DOTALL)
+            assert count == 1, f"docs/architecture.md needs one block of the layers of {package}"
+    return text
 
 
 # ---------------------------------------------------------------- parameters
