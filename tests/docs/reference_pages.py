@@ -44,7 +44,9 @@ def pages() -> dict[str, str]:
 
 def with_layers(text: str) -> str:
     """The architecture page with the layers that import-linter holds, in its blocks named ``layers <package>``."""
-    for contract in tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]:
+    for contract in tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ]:
         if contract["type"] == "layers":
             (package,) = contract["containers"]
             block = "\n".join((f"```layers {package}", *contract["layers"], "```"))
@@ -68,8 +70,8 @@ def _parameter_lines() -> Iterator[str]:
         _MADE,
         "",
         "Every tunable of the pipeline is declared once, in `pipeline/params/`. The sliders of the dashboard, `--set`,",
-        "`--params` and the API all come from that declaration. A value out of its range is refused, and so is a name that",
-        "does not exist.",
+        "`--params` and the API all come from that declaration. A value out of its range is refused, and so is a name",
+        "that does not exist.",
         "",
         "    cipv run sim:straight --set cluster.z_weight=0.3 --set cipv.confirm_hits=2",
         "    cipv params --preset paper --yaml > mine.yaml",
@@ -134,8 +136,8 @@ def _cli_lines() -> Iterator[str]:
         "`cipv COMMAND --help` prints the same. `make install` puts the program at `.venv/bin/cipv`.",
         "",
         "Exit status: 0 done, 1 the work failed, 2 bad usage or bad input. An error is one line on standard error; set",
-        "`CIPV_DEBUG=1` for the traceback of an unexpected one. Results go to standard output, everything else to standard",
-        "error, so output can be piped.",
+        "`CIPV_DEBUG=1` for the traceback of an unexpected one. Results go to standard output, everything else to",
+        "standard error, so output can be piped.",
         "",
         "## Environment",
         "",
@@ -143,22 +145,29 @@ def _cli_lines() -> Iterator[str]:
         "|---|---|",
         "| `CIPV_DATA` | folder of data sets and networks (`models/`) of this machine |",
         "| `CIPV_LABELS_URL` | database that labels are kept in; `--labels` and `--database` override it |",
-        "| `CIPV_TOKEN`, `CIPV_DISPLAY_TOKEN` | tokens of the links for other machines, 16 or more letters and digits |",
+        "| `CIPV_TOKEN`, `CIPV_DISPLAY_TOKEN` | tokens of the links for other machines, at least 16 characters |",
         "| `CIPV_DEBUG` | when set, an unexpected error shows its traceback |",
     )
-    for title, about, name, prefix in _SHARED:
+    for title, about, name, prefixes in _SHARED:
         yield from ("", f"## {title}", "", about, "")
-        yield from _table([row for action in parser_of(name)._actions if (row := _option(action, prefix)) is not None])
+        yield from _table(
+            [row for action in parser_of(name)._actions if (row := _option(action, prefixes)) is not None]
+        )
     for name in commands():
         yield from ("", f"## cipv {name}", "", *_command_lines(name))
 
 
 _SHARED = (
-    ("Source options", "Of every command that opens a recording through the pipeline.", "run", "source."),
-    ("Pipeline options", "Of every command that runs the pipeline: its parameters and its networks.", "run", "line."),
-    ("Server options", "Of the commands that serve the dashboard.", "serve", "server."),
+    ("Source options", "Of every command that opens a recording through the pipeline.", "run", ("source.",)),
+    (
+        "Pipeline options",
+        "Of every command that runs the pipeline: its parameters and its networks.",
+        "run",
+        ("pipeline.", "line."),
+    ),
+    ("Server options", "Of the commands that serve the dashboard.", "serve", ("server.",)),
 )
-"""Options that several commands share: title, about, a command that has them, the prefix of their names in the parser."""
+"""Options that several commands share: title, about, a command that has them, prefixes of their names in the parser."""
 
 
 def commands() -> list[str]:
@@ -199,8 +208,8 @@ def _command_lines(name: str) -> Iterator[str]:
         yield from ("", *_table(own))
     shared = [
         f"[{title.lower()}](#{title.lower().replace(' ', '-')})"
-        for title, _, _, prefix in _SHARED
-        if any(action.dest.startswith(prefix) and action.option_strings for action in parser._actions)
+        for title, _, _, prefixes in _SHARED
+        if any(action.dest.startswith(prefixes) and action.option_strings for action in parser._actions)
     ]
     if shared:
         yield from ("", f"Takes the {', the '.join(shared)} too.")
@@ -212,11 +221,11 @@ def _table(rows: list[tuple[str, str, str]]) -> Iterator[str]:
         yield f"| {' | '.join(_cell(cell) for cell in row)} |"
 
 
-def _option(action: argparse.Action, prefix: str = "") -> tuple[str, str, str] | None:
-    """A row for an option with this prefix; without one, for the command's own and for all that have no name."""
+def _option(action: argparse.Action, prefixes: tuple[str, ...] = ()) -> tuple[str, str, str] | None:
+    """A row for an option with one of these prefixes; without them, for the command's own, and for what has no name."""
     shared = any(action.dest.startswith(each) for *_, each in _SHARED)
-    if prefix:
-        wanted = action.dest.startswith(prefix) and bool(action.option_strings)
+    if prefixes:
+        wanted = action.dest.startswith(prefixes) and bool(action.option_strings)
     else:
         wanted = not shared or not action.option_strings
     if "--help" in action.option_strings or not wanted:
@@ -233,7 +242,9 @@ def _option(action: argparse.Action, prefix: str = "") -> tuple[str, str, str] |
     if action.dest.endswith("person"):
         default = "your login name"
     default = default.replace(str(SESSIONS.parent) + "/", "")
-    is_switch = isinstance(action, argparse.BooleanOptionalAction) or any("--no-" in each for each in action.option_strings)
+    is_switch = isinstance(action, argparse.BooleanOptionalAction) or any(
+        "--no-" in each for each in action.option_strings
+    )
     if default in ("None", "[]") or (is_switch and default == "False"):
         default = ""
     if is_switch and default == "True":

@@ -53,8 +53,9 @@ def parameters(file: str) -> Iterator[str]:
     """What looks like a parameter: in backticks, and given to ``--set``."""
     for span in code_spans(file):
         match = PARAMETER.fullmatch(span)
-        if match and match[1] in Params.model_fields and match[2] not in FILE_ENDINGS:
-            if match[2] not in FIELDS.get(match[1], "").split():  # a field of the result, such as path.carried_by
-                yield span
+        if not match or match[1] not in Params.model_fields or match[2] in FILE_ENDINGS:
+            continue
+        if match[2] not in FIELDS.get(match[1], "").split():  # a field of the result, such as path.carried_by
+            yield span
     for match in re.finditer(r"--set ([a-z_]+\.[a-z0-9_]+)=", (ROOT / file).read_text(encoding="utf-8")):
         yield match[1]

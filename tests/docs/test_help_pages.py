@@ -81,7 +81,9 @@ def test_a_missing_page_is_said_as_a_page(client: httpx.Client) -> None:
     assert "/help/getting-started" in answer.text
 
 
-@pytest.mark.parametrize("path", ["../pyproject.toml", "..%2fpyproject.toml", "%2e%2e/%2e%2e/etc/passwd", "/etc/passwd"])
+@pytest.mark.parametrize(
+    "path", ["../pyproject.toml", "..%2fpyproject.toml", "%2e%2e/%2e%2e/etc/passwd", "/etc/passwd"]
+)
 def test_no_other_file_is_served(client: httpx.Client, path: str) -> None:
     assert client.get(f"/help/{path}").status_code == 404
 

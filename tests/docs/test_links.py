@@ -28,9 +28,11 @@ def test_every_link_leads_somewhere(file: str) -> None:
                 broken.append(target)
             continue
         path = ((ROOT / file).parent / parts.path).resolve() if parts.path else ROOT / file
-        if not path.exists() or not path.is_relative_to(ROOT):
-            broken.append(target)
-        elif parts.fragment and parts.fragment not in anchors(path.relative_to(ROOT).as_posix()):
+        if (
+            not path.exists()
+            or not path.is_relative_to(ROOT)
+            or (parts.fragment and parts.fragment not in anchors(path.relative_to(ROOT).as_posix()))
+        ):
             broken.append(target)
     assert broken == []
 
@@ -49,7 +51,9 @@ def test_a_page_has_one_title(file: str) -> None:
 
 
 def test_every_image_is_small_and_used() -> None:
-    used = {(ROOT / file).parent.joinpath(link.target).resolve() for file in FILES for link in links(file) if link.is_image}
+    used = {
+        (ROOT / file).parent.joinpath(link.target).resolve() for file in FILES for link in links(file) if link.is_image
+    }
     images = set((DOCS / "img").iterdir())
     assert {image.name for image in images if image.stat().st_size > LARGEST_IMAGE_BYTES} == set()
     assert {image.name for image in images - used} == set()
