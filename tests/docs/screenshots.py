@@ -13,8 +13,8 @@ from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 from app.bench.devtools import CHROMIUM, FLAGS
 from app.engine.engine import Engine
 from app.engine.session_recording import RecordingDesk
+from pipeline.detection import detector_for, lanes_for
 from pipeline.params import Params
-from pipeline.run import detector_for, lanes_for
 from pipeline.sources import open_source
 from tests.browser.conftest import Site
 
@@ -49,11 +49,6 @@ def main() -> None:
         page.keyboard.press("a")
         expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %"))
         save(page, "align")
-        page.close()
-
-        page = opened(browser, site)
-        label(page)
-        save(page, "label")
         page.close()
 
         page = browser.new_page(viewport={"width": DISPLAY[0], "height": DISPLAY[1]}, color_scheme="dark")
@@ -114,16 +109,6 @@ def what_if(page: Page) -> None:
     expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
     page.get_by_role("tab", name="Runs").click()
     expect(page.locator(".metrics tbody tr")).not_to_have_count(0)
-    painted(page)
-
-
-def label(page: Page) -> None:
-    """The labeling mode with the pipeline's proposals."""
-    page.keyboard.press("Shift+L")
-    expect(page.locator("#label-bar")).to_be_visible()
-    page.keyboard.press("p")
-    expect(page.locator(".track-row").first).to_be_visible()
-    page.keyboard.press(".")
     painted(page)
 
 

@@ -12,7 +12,9 @@ from app.engine.engine import Engine
 from app.web import help_pages
 from app.web.server import create_app
 from app.web.tokens import Tokens
-from tests.app.web.serving import WAIT_S, running, serving
+from pipeline.params import Params
+from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
+from tests.app.web.serving import WAIT_S, serving
 
 PAGES = sorted(file for file in help_pages.files() if file.endswith(".md"))
 IMAGES = sorted(file for file in help_pages.files() if not file.endswith(".md"))
@@ -20,9 +22,10 @@ TOKENS = Tokens("person-0123456789abcdef", "display-0123456789abcde")
 
 
 @pytest.fixture(scope="module")
-def engine() -> Iterator[Engine]:
-    with running() as engine:
-        yield engine
+def engine() -> Engine:
+    """Not started: help needs no recording."""
+    recording = Recording()
+    return Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri)
 
 
 @pytest.fixture(scope="module")
