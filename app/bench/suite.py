@@ -29,8 +29,10 @@ looks as often as it does then."""
 
 
 def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, Any]]:
-    """The contract's object: stage → median_ms, p99_ms and peers with their ratios. The LiDAR stages come once more as
-    ``stage@kitti`` where a KITTI drive is at hand: its sweeps, cut to a VLP-16's rings, are twice as dense."""
+    """The object of docs/reference/results.md: stage → median_ms, p99_ms and peers with their ratios.
+
+    The LiDAR stages come once more as ``stage@kitti`` where a KITTI drive is at hand: its sweeps, cut to a VLP-16's
+    rings, are twice as dense."""
     source = _source()
     print(f"cipv: measuring on {source.title}", file=sys.stderr)
     frames = [source.frame(i) for i in range(min(FRAMES, len(source)))]

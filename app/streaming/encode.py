@@ -11,7 +11,7 @@
                         ``points`` × uint8         ring, 0 = lowest beam
                         ``points`` × uint8         ms before the sweep's newest point; 255 unknown
 
-The header holds ``state`` (playback), ``result`` (the contract's object) and ``display``: geometry projected by the
+The header holds ``state`` (playback), ``result`` (docs/reference/results.md) and ``display``: geometry projected by the
 alignment in use, in pixels of the sent picture, so that no view projects anything.
 """
 

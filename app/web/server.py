@@ -33,6 +33,7 @@ from app.web.routes.alignment import alignment_router
 from app.web.routes.clips import clips_router
 from app.web.routes.drive import drive_router
 from app.web.routes.health import health_router
+from app.web.routes.help import help_router
 from app.web.routes.label_acts import label_acts_router
 from app.web.routes.label_files import IMPORT, label_files_router
 from app.web.routes.labels import labels_router
@@ -93,6 +94,7 @@ def create_app(
     app.include_router(project_router(engine))
     app.include_router(rerun_router(engine, viewer))
     app.include_router(viser_router(viser_port, access.allowed))
+    app.include_router(help_router())
     app.add_api_route("/palette.css", _palette, include_in_schema=False)
     app.mount("/", _Pages(engine.drives.turn.asked), name="pages")
     return app

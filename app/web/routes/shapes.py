@@ -1,4 +1,4 @@
-"""What the API answers, as types: the contract's result, the state of the stream, the parameters.
+"""What the API answers, as types: the result (docs/reference/results.md), the state of the stream, the parameters.
 
 Answers are made elsewhere and sent as they are; these say what is in them, to OpenAPI and to who writes a client. A
 test holds each against real answers, key by key.

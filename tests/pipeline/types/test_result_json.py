@@ -1,4 +1,5 @@
-"""``to_json`` against the field lists of the contract, in both directions, and against what must never be in a file."""
+"""``to_json`` against the field lists of docs/reference/results.md, in both directions, and against what must never be
+in a file."""
 
 from __future__ import annotations
 
