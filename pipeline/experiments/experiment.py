@@ -17,7 +17,7 @@ Suite = Literal["paper", "curves", "euroncap", "iso"]
 
 
 @dataclass(frozen=True)
-class Replay:
+class ExperimentDrive:
     """A drive that can be seen again. name: fit for a file. scenario: with the ego vehicle as driven, or its script.
     text: what came of it. detections: what was seen in its pictures; null: what the embedded network saw there."""
 
@@ -42,7 +42,7 @@ Outcome = TypeVar("Outcome")
 @dataclass(frozen=True)
 class Experiment(Generic[Case, Outcome]):
     """cases: what is to be driven, in short or in full; each can be sent to another process. run: one case to its
-    outcome, a pure function at a module's top level. report: all of them, in order, to a section. replay: the drive
+    outcome, a pure function at a module's top level. report: all of them, in order, to a section. as_drive: the drive
     behind an outcome."""
 
     name: str
@@ -51,4 +51,4 @@ class Experiment(Generic[Case, Outcome]):
     cases: Callable[[bool], Sequence[Case]]
     run: Callable[[Case], Outcome]
     report: Callable[[Sequence[Case], Sequence[Outcome]], Section]
-    replay: Callable[[Case, Outcome], Replay]
+    as_drive: Callable[[Case, Outcome], ExperimentDrive]

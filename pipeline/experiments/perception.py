@@ -38,7 +38,7 @@ def eyes_for(boxes: Boxes) -> Eyes:
 
 
 def detections_for(boxes: Boxes) -> Detections | None:
-    """What a replay is given to see in its pictures; null: what the embedded network sees there."""
+    """What a as_drive is given to see in its pictures; null: what the embedded network sees there."""
     return GIVEN if boxes == "truth" else None
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.recording import topics
-from pipeline.recording.mcap_reader import McapFile
-from pipeline.recording.provenance import About
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.mcap.reader import McapFile
+from pipeline.recording.session.provenance import About
+from pipeline.recording.session.source import SessionSource
 from pipeline.types.source import Source, SourceError
 
 _GAP_STEPS = 1.5

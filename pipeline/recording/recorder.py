@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from pipeline.params import Params
-from pipeline.recording.provenance import About
 from pipeline.recording.segments import NEVER, Rotation, Segments
-from pipeline.recording.velodyne_scan import RawLidar
+from pipeline.recording.session.provenance import About
+from pipeline.recording.session.velodyne_scan import RawLidar
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
 from pipeline.types.camera_shot import Shot
 

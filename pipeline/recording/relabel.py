@@ -20,9 +20,9 @@ from mcap.writer import MCAP0_MAGIC, Writer
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
-from pipeline.recording.mcap_index import read_summary, summary_start
-from pipeline.recording.mcap_output import CHUNK_BYTES
-from pipeline.recording.mcap_reader import McapFile, Stored
+from pipeline.recording.mcap.index import read_summary, summary_start
+from pipeline.recording.mcap.output import CHUNK_BYTES
+from pipeline.recording.mcap.reader import McapFile, Stored
 
 _PIECE_BYTES = 1 << 20
 _CRC_BYTES = 4

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.common.progress import Progress, silent
-from pipeline.recording.provenance import About
 from pipeline.recording.relabel import relabel
 from pipeline.recording.rewrite import clip
-from pipeline.recording.session_source import SessionSource
-from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.session.provenance import About
+from pipeline.recording.session.source import SessionSource
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.types.source import AnySource, Recorded, Source
 
 

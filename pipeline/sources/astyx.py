@@ -31,7 +31,7 @@ from pipeline.formats.file_reading import (
 )
 from pipeline.formats.text_rows import parse_rows
 from pipeline.types import F64, CameraCalibration, Frame, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _CHANNELS = 16
 _HALF_ROTATION_NS = 50_000_000
@@ -45,6 +45,11 @@ _HEAD_BYTES = 4096
 _LABELS = {"motorcyclist": "motorcycle", "cyclist": "bicycle", "towed object": "trailer"}
 _RING_OF_LASER = np.array([laser // 2 + 8 * (laser % 2) for laser in range(_CHANNELS)], dtype=np.uint8)
 """VLP-16 lasers fire −15°, +1°, −13°, +3°, … (Velodyne manual 63-9243, table 9-1); rings count upwards."""
+
+
+def open_recording(uri: str, rest: str, how: Opening) -> AstyxSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return AstyxSource(uri, rest)
 
 
 class AstyxSource:

@@ -27,7 +27,7 @@ from pipeline.formats.kitti_calibration import KittiCalibration, parse_object_ca
 from pipeline.formats.kitti_records import parse_labels, parse_oxts, parse_timestamps
 from pipeline.sources.hdl64_rings import keep_rings, match_vlp16, ring_elevations_deg, turns
 from pipeline.types import F32, F64, EgoState, Frame, GnssFix, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _STEP_NS = 100_000_000
 _RINGS = 64
@@ -47,6 +47,11 @@ class _Files:
     raw_calibration: tuple[Path, Path] | None
     lidar_stamps: tuple[int, ...]
     camera_stamps: tuple[int, ...]
+
+
+def open_recording(uri: str, rest: str, how: Opening) -> KittiSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return KittiSource(uri, rest, how.rings)
 
 
 class KittiSource:

@@ -18,7 +18,7 @@ from pipeline.formats.point_cloud_fields import cloud_of
 from pipeline.sources import rig as rig_files
 from pipeline.sources.uri_options import split_options
 from pipeline.types import Frame, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _STEP_NS = 100_000_000
 _PICTURES = ("", "images", "image", "camera", "image_02")
@@ -27,6 +27,11 @@ _CLOUDS = ("", "pcd", "lidar", "velodyne", "points")
 _NUMBER = re.compile(r"^\d+(\.\d+)?$")
 _EPOCH_S = 631_152_000  # 1990: smaller numbers count frames
 _UNITS_NS = ((10**18, 1), (10**15, 1_000), (10**12, 1_000_000))
+
+
+def open_recording(uri: str, rest: str, how: Opening) -> PcdSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return PcdSource(uri, rest)
 
 
 class PcdSource:

@@ -189,7 +189,7 @@ def _nmea_place(line: str) -> tuple[str, tuple[float, float], float] | None:
 
 
 def _from_session(path: str, name: str) -> Route:
-    from pipeline.recording.session_source import SessionSource  # half a second of imports: only who opens one pays
+    from pipeline.recording.session.source import SessionSource  # half a second of imports: only who opens one pays
 
     session = SessionSource(f"mcap:{path}", path)
     try:

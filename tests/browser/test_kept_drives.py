@@ -9,7 +9,6 @@ from urllib.parse import parse_qs, urlsplit
 from playwright.sync_api import Browser
 
 from app.reports.experiment_drives import ReplayFolder
-from pipeline.experiments.experiment import Replay
 from pipeline.experiments.iso15622.experiment import ISO
 from pipeline.experiments.straight_track import parameters
 from pipeline.simulation import scenario

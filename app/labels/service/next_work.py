@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 What = Literal["unlabelled", "disagreement", "proposed", "sent_back", "unreviewed"]
 Key = tuple[ItemKind, int]
-"""Kind and number of a label."""
+"""TaskKind and number of a label."""
 _NOTHING: dict[What, str] = {
     "unlabelled": "who leads is said in every frame there",
     "disagreement": "the pipeline and the accepted labels agree there",

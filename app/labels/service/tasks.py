@@ -14,7 +14,7 @@ from pipeline.common.errors import BadInput
 
 logger = logging.getLogger("cipv.labels")
 
-Kind = Literal["propose", "import"]
+TaskKind = Literal["propose", "import"]
 _PATIENCE_S = 10.0
 _TELL_EVERY_S = 0.1
 
@@ -29,7 +29,7 @@ class TaskState:
     begins, or what it was about is closed."""
 
     id: int
-    what: Kind
+    what: TaskKind
     done: int = 0
     total: int = 0
     note: str = ""
@@ -66,7 +66,7 @@ class Tasks:
         """Null while there was none."""
         return self._state
 
-    def begin(self, what: Kind, work: Work) -> int:
+    def begin(self, what: TaskKind, work: Work) -> int:
         """Its number. ActRefused while another one runs."""
         with self._lock:
             if self._state is not None and self._state.running:

@@ -20,7 +20,7 @@ from app.labels.errors import ActRefused, BadAct
 from app.labels.service.tasks import Progress, Work, to_nobody
 from app.labels.store.drive_labels import DriveLabels
 from pipeline.common.errors import BadInput
-from pipeline.labels.formats.base import Drive, FormatName, drive_of
+from pipeline.labels.formats.base import FormatName, LabeledDrive, drive_of
 from pipeline.labels.formats.registry import export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
 
@@ -83,7 +83,7 @@ def importing_file(labels: DriveLabels, recording: Recording, person: str, file:
     return work
 
 
-def drive_for(recording: Recording, progress: Progress = to_nobody) -> Drive:
+def drive_for(recording: Recording, progress: Progress = to_nobody) -> LabeledDrive:
     """What formats must know of the drive: looked for once while it is open, and read from its source only where no
     run has."""
     with recording.describing:

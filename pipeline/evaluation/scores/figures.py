@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pipeline.evaluation.scores.alarms import Alarm, Kind
+from pipeline.evaluation.scores.alarms import Alarm, AlarmKind
 from pipeline.evaluation.scores.drive import DriveScore
 from pipeline.evaluation.scores.tracking import Counts, hota_of, idf1_sums, mota_sums, precision_sums, recall_sums
 
@@ -169,19 +169,19 @@ def _hota(parts: Sequence[Counts | None]) -> float | None:
     return None if value is None else 100.0 * value
 
 
-def _alarms(kind: Kind, drive: DriveScore) -> list[Alarm]:
+def _alarms(kind: AlarmKind, drive: DriveScore) -> list[Alarm]:
     return [alarm for alarm in drive.alarms if alarm.kind == kind]
 
 
-def _delay(kind: Kind, drive: DriveScore) -> Sums:
+def _delay(kind: AlarmKind, drive: DriveScore) -> Sums:
     return _sums(alarm.delay_s for alarm in _alarms(kind, drive))
 
 
-def _never_acted(kind: Kind, drive: DriveScore) -> Sums:
+def _never_acted(kind: AlarmKind, drive: DriveScore) -> Sums:
     return _sums(100.0 * (each.acted_ns is None) for each in _alarms(kind, drive) if each.due_ns is not None)
 
 
-def _without_danger(kind: Kind, drive: DriveScore) -> Sums:
+def _without_danger(kind: AlarmKind, drive: DriveScore) -> Sums:
     return float(sum(alarm.due_ns is None for alarm in _alarms(kind, drive))), drive.guarded_s / 60.0
 
 

@@ -24,8 +24,8 @@ from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.detection_model import BoxNoise, LineNoise
 from pipeline.simulation.sensors.rig import Sensors
 from pipeline.simulation.sensors.truth_lanes import lane_points
-from pipeline.simulation.world import world
-from pipeline.simulation.world.world import ActorState, World
+from pipeline.simulation.world import world_state
+from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.step import State, step
 from pipeline.types import Frame, Path, Result
 from pipeline.warm_up import warm_up
@@ -70,7 +70,7 @@ def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[Wor
     """Each moment of a drive along its script, with given detections. lines null: the road has none."""
     sensors = Sensors(scene, scene.ego.start_m + scene.ego.travelled_m(scene.duration_s))
     for index in range(scene.frame_count()):
-        now = world.at(scene, index / scene.rate_hz)
+        now = world_state.at(scene, index / scene.rate_hz)
         frame = sensors.frame(now, index, round(now.t_s * 1e9), picture=False)
         assert frame.camera is not None
         found = truth_boxes.boxes(now, frame.camera, BOXES, scene.seed, index)

@@ -41,7 +41,7 @@ def _no_points(frame: int) -> F32 | None:
 
 
 @dataclass(frozen=True)
-class Drive:
+class LabeledDrive:
     """The recording that labels belong to. points: (N, 4) float32 of a frame's sweep, null without one; read when
     asked for."""
 
@@ -73,7 +73,7 @@ def drive_of(
     source: Source,
     progress: Progress = silent,
     frame_of: Callable[[int], Frame] | None = None,
-) -> Drive:
+) -> LabeledDrive:
     """What is known of every frame, without points and pictures where the source can tell it so. frame_of: who may
     have whole frames already; a picture's pixels are not asked for."""
     read = frame_of or source.frame
@@ -91,7 +91,7 @@ def drive_of(
         sweep = source.sweep(index) if isinstance(source, InParts) else read(index).sweep
         return sweep.points if sweep is not None else None
 
-    return Drive(source.uri, tuple(shots), points)
+    return LabeledDrive(source.uri, tuple(shots), points)
 
 
 def _size(frame: Frame) -> tuple[int, int] | None:
@@ -107,11 +107,11 @@ class Imported:
     notes: tuple[str, ...] = ()
 
 
-Write = Callable[[LabelSet, Drive, Path], tuple[str, ...]]
+Write = Callable[[LabelSet, LabeledDrive, Path], tuple[str, ...]]
 """Labels that hold nothing but what the format can, the drive, where to. Gives sentences about what was written
 otherwise than it was."""
 
-Read = Callable[[Path, Drive, Origin], Imported]
+Read = Callable[[Path, LabeledDrive, Origin], Imported]
 """The file or folder, the drive, and who made labels of which the file does not say that."""
 
 
@@ -125,7 +125,7 @@ class Format:
     read: Read
 
 
-def check_extrinsic(labels: LabelSet, drive: Drive, what: str) -> None:
+def check_extrinsic(labels: LabelSet, drive: LabeledDrive, what: str) -> None:
     """BadInput when cuboids and boxes of the same sightings lie apart in the picture: the sign of an extrinsic that was
     taken the wrong way round, or of labels of another recording."""
     count, apart = 0, 0

@@ -13,7 +13,7 @@ from pathlib import Path
 from pydantic import BaseModel, Field, TypeAdapter
 
 from pipeline.common.errors import BadInput
-from pipeline.labels.formats.base import Drive, Imported, write_file
+from pipeline.labels.formats.base import Imported, LabeledDrive, write_file
 from pipeline.labels.formats.reading import parse_as, read_bytes
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
 from pipeline.types import Box
@@ -50,7 +50,7 @@ class _Coco(BaseModel):
 _FILE = TypeAdapter(_Coco)
 
 
-def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
+def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     """BadInput when the recording has no pictures, whose size the format wants."""
     categories = {name: place for place, name in enumerate(sorted({track.label for track in labels.tracks}), start=1)}
     size = next((shot.size for shot in drive.shots if shot.size is not None), None)
@@ -84,7 +84,7 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
     )
 
 
-def read(path: Path, drive: Drive, origin: Origin) -> Imported:
+def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     """Boxes without ``track_id`` are tracks of their own."""
     coco = parse_as(_FILE, read_bytes(path), str(path))
     frames = _frames(coco.images, drive, str(path))
@@ -140,7 +140,7 @@ def _annotations(labels: LabelSet, categories: dict[str, int]) -> list[dict[str,
     ]
 
 
-def _frames(images: list[_Image], drive: Drive, what: str) -> dict[int, int]:
+def _frames(images: list[_Image], drive: LabeledDrive, what: str) -> dict[int, int]:
     """Image id → frame: by ``frame_index`` where it is said, else by the file's name without its ending."""
     by_name = {name: index for index, name in enumerate(drive.file_names())}
     frames: dict[int, int] = {}

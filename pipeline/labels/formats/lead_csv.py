@@ -18,7 +18,7 @@ from pydantic import TypeAdapter
 
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import closest_on_polygon
-from pipeline.labels.formats.base import Drive, Imported, write_file
+from pipeline.labels.formats.base import Imported, LabeledDrive, write_file
 from pipeline.labels.formats.reading import fit, read_bytes
 from pipeline.labels.model import LabelSet, Lead, LeadRange, Origin, State
 
@@ -32,7 +32,7 @@ _STATE: TypeAdapter[State] = TypeAdapter(State)
 _MAKER: TypeAdapter[Literal["pipeline", "person", "import"]] = TypeAdapter(Literal["pipeline", "person", "import"])
 
 
-def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
+def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(_COLUMNS)
@@ -45,7 +45,7 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
     return (f"{rejected:,} rejected ranges of the lead left out: a frame has one lead here",) if rejected else ()
 
 
-def read(path: Path, drive: Drive, origin: Origin) -> Imported:
+def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     data = read_bytes(path).decode("utf-8-sig", "replace")
     found: dict[int, LeadRange | None] = {}
     try:
@@ -83,7 +83,7 @@ def _seen(labels: LabelSet, lead: LeadRange | None, index: int) -> tuple[str, ..
     return track.label, f"{distance_m:.3f}", f"{x:.3f}", f"{y:.3f}"
 
 
-def _frame(row: dict[str, str], drive: Drive, what: str) -> int:
+def _frame(row: dict[str, str], drive: LabeledDrive, what: str) -> int:
     frame = _whole(row["frame"], what)
     if not 0 <= frame < len(drive.shots):
         raise BadInput(f"{what}: frame {frame} of {len(drive.shots)}")

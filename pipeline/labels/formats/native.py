@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter
 
 from pipeline.common.errors import BadInput
-from pipeline.labels.formats.base import Drive, Imported, write_file
+from pipeline.labels.formats.base import Imported, LabeledDrive, write_file
 from pipeline.labels.formats.reading import fit, parse_json, read_bytes
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel
 from pipeline.labels.validate import check
@@ -60,16 +60,16 @@ def as_range(tag: Mapping[str, Any]) -> dict[str, Any]:
     return body | {"first": frame, "last": frame}
 
 
-def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
+def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     write_file(out, _bytes(labels))
     return ()
 
 
-def read(path: Path, drive: Drive, origin: Origin) -> Imported:
+def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     return onto(from_json(read_bytes(path), str(path)), drive, str(path))
 
 
-def onto(labels: LabelSet, drive: Drive, what: str) -> Imported:
+def onto(labels: LabelSet, drive: LabeledDrive, what: str) -> Imported:
     """Labels of this drive, or of one that it is a clip of or that is a clip of it, counted by this drive's frames.
 
     Frames are known by their name and time. BadInput when the two have no frame in common.

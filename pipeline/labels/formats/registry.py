@@ -7,18 +7,13 @@ from pathlib import Path
 
 from pipeline.common.errors import BadInput
 from pipeline.common.garbage_collection import gc_paused
-from pipeline.labels.formats import (
-    coco,
-    kitti,
-    lead_csv,
-    native,
-    nuscenes,
-    nuscenes_read,
-    openlabel,
-    openlabel_read,
-    session,
-)
-from pipeline.labels.formats.base import Drive, Format, FormatName, Imported, check_extrinsic
+from pipeline.labels.formats import coco, lead_csv, native, session
+from pipeline.labels.formats.base import Format, FormatName, Imported, LabeledDrive, check_extrinsic
+from pipeline.labels.formats.kitti.files import files as kitti
+from pipeline.labels.formats.nuscenes.write import read as nuscenes_read
+from pipeline.labels.formats.nuscenes.write import write as nuscenes
+from pipeline.labels.formats.openlabel.write import read as openlabel_read
+from pipeline.labels.formats.openlabel.write import write as openlabel
 from pipeline.labels.formats.parts import EVERYTHING, Part, reduce
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.labels.validate import check
@@ -43,7 +38,7 @@ FORMATS: dict[FormatName, Format] = {
 }
 
 
-def export_labels(labels: LabelSet, drive: Drive, name: FormatName, out: Path) -> tuple[str, ...]:
+def export_labels(labels: LabelSet, drive: LabeledDrive, name: FormatName, out: Path) -> tuple[str, ...]:
     """Write labels of a drive as a new file or folder. Returns a sentence for each thing that the format cannot hold.
 
     BadInput when the labels are of another recording or cannot be, when ``out`` exists, or when the format needs what
@@ -56,7 +51,7 @@ def export_labels(labels: LabelSet, drive: Drive, name: FormatName, out: Path) -
         return (*placed.notes, *lost, *kind.write(kept, drive, out))
 
 
-def import_labels(path: Path, drive: Drive, name: FormatName, origin: Origin) -> Imported:
+def import_labels(path: Path, drive: LabeledDrive, name: FormatName, origin: Origin) -> Imported:
     """Read a file or folder as labels of a drive. BadInput in one sentence when it is none, or not of this drive."""
     kind = FORMATS[name]
     if not path.exists():

@@ -16,7 +16,7 @@ from pipeline.simulation.sensors.camera import DrawnCamera, calibration
 from pipeline.simulation.sensors.lidar import Lidar
 from pipeline.simulation.world.planned_route import planned_route
 from pipeline.simulation.world.roadside import Roadside
-from pipeline.simulation.world.world import World
+from pipeline.simulation.world.world_state import World
 from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Route, Sweep
 
 _BEFORE_M, _BEYOND_M = 100.0, 600.0

@@ -12,25 +12,30 @@ from dataclasses import replace
 from typing import TypeVar
 
 from pipeline.params import SyncParams
-from pipeline.sources.live.camera import CameraInput
-from pipeline.sources.live.can import CanInput
 from pipeline.sources.live.clock import HostClock
-from pipeline.sources.live.config import LiveConfig
-from pipeline.sources.live.gnss import GnssInput
+from pipeline.sources.live.config import LiveConfig, load
+from pipeline.sources.live.devices.camera import CameraInput
+from pipeline.sources.live.devices.can import CanInput
+from pipeline.sources.live.devices.gnss import GnssInput
+from pipeline.sources.live.devices.lidar import LidarInput
+from pipeline.sources.live.devices.sensor_input import Input
 from pipeline.sources.live.gnss_motion import MotionFromGnss
 from pipeline.sources.live.health import StreamStats, not_delivering
-from pipeline.sources.live.lidar import LidarInput
-from pipeline.sources.live.sensor_input import Input
 from pipeline.sources.live.sync import Stream, Synchroniser, Together
 from pipeline.sources.rig import calibration_for
 from pipeline.types import F64, EgoState, Frame, GnssFix, Picture, StreamHealth, Sweep
 from pipeline.types.camera_shot import Shot
-from pipeline.types.source import Tap
+from pipeline.types.source import Opening, Tap
 
 T = TypeVar("T")
 
 _LOOK_AGAIN_S = 0.005
 """How often a tick that waits for its picture, or for the LiDAR's silence, is looked at when nothing arrives."""
+
+
+def open_sensors(uri: str, rest: str, how: Opening) -> LiveSensors:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when the config file cannot be used."""
+    return LiveSensors(uri, load(rest))
 
 
 class LiveSensors:

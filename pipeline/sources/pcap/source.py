@@ -30,7 +30,7 @@ from pipeline.sources.pcap.capture import Capture, Datagram
 from pipeline.sources.sidecar_files import OPTIONS, Beside, rig_of
 from pipeline.sources.uri_options import number_option, split_options
 from pipeline.types import F64, Frame, GnssFix, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _DATA_PORT = 2368
 _LOOK_AT = 2000
@@ -38,6 +38,11 @@ _LOOK_AT = 2000
 _TELL_EVERY = 4 << 20
 """Bytes between two words of progress."""
 _NMEA = slice(0xCA, 0x14E)  # PPS state and sentence of a position packet
+
+
+def open_recording(uri: str, rest: str, how: Opening) -> PcapSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return PcapSource(uri, rest, how.progress)
 
 
 class PcapSource:

@@ -24,11 +24,16 @@ from pipeline.sources.rosbag.topics import ROLES, map_topics
 from pipeline.sources.sidecar_files import rig_of
 from pipeline.sources.uri_options import split_options
 from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _PICTURE_WITHIN_NS = 100_000_000
 _OWN_WITHIN_NS, _FIX_WITHIN_NS = 500_000_000, 1_500_000_000
 _MESSAGES_A_SWEEP = 3
+
+
+def open_recording(uri: str, rest: str, how: Opening) -> RosbagSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return RosbagSource(uri, rest, how.progress)
 
 
 class RosbagSource:

@@ -10,7 +10,7 @@ import pytest
 
 from app.cli import main
 from pipeline.labels.formats.base import FormatName
-from pipeline.recording import session_source
+from pipeline.recording.session import source as session_source
 from tests.pipeline.recording.frames import full, write
 
 

@@ -69,7 +69,7 @@ def test_the_report_leads_to_every_drive_wherever_both_are_moved(
 
 
 def test_the_worst_drives_are_linked_from_the_braking_table(tmp_path: Path) -> None:
-    case, lidar = braking.Case("CCRs", "both", "ACC", 0), braking.Case("CCRs", "lidar", "ACC", 0)
+    case, lidar = braking.BrakingCase("CCRs", "both", "ACC", 0), braking.BrakingCase("CCRs", "lidar", "ACC", 0)
     gap_m, unseen, off = (9.0, 7.0), (None, None), ("off", "off")
     drive = Drive((0.0, 0.1), (20.0, 19.0), (0.0, -1.0), gap_m, (0.0, 0.0), unseen, off, None, None, 5.0)
     twin = evolve(drive, impact_mps=8.0)

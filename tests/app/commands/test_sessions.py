@@ -14,7 +14,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from app.cli import main
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from pipeline.sources import open_source
 from tests.conftest import ROOT
 from tests.pipeline.recording.frames import ABOUT, full, same, write

@@ -14,7 +14,7 @@ from app.engine.engine import Engine
 from app.labels.transfer import files
 from app.web.limits import LARGEST_FILE
 from pipeline.common.progress import Progress
-from pipeline.labels.formats.base import Drive, drive_of
+from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.native import from_json
 from pipeline.types import Frame
 from pipeline.types.source import Source
@@ -56,7 +56,7 @@ def test_what_is_there_already_is_not_imported_twice(engine: Engine, client: htt
 def test_a_drive_is_looked_through_once_while_it_is_open(client: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[str] = []
 
-    def look(source: Source, progress: Progress, frame_of: Callable[[int], Frame]) -> Drive:
+    def look(source: Source, progress: Progress, frame_of: Callable[[int], Frame]) -> LabeledDrive:
         looked.append(source.uri)
         return drive_of(source, progress, frame_of)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pyproj import Transformer
 
-from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.sources import open_source
 from pipeline.sources.along_route import along_route
 from pipeline.sources.route_files import RouteError, from_fixes, load_route
@@ -155,7 +155,7 @@ def test_of_an_earlier_session_the_fixes_alone_are_read(tmp_path: Path, monkeypa
     writer.write(replace(full(3), gnss=None))
     writer.close()
     for decoder in ("sweep_from", "picture_from"):
-        monkeypatch.setattr(f"pipeline.recording.session_source.{decoder}", lambda *of: pytest.fail("decoded"))
+        monkeypatch.setattr(f"pipeline.recording.session.source.{decoder}", lambda *of: pytest.fail("decoded"))
     route = load_route(str(tmp_path / "earlier.mcap"))
     first = frames[0].gnss
     assert first is not None

@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from pipeline.alignment.projection import Pinhole, project_cuboid
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid, inverse
-from pipeline.labels.formats.base import Drive, FormatName
+from pipeline.labels.formats.base import FormatName, LabeledDrive
 from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
 from pipeline.labels.validate import check
@@ -116,7 +116,7 @@ def test_labels_that_cannot_be_are_not_written(what: str, tmp_path: Path) -> Non
     assert not (tmp_path / "out").exists()
 
 
-def seen_set(here: Drive) -> LabelSet:
+def seen_set(here: LabeledDrive) -> LabelSet:
     """Four cars with the boxes that they have in the picture."""
     eye = here.shots[0].camera
     assert eye is not None
@@ -129,7 +129,7 @@ def seen_set(here: Drive) -> LabelSet:
     return replace(here.empty(), tracks=tuple(tracks))
 
 
-def turned_round(here: Drive) -> Drive:
+def turned_round(here: LabeledDrive) -> LabeledDrive:
     """The same drive with its extrinsic given the wrong way round."""
     eye = here.shots[0].camera
     assert eye is not None

@@ -14,11 +14,11 @@ from hypothesis import HealthCheck, given, settings
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats import base, native
-from pipeline.labels.formats.base import Drive, FormatName
+from pipeline.labels.formats.base import FormatName, LabeledDrive
 from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.recording.rewrite import clip
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from pipeline.sources import open_source
 from tests.pipeline.labels.formats.sets import IMPORT, assert_same, assert_same_alone, camera, drive, label_sets, plain
 from tests.pipeline.recording.frames import full, write
@@ -26,7 +26,7 @@ from tests.pipeline.recording.frames import full, write
 SCRATCH = count()
 
 
-def there_and_back(labels: LabelSet, here: Drive, name: FormatName, folder: Path) -> LabelSet:
+def there_and_back(labels: LabelSet, here: LabeledDrive, name: FormatName, folder: Path) -> LabelSet:
     out = folder / f"{name}{next(SCRATCH)}"
     export_labels(labels, here, name, out)
     return import_labels(out, here, name, IMPORT).labels
@@ -145,7 +145,7 @@ def test_the_same_labels_give_the_same_bytes(tmp_path: Path) -> None:
 
 def test_labels_of_a_drive_are_also_labels_of_its_clip() -> None:
     here = drive()
-    clip = Drive(here.uri, here.shots[1:4])
+    clip = LabeledDrive(here.uri, here.shots[1:4])
     placed = native.onto(full_set(), clip, "labels")
     assert [(r.first, r.last, r.lead) for r in placed.labels.leads] == [(0, 0, 3), (1, 2, "none")]
     assert [(t.id, [s.frame for s in t.sightings]) for t in placed.labels.tracks] == [(3, [0]), (4, [1]), (5, [1])]

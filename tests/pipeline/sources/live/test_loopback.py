@@ -13,7 +13,7 @@ from pipeline.replay.messages import of_frame, of_recording
 from pipeline.run import advance
 from pipeline.sources import open_source
 from pipeline.sources.live.check import check
-from pipeline.sources.live.lidar import LidarInput
+from pipeline.sources.live.devices.lidar import LidarInput
 from pipeline.sources.live.source import LiveSensors
 from pipeline.sources.pcap import PcapSource
 from pipeline.step import State
