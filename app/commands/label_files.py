@@ -18,10 +18,10 @@ from app.commands.support.progress_bars import frames_progress
 from app.labels.wording import WORKING
 from pipeline.common.garbage_collection import gc_paused
 from pipeline.common.user_file_errors import given_path
-from pipeline.labels.formats.base import FormatName, LabeledDrive, drive_of
+from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.native import from_json, onto
 from pipeline.labels.formats.reading import read_bytes
-from pipeline.labels.formats.registry import export_labels, import_labels
+from pipeline.labels.formats.registry import FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.labels.recorded_truth import truth_labels
 from pipeline.types.source import Source

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.common.geometry import Cuboid
-from pipeline.labels.formats.base import FormatName, LabeledDrive, Shot
-from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
+from pipeline.labels.formats.base import LabeledDrive, Shot
+from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Sighting
 from tests.pipeline.labels.formats.sets import IMPORT, camera
 

@@ -22,7 +22,7 @@ from app.labels.service.param_write_queue import SettlingQueue
 from app.labels.service.state import LabelState
 from app.labels.service.tasks import Tasks
 from pipeline.common.errors import BadInput
-from pipeline.labels.formats.base import FormatName
+from pipeline.labels.formats.registry import FormatName
 from pipeline.params import Params
 
 if TYPE_CHECKING:

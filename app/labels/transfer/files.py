@@ -20,15 +20,10 @@ from app.labels.errors import ActRefused, BadAct
 from app.labels.service.tasks import Progress, Work, to_nobody
 from app.labels.store.drive_labels import DriveLabels
 from pipeline.common.errors import BadInput
-from pipeline.labels.formats.base import FormatName, LabeledDrive, drive_of
-from pipeline.labels.formats.registry import export_labels, import_labels
+from pipeline.labels.formats.base import LabeledDrive, drive_of
+from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
 
-_SUFFIXES: dict[FormatName, str] = {
-    "native": ".json", "mcap": ".mcap", "openlabel": ".json", "coco": ".json", "csv": ".csv",
-    "kitti": "", "kitti-tracking": "", "nuscenes": "",
-}  # fmt: skip
-"""Of the file; the others are folders."""
 _LARGEST_UNPACKED = 512 << 20
 _MOST_PARTS = 100_000
 _ENCRYPTED = 1
@@ -57,7 +52,7 @@ def exported(recording: Recording, labels: LabelSet, name: FormatName) -> Export
     """A file, of a format that makes a folder a .zip of it. BadInput when it cannot be."""
     folder = Path(tempfile.mkdtemp(prefix="cipv-export-"))
     try:
-        out = folder / f"labels-{name}{_SUFFIXES[name]}"
+        out = folder / f"labels-{name}{FORMATS[name].suffix}"
         lost = export_labels(labels, drive_for(recording), name, out)
         file = _zipped(out) if out.is_dir() else out
     except BaseException:
@@ -71,7 +66,7 @@ def importing_file(labels: DriveLabels, recording: Recording, person: str, file:
 
     def work(progress: Progress) -> str:
         with _removed(file), tempfile.TemporaryDirectory(prefix="cipv-import-") as folder:
-            path = file if _SUFFIXES[name] else _unzipped(file, Path(folder))
+            path = file if FORMATS[name].suffix else _unzipped(file, Path(folder))
             drive = drive_for(recording, progress)
             origin = Origin("import", f"{name} file of {person}", int(time.time() * 1000))
             try:

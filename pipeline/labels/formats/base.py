@@ -6,18 +6,15 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 from pipeline.alignment.projection import Pinhole, project_cuboids
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid, corners_of
 from pipeline.common.progress import Progress, silent
-from pipeline.labels.formats.parts import Part
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.types import F32, F64, Box, CameraCalibration, EgoState, Frame
 from pipeline.types.source import InParts, Rectified, Source
 
-FormatName = Literal["native", "mcap", "openlabel", "kitti", "kitti-tracking", "nuscenes", "coco", "csv"]
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _FEWEST_PAIRS = 3
 
@@ -113,16 +110,6 @@ otherwise than it was."""
 
 Read = Callable[[Path, LabeledDrive, Origin], Imported]
 """The file or folder, the drive, and who made labels of which the file does not say that."""
-
-
-@dataclass(frozen=True)
-class Format:
-    """One kind of file or folder. holds: what it has a place for."""
-
-    name: FormatName
-    holds: frozenset[Part]
-    write: Write
-    read: Read
 
 
 def check_extrinsic(labels: LabelSet, drive: LabeledDrive, what: str) -> None:

@@ -9,7 +9,7 @@ from unittest.mock import Mock
 import pytest
 
 from app.cli import main
-from pipeline.labels.formats.base import FormatName
+from pipeline.labels.formats.registry import FormatName
 from pipeline.recording.session import source as session_source
 from tests.pipeline.recording.frames import full, write
 

@@ -16,6 +16,7 @@ from app.web.limits import LARGEST_FILE
 from pipeline.common.progress import Progress
 from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.native import from_json
+from pipeline.labels.formats.registry import FORMATS
 from pipeline.types import Frame
 from pipeline.types.source import Source
 from tests.app.labels.site import act, drive, labels, move, ref, task
@@ -65,6 +66,12 @@ def test_a_drive_is_looked_through_once_while_it_is_open(client: httpx.Client, m
     assert [answer.status_code for answer in answers] == [200] * 3
     assert answers[0].content == answers[2].content
     assert len(looked) == 1
+
+
+def test_every_format_is_listed_with_what_the_page_says_of_it(client: httpx.Client) -> None:
+    listed = client.get("/api/labels/formats").json()
+    assert [each["name"] for each in listed] == list(FORMATS)
+    assert listed[0] == {"name": "native", "title": "CIPV Studio", "about": "everything"}
 
 
 @pytest.mark.parametrize("name", ["native", "openlabel", "kitti-tracking"])

@@ -16,8 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from pipeline.alignment.projection import Pinhole, project_cuboid
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid, inverse
-from pipeline.labels.formats.base import FormatName, LabeledDrive
-from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
+from pipeline.labels.formats.base import LabeledDrive
+from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sighting
 from pipeline.labels.validate import check
 from tests.pipeline.labels.formats.sets import IMPORT, camera, drive

@@ -14,8 +14,8 @@ from hypothesis import HealthCheck, given, settings
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats import base, native
-from pipeline.labels.formats.base import FormatName, LabeledDrive
-from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
+from pipeline.labels.formats.base import LabeledDrive
+from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.recording.rewrite import clip
 from pipeline.recording.session.source import SessionSource
