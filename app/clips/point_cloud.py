@@ -41,7 +41,8 @@ def load_open3d() -> Any:
 def write_ply(sweeps: Iterable[F32 | None], path: Path) -> None:
     """Write sweeps as one cloud in the ego frame of the first one.
 
-    Each is (N, 4) float32 x y z intensity in its own ego frame. A frame without a sweep is left out. BadInput when no frame has one, or when Open3D cannot be loaded.
+    Each is (N, 4) float32 x y z intensity in its own ego frame. A frame without a sweep is left out.
+    BadInput when no frame has one, or when Open3D cannot be loaded.
     """
     open3d = load_open3d()
     clouds: list[F32] = []

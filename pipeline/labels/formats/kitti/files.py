@@ -17,7 +17,7 @@ from pipeline.formats.file_reading import check_looks_ahead, files_by_name
 from pipeline.formats.kitti_calibration import parse_object_calibration
 from pipeline.formats.kitti_records import DONT_CARE, LabelRow, kind_of, truth_of
 from pipeline.labels.formats.base import Imported, LabeledDrive, Shot, make_folder
-from pipeline.labels.formats.kitti.files import rows as kitti_rows
+from pipeline.labels.formats.kitti import rows as kitti_rows
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
 from pipeline.labels.recorded_truth import LINKED, renamed, tracks_of

@@ -15,8 +15,8 @@ from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid, transform
 from pipeline.formats.file_reading import rigid_transform
 from pipeline.labels.formats.base import Imported, LabeledDrive
+from pipeline.labels.formats.openlabel import write as ol
 from pipeline.labels.formats.openlabel.file_types import Agent, Content, Data, Element, File, Shape
-from pipeline.labels.formats.openlabel.write import write as ol
 from pipeline.labels.formats.reading import fit, parse_as, read_bytes
 from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, Lead, LeadRange, Origin, PathLabel, Sighting, State
 from pipeline.types import F64, Point2
