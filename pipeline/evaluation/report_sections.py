@@ -43,7 +43,7 @@ AnyCell = Cell | Coloured | Driven | Linked
 
 @dataclass(frozen=True)
 class Table:
-    """Numbers keep their full precision here; null is shown as a dash. decimals: for people."""
+    """Numbers keep their full precision here; None is shown as a dash. decimals: for people."""
 
     title: str
     columns: tuple[str, ...]

@@ -19,7 +19,7 @@ Suite = Literal["paper", "curves", "euroncap", "iso"]
 @dataclass(frozen=True)
 class ExperimentDrive:
     """A drive that can be seen again. name: fit for a file. scenario: with the ego vehicle as driven, or its script.
-    text: what came of it. detections: what was seen in its pictures; null: what the embedded network saw there."""
+    text: what came of it. detections: what was seen in its pictures; None: what the embedded network saw there."""
 
     name: str
     title: str
@@ -31,7 +31,7 @@ class ExperimentDrive:
     detections: Detections | None = GIVEN
 
     def as_seen(self) -> Scenario:
-        """The scenario with what the line was given in that drive, so that it believes the same again."""
+        """The scenario with the detections of that drive, so that a run gives the same results."""
         return self.scenario.model_copy(update={"sensors": self.sensors, "detections": self.detections})
 
 

@@ -60,7 +60,7 @@ def parameters(controller: str, set_speed_mps: float, changes: Mapping[str, Any]
 class DriveRecord:
     """A drive towards the target, one value a tick. gap_m: from the bumper to the target's rear. acquired_m: the gap
     when the target first was the CIPV; brakes_m: when any braking was first asked for. impact_mps: relative speed at
-    contact, null without. motions: the ego vehicle's. All null or empty where it did not happen."""
+    contact, None without. motions: the ego vehicle's. All None or empty where it did not happen."""
 
     t_s: tuple[float, ...]
     speed_mps: tuple[float, ...]
@@ -165,7 +165,7 @@ def true_range_m(target: ActorState) -> float:
 
 
 def measured_m(tick: LoopStep, target: ActorState) -> float | None:
-    """The CIPV's distance where the CIPV is the target; null where there is none or it is something else."""
+    """The CIPV's distance where the CIPV is the target; None where there is none or it is something else."""
     lead = tick.result.cipv
     if lead is None:
         return None

@@ -42,7 +42,7 @@ class Way:
         return Way(t_s, np.array([world_state.at(alone, float(t)).pose[:2] for t in t_s]))
 
     def ahead(self, now: World, at_most_m: float = _AHEAD_M) -> Path | None:
-        """What is left of it, 90 m at most, in the ego frame of now; null while the car stands."""
+        """What is left of it, 90 m at most, in the ego frame of now; None while the car stands."""
         coming = np.vstack([now.pose[:2], self.places[self.t_s > now.t_s]])
         moved = np.hypot(*np.diff(coming, axis=0).T)
         keep = np.concatenate([[True], (moved > _SMALLEST_MOVE_M) & (np.cumsum(moved) < at_most_m)])

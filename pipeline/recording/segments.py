@@ -19,7 +19,7 @@ from pipeline.types.source import TruthObject
 
 @dataclass(frozen=True)
 class Rotation:
-    """When a recording goes on in a new file; null is never. max_s: of recorded time."""
+    """When a recording goes on in a new file; None is never. max_s: of recorded time."""
 
     max_bytes: float | None = None
     max_s: float | None = None

@@ -1,4 +1,4 @@
-"""The closed loop: the world as the sensors see it → the line → pedals → the vehicle → the next world.
+"""The closed loop: the world as the sensors see it → the pipeline → pedals → the vehicle → the next world.
 
     world_state.at ─► Sensors ─► boxes (truth or network) ─► step ─► AccCommand ─► vehicle, in 5 ms steps ─┐
        └──────────────────────────────────────────────────────────────────────────────────────────◄┘
@@ -70,7 +70,7 @@ class NetworkEyes:
 @dataclass(frozen=True)
 class Setup:
     """What drives: parameters, sensors in use, eyes, and the car. closed: its pedals move the car; otherwise the car
-    follows its script, and what the line would do is only noted."""
+    follows its script, and what the pipeline would do is only recorded."""
 
     params: Params = field(default_factory=Params)
     sensors: Sensed = "both"

@@ -38,8 +38,8 @@ Moment = tuple[float, float, float, float, float, float]
 
 class Scenario(Strict):
     """driven: the ego vehicle's motion as a closed loop drove it, a moment a tick; where it is given, the ego
-    vehicle moves so and not by its script. sensors: those that the line is given. detections: what is found in the
-    pictures; null: what detectors find that look at them."""
+    vehicle moves so and not by its script. sensors: those that the pipeline is given. detections: what is found in the
+    pictures; None: what detectors find that look at them."""
 
     title: str
     seed: int = Field(default=0, ge=0)

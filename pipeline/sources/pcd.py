@@ -113,7 +113,7 @@ def _rig(folder: Path, options: dict[str, str]) -> rig_files.Rig:
 
 
 def _stamp_ns(name: str) -> int | None:
-    """The time that a file's name is; null when it is none."""
+    """The time that a file's name is; None when it is none."""
     if not _NUMBER.match(name):
         return None
     whole, _, fraction = name.partition(".")

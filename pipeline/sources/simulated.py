@@ -92,12 +92,12 @@ def sensed(frame: Frame, now: world_state.World, scene: scenario.Scenario) -> Fr
 
 def _notes(scene: scenario.Scenario) -> Iterator[str]:
     if scene.sensors == "lidar":
-        yield "This drive goes by the LiDAR alone; nothing looks at its pictures."
+        yield "This drive uses the LiDAR alone; its pictures are shown but not analysed."
         return
     if scene.sensors == "camera":
-        yield "This drive goes by the camera alone; it has no LiDAR."
+        yield "This drive uses the camera alone; it has no LiDAR."
     if scene.detections is not None:
-        yield "What is seen in this drive's pictures is given: the truth, with a detector's errors. No network looks."
+        yield "Detections come with this drive: the truth, with a detector's errors. No network runs."
 
 
 def truth_of(now: world_state.World) -> tuple[TruthObject, ...]:

@@ -89,7 +89,7 @@ class LabelDesk:
         self.kept.close()
 
     def open(self, uri: str, recording: Recording | None) -> None:
-        """Something else was opened; null for what has no frames to label. Its labels are looked for a little later,
+        """Something else was opened; None for what has no frames to label. Its labels are looked for a little later,
         when it is shown."""
         self.tasks.cancel()
         with self._lock:
@@ -118,7 +118,7 @@ class LabelDesk:
 
     @property
     def drive(self) -> str | None:
-        """The key of the open recording; null for what has no frames to label."""
+        """The key of the open recording; None for what has no frames to label."""
         return self._open.key
 
     @cached_property
@@ -152,7 +152,7 @@ class LabelDesk:
 
     def move(self, way: Way, person: str, drive: str | None, act_id: str | None = None) -> ActDone:
         """Undo or redo, across labels and parameters; what is only being tried is undone first. ActRefused when there
-        is nothing to, or somebody else is in the way. drive, act_id: as in ``act``; null for what has no frames to
+        is nothing to, or somebody else is in the way. drive, act_id: as in ``act``; None for what has no frames to
         label."""
         labels = self._open.meant(drive)
         self._settling.finish()

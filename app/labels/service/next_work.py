@@ -41,7 +41,7 @@ class Place:
 @dataclass(frozen=True)
 class Asked:
     """What is looked for, beyond which frame, which way. after: of several labels in that frame, the one that was
-    looked at; null to go beyond the frame. person: who asks."""
+    looked at; None to go beyond the frame. person: who asks."""
 
     what: What
     frame: int

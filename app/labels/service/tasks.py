@@ -63,14 +63,14 @@ class Tasks:
 
     @property
     def state(self) -> TaskState | None:
-        """Null while there was none."""
+        """None while there was none."""
         return self._state
 
     def begin(self, what: TaskKind, work: Work) -> int:
         """Its number. ActRefused while another one runs."""
         with self._lock:
             if self._state is not None and self._state.running:
-                raise ActRefused(f"{self._state.what} is still going on")
+                raise ActRefused(f"{self._state.what} is still running")
             self._turn += 1
             turn = self._turn
             self._state = TaskState(turn, what)

@@ -108,13 +108,13 @@ def _unzipped(file: Path, folder: Path) -> Path:
             for each in parts:
                 name = PurePosixPath(each.filename)
                 if name.is_absolute() or ".." in name.parts or "\\" in each.filename:
-                    raise BadAct(f"the .zip holds a file that leads out of it: {each.filename!r}")
+                    raise BadAct(f"the .zip contains a path outside its folder: {each.filename!r}")
                 target = folder / name
                 target.parent.mkdir(parents=True, exist_ok=True)
                 with packed.open(each) as source, target.open("xb") as out:
                     _copied(source, out, each.file_size)
     except _BROKEN_ZIP as error:
-        raise ActRefused(f"no .zip of a folder: {error}") from None
+        raise ActRefused(f"not a valid .zip: {error}") from None
     inside = list(folder.iterdir())
     return inside[0] if len(inside) == 1 and inside[0].is_dir() and inside[0].name.startswith("labels") else folder
 
@@ -123,7 +123,7 @@ def _copied(source: IO[bytes], out: IO[bytes], size: int) -> None:
     """Never more than the .zip says it holds."""
     data = source.read(size + 1)
     if len(data) > size:
-        raise ValueError("a file in it is longer than it says")
+        raise ValueError("a file in it is longer than declared")
     out.write(data)
 
 

@@ -30,8 +30,8 @@ _ACTING: dict[AlarmKind, frozenset[str]] = {
 
 @dataclass(frozen=True)
 class Alarm:
-    """One danger, or one alarm without any. due_ns, acted_ns: null where there was none. delay_s: acted after it was
-    due; negative: before. true_ttc_s: of the true lead when it acted, null where it had none."""
+    """One danger, or one alarm without any. due_ns, acted_ns: None where there was none. delay_s: acted after it was
+    due; negative: before. true_ttc_s: of the true lead when it acted, None where it had none."""
 
     kind: AlarmKind
     due_ns: int | None

@@ -25,14 +25,14 @@ RESAMPLES, CONFIDENCE, SEED = 1000, 0.95, 0
 
 
 def ratio(parts: Sequence[Sums]) -> float | None:
-    """Sums over drives, divided; null when there is nothing to divide by."""
+    """Sums over drives, divided; None when there is nothing to divide by."""
     over, under = sum(part[0] for part in parts), sum(part[1] for part in parts)
     return over / under if under else None
 
 
 @dataclass(frozen=True)
 class Figure:
-    """name: for scripts. part: what one drive brings. whole: of the parts of all, null where there is nothing to
+    """name: for scripts. part: what one drive brings. whole: of the parts of all, None where there is nothing to
     say."""
 
     name: str
@@ -54,7 +54,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Measured:
-    """A figure's value, and where it lies with 95 % confidence; null where fewer than two drives have it."""
+    """A figure's value, and where it lies with 95 % confidence; None where fewer than two drives have it."""
 
     figure: Figure
     value: float | None
@@ -101,7 +101,7 @@ def _difference(figure: Figure, pairs: Sequence[tuple[Any, Any]]) -> float | Non
 
 def bootstrap(parts: Sequence[Any], whole: Callable[[Sequence[Any]], float | None]) -> Interval | None:
     """Where a figure lies with 95 % confidence when drives are drawn anew with replacement. The draws are always the
-    same. Null where fewer than two drives have the figure."""
+    same. None where fewer than two drives have the figure."""
     if sum(whole([part]) is not None for part in parts) < 2:
         return None
     draws = np.sort(np.random.default_rng(SEED).integers(len(parts), size=(RESAMPLES, len(parts))), axis=1)
@@ -189,7 +189,7 @@ FIGURES: tuple[Figure, ...] = (
     Figure("cipv_correct", "CIPV correct", "%", "higher", partial(_percent, ("correct", "none"))),
     Figure("lead_missed", "lead missed", "%", "lower", partial(_percent, ("missed",))),
     Figure("cipv_false", "CIPV without a lead", "%", "lower", partial(_percent, ("false",))),
-    Figure("cipv_wrong", "CIPV not where the lead is", "%", "lower", partial(_percent, ("wrong",))),
+    Figure("cipv_wrong", "wrong CIPV", "%", "lower", partial(_percent, ("wrong",))),
     Figure("switches", "switches", "a minute", "lower", partial(_a_minute, _switches)),
     Figure("drop_outs", "drop-outs", "a minute", "lower", partial(_a_minute, _drop_outs)),
     Figure("acquired_m", "acquisition distance", "m", "higher", partial(_acquired, "range_m")),

@@ -2,8 +2,8 @@
 
 Bends at 3 m/s² lateral acceleration, S-curves and straights; a lead in the lane draws away while cars drive in the
 lanes beside it at 20–100 m. Detections are given: true boxes with the errors measured of the embedded detector, a
-simulated LiDAR. Every frame goes through the line with each source of the path alone, with none, without a route, and
-with all fused. Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge
+simulated LiDAR. Every frame goes through the pipeline with each source of the path alone, with none, without a route,
+and with all fused. Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge
 and no nearer vehicle hides it. Missing one that has just come into sight is not counted before confirmation can be
 through (``true_lead.InSight``).
 """
@@ -122,7 +122,7 @@ def longest_wrong_s(drive: Frames) -> float:
 
 def told_before_line_s(drive: Frames) -> float | None:
     """By how many seconds before its wheel was over the line the car that cuts in was told and stayed so; negative:
-    after it. Null: never."""
+    after it. None: never."""
     assert drive.over_line_s is not None
     if not drive.told[-1]:
         return None

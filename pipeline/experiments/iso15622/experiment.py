@@ -51,8 +51,8 @@ class FollowingCase:
 
 @dataclass(frozen=True)
 class Outcome:
-    """acquired_m: range when the lead first was the CIPV, null if never. kept: share of the frames from then on in
-    which it was. smallest_gap_m: range to the lead. smallest_time_gap_s: that over own speed, while driving; null when
+    """acquired_m: range when the lead first was the CIPV, None if never. kept: share of the frames from then on in
+    which it was. smallest_gap_m: range to the lead. smallest_time_gap_s: that over own speed, while driving; None when
     it never drove. touched: there was contact. t_s, range_m, speed_mps, motions of the ego vehicle: each tick."""
 
     acquired_m: float | None

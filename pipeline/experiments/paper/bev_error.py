@@ -63,7 +63,7 @@ BevVariant = tuple[str, Sensors, Boxes]
 
 @dataclass(frozen=True)
 class Sighting:
-    """The target in one frame: its true range, and where it was believed to be; null when no object stands for it."""
+    """The target in one frame: its true range, and where it was believed to be; None when no object stands for it."""
 
     range_m: float
     error: Error | None
@@ -113,7 +113,7 @@ def _scenario(case: BevCase) -> Scenario:
 
 def sighting(tick: LoopStep) -> Sighting | None:
     """Of the object that stands for the target: the one whose place in the picture overlaps the target's most, however
-    far off its distance is. One that is carried stands for nothing. Null beyond 60 m and beside the car."""
+    far off its distance is. One that is carried stands for nothing. None beyond 60 m and beside the car."""
     target, camera = target_of(tick), tick.frame.camera
     assert camera is not None
     truth_m = true_range_m(target)

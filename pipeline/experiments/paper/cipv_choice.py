@@ -54,7 +54,7 @@ class ChoiceCase:
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame's verdict, with the true lead's id and range and the chosen object's id; null where there is none."""
+    """One frame's verdict, with the true lead's id and range and the chosen object's id; None where there is none."""
 
     t_s: float
     verdict: Verdict

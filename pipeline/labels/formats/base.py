@@ -21,7 +21,7 @@ _FEWEST_PAIRS = 3
 
 @dataclass(frozen=True)
 class Shot:
-    """One frame, without its data. camera: null where there is none. size: width and height of its picture in pixels.
+    """One frame, without its data. camera: None where there is none. size: width and height of its picture in pixels.
     T_rect_ego: (4, 4) to the frame that KITTI's labels are in: the recording's rectified camera 0 if it has one, else
     the camera itself."""
 
@@ -39,7 +39,7 @@ def _no_points(frame: int) -> F32 | None:
 
 @dataclass(frozen=True)
 class LabeledDrive:
-    """The recording that labels belong to. points: (N, 4) float32 of a frame's sweep, null without one; read when
+    """The recording that labels belong to. points: (N, 4) float32 of a frame's sweep, None without one; read when
     asked for."""
 
     uri: str
@@ -127,7 +127,7 @@ def check_extrinsic(labels: LabelSet, drive: LabeledDrive, what: str) -> None:
     if count >= _FEWEST_PAIRS and apart > count / 2:
         raise BadInput(
             f"{what}: {apart} of {count} cuboids do not fall where their boxes are in the picture; "
-            "is an extrinsic taken the wrong way round?"
+            "is an extrinsic inverted?"
         )
 
 
@@ -148,7 +148,7 @@ def _touch(one: Box | None, other: Box) -> bool:
 def make_folder(out: Path) -> Path:
     """A folder to write into, made if need be. BadInput when files are in it already: old labels among the new."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise BadInput(f"{out}: there is something there already; choose another name or remove it")
+        raise BadInput(f"{out}: the folder is not empty; choose another name or remove it")
     out.mkdir(parents=True, exist_ok=True)
     return out
 
@@ -160,4 +160,4 @@ def write_file(out: Path, data: bytes) -> None:
         with out.open("xb") as file:
             file.write(data)
     except FileExistsError:
-        raise BadInput(f"{out}: there is such a file already; choose another name or remove it") from None
+        raise BadInput(f"{out}: file already exists; choose another name or remove it") from None

@@ -40,14 +40,14 @@ def from_json(data: bytes, what: str) -> LabelSet:
     """The labels as they were written. BadInput, beginning with ``what``, when these are none."""
     outer: Any = parse_json(data, what)
     if not isinstance(outer, dict) or outer.get("format") != KIND:
-        raise BadInput(f"{what}: no {KIND} file")
+        raise BadInput(f"{what}: not a {KIND} file")
     version = outer.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or not 1 <= version <= VERSION:
         raise BadInput(f"{what}: {KIND} of version {str(version)[:20]}; this program reads up to {VERSION}")
     inner = outer.get("labels")
     unknown = sorted(inner.keys() - {field.name for field in fields(LabelSet)}) if isinstance(inner, dict) else []
     if unknown:
-        raise BadInput(f"{what}: labels have no field {unknown[0][:40]!r}")
+        raise BadInput(f"{what}: unknown field {unknown[0][:40]!r}")
     if version < 2 and isinstance(inner, dict) and isinstance(inner.get("tags"), list):
         inner = {**inner, "tags": [as_range(tag) if isinstance(tag, dict) else tag for tag in inner["tags"]]}
     return check(fit(_LABELS, inner, what), what)

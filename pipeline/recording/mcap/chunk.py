@@ -49,7 +49,7 @@ def unpack(content: bytes) -> UnpackedChunk:
     Damaged for what they do not see."""
     chunk = Chunk.read(ReadDataStream(io.BytesIO(content)))
     if chunk.uncompressed_size > _LARGEST_CHUNK_BYTES:
-        raise Damaged("a chunk of an impossible size")
+        raise Damaged("a chunk of an invalid size")
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     data = stream.read(length)
     messages: list[Place] = []

@@ -33,7 +33,7 @@ class Unreadable(Exception):
 @dataclass(frozen=True)
 class ChunkEntry:
     """Where a chunk is and what is in it; ``length`` counts the record's head. channels: ids of its messages' channels,
-    null when the file does not say for sure. index_length: bytes of the message indexes that follow the chunk."""
+    None when the file does not say for sure. index_length: bytes of the message indexes that follow the chunk."""
 
     offset: int
     length: int
@@ -45,7 +45,7 @@ class ChunkEntry:
 
 @dataclass
 class Directory:
-    """attachments, metadata: name → (offset, length). problem: null for a whole file, else what it lacks. is_cut: its
+    """attachments, metadata: name → (offset, length). problem: None for a whole file, else what it lacks. is_cut: its
     end is missing; sound_bytes: up to where records are whole."""
 
     profile: str
@@ -101,7 +101,7 @@ def _read_profile(file: BinaryIO) -> str:
 
 
 def read_summary(file: BinaryIO, size: int) -> Summary | None:
-    """The library's reading of the file's end. Null when there is none, or none that fits the file."""
+    """The library's reading of the file's end. None when there is none, or none that fits the file."""
     try:
         if not _is_sound(file, size):
             return None
@@ -124,7 +124,7 @@ def summary_start(file: BinaryIO, size: int) -> int:
 
 
 def _from_summary(file: BinaryIO, size: int, profile: str) -> Directory | None:
-    """Null when there is no summary."""
+    """None when there is no summary."""
     summary = read_summary(file, size)
     if summary is None:
         return None

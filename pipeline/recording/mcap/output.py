@@ -59,7 +59,7 @@ class Output:
         try:
             self._stream = _Stream(path)
         except FileExistsError:
-            raise BadInput(f"{path}: there is such a file already; choose another name or remove it") from None
+            raise BadInput(f"{path}: file already exists; choose another name or remove it") from None
         self.path = path
         self._channels: dict[Channel, int] = {}
         self._schemas: dict[tuple[str, str, bytes], int] = {}

@@ -116,7 +116,7 @@ class McapFile:
         return {channels[i]: np.sort(np.array(times)) for i, times in sorted(found.items()) if i in channels}
 
     def attachment(self, name: str) -> bytes | None:
-        """The data of an attachment, null when there is none that can be read."""
+        """The data of an attachment, None when there is none that can be read."""
         record = self._record(*self.directory.attachments.get(name, (0, 0)))
         try:
             return Attachment.read(ReadDataStream(io.BytesIO(record))).data if record else None
@@ -124,7 +124,7 @@ class McapFile:
             return None
 
     def metadata(self, name: str) -> dict[str, str] | None:
-        """A metadata record, null when there is none that can be read."""
+        """A metadata record, None when there is none that can be read."""
         record = self._record(*self.directory.metadata.get(name, (0, 0)))
         try:
             return Metadata.read(ReadDataStream(io.BytesIO(record))).metadata if record else None

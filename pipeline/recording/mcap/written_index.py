@@ -16,5 +16,5 @@ class WrittenIndex:
         self._values.append((value, at_ns))
 
     def log_time(self, value: object) -> int | None:
-        """Null when it was not written, or too long ago."""
+        """None when it was not written, or too long ago."""
         return next((at_ns for each, at_ns in reversed(self._values) if each is value), None)

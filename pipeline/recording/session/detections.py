@@ -48,14 +48,14 @@ class LanesRecord:
 
 @dataclass(frozen=True)
 class Given:
-    """The detections that a frame came with; null where nothing was looked for."""
+    """The detections that a frame came with; None where nothing was looked for."""
 
     boxes: BoxesRecord | None = None
     lanes: LanesRecord | None = None
 
 
 def given_of(frame: Frame) -> Given | None:
-    """Null for a frame whose detections are for networks to find."""
+    """None for a frame whose detections are for networks to find."""
     if not frame.detections_given:
         return None
     return Given(

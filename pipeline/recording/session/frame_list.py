@@ -40,7 +40,7 @@ class FrameList:
         return (self._times[-1][0] - self._times[0][0]) / 1e9 if self._times else 0.0
 
     def add(self, log_time_ns: int, t_ns: int, tick: FrameRecord | None) -> None:
-        """tick: null for one that cannot be read."""
+        """tick: None for one that cannot be read."""
         self._times.append((log_time_ns, t_ns))
         line = frame_record_message(replace(tick, truth=None, given=None)) if tick is not None else _NO_TICK
         self._lines.write(line + b"\n")
@@ -54,7 +54,7 @@ class FrameList:
 
 
 def listed_times(file: McapFile) -> tuple[I64, I64] | None:
-    """(N,) log times and (N,) header times of all frames, null where there is no list."""
+    """(N,) log times and (N,) header times of all frames, None where there is no list."""
     data = file.attachment(topics.INDEX)
     if data is None or len(data) % 16:
         return None
@@ -63,7 +63,7 @@ def listed_times(file: McapFile) -> tuple[I64, I64] | None:
 
 
 def listed_records(file: McapFile) -> Iterator[FrameRecord | None]:
-    """Each frame's tick without ``truth`` and ``given``, in order; null for one that could not be read. It ends early
+    """Each frame's tick without ``truth`` and ``given``, in order; None for one that could not be read. It ends early
     where the list is damaged, and at once where there is none."""
     lines = gzip.GzipFile(fileobj=io.BytesIO(file.attachment(topics.TICKS) or b""))
     while True:

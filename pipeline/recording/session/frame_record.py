@@ -1,4 +1,4 @@
-"""What one message of ``/frames`` says: everything the line knew at a tick, the bulky parts by reference.
+"""What one message of ``/frames`` says: everything the pipeline knew in a frame, the bulky parts by reference.
 
 Viewers need Foxglove's schemas, which cannot hold all of a ``Frame`` exactly (a rotation becomes a quaternion, a course
 has no place). So a tick keeps the small things itself, number for number, and names the messages of the point cloud,
@@ -38,7 +38,7 @@ class SweepRef:
 
 @dataclass(frozen=True)
 class PictureRef:
-    """The picture stored at ``at_ns``; t_ns null where the camera gave no stamp."""
+    """The picture stored at ``at_ns``; t_ns None where the camera gave no stamp."""
 
     at_ns: Nanoseconds
     t_ns: Nanoseconds | None
@@ -97,8 +97,8 @@ R = TypeVar("R", SweepRef | None, PictureRef | None, CameraRecord | None)
 
 @dataclass(frozen=True)
 class FrameRecord:
-    """One frame of a session, as in ``Frame``. params_at_ns: where ``/params`` has what it was run with, null when a
-    session holds inputs alone. truth: its labels, null where nobody labelled it. given: detections it came with."""
+    """One frame of a session, as in ``Frame``. params_at_ns: where ``/params`` has what it was run with, None when a
+    session holds inputs alone. truth: its labels, None where nobody labelled it. given: detections it came with."""
 
     name: str
     t_ns: Nanoseconds

@@ -61,7 +61,7 @@ def sweep_from(data: bytes, t_ns: int, channels: int) -> Sweep:
     points = np.array(packed.view(_first_of(layout))["xyzi"]).view(np.float32).reshape(-1, 4)
     time_s = packed["time"].astype(np.float32) if layout is _TIMED_POINT else None
     if not np.isfinite(points).all() or (packed["ring"] >= channels).any():
-        raise Damaged("the point cloud holds values that cannot be")
+        raise Damaged("the point cloud holds invalid values")
     return Sweep(t_ns, points, packed["ring"].astype(np.uint8), channels, time_s)
 
 
@@ -85,7 +85,7 @@ def jpeg_message(data: bytes, t_ns: int) -> bytes:
 
 
 def jpeg_of(shot: Shot) -> bytes | None:
-    """A picture that came as none; null when it is damaged."""
+    """A picture that came as none; None when it is damaged."""
     bgr = shot.bgr()
     return None if bgr is None else cv2.imencode(".jpg", bgr, _JPEG_GOOD)[1].tobytes()
 

@@ -1,4 +1,4 @@
-"""What the line believes as boxes in a 3D view: ``foxglove.SceneUpdate``, for viewers only."""
+"""Results as boxes in a 3D view: ``foxglove.SceneUpdate``, for viewers only."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def objects_message(result: dict[str, Any], t_ns: int) -> bytes:
 
 
 def _box(each: dict[str, Any]) -> tuple[list[float], list[float], float] | None:
-    """Center, size and yaw; null for an object whose place nobody knows."""
+    """Center, size and yaw; None for an object whose place nobody knows."""
     cuboid, bev = each.get("cuboid"), each.get("bev")
     if cuboid is not None:
         return cuboid["center"], cuboid["size"], cuboid["yaw_rad"]

@@ -104,7 +104,7 @@ class SessionSource:
         return tick.truth if tick is not None else None
 
     def params(self, index: int) -> Params | None:
-        """What the frame was run with when it was recorded; null when a session holds inputs alone."""
+        """What the frame was run with when it was recorded; None when a session holds inputs alone."""
         tick = self._read_record(index, [])
         if tick is None or tick.params_at_ns is None:
             return None
@@ -137,7 +137,7 @@ class SessionSource:
         return tuple(tick.gnss for tick in ticks if tick is not None and tick.gnss is not None)
 
     def labels(self) -> bytes | None:
-        """The newest file of labels in it, null when there is none."""
+        """The newest file of labels in it, None when there is none."""
         newest = None
         for stored in self.file.messages((topics.LABELS,)):
             newest = stored.data
@@ -153,11 +153,11 @@ class SessionSource:
         if metadata is None:
             kind = self.file.directory.profile or "unknown"
             hint = f"; try rosbag:{path}" if kind.startswith("ros") else ""
-            raise SourceError(f"{path}: an MCAP file, but no session of ours (its profile is {kind!r}){hint}")
+            raise SourceError(f"{path}: an MCAP file, but not a session of CIPV Studio (its profile is {kind!r}){hint}")
         try:
             about = About.from_metadata(metadata)
         except ValueError as error:
-            raise SourceError(f"{path}: a session that cannot be read: {error}") from None
+            raise SourceError(f"{path}: the session cannot be read: {error}") from None
         if about.version > VERSION:
             raise SourceError(f"{path}: a session of version {about.version}; this program reads up to {VERSION}")
         return about
@@ -179,7 +179,7 @@ class SessionSource:
     def _problems(self, path: str) -> list[str]:
         notes = []
         if self.file.directory.problem is not None:
-            notes.append(f"{self.file.directory.problem}; `cipv recover {path}` makes a whole file of it")
+            notes.append(f"{self.file.directory.problem}; `cipv recover {path}` repairs it")
         if self.file.damaged:
             notes.append(f"{len(self.file.damaged)} parts of the file are damaged")
         return notes
@@ -192,7 +192,7 @@ class SessionSource:
         return index
 
     def _listed(self) -> Iterator[tuple[int, FrameRecord | None]]:
-        """Every frame with its tick of the list at the file's end, null where that does not tell."""
+        """Every frame with its tick of the list at the file's end, None where that does not tell."""
         listed = chain(listed_records(self.file), repeat(None))
         for index, (t_ns, tick) in enumerate(zip(self._t_ns, listed, strict=False)):
             yield index, tick if tick is not None and tick.t_ns == t_ns else None
@@ -257,7 +257,7 @@ def _given(tick: FrameRecord, notes: list[str]) -> dict[str, Any]:
 
 
 def _or_note(read: Callable[[], _T], notes: list[str]) -> _T | None:
-    """What ``read`` gives; null, and a note, when it is damaged."""
+    """What ``read`` gives; None, and a note, when it is damaged."""
     try:
         return read()
     except Damaged as damage:

@@ -42,7 +42,7 @@ def sweep_of_packets(ref: PacketsRef, at_ns: int, file: McapFile) -> Sweep:
     try:
         decoder = Vlp16Decoder(rigid_transform(np.reshape(ref.T_ego_lidar, (4, 4)), "T_ego_lidar"))
     except (SourceError, ValueError):
-        raise Damaged("where the LiDAR sits cannot be read") from None
+        raise Damaged("the LiDAR's mount cannot be read") from None
     scans = file.messages((PACKETS,), at_ns - PACKETS_BEFORE_NS, at_ns + _PACKETS_AFTER_NS)
     packets = [packet for stored in scans for packet in packets_from(stored.data)]
     sweeps = [decoder.push(payload, t_ns) for t_ns, payload in packets] + [decoder.flush()]

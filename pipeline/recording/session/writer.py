@@ -111,7 +111,7 @@ class SessionWriter:
     ) -> None:
         """Append a frame with what was believed of it, if anything. A result may be in the contract's JSON already.
 
-        received_ns: when the frame was made, by the recorder's clock; null for one that comes from a recording.
+        received_ns: when the frame was made, by the recorder's clock; None for one that comes from a recording.
         """
         at_ns = self._clock.log_time(frame.t_ns, received_ns)
         self._header_ns = frame.t_ns

@@ -1,4 +1,4 @@
-"""The ego vehicle's sensors in one scenario: any moment of the world as the ``Frame`` that the line takes.
+"""The ego vehicle's sensors in one scenario: any moment of the world as the ``Frame`` that the pipeline takes.
 
 Recorded drives and closed loops see the world through this one place, so both see the same.
 """

@@ -109,7 +109,7 @@ class Script(Speeds):
 
 
 class Vehicle(Strict):
-    """What a vehicle is. size_m: length, width, height; null takes the kind's usual size."""
+    """What a vehicle is. size_m: length, width, height; None takes the kind's usual size."""
 
     id: int = Field(ge=1)
     kind: VehicleKind

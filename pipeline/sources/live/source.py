@@ -1,7 +1,7 @@
 """``live:<config.yaml>``: the sensors of one car as a source of ticks, the newest only.
 
 Readers' threads put what comes into the synchroniser; whoever wants a frame takes the newest tick out of it. There is
-no queue between them, so what is shown is never older than the sensors and the line make it.
+no queue between them, so what is shown is never older than the sensors and the pipeline make it.
 """
 
 from __future__ import annotations
@@ -99,19 +99,19 @@ class LiveSensors:
 
     @property
     def lidar_mount(self) -> tuple[F64, int] | None:
-        """T_ego_lidar (4, 4) and what is added to the LiDAR's stamps in ns; null when there is none."""
+        """T_ego_lidar (4, 4) and what is added to the LiDAR's stamps in ns; None when there is none."""
         lidar = self.inputs.get("lidar")
         return (lidar.T_ego_lidar, lidar.offset_ns) if isinstance(lidar, LidarInput) else None
 
     def tap(self, tap: Tap | None) -> None:
-        """Have what comes told from now on; null ends that. What is told twice or at an impossible time is not."""
+        """Have what comes told from now on; None ends that. What is told twice or at an impossible time is not."""
         self._tap = tap
         lidar = self.inputs.get("lidar")
         if isinstance(lidar, LidarInput):
             lidar.on_packet = tap.packet if tap is not None else None
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
-        """The newest tick not given yet; null when none came in time."""
+        """The newest tick not given yet; None when none came in time."""
         together = self._wait(timeout_s, params or SyncParams())
         return self._frame(together) if together is not None else None
 
@@ -214,11 +214,11 @@ def _about(config: LiveConfig) -> tuple[str, ...]:
     """What a person should know about this set of sensors."""
     notes = []
     if config.lidar is None:
-        notes.append("no LiDAR: the camera ticks")
+        notes.append("no LiDAR: frames follow the camera")
     if config.camera is None:
-        notes.append("no camera: LiDAR goes on alone")
+        notes.append("no camera: the pipeline runs on LiDAR alone")
     elif config.camera.calibration is None:
         notes.append("the camera has no calibration: LiDAR and camera are not fused")
     if config.ego is None:
-        notes.append("no own speed: neither gnss nor CAN gives it")
+        notes.append("no ego speed: neither gnss nor can provides it")
     return tuple(notes)

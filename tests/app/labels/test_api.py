@@ -225,7 +225,7 @@ def test_live_sensors_and_nothing_cannot_be_labelled() -> None:
         with serving(create_app(engine)) as address, httpx.Client(base_url=address, timeout=WAIT_S) as client:
             assert client.get("/api/state").json()["labels"] is None
             answer = act(client, kind="tag", first=0, last=0, tag="x")
-            assert answer.json()["detail"] == "no recording is open that could be labelled"
+            assert answer.json()["detail"] == "no recording is open"
             assert answer.status_code == 404
     finally:
         engine.stop()

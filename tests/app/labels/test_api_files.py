@@ -130,8 +130,8 @@ FLAGS, METHOD, DATA = (6, 8), (8, 10), 30 + len("a.txt")
         ("kitti", spoilt(*FLAGS, 1), "the .zip needs a password"),
         ("kitti", spoilt(*METHOD, 99), "compression method is not supported"),
         ("kitti", spoilt(DATA, None, 0xFF), "Error -3 while decompressing data"),
-        ("kitti", spoilt(DATA + 9, None, 0xFF, zipfile.ZIP_LZMA), "no .zip of a folder: Corrupt input data"),
-        ("kitti", spoilt(DATA + 1, None, 0xFF, zipfile.ZIP_BZIP2), "no .zip of a folder: Invalid data stream"),
+        ("kitti", spoilt(DATA + 9, None, 0xFF, zipfile.ZIP_LZMA), "not a valid .zip: Corrupt input data"),
+        ("kitti", spoilt(DATA + 1, None, 0xFF, zipfile.ZIP_BZIP2), "not a valid .zip: Invalid data stream"),
         ("openlabel", b"{}", "the file: "),
     ],
 )

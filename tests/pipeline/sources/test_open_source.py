@@ -57,7 +57,7 @@ def test_an_empty_folder_and_a_file_are_told_apart(scheme: str, tmp_path: Path) 
 @pytest.mark.parametrize("scheme", ["astyx", "kitti"])
 def test_a_folder_of_something_else_is_refused(scheme: str, tmp_path: Path) -> None:
     (tmp_path / "holiday.txt").write_text("x")
-    with pytest.raises(SourceError, match=r"no (Astyx|KITTI) recording"):
+    with pytest.raises(SourceError, match=r"not an? (Astyx|KITTI) recording"):
         open_source(f"{scheme}:{tmp_path}")
 
 

@@ -50,10 +50,10 @@ WRONG = {
     "not text": (bytes(range(256)) * 40, "no PCD file"),
     "something else": (b"ply\nformat ascii\n", "no PCD file"),
     "no points": (pcd(ROWS[:0]), "no points in it"),
-    "unknown type": (pcd(ROWS).replace(b"TYPE F", b"TYPE Q"), "its header makes no sense"),
-    "too few sizes": (pcd(ROWS).replace(b"SIZE 4 ", b"SIZE "), "its header makes no sense"),
-    "too many points": (pcd(ROWS).replace(b"POINTS ", b"POINTS 99999999"), "its header makes no sense"),
-    "unknown encoding": (pcd(ROWS).replace(b"DATA binary", b"DATA zipped"), "its header makes no sense"),
+    "unknown type": (pcd(ROWS).replace(b"TYPE F", b"TYPE Q"), "its header is invalid"),
+    "too few sizes": (pcd(ROWS).replace(b"SIZE 4 ", b"SIZE "), "its header is invalid"),
+    "too many points": (pcd(ROWS).replace(b"POINTS ", b"POINTS 99999999"), "its header is invalid"),
+    "unknown encoding": (pcd(ROWS).replace(b"DATA binary", b"DATA zipped"), "its header is invalid"),
     "compressed, cut": (pcd(ROWS, "binary_compressed")[:-50], "cut off or damaged"),
     "compressed, spoiled": (pcd(ROWS, "binary_compressed")[:-50] + bytes([255]) * 50, "compressed points are damaged"),
 }
@@ -141,7 +141,7 @@ def test_a_damaged_file_degrades_its_frame(tmp_path: Path) -> None:
     (folder / f"{STAMPS_NS[0]}.pcd").write_bytes(b"garbage")
     source = open_source(f"pcd:{folder}")
     assert source.frame(0).sweep is None
-    assert source.frame(0).notes == (f"{STAMPS_NS[0]}.pcd: no PCD file: its header does not end",)
+    assert source.frame(0).notes == (f"{STAMPS_NS[0]}.pcd: not a PCD file: its header does not end",)
     assert source.frame(1).sweep is not None
 
 

@@ -68,7 +68,7 @@ def test_places_of_a_utm_zone(tmp_path: Path, text: str, asked: str) -> None:
         pytest.param("easting,northing\n1,2\n3,4\n", "?epsg=61N", "not one UTM zone: 61N", id="no such zone"),
         pytest.param("east,north,zone\n1,2,32N\n3,4,33N\n", "", "not one UTM zone: 32N, 33N", id="two zones"),
         pytest.param("lat,lon\n48,11\n48.1,11\n", "?epsg=32632", "no columns named easting and", id="degrees"),
-        pytest.param(GGA, "?epsg=32632", "only CSV has places of a UTM zone", id="another kind of file"),
+        pytest.param(GGA, "?epsg=32632", "UTM coordinates are read from CSV only", id="another kind of file"),
     ],
 )
 def test_a_utm_zone_that_is_missing_or_wrong_is_said(tmp_path: Path, text: str, asked: str, says: str) -> None:

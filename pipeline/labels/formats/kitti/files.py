@@ -75,7 +75,7 @@ def read_objects(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     frames = {name: index for index, name in enumerate(drive.file_names())}
     known = {frames[name]: (name, file) for name, file in files.items() if name in frames}
     if not known:
-        raise BadInput(f"{path}: no label file is named as a frame of {drive.uri}")
+        raise BadInput(f"{path}: no label file is named like a frame of {drive.uri}")
     rows: dict[int, list[LabelRow]] = {}
     for frame, (name, file) in sorted(known.items()):
         T_rect_ego, camera = _view_beside(home, name, drive.shots[frame])
@@ -115,7 +115,7 @@ def read_tracking(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
         row = kitti_rows.from_fields(fields, T_rect_ego, camera, what)
         label, sightings = found.setdefault(number, (row.label, {}))
         if frame in sightings or label != row.label:
-            raise BadInput(f"{what}: track {number} is there twice, or of two classes")
+            raise BadInput(f"{what}: track {number} occurs twice, or with two classes")
         sightings[frame] = Sighting(frame, row.cuboid, row.bbox)
         rows.append(row)
     tracks = [
@@ -135,7 +135,7 @@ def _sightings(labels: LabelSet) -> Iterator[tuple[LabelTrack, Sighting]]:
 def _view(shot: Shot) -> tuple[F64, CameraCalibration]:
     """Where labels of a frame are, and its camera. BadInput without one."""
     if shot.camera is None or shot.T_rect_ego is None:
-        raise BadInput("KITTI labels are in the camera's frame; this recording has no calibration of a camera")
+        raise BadInput("KITTI labels are in the camera's frame; this recording has no camera calibration")
     check_looks_ahead(shot.camera, "the recording's calibration")
     return shot.T_rect_ego, shot.camera
 
@@ -157,7 +157,7 @@ def _files(path: Path, folder: str) -> tuple[Path, dict[str, Path]]:
     inside = path / folder if (path / folder).is_dir() else path
     files = files_by_name(inside, (".txt",))
     if not files:
-        raise BadInput(f"{path}: no KITTI labels: neither {folder}/*.txt nor *.txt in it")
+        raise BadInput(f"{path}: not KITTI labels: neither {folder}/*.txt nor *.txt in it")
     return inside.parent, files
 
 
@@ -173,7 +173,7 @@ def _lines(file: Path, skip: int = 0) -> Iterator[tuple[list[str], str]]:
 
 def _whole(text: str, limit: int, what: str) -> int:
     if not (text.isascii() and text.isdecimal() and len(text) < 20 and int(text) < limit):
-        raise BadInput(f"{what}: {text[:20]!r} is no frame or track of this recording")
+        raise BadInput(f"{what}: {text[:20]!r} is not a frame or track of this recording")
     return int(text)
 
 
@@ -200,7 +200,7 @@ def _notes(rows: list[LabelRow]) -> tuple[str, ...]:
     notes = renamed((row.kind, row.label) for row in rows if row.kind != kind_of(row.label))
     more = sum(row.said_more for row in rows)
     if more:
-        notes.append(f"how far {more:,} objects are cut or hidden is not kept: labels have no place for it")
+        notes.append(f"truncation and occlusion of {more:,} objects are dropped: labels cannot hold them")
     return tuple(notes)
 
 

@@ -97,16 +97,16 @@ def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
             outside += 1
             continue
         if each.instance_token not in found or each.sample_token not in poses:
-            raise BadInput(f"{path}: annotation {token[:40]} is of an instance or a pose that is not there")
+            raise BadInput(f"{path}: annotation {token[:40]} refers to a missing instance or pose")
         if frame in found[each.instance_token]:
-            raise BadInput(f"{path}: annotation {token[:40]} is there twice")
+            raise BadInput(f"{path}: annotation {token[:40]} occurs twice")
         found[each.instance_token][frame] = Sighting(frame, _cuboid(each, poses[each.sample_token], str(path)))
     numbers = _numbers(list(found))
     tracks = []
     for token, sightings in found.items():
         category = categories.get(instances[token].category_token)
         if category is None:
-            raise BadInput(f"{path}: instance {token[:40]} is of a category that is not there")
+            raise BadInput(f"{path}: instance {token[:40]} refers to a missing category")
         if sightings:
             in_order = tuple(sightings[frame] for frame in sorted(sightings))
             tracks.append(LabelTrack(numbers[token], _label(category.name), in_order, "accepted", origin))
@@ -120,7 +120,7 @@ def _home(path: Path) -> Path:
     for folder in (path, *sorted(each for each in path.glob("*") if each.is_dir())):
         if (folder / "sample.json").is_file():
             return folder
-    raise BadInput(f"{path}: no nuScenes tables: no sample.json in it")
+    raise BadInput(f"{path}: not nuScenes tables: sample.json is missing")
 
 
 def _table(home: Path, name: str, row: type[R]) -> dict[str, R]:
@@ -143,9 +143,9 @@ def _frames(samples: list[_Sample], drive: LabeledDrive, what: str) -> dict[str,
         if len(away_us) and away_us[nearest] < reach_us:
             frames[sample.token] = nearest
     if not frames:
-        raise BadInput(f"{what}: no sample is of the time of a frame of {drive.uri}")
+        raise BadInput(f"{what}: no sample has the time of a frame of {drive.uri}")
     if len(set(frames.values())) < len(frames):
-        raise BadInput(f"{what}: two samples are of the same frame of {drive.uri}")
+        raise BadInput(f"{what}: two samples match the same frame of {drive.uri}")
     return frames
 
 
@@ -196,7 +196,7 @@ def _check_camera(
 def _cuboid(each: _Annotation, T_ego_global: F64, what: str) -> Cuboid:
     turn = T_ego_global[:3, :3] @ _turn(each.rotation, what)
     if not np.all(np.abs(np.array((*each.translation, *each.size))) < _LARGEST_M):
-        raise BadInput(f"{what}: annotation {each.token[:40]} has no place")
+        raise BadInput(f"{what}: annotation {each.token[:40]} has no position")
     x, y, z = (float(value) for value in transform(T_ego_global, np.array([each.translation]))[0])
     width, length, height = each.size
     return Cuboid((x, y, z), (length, width, height), float(np.arctan2(turn[1, 0], turn[0, 0])))
@@ -206,7 +206,7 @@ def _rigid(pose: _Pose, what: str) -> F64:
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = _turn(pose.rotation, what), pose.translation
     if not np.all(np.abs(T) < _LARGEST_M):
-        raise BadInput(f"{what}: a pose that is nowhere")
+        raise BadInput(f"{what}: an invalid pose")
     return T
 
 
@@ -215,7 +215,7 @@ def _turn(quaternion: Four, what: str) -> F64:
     w, x, y, z = quaternion
     length = float(np.linalg.norm(quaternion)) if max(map(abs, quaternion)) < 2.0 else 0.0
     if not abs(length - 1.0) < 1e-3:
-        raise BadInput(f"{what}: a rotation that is no unit quaternion")
+        raise BadInput(f"{what}: a rotation that is not a unit quaternion")
     return np.asarray(Rotation.from_quat([x, y, z, w]).as_matrix())
 
 

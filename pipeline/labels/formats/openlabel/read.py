@@ -65,7 +65,7 @@ class _Reading:
             index = self._frame(key)
             told = frame.frame_properties.timestamp
             if self.is_ours and told != str(self.drive.shots[index].t_ns):
-                raise BadInput(f"{self.what}: frame {index} is of another time than in {self.drive.uri}")
+                raise BadInput(f"{self.what}: frame {index} has another time than in {self.drive.uri}")
 
     def _frame(self, key: str | int) -> int:
         text = str(key)
@@ -80,7 +80,7 @@ class _Reading:
                 if uid in sightings:
                     sightings[uid].append(self._sighting(self._frame(key), seen.object_data))
                 elif uid not in self.content.objects:
-                    raise BadInput(f"{self.what}: frame {key} has an object {uid[:40]!r} that is not there")
+                    raise BadInput(f"{self.what}: frame {key} refers to an object {uid[:40]!r} that does not exist")
         for uid, number in self.numbers.items():
             each = self.content.objects[uid]
             state, origin = self._made(each.object_data)
@@ -122,11 +122,11 @@ class _Reading:
             if system is None or system.pose_wrt_parent is None:
                 return T
             if system.pose_wrt_parent.matrix4x4 is None:
-                raise BadInput(f"{self.what}: the pose of {name[:40]!r} is not a matrix4x4, which alone is read")
+                raise BadInput(f"{self.what}: the pose of {name[:40]!r} is not a matrix4x4, the only supported form")
             val = _of_length(system.pose_wrt_parent.matrix4x4, (16,), f"{self.what}: a matrix4x4")
             T = rigid_transform(np.reshape(val, (4, 4)), f"{self.what}: the pose of {name[:40]!r}") @ T
             name = system.parent
-        raise BadInput(f"{self.what}: coordinate systems that are each other's parents")
+        raise BadInput(f"{self.what}: the coordinate systems form a cycle")
 
     def _leads(self) -> Iterable[LeadRange]:
         """Actions where they are ours, else the relations alone."""
@@ -148,7 +148,7 @@ class _Reading:
             return "none" if kind == ol.NO_LEAD else "unknown"
         relation = self.content.relations.get(uid)
         if kind != ol.LEAD or relation is None or relation.type != ol.LEADS:
-            raise BadInput(f"{self.what}: the lead {uid[:20]!r} is no track")
+            raise BadInput(f"{self.what}: the lead {uid[:20]!r} is not a track")
         return self._track_of(relation.rdf_subjects)
 
     def _track_of(self, subjects: list[Agent]) -> int:
@@ -219,9 +219,9 @@ class _Reading:
             return
         other = sum(each.type != ol.LEADS for each in self.content.relations.values()) + len(self.content.actions)
         if other:
-            yield f"{other:,} relations and actions other than {ol.LEADS} are not kept: labels have no place for them"
+            yield f"{other:,} relations and actions other than {ol.LEADS} are dropped: labels cannot hold them"
         if self.content.objects and not any(each.type == ol.LEADS for each in self.content.relations.values()):
-            yield "the file says of no frame who leads"
+            yield "the file names no lead in any frame"
 
 
 def _is_track(uid: str, each: Element) -> bool:

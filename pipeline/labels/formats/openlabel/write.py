@@ -152,7 +152,7 @@ def _seen(sighting: Sighting) -> Element:
 
 
 def _marks(origin: Origin, marked: LabelTrack | LeadRange | PathLabel | EventLabel | None = None) -> Element:
-    """State, review and origin as the texts and numbers that any element may have. marked: null for what has no
+    """State, review and origin as the texts and numbers that any element may have. marked: None for what has no
     state."""
     texts: dict[str, str | None] = {"maker": origin.maker, "by": origin.name, "how": origin.how or None}
     texts |= {"params": origin.params, "calibration": origin.calibration}

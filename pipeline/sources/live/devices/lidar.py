@@ -16,7 +16,7 @@ from pipeline.types import Sweep
 
 
 class LidarInput:
-    """pps: what the last position packet said of the pulse per second; null before one came. follows_gps: the sensor's
+    """pps: what the last position packet said of the pulse per second; None before one came. follows_gps: the sensor's
     time is UTC past the hour. T_ego_lidar: (4, 4), where it sits. offset_ns: what is added to its stamps. on_packet:
     told each data packet and when it arrived."""
 
@@ -44,7 +44,7 @@ class LidarInput:
         return None if offset_ns is None else whole_hours_off(offset_ns)
 
     def utc_to_host_ns(self, utc_ns: int, near_ns: int) -> int | None:
-        """UTC on the host's timeline, by the LiDAR's clock; null while that does not follow GPS."""
+        """UTC on the host's timeline, by the LiDAR's clock; None while that does not follow GPS."""
         offset_ns = self._decoder.clock.offset_ns
         if not self.follows_gps or offset_ns is None:
             return None

@@ -21,7 +21,7 @@ class Input(Protocol):
     readers: tuple[Reader, ...]
 
     def clock_offset_ms(self) -> float | None:
-        """Host time less the sensor's own (of a VLP-16: past the hour), the shortest delay on the way included; null
+        """Host time less the sensor's own (of a VLP-16: past the hour), the shortest delay on the way included; None
         where the sensor has no clock."""
         ...
 

@@ -50,7 +50,7 @@ def _listening(port: int, interface: str, group: str | None) -> socket.socket:
         bound.close()
         where = f"UDP port {port} on {interface}" + (f", group {group}" if group else "")
         if error.errno == errno.EADDRINUSE:
-            raise DeviceLost(f"{where} is taken by another program") from None
+            raise DeviceLost(f"{where} is in use by another program") from None
         raise DeviceLost(f"cannot listen on {where}: {error.strerror or error}") from None
     return bound
 

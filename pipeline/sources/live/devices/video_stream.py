@@ -52,7 +52,7 @@ def play_file(path: Path, receive: Receive, stop: Stop) -> None:
         except (av.FFmpegError, OSError, ValueError) as error:
             raise DeviceLost(f"{path}: {_reason(error)}") from None
         if not shown:
-            raise DeviceLost(f"{path}: no pictures in it")
+            raise DeviceLost(f"{path}: no pictures")
 
 
 def read_device(device: int | str, receive: Receive, stop: Stop) -> None:
@@ -87,7 +87,7 @@ def device_number(device: int | str) -> int:
 def _shots(container: av.container.InputContainer) -> Iterator[tuple[Shot, float]]:
     """Each picture with its time in the video, seconds. JPEGs are handed on as they are."""
     if not container.streams.video:
-        raise ValueError("no video in it")
+        raise ValueError("no video stream")
     stream = container.streams.video[0]
     rate = float(stream.average_rate or stream.base_rate or _USUAL_HZ)
     rate = rate if _SLOWEST_HZ <= rate <= _FASTEST_HZ else _USUAL_HZ

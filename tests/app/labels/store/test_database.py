@@ -117,7 +117,7 @@ def test_a_file_that_is_no_database_is_said(file: Path) -> None:
     with pytest.raises(DatabaseError, match="not a database"):
         Database.in_file(file)
     (file.parent / "a file").write_text("")
-    with pytest.raises(DatabaseError, match="labels cannot be kept there"):
+    with pytest.raises(DatabaseError, match="labels cannot be stored there"):
         Database.in_file(file.parent / "a file" / "labels.db")
 
 

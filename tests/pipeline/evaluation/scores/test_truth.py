@@ -262,5 +262,5 @@ def test_what_a_person_should_know_is_said() -> None:
     assert "In 3 a vehicle is only proposed" in notes
     assert "nobody says that every vehicle" not in notes
     by_hand = " ".join(of_labels(labels(track(4, 30.0, by=PERSON), tags=TAGGED), RULE).notes)
-    assert "Of 1 nobody says that every vehicle is labelled: tag them “all labelled”" in by_hand
+    assert "Of 1 no one has confirmed that every vehicle is labelled: tag them “all labelled”" in by_hand
     assert not any(words in by_hand for words in ("jump", "as the pipeline proposed", "only proposed"))

@@ -116,7 +116,7 @@ def test_two_programs_on_one_port_are_told_so(sensors: list[LiveSensors]) -> Non
     told: list[LiveSensors] = []
     for _ in range(600):
         both[0].next(0.05)
-        told = [each for each in both if "is taken by another program" in each.health()[0].note]
+        told = [each for each in both if "is in use by another program" in each.health()[0].note]
         if told:
             break
     assert len(told) == 1, "whichever came second"

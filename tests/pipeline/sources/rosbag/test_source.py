@@ -132,7 +132,7 @@ def test_a_message_without_a_time_is_taken_when_it_was_recorded(tmp_path: Path) 
             bag.write("/points", cloud, HEADER_NS + index * STEP_NS + RECORDED_LATER_NS)
     source = open_source(f"rosbag:{tmp_path / 'drive'}")
     assert source.t_ns(1) == HEADER_NS + STEP_NS + RECORDED_LATER_NS
-    assert "LiDAR: 2 messages without a time: taken when they were recorded" in source.notes
+    assert "LiDAR: 2 messages without a time stamp: their recording time is used" in source.notes
     assert source.frame(1).sweep is not None
 
 
@@ -156,7 +156,7 @@ def test_clouds_without_rings_and_times(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "drive", "db3") as bag:
         bag.write("/points", bag.cloud(ring_wall(0), HEADER_NS, plain), HEADER_NS)
     frame = open_source(f"rosbag:{tmp_path / 'drive'}").frame(0)
-    assert frame.notes == ("no ring numbers: given by elevation, as a VLP-16's",)
+    assert frame.notes == ("no ring numbers: assigned by elevation, as on a VLP-16",)
     assert frame.sweep is not None
     assert frame.sweep.time_s is None
     assert np.array_equal(frame.sweep.ring, ring_wall(0).ring)
@@ -205,7 +205,7 @@ WRONG = {
     "no such topic": ("rosbag:{0}/drive?lidar=/nope", "lidar=/nope: no such topic; there are /fix, /front/camera_info"),
     "wrong kind": ("rosbag:{0}/drive?lidar=/fix", "lidar=/fix: its messages are NavSatFix, not PointCloud2 or"),
     "no option": ("rosbag:{0}/drive?radar=/x", "no option 'radar'"),
-    "nothing left": ("rosbag:{0}/drive?lidar=none&camera=none", "neither LiDAR nor pictures in it; its topics are"),
+    "nothing left": ("rosbag:{0}/drive?lidar=none&camera=none", "no LiDAR and no picture topic; its topics are"),
 }
 
 
