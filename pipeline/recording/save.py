@@ -23,8 +23,8 @@ def save(
 ) -> None:
     """Write frames ``first`` to ``last`` (both included; None: to the end) to a new file, inputs and labels.
 
-    A part of a session keeps all that is in it: results, marks, parameters, labels. Run on either, the pipeline gives the same
-    results. labels: a file of labels to put in, in place of any that are there.
+    A part of a session keeps all that is in it: results, marks, parameters, labels. The pipeline gives the same results
+    on either. labels: a file of labels to put in, in place of any that are there.
 
     BadInput when ``out`` exists; whatever ends this early leaves no file behind.
     """

@@ -22,10 +22,10 @@ SeeAgain = Callable[[ExperimentDrive, int], list[Result]]
 def see_again(tmp_path: Path) -> SeeAgain:
     """What the line believes in the first frames of a kept drive whose detections are given, opened as a file."""
 
-    def believed(as_drive: ExperimentDrive, frames: int) -> list[Result]:
-        file = tmp_path / f"{as_drive.name}.yaml"
-        file.write_text(to_yaml(as_drive.as_seen()), encoding="utf-8")
-        drive = run(open_source(f"sim:{file}"), as_drive.params, Detectors())
+    def believed(driven: ExperimentDrive, frames: int) -> list[Result]:
+        file = tmp_path / f"{driven.name}.yaml"
+        file.write_text(to_yaml(driven.as_seen()), encoding="utf-8")
+        drive = run(open_source(f"sim:{file}"), driven.params, Detectors())
         return [result for _, result in islice(drive, frames)]
 
     return believed

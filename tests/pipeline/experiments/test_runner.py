@@ -56,7 +56,7 @@ def test_every_suite_has_experiments(suite: str) -> None:
 def test_every_drive_of_an_experiment_is_kept() -> None:
     kept: list[tuple[str, ExperimentDrive]] = []
     run_all(of_suite("regression"), short=True, jobs=1, keep=lambda each, as_drive: kept.append((each.name, as_drive)))
-    assert len({as_drive.name for _, as_drive in kept}) == count_cases(of_suite("regression"), short=True)
+    assert len({driven.name for _, driven in kept}) == count_cases(of_suite("regression"), short=True)
     assert {name for name, _ in kept} == {"regression"}
 
 
