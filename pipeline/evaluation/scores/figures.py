@@ -32,15 +32,18 @@ def ratio(parts: Sequence[Sums]) -> float | None:
 
 @dataclass(frozen=True)
 class Figure:
-    """name: for scripts. part: what one drive brings. whole: of the parts of all, None where there is nothing to
-    say."""
+    """One score: how it is called, and how it is computed over drives."""
 
     name: str
+    """For scripts."""
     title: str
+    """For reports."""
     unit: str
     better: Literal["higher", "lower"]
     part: Callable[[DriveScore], Any]
+    """The contribution of one drive."""
     whole: Callable[[Sequence[Any]], float | None] = ratio
+    """The score from the contributions of all drives; None where it is undefined."""
 
     def of(self, drives: Drives) -> float | None:
         return self.whole([self.part(drive) for drive in drives])
@@ -54,21 +57,24 @@ class Interval:
 
 @dataclass(frozen=True)
 class Measured:
-    """A figure's value, and where it lies with 95 % confidence; None where fewer than two drives have it."""
+    """The value of a figure."""
 
     figure: Figure
     value: float | None
+    """None where it is undefined."""
     interval: Interval | None
+    """95 % confidence interval; None where fewer than two drives have the figure."""
 
 
 @dataclass(frozen=True)
 class Compared:
-    """A figure of two runs on the same drives. interval: of run minus base, drives drawn in pairs."""
+    """A figure of two runs over the same drives."""
 
     figure: Figure
     base: float | None
     run: float | None
     interval: Interval | None
+    """95 % confidence interval of run minus base, from drives resampled in pairs."""
 
     @property
     def difference(self) -> float | None:
@@ -100,8 +106,8 @@ def _difference(figure: Figure, pairs: Sequence[tuple[Any, Any]]) -> float | Non
 
 
 def bootstrap(parts: Sequence[Any], whole: Callable[[Sequence[Any]], float | None]) -> Interval | None:
-    """Where a figure lies with 95 % confidence when drives are drawn anew with replacement. The draws are always the
-    same. None where fewer than two drives have the figure."""
+    """Where a figure lies with 95 % confidence when drives are resampled with replacement, always with the same
+    seed. None where fewer than two drives have the figure."""
     if sum(whole([part]) is not None for part in parts) < 2:
         return None
     draws = np.sort(np.random.default_rng(SEED).integers(len(parts), size=(RESAMPLES, len(parts))), axis=1)

@@ -21,15 +21,18 @@ _FEWEST_PAIRS = 3
 
 @dataclass(frozen=True)
 class Shot:
-    """One frame, without its data. camera: None where there is none. size: width and height of its picture in pixels.
-    T_rect_ego: (4, 4) to the frame that KITTI's labels are in: the recording's rectified camera 0 if it has one, else
-    the camera itself."""
+    """One frame, without its data."""
 
     name: str
+    """The recording's own name of the frame."""
     t_ns: int
     camera: CameraCalibration | None = None
+    """None where the camera has no calibration."""
     size: tuple[int, int] | None = None
+    """Width and height of its picture in pixels."""
     T_rect_ego: F64 | None = None
+    """(4, 4), takes ego points to the frame of KITTI's labels: the recording's rectified camera 0 if it has one, else
+    the camera itself."""
     ego: EgoState | None = None
 
 
@@ -39,12 +42,13 @@ def _no_points(frame: int) -> F32 | None:
 
 @dataclass(frozen=True)
 class LabeledDrive:
-    """The recording that labels belong to. points: (N, 4) float32 of a frame's sweep, None without one; read when
-    asked for."""
+    """The recording that labels belong to."""
 
     uri: str
     shots: tuple[Shot, ...]
+    """Every frame, in order."""
     points: Callable[[int], F32 | None] = field(default=_no_points, compare=False)
+    """Gives the (N, 4) float32 x y z intensity of a frame's sweep, None without one; read on demand."""
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -98,10 +102,11 @@ def _size(frame: Frame) -> tuple[int, int] | None:
 
 @dataclass(frozen=True)
 class Imported:
-    """What was read. notes: what the file said that labels do not keep, and what it did not say."""
+    """What was read from a file of labels."""
 
     labels: LabelSet
     notes: tuple[str, ...] = ()
+    """What the file says that labels cannot hold, and what it does not say."""
 
 
 Write = Callable[[LabelSet, LabeledDrive, Path], tuple[str, ...]]

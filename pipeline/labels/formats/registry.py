@@ -65,21 +65,21 @@ _LEADS: frozenset[Part] = frozenset(("leads", "states", "origins", "comments", "
 FORMATS: dict[str, Format] = {
     each.name: each
     for each in (
-        Format("native", "CIPV Studio", "everything", ".json", EVERYTHING,
+        Format("native", "CIPV Studio", "all labels", ".json", EVERYTHING,
                f"{_OURS}.native:write", f"{_OURS}.native:read"),
-        Format("mcap", "MCAP session", "the recording's labels as a channel", ".mcap", EVERYTHING,
+        Format("mcap", "MCAP session", "labels as a channel", ".mcap", EVERYTHING,
                f"{_OURS}.session:write", f"{_OURS}.session:read"),
         Format("openlabel", "OpenLABEL", "ASAM OpenLABEL 1.0", ".json", EVERYTHING,
                f"{_OURS}.openlabel.write:write", f"{_OURS}.openlabel.read:read"),
         Format("nuscenes", "nuScenes", "JSON tables", "", _TRACKED,
                f"{_OURS}.nuscenes.write:write", f"{_OURS}.nuscenes.read:read"),
-        Format("kitti", "KITTI object", "one file a frame", "", _SHAPES,
+        Format("kitti", "KITTI object", "one file per frame", "", _SHAPES,
                f"{_OURS}.kitti.files:write_objects", f"{_OURS}.kitti.files:read_objects"),
-        Format("kitti-tracking", "KITTI tracking", "one file", "", _SHAPES | {"identities"},
+        Format("kitti-tracking", "KITTI tracking", "single file", "", _SHAPES | {"identities"},
                f"{_OURS}.kitti.files:write_tracking", f"{_OURS}.kitti.files:read_tracking"),
-        Format("coco", "COCO", "boxes in pictures", ".json", _BOXES,
+        Format("coco", "COCO", "image boxes", ".json", _BOXES,
                f"{_OURS}.coco:write", f"{_OURS}.coco:read"),
-        Format("csv", "CSV", "the lead of each frame", ".csv", _LEADS,
+        Format("csv", "CSV", "lead per frame", ".csv", _LEADS,
                f"{_OURS}.lead_csv:write", f"{_OURS}.lead_csv:read"),
     )
 }  # fmt: skip

@@ -13,13 +13,18 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class About:
-    """Where a session came from. origin: the URI that was recorded. notes: what to know about the whole."""
+    """Where a session came from."""
 
     origin: str
+    """The URI that was recorded."""
     title: str
+    """Short, for a heading."""
     rate_hz: float
+    """Nominal frames per second."""
     notes: tuple[str, ...] = ()
+    """What a person should know about the whole recording."""
     version: int = VERSION
+    """Of the session's form."""
 
     @property
     def is_of_simulator(self) -> bool:

@@ -71,7 +71,7 @@ def test_a_drive_is_looked_through_once_while_it_is_open(client: httpx.Client, m
 def test_every_format_is_listed_with_what_the_page_says_of_it(client: httpx.Client) -> None:
     listed = client.get("/api/labels/formats").json()
     assert [each["name"] for each in listed] == list(FORMATS)
-    assert listed[0] == {"name": "native", "title": "CIPV Studio", "about": "everything"}
+    assert listed[0] == {"name": "native", "title": "CIPV Studio", "about": "all labels"}
 
 
 @pytest.mark.parametrize("name", ["native", "openlabel", "kitti-tracking"])
