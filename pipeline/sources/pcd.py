@@ -97,7 +97,7 @@ class PcdSource:
         return cloud.sweep(t_ns, self._T_ego_lidar)
 
     def _about(self) -> tuple[str, ...]:
-        notes = [] if self._has_times else ["no time stamps in the files' names: taken as 10 Hz"]
+        notes = [] if self._has_times else ["no time stamps in the file names: 10 Hz assumed"]
         if self._pictures and self._camera is None:
             notes.append("the camera has no calibration: LiDAR and camera are not fused")
         return (*notes, "no ego speed recorded")

@@ -165,7 +165,7 @@ class _Index:
         """Why there is no sweep in it."""
         counts = self._cutter.counts
         if counts.models:
-            return f"packets of another Velodyne, {counts.models.most_common(1)[0][0]}; only the VLP-16 is read"
+            return f"packets of a Velodyne {counts.models.most_common(1)[0][0]}; only the VLP-16 is supported"
         says = [f"no whole sweep in {counts.packets} packets to port {port}"] if counts.packets else []
         says = says or [f"no packets of a VLP-16 to port {port} in it"]
         says += [counts.about_refused()] if counts.refused else []

@@ -53,7 +53,7 @@ def test_a_lead_whose_track_is_only_proposed_judges_nothing_and_it_is_said(
     done = act(client, kind="accept", items=[{"kind": "lead", "id": lead["id"], "revision": lead["revision"]}]).json()
     assert done["what"].endswith(f"; #{track['id']} is still proposed")
     score = ScoreJson.model_validate(client.get("/api/labels/score").json())
-    said = f"#{track['id']} leads in 30 frames but is only proposed: not judged until it is accepted."
+    said = f"#{track['id']} leads in 30 frames but is only proposed: not scored until accepted."
     assert (score.judged, score.metrics, score.errors, score.notes[0]) == (0, [], [], said)
     following = client.get("/api/labels/next", params={"what": "disagreement", "frame": 0}).json()
     assert (following["frame"], following["why"]) == (None, f"no frame is judged: {said}")

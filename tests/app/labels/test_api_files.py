@@ -124,9 +124,9 @@ FLAGS, METHOD, DATA = (6, 8), (8, 10), 30 + len("a.txt")
 @pytest.mark.parametrize(
     ("name", "body", "says"),
     [
-        ("native", b"these are no labels", "the file: no JSON"),
-        ("kitti", b"these are no labels", "no .zip of a folder"),
-        ("kitti", packed(**{"..__..__out.txt": "x"}), "leads out of it"),
+        ("native", b"these are no labels", "the file: not JSON"),
+        ("kitti", b"these are no labels", "not a valid .zip"),
+        ("kitti", packed(**{"..__..__out.txt": "x"}), "path outside its folder"),
         ("kitti", spoilt(*FLAGS, 1), "the .zip needs a password"),
         ("kitti", spoilt(*METHOD, 99), "compression method is not supported"),
         ("kitti", spoilt(DATA, None, 0xFF), "Error -3 while decompressing data"),

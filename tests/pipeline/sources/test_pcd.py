@@ -47,9 +47,9 @@ def test_padding_and_repeated_names_are_room() -> None:
 
 WRONG = {
     "empty": (b"", "its header does not end"),
-    "not text": (bytes(range(256)) * 40, "no PCD file"),
-    "something else": (b"ply\nformat ascii\n", "no PCD file"),
-    "no points": (pcd(ROWS[:0]), "no points in it"),
+    "not text": (bytes(range(256)) * 40, "not a PCD file"),
+    "something else": (b"ply\nformat ascii\n", "not a PCD file"),
+    "no points": (pcd(ROWS[:0]), "no points"),
     "unknown type": (pcd(ROWS).replace(b"TYPE F", b"TYPE Q"), "its header is invalid"),
     "too few sizes": (pcd(ROWS).replace(b"SIZE 4 ", b"SIZE "), "its header is invalid"),
     "too many points": (pcd(ROWS).replace(b"POINTS ", b"POINTS 99999999"), "its header is invalid"),
@@ -106,7 +106,7 @@ def test_names_that_are_no_times_are_ten_a_second(tmp_path: Path) -> None:
         (tmp_path / f"{name}.pcd").write_bytes(pcd(ROWS))
     source = open_source(f"pcd:{tmp_path}")
     assert [source.t_ns(index) for index in range(2)] == [0, 100_000_000]
-    assert source.notes[0] == "no time stamps in the files' names: taken as 10 Hz"
+    assert source.notes[0] == "no time stamps in the file names: 10 Hz assumed"
     assert [source.frame(index).name for index in range(2)] == ["000001", "000002"]
 
 

@@ -113,14 +113,14 @@ def test_nmea_logs_say_how_good_they_are(tmp_path: Path, text: str, sigma_m: flo
 @pytest.mark.parametrize(
     ("name", "text", "says"),
     [
-        pytest.param("a.csv", "", "no route in it", id="empty"),
+        pytest.param("a.csv", "", "no route:", id="empty"),
         pytest.param("a.csv", "a,b\n1,2\n", "no columns named lat and lon", id="other columns"),
-        pytest.param("a.csv", "lat,lon\n48,11\n48,11\n", "1 places on the Earth", id="one place"),
-        pytest.param("a.csv", "lat,lon\n480,11\n481,11\n", "0 places on the Earth", id="not on the Earth"),
+        pytest.param("a.csv", "lat,lon\n48,11\n48,11\n", "1 distinct positions on the Earth", id="one place"),
+        pytest.param("a.csv", "lat,lon\n480,11\n481,11\n", "0 distinct positions on the Earth", id="not on the Earth"),
         pytest.param("a.csv", 'lat,lon\n"48,11\n' + "48.1,11.2\n" * 20_000, "not CSV: field larger", id="open quote"),
         pytest.param("a.gpx", "<gpx", "not XML", id="cut off"),
         pytest.param("a.gpx", '<!DOCTYPE x [<!ENTITY a "b">]><gpx/>', "no document type", id="entities"),
-        pytest.param("a.nmea", GGA.replace("E,4,", "E,0,"), "no route in it", id="no fix, wrong checksums"),
+        pytest.param("a.nmea", GGA.replace("E,4,", "E,0,"), "no route:", id="no fix, wrong checksums"),
     ],
 )
 def test_what_is_no_route_is_told_in_one_sentence(tmp_path: Path, name: str, text: str, says: str) -> None:
@@ -141,7 +141,7 @@ def test_an_earlier_drive() -> None:
     route = from_fixes("drive", fixes)
     assert route.lat_deg.tolist() == [fix.lat_deg for fix in fixes]
     assert route.sigma_m == 0.01
-    with pytest.raises(RouteError, match="no route in it"):
+    with pytest.raises(RouteError, match="no route:"):
         from_fixes("nothing", [])
 
 

@@ -70,8 +70,8 @@ def test_a_database_of_a_newer_program_is_left_alone(file: Path) -> None:
 @pytest.mark.parametrize(
     ("url", "says"),
     [
-        ("nonsense", "no database address"),
-        ("mysql://somewhere/labels", "no database address"),
+        ("nonsense", "invalid database address"),
+        ("mysql://somewhere/labels", "invalid database address"),
         ("sqlite:////nowhere/at/all/labels.db", "unable to open"),
         ("postgresql://me:secret@127.0.0.1:1/labels", "127.0.0.1:1"),
     ],

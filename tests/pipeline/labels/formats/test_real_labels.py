@@ -46,7 +46,7 @@ def test_kitti_lines_are_what_they_were(kitti: tuple[Path, LabeledDrive], tmp_pa
     assert (len(found.labels.tracks), len(sightings)) == (8, 24)
     assert None not in [each.bbox for each in sightings]
     assert "9 Van are taken for class 'car'" in found.notes
-    assert any(note.startswith("how far 17 objects are cut or hidden") for note in found.notes)
+    assert any(note.startswith("truncation and occlusion of 17 objects") for note in found.notes)
     export_labels(found.labels, drive, "kitti", tmp_path / "out")
     for path in sorted((folder / "label_2").iterdir()):
         theirs = [line.split() for line in path.read_text().splitlines() if not line.startswith("DontCare")]

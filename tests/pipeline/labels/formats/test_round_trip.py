@@ -110,10 +110,10 @@ LOSSES: dict[FormatName, tuple[str, ...]] = {
         "2 ranges of the lead", "1 frame of the ego path", "1 event", "1 frame tag", "2 comments", "2 reviews",
         "1 track lose their identity", "1 interpolated place", "2 labels left out: rejected",
         "1 label written as if true", "1 corrected label", "who made each label", "'frozen'", "tracks' numbers",
-        "1 track without sightings", "1 objects have no box", "cut or hidden", "3 frames have no file",
+        "1 track without sightings", "1 objects have no box", "truncation and occlusion", "3 frames have no file",
     ),
     "kitti-tracking": ("2 ranges of the lead", "2 labels left out: rejected", "1 event", "who made each label"),
-    "nuscenes": ("3 boxes of pictures not written", "1 sighting not written", "pictures and point"),
+    "nuscenes": ("3 boxes in pictures not written", "1 sighting not written", "pictures and point"),
     "coco": ("3 cuboids not written", "1 sighting not written", "1 frame tag"),
     "csv": ("4 tracks not written", "1 frame of the ego path", "1 rejected ranges", "'frozen'"),
 }  # fmt: skip

@@ -265,7 +265,7 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "text": (lambda path: path.write_text("hello"), "not an MCAP file"),
     "no more than the magic": (lambda path: path.write_bytes(b"\x89MCAP0\r\n"), "without a header"),
     "of ROS 2": (lambda path: _foreign(path, "ros2"), "try rosbag:"),
-    "of someone else": (lambda path: _foreign(path, ""), "no session of ours"),
+    "of someone else": (lambda path: _foreign(path, ""), "not a session of CIPV Studio"),
     "without frames": (lambda path: SessionWriter(path, ABOUT).close(), "holds no frames"),
     "from a later version": (_of_the_future, "version 2"),
 }
