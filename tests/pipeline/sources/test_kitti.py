@@ -166,7 +166,7 @@ def test_an_inverted_velodyne_calibration_is_noticed(kitti_raw: Path) -> None:
     T = T_ego_rect()
     rotation, place = (" ".join(map(str, part.ravel())) for part in (T[:3, :3], T[:3, 3]))
     (kitti_raw.parent / "calib_velo_to_cam.txt").write_text(f"R: {rotation}\nT: {place}\n")
-    with pytest.raises(SourceError, match="wrong way round"):
+    with pytest.raises(SourceError, match="is its extrinsic inverted"):
         open_source(f"kitti:{kitti_raw}")
 
 

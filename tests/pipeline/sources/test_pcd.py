@@ -54,7 +54,7 @@ WRONG = {
     "too few sizes": (pcd(ROWS).replace(b"SIZE 4 ", b"SIZE "), "its header is invalid"),
     "too many points": (pcd(ROWS).replace(b"POINTS ", b"POINTS 99999999"), "its header is invalid"),
     "unknown encoding": (pcd(ROWS).replace(b"DATA binary", b"DATA zipped"), "its header is invalid"),
-    "compressed, cut": (pcd(ROWS, "binary_compressed")[:-50], "cut off or damaged"),
+    "compressed, cut": (pcd(ROWS, "binary_compressed")[:-50], "truncated or damaged"),
     "compressed, spoiled": (pcd(ROWS, "binary_compressed")[:-50] + bytes([255]) * 50, "compressed points are damaged"),
 }
 
@@ -71,7 +71,7 @@ def test_a_cut_file_gives_what_is_there(encoding: str) -> None:
     notes: list[str] = []
     rows = parse_pcd(pcd(ROWS, encoding)[:-60], "a.pcd", notes)
     assert 0 < len(rows) < len(ROWS)
-    assert notes == [f"a.pcd: {len(rows)} of {len(ROWS)} points are there"]
+    assert notes == [f"a.pcd: {len(rows)} of {len(ROWS)} points read"]
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)

@@ -165,7 +165,7 @@ def test_a_vehicle_that_nobody_looked_at_is_not_claimed_falsely() -> None:
 def test_no_lead_is_derived_where_a_nearer_vehicle_may_not_be_labelled() -> None:
     known = of_labels(labels(track(4, 30.0), track(5, 20.0, state="proposed")), RULE)
     assert leads(known) == ["?", "?", "?"]
-    assert any("who leads" in note for note in known.notes)
+    assert any("No lead is labelled" in note for note in known.notes)
 
 
 def test_a_lead_that_is_only_proposed_is_said() -> None:

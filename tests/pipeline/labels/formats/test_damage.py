@@ -140,7 +140,7 @@ def turned_round(here: LabeledDrive) -> LabeledDrive:
 @pytest.mark.parametrize("name", ["kitti", "kitti-tracking", "nuscenes", "openlabel"])
 def test_an_inverted_extrinsic_of_the_recording_is_detected(name: FormatName, tmp_path: Path) -> None:
     here = drive()
-    with pytest.raises(BadInput, match="wrong way round"):
+    with pytest.raises(BadInput, match="is an extrinsic inverted"):
         export_labels(seen_set(here), turned_round(here), name, tmp_path / "out")
 
 

@@ -117,7 +117,7 @@ WRONG = {
     "no file": ("pcap:", "no file given"),
     "missing": ("pcap:{folder}/missing.pcap", "no such file"),
     "folder": ("pcap:{folder}", "not a file"),
-    "option": ("pcap:{file}?colour=red", "no option 'colour'; there are port, video"),
+    "option": ("pcap:{file}?colour=red", "unknown option 'colour'; the options are port, video"),
     "twice": ("pcap:{file}?port=1&port=2", "given twice"),
     "no number": ("pcap:{file}?port=many", "port=many: not a number"),
     "no video": ("pcap:{file}?video=other.mp4", "video=other.mp4: no such file"),
