@@ -189,7 +189,7 @@ def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
     if any(camera is not None and camera.distortion.size for camera in cameras):
         changes.append("boxes are moved to the undistorted picture, which KITTI's are of")
     if found:
-        changes.append("how far objects are cut or hidden is not known: written as -1")
+        changes.append("truncation and occlusion are unknown: written as -1")
     without = sum(sighting.bbox is None for _, sighting in found)
     if without:
         changes.append(f"{without:,} objects have no box in the picture: written as -1")

@@ -63,7 +63,7 @@ def test_a_database_of_a_newer_program_is_left_alone(file: Path) -> None:
     with first.writing() as connection:
         connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
     first.close()
-    with pytest.raises(DatabaseError, match="written by a newer program"):
+    with pytest.raises(DatabaseError, match="written by a newer version of this program"):
         Database.in_file(file)
 
 

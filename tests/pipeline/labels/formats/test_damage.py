@@ -140,7 +140,7 @@ def turned_round(here: LabeledDrive) -> LabeledDrive:
 @pytest.mark.parametrize("name", ["kitti", "kitti-tracking", "nuscenes", "openlabel"])
 def test_an_inverted_extrinsic_of_the_recording_is_detected(name: FormatName, tmp_path: Path) -> None:
     here = drive()
-    with pytest.raises(BadInput, match="is an extrinsic inverted"):
+    with pytest.raises(BadInput, match="extrinsic inverted"):
         export_labels(seen_set(here), turned_round(here), name, tmp_path / "out")
 
 
@@ -194,7 +194,7 @@ def test_labels_of_another_recording_are_refused(tmp_path: Path) -> None:
 def test_nothing_is_written_over(tmp_path: Path) -> None:
     for name in FORMATS.keys() - {"mcap"}:
         export_labels(full_set(), HERE, name, tmp_path / name)
-        with pytest.raises(BadInput, match="there is"):
+        with pytest.raises(BadInput, match="file already exists|folder is not empty"):
             export_labels(full_set(), HERE, name, tmp_path / name)
 
 
