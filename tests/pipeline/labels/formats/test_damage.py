@@ -194,7 +194,7 @@ def test_labels_of_another_recording_are_refused(tmp_path: Path) -> None:
 def test_nothing_is_written_over(tmp_path: Path) -> None:
     for name in FORMATS.keys() - {"mcap"}:
         export_labels(full_set(), HERE, name, tmp_path / name)
-        with pytest.raises(BadInput, match="file already exists|folder is not empty"):
+        with pytest.raises(BadInput, match=r"file already exists|folder is not empty"):
             export_labels(full_set(), HERE, name, tmp_path / name)
 
 
