@@ -187,7 +187,7 @@ def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
     ]
     cameras = [drive.shots[sighting.frame].camera for _, sighting in found if sighting.bbox is not None]
     if any(camera is not None and camera.distortion.size for camera in cameras):
-        changes.append("boxes are moved to the undistorted picture, which KITTI's are of")
+        changes.append("boxes are moved to the undistorted picture, as in KITTI")
     if found:
         changes.append("truncation and occlusion are unknown: written as -1")
     without = sum(sighting.bbox is None for _, sighting in found)

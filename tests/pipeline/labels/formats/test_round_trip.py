@@ -109,7 +109,7 @@ LOSSES: dict[FormatName, tuple[str, ...]] = {
     "kitti": (
         "2 ranges of the lead", "1 frame of the ego path", "1 event", "1 frame tag", "2 comments", "2 reviews",
         "1 track lose their identity", "1 interpolated position", "2 labels left out: rejected",
-        "1 label written as if true", "1 corrected label", "who made each label", "'frozen'", "tracks' numbers",
+        "1 label written as if accepted", "1 corrected label", "who made each label", "'frozen'", "tracks' numbers",
         "1 track without sightings", "1 objects have no box", "truncation and occlusion", "3 frames have no file",
     ),
     "kitti-tracking": ("2 ranges of the lead", "2 labels left out: rejected", "1 event", "who made each label"),
