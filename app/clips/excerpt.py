@@ -13,7 +13,7 @@ from pipeline.common.progress import Progress, silent
 from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.recording.save import save
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from pipeline.run import through
 from pipeline.types import Frame, Result
 from pipeline.types.result_json import to_json

@@ -3,7 +3,7 @@ that takes (films, MCAP, pages: 0.4 s together) when one is asked for."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -15,9 +15,10 @@ from app.drive.open_recording import Recording
 from app.views.rerun_start_options import Opening
 from pipeline.common.errors import BadInput
 from pipeline.params import Params
+from pipeline.types import F32
 from pipeline.types.result_json import to_json
 
-Kind = Literal["mcap", "rrd", "mp4", "csv", "html"]
+Kind = Literal["mcap", "rrd", "mp4", "csv", "html", "ply"]
 MOST_FRAMES = 6000
 
 
@@ -84,10 +85,29 @@ def _html(clip: Clip, path: Path, report: Report) -> None:
     path.write_text(text, encoding="utf-8")
 
 
+def _ply(clip: Clip, path: Path, report: Report) -> None:
+    from app.clips.point_cloud import MOST_SWEEPS, write_ply
+
+    total = clip.last + 1 - clip.first
+    if total > MOST_SWEEPS:
+        raise BadInput(f"a point cloud takes {MOST_SWEEPS} frames at most")
+    report(0, total)
+
+    def sweeps() -> Iterator[F32 | None]:
+        for index in range(clip.first, clip.last + 1):
+            with clip.turn.background(to_the_end=True):
+                sweep = clip.recording.as_read(index).sweep
+            yield sweep.points if sweep is not None else None
+            report(index + 1 - clip.first, total)
+
+    write_ply(sweeps(), path)
+
+
 WRITERS: dict[Kind, Callable[[Clip, Path, Report], None]] = {
     "mcap": _mcap,
     "rrd": _rrd,
     "mp4": _mp4,
     "csv": _csv,
     "html": _html,
+    "ply": _ply,
 }

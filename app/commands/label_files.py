@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from app.commands.support.open_with_progress import opened_recording
+from app.commands.support.options import RecordingName
 from app.commands.support.progress_bars import frames_progress
 from app.labels.wording import WORKING
 from pipeline.common.garbage_collection import gc_paused
 from pipeline.common.user_file_errors import given_path
-from pipeline.labels.formats.base import Drive, FormatName, drive_of
+from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.native import from_json, onto
 from pipeline.labels.formats.reading import read_bytes
-from pipeline.labels.formats.registry import export_labels, import_labels
+from pipeline.labels.formats.registry import FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.labels.recorded_truth import truth_labels
 from pipeline.types.source import Source
@@ -43,8 +44,7 @@ class ExportLabels:
     Example: cipv labels export kitti:DRIVE --format nuscenes --out labels
     """
 
-    source: tyro.conf.Positional[str]
-    """The recording: a session.mcap, astyx:<dir>, kitti:<dir>, sim:<scenario>, …"""
+    source: RecordingName
     format: FormatName
     """Which kind of file"""
     out: Path
@@ -64,7 +64,7 @@ class ExportLabels:
         say(*notes, *lost, f"{self.out}: {_amount(labels)}")
         return 0
 
-    def _labels(self, source: Source, drive: Drive) -> tuple[LabelSet, tuple[str, ...]]:
+    def _labels(self, source: Source, drive: LabeledDrive) -> tuple[LabelSet, tuple[str, ...]]:
         """The labels that are meant, with what there is to say of them."""
         if self.labels is not None:
             with gc_paused():
@@ -85,8 +85,7 @@ class ImportLabels:
     Example: cipv labels import kitti:DRIVE label_2 --format kitti
     """
 
-    source: tyro.conf.Positional[str]
-    """The recording: a session.mcap, astyx:<dir>, kitti:<dir>, sim:<scenario>, …"""
+    source: RecordingName
     file: tyro.conf.Positional[Path]
     """The file or folder to read"""
     format: FormatName
@@ -116,7 +115,7 @@ class ImportLabels:
 
 
 @contextmanager
-def _kept(source: Source, drive: Drive, url: str | None) -> Iterator[DriveLabels]:
+def _kept(source: Source, drive: LabeledDrive, url: str | None) -> Iterator[DriveLabels]:
     """The database's labels of a recording."""
     from app.labels.store.database import open_database  # as above
     from app.labels.store.drive_labels import DriveLabels, info_of
@@ -128,7 +127,7 @@ def _kept(source: Source, drive: Drive, url: str | None) -> Iterator[DriveLabels
         database.close()
 
 
-def _drive(source: Source) -> Drive:
+def _drive(source: Source) -> LabeledDrive:
     with frames_progress() as bar:
         task = bar.add_task(source.title, total=len(source))
         return drive_of(source, lambda done, total: bar.update(task, completed=done, total=total))

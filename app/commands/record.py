@@ -23,7 +23,7 @@ from pipeline.params import Params
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.save import about
 from pipeline.recording.segments import Rotation, Segments
-from pipeline.recording.velodyne_scan import RawLidar
+from pipeline.recording.session.velodyne_scan import RawLidar
 from pipeline.run import run, run_live
 from pipeline.sources import is_live
 from pipeline.types import Frame, Result

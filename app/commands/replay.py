@@ -12,6 +12,7 @@ import tyro
 
 from app.commands.support.options import SourceOptions
 from pipeline.common.errors import BadInput
+from pipeline.types.source import RawPackets
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Replay:
         config = load(str(self.config))
         faults = load_faults(self.faults) if self.faults is not None else ()
         source = self.source.open()
-        if self.speed != 1.0 and self.source.source.startswith("pcap:"):
+        if self.speed != 1.0 and isinstance(source, RawPackets):
             raise BadInput(f"--speed {self.speed:g}: a capture's packets carry their own times; only 1 is true to them")
         senders = open_senders(config)
         mount = config.lidar.mount.T_ego_sensor() if config.lidar is not None else None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from app.commands.support.open_with_progress import opened
-from app.commands.support.options import LineOptions, planned
+from app.commands.support.options import LineOptions, SourceName, planned
 from app.core.server_address import DEFAULT_PORT
 from app.core.shared_view_state import Looks
 from app.engine.engine import Engine
@@ -98,9 +98,7 @@ class Serve:
     Example: cipv serve astyx:PATH --port 8420
     """
 
-    source: tyro.conf.Positional[str]
-    """What to open: a session.mcap, pcap:<file>, rosbag:<path>, pcd:<dir>, astyx:<dir>, kitti:<dir>,
-    sim:<scenario or my.yaml>, live:<config.yaml>"""
+    source: SourceName
     server: ServerOptions = field(default_factory=ServerOptions)
     line: LineOptions = field(default_factory=LineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"

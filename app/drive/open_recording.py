@@ -24,7 +24,7 @@ from pipeline.types import F64, I64, Frame
 from pipeline.types.source import Mark, Marked, Source, TruthObject, is_simulated
 
 if TYPE_CHECKING:
-    from pipeline.labels.formats.base import Drive
+    from pipeline.labels.formats.base import LabeledDrive
 
 RULE = LeadRule()
 Truth = tuple[TruthObject, ...] | None
@@ -64,7 +64,7 @@ class Recording:
         self._ask = detections.asker(recipe.uri)
         self._truths: dict[int, Truth] = {}
         self.describing = Lock()
-        self.described: Drive | None = None
+        self.described: LabeledDrive | None = None
         """What files of labels must know of it, once somebody has asked; held by ``describing`` meanwhile."""
 
     def advance(self, run: DriveRun) -> None:

@@ -93,11 +93,11 @@ def _cell(cell: AnyCell, decimals: int, replays: str) -> str:
         return f'<td class="word"><a href="{escape(cell.href)}">{escape(in_words(cell.value, decimals))}</a></td>'
     value = cell.value if isinstance(cell, Coloured | Driven) else cell
     tone = cell.tone if isinstance(cell, Coloured) else ""
-    replay = cell.replay if isinstance(cell, Coloured | Driven) else ""
+    drive = cell.drive if isinstance(cell, Coloured | Driven) else ""
     kind = "word" if isinstance(value, str) and not tone else tone
     text = escape(in_words(value, decimals))
-    if replay and replays:
-        text = f'<a href="{escape(replays + replay)}.html" title="See this drive">{text}</a>'
+    if drive and replays:
+        text = f'<a href="{escape(replays + drive)}.html" title="See this drive">{text}</a>'
     return f'<td class="{kind}">{text}</td>'
 
 

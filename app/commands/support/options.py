@@ -13,6 +13,7 @@ import tyro
 from pipeline.common.errors import BadInput
 from pipeline.common.user_file_errors import parse_yaml
 from pipeline.params import Params, ParamsError, from_yaml, preset, with_changes
+from pipeline.source_kinds import usages
 
 if TYPE_CHECKING:
     from pipeline.detection import Detectors
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from pipeline.vision.detector import Detector
 
 S = TypeVar("S", "Source", "AnySource")
+SourceName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(help=f"What to open: {usages()}")]
+RecordingName = Annotated[str, tyro.conf.Positional, tyro.conf.arg(help=f"The recording: {usages(live=False)}")]
 
 
 def planned(file: Path | None) -> Route | None:
@@ -37,9 +40,7 @@ def planned(file: Path | None) -> Route | None:
 class SourceOptions:
     """Where frames come from."""
 
-    source: tyro.conf.Positional[str]
-    """What to open: a session.mcap, pcap:<file>, rosbag:<path>, pcd:<dir>, astyx:<dir>, kitti:<dir>,
-    sim:<scenario or my.yaml>, live:<config.yaml>"""
+    source: SourceName
     rings: int = 16
     """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
     route: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None

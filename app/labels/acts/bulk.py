@@ -124,7 +124,7 @@ def _put_tracks(draft: Draft, tracks: Sequence[LabelTrack], known: list[int]) ->
 def _numbered(numbers: Mapping[int, int], track: int, what: str) -> int:
     """The number that a track of the file has here."""
     if track not in numbers:
-        raise ActRefused(f"{what} is #{track}, and no such track comes with it or is here")
+        raise ActRefused(f"{what} is #{track}: track not found in file or database")
     return numbers[track]
 
 
@@ -154,7 +154,7 @@ def importing_truth(labels: DriveLabels, recording: Recording, person: str) -> W
         origin = Origin("import", source.title, int(time.time() * 1000))
         found, notes = truth_labels(source, recording.names(), origin, progress)
         if not found.tracks:
-            raise ActRefused("no frame of this recording comes with truth")
+            raise ActRefused("this recording comes with no ground truth")
         return importing(labels, found, person, notes, progress)
 
     return work

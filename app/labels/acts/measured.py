@@ -50,7 +50,7 @@ def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> t
     else:
         seen = lift(frame, params, track.label, sighting.bbox)
         if not seen.points:
-            raise ActRefused(f"#{act.track}: {seen.how}; that is too rough for a label: draw it")
+            raise ActRefused(f"#{act.track}: {seen.how}; too rough for a label: draw it by hand")
         cuboid, note = seen.cuboid, seen.how
     placed = SetSighting(
         kind="set_sighting",
@@ -67,9 +67,9 @@ def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddMeasured, str]:
     """A new track from where something is in the picture, with the parameters that are in use. BadInput where neither
     points nor picture tell where it is."""
     if (act.bbox is None) == (act.pixel is None):
-        raise BadAct("either a box or a pixel")
+        raise BadAct("provide either a box or a pixel")
     if act.bbox is not None and not (act.bbox[0] < act.bbox[2] and act.bbox[1] < act.bbox[3]):
-        raise BadAct("the box is none")
+        raise BadAct("invalid box")
     found = lift(frame, params, canonical(act.label), act.bbox, act.pixel)
     cuboid, how = _given(found.cuboid), found.how
     return AddMeasured(kind="lift", label=act.label, frame=frame.index, cuboid=cuboid, bbox=found.bbox, how=how), how

@@ -29,7 +29,7 @@ class Placed(Strict):
     def sighting(self) -> Sighting:
         """As a keyframe. BadAct for a box that is none, or when nothing is there."""
         if self.cuboid is None and self.bbox is None:
-            raise BadAct("neither a cuboid nor a box")
+            raise BadAct("provide a cuboid or a box")
         sighting = Sighting(self.frame, self.cuboid.value() if self.cuboid else None, self.bbox)
         try:
             return check_sighting(sighting, frames_text(self.frame))
@@ -212,7 +212,7 @@ class SetPath(Strict):
     def lines(self) -> tuple[tuple[Point2, ...] | None, tuple[Point2, ...] | None]:
         """BadAct when there is neither."""
         if self.left is None and self.right is None:
-            raise BadAct("neither a left nor a right line")
+            raise BadAct("provide a left or a right line")
         return (
             tuple(self.left) if self.left is not None else None,
             tuple(self.right) if self.right is not None else None,

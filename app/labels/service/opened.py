@@ -58,7 +58,7 @@ class KeptLabels:
 
 @dataclass(eq=False)
 class Opened:
-    """What is open. recording: null for what has no frames to label. kept: where its labels are."""
+    """What is open. recording: None for what has no frames to label. kept: where its labels are."""
 
     uri: str
     recording: Recording | None
@@ -76,13 +76,13 @@ class Opened:
 
     @property
     def key(self) -> str | None:
-        """Of the recording; null for what has no frames to label."""
+        """Of the recording; None for what has no frames to label."""
         return self.labels.info.key if self.recording is not None else None
 
     def framed(self) -> Recording:
         """What can be labelled. NoSuchLabel when nothing can."""
         if self.recording is None:
-            raise NoSuchLabel("no recording is open that could be labelled")
+            raise NoSuchLabel("no recording is open")
         return self.recording
 
     def meant(self, drive: str | None) -> DriveLabels:

@@ -14,7 +14,7 @@ from pipeline.common.errors import BadInput
 
 logger = logging.getLogger("cipv.labels")
 
-Kind = Literal["propose", "import"]
+TaskKind = Literal["propose", "import"]
 _PATIENCE_S = 10.0
 _TELL_EVERY_S = 0.1
 
@@ -29,7 +29,7 @@ class TaskState:
     begins, or what it was about is closed."""
 
     id: int
-    what: Kind
+    what: TaskKind
     done: int = 0
     total: int = 0
     note: str = ""
@@ -63,14 +63,14 @@ class Tasks:
 
     @property
     def state(self) -> TaskState | None:
-        """Null while there was none."""
+        """None while there was none."""
         return self._state
 
-    def begin(self, what: Kind, work: Work) -> int:
+    def begin(self, what: TaskKind, work: Work) -> int:
         """Its number. ActRefused while another one runs."""
         with self._lock:
             if self._state is not None and self._state.running:
-                raise ActRefused(f"{self._state.what} is still going on")
+                raise ActRefused(f"{self._state.what} is still running")
             self._turn += 1
             turn = self._turn
             self._state = TaskState(turn, what)

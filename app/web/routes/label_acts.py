@@ -10,7 +10,7 @@ from fastapi.responses import JSONResponse
 from app.labels.acts.requests import Import, Propose
 from app.labels.errors import Stale
 from app.labels.service.answers import changes_json
-from app.labels.service.desk import Done, LabelDesk
+from app.labels.service.desk import ActDone, LabelDesk
 from app.web.routes.label_act_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
 from app.web.routes.refusals import refusing
 
@@ -60,7 +60,7 @@ def label_acts_router(desk: LabelDesk) -> APIRouter:
     return router
 
 
-def _answer(done: Done) -> Response:
+def _answer(done: ActDone) -> Response:
     """changed: null for what has no frames to label."""
     acted, labels = done.acted, done.labels
     changed = None

@@ -38,6 +38,16 @@ class NativeFile(BaseModel):
     labels: dict[str, Any]
 
 
+class FormatJson(BaseModel):
+    """A format of labels."""
+
+    name: str
+    """As the other routes take it."""
+    title: str
+    about: str
+    """What it is, in a few words."""
+
+
 class LostJson(BaseModel):
     """What a format has no place for, a sentence each."""
 

@@ -19,10 +19,10 @@ from app.labels.service.desk import LabelDesk
 from app.labels.store.values import LONGEST_ITEM, LONGEST_NAME
 from app.labels.wording import WORKING
 from app.web.routes.label_act_shapes import TaskBegun
-from app.web.routes.label_file_shapes import VERSION_NAME, LostJson, NativeFile, NewVersion, VersionJson
+from app.web.routes.label_file_shapes import VERSION_NAME, FormatJson, LostJson, NativeFile, NewVersion, VersionJson
 from app.web.routes.refusals import refusing
 from app.web.routes.shapes import file_of
-from pipeline.labels.formats.base import FormatName
+from pipeline.labels.formats.registry import FORMATS, FormatName
 
 IMPORT = "/api/labels/import"
 _BYTES = "application/octet-stream"
@@ -62,6 +62,11 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
             raise
         return JSONResponse({"status": "begun", "what": "import", "task": number}, 202)
 
+    @router.get("/formats")
+    def formats() -> list[FormatJson]:
+        """Every format in which labels can be exported and imported."""
+        return [FormatJson(name=each.name, title=each.title, about=each.about) for each in FORMATS.values()]
+
     @router.get("/export", response_class=FileResponse, responses=_FILE)
     def export(format: FormatName = "native", version: VersionName = WORKING) -> FileResponse:
         """All labels as a file, of a format that is a folder as a .zip. The header X-Cipv-Lost says how many kinds of
@@ -82,7 +87,6 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
     def notes(format: FormatName = "native", version: VersionName = WORKING) -> LostJson:
         """What a format has no place for, a sentence each, before anything is written."""
         from pipeline.labels.formats.parts import reduce
-        from pipeline.labels.formats.registry import FORMATS  # as above
 
         with refusing():
             _, lost = reduce(desk.labels.label_set(version), FORMATS[format].holds)

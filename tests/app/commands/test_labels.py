@@ -9,8 +9,8 @@ from unittest.mock import Mock
 import pytest
 
 from app.cli import main
-from pipeline.labels.formats.base import FormatName
-from pipeline.recording import session_source
+from pipeline.labels.formats.registry import FormatName
+from pipeline.recording.session import source as session_source
 from tests.pipeline.recording.frames import full, write
 
 
@@ -40,7 +40,7 @@ def test_truth_goes_out_and_comes_back(drive: Path, tmp_path: Path, capsys: pyte
     assert (labels["format"], labels["version"]) == ("cipv-labels", 2)
     assert [track["id"] for track in labels["labels"]["tracks"]] == [7]
     assert cipv("labels", "export", drive, "--labels", file, "--format", "csv", "--out", tmp_path / "lead.csv") == 0
-    assert "cipv: 1 track not written: no place for them" in capsys.readouterr().err
+    assert "cipv: 1 track not written: the format cannot hold them" in capsys.readouterr().err
 
 
 READ: dict[FormatName, tuple[int, int]] = {

@@ -13,7 +13,7 @@ from app.cli import main
 from app.commands.record import Record
 from app.commands.support.options import LineOptions, SourceOptions
 from pipeline.params import SyncParams
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from pipeline.types import Frame
 from tests.app.engine.test_live_engine import Sensors
 from tests.pipeline.sources.live.bench import endless

@@ -12,7 +12,14 @@ import pytest
 ROOT = Path(__file__).resolve().parents[3]
 DRAWING = {"fastapi", "uvicorn", "viser", "rerun", "rich.progress", "prometheus_client"}
 RECORDING = {"mcap", "foxglove", "rosbags", "velodyne_decoder", "av", "serial", "can", "pynmea2", "zstandard"}
-LABELS = {"sqlalchemy", "alembic", "psycopg", "trackeval", "scipy.interpolate", "pipeline.labels.formats.registry"}
+LABELS = {
+    "sqlalchemy",
+    "alembic",
+    "psycopg",
+    "trackeval",
+    "scipy.interpolate",
+    "pipeline.labels.formats.openlabel.read",
+}
 LINE = {"numba", "scipy.optimize", "onnxruntime", "onnx", "pyproj"}
 SERVING = LABELS | RECORDING | {"open3d", "dask", "scipy.ndimage", "viser", "rerun", "rich", "app.clips.video"}
 
@@ -45,6 +52,15 @@ def imported(program: str) -> set[str]:
 )
 def test_a_command_imports_what_it_needs(module: str, without: set[str]) -> None:
     assert without & imported(f"import {module}") == set()
+
+
+USED_EVERY_DAY = ("serve", "run", "evaluate", "record", "sessions", "label_files", "labels", "replay", "live")
+
+
+@pytest.mark.parametrize("command", USED_EVERY_DAY)
+def test_a_users_process_has_neither_the_experiments_nor_what_trains_the_detector(command: str) -> None:
+    there = imported(f"import app.commands.{command}, app.web.server")
+    assert [name for name in there if name.startswith(("pipeline.experiments", "pipeline.training", "torch"))] == []
 
 
 def test_the_list_of_commands_needs_none_of_them() -> None:

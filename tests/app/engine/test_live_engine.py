@@ -19,7 +19,7 @@ from app.engine.snapshot import Snapshot
 from pipeline.common.progress import Progress
 from pipeline.detection import Detectors
 from pipeline.params import Params, SyncParams, with_changes
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from pipeline.types import U8, CameraCalibration, Frame, GnssFix, RawLanes, StreamHealth
 from pipeline.types.camera_shot import Shot
 from pipeline.types.source import AnySource, SourceError, Tap

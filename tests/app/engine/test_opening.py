@@ -165,7 +165,7 @@ def test_what_a_detector_has_to_say_is_said_on_the_page():
 
 @pytest.mark.parametrize(
     ("sensors", "told"),
-    [("both", []), ("lidar", ["by the LiDAR alone"]), ("camera", ["by the camera alone"])],
+    [("both", []), ("lidar", ["uses the LiDAR alone"]), ("camera", ["uses the camera alone"])],
     ids=["both", "LiDAR", "camera"],
 )
 def test_a_car_with_only_one_sensor_is_told_on_the_page(start: Start, sensors: str, told: list[str]):

@@ -19,7 +19,7 @@ from app.web.source_catalog import sessions
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
 from pipeline.recording.segments import Segments
-from pipeline.recording.session_source import Mark, SessionSource
+from pipeline.recording.session.source import Mark, SessionSource
 from pipeline.run import run
 from pipeline.types.result_json import to_json
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener

@@ -18,8 +18,8 @@ from app.web.server import create_app
 from pipeline.calibration.edge_match import FEWEST
 from pipeline.detection import Detectors
 from pipeline.params import Params, from_yaml, preset, with_changes
-from pipeline.recording.provenance import About
-from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.session.provenance import About
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.run import run
 from pipeline.sources import open_source
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
