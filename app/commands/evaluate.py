@@ -15,6 +15,7 @@ import tyro
 
 from app.commands.support.options import LineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
+from app.core.frame_input import frame_input
 from app.reports.html import html
 from app.reports.terminal_tables import show
 from pipeline.common.errors import BadInput
@@ -27,9 +28,9 @@ from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels, of_
 from pipeline.labels.formats import native
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.params import Params, from_yaml, preset
-from pipeline.run import Sensors, only
-from pipeline.step import State, step
-from pipeline.types import Frame, Result
+from pipeline.run import Detectors, Sensors
+from pipeline.step import State, step, warm_up
+from pipeline.types import Result
 from pipeline.types.source import Source
 from pipeline.warm_up import warm_up
 
@@ -162,17 +163,13 @@ def _lines(
     warm_up()
     states = [State() for _ in wanted]
     for index in range(len(source)):
-        frame = _seen(source.frame(index), detectors, sensors)
+        frame = frame_input(source.frame(index), detectors, sensors)
         row = []
         for n, params in enumerate(wanted):
             states[n], result = step(states[n], frame, params)
             row.append(replace(result, layers=EMPTY))
         yield row
         done()
-
-
-def _seen(frame: Frame, detectors: Detectors, sensors: Sensors) -> Frame:
-    return only(frame if sensors == "lidar" else detect(frame, detectors), sensors)
 
 
 def dashboard_link(dashboard: str, uri: str, index: int) -> str:

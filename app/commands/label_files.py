@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from app.commands.support.open_with_progress import opened_recording
-from app.commands.support.progress_bars import frames_progress
+from app.commands.support.progress_bars import frames_progress, task_progress
 from app.labels.wording import WORKING
 from pipeline.common.garbage_collection import gc_paused
 from pipeline.common.user_file_errors import given_path
@@ -130,8 +130,7 @@ def _kept(source: Source, drive: Drive, url: str | None) -> Iterator[DriveLabels
 
 def _drive(source: Source) -> Drive:
     with frames_progress() as bar:
-        task = bar.add_task(source.title, total=len(source))
-        return drive_of(source, lambda done, total: bar.update(task, completed=done, total=total))
+        return drive_of(source, task_progress(bar, source.title, len(source)))
 
 
 def _amount(labels: LabelSet) -> str:

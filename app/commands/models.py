@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.commands.support.progress_bars import bytes_progress
+from app.commands.support.progress_bars import bytes_progress, task_progress
 from pipeline.inference.model_registry import ModelEntry, known_model, list_models, own_file, pull, register, store
 from pipeline.lanes.network import open_lane_network
 from pipeline.types import REAL_VEHICLES
@@ -52,8 +52,7 @@ class PullModel:
         if known.size is not None:
             print(f"{known.url}\n{known.size / 1e6:.1f} MB, licence {known.licence}, SHA-256 {known.sha256}")
         with bytes_progress() as bar:
-            task = bar.add_task(self.name, total=known.size)
-            path = pull(self.name, lambda done, total: bar.update(task, completed=done, total=total))
+            path = pull(self.name, task_progress(bar, self.name, known.size))
         print(f"{path}: size and checksum are right")
         return 0
 

@@ -15,7 +15,7 @@ import tyro
 from app.commands.support.open_with_progress import opened
 from app.commands.support.options import LineOptions, planned
 from app.core.server_address import DEFAULT_PORT
-from app.core.shared_view_state import Looks
+from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from app.labels import URL_VARIABLE
 from app.labels.service.desk import LabelDesk
@@ -59,7 +59,7 @@ class ServerOptions:
     def serve(self, engine: Engine) -> int:
         """Until Ctrl-C."""
         on_ready: Callable[[str], None] | None = webbrowser.open if self.browser else None  # type: ignore[assignment]
-        looks = Looks()
+        looks = SharedViewState()
         with ExitStack() as stack:
             scene = stack.enter_context(LateScene(engine, looks))
             if self.rerun is not None:

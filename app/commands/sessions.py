@@ -10,15 +10,16 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from app.clips.excerpt import Kind, export_clip
 from app.commands.info import size_text
 from app.commands.support.options import LineOptions, SourceOptions
-from app.commands.support.progress_bars import frames_progress
+from app.commands.support.progress_bars import frames_progress, task_progress
 from app.core.playback_clock import timeline_s
 from pipeline.common.errors import BadInput
-from pipeline.detection import Detectors
+from pipeline.params import Params
 from pipeline.recording.rewrite import recover
 from pipeline.recording.save import save
+from pipeline.recording.session_source import SessionSource
+from pipeline.run import Detectors
 from pipeline.types.source import Source
 
 
@@ -36,8 +37,7 @@ class Import:
     def __call__(self) -> int:
         source = self.source.open()
         with frames_progress() as bar:
-            task = bar.add_task(source.title, total=len(source))
-            save(source, self.out, progress=lambda done, total: bar.update(task, completed=done, total=total))
+            save(source, self.out, progress=task_progress(bar, source.title, len(source)))
         print(f"cipv: {self.out}: {len(source)} frames, {size_text(self.out.stat().st_size)}", file=sys.stderr)
         return 0
 
@@ -63,22 +63,26 @@ class Export:
     line: LineOptions = field(default_factory=LineOptions)
 
     def __call__(self) -> int:
-        asked: tuple[tuple[Kind, Path | None], ...] = ("mcap", self.mcap), ("rrd", self.rrd), ("csv", self.csv)
-        wanted: dict[Kind, Path] = {kind: path for kind, path in asked if path is not None}
+        from app.clips.clip import Clip  # imports the pipeline, which the other commands here do without
+        from app.clips.csv_table import write_csv
+        from app.clips.exports import write_clip
+
+        wanted = {kind: path for kind in ("mcap", "rrd", "csv") if (path := getattr(self, kind)) is not None}
         if not wanted:
-            raise BadInput("nothing to write; say --rrd FILE, --mcap FILE or --csv FILE")
+            raise BadInput("nothing to write; add --rrd FILE, --mcap FILE or --csv FILE")
         source = self.source.open()
         first, last = _between(source, self.from_s, self.to_s)
-        params = self.line.parameters() if self.line.changes_parameters() else None
+        session = source if isinstance(source, SessionSource) else None
+        given = self.line.parameters() if self.line.changes_parameters() else None
+        params = given or (session.params(first) if session is not None else None) or Params()
         detectors = self.line.open_detectors(source) if wanted.keys() - {"mcap"} else Detectors()
+        clip = Clip.of_source(source, params, first, last, detectors)
         with frames_progress() as bar:
             for kind, path in wanted.items():
-                task = bar.add_task(path.name, total=last + 1 - first)
-
-                def show(done: int, total: int, task: object = task) -> None:
-                    bar.update(task, completed=done, total=total)  # type: ignore[arg-type]
-
-                export_clip(source, first, last, path, kind, params=params, detectors=detectors, progress=show)
+                if kind == "csv" and given is None and session is not None and session.result(first) is not None:
+                    write_csv((session.result(index) for index in range(first, last + 1)), path)
+                else:
+                    write_clip(clip, kind, path, task_progress(bar, path.name))
         for path in wanted.values():
             print(f"cipv: {path}: {last + 1 - first} frames, {size_text(path.stat().st_size)}", file=sys.stderr)
         return 0
@@ -99,8 +103,7 @@ class Recover:
     def __call__(self) -> int:
         out = self.out or self.file.with_name(f"{self.file.stem}_recovered.mcap")
         with frames_progress() as bar:
-            task = bar.add_task(self.file.name, total=None)
-            saved = recover(self.file, out, lambda done, total: bar.update(task, completed=done, total=total))
+            saved = recover(self.file, out, task_progress(bar, self.file.name))
         lost_bytes = saved.size_bytes - saved.sound_bytes
         hurt = [f"{size_text(lost_bytes)} at the end were no whole chunk"] if saved.is_cut else []
         hurt += [f"{saved.lost_chunks} chunks are damaged and left out"] if saved.lost_chunks else []

@@ -29,7 +29,7 @@ _LONGEST_FRONT_S = 2.0
 background down; they do not stop it."""
 
 
-class Turn:
+class ComputeScheduler:
     """Shared by the threads in front, those in the background, and whoever asks for something."""
 
     def __init__(self) -> None:

@@ -22,7 +22,7 @@ class RunRefused(BadInput):
     """Something that cannot be done to a run; the text says why."""
 
 
-class RunBook:
+class RunRegistry:
     """Any thread. current: of the present parameters. base: what others are compared against, at first the first one.
     Runs that nobody kept go when newer ones come."""
 

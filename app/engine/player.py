@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from app.core.control import Wish
-from app.core.line import Tick
+from app.engine.processed_frame import ProcessedFrame
 from app.engine.snapshot import Snapshot
 from pipeline.params import Params
 from pipeline.types.source import AnySource
@@ -41,7 +41,7 @@ class Player(Protocol):
         """For what the line goes on with, but not long. Others may work meanwhile."""
         ...
 
-    def serve(self, wish: Wish, shown: Snapshot) -> Tick | None:
+    def serve(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
         """What a wish makes of it; null when what is shown stays."""
         ...
 
@@ -49,7 +49,7 @@ class Player(Protocol):
         """Make ready for what comes after the frame that is shown from now on."""
         ...
 
-    def time_s(self, tick: Tick) -> float:
+    def time_s(self, processed: ProcessedFrame) -> float:
         """Where a tick is on the timeline."""
         ...
 

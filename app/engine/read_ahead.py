@@ -13,7 +13,7 @@ from collections.abc import Callable
 logger = logging.getLogger("cipv.ahead")
 
 
-class Ahead:
+class ReadAhead:
     """Has ``prepare(index)`` run for one index at a time. ``on_ready`` is called when it has, on the thread that did.
 
     What went wrong is left to who reads the frame in earnest: it goes wrong there again."""

@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.core.line import Tick
 from app.core.session_folder import SESSIONS
+from app.engine.processed_frame import ProcessedFrame
 from pipeline.common.errors import BadInput
 from pipeline.types.source import AnySource, LiveSource, is_live_source
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _LONGEST_NAME = 60
 
 
-class RecordingDesk:
+class SessionRecorder:
     """At most one recording at a time, of one source, into ``folder``. Any thread; ``take`` on the engine's.
 
     A recording holds what was shown: playing a drive at double speed or seeking leaves out what was skipped. Of live
@@ -35,7 +35,7 @@ class RecordingDesk:
         self._recorder: Recorder | None = None
         self._live: LiveSource | None = None
         self._feeding = threading.RLock()
-        self._last: Tick | None = None
+        self._last: ProcessedFrame | None = None
         self._waits = False
         self._marks: list[str] = []
 
@@ -86,28 +86,28 @@ class RecordingDesk:
             self._marks.append(text)
             return self._recorder.state.error is None
 
-    def take(self, tick: Tick) -> None:
+    def take(self, processed: ProcessedFrame) -> None:
         """A tick that the line ran. The same frame again, with other parameters, is not recorded twice."""
         with self._feeding:
             recorder, last = self._recorder, self._last
             if recorder is None:
                 return
-            if last is not None and last.frame.t_ns == tick.frame.t_ns:
-                if not self._waits or tick.params != last.params:
+            if last is not None and last.frame.t_ns == processed.frame.t_ns:
+                if not self._waits or processed.params != last.params:
                     return
             else:
                 self._write_waiting(recorder)
-            self._last, self._waits = tick, True
-            if tick.exact:
+            self._last, self._waits = processed, True
+            if processed.exact:
                 self._write_waiting(recorder)
 
     def _write_waiting(self, recorder: Recorder) -> None:
         """The frame that waits, if one does, as it is known now."""
         if not self._waits or self._last is None:
             return
-        tick, self._waits = self._last, False
+        processed, self._waits = self._last, False
         received_ns = self._live.now_ns() if self._live is not None else None
-        recorder.put(tick.frame, tick.result, tick.params, received_ns=received_ns)
+        recorder.put(processed.frame, processed.result, processed.params, received_ns=received_ns)
         marks, self._marks = self._marks, []
         for text in marks:
             recorder.mark(text)

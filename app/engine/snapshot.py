@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from app.core.line import Tick
 from app.drive.background_runs import DriveState
+from app.engine.processed_frame import ProcessedFrame
 from app.labels.service.state import LabelState
 from pipeline.params import Params
 from pipeline.types import StreamHealth
@@ -53,7 +53,7 @@ class Snapshot:
     sequence: int = 0
     skipped: int = 0
     made_unix_s: float = 0.0
-    tick: Tick | None = None
+    processed: ProcessedFrame | None = None
     drive: DriveState = DriveState()
     labels: LabelState = LabelState()
     live: bool = False
@@ -68,7 +68,7 @@ class Snapshot:
             "rate_hz": self.rate_hz,
             "count": self.count,
             "index": self.index,
-            "frame": self.tick.frame.name if self.tick else None,
+            "frame": self.processed.frame.name if self.processed else None,
             "time_s": self.time_s,
             "duration_s": self.duration_s,
             "playing": self.playing,
@@ -81,7 +81,7 @@ class Snapshot:
             "params_revision": self.params_revision,
             "sequence": self.sequence,
             "skipped": self.skipped,
-            "provisional": self.tick is not None and not self.tick.exact,
+            "provisional": self.processed is not None and not self.processed.exact,
             "drive": self.drive.to_json(),
             "can_undo": self.labels.can_undo,
             "can_redo": self.labels.can_redo,

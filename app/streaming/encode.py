@@ -43,16 +43,16 @@ class Encoder:
 
     def message(self, snapshot: Snapshot, width_px: int = MAX_WIDTH_PX) -> bytes | None:
         """The message for the snapshot's tick, its picture at most ``width_px`` wide; null when there is no tick."""
-        if snapshot.tick is None:
+        if snapshot.processed is None:
             return None
-        frame, result = snapshot.tick.frame, snapshot.tick.result
+        frame, result = snapshot.processed.frame, snapshot.processed.result
         picture = self._picture(frame, width_px)
         scale = picture.scale if picture else 1.0
         aligned = resolve(snapshot.params.alignment, frame.camera)
         header = {
             "type": "frame",
             "made_unix_ms": snapshot.made_unix_s * 1e3,
-            "detect_ms": snapshot.tick.detect_ms,
+            "detect_ms": snapshot.processed.detect_ms,
             "state": snapshot.state_json(),
             "picture": _picture_json(picture, frame),
             "points": len(result.layers.points),

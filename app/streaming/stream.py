@@ -29,8 +29,8 @@ from pydantic import BaseModel, Field, ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.core.client_role import is_display
-from app.core.request_shapes import GivenCuboid
-from app.core.shared_view_state import Held, Looks
+from app.core.request_shapes import CuboidShape
+from app.core.shared_view_state import HeldCuboid, SharedViewState
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.streaming.picture import MAX_WIDTH_PX, width_for
@@ -48,7 +48,7 @@ class _Held(BaseModel):
 
     track: int = Field(ge=0, lt=2**53)
     frame: int = Field(ge=0, lt=2**53)
-    cuboid: GivenCuboid
+    cuboid: CuboidShape
 
 
 @dataclass
@@ -125,9 +125,9 @@ class _Encoded:
 class Stream:
     """Between the engine's thread, which publishes, and the clients' slots on the event loop."""
 
-    def __init__(self, looks: Looks | None = None) -> None:
+    def __init__(self, looks: SharedViewState | None = None) -> None:
         self.traffic = Traffic()
-        self._looks = looks or Looks()
+        self._looks = looks or SharedViewState()
         self._looks.on_drag(self._tell_dragged)
         self._looks.on_pick(self._picked)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -207,9 +207,9 @@ class Stream:
         except ValidationError:
             self._looks.let_go(slot)
         else:
-            self._looks.hold(Held(slot, held.track, held.frame, held.cuboid.value()))
+            self._looks.hold(HeldCuboid(slot, held.track, held.frame, held.cuboid.value()))
 
-    def _tell_dragged(self, held: Held, ended: bool) -> None:
+    def _tell_dragged(self, held: HeldCuboid, ended: bool) -> None:
         """Tell the page that holds it; on a thread of the 3D view's."""
         said = {"track": held.track, "frame": held.frame, "cuboid": held.cuboid._asdict(), "ended": ended}
         message = _dump({"type": "held", **said})
@@ -237,7 +237,7 @@ class Stream:
     def _encoded(self, snapshot: Snapshot) -> _Encoded:
         """The frame of this snapshot, or a newer one."""
         with self._lock:
-            if self._frame.sequence < snapshot.sequence and snapshot.tick is not None:
+            if self._frame.sequence < snapshot.sequence and snapshot.processed is not None:
                 message = self._encoder.message(snapshot, self._width_px)
                 self._frame = _Encoded(snapshot.sequence, message, snapshot)
             return self._frame

@@ -6,7 +6,7 @@ from typing import Any
 
 import rerun.blueprint as rrb
 
-from app.views.rerun_start_options import PLAYING, Opening
+from app.views.rerun_start_options import PLAYING, RerunStartOptions
 
 CAMERA = "world/camera"
 OVERLAYS = f"{CAMERA}/overlay"
@@ -17,7 +17,7 @@ _BACKGROUND = (13, 17, 23)
 _NO_LEGEND = rrb.PlotLegend(visible=False)
 
 
-def blueprint(opening: Opening = PLAYING) -> rrb.Blueprint:
+def blueprint(opening: RerunStartOptions = PLAYING) -> rrb.Blueprint:
     """The layout that a replay carries inside its file."""
     camera = rrb.Spatial2DView(name="Camera", origin=CAMERA, contents=[f"{CAMERA}/image", f"{OVERLAYS}/**"])
     world = rrb.Spatial3DView(

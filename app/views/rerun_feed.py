@@ -49,23 +49,23 @@ class RerunFeed:
         self._thread.join(2 * _PATIENCE_S)
 
     def _offer(self, snapshot: Snapshot) -> None:
-        if snapshot.tick is not None:
+        if snapshot.processed is not None:
             self._newest.put(snapshot)
 
     def _work(self) -> None:
         sink: RerunSink | None = None
         sent: Snapshot | None = None
         while (newest := self._newest.take()) is not None:
-            if sent is not None and newest.tick is sent.tick:
+            if sent is not None and newest.processed is sent.processed:
                 continue
             if sink is not None and sent is not None and newest.uri != sent.uri:
                 sink.abandon()
                 sink = None
             if sink is None:
                 sink = self._connect(newest)
-            if sink is None or newest.tick is None:
+            if sink is None or newest.processed is None:
                 continue
-            sink.show(newest.tick.frame, newest.tick.result)
+            sink.show(newest.processed.frame, newest.processed.result)
             if sink.flush(_PATIENCE_S):
                 sent = newest
                 self.sent += 1

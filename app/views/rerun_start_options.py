@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Opening:
+class RerunStartOptions:
     """paused: it stands still at its first frame instead of playing. compact: laid out for a narrow pane, the camera
     above and one other view at a time below it."""
 
@@ -14,5 +14,5 @@ class Opening:
     compact: bool = False
 
 
-PLAYING = Opening()
+PLAYING = RerunStartOptions()
 """As a file opens that somebody keeps."""

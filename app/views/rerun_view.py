@@ -17,7 +17,7 @@ from app.views import rerun_parts as parts
 from app.views import scene
 from app.views.colors import rgb
 from app.views.rerun_blueprint import BEV_AHEAD_M, BEV_ASIDE_M, CAMERA, OVERLAYS, blueprint
-from app.views.rerun_start_options import PLAYING, Opening
+from app.views.rerun_start_options import PLAYING, RerunStartOptions
 from pipeline.alignment import projection
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import inverse
@@ -56,7 +56,7 @@ class RerunSink:
         target: str | FilePath | BinaryIO | ViewerAddress,
         title: str = APPLICATION,
         params: AlignmentParams = _CALIBRATED,
-        opening: Opening = PLAYING,
+        opening: RerunStartOptions = PLAYING,
     ) -> None:
         self._params = params
         self._rec = rr.RecordingStream(APPLICATION, send_properties=False)

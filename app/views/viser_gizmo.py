@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from app.core.shared_view_state import Held, OnDrag
+from app.core.shared_view_state import HeldCuboid, OnDrag
 from app.views.scene import cuboid_edges
 from pipeline.common.geometry import Cuboid
 from pipeline.types import F64
@@ -35,13 +35,13 @@ class CuboidGizmo:
     def __init__(self, scene: viser.SceneApi, on_drag: OnDrag) -> None:
         self._scene, self._on_drag = scene, on_drag
         self._lock = threading.Lock()
-        self._wanted: Held | None = None
-        self._held: Held | None = None
+        self._wanted: HeldCuboid | None = None
+        self._held: HeldCuboid | None = None
         self._before: Cuboid | None = None
         self._hand: int | None = None
         self._handles: dict[str, viser.TransformControlsHandle] = {}
 
-    def hold(self, held: Held | None) -> None:
+    def hold(self, held: HeldCuboid | None) -> None:
         """Show it here; null takes it away. While a hand drags something, the hand is right."""
         with self._lock:
             self._wanted = held
@@ -57,7 +57,7 @@ class CuboidGizmo:
             self._let_go(held)
         self._on_drag(held, True)
 
-    def _show(self, held: Held | None) -> None:
+    def _show(self, held: HeldCuboid | None) -> None:
         if held == self._held:
             return
         self._held = held
@@ -102,7 +102,7 @@ class CuboidGizmo:
 
         return follow
 
-    def _let_go(self, held: Held) -> None:
+    def _let_go(self, held: HeldCuboid) -> None:
         """The hand is off it. Its page says where it is from now on; another label that is held by now is shown."""
         self._before = self._hand = None
         if not held.is_of(self._wanted):

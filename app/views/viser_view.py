@@ -16,7 +16,7 @@ import numpy as np
 import rich
 import viser
 
-from app.core.shared_view_state import Held, OnDrag
+from app.core.shared_view_state import HeldCuboid, OnDrag
 from app.views import scene, viser_nodes
 from app.views.colors import Role, rgb
 from app.views.ray_picking import object_on_ray
@@ -125,7 +125,7 @@ class ViserView:
                 self._selected = number
                 self._draw()
 
-    def hold(self, held: Held | None) -> None:
+    def hold(self, held: HeldCuboid | None) -> None:
         """Show a cuboid with handles to move, turn and resize it by; null for none."""
         self._gizmo.hold(held)
 

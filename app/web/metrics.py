@@ -28,7 +28,7 @@ class Metrics:
         self._shown_at: deque[float] = deque(maxlen=_MOST_FRAMES)
         to = self._registry
         self._frames = Counter("cipv_frames", "Results made", registry=to)
-        self._line = Histogram(
+        self._pipeline = Histogram(
             "cipv_line_seconds", "Of one frame, all stages without the networks", buckets=_BUCKETS_S, registry=to
         )
         self._detector = Histogram(
@@ -48,17 +48,17 @@ class Metrics:
 
     def saw(self, snapshot: Snapshot) -> None:
         """Called by the engine after the stream has taken the snapshot: what is not a new result is not counted."""
-        tick = snapshot.tick
-        if tick is None or snapshot.sequence <= self._sequence:
+        processed = snapshot.processed
+        if processed is None or snapshot.sequence <= self._sequence:
             return
         self._frames.inc(snapshot.sequence - self._sequence)
         self._sequence = snapshot.sequence
         self._shown_at.append(time.monotonic())
-        total_ms = tick.result.timing_ms.get("total")
+        total_ms = processed.result.timing_ms.get("total")
         if total_ms is not None:
-            self._line.observe(total_ms / 1e3)
-        if tick.detect_ms > 0:
-            self._detector.observe(tick.detect_ms / 1e3)
+            self._pipeline.observe(total_ms / 1e3)
+        if processed.detect_ms > 0:
+            self._detector.observe(processed.detect_ms / 1e3)
         self._latency.observe(max(0.0, time.time() - snapshot.made_unix_s))
 
     def render(self) -> bytes:

@@ -17,8 +17,8 @@ from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from starlette.types import Scope
 
-from app.clips.jobs import Jobs
-from app.core.shared_view_state import Looks
+from app.clips.export_queue import ExportQueue
+from app.core.shared_view_state import SharedViewState
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.streaming.stream import Stream
@@ -52,7 +52,7 @@ def create_app(
     viser_port: Callable[[], int | None] = lambda: None,
     hosts: Iterable[str] = (),
     marks: Marks | None = None,
-    looks: Looks | None = None,
+    looks: SharedViewState | None = None,
     tokens: Tokens | None = None,
 ) -> FastAPI:
     """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
@@ -60,7 +60,7 @@ def create_app(
     comes must have; null where only this machine can come."""
     access = Access(hosts)
     stream = Stream(looks)
-    jobs, viewer, metrics = Jobs(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
+    jobs, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
 
     @asynccontextmanager
     async def listening(_: FastAPI) -> AsyncIterator[None]:

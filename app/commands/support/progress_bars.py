@@ -14,6 +14,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from pipeline.common.progress import Progress as Told
+
 
 def frames_progress() -> Progress:
     """A bar that counts frames and vanishes when done."""
@@ -28,6 +30,12 @@ def bytes_progress() -> Progress:
 def share_progress() -> Progress:
     """A bar that shows how much is done."""
     return _bar(TaskProgressColumn())
+
+
+def task_progress(bar: Progress, name: str, total: int | None = None) -> Told:
+    """A line of the bar, as the callback that work reports its progress to."""
+    task = bar.add_task(name, total=total)
+    return lambda done, of: bar.update(task, completed=done, total=of)
 
 
 def _bar(count: ProgressColumn) -> Progress:

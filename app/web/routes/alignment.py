@@ -10,7 +10,7 @@ import numpy as np
 from fastapi import APIRouter, HTTPException
 from pydantic import BaseModel
 
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
 from pipeline.calibration.depth_edges import edge_scene
@@ -59,23 +59,23 @@ class _Scenes:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._of: Recording | str | None = None
+        self._of: OpenRecording | str | None = None
         self._newest_ns = 0
         self._seen: deque[Seen] = deque(maxlen=FRAMES)
 
-    def of_recording(self, recording: Recording) -> list[Seen]:
+    def of_recording(self, recording: OpenRecording) -> list[Seen]:
         with self._lock:
             if self._of is not recording:
                 self._begin(recording)
-                for index in np.unique(np.linspace(0, recording.recipe.total - 1, FRAMES).round().astype(int)).tolist():
+                for index in np.unique(np.linspace(0, recording.setup.total - 1, FRAMES).round().astype(int)).tolist():
                     self._look(recording.as_read(index))
             return list(self._seen)
 
     def of_shown(self, shown: Snapshot) -> list[Seen]:
         """404 when nothing is."""
-        if shown.tick is None or shown.uri is None:
+        if shown.processed is None or shown.uri is None:
             raise HTTPException(404, "nothing is shown yet")
-        frame = shown.tick.frame
+        frame = shown.processed.frame
         with self._lock:
             if self._of != shown.uri:
                 self._begin(shown.uri)
@@ -83,7 +83,7 @@ class _Scenes:
                 self._look(frame)
             return list(self._seen)
 
-    def _begin(self, of: Recording | str) -> None:
+    def _begin(self, of: OpenRecording | str) -> None:
         self._of = of
         self._seen.clear()
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from fastapi import APIRouter, HTTPException
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 
-from app.clips.exports import Clip, Kind, submit
-from app.clips.jobs import Job, Jobs, JobState
+from app.clips.clip import Clip
+from app.clips.export_queue import ExportQueue, ExportStatus
+from app.clips.exports import EXPORTERS, submit
+from app.core.jobs import JobState
 from app.engine.engine import Engine
+from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
 from app.web.routes.shapes import Done, file_of
+
+ClipKind = Annotated[str, *one_of(EXPORTERS)]
 
 
 class ClipChoice(BaseModel):
@@ -18,7 +25,7 @@ class ClipChoice(BaseModel):
 
     first: int = Field(ge=0)
     last: int = Field(ge=0)
-    kind: Kind
+    kind: ClipKind
 
 
 class JobJson(BaseModel):
@@ -41,7 +48,7 @@ class JobList(BaseModel):
     jobs: list[JobJson]
 
 
-def clips_router(engine: Engine, jobs: Jobs) -> APIRouter:
+def clips_router(engine: Engine, jobs: ExportQueue) -> APIRouter:
     """Routes over exports."""
     router = APIRouter(prefix="/api", tags=["clips"])
 
@@ -89,5 +96,5 @@ def clip_of(engine: Engine, first: int, last: int) -> Clip:
     return Clip(recording, engine.control.peek().params, first, last, engine.drives.turn, shown.title, shown.rate_hz)
 
 
-def _json(job: Job) -> JobJson:
+def _json(job: ExportStatus) -> JobJson:
     return JobJson(**vars(job))

@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field
 
 from app.labels.acts.request_fields import Person, PersonOrNobody, Strict
 from app.labels.acts.requests import Act
-from app.labels.service.tasks import Kind
+from app.labels.service.tasks import TaskKind
 from app.labels.store.values import LONGEST_ITEM
 from app.web.routes.label_shapes import ItemKey, LabelChanges
 
@@ -57,7 +57,7 @@ class TaskBegun(BaseModel):
     """It goes on; ``state.labels.task`` tells how far it is. task: its id there."""
 
     status: Literal["begun"]
-    what: Kind
+    what: TaskKind
     task: int
 
 

@@ -63,7 +63,7 @@ def labels_router(desk: LabelDesk) -> APIRouter:
         person: who asks: what one has made oneself, another reviews."""
         after = (after_kind, after_id) if after_kind is not None else None
         with refusing():
-            run = desk.recording.book.current
+            run = desk.recording.runs.current
             asked = Asked(what, frame, direction, person, after)
             found, why, left = where_next(desk.labels, desk.scores, run, asked)
         item = ItemKey(kind=found.item[0], id=found.item[1]) if found is not None and found.item is not None else None
@@ -74,9 +74,9 @@ def labels_router(desk: LabelDesk) -> APIRouter:
         """The present run, and the one it is compared with, against the labels that people stand behind: the figures of
         `cipv evaluate`, at once."""
         with refusing():
-            book, labels = desk.recording.book, desk.labels
+            registry, labels = desk.recording.runs, desk.labels
             run = current(desk.recording)
-            found = desk.scores.standing(labels, book.base or run, run)
+            found = desk.scores.standing(labels, registry.base or run, run)
             return ScoreJson(
                 revision=labels.revision,
                 run=run.number,

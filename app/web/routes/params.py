@@ -147,7 +147,7 @@ def effective(frame: Frame | None, params: Params) -> dict[str, float]:
 def _params_json(engine: Engine, person: str = "") -> Response:
     """It is made beside the frame that a change runs again, for which a person waits: what never changes is encoded
     once."""
-    wish, tick = engine.control.peek(), engine.snapshot.tick
+    wish, processed = engine.control.peek(), engine.snapshot.processed
     can_undo, can_redo = engine.labels.possible(person)
     answer = {
         "preset": wish.preset,
@@ -158,7 +158,7 @@ def _params_json(engine: Engine, person: str = "") -> Response:
         "sections": _sections(),
         "values": flat(wish.params),
         "base": _base(wish.preset),
-        "effective": effective(tick.frame if tick else None, wish.params),
+        "effective": effective(processed.frame if processed else None, wish.params),
     }
     return Response(msgspec.json.encode(answer), media_type="application/json")
 

@@ -43,10 +43,10 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
     @router.get("/result", responses={200: {"model": ResultJson}})
     def result() -> JSONResponse:
         """The shown frame's result; 404 before there is one."""
-        tick = engine.snapshot.tick
-        if tick is None:
+        processed = engine.snapshot.processed
+        if processed is None:
             raise HTTPException(404, "no frame is shown yet")
-        return JSONResponse(to_json(tick.result))
+        return JSONResponse(to_json(processed.result))
 
     @router.post("/playback", status_code=202)
     def playback(body: PlaybackChange) -> Done:

@@ -7,7 +7,7 @@ import numpy as np
 from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.core.request_shapes import Finite, GivenCuboid
+from app.core.request_shapes import CuboidShape, Finite
 from app.engine.engine import Engine
 from pipeline.alignment.projection import resolve
 from pipeline.common.geometry import corners_of
@@ -22,7 +22,7 @@ class Given(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    cuboids: list[GivenCuboid] = Field(max_length=MOST_CUBOIDS)
+    cuboids: list[CuboidShape] = Field(max_length=MOST_CUBOIDS)
 
 
 class Projected(BaseModel):
@@ -56,8 +56,8 @@ def project_router(engine: Engine) -> APIRouter:
     def project(body: Given) -> Projected:
         """Cuboids as the shown frame's camera sees them with the present parameters."""
         shown = engine.snapshot
-        tick = shown.tick
-        aligned = resolve(shown.params.alignment, tick.frame.camera) if tick is not None else None
+        processed = shown.processed
+        aligned = resolve(shown.params.alignment, processed.frame.camera) if processed is not None else None
         if aligned is None:
             return Projected(pixels=None)
         if not body.cuboids:
@@ -71,7 +71,7 @@ def project_router(engine: Engine) -> APIRouter:
     def ray(body: GivenPixel) -> Ray:
         """What a pixel of the shown frame looks along with the present parameters."""
         shown = engine.snapshot
-        aligned = resolve(shown.params.alignment, shown.tick.frame.camera) if shown.tick is not None else None
+        aligned = resolve(shown.params.alignment, shown.processed.frame.camera) if shown.processed is not None else None
         if aligned is None:
             return Ray(start=None, toward=None)
         start, (toward,) = aligned.rays(np.array([body.pixel]))

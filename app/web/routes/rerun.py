@@ -13,13 +13,14 @@ from fastapi.responses import FileResponse
 from pydantic import BaseModel
 from starlette.background import BackgroundTask
 
-from app.clips.exports import WRITERS
+from app.clips.exports import write_clip
 from app.engine.engine import Engine
-from app.views.rerun_start_options import Opening
+from app.views.rerun_start_options import RerunStartOptions
 from app.views.rerun_web import FILES, ViewerFiles
 from app.web.routes.clips import clip_of
 from app.web.routes.refusals import open_recording, refusing
 from app.web.routes.shapes import file_of
+from pipeline.common.progress import silent
 
 AROUND = 50
 """Frames before and behind the shown one that are opened by default."""
@@ -72,13 +73,13 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
         """The drive as a rerun recording, with the present parameters: by default what is around the shown frame, at
         most 600 frames."""
         span = _span(engine, first, last)
-        clip = replace(clip_of(engine, *span), opening=Opening(paused, compact))
+        clip = replace(clip_of(engine, *span), start=RerunStartOptions(paused, compact))
         file = tempfile.NamedTemporaryFile(prefix="cipv-", suffix=".rrd", delete=False)  # noqa: SIM115
         path = Path(file.name)
         file.close()
         try:
             with refusing():
-                WRITERS["rrd"](clip, path, lambda done, total: None)
+                write_clip(clip, "rrd", path, silent)
         except BaseException:
             path.unlink(missing_ok=True)
             raise

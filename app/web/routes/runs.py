@@ -8,11 +8,11 @@ from typing import Any, Literal
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, Field
 
-from app.drive.background_runs import Drives, Phase
+from app.drive.background_runs import BackgroundRuns, Phase
 from app.drive.compare import compare
 from app.drive.frame_rows import Row
 from app.drive.full_run import DriveRun
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.drive.run_registry import LONGEST_NAME
 from app.engine.engine import Engine
 from app.labels.errors import DatabaseError
@@ -74,7 +74,7 @@ class ComparisonJson(BaseModel):
     judged: int
 
 
-def runs_router(engine: Engine, drives: Drives) -> APIRouter:
+def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
     """Routes over the runs of the open recording."""
     router = APIRouter(prefix="/api", tags=["what if"])
 
@@ -88,14 +88,14 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
         """A run's columns from a frame on."""
         recording = open_recording(drives)
         with refusing():
-            return columns_of(recording, recording.book.get(number), first)
+            return columns_of(recording, recording.runs.get(number), first)
 
     @router.post("/runs/{number}/keep")
     def keep(number: int, body: Name) -> Runs:
         """Keep a run under a name, or rename it. Others go when newer ones come."""
         recording = open_recording(drives)
         with refusing():
-            recording.book.keep(number, body.name)
+            recording.runs.keep(number, body.name)
         drives.changed()
         return _runs_json(recording)
 
@@ -104,7 +104,7 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
         """Compare against this one from now on."""
         recording = open_recording(drives)
         with refusing():
-            recording.book.compare_with(number)
+            recording.runs.compare_with(number)
         drives.changed()
         return _runs_json(recording)
 
@@ -113,7 +113,7 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
         """Take a run's parameters: a change that can be undone."""
         recording = open_recording(drives)
         with refusing():
-            run = recording.book.get(number)
+            run = recording.runs.get(number)
         engine.control.set_params(run.params, run.preset)
         drives.want(run.params, run.preset)
         return _runs_json(recording)
@@ -123,7 +123,7 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
         """Forget a run. The present one and the base stay."""
         recording = open_recording(drives)
         with refusing():
-            recording.book.delete(number)
+            recording.runs.delete(number)
         drives.changed()
         return _runs_json(recording)
 
@@ -131,7 +131,7 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
     def preset_file(number: int) -> Response:
         """A run's parameters as a file for `cipv run --params`."""
         with refusing():
-            params = open_recording(drives).book.get(number).params
+            params = open_recording(drives).runs.get(number).params
         headers = {"content-disposition": f'attachment; filename="cipv-run-{number}.yaml"'}
         return Response(to_yaml(params), media_type="application/yaml", headers=headers)
 
@@ -140,11 +140,11 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
         """Two runs side by side; without numbers the base and the present one."""
         recording = open_recording(drives)
         with refusing():
-            new = recording.book.get(run) if run is not None else current(recording)
-            old = recording.book.get(base) if base is not None else recording.book.base or new
+            new = recording.runs.get(run) if run is not None else current(recording)
+            old = recording.runs.get(base) if base is not None else recording.runs.base or new
         judged = _judged_by_labels(engine.labels, old, new)
         found = compare(*(judged or (old.rows(), new.rows())))
-        truth: Literal["labels", "recording", "simulator"] = "simulator" if recording.recipe.simulated else "recording"
+        truth: Literal["labels", "recording", "simulator"] = "simulator" if recording.setup.simulated else "recording"
         return ComparisonJson(
             base=old.number,
             run=new.number,
@@ -181,19 +181,19 @@ def label_of(changes: dict[str, tuple[Any, Any]], preset: str) -> str:
     return ", ".join(named) + (f" and {rest} more" if rest else "")
 
 
-def _runs_json(recording: Recording | None) -> Runs:
+def _runs_json(recording: OpenRecording | None) -> Runs:
     if recording is None:
         return Runs(base=None, run=None, runs=[])
-    book = recording.book
-    base, run = book.base, book.current
+    registry = recording.runs
+    base, run = registry.base, registry.current
     return Runs(
         base=base.number if base else None,
         run=run.number if run else None,
-        runs=[_run_json(recording, each, base or each) for each in book.all()],
+        runs=[_run_json(recording, each, base or each) for each in registry.all()],
     )
 
 
-def _run_json(recording: Recording, run: DriveRun, base: DriveRun) -> Run:
+def _run_json(recording: OpenRecording, run: DriveRun, base: DriveRun) -> Run:
     changes = changes_of(base.params, run.params)
     return Run(
         id=run.number,

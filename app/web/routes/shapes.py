@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from app.labels.service.tasks import Kind
+from app.labels.service.tasks import TaskKind
 
 Point = tuple[float, float]
 Sees = Literal["V", "L", "VL"]
@@ -200,7 +200,7 @@ class LabelTaskJson(_Exact):
     """Something on labels that takes a while. It stays, with its note or error, until the next one begins."""
 
     id: int
-    what: Kind
+    what: TaskKind
     done: int
     total: int
     note: str

@@ -25,7 +25,7 @@ WAIT_S = 60.0
 def engine() -> Iterator[Engine]:
     engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car")
     engine.start()
-    engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+    engine.wait_for(lambda s: s.processed is not None, WAIT_S)
     yield engine
     engine.stop()
 

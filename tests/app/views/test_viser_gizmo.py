@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.core.shared_view_state import Held
+from app.core.shared_view_state import HeldCuboid
 from app.views.viser_gizmo import FACES, NODE, moved
 from app.views.viser_view import ViserView
 from pipeline.common.geometry import Cuboid
@@ -19,7 +19,7 @@ from pipeline.params import Params
 CAR = Cuboid((20.0, 1.0, 0.8), (4.0, 2.0, 1.5), 0.4)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 WAIT_S = 20.0
-Drags = queue.Queue[tuple[Held, bool]]
+Drags = queue.Queue[tuple[HeldCuboid, bool]]
 PAGE = object()
 
 
@@ -83,8 +83,8 @@ def drag(client: Any, name: str, position: tuple[float, ...]) -> None:
     client._send("TransformControlsUpdateMessage", name=f"{NODE}/{name}", wxyz=(1.0, 0.0, 0.0, 0.0), position=position)
 
 
-def held(track: int, cuboid: Cuboid) -> Held:
-    return Held(PAGE, track, 3, cuboid)
+def held(track: int, cuboid: Cuboid) -> HeldCuboid:
+    return HeldCuboid(PAGE, track, 3, cuboid)
 
 
 def grab(client: Any, name: str) -> None:

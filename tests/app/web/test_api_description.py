@@ -15,7 +15,7 @@ from starlette.routing import BaseRoute, Route
 from websockets.sync.client import connect
 
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from app.web.routes import shapes
 from app.web.server import create_app
 from pipeline.params import Params
@@ -30,7 +30,7 @@ BYTES = {"type": "string", "format": "binary"}
 
 @pytest.fixture(scope="module")
 def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Engine]:
-    with running(RecordingDesk(tmp_path_factory.mktemp("sessions"))) as engine:
+    with running(SessionRecorder(tmp_path_factory.mktemp("sessions"))) as engine:
         yield engine
 
 
@@ -164,7 +164,7 @@ ANSWERS: dict[str, type[BaseModel]] = {
 @pytest.mark.parametrize("path", ANSWERS)
 def test_what_is_said_of_an_answer_is_what_is_in_it(client: httpx.Client, engine: Engine, path: str):
     engine.control.seek(20)
-    engine.wait_for(lambda shown: shown.index == 20 and shown.tick is not None, WAIT_S)
+    engine.wait_for(lambda shown: shown.index == 20 and shown.processed is not None, WAIT_S)
     answer = client.get(path).json()
     model = ANSWERS[path].model_validate(answer)
     assert model.model_dump(exclude_unset=True).keys() == answer.keys() == ANSWERS[path].model_fields.keys()

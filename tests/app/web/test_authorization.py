@@ -17,7 +17,7 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import connect
 
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from app.web.limits import LARGEST_BODY, LARGEST_FILE
 from app.web.routes.label_files import IMPORT
 from app.web.server import create_app
@@ -30,7 +30,7 @@ EVIL = "http://evil.example"
 
 @pytest.fixture(scope="module")
 def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Engine]:
-    with running(RecordingDesk(tmp_path_factory.mktemp("sessions"))) as engine:
+    with running(SessionRecorder(tmp_path_factory.mktemp("sessions"))) as engine:
         yield engine
 
 

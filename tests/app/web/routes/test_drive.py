@@ -50,7 +50,9 @@ def _at_the_start(engine: Engine) -> None:
     engine.control.set_params(Params(), "default")
     before = engine.drives.recording
     engine.control.change(uri="test:car", playing=False, target=None, steps=0)
-    engine.wait_for(lambda s: engine.drives.recording is not before and s.index == 0 and s.tick is not None, WAIT_S)
+    engine.wait_for(
+        lambda s: engine.drives.recording is not before and s.index == 0 and s.processed is not None, WAIT_S
+    )
     computed(engine)
 
 
@@ -286,7 +288,7 @@ def test_without_a_whole_drive_the_routes_say_so():
     engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car")
     engine.start()
     try:
-        engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+        engine.wait_for(lambda s: s.processed is not None, WAIT_S)
         with client_of(engine) as client:
             for route in ("/api/drive", "/api/compare", "/api/rerun.rrd", "/api/rerun/open"):
                 assert client.get(route).status_code == 404

@@ -13,7 +13,7 @@ logger = logging.getLogger("cipv.engine")
 Listener = Callable[[Snapshot], None]
 
 
-class Showing:
+class SnapshotPublisher:
     """Holds the newest snapshot. ``publish`` on the worker's thread, the rest on any."""
 
     def __init__(self, first: Snapshot) -> None:

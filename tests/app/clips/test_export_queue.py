@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from app.clips.jobs import MOST_JOBS, Job, JobRefused, Jobs, Report
+from app.clips.export_queue import MOST_EXPORTS, ExportQueue, ExportRefused, ExportStatus
 from pipeline.common.errors import BadInput
+from pipeline.common.progress import Progress
 
 WAIT_S = 60.0
 
@@ -39,13 +40,13 @@ def ended() -> Ended:
 
 
 @pytest.fixture
-def jobs(ended: Ended) -> Iterator[Jobs]:
-    jobs = Jobs(ended)
+def jobs(ended: Ended) -> Iterator[ExportQueue]:
+    jobs = ExportQueue(ended)
     yield jobs
     jobs.close()
 
 
-def writes(path: Path, report: Report) -> None:
+def writes(path: Path, report: Progress) -> None:
     report(1, 2)
     path.write_bytes(b"done")
 
@@ -56,7 +57,7 @@ class Held:
     def __init__(self) -> None:
         self.began, self.go = threading.Event(), threading.Event()
 
-    def __call__(self, path: Path, report: Report) -> None:
+    def __call__(self, path: Path, report: Progress) -> None:
         path.write_bytes(b"half")
         report(1, 2)
         self.began.set()
@@ -64,16 +65,16 @@ class Held:
         report(2, 2)
 
 
-def submit(jobs: Jobs, work: Callable[[Path, Report], None]) -> Job:
+def submit(jobs: ExportQueue, work: Callable[[Path, Progress], None]) -> ExportStatus:
     return jobs.submit("csv", 0, 9, "clip.csv", work)
 
 
-def test_a_job_ends_in_a_file_to_download(jobs: Jobs, ended: Ended):
+def test_a_job_ends_in_a_file_to_download(jobs: ExportQueue, ended: Ended):
     job = submit(jobs, writes)
     assert (job.file, jobs.get(job.id) is not None) == (None, True)
     ended.wait(1)
     done = jobs.get(job.id)
-    assert done == Job(job.id, "csv", 0, 9, "done", 1.0, "", "clip.csv", 4)
+    assert done == ExportStatus(job.id, "csv", 0, 9, "done", 1.0, "", "clip.csv", 4)
     path = jobs.path(job.id)
     assert path is not None
     assert path.read_bytes() == b"done"
@@ -83,7 +84,7 @@ def test_a_job_ends_in_a_file_to_download(jobs: Jobs, ended: Ended):
     assert not jobs.cancel(job.id)
 
 
-def test_progress_is_seen_while_it_runs(jobs: Jobs, ended: Ended):
+def test_progress_is_seen_while_it_runs(jobs: ExportQueue, ended: Ended):
     held = Held()
     job = submit(jobs, held)
     assert held.began.wait(WAIT_S)
@@ -100,8 +101,8 @@ def test_progress_is_seen_while_it_runs(jobs: Jobs, ended: Ended):
     [(BadInput("the disk is full"), "the disk is full"), (ValueError("oops"), "ValueError: oops")],
     ids=["a person's fault", "ours"],
 )
-def test_a_failed_job_says_why_and_the_next_goes_on(jobs: Jobs, ended: Ended, error: Exception, note: str):
-    def fails(path: Path, report: Report) -> None:
+def test_a_failed_job_says_why_and_the_next_goes_on(jobs: ExportQueue, ended: Ended, error: Exception, note: str):
+    def fails(path: Path, report: Progress) -> None:
         path.write_bytes(b"half")
         raise error
 
@@ -117,7 +118,7 @@ def test_a_failed_job_says_why_and_the_next_goes_on(jobs: Jobs, ended: Ended, er
     assert after.state == "done"
 
 
-def test_a_cancelled_job_stops_and_leaves_no_file(jobs: Jobs, ended: Ended):
+def test_a_cancelled_job_stops_and_leaves_no_file(jobs: ExportQueue, ended: Ended):
     held, waiting = Held(), Held()
     running, later = submit(jobs, held), submit(jobs, waiting)
     assert held.began.wait(WAIT_S)
@@ -130,7 +131,7 @@ def test_a_cancelled_job_stops_and_leaves_no_file(jobs: Jobs, ended: Ended):
     assert list(jobs._folder.iterdir()) == []
 
 
-def test_a_jobs_work_is_let_go_when_it_has_ended_or_was_cancelled(jobs: Jobs, ended: Ended):
+def test_a_jobs_work_is_let_go_when_it_has_ended_or_was_cancelled(jobs: ExportQueue, ended: Ended):
     """It holds a whole recording."""
     held, waiting = Held(), Held()
     first, second = submit(jobs, held), submit(jobs, waiting)
@@ -157,25 +158,25 @@ def let_go(what: weakref.ref[Held]) -> bool:
     return False
 
 
-def test_so_many_jobs_and_no_more(jobs: Jobs, ended: Ended):
+def test_so_many_jobs_and_no_more(jobs: ExportQueue, ended: Ended):
     held = Held()
     first = submit(jobs, held)
-    for _ in range(MOST_JOBS - 1):
+    for _ in range(MOST_EXPORTS - 1):
         submit(jobs, writes)
-    with pytest.raises(JobRefused, match="under way"):
+    with pytest.raises(ExportRefused, match="under way"):
         submit(jobs, writes)
     held.go.set()
-    ended.wait(MOST_JOBS)
+    ended.wait(MOST_EXPORTS)
     submit(jobs, writes)
     assert jobs.get(first.id) is None, "the oldest that had ended went"
 
 
 def test_closing_stops_what_is_under_way_and_removes_every_file():
-    jobs, held = Jobs(), Held()
+    jobs, held = ExportQueue(), Held()
     submit(jobs, held)
     assert held.began.wait(WAIT_S)
     folder = jobs._folder
     held.go.set()
     jobs.close()
     assert not folder.exists()
-    Jobs().close()  # one that never had a job has nothing to remove
+    ExportQueue().close()  # one that never had a job has nothing to remove
