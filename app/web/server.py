@@ -29,19 +29,8 @@ from app.web.access import Access, Guard
 from app.web.api_description import REFUSALS, titled
 from app.web.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
 from app.web.metrics import Metrics
-from app.web.routes.alignment import alignment_router
-from app.web.routes.clips import clips_router
-from app.web.routes.drive import drive_router
-from app.web.routes.health import health_router
-from app.web.routes.label_acts import label_acts_router
-from app.web.routes.label_files import IMPORT, label_files_router
-from app.web.routes.labels import labels_router
-from app.web.routes.params import params_router
-from app.web.routes.playback import playback_router
-from app.web.routes.project import project_router
-from app.web.routes.recording import recording_router
-from app.web.routes.rerun import rerun_router
-from app.web.routes.runs import runs_router
+from app.web.routers import ROUTERS, Services
+from app.web.routes.label_files import IMPORT
 from app.web.tokens import Tokens
 
 STATIC = Path(__file__).resolve().parents[2] / "static"
@@ -60,7 +49,8 @@ def create_app(
     comes must have; null where only this machine can come."""
     access = Access(hosts)
     stream = Stream(looks)
-    jobs, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
+    exports, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
+    services = Services(engine, stream, marks or Marks(), exports, viewer, metrics)
 
     @asynccontextmanager
     async def listening(_: FastAPI) -> AsyncIterator[None]:
@@ -69,7 +59,7 @@ def create_app(
         yield
         for end in ends:
             end()
-        await asyncio.to_thread(jobs.close)
+        await asyncio.to_thread(exports.close)
         viewer.close()
 
     app = FastAPI(
@@ -79,19 +69,8 @@ def create_app(
     app.add_middleware(BodyLimit, files={IMPORT: LARGEST_FILE})
     app.add_middleware(Guard, access=access, tokens=tokens)  # the last one added is the first to be asked
     app.add_exception_handler(RequestValidationError, _one_sentence)
-    app.include_router(health_router(engine, metrics))
-    app.include_router(playback_router(engine, stream))
-    app.include_router(params_router(engine))
-    app.include_router(recording_router(engine))
-    app.include_router(drive_router(engine, engine.drives, marks or Marks()))
-    app.include_router(runs_router(engine, engine.drives))
-    app.include_router(labels_router(engine.labels))
-    app.include_router(label_acts_router(engine.labels))
-    app.include_router(label_files_router(engine.labels))
-    app.include_router(clips_router(engine, jobs))
-    app.include_router(alignment_router(engine))
-    app.include_router(project_router(engine))
-    app.include_router(rerun_router(engine, viewer))
+    for make_router in ROUTERS:
+        app.include_router(make_router(services))
     app.include_router(viser_router(viser_port, access.allowed))
     app.add_api_route("/palette.css", _palette, include_in_schema=False)
     app.mount("/", _Pages(engine.drives.turn.asked), name="pages")

@@ -11,7 +11,7 @@ import httpx
 import pytest
 import yaml
 
-from app.drive.frame_rows import COLUMNS
+from app.drive.frame_rows import column_names
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.web.server import create_app
@@ -81,7 +81,7 @@ def test_columns_are_the_command_lines(client: httpx.Client, engine: Engine):
     results = [result for _, result in run(Recording(), Params(), Detectors(CountingDetector()))]
     assert (answer["count"], answer["from"], answer["done"]) == (30, 0, 30)
     assert answer["t_s"] == pytest.approx([0.1 * n for n in range(30)])
-    assert tuple(answer["columns"]) == COLUMNS
+    assert tuple(answer["columns"]) == column_names()
     assert answer["columns"]["cipv_id"] == [r.cipv.id if r.cipv else None for r in results]
     assert answer["columns"]["distance_m"] == [round(r.cipv.distance_m, 4) if r.cipv else None for r in results]
     assert answer["columns"]["gaps"] == [""] * 30
