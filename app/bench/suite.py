@@ -7,9 +7,9 @@ from typing import Any
 
 from app.bench import detector as detector_bench
 from app.bench import lidar as lidar_bench
-from app.bench import line as line_bench
 from app.bench import packets as packets_bench
 from app.bench import simulation as simulation_bench
+from app.bench import whole_pipeline as pipeline_bench
 from app.web.source_catalog import recordings
 from pipeline.detection import Detectors, detector_for, lanes_for
 from pipeline.inference.runtime import DetectorMissing
@@ -40,7 +40,7 @@ def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, An
     figures |= lidar_bench.stages(_sweeps(source), BUDGET_S["lidar"], params)
     figures |= _dense_sweeps(params)
     looking = Detectors(network, lanes, usual_every(lanes, SWEEPS_HZ))
-    figures |= line_bench.stages(source, len(frames), params, looking, BUDGET_S["line"])
+    figures |= pipeline_bench.stages(source, len(frames), params, looking, BUDGET_S["line"])
     if network is not None:
         figures |= detector_bench.stages(pictures, network, BUDGET_S["detector"])
     figures |= simulation_bench.stages(BUDGET_S["simulation"])

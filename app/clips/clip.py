@@ -13,7 +13,7 @@ from app.core.detection_cache import DetectionCache
 from app.core.playback_clock import timeline_s
 from app.drive.compute_scheduler import ComputeScheduler
 from app.drive.open_recording import OpenRecording, RunSetup
-from app.views.rerun_start_options import RerunStartOptions
+from app.views.rerun.start_options import RerunStartOptions
 from pipeline.common.progress import Progress
 from pipeline.params import Params
 from pipeline.run import Detectors

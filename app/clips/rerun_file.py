@@ -10,7 +10,7 @@ from pipeline.common.progress import Progress
 
 def write(clip: Clip, path: Path, progress: Progress) -> None:
     """A ``.rrd`` file. ReplayError when it cannot be written."""
-    from app.views.rerun_view import RerunSink  # takes half a second to import
+    from app.views.rerun.view import RerunSink  # takes half a second to import
 
     with RerunSink(path, clip.title, clip.params.alignment, clip.start) as sink:
         for frame, result in clip_frames(clip, progress):

@@ -12,8 +12,8 @@ from rich.console import Console
 from rich.table import Table
 
 from app.bench import clients as clients_bench
-from app.bench import page as page_bench
 from app.bench.demands import PAGE_DEMANDS, broken, page_rows
+from app.bench.page import measure as page_bench
 from app.bench.suite import run_all
 from app.commands.support.options import LineOptions
 from pipeline.common.errors import BadInput

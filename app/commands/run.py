@@ -56,7 +56,7 @@ class Run:
                 out = sys.stdout if to_stdout else stack.enter_context(self.out.open("w", encoding="utf-8"))
             replay = None
             if self.rrd is not None:
-                from app.views.rerun_view import RerunSink  # half a second to import: only who asks pays
+                from app.views.rerun.view import RerunSink  # half a second to import: only who asks pays
 
                 replay = stack.enter_context(RerunSink(self.rrd, source.title, params.alignment))
             bar = stack.enter_context(frames_progress())

@@ -29,7 +29,7 @@ from pipeline.types.source import AnySource
 
 if TYPE_CHECKING:
     from app.labels.store.database import Database
-    from app.views.rerun_feed import RerunFeed
+    from app.views.rerun.feed import RerunFeed
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def _open_labels(url: str | None) -> Database:
 
 
 def _rerun_feed(engine: Engine, url: str) -> RerunFeed:
-    from app.views.rerun_feed import RerunFeed  # half a second to import: only who asks pays
+    from app.views.rerun.feed import RerunFeed  # half a second to import: only who asks pays
 
     return RerunFeed(engine, url)
 

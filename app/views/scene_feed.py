@@ -9,7 +9,7 @@ from app.core.latest_value import Newest
 from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
-from app.views.viser_view import ViserView
+from app.views.viser.view import ViserView
 from pipeline.params import ParamsError
 
 

@@ -23,14 +23,14 @@ from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.streaming.stream import Stream
 from app.views.colors import palette_css
-from app.views.rerun_web import ViewerFiles
-from app.views.viser_proxy import viser_router
+from app.views.rerun.web import ViewerFiles
+from app.views.viser.proxy import viser_router
 from app.web.access import Access, Guard
 from app.web.api_description import REFUSALS, titled
 from app.web.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
 from app.web.metrics import Metrics
 from app.web.routers import ROUTERS, Services
-from app.web.routes.label_files import IMPORT
+from app.web.routes.labels.files import IMPORT
 from app.web.tokens import Tokens
 
 STATIC = Path(__file__).resolve().parents[2] / "static"

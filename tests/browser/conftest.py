@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
-from app.bench.devtools import CHROMIUM, FLAGS
+from app.bench.page.devtools import CHROMIUM, FLAGS
 from app.core.server_address import listen_socket
 from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder

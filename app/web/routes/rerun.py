@@ -15,8 +15,8 @@ from starlette.background import BackgroundTask
 
 from app.clips.exports import write_clip
 from app.engine.engine import Engine
-from app.views.rerun_start_options import RerunStartOptions
-from app.views.rerun_web import FILES, ViewerFiles
+from app.views.rerun.start_options import RerunStartOptions
+from app.views.rerun.web import FILES, ViewerFiles
 from app.web.routes.clips import clip_of
 from app.web.routes.refusals import open_recording, refusing
 from app.web.routes.shapes import file_of

@@ -38,7 +38,7 @@ def imported(program: str) -> set[str]:
             LINE - {"numba"} | LABELS | DRAWING - {"rich.progress"} | {"rosbags", "velodyne_decoder"},
         ),
         (
-            "app.commands.labels",
+            "app.commands.labels.labels",
             LINE - {"numba"} | {"sqlalchemy", "alembic", "trackeval", "scipy.interpolate", "viser"},
         ),
     ],

@@ -19,7 +19,7 @@ from websockets.sync.client import connect
 from app.engine.engine import Engine
 from app.engine.session_recording import SessionRecorder
 from app.web.limits import LARGEST_BODY, LARGEST_FILE
-from app.web.routes.label_files import IMPORT
+from app.web.routes.labels.files import IMPORT
 from app.web.server import create_app
 from app.web.tokens import Tokens
 from tests.app.web.serving import WAIT_S, running, serving

@@ -10,7 +10,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from app.views.rerun_web import FILES, NoViewer, ViewerFiles
+from app.views.rerun.web import FILES, NoViewer, ViewerFiles
 from app.web.server import create_app
 from tests.app.web.serving import WAIT_S, running, serving
 

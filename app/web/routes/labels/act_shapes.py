@@ -11,7 +11,7 @@ from app.labels.acts.request_fields import Person, PersonOrNobody, Strict
 from app.labels.acts.requests import Act
 from app.labels.service.tasks import TaskKind
 from app.labels.store.values import LONGEST_ITEM
-from app.web.routes.label_shapes import ItemKey, LabelChanges
+from app.web.routes.labels.shapes import ItemKey, LabelChanges
 
 Drive = Annotated[str, Field(max_length=LONGEST_ITEM, description="Id of the recording, of GET /api/labels")]
 

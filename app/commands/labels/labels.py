@@ -11,7 +11,7 @@ from typing import Annotated
 
 import tyro
 
-from app.commands.label_files import Database, ExportLabels, ImportLabels, Person, say
+from app.commands.labels.files import Database, ExportLabels, ImportLabels, Person, say
 from app.commands.support.options import LineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from app.engine.engine import Engine
-from app.views.rerun_feed import RerunFeed
-from app.views.rerun_view import ReplayError
-from app.views.rerun_web import free_ports
+from app.views.rerun.feed import RerunFeed
+from app.views.rerun.view import ReplayError
+from app.views.rerun.web import free_ports
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.app.waiting import wait_until

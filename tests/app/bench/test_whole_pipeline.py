@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from app.bench import line
+from app.bench import whole_pipeline
 from app.commands.bench import _table
 from pipeline.detection import Detectors
 from pipeline.params import Params
@@ -45,7 +45,7 @@ def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monke
 
     monkeypatch.setattr(Detector, "detect", noting)
     lanes = Paint()
-    figures = line.stages(source, 3, Params(), Detectors(detector, lanes, 2), 0.4)
+    figures = whole_pipeline.stages(source, 3, Params(), Detectors(detector, lanes, 2), 0.4)
     assert list(figures) == ["step", "step_beside_network", "line"]
     assert asked == {"here", "beside"}
     assert lanes.asked > 0
@@ -64,7 +64,7 @@ def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monke
 
 def test_each_round_goes_on_where_the_last_one_ended() -> None:
     source = open_source("sim:straight")
-    laps = line._Laps(iter([source.frame(0), source.frame(1)] * 1000), Params())
+    laps = whole_pipeline._Laps(iter([source.frame(0), source.frame(1)] * 1000), Params())
     for _ in range(2):
         laps.go_on(0.0)
     assert len(laps.times_s) == 1, "one frame at least, however short the time"

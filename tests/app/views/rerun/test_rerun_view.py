@@ -14,7 +14,7 @@ from rerun.chunk import RrdReader
 
 from app.views import scene
 from app.views.colors import rgb
-from app.views.rerun_view import APPLICATION, ReplayError, RerunSink
+from app.views.rerun.view import APPLICATION, ReplayError, RerunSink
 from pipeline.params import AlignmentParams
 from pipeline.types import Frame, Layers, Result
 

@@ -17,12 +17,13 @@ import rich
 import viser
 
 from app.core.shared_view_state import HeldCuboid, OnDrag
-from app.views import scene, viser_nodes
+from app.views import scene
 from app.views.colors import Role, rgb
 from app.views.ray_picking import object_on_ray
-from app.views.viser_gizmo import CuboidGizmo
-from app.views.viser_gui import OnChange, ParamsGui
-from app.views.viser_nodes import Strokes
+from app.views.viser import nodes as viser_nodes
+from app.views.viser.gizmo import CuboidGizmo
+from app.views.viser.gui import OnChange, ParamsGui
+from app.views.viser.nodes import Strokes
 from pipeline.params import Params
 from pipeline.types import Frame, FusedObject, Point3, Result
 

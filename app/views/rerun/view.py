@@ -13,11 +13,11 @@ from typing import BinaryIO
 import numpy as np
 import rerun as rr
 
-from app.views import rerun_parts as parts
 from app.views import scene
 from app.views.colors import rgb
-from app.views.rerun_blueprint import BEV_AHEAD_M, BEV_ASIDE_M, CAMERA, OVERLAYS, blueprint
-from app.views.rerun_start_options import PLAYING, RerunStartOptions
+from app.views.rerun import parts
+from app.views.rerun.blueprint import BEV_AHEAD_M, BEV_ASIDE_M, CAMERA, OVERLAYS, blueprint
+from app.views.rerun.start_options import PLAYING, RerunStartOptions
 from pipeline.alignment import projection
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import inverse

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.views.viser_gui import ParamsGui
-from app.views.viser_view import POSES, ViserView
+from app.views.viser.gui import ParamsGui
+from app.views.viser.view import POSES, ViserView
 from pipeline.params import Params, with_changes
 from pipeline.types import Cipv, Frame, Layers, Result
 from pipeline.types.lane import EgoLane, LaneLine

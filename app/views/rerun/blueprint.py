@@ -6,7 +6,7 @@ from typing import Any
 
 import rerun.blueprint as rrb
 
-from app.views.rerun_start_options import PLAYING, RerunStartOptions
+from app.views.rerun.start_options import PLAYING, RerunStartOptions
 
 CAMERA = "world/camera"
 OVERLAYS = f"{CAMERA}/overlay"

@@ -13,8 +13,8 @@ from app.labels.service.desk import LabelDesk
 from app.labels.service.next_work import Asked, What, where_next
 from app.labels.store.values import ItemKind
 from app.web.routes.drive import current
-from app.web.routes.label_score_shapes import BadFrameJson, ScoreJson, errors_json
-from app.web.routes.label_shapes import HistoryJson, ItemKey, LabelsOfPerson, NextJson, WholeTrack, Window
+from app.web.routes.labels.score_shapes import BadFrameJson, ScoreJson, errors_json
+from app.web.routes.labels.shapes import HistoryJson, ItemKey, LabelsOfPerson, NextJson, WholeTrack, Window
 from app.web.routes.refusals import refusing
 from app.web.routes.shapes import MetricJson
 

@@ -13,7 +13,7 @@ from fastapi import FastAPI
 
 from app.labels.service.desk import LabelDesk
 from app.web.limits import BodyLimit
-from app.web.routes.label_files import IMPORT, label_files_router
+from app.web.routes.labels.files import IMPORT, label_files_router
 from tests.app.waiting import loop_apart
 
 MOST = 10

@@ -11,7 +11,7 @@ from app.labels.acts.requests import Import, Propose
 from app.labels.errors import Stale
 from app.labels.service.answers import changes_json
 from app.labels.service.desk import Done, LabelDesk
-from app.web.routes.label_act_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
+from app.web.routes.labels.act_shapes import ActBody, ActedJson, StaleJson, TaskBegun, Who
 from app.web.routes.refusals import refusing
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 from app.core.latest_value import Newest
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
-from app.views.rerun_view import ReplayError, RerunSink, ViewerAddress
+from app.views.rerun.view import ReplayError, RerunSink, ViewerAddress
 
 logger = logging.getLogger("cipv.rerun")
 

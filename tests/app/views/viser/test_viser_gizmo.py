@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from app.core.shared_view_state import HeldCuboid
-from app.views.viser_gizmo import FACES, NODE, moved
-from app.views.viser_view import ViserView
+from app.views.viser.gizmo import FACES, NODE, moved
+from app.views.viser.view import ViserView
 from pipeline.common.geometry import Cuboid
 from pipeline.params import Params
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from typing import NamedTuple
 
-from app.bench.devtools import Browser, Page
+from app.bench.page.devtools import Browser, Page
 
 _SETTLE_S = 4.0
 _FIRST_VIEWS = 5

@@ -18,8 +18,8 @@ from app.labels.acts.request_fields import Person
 from app.labels.service.desk import LabelDesk
 from app.labels.store.values import LONGEST_ITEM, LONGEST_NAME
 from app.labels.wording import WORKING
-from app.web.routes.label_act_shapes import TaskBegun
-from app.web.routes.label_file_shapes import VERSION_NAME, LostJson, NativeFile, NewVersion, VersionJson
+from app.web.routes.labels.act_shapes import TaskBegun
+from app.web.routes.labels.file_shapes import VERSION_NAME, LostJson, NativeFile, NewVersion, VersionJson
 from app.web.routes.refusals import refusing
 from app.web.routes.shapes import file_of
 from pipeline.labels.formats.base import FormatName

@@ -16,8 +16,8 @@ from fastapi import FastAPI
 from starlette.requests import HTTPConnection
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
-from app.views.viser_proxy import POLICY, viser_router
-from app.views.viser_view import ViserView
+from app.views.viser.proxy import POLICY, viser_router
+from app.views.viser.view import ViserView
 from pipeline.params import Params
 from pipeline.types import Frame, Result
 
