@@ -21,8 +21,8 @@ from app.web.routes.clips import clips_router
 from app.web.routes.drive import drive_router
 from app.web.routes.health import health_router
 from app.web.routes.labels.acts import label_acts_router
-from app.web.routes.labels.reading import labels_router
 from app.web.routes.labels.files import label_files_router
+from app.web.routes.labels.reading import labels_router
 from app.web.routes.params import params_router
 from app.web.routes.playback import playback_router
 from app.web.routes.project import project_router

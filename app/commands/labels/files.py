@@ -37,8 +37,8 @@ Person = Annotated[str, tyro.conf.arg(metavar="NAME")]
 
 @dataclass(frozen=True)
 class ExportLabels:
-    """Write the labels of a recording for another tool, and say what that tool's format has no place for. Without
-    --labels: those of the database, where it has some of this recording, else the truth that comes with it.
+    """Write the labels of a recording in another tool's format, and report what that format cannot express. Without
+    --labels: the labels in the database if there are any, otherwise the truth that comes with the recording.
 
     Example: cipv labels export kitti:DRIVE --format nuscenes --out labels
     """
@@ -46,15 +46,15 @@ class ExportLabels:
     source: tyro.conf.Positional[str]
     """The recording: a session.mcap, astyx:<dir>, kitti:<dir>, sim:<scenario>, …"""
     format: FormatName
-    """Which kind of file"""
+    """File format"""
     out: Path
-    """The file or folder to write; there may be none yet"""
+    """The file or folder to write; must not exist"""
     labels: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """A file of our own with the labels"""
+    """A file of labels in the native format"""
     version: Annotated[str, tyro.conf.arg(metavar="NAME")] = WORKING
-    """Which frozen version of the database's labels; else as they are now"""
+    """A frozen version of the labels in the database; default: their present state"""
     database: Database = None
-    """A team's database; else $CIPV_LABELS_URL, else sessions/labels.db"""
+    """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
 
     def __call__(self) -> int:
         source = opened_recording(self.source)
@@ -79,8 +79,8 @@ class ExportLabels:
 
 @dataclass(frozen=True)
 class ImportLabels:
-    """Read labels of a recording that another tool wrote: into the database, beside those that are there, or with
-    --out into a file of our own.
+    """Read labels that another tool wrote: into the database, in addition to those already there, or with --out into a
+    file in the native format.
 
     Example: cipv labels import kitti:DRIVE label_2 --format kitti
     """
@@ -90,13 +90,13 @@ class ImportLabels:
     file: tyro.conf.Positional[Path]
     """The file or folder to read"""
     format: FormatName
-    """Which kind of file it is"""
+    """File format"""
     out: Path | None = None
-    """The file to write; there may be none yet"""
+    """The file to write; must not exist"""
     database: Database = None
-    """A team's database; else $CIPV_LABELS_URL, else sessions/labels.db"""
+    """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
     person: Person = field(default_factory=getpass.getuser)
-    """Whose act it is, to be undone in the page"""
+    """Author of the change, who can undo it in the dashboard"""
 
     def __call__(self) -> int:
         source = opened_recording(self.source)
@@ -135,7 +135,7 @@ def _drive(source: Source) -> Drive:
 
 def _amount(labels: LabelSet) -> str:
     sightings = sum(len(track.sightings) for track in labels.tracks)
-    return f"tracks {len(labels.tracks):,}, sightings {sightings:,}, ranges of the lead {len(labels.leads):,}"
+    return f"tracks {len(labels.tracks):,}, sightings {sightings:,}, lead ranges {len(labels.leads):,}"
 
 
 def say(*sentences: str) -> None:

@@ -12,24 +12,24 @@ from typing import Annotated
 import tyro
 
 from app.commands.labels.files import Database, ExportLabels, ImportLabels, Person, say
-from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 
 
 @dataclass(frozen=True)
 class ProposeLabels:
-    """Run the pipeline over a recording and keep what it saw as proposals, to be accepted or corrected in the page.
-    What a person has looked at already is not proposed again.
+    """Run the pipeline on a recording and save its objects as proposed labels, to be accepted or corrected in the
+    dashboard. Objects that a person has reviewed already are not proposed again.
 
     Example: cipv labels propose astyx:PATH
     """
 
     source: SourceOptions
-    line: LineOptions = field(default_factory=LineOptions)
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     database: Database = None
-    """A team's database; else $CIPV_LABELS_URL, else sessions/labels.db"""
+    """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
     person: Person = field(default_factory=getpass.getuser)
-    """Whose act it is, to be undone in the page"""
+    """Author of the change, who can undo it in the dashboard"""
 
     def __call__(self) -> int:
         from app.drive.full_run import calibration_digest, digest
@@ -40,8 +40,8 @@ class ProposeLabels:
         from pipeline.labels.propose import Seen, propose
         from pipeline.run import run
 
-        params, source = self.line.parameters(), self.source.open()
-        detectors = self.line.open_detectors(source)
+        params, source = self.pipeline.parameters(), self.source.open()
+        detectors = self.pipeline.open_detectors(source)
         frames: dict[int, list[Seen]] = {}
         leads: dict[int, int | None] = {}
         names, calibration = [], ""
@@ -71,15 +71,15 @@ class ProposeLabels:
 
 @dataclass(frozen=True)
 class ListLabels:
-    """Every recording that the database has labels of.
+    """List every recording with labels in the database.
 
     Example: cipv labels list --json
     """
 
     database: Database = None
-    """A team's database; else $CIPV_LABELS_URL, else sessions/labels.db"""
+    """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
     json: bool = False
-    """As JSON"""
+    """Print the list as JSON"""
 
     def __call__(self) -> int:
         from app.labels.store.database import open_database
@@ -105,7 +105,7 @@ class ListLabels:
 
 @dataclass(frozen=True)
 class Labels:
-    """Labels of recordings: propose, list, and exchange with other tools."""
+    """Labels of recordings: propose, list, export and import."""
 
     action: (
         Annotated[ProposeLabels, tyro.conf.subcommand("propose")]

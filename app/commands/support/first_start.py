@@ -1,4 +1,4 @@
-"""What a first start would wait for, done once by ``make install``: kernels are compiled, and modules to bytecode."""
+"""Compile numba kernels and Python bytecode once, in ``make install``, so that the first start need not."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ STARTED = ("app.cli", "app.commands.serve", "app.web.server", "app.views.scene_f
 
 
 def main() -> None:
-    """The dashboard's modules, and a frame of its demo through the whole line."""
+    """Import the dashboard's modules, and run the pipeline on one frame of its demo."""
     for name in STARTED:
         import_module(name)
     source = open_source("sim:straight")
