@@ -20,7 +20,7 @@ class Demand:
     is_optional: bool = False
 
     def broken(self, figures: Mapping[str, Mapping[str, Any]]) -> str | None:
-        """A sentence when it does not hold, or nobody measured it; null when it does. A peer that is not installed
+        """A sentence when it does not hold, or nobody measured it; None when it does. A peer that is not installed
         says nothing."""
         if self.stage not in figures and self.is_optional:
             return None

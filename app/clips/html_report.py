@@ -29,7 +29,7 @@ _CURVES = (
     ("Time to collision", "s", ("ttc_s",)),
     ("Path offset of the CIPV", "m", ("path_offset_m",)),
     ("Own and desired speed", "m/s", ("speed_mps", "desired_speed_mps")),
-    ("Brake", "share of the pedal", ("brake",)),
+    ("Brake", "fraction of the pedal", ("brake",)),
 )
 _LONGEST_TTC_S = 20.0
 _WEIGHT = {"alarm": 0, "warning": 1, "notice": 2, "info": 3}
@@ -91,7 +91,7 @@ def worth_a_picture(events: Sequence[Event]) -> dict[int, str]:
     for event in weighty:
         if len(said) < MOST_PICTURES - 1:
             said.setdefault(event.index, event.text)
-    return dict(sorted({0: "the clip begins", **said}.items()))
+    return dict(sorted({0: "start of the clip", **said}.items()))
 
 
 def _jpeg(drawn: U8) -> bytes:
@@ -103,7 +103,7 @@ def _summary(rows: Sequence[Row], names: Sequence[str], info: ClipInfo) -> Secti
     leads = {row.cipv_id for row in rows} - {None}
     text = (
         f"Frames {names[0]} to {names[-1]} ({len(rows)}) of {info.uri}.",
-        f"{with_lead} frames with a CIPV, {len(leads)} vehicle{'s' if len(leads) != 1 else ''} in turn. "
+        f"{with_lead} frames with a CIPV, {len(leads)} different vehicle{'s' if len(leads) != 1 else ''}. "
         f"Made from the same input and parameters, a run has the digest {info.digest}.",
     )
     return Section("clip", "Clip", text)
@@ -112,7 +112,7 @@ def _summary(rows: Sequence[Row], names: Sequence[str], info: ClipInfo) -> Secti
 def _events(events: Sequence[Event], names: Sequence[str], times: Sequence[float]) -> Section:
     rows = tuple((names[each.index], round(times[each.index], 2), each.kind, each.text) for each in events)
     table = Table("What happened", ("frame", "at s", "kind", "event"), rows)
-    return Section("events", "Events", tables=(table,) if rows else (), text=() if rows else ("Nothing.",))
+    return Section("events", "Events", tables=(table,) if rows else (), text=() if rows else ("No events.",))
 
 
 def _charts(rows: Sequence[Row], times: Sequence[float]) -> Iterable[Chart]:
@@ -133,7 +133,7 @@ def _is_drawn(name: str, value: float) -> bool:
 def _pictures(pictures: dict[int, tuple[bytes, str]], names: Sequence[str]) -> str:
     figures = "".join(
         f"<figure><figcaption>{escape(names[place])}: {escape(text)}</figcaption>"
-        f'<img style="width:100%" alt="Camera at frame {escape(names[place])} with what the line believes" '
+        f'<img style="width:100%" alt="Camera at frame {escape(names[place])} with the result drawn over it" '
         f'src="data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"></figure>'
         for place, (jpeg, text) in pictures.items()
     )

@@ -55,7 +55,7 @@ class Calibrate:
             )
         if self.keep and not params.distance.scale_to_camera:
             raise BadInput(
-                "--keep needs distance.scale_to_camera, since a stored law must work with every camera; use --out instead"
+                "--keep needs distance.scale_to_camera: a stored law must work with every camera; use --out instead"
             )
         pairs = collect_pairs(source, detector, self.truth, params)
         fits = fit_laws(pairs, None if self.free_exponent else -1.0)

@@ -30,7 +30,7 @@ Phase = Literal["detect", "run", "done", "failed"]
 
 @dataclass(frozen=True)
 class DriveState:
-    """How far the run of the present parameters is; run and base are ids, null without one. revision grows whenever
+    """How far the run of the present parameters is; run and base are ids, None without one. revision grows whenever
     there is something new to fetch. phase detect: networks still look at pictures for the first time."""
 
     revision: int = 0
@@ -64,7 +64,7 @@ class BackgroundRuns:
 
     @property
     def recording(self) -> OpenRecording | None:
-        """The open recording; null when there is none whose whole drive can be known."""
+        """The open recording; None when there is none whose whole drive can be known."""
         return self._recording
 
     @property
@@ -119,7 +119,7 @@ class BackgroundRuns:
             self._recording.inputs.offer(frame)
 
     def state_before(self, index: int, params: Params) -> State | None:
-        """The state in which the whole-drive run comes to a frame; null where it has not come that far."""
+        """The state in which the whole-drive run comes to a frame; None where it has not come that far."""
         recording = self._recording
         return recording.state_before(index, params) if recording is not None else None
 
@@ -141,7 +141,7 @@ class BackgroundRuns:
             del work  # a recording that is open no more is not kept while there is nothing to do
 
     def _next(self) -> tuple[OpenRecording, DriveRun] | None:
-        """Wait for a run that is not finished; null at the end."""
+        """Wait for a run that is not finished; None at the end."""
         with self._condition:
             while not self._ended:
                 recording = self._recording

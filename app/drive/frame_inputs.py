@@ -44,11 +44,11 @@ class InputStore:
         return len(self._frames)
 
     def get(self, index: int) -> Frame | None:
-        """The frame without pixels; null when it is not held."""
+        """The frame without pixels; None when it is not held."""
         return self._frames.get(index)
 
     def name(self, index: int) -> str | None:
-        """What the recording calls a frame; null when it was not seen yet. Of all frames, also of those not held."""
+        """What the recording calls a frame; None when it was not seen yet. Of all frames, also of those not held."""
         return self._names.get(index)
 
     def offer(self, frame: Frame) -> None:

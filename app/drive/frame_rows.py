@@ -1,6 +1,6 @@
 """One frame of a drive as a row of plain values, and one object in it as a record: what timelines and events need.
 
-A row is some 200 bytes and an object 130, so that a whole drive fits where its results would not. Null in a row, NaN
+A row is some 200 bytes and an object 130, so that a whole drive fits where its results would not. None in a row, NaN
 and 0 in a record (``source``) stand for what is not known.
 """
 

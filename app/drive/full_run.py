@@ -74,7 +74,7 @@ class DriveRun:
         return list(enumerate(self._objects[: self.done]))
 
     def nearest_state(self, index: int) -> KnownState | None:
-        """The last kept state at or before ``index``; null where the pass has not come that far."""
+        """The last kept state at or before ``index``; None where the pass has not come that far."""
         head, states = self._head, self._states
         if index >= head.at:
             return head if index == head.at else None

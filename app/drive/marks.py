@@ -35,7 +35,7 @@ class SavedMark:
 
 
 class Marks:
-    """By recording. Any thread. folder: one small file a recording is kept there; null keeps them in memory only."""
+    """By recording. Any thread. folder: one small file a recording is kept there; None keeps them in memory only."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self._folder = folder
@@ -54,7 +54,7 @@ class Marks:
         with self._lock:
             marks = self._loaded(uri)
             if len(marks) >= MOST_MARKS:
-                raise MarkRefused(f"a recording holds {MOST_MARKS} marks at most")
+                raise MarkRefused(f"a recording can have at most {MOST_MARKS} marks")
             number, words = max((each.id for each in marks), default=0) + 1, " ".join(text.split())[:LONGEST_TEXT]
             mark = SavedMark(number, index, words, t_ns, in_session)
             self._save(uri, [*marks, mark])
@@ -84,7 +84,7 @@ class Marks:
                 partial.write_text(text, encoding="utf-8")
                 os.replace(partial, file)
             except OSError as error:
-                raise MarkRefused(f"{file}: the mark cannot be kept: {error.strerror}") from None
+                raise MarkRefused(f"{file}: the mark cannot be saved: {error.strerror}") from None
         self._marks[uri] = marks
 
     def _file(self, uri: str) -> Path | None:

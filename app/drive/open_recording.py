@@ -76,7 +76,7 @@ class OpenRecording:
         run.add(self.input(index), self.truth(index), RULE)
 
     def state_before(self, index: int, params: Params) -> State | None:
-        """The state in which the run of these parameters came to a frame; null where it has not come that far."""
+        """The state in which the run of these parameters came to a frame; None where it has not come that far."""
         run = self.runs.of(params)
         kept = run.nearest_state(index) if run is not None else None
         return self._onwards(kept, index, params) if kept is not None else None
@@ -136,7 +136,7 @@ class OpenRecording:
         save(self.setup.source, path, first, last, progress)
 
     def truth(self, index: int) -> Truth:
-        """The labelled objects of a frame; null when it is not labelled."""
+        """The labelled objects of a frame; None when it is not labelled."""
         if index not in self._truths:
             self._truths[index] = self.setup.source.truth(index)
         return self._truths[index]

@@ -57,11 +57,11 @@ class RunRegistry:
         with self._lock:
             found = next((run for run in self._runs if run.number == number), None)
         if found is None:
-            raise NoSuchRun(f"there is no run {number}")
+            raise NoSuchRun(f"run {number} not found")
         return found
 
     def of(self, params: Params) -> DriveRun | None:
-        """The run with these parameters; null when there is none."""
+        """The run with these parameters; None when there is none."""
         with self._lock:
             return next((run for run in reversed(self._runs) if run.params == params), None)
 
@@ -93,7 +93,7 @@ class RunRegistry:
         with self._lock:
             run = self.get(number)
             if not run.kept and sum(each.kept for each in self._runs) >= MOST_KEPT:
-                raise RunRefused(f"{MOST_KEPT} runs are kept already; delete one first")
+                raise RunRefused(f"{MOST_KEPT} runs are saved already; delete one first")
             run.kept, run.name = True, " ".join(name.split())[:LONGEST_NAME]
             return run
 
@@ -108,7 +108,7 @@ class RunRegistry:
         with self._lock:
             run = self.get(number)
             if run is self._current or run is self._base:
-                raise RunRefused("the present run and the one it is compared against stay")
+                raise RunRefused("the present run and the base of comparison cannot be deleted")
             self._runs.remove(run)
 
     def _let_go(self) -> None:

@@ -40,10 +40,10 @@ _PATIENCE_S = 10.0
 _TELL_EVERY_S = 0.25
 _ABLATION: dict[Sensors, tuple[str, ...]] = {
     "both": (),
-    "lidar": ("by the LiDAR alone: nothing looks at the pictures",),
-    "camera": ("by the camera alone: the LiDAR's points are left out",),
+    "lidar": ("LiDAR only: no detection in the pictures",),
+    "camera": ("Camera only: LiDAR points are not used",),
 }
-"""What people are told who see only a part of what is there."""
+"""Notices about sensors that are left out."""
 
 
 class OpenSource(Protocol):
@@ -54,7 +54,7 @@ class OpenSource(Protocol):
 
 class Engine:
     """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
-    one for a source's pictures; null runs without a camera's detector and says nothing about it; ``open_lanes`` gives
+    one for a source's pictures; None runs without a camera's detector and says nothing about it; ``open_lanes`` gives
     the lane detector, which looks at every ``lanes_every``-th frame. ``whole_drives``: a recording's whole drive is
     computed in the background (``drives``), so that any frame is shown as it is in it. ``desk``: where what is shown
     can be recorded; by default into the folder of this machine's sessions. ``labels``: what people say of it, and the

@@ -34,7 +34,7 @@ class Player(Protocol):
         ...
 
     def wait_s(self, index: int) -> float | None:
-        """Seconds until it needs the worker, with this frame shown; null while only a wish or its own call does."""
+        """Seconds until it needs the worker, with this frame shown; None while only a wish or its own call does."""
         ...
 
     def wait(self, params: Params) -> None:
@@ -42,7 +42,7 @@ class Player(Protocol):
         ...
 
     def serve(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
-        """What a wish makes of it; null when what is shown stays."""
+        """What a wish makes of it; None when what is shown stays."""
         ...
 
     def go_on(self, standing: Wish, index: int) -> None:

@@ -41,7 +41,7 @@ class SessionRecorder:
 
     @property
     def state(self) -> RecordingState | None:
-        """Null while nothing is recorded. One that ended by itself stays, with its error, until it is stopped."""
+        """None while nothing is recorded. One that ended by itself stays, with its error, until it is stopped."""
         recorder = self._recorder
         return recorder.state if recorder is not None else None
 
@@ -55,7 +55,7 @@ class SessionRecorder:
                 return self._recorder.state
             self._end()
             if source is None:
-                raise BadInput("nothing is open that could be recorded")
+                raise BadInput("nothing is open to record")
             # what MCAP and its schemas need takes 0.2 s to import: only who records pays
             from pipeline.recording.recorder import Recorder
             from pipeline.recording.save import about
@@ -63,7 +63,7 @@ class SessionRecorder:
             try:
                 recorder = Recorder(new_session(self._folder, source.title), about(source))
             except OSError as error:
-                raise BadInput(f"{self._folder}: no recording can be made: {error.strerror}") from None
+                raise BadInput(f"{self._folder}: cannot record here: {error.strerror}") from None
             with self._feeding:
                 self._live = source if is_live_source(source) else None
                 self._last, self._recorder = None, recorder
@@ -72,7 +72,7 @@ class SessionRecorder:
             return recorder.state
 
     def stop(self) -> RecordingState | None:
-        """End the recording, wait until it is written, and say how it went; null (and no file) when it is empty."""
+        """End the recording, wait until it is written, and say how it went; None (and no file) when it is empty."""
         with self._lock:
             return self._end()
 

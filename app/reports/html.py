@@ -102,7 +102,7 @@ def _cell(cell: AnyCell, decimals: int, replays: str) -> str:
 
 
 def in_words(value: Cell, decimals: int) -> str:
-    """As people read it: a dash for null, whole numbers whole."""
+    """As people read it: a dash for None, whole numbers whole."""
     if value is None:
         return "–"
     return f"{value:.{decimals}f}" if isinstance(value, float) else str(value)

@@ -10,7 +10,7 @@ for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no m
 ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the picture: the one that all get is
 as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
 ``{"selected": 7}`` and ``{"hides_3d": true}`` are for the views that the server draws. So is ``{"held": {"track": 7,
-"cuboid": …}}``, a label that may be dragged in 3D, or null; the page that holds it hears of the drag as
+"cuboid": …}}``, a label that may be dragged in 3D, or None; the page that holds it hears of the drag as
 ``{"type": "held", "track": 7, "cuboid": …, "ended": true}``. What is picked in 3D comes to all as
 ``{"type": "selected", "id": 7}``.
 """
@@ -63,7 +63,7 @@ class Slot:
     """The newest unsent messages of one client, by kind. Lives on the server's event loop.
 
     ``paced``: frames wait for ``painted``. ``traffic``: where frames are counted. picture_px: how wide it shows the
-    picture, null until it says so."""
+    picture, None until it says so."""
 
     def __init__(self, paced: bool = False, traffic: Traffic | None = None) -> None:
         self.picture_px: int | None = None
@@ -284,7 +284,7 @@ def _object(text: str | None) -> dict[str, Any]:
 
 
 def _number(value: Any, limit: float) -> float | None:
-    """A number within ±limit; else null. What a client says is not to be trusted."""
+    """A number within ±limit; else None. What a client says is not to be trusted."""
     return value if isinstance(value, int | float) and -limit < value < limit else None
 
 
@@ -293,7 +293,7 @@ def _is_id_or_null(value: Any) -> bool:
 
 
 def _width(shown_px: Any) -> int | None:
-    """The width to send to who shows it so wide; null for what is no width."""
+    """The width to send to who shows it so wide; None for what is no width."""
     shown = _number(float(shown_px) if isinstance(shown_px, str) and shown_px.isdecimal() else shown_px, _WIDEST_PX)
     return None if shown is None or shown <= 0 else width_for(shown)
 

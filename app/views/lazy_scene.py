@@ -21,7 +21,7 @@ class LateScene:
         self._ended = False
 
     def port(self) -> int | None:
-        """Where viser listens, on loopback; null at the end. The first to ask waits until it does. Any thread."""
+        """Where viser listens, on loopback; None at the end. The first to ask waits until it does. Any thread."""
         with self._lock:
             if self._port is None and not self._ended:
                 from app.views.scene_feed import SceneFeed

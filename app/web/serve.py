@@ -39,7 +39,7 @@ def serve(
     bound = listen_socket(host, port, strict=strict_port)
     number = bound.getsockname()[1]
     if port not in (0, number):
-        print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
+        print(f"cipv: port {port} is in use; using {number}", file=sys.stderr)
     address = f"http://{reachable(host)}:{number}"
     engine.labels.kept.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
     engine.start()

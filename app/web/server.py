@@ -45,8 +45,8 @@ def create_app(
     tokens: Tokens | None = None,
 ) -> FastAPI:
     """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
-    marked moments are kept; null forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
-    comes must have; null where only this machine can come."""
+    marked moments are kept; None forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
+    comes must have; None where only this machine can come."""
     access = Access(hosts)
     stream = Stream(looks)
     exports, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
@@ -151,9 +151,9 @@ async def _one_sentence(_: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     if first["type"] == "json_invalid":
-        return _not_understood(f"the body is no JSON: {first['ctx']['error']}")
+        return _not_understood(f"the body is not valid JSON: {first['ctx']['error']}")
     if first["loc"] == ("body",) and first["type"] != "missing":
-        return _not_understood("the body has to be a JSON object, sent as application/json")
+        return _not_understood("the body must be a JSON object, sent as application/json")
     place = ".".join(str(part) for part in first["loc"] if part != "body")
     return _not_understood(f"{place}: {first['msg']}" if place else first["msg"])
 

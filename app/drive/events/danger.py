@@ -54,7 +54,7 @@ def braking(run: RunRows) -> Iterator[Event]:
             yield Event(kind, index, f"{texts[stage]}{_where(row)}", about, "warning" if stage == 1 else "alarm")
         elif hard and not last_hard and not stage:
             yield Event(
-                "brake", index, f"ACC brakes with {-(row.accel_mps2 or 0.0):.1f} m/s²{_where(row)}", about, "notice"
+                "brake", index, f"ACC brakes at {-(row.accel_mps2 or 0.0):.1f} m/s²{_where(row)}", about, "notice"
             )
         last_stage, last_hard = stage, hard
 

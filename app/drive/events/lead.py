@@ -36,14 +36,14 @@ def _lead_change(run: RunRows, index: int, last: int | None, now: int | None, se
         assert last is not None
         if left:
             return Event("cut_out", index, f"#{last} left the path; nothing ahead", (last,), "notice")
-        return Event("cipv_lost", index, f"#{last} is not the CIPV any more; nothing ahead", (last,), "notice")
+        return Event("cipv_lost", index, f"#{last} is no longer the CIPV; nothing ahead", (last,), "notice")
     at = f"{row.distance_m:.1f} m" if row.distance_m is not None else "unknown distance"
     nearer = _nearer_than_before(run, index)
     if nearer and _was_beside(run, index, now):
         before = f" before #{last}" if last is not None else ""
         return Event("cut_in", index, f"#{now} cut in{before} at {at}", ids(now, last), "warning")
     if last is not None and left:
-        return Event("cut_out", index, f"#{last} left the path; #{now} at {at} leads now", (last, now), "notice")
+        return Event("cut_out", index, f"#{last} left the path; #{now} at {at} is the CIPV now", (last, now), "notice")
     if last is not None:
         return Event("cipv_switch", index, f"CIPV #{last} → #{now} at {at}", (now, last), "notice")
     if now in seen:

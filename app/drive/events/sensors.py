@@ -28,7 +28,7 @@ def disagreements(run: RunRows) -> Iterator[Event]:
                 gap_m = float(now[number]["vl_gap_m"])
                 way = "farther" if gap_m > 0 else "nearer"
                 off = float(now[number]["vl_gap_sigmas"])
-                text = f"camera has #{number} {abs(gap_m):.1f} m {way} than the LiDAR ({off:.1f} σ)"
+                text = f"camera sees #{number} {abs(gap_m):.1f} m {way} than LiDAR ({off:.1f} σ)"
                 yield Event("vl_disagreement", index, text, (number,), "notice")
 
 
@@ -52,7 +52,7 @@ def _time_gaps(t_ns: Sequence[int]) -> Iterator[Event]:
     usual = float(np.median(steps))
     for at in np.flatnonzero((steps > TIME_GAP_PERIODS * usual) | (steps <= 0)):
         step = float(steps[at])
-        text = f"the recording jumps by {step:.1f} s" if step > 0 else f"time goes back by {-step:.1f} s"
+        text = f"gap of {step:.1f} s in the recording" if step > 0 else f"time jumps back by {-step:.1f} s"
         yield Event("sensor_gap", int(at) + 1, text, (), "info")
 
 

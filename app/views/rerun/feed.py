@@ -76,7 +76,7 @@ class RerunFeed:
             sink.abandon()
 
     def _connect(self, snapshot: Snapshot) -> RerunSink | None:
-        """A sink, if somebody listens; else null, after a while, with the frame to be tried again."""
+        """A sink, if somebody listens; else None, after a while, with the frame to be tried again."""
         try:
             socket.create_connection(self._place, _PATIENCE_S).close()
         except OSError:

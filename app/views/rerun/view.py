@@ -246,7 +246,7 @@ class RerunSink:
             self._scalar(f"timing/{stage}", value)
 
     def _scalar(self, name: str, value: float | None) -> None:
-        """A null breaks the curve instead of drawing a number that nobody measured."""
+        """A None breaks the curve instead of drawing a number that nobody measured."""
         self._put(f"curves/{name}", None if value is None else rr.Scalars(value))
 
     def _log_reasons(self, result: Result) -> None:

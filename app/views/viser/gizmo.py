@@ -42,7 +42,7 @@ class CuboidGizmo:
         self._handles: dict[str, viser.TransformControlsHandle] = {}
 
     def hold(self, held: HeldCuboid | None) -> None:
-        """Show it here; null takes it away. While a hand drags something, the hand is right."""
+        """Show it here; None takes it away. While a hand drags something, the hand is right."""
         with self._lock:
             self._wanted = held
             if self._before is None:

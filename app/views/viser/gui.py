@@ -13,7 +13,7 @@ OnChange = Callable[[str, Any], None]
 
 
 class ParamsGui:
-    """One folder a section, all closed at first; a parameter that may be null has a switch "auto" before its slider.
+    """One folder a section, all closed at first; a parameter that may be None has a switch "auto" before its slider.
 
     ``on_change(name, value)`` is called with a dotted name when a person moves something, never for ``set``.
     """

@@ -38,7 +38,7 @@ _GONE = "The 3D view is not running."
 
 
 def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConnection], bool]) -> APIRouter:
-    """Routes for ``/viser/``. ``get_port``: where viser listens on loopback now, null when it does not; it may take a
+    """Routes for ``/viser/``. ``get_port``: where viser listens on loopback now, None when it does not; it may take a
     while, and is asked on any thread.
     ``allowed``: the application's own rule; a WebSocket must besides come from a page of the same host and port.
 

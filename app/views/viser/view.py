@@ -65,7 +65,7 @@ class ViserView:
 
     ``on_change(name, value)`` hears of every slider that a person moves, on a thread of viser's; ``on_drag(held,
     ended)`` of a held cuboid that is dragged; ``on_pick(id)`` of every click into the scene: the object that was met,
-    or null.
+    or None.
     """
 
     def __init__(
@@ -127,7 +127,7 @@ class ViserView:
                 self._draw()
 
     def hold(self, held: HeldCuboid | None) -> None:
-        """Show a cuboid with handles to move, turn and resize it by; null for none."""
+        """Show a cuboid with handles to move, turn and resize it by; None for none."""
         self._gizmo.hold(held)
 
     def set_params(self, params: Params) -> None:

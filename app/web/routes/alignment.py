@@ -19,7 +19,7 @@ from pipeline.types import Frame
 
 FRAMES = 20
 """Frames that are looked at, over the whole drive or the last shown ones: one sweep of 16 rings has few borders."""
-_NOTHING = "No frame has both a picture and LiDAR points to lie on it"
+_NOTHING = "No frame has both a picture and LiDAR points in it"
 APART_NS = 500_000_000
 """Of live sensors, frames nearer to each other than this show the same once more."""
 
@@ -44,9 +44,9 @@ def alignment_router(engine: Engine) -> APIRouter:
 
     @router.get("/score")
     def score() -> Score:
-        """How well the borders of what the LiDAR sees lie on the edges of the pictures, against the same with the mount
-        turned by up to 3°. Of a recording, frames of the whole drive are looked at, which takes a second the first
-        time; of live sensors, those that were shown when it was asked for. 404 when nothing is shown."""
+        """Score the alignment of LiDAR and camera. Compares how well depth borders match picture edges with the same
+        for the mount rotated by up to 3°. Uses frames of the whole recording, which takes a second the first time; for
+        live sensors, the frames shown at each request. 404 when nothing is shown."""
         recording, shown = engine.drives.recording, engine.snapshot
         seen = scenes.of_shown(shown) if recording is None else scenes.of_recording(recording)
         return _json(edge_score(seen, engine.control.peek().params.alignment), len(seen))
@@ -111,18 +111,18 @@ def _brief(found: EdgeScore) -> str:
     if found.borders < FEWEST:
         return "too few borders"
     if found.score is None:
-        return "nothing stands out"
+        return "no clear best"
     return f"{100 * found.score:.0f} %" + (f" · better {_words(found.better)}" if found.better else "")
 
 
 def _sentence(found: EdgeScore) -> str:
     if found.borders < FEWEST:
-        return "Too few borders of what the LiDAR sees lie in the pictures to say how well they match"
+        return "Too few LiDAR depth borders in the pictures for a score"
     if found.score is None:
-        return f"No mount within {REACH_DEG:.0f}° meets the pictures' edges clearly better than the others: no score"
+        return f"No mount rotation within {REACH_DEG:.0f}° matches the picture edges clearly best: no score"
     if found.better:
-        return f"The LiDAR's borders meet the pictures' edges better with {_words(found.better)}"
-    return f"No mount within {REACH_DEG:.0f}° meets the pictures' edges clearly better than this one"
+        return f"LiDAR depth borders match the picture edges better with {_words(found.better)}"
+    return f"No mount rotation within {REACH_DEG:.0f}° matches the picture edges clearly better than the present one"
 
 
 def _words(better: Mapping[str, float]) -> str:

@@ -1,4 +1,4 @@
-"""/api/clip and /api/jobs: a part of the drive as a file, made in the background."""
+"""/api/clip and /api/jobs: export a part of the drive as a file, in the background."""
 
 from __future__ import annotations
 
@@ -54,36 +54,36 @@ def clips_router(engine: Engine, jobs: ExportQueue) -> APIRouter:
 
     @router.post("/clip", status_code=202)
     def export(body: ClipChoice) -> JobJson:
-        """Begin to write a clip with the present parameters. 409 when it is none."""
+        """Export a clip with the present parameters. Runs in the background; 409 for an invalid range."""
         with refusing():
             return _json(submit(jobs, clip_of(engine, body.first, body.last), body.kind))
 
     @router.get("/jobs")
     def every() -> JobList:
-        """Exports, the oldest first."""
+        """List exports, oldest first."""
         return JobList(jobs=[_json(job) for job in jobs.all()])
 
     @router.get("/jobs/{number}")
     def one(number: str) -> JobJson:
-        """How far an export is."""
+        """Get the progress of an export."""
         job = jobs.get(number)
         if job is None:
-            raise HTTPException(404, "there is no such export")
+            raise HTTPException(404, "export not found")
         return _json(job)
 
     @router.delete("/jobs/{number}")
     def cancel(number: str) -> Done:
-        """Stop an export, or forget one that has ended."""
+        """Cancel an export, or delete a finished one."""
         if not jobs.cancel(number):
-            raise HTTPException(404, "there is no such export")
+            raise HTTPException(404, "export not found")
         return Done(status="removed")
 
     @router.get("/jobs/{number}/file", response_class=FileResponse, responses=file_of("application/octet-stream"))
     def download(number: str) -> FileResponse:
-        """The file of an export that is done."""
+        """Download the file of a finished export."""
         job, path = jobs.get(number), jobs.path(number)
         if job is None or path is None:
-            raise HTTPException(404, "there is no such file")
+            raise HTTPException(404, "file not found")
         return FileResponse(path, filename=job.file, media_type="application/octet-stream")
 
     return router

@@ -96,13 +96,13 @@ def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRou
 
     @router.get("/drive")
     def drive(first: int = Query(0, alias="from", ge=0)) -> Columns:
-        """The run of the present parameters, from a frame on; ask again from ``done`` while ``run`` stays the same."""
+        """Get the columns of the present run from a frame on. Ask again from ``done`` while ``run`` stays the same."""
         recording = open_recording(drives)
         return columns_of(recording, current(recording), first)
 
     @router.get("/drive/object/{object_id}")
     def curve(object_id: int, run: int | None = None) -> Curve:
-        """One object over the drive; numbers of objects are those of the run."""
+        """Get the curves of one object over the drive. Object numbers are those of the run."""
         recording = open_recording(drives)
         with refusing():
             of = current(recording) if run is None else recording.runs.get(run)
@@ -110,8 +110,8 @@ def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRou
 
     @router.get("/drive/events")
     def events() -> Events:
-        """What happened, by frame, marks among it. While a run goes on, only what it has come to. Of live sensors there
-        are marks alone, those made since they were opened: ``t_s`` is theirs, ``index`` the count of ticks."""
+        """List events and marks by frame. While a run is in progress, up to the frame it has reached. For live sensors,
+        the marks made since they were opened: ``t_s`` is their time, ``index`` the tick count."""
         recording = drives.recording
         run = recording.runs.current if recording is not None else None
         if recording is None or run is None:
@@ -132,13 +132,13 @@ def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRou
 
     @router.post("/marks", status_code=201)
     def mark(body: NewMark) -> MarkJson:
-        """Mark a moment; it is kept with the recording, and lands in the session that is being recorded. Of live
-        sensors the shown moment is marked; the mark is kept by its time, and is on every recording of that time."""
+        """Mark a frame. The mark is stored with the recording, and written to the session that is being recorded. For
+        live sensors it marks the shown tick, is stored by its time, and appears on every recording of that time."""
         shown = engine.snapshot
         if shown.uri is None:
             raise HTTPException(409, "no recording is open")
         if shown.live and shown.processed is None:
-            raise HTTPException(409, "the sensors have shown nothing yet")
+            raise HTTPException(409, "no data from the sensors yet")
         index = shown.index if body.index is None or shown.live else body.index
         if not shown.live and index >= max(shown.count, 1):
             raise HTTPException(422, f"index: the recording has {shown.count} frames")
@@ -154,10 +154,10 @@ def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRou
 
     @router.delete("/marks/{number}")
     def unmark(number: int) -> Done:
-        """Take a mark away."""
+        """Remove a mark."""
         shown = engine.snapshot
         if shown.uri is None or not marks.remove(_marks_of(shown), number):
-            raise HTTPException(404, f"there is no mark {number}")
+            raise HTTPException(404, f"mark {number} not found")
         drives.changed()
         return Done(status="removed")
 
@@ -190,12 +190,12 @@ def current(recording: OpenRecording) -> DriveRun:
     """The run of the present parameters; 404 while there is none."""
     run = recording.runs.current
     if run is None:
-        raise HTTPException(404, "no run has begun yet")
+        raise HTTPException(404, "no run has started yet")
     return run
 
 
 def columns_of(recording: OpenRecording, run: DriveRun, first: int) -> Columns:
-    """A run's columns from a frame on."""
+    """Get the columns of a run from a frame on."""
     rows = run.rows(first)
     return Columns(
         run=run.number,

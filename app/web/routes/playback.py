@@ -14,12 +14,12 @@ from pipeline.types.result_json import to_json
 
 
 class PlaybackChange(BaseModel):
-    """What to change; absent fields stay as they are. ``step`` pauses and moves by that many frames."""
+    """What to change; absent fields stay as they are. ``step`` pauses and moves by this many frames."""
 
     model_config = ConfigDict(extra="forbid")
 
     playing: bool | None = None
-    seek: int | None = Field(None, ge=0, description="Frame index; beyond the end is the last frame")
+    seek: int | None = Field(None, ge=0, description="Frame index; clamped to the last frame")
     step: int | None = Field(None, ge=-1000, le=1000)
     speed: float | None = Field(None, ge=0.1, le=10.0, description="1 is real time")
     loop: bool | None = None
@@ -37,12 +37,12 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
 
     @router.get("/state", responses={200: {"model": StateJson}})
     def state() -> JSONResponse:
-        """Source, position, playback, notices."""
+        """Get the state: source, position, playback, notices."""
         return JSONResponse(engine.snapshot.state_json())
 
     @router.get("/result", responses={200: {"model": ResultJson}})
     def result() -> JSONResponse:
-        """The shown frame's result; 404 before there is one."""
+        """Get the result of the shown frame. 404 before there is one."""
         processed = engine.snapshot.processed
         if processed is None:
             raise HTTPException(404, "no frame is shown yet")
@@ -50,7 +50,7 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
 
     @router.post("/playback", status_code=202)
     def playback(body: PlaybackChange) -> Done:
-        """Ask for a change; the stream brings what comes of it."""
+        """Control playback. The answer arrives with the stream."""
         standing = body.model_dump(include={"playing", "speed", "loop"}, exclude_none=True)
         if standing:
             engine.control.change(**standing)
@@ -62,13 +62,13 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
 
     @router.get("/sources")
     def sources() -> SourcesJson:
-        """What can be opened without typing, and what is open."""
+        """List the sources that the dashboard offers, and the open one."""
         offered = [SourceJson(uri=uri, title=title) for uri, title in catalog()]
         return SourcesJson(open=engine.snapshot.uri, sources=offered)
 
     @router.post("/source", status_code=202)
     def open_source(body: SourceChoice) -> Done:
-        """Open another recording. One that cannot be opened leaves the old one, with a notice."""
+        """Open a source. If it cannot be opened, the present one stays open and a notice says why."""
         engine.control.change(uri=body.uri.strip(), target=None, steps=0)
         return Done(status="accepted")
 

@@ -35,5 +35,5 @@ def refusing() -> Iterator[None]:
 def open_recording(drives: BackgroundRuns) -> OpenRecording:
     """The recording whose whole drive is computed; 404 when there is none, as with live sensors."""
     if drives.recording is None:
-        raise HTTPException(404, "no recording is open; live sensors are to be recorded first, and the session opened")
+        raise HTTPException(404, "no recording is open; for live sensors, record a session and open it")
     return drives.recording

@@ -1,4 +1,4 @@
-"""/api/runs: what other parameters would have made of the drive. Keep, name, compare, take, delete."""
+"""/api/runs: what other parameters would have made of the drive. Save, name, compare, use, delete."""
 
 from __future__ import annotations
 
@@ -29,7 +29,8 @@ _NAMED_CHANGES = 3
 
 
 class Run(BaseModel):
-    """name: a person's. label: what it changes against the base. digest: equal when it is made from the same."""
+    """name: given by a person. label: what it changes against the base. digest: equal for equal inputs and
+    parameters."""
 
     id: int
     name: str
@@ -46,7 +47,7 @@ class Run(BaseModel):
 
 
 class Runs(BaseModel):
-    """run: of the present parameters. base: what it is compared against."""
+    """run: the run of the present parameters. base: the run that it is compared against."""
 
     base: int | None
     run: int | None
@@ -60,8 +61,8 @@ class Name(BaseModel):
 
 
 class ComparisonJson(BaseModel):
-    """differing: first and last frame of ranges whose lead differs; first: what differs where a range begins. truth:
-    who judges: what people labelled here, else the labels that come with the recording, or the simulator."""
+    """differing: first and last frame of each range whose lead differs. first: what differs where a range begins.
+    truth: the source of truth: labels made here, otherwise labels that come with the recording, or the simulator."""
 
     base: int
     run: int
@@ -80,19 +81,19 @@ def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
 
     @router.get("/runs")
     def runs() -> Runs:
-        """Every run of the open recording, the oldest first."""
+        """List the runs of the open recording, oldest first."""
         return _runs_json(drives.recording)
 
     @router.get("/runs/{number}/columns")
     def columns(number: int, first: int = Query(0, alias="from", ge=0)) -> Columns:
-        """A run's columns from a frame on."""
+        """Get the columns of a run from a frame on."""
         recording = open_recording(drives)
         with refusing():
             return columns_of(recording, recording.runs.get(number), first)
 
     @router.post("/runs/{number}/keep")
     def keep(number: int, body: Name) -> Runs:
-        """Keep a run under a name, or rename it. Others go when newer ones come."""
+        """Save a run under a name, or rename it. Unsaved runs are discarded when newer ones are made."""
         recording = open_recording(drives)
         with refusing():
             recording.runs.keep(number, body.name)
@@ -101,7 +102,7 @@ def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
 
     @router.post("/runs/{number}/base")
     def base(number: int) -> Runs:
-        """Compare against this one from now on."""
+        """Make a run the base of comparison."""
         recording = open_recording(drives)
         with refusing():
             recording.runs.compare_with(number)
@@ -110,7 +111,7 @@ def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
 
     @router.post("/runs/{number}/use")
     def use(number: int) -> Runs:
-        """Take a run's parameters: a change that can be undone."""
+        """Use the parameters of a run. The change can be undone."""
         recording = open_recording(drives)
         with refusing():
             run = recording.runs.get(number)
@@ -120,7 +121,7 @@ def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
 
     @router.delete("/runs/{number}")
     def delete(number: int) -> Runs:
-        """Forget a run. The present one and the base stay."""
+        """Delete a run. The present run and the base cannot be deleted."""
         recording = open_recording(drives)
         with refusing():
             recording.runs.delete(number)
@@ -129,7 +130,7 @@ def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
 
     @router.get("/runs/{number}/params.yaml", response_class=Response, responses=file_of("application/yaml"))
     def preset_file(number: int) -> Response:
-        """A run's parameters as a file for `cipv run --params`."""
+        """Download the parameters of a run as a file for `cipv run --params`."""
         with refusing():
             params = open_recording(drives).runs.get(number).params
         headers = {"content-disposition": f'attachment; filename="cipv-run-{number}.yaml"'}
@@ -137,7 +138,7 @@ def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
 
     @router.get("/compare")
     def comparison(base: int | None = None, run: int | None = None) -> ComparisonJson:
-        """Two runs side by side; without numbers the base and the present one."""
+        """Compare two runs. Defaults to the base and the present run."""
         recording = open_recording(drives)
         with refusing():
             new = recording.runs.get(run) if run is not None else current(recording)
@@ -161,8 +162,8 @@ def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
 
 
 def _judged_by_labels(desk: LabelDesk, base: DriveRun, run: DriveRun) -> tuple[list[Row], list[Row]] | None:
-    """The rows of both, judged by what people labelled here; null where they stand behind nothing, and the truth that
-    comes with the recording judges; also while their database is away."""
+    """The rows of both, judged by labels made here; None where no label is accepted, or while the label database is
+    unavailable: then the truth that comes with the recording judges."""
     try:
         labels = desk.labels
         first, second = desk.scores.judged_rows(labels, base), desk.scores.judged_rows(labels, run)
@@ -173,7 +174,7 @@ def _judged_by_labels(desk: LabelDesk, base: DriveRun, run: DriveRun) -> tuple[l
 
 
 def label_of(changes: dict[str, tuple[Any, Any]], preset: str) -> str:
-    """A run's name by itself: what it changes, or where it started."""
+    """The label of a run: what it changes, or the preset it started from."""
     if not changes:
         return f"preset {preset}"
     named = [f"{name} {old} → {new}" for name, (old, new) in list(changes.items())[:_NAMED_CHANGES]]

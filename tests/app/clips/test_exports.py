@@ -163,7 +163,7 @@ def test_pictures_are_of_the_weightiest_events():
     chosen = worth_a_picture([*events, Event("brake", 15, "full braking", severity="alarm")])
     assert list(chosen) == [0, 1, 2, 3, 15]
     assert chosen[15] == "full braking"
-    assert worth_a_picture([]) == {0: "the clip begins"}
+    assert worth_a_picture([]) == {0: "start of the clip"}
 
 
 def test_a_real_clip_looks_as_it_should(data_dir: Path):

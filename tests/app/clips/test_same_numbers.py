@@ -18,7 +18,7 @@ from pipeline.sources import open_source
 
 SCENARIO = "sim:cut_in"
 """Objects come and go, so that numbers given from a later start would be others."""
-FIRST, LAST = 30, 34
+FIRST, LAST = 15, 17
 Numbers = list[tuple[str, int, str]]
 
 

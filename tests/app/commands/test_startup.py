@@ -50,7 +50,8 @@ def test_a_command_imports_what_it_needs(module: str, without: set[str]) -> None
 def test_the_list_of_commands_needs_none_of_them() -> None:
     there = imported("from app.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass")
     assert {"numpy", "pydantic", *LINE, *SERVING, *DRAWING} & there <= {"rich"}
-    assert not [name for name in there if name.startswith("app.commands.")]
+    packages = {"app.commands.labels"}  # empty ones; a search for what is in them imports them
+    assert not [name for name in there - packages if name.startswith("app.commands.")]
 
 
 def test_the_engine_opens_the_recording_before_the_server_is_imported() -> None:

@@ -283,6 +283,6 @@ def test_no_more_than_a_dozen_runs_are_kept():
     runs = book()
     for hits in range(1, MOST_KEPT + 1):
         runs.keep(begun(runs, hits).number, "")
-    with pytest.raises(RunRefused, match="kept already"):
+    with pytest.raises(RunRefused, match="saved already"):
         runs.keep(begun(runs, 19).number, "")
     runs.keep(1, "renamed")

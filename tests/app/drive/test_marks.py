@@ -50,7 +50,7 @@ def test_a_damaged_file_holds_no_marks(tmp_path: Path, content: str):
 def test_a_folder_that_cannot_be_written_refuses_the_mark(tmp_path: Path):
     (tmp_path / "file").write_text("in the way")
     marks = Marks(tmp_path / "file")
-    with pytest.raises(MarkRefused, match="cannot be kept"):
+    with pytest.raises(MarkRefused, match="cannot be saved"):
         marks.add("sim:a", 4)
     assert marks.of("sim:a") == []
 

@@ -43,7 +43,7 @@ def test_a_missing_lane_network_is_said_and_boxes_go_on() -> None:
     detectors, notices = both(missing)
     assert detectors.boxes is not None
     assert detectors.lanes is None
-    assert notices == [Notice("warning", "No lane network 'x'. Lane lines are not looked for.")]
+    assert notices == [Notice("warning", "No lane network 'x'. No lane detection.")]
 
 
 def test_lidar_alone_opens_no_detector() -> None:

@@ -166,7 +166,7 @@ def test_what_a_detector_has_to_say_is_said_on_the_page():
 
 @pytest.mark.parametrize(
     ("sensors", "told"),
-    [("both", []), ("lidar", ["by the LiDAR alone"]), ("camera", ["by the camera alone"])],
+    [("both", []), ("lidar", ["LiDAR only"]), ("camera", ["Camera only"])],
     ids=["both", "LiDAR", "camera"],
 )
 def test_a_car_with_only_one_sensor_is_told_on_the_page(start: Start, sensors: str, told: list[str]):

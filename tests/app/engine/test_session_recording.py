@@ -169,7 +169,7 @@ def test_what_goes_wrong_is_one_sentence(
     (tmp_path / "sessions").write_text("in the way")
     answer = client.post("/api/recording", json={"on": True})
     assert answer.status_code == 409
-    assert "no recording can be made" in answer.json()["detail"]
+    assert "cannot record here" in answer.json()["detail"]
     (tmp_path / "sessions").unlink()
 
     def fail(*_: object, **__: object) -> None:

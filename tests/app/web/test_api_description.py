@@ -130,7 +130,7 @@ def test_a_refusal_is_described_as_it_is_sent(client: httpx.Client, app: FastAPI
 @pytest.mark.parametrize(
     ("body", "kind", "said"),
     [
-        (b"{playing: yes", "application/json", "the body is no JSON: "),
+        (b"{playing: yes", "application/json", "the body is not valid JSON: "),
         (b"[1, 2]", "application/json", "the body has to be a JSON object"),
         (b"{}", "text/plain", "the body has to be a JSON object"),
     ],

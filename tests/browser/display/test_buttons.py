@@ -64,7 +64,7 @@ def test_a_refusal_is_said(open_display: OpenDisplay, tmp_path: Path):
             page = open_display(address, quiet=False)
             is_now(page, "waiting")
             page.locator("#record").tap()
-            expect(page.locator("#answer")).to_have_text("✕ Recording failed: nothing is open that could be recorded")
+            expect(page.locator("#answer")).to_have_text("✕ Recording failed: nothing is open to record")
             page.locator("#mark").tap()
             expect(page.locator("#answer")).to_have_text("✕ Mark failed: no recording is open")
     finally:

@@ -1,4 +1,4 @@
-"""/api/labels/act: changing labels, and going back and forth. What is answered as done is on disk."""
+"""/api/labels/act: change labels, undo and redo. A change is on disk once it is answered."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def label_acts_router(desk: LabelDesk) -> APIRouter:
 
     @router.post("/act", responses=_ANSWERS)
     def act(body: ActBody) -> Response:
-        """One act: one transaction, one step that can be undone. It answers only when the act is on disk."""
+        """Change labels. One act is one transaction and one undo step; the answer comes once it is on disk."""
         try:
             with refusing():
                 if isinstance(body.act, Propose | Import):
@@ -44,13 +44,13 @@ def label_acts_router(desk: LabelDesk) -> APIRouter:
 
     @router.post("/undo", responses={200: {"model": ActedJson}})
     def undo(body: Who) -> Response:
-        """Take back the person's newest act, across labels, parameters and calibration. 409 when there is none, or when
-        somebody else changed the same thing since."""
+        """Undo the person's newest change to labels, parameters or calibration. 409 when there is none, or when someone
+        else has changed the same item since."""
         return _move("undo", body)
 
     @router.post("/redo", responses={200: {"model": ActedJson}})
     def redo(body: Who) -> Response:
-        """Do again what the person took back last."""
+        """Redo what the person undid last."""
         return _move("redo", body)
 
     def _move(way: Way, body: Who) -> Response:

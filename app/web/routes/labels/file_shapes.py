@@ -39,6 +39,6 @@ class NativeFile(BaseModel):
 
 
 class LostJson(BaseModel):
-    """What a format has no place for, a sentence each."""
+    """What a format cannot express, one sentence each."""
 
     lost: list[str]

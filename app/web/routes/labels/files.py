@@ -1,4 +1,4 @@
-"""/api/labels/export, import and versions: labels as files, and label sets that stay as they are."""
+"""/api/labels/export, import and versions: labels as files, and frozen label sets."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         drive: Annotated[str, Query(max_length=LONGEST_ITEM)],
         format: FormatName = "native",
     ) -> Response:
-        """Labels that another tool made of this recording: the body is the file, of a format that is a folder a .zip of
+        """Import labels that another tool made. The body is the file; for a format that is a folder, a .zip of
         it. They come beside those that are there, as one act. state.labels.task tells how far it is. drive: id of the
         recording that is meant; 409 when another one is open."""
         path = _new_file()
@@ -58,14 +58,14 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         except BaseException as error:
             path.unlink(missing_ok=True)
             if isinstance(error, ClientDisconnect):  # nobody hears it, but it is no trouble of this program
-                raise HTTPException(400, "the file did not come whole") from None
+                raise HTTPException(400, "the upload was incomplete") from None
             raise
         return JSONResponse({"status": "begun", "what": "import", "task": number}, 202)
 
     @router.get("/export", response_class=FileResponse, responses=_FILE)
     def export(format: FormatName = "native", version: VersionName = WORKING) -> FileResponse:
-        """All labels as a file, of a format that is a folder as a .zip. The header X-Cipv-Lost says how many kinds of
-        things the format has no place for; /api/labels/export/notes says which."""
+        """Download all labels as a file, or as a .zip for a format that is a folder. The header X-Cipv-Lost counts the
+        kinds of information that the format cannot express; /api/labels/export/notes lists them."""
         from app.labels.transfer.files import exported  # the formats' libraries: only who exchanges labels pays
 
         with refusing():
@@ -80,7 +80,7 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
 
     @router.get("/export/notes")
     def notes(format: FormatName = "native", version: VersionName = WORKING) -> LostJson:
-        """What a format has no place for, a sentence each, before anything is written."""
+        """List what a format cannot express, one sentence each, before exporting."""
         from pipeline.labels.formats.parts import reduce
         from pipeline.labels.formats.registry import FORMATS  # as above
 
@@ -90,19 +90,19 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
 
     @router.get("/versions", responses={200: {"model": list[VersionJson]}})
     def versions() -> Response:
-        """Frozen label sets, the oldest first."""
+        """List frozen label sets, oldest first."""
         with refusing():
             return JSONResponse([vars(version) for version in desk.labels.versions()])
 
     @router.post("/versions", status_code=201)
     def freeze(body: NewVersion) -> VersionJson:
-        """Keep all labels as they are now under a name. 409 when it is taken."""
+        """Freeze all labels as they are now under a name. 409 when the name is taken."""
         with refusing():
             return VersionJson(**vars(desk.labels.freeze(body.name, body.person)))
 
     @router.get("/versions/{name}", responses={200: {"model": NativeFile}})
     def version(name: str) -> Response:
-        """A frozen label set as our own file."""
+        """Download a frozen label set in the native format."""
         with refusing():
             return Response(desk.labels.version_json(name), media_type="application/json")
 
@@ -110,7 +110,7 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
 
 
 def _new_file() -> Path:
-    """An empty one that only this program can read; who asked for it removes it."""
+    """An empty temporary file that only this user can read; the caller removes it."""
     handle, name = tempfile.mkstemp(prefix="cipv-upload-")
     os.close(handle)
     return Path(name)

@@ -1,4 +1,4 @@
-"""/api/labels: what people say is true of the open recording, read."""
+"""/api/labels: read the labels of the open recording."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def labels_router(desk: LabelDesk) -> APIRouter:
 
     @router.get("", responses={200: {"model": LabelsOfPerson}})
     def changes(since: Annotated[Id, Query()] = 0, person: Annotated[PersonOrNobody, Query()] = "") -> Response:
-        """What changed after act ``since``; 0 for everything. Ask again whenever ``state.labels.revision`` is
-        another. can_undo, can_redo: of the person."""
+        """Get the labels that changed after act ``since``; 0 for all. Ask again whenever ``state.labels.revision`` has
+        changed. can_undo, can_redo: for this person."""
         with refusing():
             labels = desk.labels
             body = changes_json(labels.info, labels.changes(since))
@@ -37,15 +37,15 @@ def labels_router(desk: LabelDesk) -> APIRouter:
 
     @router.get("/frames", responses={200: {"model": Window}})
     def frames(first: Annotated[Index, Query()], last: Annotated[Index, Query()]) -> Response:
-        """Where tracks are, frame by frame; at most 200 frames."""
+        """Get the labels of up to 200 frames, frame by frame."""
         if not first <= last < first + LONGEST_WINDOW:
-            raise HTTPException(422, f"first to last: at least one frame, and {LONGEST_WINDOW} at most")
+            raise HTTPException(422, f"first to last: must span 1 to {LONGEST_WINDOW} frames")
         with refusing():
             return JSONResponse(window_json(desk.labels, first, last))
 
     @router.get("/tracks/{number}", responses={200: {"model": WholeTrack}})
     def track(number: Id) -> Response:
-        """A whole track."""
+        """Get a track with all its sightings."""
         with refusing():
             return JSONResponse(track_json(desk.labels.track(number)))
 
@@ -58,8 +58,8 @@ def labels_router(desk: LabelDesk) -> APIRouter:
         after_kind: Annotated[ItemKind | None, Query()] = None,
         after_id: Annotated[Id, Query()] = 0,
     ) -> NextJson:
-        """The nearest frame after ``frame``, or with a negative direction before it, where there is something to do.
-        after_kind, after_id: a label of that frame that was looked at; the others of the frame come first then.
+        """Find the nearest frame after ``frame``, or before it for a negative direction, where there is something to
+        do. after_kind, after_id: a label of that frame that was looked at; the others of the frame come first then.
         person: who asks: what one has made oneself, another reviews."""
         after = (after_kind, after_id) if after_kind is not None else None
         with refusing():
@@ -71,8 +71,7 @@ def labels_router(desk: LabelDesk) -> APIRouter:
 
     @router.get("/score")
     def score() -> ScoreJson:
-        """The present run, and the one it is compared with, against the labels that people stand behind: the figures of
-        `cipv evaluate`, at once."""
+        """Score the present run and the base against accepted labels. The same figures as `cipv evaluate`."""
         with refusing():
             registry, labels = desk.recording.runs, desk.labels
             run = current(desk.recording)
@@ -92,7 +91,7 @@ def labels_router(desk: LabelDesk) -> APIRouter:
 
     @router.get("/history", responses={200: {"model": list[HistoryJson]}})
     def history(kind: ItemKind, number: Annotated[Id, Query(alias="id")]) -> Response:
-        """The acts that changed a label, newest first, at most 200."""
+        """Get the history of a label: up to 200 changes, newest first."""
         with refusing():
             return JSONResponse([history_json(entry) for entry in desk.labels.log.history(kind, number)])
 
