@@ -15,8 +15,8 @@ from app.drive.compute_scheduler import ComputeScheduler
 from app.drive.open_recording import OpenRecording, RunSetup
 from app.views.rerun.start_options import RerunStartOptions
 from pipeline.common.progress import Progress
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors
 from pipeline.step import step
 from pipeline.types import Frame, Result
 from pipeline.types.source import Source

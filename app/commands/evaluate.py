@@ -15,11 +15,10 @@ import tyro
 
 from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
-from app.core.frame_input import frame_input
 from app.reports.html import html
 from app.reports.terminal_tables import show
 from pipeline.common.errors import BadInput
-from pipeline.detection import Detectors, detect
+from pipeline.detection import Detectors
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
 from pipeline.evaluation.scores.report import as_json, sections
@@ -28,8 +27,8 @@ from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels, of_
 from pipeline.labels.formats import native
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.params import Params, from_yaml, preset
-from pipeline.run import Detectors, Sensors
-from pipeline.step import State, step, warm_up
+from pipeline.run import Sensors, sensed
+from pipeline.step import State, step
 from pipeline.types import Result
 from pipeline.types.source import Source
 from pipeline.warm_up import warm_up
@@ -163,7 +162,7 @@ def _lines(
     warm_up()
     states = [State() for _ in wanted]
     for index in range(len(source)):
-        frame = frame_input(source.frame(index), detectors, sensors)
+        frame = sensed(source.frame(index), detectors, sensors)
         row = []
         for n, params in enumerate(wanted):
             states[n], result = step(states[n], frame, params)

@@ -15,11 +15,11 @@ from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress, task_progress
 from app.core.playback_clock import timeline_s
 from pipeline.common.errors import BadInput
+from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.recording.rewrite import recover
 from pipeline.recording.save import save
 from pipeline.recording.session_source import SessionSource
-from pipeline.run import Detectors
 from pipeline.types.source import Source
 
 

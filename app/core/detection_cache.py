@@ -7,7 +7,7 @@ from time import perf_counter
 from typing import cast
 
 from app.core.lru import BoundedCache
-from pipeline.run import Detects, Seen
+from pipeline.detection import Detects, Seen
 from pipeline.sources.fingerprint import fingerprint
 from pipeline.types import U8, Frame, RawBoxes, RawLanes
 

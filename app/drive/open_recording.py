@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.core.detection_cache import DetectionCache
-from app.core.frame_input import frame_input
 from app.drive.frame_inputs import InputStore
 from app.drive.full_run import DriveRun, KnownState, calibration_digest, digest
 from app.drive.run_registry import RunRegistry
 from pipeline.common.progress import Progress
-from pipeline.detection import Detectors, detect
+from pipeline.detection import Detectors
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.params import Params
-from pipeline.run import Detectors, Sensors
+from pipeline.run import Sensors, sensed
 from pipeline.step import State, step
 from pipeline.types import F64, I64, Frame
 from pipeline.types.source import Mark, Marked, Source, TruthObject, is_simulated
@@ -98,7 +97,7 @@ class OpenRecording:
 
     def frame(self, index: int) -> Frame:
         """A frame as the line takes it, from the source, with its picture."""
-        frame = frame_input(self.as_read(index), self.setup.detectors, self.setup.sensors, self._ask)
+        frame = sensed(self.as_read(index), self.setup.detectors, self.setup.sensors, self._ask)
         self.inputs.offer(frame)
         return frame
 

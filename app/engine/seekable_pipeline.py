@@ -10,12 +10,12 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from app.core.detection_cache import DetectionCache
-from app.core.frame_input import frame_input
 from app.core.lru import BoundedCache
 from app.core.playback_clock import timeline_s
 from app.engine.processed_frame import ProcessedFrame
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors, Sensors, advance
+from pipeline.run import Sensors, advance, sensed
 from pipeline.step import State, step
 from pipeline.types import Frame
 from pipeline.types.source import Source
@@ -115,7 +115,7 @@ class SeekablePipeline:
     def prepare(self, index: int) -> None:
         """Read a frame and run the detectors on it, so that running it later waits for neither. For a second thread."""
         spent_ms = self._ask_ahead.spent_ms
-        frame_input(self._read(index), self._detectors, self._sensors, self._ask_ahead)
+        sensed(self._read(index), self._detectors, self._sensors, self._ask_ahead)
         self._ahead_ms = (index, self._ask_ahead.spent_ms - spent_ms)
 
     def can_be_exact(self) -> bool:

@@ -22,8 +22,9 @@ from app.drive.timeline_columns import EXTRA_COLUMNS
 from app.web.routers import ROUTERS, Services
 from app.web.server import create_app
 from pipeline.common.progress import silent
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors, run
+from pipeline.run import run
 from tests.app.drive.rows import drive, objects
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 from tests.app.web.serving import WAIT_S, running, serving

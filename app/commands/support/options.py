@@ -114,6 +114,7 @@ class PipelineOptions:
     def open_detectors(self, source: AnySource, sensors: Sensors = "both") -> Detectors:
         """All detectors for the source's pictures; their notes are printed. None of them for LiDAR alone, and for
         recordings that contain detections."""
+        from pipeline.detection import Detectors, brings_detections, lanes_for
         from pipeline.lanes.open_detector import usual_every
 
         every = self.every()
@@ -127,6 +128,7 @@ class PipelineOptions:
     def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
         """The detector for the source's pictures; its notes are printed. DetectorMissing when a named one is missing,
         or any with ``sensors="camera"``; otherwise a message says so and LiDAR runs alone."""
+        from pipeline.detection import detector_for
         from pipeline.inference.runtime import DetectorMissing
 
         try:

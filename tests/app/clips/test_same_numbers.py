@@ -12,8 +12,8 @@ from app.cli import main
 from app.clips.clip import Clip
 from app.clips.exports import write_clip
 from pipeline.common.progress import silent
+from pipeline.detection import Detectors
 from pipeline.params import Params
-from pipeline.run import Detectors
 from pipeline.sources import open_source
 
 SCENARIO = "sim:cut_in"
