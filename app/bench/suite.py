@@ -24,7 +24,7 @@ BUDGET_S = {"decode": 1.5, "lidar": 8.0, "lidar@kitti": 6.5, "line": 10.0, "dete
 """Wall time of each part; together with loading and compiling they stay below 45 s."""
 FRAMES = 40
 SWEEPS_HZ = 10.0
-"""Of a VLP-16. A recording may have fewer (Astyx 3.3), but the line must keep up with the sensor: the lane network
+"""Of a VLP-16. A recording may have fewer (Astyx 3.3), but the pipeline must keep up with the sensor: the lane network
 looks as often as it does then."""
 
 

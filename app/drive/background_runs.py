@@ -1,4 +1,4 @@
-"""Whole drives computed in the background: the newest wish first, and never in the way of the frame that is shown."""
+"""Runs over whole drives in the background: the newest request first, and interactive requests take priority."""
 
 from __future__ import annotations
 
@@ -30,25 +30,31 @@ Phase = Literal["detect", "run", "done", "failed"]
 
 @dataclass(frozen=True)
 class DriveState:
-    """How far the run of the present parameters is; run and base are ids, None without one. revision grows whenever
-    there is something new to fetch. phase detect: networks still look at pictures for the first time."""
+    """How far the run of the present parameters over the whole drive is."""
 
     revision: int = 0
+    """Grows whenever there is something new to fetch."""
     run: int | None = None
+    """Number of the run; None without one."""
     base: int | None = None
+    """Number of the run that it is compared with."""
     done: int = 0
+    """Frames that have been run."""
     total: int = 0
+    """Frames of the drive."""
     running: bool = False
     phase: Phase = "done"
+    """``detect`` while networks run on pictures for the first time, ``run`` afterwards."""
     note: str = ""
+    """Why the run failed."""
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
 
 
 class BackgroundRuns:
-    """``open`` a recording, ``want`` parameters; read ``recording``. on_change is called on any thread when ``state``
-    changed, at most every 0.25 s while a run goes on."""
+    """``open`` a recording, ``want`` parameters, read ``recording``. ``on_change`` is called on any thread when
+    ``state`` has changed, at most every 0.25 s while a run is in progress."""
 
     def __init__(self, detections: DetectionCache) -> None:
         self.turn = ComputeScheduler()
@@ -64,7 +70,7 @@ class BackgroundRuns:
 
     @property
     def recording(self) -> OpenRecording | None:
-        """The open recording; None when there is none whose whole drive can be known."""
+        """The open recording; None for live sensors, or when nothing is open."""
         return self._recording
 
     @property
@@ -92,7 +98,7 @@ class BackgroundRuns:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread; a network that runs for it is stopped, a read in progress is finished first."""
+        """End the thread. A running network is stopped; a read in progress is finished first."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()
@@ -108,23 +114,23 @@ class BackgroundRuns:
             self.changed()
 
     def want(self, params: Params, preset: str) -> None:
-        """Compute the drive with these parameters, if it is not yet. What was being computed gives way."""
+        """Run the drive with these parameters unless that has been done. Other runs wait meanwhile."""
         recording = self._recording
         if recording is not None and recording.runs.want(params, preset):
             self.changed()
 
     def offer(self, frame: Frame) -> None:
-        """A frame that the line has just taken: it need not be read and looked at once more."""
+        """Reuse a frame that has just been read and detected in."""
         if self._recording is not None:
             self._recording.inputs.offer(frame)
 
     def state_before(self, index: int, params: Params) -> State | None:
-        """The state in which the whole-drive run comes to a frame; None where it has not come that far."""
+        """The state with which the whole-drive run arrives at a frame; None if it has not got that far."""
         recording = self._recording
         return recording.state_before(index, params) if recording is not None else None
 
     def changed(self) -> None:
-        """There is something new to fetch or to compute."""
+        """Announce that there is something new to fetch or to compute."""
         with self._condition:
             self._revision += 1
             self._told_s = time.monotonic()

@@ -28,7 +28,7 @@ def without_pixels(frame: Frame) -> Frame:
 
 
 class InputStore:
-    """The frames of one recording as the line takes them, by index. Any thread.
+    """The frames of one recording as ``step`` takes them, by index. Any thread.
 
     It fills until it is full and then keeps what it has: runs go through a drive from its beginning, and a store that
     let the oldest go would, for a drive that does not fit, never have the frame that is asked for next."""

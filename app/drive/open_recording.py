@@ -32,13 +32,15 @@ Truth = tuple[TruthObject, ...] | None
 
 @dataclass(frozen=True, eq=False)
 class RunSetup:
-    """What every run of a recording is made from. source: the one that is shown too, which any thread may read.
-    timeline_s: (total,) each frame's place on the playback timeline."""
+    """What every run of a recording is made from."""
 
     source: Source
+    """Also read for the shown frames; safe on any thread."""
     timeline_s: F64
+    """(total,) place of each frame on the playback timeline, in seconds."""
     detectors: Detectors
     sensors: Sensors
+    """The sensors whose data the pipeline may use."""
 
     @property
     def uri(self) -> str:
@@ -50,12 +52,12 @@ class RunSetup:
 
     @property
     def simulated(self) -> bool:
-        """Whether its truth is the simulator's."""
+        """Whether the truth comes from the simulator."""
         return is_simulated(self.source)
 
 
 class OpenRecording:
-    """Frames are read from the source that is shown, also at the same moment."""
+    """An open recording. Its source may be read at the same time for the shown frame."""
 
     def __init__(self, setup: RunSetup, detections: DetectionCache, next_number: int) -> None:
         self.setup = setup
@@ -75,7 +77,7 @@ class OpenRecording:
         run.add(self.input(index), self.truth(index), RULE)
 
     def state_before(self, index: int, params: Params) -> State | None:
-        """The state in which the run of these parameters came to a frame; None where it has not come that far."""
+        """The state with which the run of these parameters arrived at a frame; None if it has not got that far."""
         run = self.runs.of(params)
         kept = run.nearest_state(index) if run is not None else None
         return self._onwards(kept, index, params) if kept is not None else None
@@ -91,12 +93,12 @@ class OpenRecording:
         return self._onwards(self.last_known_state(index, params), index, params)
 
     def input(self, index: int) -> Frame:
-        """A frame as the line takes it; its picture may be without pixels."""
+        """A frame as ``step`` takes it; its picture may be without pixels."""
         held = self.inputs.get(index)
         return held if held is not None else self.frame(index)
 
     def frame(self, index: int) -> Frame:
-        """A frame as the line takes it, from the source, with its picture."""
+        """A frame as ``step`` takes it, from the source, with its picture."""
         frame = sensed(self.as_read(index), self.setup.detectors, self.setup.sensors, self._ask)
         self.inputs.offer(frame)
         return frame
@@ -107,11 +109,11 @@ class OpenRecording:
         return is_without or self.inputs.get(index) is not None
 
     def as_read(self, index: int) -> Frame:
-        """A frame as its source gives it: no detector has looked at it."""
+        """A frame as its source gives it, without detections."""
         return self.setup.source.frame(index)
 
     def names(self) -> tuple[str, ...]:
-        """What the recording calls its frames; those that nobody saw yet are read."""
+        """The names of all frames; frames that were not read yet are read."""
         return tuple(self.inputs.name(index) or self.as_read(index).name for index in range(self.setup.total))
 
     @cached_property
@@ -125,17 +127,17 @@ class OpenRecording:
         return np.array([self.setup.source.t_ns(index) for index in range(self.setup.total)], np.int64)
 
     def at_hand(self, index: int) -> Frame:
-        """A frame as the line takes it, its picture without pixels, if it is held; else as its source gives it."""
+        """A frame as ``step`` takes it, without pixels, if it is cached; otherwise as its source gives it."""
         return self.inputs.get(index) or self.as_read(index)
 
     def save(self, path: Path, first: int, last: int, progress: Progress) -> None:
-        """Frames as a session file, with all that the source has."""
+        """Write frames to a session file, with all data of the source."""
         from pipeline.recording.save import save  # MCAP takes 0.2 s to import: only who saves pays
 
         save(self.setup.source, path, first, last, progress)
 
     def truth(self, index: int) -> Truth:
-        """The labelled objects of a frame; None when it is not labelled."""
+        """The labelled objects of a frame; None if it is not labelled."""
         if index not in self._truths:
             self._truths[index] = self.setup.source.truth(index)
         return self._truths[index]

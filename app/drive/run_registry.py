@@ -1,4 +1,4 @@
-"""The runs of one recording: which is shown, which is compared against, which a person keeps."""
+"""The runs of one recording: the present one, the base of comparison, and the saved ones."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ LONGEST_NAME = 80
 
 
 class NoSuchRun(BadInput):
-    """A run that is not, or no longer, there."""
+    """A run that does not exist, or no longer does."""
 
 
 class RunRefused(BadInput):
-    """Something that cannot be done to a run; the text says why."""
+    """An operation that a run does not allow; the text says why."""
 
 
 class RunRegistry:
-    """Any thread. current: of the present parameters. base: what others are compared against, at first the first one.
-    Runs that nobody kept go when newer ones come."""
+    """The runs of one recording. Unsaved runs are discarded when newer ones are made. Any thread."""
 
     def __init__(self, new_run: Callable[[int, Params, str], DriveRun], next_number: int = 1) -> None:
         self._new_run = new_run
@@ -66,7 +65,7 @@ class RunRegistry:
             return next((run for run in reversed(self._runs) if run.params == params), None)
 
     def want(self, params: Params, preset: str) -> bool:
-        """Make the run of these parameters the current one; true when it was another before."""
+        """Make the run of these parameters the current one; true if it was another before."""
         with self._lock:
             if self._current is not None and self._current.params == params:
                 return False
@@ -83,13 +82,13 @@ class RunRegistry:
             return True
 
     def unfinished(self) -> DriveRun | None:
-        """What to compute next: the newest wish before all else, then what it is compared against, then kept ones."""
+        """The run to continue next: the current one, then the base, then saved ones."""
         with self._lock:
             wanted = [self._current, self._base, *(run for run in self._runs if run.kept)]
         return next((run for run in wanted if run is not None and not run.is_complete and not run.note), None)
 
     def keep(self, number: int, name: str) -> DriveRun:
-        """Keep a run under a name, or rename it. RunRefused when too many are kept."""
+        """Save a run under a name, or rename it. RunRefused when too many are saved."""
         with self._lock:
             run = self.get(number)
             if not run.kept and sum(each.kept for each in self._runs) >= MOST_KEPT:

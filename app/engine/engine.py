@@ -1,4 +1,4 @@
-"""The one worker: it owns what is open, and shows a ``Snapshot`` after everything it does.
+"""The engine's worker thread: it owns the open source, and publishes a ``Snapshot`` after each thing it does.
 
 Callers say what they want through ``control``; the newest wish wins. What a wish makes of a recording or of sensors is
 its player's: ``app/playing/``.

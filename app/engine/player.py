@@ -1,4 +1,4 @@
-"""What the engine's worker asks of whatever is open."""
+"""The interface between the engine's worker and what is open: a recording or live sensors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pipeline.types.source import AnySource
 
 
 class Player(Protocol):
-    """A recording or sensors on the line. Used by the worker alone.
+    """Runs the pipeline on a recording or on live sensors. Used by the worker thread alone.
 
     live: sensors. count, duration_s: frames and length of a recording, 0 of sensors. skipped: frames since the opening
     that came and were not shown.
@@ -38,7 +38,7 @@ class Player(Protocol):
         ...
 
     def wait(self, params: Params) -> None:
-        """For what the line goes on with, but not long. Others may work meanwhile."""
+        """Wait shortly for the next input of the pipeline. Other threads may work meanwhile."""
         ...
 
     def serve(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:

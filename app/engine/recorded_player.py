@@ -1,4 +1,4 @@
-"""A recording that is played: by its clock, by steps and by seeking.
+"""Playback of a recording: in real time, by steps and by seeking.
 
 Nothing is queued: late frames are skipped, and a seek that is overtaken by another is dropped on the way.
 """

@@ -1,4 +1,4 @@
-"""Recording what is shown: begun and ended by whoever asks, fed by the engine."""
+"""Recording of the shown frames to a session, started and stopped by any client and fed by the engine."""
 
 from __future__ import annotations
 
@@ -24,10 +24,9 @@ class SessionRecorder:
     """At most one recording at a time, of one source, into ``folder``. Any thread; ``take`` on the engine's.
 
     A recording holds what was shown: playing a drive at double speed or seeking leaves out what was skipped. Of live
-    sensors it holds every tick that the line ran, also while the page is paused, and every sweep, picture, fix and own
-    motion that came in between. A frame whose result is not exact yet
-    waits, with its marks, for the exact one, until the next frame comes or recording ends.
-    """
+    sensors it contains every tick that the pipeline ran on, also while playback is paused, and every sweep, picture,
+    fix and own motion that came in between. A frame whose result is not exact yet waits, with its marks, for the exact
+    one, until the next frame comes or recording ends."""
 
     def __init__(self, folder: Path = SESSIONS) -> None:
         self._folder = folder
@@ -87,7 +86,7 @@ class SessionRecorder:
             return self._recorder.state.error is None
 
     def take(self, processed: ProcessedFrame) -> None:
-        """A tick that the line ran. The same frame again, with other parameters, is not recorded twice."""
+        """Record a frame that the pipeline has run on. A rerun with other parameters is not recorded again."""
         with self._feeding:
             recorder, last = self._recorder, self._last
             if recorder is None:

@@ -46,5 +46,5 @@ class SnapshotPublisher:
     def _tell(self, listener: Listener, snapshot: Snapshot) -> None:
         try:
             listener(snapshot)
-        except Exception:  # a view that fails takes neither the line nor the other views with it
+        except Exception:  # a view that fails must not affect the engine or other views
             logger.exception("a view failed on frame %s", snapshot.index)

@@ -15,8 +15,8 @@ from pipeline.params import ParamsError
 
 class SceneFeed:
     """Draws the engine's newest snapshot in viser, while a browser looks: one that hides its 3D view does not. While
-    one is drawn, older ones that wait are dropped: the 3D view may be slower than the line, but never behind it. Use it
-    in a ``with`` block.
+    one is drawn, older ones that wait are dropped: the 3D view may be slower than the pipeline, but never behind it.
+    Use it in a ``with`` block.
 
     drawn: frames drawn so far."""
 

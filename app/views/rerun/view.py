@@ -1,4 +1,4 @@
-"""A replay for the rerun viewer: every frame with what the line made of it, in one ``.rrd`` file or stream.
+"""A recording for the rerun viewer: every frame with its result, in one ``.rrd`` file or stream.
 
 The viewer reads files of its own and the previous minor version only: this is an export, recordings are the archive.
 """

@@ -15,7 +15,7 @@ from app.core.jobs import JobState
 from app.engine.engine import Engine
 from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes import Done, file_of
+from app.web.routes.shapes import StatusJson, file_of
 
 ClipKind = Annotated[str, *one_of(EXPORTERS)]
 
@@ -72,11 +72,11 @@ def clips_router(engine: Engine, jobs: ExportQueue) -> APIRouter:
         return _json(job)
 
     @router.delete("/jobs/{number}")
-    def cancel(number: str) -> Done:
+    def cancel(number: str) -> StatusJson:
         """Cancel an export, or delete a finished one."""
         if not jobs.cancel(number):
             raise HTTPException(404, "export not found")
-        return Done(status="removed")
+        return StatusJson(status="removed")
 
     @router.get("/jobs/{number}/file", response_class=FileResponse, responses=file_of("application/octet-stream"))
     def download(number: str) -> FileResponse:

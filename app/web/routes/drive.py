@@ -19,7 +19,7 @@ from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
 from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes import Done
+from app.web.routes.shapes import StatusJson
 
 
 class Columns(BaseModel):
@@ -153,13 +153,13 @@ def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRou
         return MarkJson(id=made.id, index=made.index, t_s=t_s, text=made.text, in_session=in_session)
 
     @router.delete("/marks/{number}")
-    def unmark(number: int) -> Done:
+    def unmark(number: int) -> StatusJson:
         """Remove a mark."""
         shown = engine.snapshot
         if shown.uri is None or not marks.remove(_marks_of(shown), number):
             raise HTTPException(404, f"mark {number} not found")
         drives.changed()
-        return Done(status="removed")
+        return StatusJson(status="removed")
 
     return router
 

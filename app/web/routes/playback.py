@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.engine.engine import Engine
 from app.streaming.stream import Stream
-from app.web.routes.shapes import Done, ResultJson, SourceJson, SourcesJson, StateJson
+from app.web.routes.shapes import ResultJson, SourceJson, SourcesJson, StateJson, StatusJson
 from app.web.source_catalog import catalog
 from pipeline.types.result_json import to_json
 
@@ -49,7 +49,7 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
         return JSONResponse(to_json(processed.result))
 
     @router.post("/playback", status_code=202)
-    def playback(body: PlaybackChange) -> Done:
+    def playback(body: PlaybackChange) -> StatusJson:
         """Control playback. The answer arrives with the stream."""
         standing = body.model_dump(include={"playing", "speed", "loop"}, exclude_none=True)
         if standing:
@@ -58,7 +58,7 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
             engine.control.seek(body.seek)
         if body.step is not None:
             engine.control.step(body.step)
-        return Done(status="accepted")
+        return StatusJson(status="accepted")
 
     @router.get("/sources")
     def sources() -> SourcesJson:
@@ -67,10 +67,10 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
         return SourcesJson(open=engine.snapshot.uri, sources=offered)
 
     @router.post("/source", status_code=202)
-    def open_source(body: SourceChoice) -> Done:
+    def open_source(body: SourceChoice) -> StatusJson:
         """Open a source. If it cannot be opened, the present one stays open and a notice says why."""
         engine.control.change(uri=body.uri.strip(), target=None, steps=0)
-        return Done(status="accepted")
+        return StatusJson(status="accepted")
 
     @router.websocket("/stream")
     async def stream_frames(socket: WebSocket) -> None:

@@ -13,7 +13,7 @@ from app.labels.service.tasks import TaskKind
 from app.labels.store.values import LONGEST_ITEM
 from app.web.routes.labels.shapes import ItemKey, LabelChanges
 
-Drive = Annotated[str, Field(max_length=LONGEST_ITEM, description="Id of the recording, of GET /api/labels")]
+DriveKey = Annotated[str, Field(max_length=LONGEST_ITEM, description="Id of the recording, of GET /api/labels")]
 
 
 class Sent(Strict):
@@ -31,7 +31,7 @@ class ActBody(Sent):
     """person: whose act it is. drive: the recording that is meant; 409 when another one is open."""
 
     person: Person
-    drive: Drive
+    drive: DriveKey
     act: Act
 
 
@@ -39,7 +39,7 @@ class Who(Sent):
     """person: whose newest act is meant. drive: as of an act; null where what is open has no frames to label."""
 
     person: PersonOrNobody = ""
-    drive: Drive | None
+    drive: DriveKey | None
 
 
 class ActedJson(BaseModel):
