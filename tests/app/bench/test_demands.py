@@ -32,7 +32,7 @@ def test_what_is_slower_is_said(demand: Any) -> None:
     row[demand.figure] *= 1.01 if demand.at_most is not None else 0.99
     (sentence,) = broken(slower)
     assert sentence.startswith(f"{demand.stage}: {demand.figure}")
-    assert "wanted at" in sentence
+    assert "required: at" in sentence
 
 
 def test_the_page_is_judged_by_its_own_demands_also_while_a_drive_is_computed() -> None:
