@@ -35,10 +35,12 @@ class RunRegistry:
 
     @property
     def current(self) -> DriveRun | None:
+        """The run of the present parameters."""
         return self._current
 
     @property
     def base(self) -> DriveRun | None:
+        """The run that others are compared with; at first the first one."""
         return self._base
 
     @property
