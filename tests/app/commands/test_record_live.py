@@ -66,7 +66,7 @@ def test_sensors_that_give_nothing_are_said_and_leave_no_file(
     assert Record(SourceOptions("live:test"), tmp_path, PipelineOptions(lanes="off"))() == 1
     said = capsys.readouterr().err
     assert said.count("cipv: waiting for sensors: lidar absent") == 1
-    assert "nothing to keep" in said
+    assert "no data received; nothing saved" in said
     assert list(tmp_path.iterdir()) == []
     assert sensors.tapped is None
 
@@ -92,7 +92,7 @@ def test_ticks_that_the_line_was_too_slow_for_are_said(
     assert Record(SourceOptions("live:test"), tmp_path / "a.mcap", PipelineOptions(lanes="off"))() == 0
     said = capsys.readouterr().err
     assert "2 frames" in said
-    assert "the line was too slow for 4 ticks" in said
+    assert "the pipeline was too slow for 4 ticks" in said
 
 
 @pytest.mark.parametrize("arguments", [(), ("--packets",)], ids=["clouds", "packets"])

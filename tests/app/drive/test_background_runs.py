@@ -264,7 +264,7 @@ def test_runs_that_nobody_kept_go_when_newer_ones_come():
     numbers = [each.number for each in runs.all()]
     assert numbers == [1, 2, *range(12 - MOST_UNKEPT - 1, 12)]
     assert runs.get(1).name == "first one"
-    with pytest.raises(NoSuchRun, match="no run 4"):
+    with pytest.raises(NoSuchRun, match="run 4 not found"):
         runs.get(4)
 
 
