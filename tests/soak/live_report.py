@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.recording.tick import tick_from
 from pipeline.recording.session_source import SessionSource
+from pipeline.recording.tick import tick_from
 from pipeline.recording.topics import FRAMES, IMAGE, POINTS
 from pipeline.replay.faults import Fault
 from tests.soak import live_car
