@@ -169,7 +169,7 @@ def _signed_in(connection: HTTPConnection, token: str) -> Response:
 
 
 def _who_are_you(connection: HTTPConnection) -> Response:
-    sentence = "Open the link with the token that the server printed at startup."
+    sentence = "Open the link with the token that the server printed in its terminal at startup."
     headers = {"www-authenticate": "Bearer", "cache-control": "no-store"}
     if "text/html" not in connection.headers.get("accept", ""):
         return JSONResponse({"detail": sentence}, 401, headers)

@@ -79,7 +79,7 @@ class PipelineOptions:
     """Change one parameter, e.g. cluster.z_weight=0.4 (repeatable; `cipv params` lists them)"""
     detector: str | None = None
     """Name or path of an ONNX detector. Default: the registered one, then $CIPV_DATA/models, then the embedded
-    one, which detects simulated cars only and is the default for sim:"""
+    one, trained on simulated cars only, which is the default for sim:"""
     lanes: str | None = None
     """Name or path of an ONNX lane network, `classical` for detection without a network, or `off`. Default: the
     registered one, then $CIPV_DATA/models, then `classical`, which is the default for sim:. Use `classical` for
