@@ -131,8 +131,8 @@ def test_a_refusal_is_described_as_it_is_sent(client: httpx.Client, app: FastAPI
     ("body", "kind", "said"),
     [
         (b"{playing: yes", "application/json", "the body is not valid JSON: "),
-        (b"[1, 2]", "application/json", "the body has to be a JSON object"),
-        (b"{}", "text/plain", "the body has to be a JSON object"),
+        (b"[1, 2]", "application/json", "the body must be a JSON object"),
+        (b"{}", "text/plain", "the body must be a JSON object"),
     ],
 )
 def test_a_body_that_is_none_is_said_in_words(client: httpx.Client, body: bytes, kind: str, said: str):
