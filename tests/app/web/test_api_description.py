@@ -106,8 +106,8 @@ def test_every_operation_says_what_it_does_and_what_it_answers(app: FastAPI):
 
 def test_a_route_is_called_by_what_it_does(app: FastAPI):
     titles = {name: operation["summary"] for name, operation in operations(app).items()}
-    assert titles["GET /api/result"] == "The shown frame's result"
-    assert titles["GET /api/jobs/{number}"] == "How far an export is"
+    assert titles["GET /api/result"] == "Get the result of the shown frame"
+    assert titles["GET /api/jobs/{number}"] == "Get the progress of an export"
     assert [name for name, title in titles.items() if len(title.split()) < 2 or title.endswith(".")] == []
 
 
