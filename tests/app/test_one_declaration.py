@@ -36,7 +36,7 @@ def printed(command):
 
 file = pathlib.Path(sys.argv[1])
 changed = PipelineOptions(set=("cluster.brand_new=0.8",))
-file.write_text(printed(ListParams(line=changed, yaml=True)), encoding="utf-8")
+file.write_text(printed(ListParams(pipeline=changed, yaml=True)), encoding="utf-8")
 clusters = next(section for section in describe() if section["name"] == "cluster")
 print(json.dumps({
     "schema": Params.model_json_schema()["$defs"]["ClusterParams"]["properties"]["brand_new"],
