@@ -14,7 +14,7 @@ install: .venv/.installed
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python -r requirements.lock
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps -e .
 	@echo "compiling what a first start would wait for, once"
-	@$(BIN)/python -m app.commands.first_start
+	@$(BIN)/python -m app.commands.support.first_start
 	@touch $@
 
 demo: install

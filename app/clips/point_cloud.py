@@ -5,13 +5,15 @@ Open3D registers and writes; it is imported when a cloud is asked for, because s
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from app.clips.clip import Clip
 from pipeline.common.errors import BadInput
+from pipeline.common.progress import Progress
 from pipeline.types import F32, F64
 
 MOST_SWEEPS = 300
@@ -36,6 +38,23 @@ def load_open3d() -> Any:
             f"Open3D cannot be loaded ({reason}); install the system packages libegl1 libgl1 libx11-6 libusb-1.0-0"
         ) from None
     return open3d
+
+
+def write(clip: Clip, path: Path, progress: Progress) -> None:
+    """Write a clip's sweeps as one cloud. BadInput for a longer clip, one without LiDAR, or when Open3D is missing."""
+    total = clip.last + 1 - clip.first
+    if total > MOST_SWEEPS:
+        raise BadInput(f"a point cloud can have at most {MOST_SWEEPS} frames")
+    progress(0, total)
+
+    def sweeps() -> Iterator[F32 | None]:
+        for index in range(clip.first, clip.last + 1):
+            with clip.scheduler.background(to_the_end=True):
+                sweep = clip.recording.as_read(index).sweep
+            yield sweep.points if sweep is not None else None
+            progress(index + 1 - clip.first, total)
+
+    write_ply(sweeps(), path)
 
 
 def write_ply(sweeps: Iterable[F32 | None], path: Path) -> None:

@@ -24,7 +24,7 @@ from pipeline.simulation.drive_as_scenario import to_yaml
 
 _BY_NETWORK = (
     "In the loop the embedded network looked for vehicles in the drawn pictures, as it does here. It looked for no "
-    "lane lines; a dashboard that does may believe in another path."
+    "lane lines; a dashboard that does may estimate another path."
 )
 _LINK = """<p id="open" hidden>In a dashboard on this machine that is open already: <a href="">open it there</a>, with
 the parameters it drove with.</p>

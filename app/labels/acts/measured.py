@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import ValidationError
 
-from app.core.request_shapes import GivenCuboid
-from app.drive.open_recording import Recording
+from app.core.request_shapes import CuboidShape
+from app.drive.open_recording import OpenRecording
 from app.labels.acts.requests import AddMeasured, Lift, Refit, SetSighting
 from app.labels.acts.scope import Scope
 from app.labels.errors import ActRefused, BadAct
@@ -23,7 +23,7 @@ _DECIMALS = 4
 
 
 def measured(
-    labels: DriveLabels, recording: Recording, params: Params, act: Refit | Lift
+    labels: DriveLabels, recording: OpenRecording, params: Params, act: Refit | Lift
 ) -> tuple[SetSighting | AddMeasured, str]:
     """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found. BadInput
     where there is nothing to measure."""
@@ -75,11 +75,11 @@ def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddMeasured, str]:
     return AddMeasured(kind="lift", label=act.label, frame=frame.index, cuboid=cuboid, bbox=found.bbox, how=how), how
 
 
-def _given(cuboid: Cuboid) -> GivenCuboid:
+def _given(cuboid: Cuboid) -> CuboidShape:
     """ActRefused for one that nobody could have drawn."""
     x, y, z = (round(value, _DECIMALS) for value in cuboid.center)
     length, width, height = (round(value, _DECIMALS) for value in cuboid.size)
     try:
-        return GivenCuboid(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
+        return CuboidShape(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
     except ValidationError:
         raise ActRefused(f"the points there are {length:.0f} × {width:.0f} × {height:.0f} m: no vehicle") from None

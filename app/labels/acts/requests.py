@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.core.request_shapes import Finite, GivenCuboid, Meters
+from app.core.request_shapes import CuboidShape, Finite, Meters
 from app.labels.acts.request_fields import MOST_FRAMES, Comment, Id, Index, Line, Strict, Word
 from app.labels.errors import BadAct
 from app.labels.store.values import ItemKind
@@ -23,7 +23,7 @@ class Placed(Strict):
     """Where something is in one frame. bbox: x1 y1 x2 y2 in pixels of the raw picture."""
 
     frame: Index
-    cuboid: GivenCuboid | None = None
+    cuboid: CuboidShape | None = None
     bbox: tuple[Finite, Finite, Finite, Finite] | None = None
 
     def sighting(self) -> Sighting:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.core.control import Control, Wish
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.labels.acts.requests import Import, Lift, Propose, Refit
 from app.labels.service.opened import KeptLabels, Opened
 from app.labels.service.param_write_queue import SettlingQueue
@@ -88,7 +88,7 @@ class LabelDesk:
             self._thread.join(_PATIENCE_S)
         self.kept.close()
 
-    def open(self, uri: str, recording: Recording | None) -> None:
+    def open(self, uri: str, recording: OpenRecording | None) -> None:
         """Something else was opened; None for what has no frames to label. Its labels are looked for a little later,
         when it is shown."""
         self.tasks.cancel()
@@ -105,7 +105,7 @@ class LabelDesk:
         return self._state
 
     @property
-    def recording(self) -> Recording:
+    def recording(self) -> OpenRecording:
         """What can be labelled. NoSuchLabel when nothing can."""
         return self._open.framed()
 

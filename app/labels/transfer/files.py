@@ -14,12 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.labels.acts.bulk import importing
 from app.labels.errors import ActRefused, BadAct
-from app.labels.service.tasks import Progress, Work, to_nobody
+from app.labels.service.tasks import TaskWork
 from app.labels.store.drive_labels import DriveLabels
 from pipeline.common.errors import BadInput
+from pipeline.common.progress import Progress, silent
 from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
@@ -48,7 +49,7 @@ class Exported:
     lost: tuple[str, ...]
 
 
-def exported(recording: Recording, labels: LabelSet, name: FormatName) -> Exported:
+def exported(recording: OpenRecording, labels: LabelSet, name: FormatName) -> Exported:
     """A file, of a format that makes a folder a .zip of it. BadInput when it cannot be."""
     folder = Path(tempfile.mkdtemp(prefix="cipv-export-"))
     try:
@@ -61,7 +62,9 @@ def exported(recording: Recording, labels: LabelSet, name: FormatName) -> Export
     return Exported(file, folder, lost)
 
 
-def importing_file(labels: DriveLabels, recording: Recording, person: str, file: Path, name: FormatName) -> Work:
+def importing_file(
+    labels: DriveLabels, recording: OpenRecording, person: str, file: Path, name: FormatName
+) -> TaskWork:
     """Labels of an uploaded file; a format that is a folder comes as a .zip of it."""
 
     def work(progress: Progress) -> str:
@@ -78,12 +81,12 @@ def importing_file(labels: DriveLabels, recording: Recording, person: str, file:
     return work
 
 
-def drive_for(recording: Recording, progress: Progress = to_nobody) -> LabeledDrive:
+def drive_for(recording: OpenRecording, progress: Progress = silent) -> LabeledDrive:
     """What formats must know of the drive: looked for once while it is open, and read from its source only where no
     run has."""
     with recording.describing:
         if recording.described is None:
-            recording.described = drive_of(recording.recipe.source, progress, recording.at_hand)
+            recording.described = drive_of(recording.setup.source, progress, recording.at_hand)
         return recording.described
 
 

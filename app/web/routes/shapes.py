@@ -27,7 +27,7 @@ class _Exact(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-class Done(_Exact):
+class StatusJson(_Exact):
     """status: what became of the request."""
 
     status: str

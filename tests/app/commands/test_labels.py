@@ -33,7 +33,7 @@ def drive(tmp_path: Path) -> Path:
 
 def test_truth_goes_out_and_comes_back(drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cipv("labels", "export", drive, "--format", "openlabel", "--out", tmp_path / "out.json") == 0
-    assert "tracks 1, sightings 3, ranges of the lead 0" in capsys.readouterr().err
+    assert "tracks 1, sightings 3, lead ranges 0" in capsys.readouterr().err
     file = tmp_path / "labels.json"
     assert cipv("labels", "import", drive, tmp_path / "out.json", "--format", "openlabel", "--out", file) == 0
     labels = json.loads(file.read_text())

@@ -111,4 +111,4 @@ def test_a_demand_that_does_not_hold_fails_the_command(
     assert ended.value.code == code
     out, err = capsys.readouterr()
     assert json.loads(out)[0]["failures"] == list(failures)
-    assert ("does not hold: Left turn" in err) is bool(failures)
+    assert ("FAILED: Left turn" in err) is bool(failures)

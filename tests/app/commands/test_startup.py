@@ -45,7 +45,7 @@ def imported(program: str) -> set[str]:
             LINE - {"numba"} | LABELS | DRAWING - {"rich.progress"} | {"rosbags", "velodyne_decoder"},
         ),
         (
-            "app.commands.labels",
+            "app.commands.labels.labels",
             LINE - {"numba"} | {"sqlalchemy", "alembic", "trackeval", "scipy.interpolate", "viser"},
         ),
     ],
@@ -66,7 +66,8 @@ def test_a_users_process_has_neither_the_experiments_nor_what_trains_the_detecto
 def test_the_list_of_commands_needs_none_of_them() -> None:
     there = imported("from app.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass")
     assert {"numpy", "pydantic", *LINE, *SERVING, *DRAWING} & there <= {"rich"}
-    assert not [name for name in there if name.startswith("app.commands.")]
+    packages = {"app.commands.labels"}  # empty ones; a search for what is in them imports them
+    assert not [name for name in there - packages if name.startswith("app.commands.")]
 
 
 def test_the_engine_opens_the_recording_before_the_server_is_imported() -> None:

@@ -6,8 +6,8 @@ import httpx
 import pytest
 
 from app.engine.engine import Engine
-from app.web.routes.label_score_shapes import ScoreJson
-from app.web.routes.label_shapes import Window
+from app.web.routes.labels.score_shapes import ScoreJson
+from app.web.routes.labels.shapes import Window
 from app.web.server import create_app
 from app.web.tokens import Tokens
 from pipeline.labels.model import WHOLE_TAG

@@ -17,7 +17,7 @@ from playwright.sync_api import Page, expect
 from app.drive.open_recording import RULE
 from app.drive.run_results import results_of
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from pipeline.common.geometry import Cuboid, closest_on_polygon
 from pipeline.detection import detector_for
 from pipeline.evaluation.scores.drive import Rules, score_drive
@@ -59,7 +59,7 @@ def astyx(clip: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]
         Params(),
         uri=clip,
         whole_drives=True,
-        desk=RecordingDesk(tmp_path_factory.mktemp("sessions")),
+        desk=SessionRecorder(tmp_path_factory.mktemp("sessions")),
     )
     engine.start()
     running = Site(engine, 0)
@@ -155,7 +155,7 @@ def score_of(page: Page, labels: Labels) -> dict[str, str]:
 def exported_score(engine: Engine, labels: Labels) -> dict[str, str]:
     """The same figures of the labels as a file."""
     known = of_labels(from_json(json.dumps(labels.get("/export?format=native")).encode(), "the export"), RULE)
-    run = engine.labels.recording.book.current
+    run = engine.labels.recording.runs.current
     assert run is not None
     score = score_drive(results_of(run), known, Rules(RULE))
     values = {f"{each.title}, {each.unit}": each.of([score]) for each in FIGURES}

@@ -177,7 +177,7 @@ def test_a_head_is_added_by_a_file_and_one_entry(monkeypatch: pytest.MonkeyPatch
     decoder = pick_decoder([table], SIZE)
     boxes, _, classes = decoder.decode([table], SIZE, FLOOR)
     assert (decoder.name, boxes.tolist(), classes.tolist()) == ("tables", [[1.0, 2.0, 3.0, 4.0]], [2])
-    with pytest.raises(UnknownHead, match="known are YOLOv3, .*Tables"):
+    with pytest.raises(UnknownHead, match=r"known are YOLOv3, .*Tables"):
         pick_decoder([], SIZE)
     for name, (outputs, metadata, *_) in HEADS.items():
         assert pick_decoder(outputs, SIZE, metadata).name == name, "the others stay"
