@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: install demo test check fix bench suite soak lock clean
+.PHONY: install demo test check fix bench docs screenshots suite soak lock clean
 
 install: .venv/.installed
 
@@ -14,7 +14,7 @@ install: .venv/.installed
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python -r requirements.lock
 	@$(BIN)/uv pip install --quiet --python $(BIN)/python --no-deps -e .
 	@echo "compiling what a first start would wait for, once"
-	@$(BIN)/python -m app.commands.first_start
+	@$(BIN)/python -m app.commands.support.first_start
 	@touch $@
 
 demo: install
@@ -36,6 +36,14 @@ fix: install
 
 bench: install
 	@$(BIN)/cipv bench
+
+# The reference pages that are made from the code.
+docs: install
+	@$(BIN)/python -m tests.docs.reference_pages
+
+# docs/img/*.jpg, from the real page on the simulated drive. Needs Chromium.
+screenshots: install
+	@$(BIN)/python -m tests.docs.screenshots
 
 # Accuracy on the real recordings, then every experiment of the simulator. Writes build/accuracy.md, build/experiments.*
 suite: install

@@ -18,8 +18,10 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
 
-from app.core.line import DetectionCache, Line, Tick
+from app.core.detection_cache import DetectionCache
 from app.core.server_address import listen_socket
+from app.engine.processed_frame import ProcessedFrame
+from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
 from app.streaming.stream import Stream
 from pipeline.detection import Detectors
@@ -32,12 +34,12 @@ FRAMES = 20
 
 def main() -> None:
     """Until standard input ends."""
-    stream, ticks = Stream(), _ticks()
+    stream, frames = Stream(), _frames()
     app = Starlette(routes=[WebSocketRoute("/", stream.serve)])
     config = uvicorn.Config(app, log_level="warning", access_log=False, ws_per_message_deflate="--deflate" in sys.argv)
     server, bound = uvicorn.Server(config), listen_socket("127.0.0.1", 0)
     threading.Thread(target=lambda: server.run(sockets=[bound]), daemon=True).start()
-    threading.Thread(target=_publish, args=(stream, ticks), daemon=True).start()
+    threading.Thread(target=_publish, args=(stream, frames), daemon=True).start()
     while not server.started:
         time.sleep(0.01)
     print(bound.getsockname()[1], flush=True)
@@ -45,19 +47,19 @@ def main() -> None:
         print(time.process_time(), flush=True)
 
 
-def _publish(stream: Stream, ticks: list[Tick]) -> None:
+def _publish(stream: Stream, frames: list[ProcessedFrame]) -> None:
     """One frame each tenth of a second, by the clock: a late one does not put off the next."""
     start = time.monotonic()
     for sequence in count(1):
         shown = Snapshot(Params(), uri="sim:straight", index=sequence, sequence=sequence, made_unix_s=time.time())
-        stream.publish(replace(shown, tick=ticks[sequence % len(ticks)]))
+        stream.publish(replace(shown, processed=frames[sequence % len(frames)]))
         time.sleep(max(0.0, start + sequence / RATE_HZ - time.monotonic()))
 
 
-def _ticks() -> list[Tick]:
+def _frames() -> list[ProcessedFrame]:
     source = open_source("sim:straight")
-    line, params = Line(source, Detectors(None, None), DetectionCache(), "both"), Params()
-    return [line.advance(index, params) for index in range(FRAMES)]
+    pipeline, params = SeekablePipeline(source, Detectors(None, None), DetectionCache(), "both"), Params()
+    return [pipeline.advance(index, params) for index in range(FRAMES)]
 
 
 if __name__ == "__main__":

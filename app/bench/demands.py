@@ -1,4 +1,4 @@
-"""What the stages must reach, on a machine of two cores that does nothing else: the one place that says so."""
+"""Performance requirements for the stages, on an idle machine with two cores."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Demand:
-    """A figure of a stage, with ``peer`` of it against that one: at most, or at least, so much. is_optional: its
-    recording need not be here."""
+    """A limit on one figure of a stage."""
 
     stage: str
     figure: str
+    """Key of the figure in the stage's row."""
     at_most: float | None = None
     at_least: float | None = None
     peer: str | None = None
+    """The library that the figure compares with; None for a figure of the stage itself."""
     is_optional: bool = False
+    """Holds only where the stage's recording is available."""
 
     def broken(self, figures: Mapping[str, Mapping[str, Any]]) -> str | None:
-        """A sentence when it does not hold, or nobody measured it; null when it does. A peer that is not installed
-        says nothing."""
+        """A sentence when the figure misses its limit or was not measured; None otherwise, or when the peer is not
+        installed."""
         if self.stage not in figures and self.is_optional:
             return None
         row = figures.get(self.stage, {})
@@ -35,14 +37,14 @@ class Demand:
             return None
         what = f"{name} is {value:.2f}"
         if self.at_most is not None and value > self.at_most:
-            return f"{what}, wanted at most {self.at_most:g}"
+            return f"{what}; required: at most {self.at_most:g}"
         if self.at_least is not None and value < self.at_least:
-            return f"{what}, wanted at least {self.at_least:g}"
+            return f"{what}; required: at least {self.at_least:g}"
         return None
 
 
 def _faster(stage: str, peer: str, times: float) -> tuple[Demand, Demand]:
-    """On both recordings that the LiDAR's stages are measured on."""
+    """For both recordings on which LiDAR stages are measured."""
     return (
         Demand(stage, "ratio", at_least=times, peer=peer),
         Demand(f"{stage}@kitti", "ratio", at_least=times, peer=peer, is_optional=True),
@@ -68,11 +70,11 @@ PAGE_DEMANDS = tuple(
     for when in ("", " while computed")
     for what, at_most in (("seek", 150.0), ("first view", 2000.0))
 )
-"""Of the page in a browser that runs beside the server."""
+"""For the dashboard in a browser on the same machine."""
 
 
 def page_rows(figures: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """What ``app.bench.page.figures`` gives, as stages."""
+    """The figures of ``app.bench.page.measure`` as stages."""
     page, computed = figures["page"], figures["while_computed"]
     return {
         "seek": page["seek"],
@@ -83,5 +85,5 @@ def page_rows(figures: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 
 
 def broken(figures: Mapping[str, Mapping[str, Any]], demands: Sequence[Demand] = DEMANDS) -> Iterator[str]:
-    """A sentence for each demand that does not hold."""
+    """One sentence for each requirement that is missed."""
     return (sentence for demand in demands if (sentence := demand.broken(figures)) is not None)

@@ -48,7 +48,7 @@ def _in_turn(work: Callable[[U8], object], pictures: Sequence[U8]) -> Callable[[
 
 
 def _opencv(detector: Detector, pictures: Sequence[U8]) -> Callable[[], object] | None:
-    """``cv2.dnn`` on the same graph, pre-processing and decoding ours; null when OpenCV cannot read it."""
+    """``cv2.dnn`` on the same graph, pre-processing and decoding ours; None when OpenCV cannot read it."""
     try:
         network = cv2.dnn.readNetFromONNX(np.frombuffer(detector.graph, np.uint8))
 

@@ -9,8 +9,8 @@ import time
 from urllib.parse import urlencode
 from urllib.request import Request, urlopen
 
-from app.bench.browser import opened
-from app.bench.devtools import Browser
+from app.bench.page.browser import opened
+from app.bench.page.devtools import Browser
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats.native import from_json, to_json

@@ -149,7 +149,7 @@ class Open3dPeer:
 
 
 def _open3d() -> tuple[Any, str]:
-    """The module, or null and why it cannot be had."""
+    """The module, or None and why it cannot be had."""
     try:
         import open3d
     except (ImportError, OSError) as error:

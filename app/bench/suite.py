@@ -7,9 +7,9 @@ from typing import Any
 
 from app.bench import detector as detector_bench
 from app.bench import lidar as lidar_bench
-from app.bench import line as line_bench
 from app.bench import packets as packets_bench
 from app.bench import simulation as simulation_bench
+from app.bench import whole_pipeline as pipeline_bench
 from app.web.source_catalog import recordings
 from pipeline.detection import Detectors, detector_for, lanes_for
 from pipeline.inference.runtime import DetectorMissing
@@ -24,13 +24,15 @@ BUDGET_S = {"decode": 1.5, "lidar": 8.0, "lidar@kitti": 6.5, "line": 10.0, "dete
 """Wall time of each part; together with loading and compiling they stay below 45 s."""
 FRAMES = 40
 SWEEPS_HZ = 10.0
-"""Of a VLP-16. A recording may have fewer (Astyx 3.3), but the line must keep up with the sensor: the lane network
+"""Of a VLP-16. A recording may have fewer (Astyx 3.3), but the pipeline must keep up with the sensor: the lane network
 looks as often as it does then."""
 
 
 def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, Any]]:
-    """The contract's object: stage → median_ms, p99_ms and peers with their ratios. The LiDAR stages come once more as
-    ``stage@kitti`` where a KITTI drive is at hand: its sweeps, cut to a VLP-16's rings, are twice as dense."""
+    """The object of docs/reference/results.md: stage → median_ms, p99_ms and peers with their ratios.
+
+    The LiDAR stages come once more as ``stage@kitti`` where a KITTI drive is at hand: its sweeps, cut to a VLP-16's
+    rings, are twice as dense."""
     source = _source()
     print(f"cipv: measuring on {source.title}", file=sys.stderr)
     frames = [source.frame(i) for i in range(min(FRAMES, len(source)))]
@@ -40,7 +42,7 @@ def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, An
     figures |= lidar_bench.stages(_sweeps(source), BUDGET_S["lidar"], params)
     figures |= _dense_sweeps(params)
     looking = Detectors(network, lanes, usual_every(lanes, SWEEPS_HZ))
-    figures |= line_bench.stages(source, len(frames), params, looking, BUDGET_S["line"])
+    figures |= pipeline_bench.stages(source, len(frames), params, looking, BUDGET_S["line"])
     if network is not None:
         figures |= detector_bench.stages(pictures, network, BUDGET_S["detector"])
     figures |= simulation_bench.stages(BUDGET_S["simulation"])

@@ -6,12 +6,17 @@ import base64
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 
 import cv2
 
-from app.drive.events import Event, find_events
+from app.clips.clip import Clip, clip_frames, one_frame
+from app.clips.overlay import draw_frame
+from app.drive.events import find_events
+from app.drive.events.event import Event
 from app.drive.frame_rows import Objects, Row, objects_of, row_of
 from app.reports.html import page, section_html
+from pipeline.common.progress import Progress
 from pipeline.evaluation.report_sections import Chart, Section, Series, Table
 from pipeline.params import Params, to_yaml
 from pipeline.types import F64, U8, Frame, Result
@@ -24,25 +29,39 @@ _CURVES = (
     ("Time to collision", "s", ("ttc_s",)),
     ("Path offset of the CIPV", "m", ("path_offset_m",)),
     ("Own and desired speed", "m/s", ("speed_mps", "desired_speed_mps")),
-    ("Brake", "share of the pedal", ("brake",)),
+    ("Brake", "fraction of the pedal", ("brake",)),
 )
 _LONGEST_TTC_S = 20.0
 _WEIGHT = {"alarm": 0, "warning": 1, "notice": 2, "info": 3}
 
 
 @dataclass(frozen=True)
-class About:
-    """What the clip is of. timeline_s: (N,) of the whole drive. digest: what the run was made from, in short."""
+class ClipInfo:
+    """Where a clip comes from."""
 
     title: str
     uri: str
     first: int
+    """First frame of the clip."""
     last: int
+    """Last frame of the clip, included."""
     timeline_s: F64
+    """(N,) place of each frame of the whole drive on the playback timeline, in seconds."""
     digest: str
+    """Short digest of all that the run was made from."""
 
 
-def clip_page(run: Iterable[tuple[Frame, Result]], draw: Callable[[int], U8], params: Params, about: About) -> str:
+def write(clip: Clip, path: Path, progress: Progress) -> None:
+    """The clip as one HTML file."""
+    recording, params = clip.recording, clip.params
+    setup = recording.setup
+    info = ClipInfo(clip.title, setup.uri, clip.first, clip.last, setup.timeline_s, recording.digest(params))
+    run = clip_frames(clip, progress, pictures=False)
+    text = clip_page(run, lambda index: draw_frame(*one_frame(recording, params, index), params), params, info)
+    path.write_text(text, encoding="utf-8")
+
+
+def clip_page(run: Iterable[tuple[Frame, Result]], draw: Callable[[int], U8], params: Params, info: ClipInfo) -> str:
     """The whole file; it loads nothing. ``draw`` gives the picture of a frame of the drive with the overlay, BGR; it is
     asked for the first frame and for those of the weightiest events."""
     rows: list[Row] = []
@@ -53,16 +72,16 @@ def clip_page(run: Iterable[tuple[Frame, Result]], draw: Callable[[int], U8], pa
         objects.append(objects_of(result))
         names.append(frame.name)
     events = find_events(rows, objects, params)
-    times = about.timeline_s[about.first : about.first + len(rows)].tolist()
+    times = info.timeline_s[info.first : info.first + len(rows)].tolist()
     sections = [
-        _summary(rows, names, about),
+        _summary(rows, names, info),
         _events(events, names, times),
         Section("curves", "Curves", charts=tuple(_charts(rows, times))),
     ]
     said = worth_a_picture(events)
-    pictures = {place: (_jpeg(draw(about.first + place)), text) for place, text in said.items()}
+    pictures = {place: (_jpeg(draw(info.first + place)), text) for place, text in said.items()}
     body = "".join(map(section_html, sections)) + _pictures(pictures, names) + _made_with(params)
-    return page(f"{about.title}: frames {names[0]} to {names[-1]}", body)
+    return page(f"{info.title}: frames {names[0]} to {names[-1]}", body)
 
 
 def worth_a_picture(events: Sequence[Event]) -> dict[int, str]:
@@ -72,20 +91,20 @@ def worth_a_picture(events: Sequence[Event]) -> dict[int, str]:
     for event in weighty:
         if len(said) < MOST_PICTURES - 1:
             said.setdefault(event.index, event.text)
-    return dict(sorted({0: "the clip begins", **said}.items()))
+    return dict(sorted({0: "start of the clip", **said}.items()))
 
 
 def _jpeg(drawn: U8) -> bytes:
     return cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1].tobytes()
 
 
-def _summary(rows: Sequence[Row], names: Sequence[str], about: About) -> Section:
+def _summary(rows: Sequence[Row], names: Sequence[str], info: ClipInfo) -> Section:
     with_lead = sum(row.cipv_id is not None for row in rows)
     leads = {row.cipv_id for row in rows} - {None}
     text = (
-        f"Frames {names[0]} to {names[-1]} ({len(rows)}) of {about.uri}.",
-        f"{with_lead} frames with a CIPV, {len(leads)} vehicle{'s' if len(leads) != 1 else ''} in turn. "
-        f"Made from the same input and parameters, a run has the digest {about.digest}.",
+        f"Frames {names[0]} to {names[-1]} ({len(rows)}) of {info.uri}.",
+        f"{with_lead} frames with a CIPV, {len(leads)} different vehicle{'s' if len(leads) != 1 else ''}. "
+        f"Made from the same input and parameters, a run has the digest {info.digest}.",
     )
     return Section("clip", "Clip", text)
 
@@ -93,7 +112,7 @@ def _summary(rows: Sequence[Row], names: Sequence[str], about: About) -> Section
 def _events(events: Sequence[Event], names: Sequence[str], times: Sequence[float]) -> Section:
     rows = tuple((names[each.index], round(times[each.index], 2), each.kind, each.text) for each in events)
     table = Table("What happened", ("frame", "at s", "kind", "event"), rows)
-    return Section("events", "Events", tables=(table,) if rows else (), text=() if rows else ("Nothing.",))
+    return Section("events", "Events", tables=(table,) if rows else (), text=() if rows else ("No events.",))
 
 
 def _charts(rows: Sequence[Row], times: Sequence[float]) -> Iterable[Chart]:
@@ -114,7 +133,7 @@ def _is_drawn(name: str, value: float) -> bool:
 def _pictures(pictures: dict[int, tuple[bytes, str]], names: Sequence[str]) -> str:
     figures = "".join(
         f"<figure><figcaption>{escape(names[place])}: {escape(text)}</figcaption>"
-        f'<img style="width:100%" alt="Camera at frame {escape(names[place])} with what the line believes" '
+        f'<img style="width:100%" alt="Camera at frame {escape(names[place])} with the result drawn over it" '
         f'src="data:image/jpeg;base64,{base64.b64encode(jpeg).decode()}"></figure>'
         for place, (jpeg, text) in pictures.items()
     )

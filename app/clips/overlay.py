@@ -1,4 +1,4 @@
-"""The camera's picture with what the line believes drawn over it, for films and reports."""
+"""The camera picture with the pipeline's result drawn over it, for films and reports."""
 
 from __future__ import annotations
 

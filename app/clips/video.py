@@ -10,13 +10,21 @@ import av
 import cv2
 import numpy as np
 
+from app.clips.clip import Clip, clip_frames
 from app.clips.overlay import draw_frame
+from pipeline.common.progress import Progress
 from pipeline.params import Params
 from pipeline.types import F64, U8, Frame, Result
 
 _TICKS_PER_S = 1000
 _QUALITY = "20"
 """x264's constant rate factor: 18 looks as the original, 23 is its default."""
+
+
+def write(clip: Clip, path: Path, progress: Progress) -> None:
+    """The clip as an MP4 file."""
+    times_s = clip.recording.setup.timeline_s
+    write_film(clip_frames(clip, progress), clip.params, times_s, clip.rate_hz, path)
 
 
 def write_film(

@@ -1,4 +1,4 @@
-"""`cipv bench`: how fast each stage is, against what a user would take instead, in the same run."""
+"""`cipv bench`: how fast each stage is, compared in the same run with the libraries one would use instead."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from rich.console import Console
 from rich.table import Table
 
 from app.bench import clients as clients_bench
-from app.bench import page as page_bench
 from app.bench.demands import PAGE_DEMANDS, broken, page_rows
+from app.bench.page import measure as page_bench
 from app.bench.suite import run_all
-from app.commands.support.options import LineOptions
+from app.commands.support.options import PipelineOptions
 from pipeline.common.errors import BadInput
 
 CLIENTS_EACH_S, PAGE_S = 6.0, 12.0
@@ -23,23 +23,23 @@ CLIENTS_EACH_S, PAGE_S = 6.0, 12.0
 
 @dataclass(frozen=True)
 class Bench:
-    """Time the stages and their peers, interleaved in one process. Ends within 45 s, and with 1 when a stage is slower
-    than it has to be on an idle machine of two cores.
+    """Time each stage and comparable libraries, interleaved in one process. Takes up to 45 s. Exits with 1 when a stage
+    is slower than required on an idle machine with two cores.
 
     Example: cipv bench --json > bench.json
     """
 
-    line: LineOptions = field(default_factory=LineOptions)
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     json: bool = False
     """Print the figures as JSON"""
     clients: int = 0
-    """Instead: what so many clients of the stream cost the server, e.g. 50"""
+    """Instead: measure the server load of N stream clients, e.g. 50"""
     page: str | None = None
-    """Instead: how fresh the page is in a browser, playing this source, e.g. sim:straight"""
+    """Instead: measure the latency of the dashboard in a browser while it plays this source, e.g. sim:straight"""
 
     def __call__(self) -> int:
         if self.clients < 0:
-            raise BadInput(f"--clients {self.clients}: there cannot be fewer than none")
+            raise BadInput(f"--clients {self.clients}: must not be negative")
         if self.clients or self.page is not None:
             live: dict[str, Any] = {}
             if self.clients:
@@ -48,7 +48,7 @@ class Bench:
                 live["page"] = page_bench.figures(self.page, PAGE_S)
             print(json.dumps(live, indent=1))
             return _judge(broken(page_rows(live["page"]), PAGE_DEMANDS) if "page" in live else ())
-        figures = run_all(self.line.parameters(), self.line.detector)
+        figures = run_all(self.pipeline.parameters(), self.pipeline.detector)
         if self.json:
             print(json.dumps(figures, indent=1))
         else:
@@ -57,7 +57,7 @@ class Bench:
 
 
 def _judge(failures: Iterable[str]) -> int:
-    """Say what does not hold. The exit status."""
+    """Print what failed. Returns the exit status."""
     status = 0
     for failure in failures:
         print(f"cipv: {failure}", file=sys.stderr)
@@ -78,14 +78,14 @@ def _table(figures: dict[str, dict[str, Any]]) -> Table:
 
 
 def _remark(row: dict[str, Any]) -> tuple[str, str, str]:
-    """What is said of a stage without peers."""
+    """The remark on a stage without peers."""
     if "p99_to_idle_median" in row:
         return f"p99 is {row['p99_to_idle_median']:.1f} × the idle step's median", "", ""
     return (f"{row['rate_hz']:.0f} Hz", "", "") if "rate_hz" in row else ("", "", "")
 
 
 def _peer_cells(name: str, peer: dict[str, Any]) -> tuple[str, str, str]:
-    """A peer that could not be measured says why."""
+    """The cells of a peer; one that could not be measured says why."""
     if peer["ratio"] is None:
         return name, "absent", peer["absent"]
     return name, f"{peer['median_ms']:.2f}", f"{peer['ratio']:.1f} ×"

@@ -1,4 +1,4 @@
-"""`cipv calibrate distance`: the paper's regression from box height to distance, repeated for another camera."""
+"""`cipv calibrate distance`: fit the paper's regression from box height to distance for another camera."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import yaml
 from rich.console import Console
 from rich.table import Table
 
-from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.options import PipelineOptions, SourceOptions
 from pipeline.calibration.distance import LawFit, as_law, as_overrides, collect_pairs, fit_laws
 from pipeline.common.errors import BadInput
 from pipeline.detection import detector_for
@@ -25,40 +25,44 @@ from pipeline.types.source import Source
 
 @dataclass(frozen=True)
 class Calibrate:
-    """Fit the line to another car or camera: d = a·h^b, class by class, to a recording's own detections.
+    """Fit the distance law d = a·h^b for each class to the detections in a recording, for another car or camera.
 
     Example: cipv calibrate distance astyx:PATH --out law.yaml
     """
 
     what: tyro.conf.Positional[Literal["distance"]]
-    """What to fit: the law that gives distance from box height"""
+    """What to fit: distance from box height"""
     source: SourceOptions
-    line: LineOptions = field(default_factory=LineOptions)
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     truth: Literal["labels", "lidar"] = "labels"
-    """Where the true distances come from: labelled cuboids, or the LiDAR's own boxes (no labels needed)"""
+    """Source of the true distances: labelled cuboids, or LiDAR boxes (needs no labels)"""
     free_exponent: bool = False
-    """Fit b too, as in print. By default b is −1, which a pinhole camera must give and which carries over better"""
+    """Fit b too, as in the paper. By default b = −1, which follows from a pinhole camera and generalises better"""
     out: Path | None = None
     """Write a preset file for `cipv run --params`"""
     keep: bool = False
-    """Keep the law with the detector: it is then used with that network wherever no parameter says otherwise"""
+    """Store the law with the detector; it is then used with that network unless a parameter overrides it"""
     json: bool = False
     """Print the laws and their figures as JSON"""
 
     def __call__(self) -> int:
-        params = self.line.parameters()
+        params = self.pipeline.parameters()
         source = self.source.open()
-        detector = detector_for(source, self.line.detector)
+        detector = detector_for(source, self.pipeline.detector)
         if self.keep and detector.path == find(EMBEDDED):
-            raise BadInput("the embedded detector's law comes with the program; use --out, and --params where it runs")
+            raise BadInput(
+                "the law of the embedded detector is built in; write a preset with --out and use it with --params"
+            )
         if self.keep and not params.distance.scale_to_camera:
-            raise BadInput("--keep with distance.scale_to_camera off: a kept law must serve every camera; use --out")
+            raise BadInput(
+                "--keep needs distance.scale_to_camera: a stored law must work with every camera; use --out instead"
+            )
         pairs = collect_pairs(source, detector, self.truth, params)
         fits = fit_laws(pairs, None if self.free_exponent else -1.0)
         if self.json:
             print(json.dumps({label: asdict(fit) for label, fit in fits.items()}, indent=1))
         else:
-            table = Table("class", "a", "b", "pairs", "mean error", "90 % below", title="d = a · h^b")
+            table = Table("class", "a", "b", "pairs", "mean error", "90th percentile", title="d = a · h^b")
             for label, fit in fits.items():
                 numbers = (f"{fit.law.coefficient:.1f}", f"{fit.law.exponent:.3f}", str(fit.pairs))
                 shares = (f"{100 * fit.mean_relative_error:.1f} %", f"{100 * fit.p90_relative_error:.1f} %")

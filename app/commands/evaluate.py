@@ -1,4 +1,4 @@
-"""`cipv evaluate`: what the line believes, scored against labels."""
+"""`cipv evaluate`: score the pipeline against labels."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from urllib.parse import quote, urlsplit
 
 import tyro
 
-from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.reports.html import html
 from app.reports.terminal_tables import show
 from pipeline.common.errors import BadInput
-from pipeline.detection import Detectors, detect
+from pipeline.detection import Detectors
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
 from pipeline.evaluation.scores.report import as_json, sections
@@ -27,9 +27,9 @@ from pipeline.evaluation.scores.truth import DriveTruth, NoTruth, of_labels, of_
 from pipeline.labels.formats import native
 from pipeline.labels.formats.reading import read_bytes
 from pipeline.params import Params, from_yaml, preset
-from pipeline.run import Sensors, only
+from pipeline.run import Sensors, sensed
 from pipeline.step import State, step
-from pipeline.types import Frame, Result
+from pipeline.types import Result
 from pipeline.types.source import Source
 from pipeline.warm_up import warm_up
 
@@ -40,7 +40,7 @@ _PRESETS = ("default", "paper")
 
 @dataclass(frozen=True)
 class Evaluate:
-    """Score what the line believes of recordings against labels: the lead, distances, tracking, warnings.
+    """Score the pipeline's results on recordings against labels: lead, distances, tracking, warnings.
 
     Example: cipv evaluate astyx:PATH --set cluster.z_weight=0.4 --against default --report scores.html
     """
@@ -48,32 +48,32 @@ class Evaluate:
     sources: tyro.conf.Positional[tuple[str, ...]]
     """Labelled recordings; with two or more, figures get confidence intervals"""
     truth: tuple[str, ...] = ("native",)
-    """native: the labels that came with a recording; else a file of labels (cipv-labels JSON), one a recording"""
-    line: LineOptions = field(default_factory=LineOptions)
+    """native: the labels that come with a recording; or one file of labels (cipv-labels JSON) per recording"""
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"
-    """Ablation: what a car with only this sensor would believe"""
+    """Ablation: run as if the car had this sensor only"""
     rings: int = 16
-    """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
+    """KITTI: LiDAR channels to keep: 16, like a VLP-16, or 64 for all"""
     results: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="FILE")] = ()
-    """Score these results of `cipv run --out`, one a recording, instead of running the line"""
+    """Score these results of `cipv run --out`, one file per recording, instead of running the pipeline"""
     against: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FILE|PRESET")] = ()
-    """Compare with another run: results of `cipv run --out`, one a recording; or a preset by name or file (YAML)"""
+    """Compare with another run: results of `cipv run --out`, one per recording, or a preset by name or file (YAML)"""
     max_range_m: float = 60.0
-    """Leads that are farther are not asked for"""
+    """Leads beyond this distance are ignored"""
     report: Path | None = None
     """Write an HTML file with tables, charts and links to the worst frames"""
     dashboard: Annotated[str, tyro.conf.arg(metavar="URL")] = DASHBOARD
-    """Where the report's links lead: the address that `cipv serve` shows when it starts"""
+    """Address that the report's links lead to, as `cipv serve` prints it"""
     json: bool = False
     """Print the figures as JSON"""
 
     def __call__(self) -> int:
         self._check()
-        params = self.line.parameters()
+        params = self.pipeline.parameters()
         base = self._base_params()
         if self.report is not None:
             self.report.parent.mkdir(parents=True, exist_ok=True)
-            self.report.open("a").close()  # a place that cannot be written to is told before the drives, not after
+            self.report.open("a").close()  # report an unwritable file before the work, not after it
         run_scores, base_scores = [], []
         for n in range(len(self.sources)):
             scores = self._score(n, params, base)
@@ -93,12 +93,12 @@ class Evaluate:
         if self.against and self._base_preset() is None and len(self.against) != count:
             raise BadInput(f"--against: {len(self.against)} files for {count} recordings; name one for each")
         if urlsplit(self.dashboard).scheme not in ("http", "https") or not urlsplit(self.dashboard).netloc:
-            raise BadInput(f"--dashboard {self.dashboard}: no address such as {DASHBOARD}")
+            raise BadInput(f"--dashboard {self.dashboard}: not a valid address; expected e.g. {DASHBOARD}")
         if not 0.0 < self.max_range_m < 1000.0:
-            raise BadInput(f"--max-range-m {self.max_range_m:g}: metres, more than 0 and less than 1000")
+            raise BadInput(f"--max-range-m {self.max_range_m:g}: expected metres, more than 0 and less than 1000")
 
     def _base_preset(self) -> str | None:
-        """What --against names, where that is a preset."""
+        """The preset that --against names, if it names one."""
         one = self.against[0] if len(self.against) == 1 else ""
         return one if one in _PRESETS or one.endswith((".yaml", ".yml")) else None
 
@@ -128,14 +128,14 @@ class Evaluate:
         ticks = tuple(source.t_ns(index) for index in range(len(source)))
         frames = {tick: frame for tick, frame in truth.frames.items() if tick in set(ticks)}
         if not frames:
-            raise NoTruth(f"{file}: labels of another recording ({truth.uri}): no frame is the same")
+            raise NoTruth(f"{file}: labels of another recording ({truth.uri}): no frame in common")
         return replace(truth, uri=source.uri, ticks=ticks, frames=frames)
 
     def _run(self, source: Source, wanted: list[Params]) -> list[list[Result]]:
-        """The line with each set of parameters. The networks look at each picture once."""
+        """Run the pipeline with each set of parameters. The networks run once per picture."""
         if not wanted:
             return []
-        detectors = self.line.open_detectors(source, self.sensors)
+        detectors = self.pipeline.open_detectors(source, self.sensors)
         with frames_progress() as progress:
             bar = progress.add_task(source.title, total=len(source))
             ran = list(_lines(source, wanted, detectors, self.sensors, lambda: progress.advance(bar)))
@@ -150,7 +150,7 @@ class Evaluate:
         if self.report is not None:
             title = "Scores: " + ", ".join(drive.uri for drive in run)
             self.report.write_text(html(told, title), encoding="utf-8")
-            print(f"cipv: report in {self.report}", file=sys.stderr)
+            print(f"cipv: report written to {self.report}", file=sys.stderr)
         if not self.json:
             show(told)
 
@@ -162,17 +162,13 @@ def _lines(
     warm_up()
     states = [State() for _ in wanted]
     for index in range(len(source)):
-        frame = _seen(source.frame(index), detectors, sensors)
+        frame = sensed(source.frame(index), detectors, sensors)
         row = []
         for n, params in enumerate(wanted):
             states[n], result = step(states[n], frame, params)
             row.append(replace(result, layers=EMPTY))
         yield row
         done()
-
-
-def _seen(frame: Frame, detectors: Detectors, sensors: Sensors) -> Frame:
-    return only(frame if sensors == "lidar" else detect(frame, detectors), sensors)
 
 
 def dashboard_link(dashboard: str, uri: str, index: int) -> str:

@@ -1,4 +1,4 @@
-"""`cipv info`: what a recording holds."""
+"""`cipv info`: what a recording contains."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SAME_RATE = 0.05
 
 @dataclass(frozen=True)
 class ShowInfo:
-    """What a recording holds: topics, rates, gaps, duration.
+    """Show what a recording contains: topics, rates, gaps, duration.
 
     Example: cipv info drive.mcap --json
     """
@@ -61,7 +61,7 @@ def _print_info(found: Info) -> None:
     for line in (*(about.notes if about else ()), *(f"mark: {mark}" for mark in found.marks)):
         print(line)
     if found.problem is not None:
-        print(f"{found.problem}; `cipv recover {found.path}` makes a whole file of it")
+        print(f"{found.problem}; run `cipv recover {found.path}` to repair it")
     if found.damaged_chunks:
         print(f"{found.damaged_chunks} of {found.chunks} chunks are damaged")
 

@@ -1,4 +1,4 @@
-"""`cipv live init` and `cipv live check`: the file that says which sensors a car has, and whether they work."""
+"""`cipv live init` and `cipv live check`: write the sensor configuration of a car, and test each sensor."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Live:
     """
 
     what: tyro.conf.Positional[Literal["init", "check"]]
-    """init: write the file; check: listen to each sensor and say how it does"""
+    """init: write the file; check: listen to each sensor and report its health"""
     file: tyro.conf.Positional[Path] = Path("live.yaml")
-    """The file"""
+    """The configuration file"""
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 3.0
     """check: how long to listen"""
     json: bool = False
@@ -45,7 +45,7 @@ class Live:
             with self.file.open("x", encoding="utf-8") as file:
                 file.write(TEMPLATE)
         except FileExistsError:
-            raise BadInput(f"{self.file}: is there already; nothing is written over") from None
+            raise BadInput(f"{self.file}: file already exists; not overwritten") from None
         print(f"{self.file} written: edit it, then `cipv live check {self.file}`")
         return 0
 

@@ -1,4 +1,4 @@
-"""`cipv models`: which networks are known and here, fetching an official one, registering a file of one's own."""
+"""`cipv models`: list networks, download an official one, register your own ONNX file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from app.commands.support.progress_bars import bytes_progress
+from app.commands.support.progress_bars import bytes_progress, task_progress
 from pipeline.inference.model_registry import ModelEntry, known_model, list_models, own_file, pull, register, store
 from pipeline.lanes.network import open_lane_network
 from pipeline.types import REAL_VEHICLES
@@ -39,7 +39,7 @@ class ListModels:
 
 @dataclass(frozen=True)
 class PullModel:
-    """Fetch an official network; its size and SHA-256 are checked.
+    """Download an official network and verify its size and SHA-256.
 
     Example: cipv models pull yolox_nano
     """
@@ -52,15 +52,14 @@ class PullModel:
         if known.size is not None:
             print(f"{known.url}\n{known.size / 1e6:.1f} MB, licence {known.licence}, SHA-256 {known.sha256}")
         with bytes_progress() as bar:
-            task = bar.add_task(self.name, total=known.size)
-            path = pull(self.name, lambda done, total: bar.update(task, completed=done, total=total))
-        print(f"{path}: size and checksum are right")
+            path = pull(self.name, task_progress(bar, self.name, known.size))
+        print(f"{path}: size and checksum verified")
         return 0
 
 
 @dataclass(frozen=True)
 class RegisterModel:
-    """Copy an ONNX file of your own into the store and make it the default.
+    """Copy your own ONNX file into the model store and make it the default.
 
     Example: cipv models register best.onnx my_yolo
     """
@@ -68,11 +67,11 @@ class RegisterModel:
     path: tyro.conf.Positional[Path]
     """The ONNX file"""
     name: tyro.conf.Positional[str]
-    """The name to call it by"""
+    """Name to register it under"""
     task: Literal["detector", "lanes"] = "detector"
     """What the network does"""
     default: bool = True
-    """Use it when no network is named"""
+    """Use it whenever no network is named"""
 
     def __call__(self) -> int:
         file = own_file(self.path)
@@ -86,7 +85,7 @@ class RegisterModel:
 
 @dataclass(frozen=True)
 class Models:
-    """Networks: which are here, fetch an official one, add your own ONNX file."""
+    """Networks: list them, download an official one, register your own ONNX file."""
 
     action: (
         Annotated[ListModels, tyro.conf.subcommand("list")]
@@ -99,8 +98,8 @@ class Models:
 
 
 def _listed(entries: tuple[ModelEntry, ...]) -> Iterator[str]:
-    """A network a paragraph: it must be readable, addresses and all, in a terminal of 80 columns."""
-    yield f"Networks in {store()} (● used when none is named)"
+    """One paragraph per network, readable with its addresses in a terminal of 80 columns."""
+    yield f"Networks in {store()} (● default)"
     for entry in entries:
         licence = f"  {entry.licence}" if entry.licence else ""
         yield f"\n{'●' if entry.default else ' '} {entry.name}  {entry.task}{licence}"
@@ -113,10 +112,10 @@ def _listed(entries: tuple[ModelEntry, ...]) -> Iterator[str]:
 def _where(entry: ModelEntry) -> Iterator[str]:
     """The file, or how to get it."""
     if entry.path is not None:
-        yield f"here: {entry.path}"
+        yield f"installed: {entry.path}"
     elif entry.url is not None:
         known = known_model(entry.name)
-        yield f"not here: {known.remedy}"
+        yield f"not installed: {known.remedy}"
         yield entry.url
 
 

@@ -1,4 +1,4 @@
-"""`cipv params`: every tunable with its default, bounds, unit and meaning."""
+"""`cipv params`: every parameter with its value, unit and meaning."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from rich.console import Console
 from rich.table import Table
 
-from app.commands.support.options import LineOptions
+from app.commands.support.options import PipelineOptions
 from pipeline.params import Params, to_yaml
 
 
@@ -19,14 +19,14 @@ class ListParams:
     Example: cipv params --preset paper --yaml > mine.yaml
     """
 
-    line: LineOptions = field(default_factory=LineOptions)
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     json: bool = False
     """Print the JSON schema"""
     yaml: bool = False
     """Print the values as a preset file"""
 
     def __call__(self) -> int:
-        params = self.line.parameters()
+        params = self.pipeline.parameters()
         if self.json:
             print(json.dumps(Params.model_json_schema(), indent=1, ensure_ascii=False))
         elif self.yaml:

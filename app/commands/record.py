@@ -1,4 +1,4 @@
-"""`cipv record`: a recording or live sensors through the line into a session, inputs and results."""
+"""`cipv record`: run the pipeline on a recording or live sensors, and write inputs and results to a session."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Annotated, cast
 
 import tyro
 
-from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.commands.support.sensor_wait import Waiting
 from app.core.session_folder import SESSIONS
@@ -23,7 +23,7 @@ from pipeline.params import Params
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.save import about
 from pipeline.recording.segments import Rotation, Segments
-from pipeline.recording.velodyne_scan import RawLidar
+from pipeline.recording.session.velodyne_scan import RawLidar
 from pipeline.run import run, run_live
 from pipeline.sources import is_live
 from pipeline.types import Frame, Result
@@ -34,28 +34,28 @@ Ran = tuple[Frame, Result]
 
 @dataclass(frozen=True)
 class Record:
-    """Run the line and record what it saw and what it believed, until the end or Ctrl-C.
+    """Run the pipeline and record its inputs and results to a session, until the end or Ctrl-C.
 
     Example: cipv record live:car.yaml --out sessions --rotate-minutes 10
     """
 
     source: SourceOptions
     out: Annotated[Path, tyro.conf.arg(metavar="DIR|FILE.mcap")] = SESSIONS
-    """A folder, for a file named by title and time, or a new file"""
-    line: LineOptions = field(default_factory=LineOptions)
+    """A folder, in which the file is named by title and time, or a new file"""
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     seconds: Annotated[float | None, tyro.conf.arg(metavar="S")] = None
-    """Stop after this time of the drive"""
+    """Stop after S seconds of the drive"""
     packets: bool = False
-    """Live: keep the LiDAR's raw packets instead of its clouds; they are decoded anew when the session is opened"""
+    """Live: record the LiDAR's raw packets instead of point clouds; they are decoded when the session is opened"""
     rotate_mb: Annotated[float | None, tyro.conf.arg(metavar="MB")] = None
-    """Go on in a new file when one has reached this size"""
+    """Start a new file when this size is reached"""
     rotate_minutes: Annotated[float | None, tyro.conf.arg(metavar="MIN")] = None
-    """Go on in a new file after this time of the drive"""
+    """Start a new file after MIN minutes of the drive"""
 
     def __call__(self) -> int:
-        params = self.line.parameters()
+        params = self.pipeline.parameters()
         if self.packets and not is_live(self.source.source):
-            raise BadInput("--packets is for live sensors; a recording has none")
+            raise BadInput("--packets works with live sensors only; recordings contain no packets to record")
         with _asked_to_stop() as asked:
             source = self.source.open_any()
             if is_live_source(source):
@@ -64,7 +64,7 @@ class Record:
 
     def _offline(self, source: Source, params: Params, asked: Event) -> int:
         """A recording waits for the disk, so nothing is dropped."""
-        detectors = self.line.open_detectors(source)
+        detectors = self.pipeline.open_detectors(source)
         segments = Segments(new_session(self.out, source.title), about(source), self._rotation)
         _say_where(segments.files[0])
         with closing(segments), frames_progress() as bar:
@@ -76,8 +76,8 @@ class Record:
         return 0
 
     def _live(self, source: LiveSource, params: Params, asked: Event) -> int:
-        """Sensors do not wait: what the disk is too slow for is dropped, and said."""
-        detectors, waiting = self.line.open_detectors(source), Waiting(source)
+        """Sensors do not wait: frames that the disk is too slow for are dropped and counted."""
+        detectors, waiting = self.pipeline.open_detectors(source), Waiting(source)
         recorder = self._recorder(source)
 
         def on_silence() -> None:
@@ -100,22 +100,22 @@ class Record:
             state = recorder.stop()
         if state.frames == 0 and state.error is None:
             state.file.unlink(missing_ok=True)
-            print("cipv: no sensor ticked; there is nothing to keep", file=sys.stderr)
+            print("cipv: no data received; nothing saved", file=sys.stderr)
             return 1
         _say(list(state.files), state.frames, state.bytes)
         if source.dropped:
             print(
-                f"cipv: the line was too slow for {source.dropped} ticks; their sensor data is recorded",
+                f"cipv: the pipeline was too slow for {source.dropped} ticks; their sensor data was recorded",
                 file=sys.stderr,
             )
         if state.dropped:
-            print(f"cipv: {state.dropped} frames or samples were dropped: the disk was too slow", file=sys.stderr)
+            print(f"cipv: {state.dropped} frames or samples dropped because the disk was too slow", file=sys.stderr)
         if state.error is not None:
             print(f"cipv: {state.error}", file=sys.stderr)
         return 0 if state.error is None else 1
 
     def _recorder(self, source: LiveSource) -> Recorder:
-        """Of clouds, or of the packets that they are made of."""
+        """Records point clouds, or the packets that they are made of."""
         path, mount = new_session(self.out, source.title), source.lidar_mount
         if not self.packets:
             return Recorder(path, about(source), self._rotation)
@@ -130,7 +130,7 @@ class Record:
         return Rotation(max_bytes, max_s)
 
     def _until_enough(self, ran: Iterator[Ran], asked: Event) -> Iterator[Ran]:
-        """Until ``seconds`` are over or somebody asks to stop, which ends a recording as it should end."""
+        """Until ``seconds`` have passed or a stop is requested; either way the file is finished properly."""
         first_ns = None
         with suppress(_Ended):
             for frame, result in ran:
@@ -142,7 +142,7 @@ class Record:
 
 
 class _Ended(Exception):
-    """Somebody asked to stop."""
+    """A stop was requested."""
 
 
 def _end_if(asked: Event) -> None:
@@ -152,7 +152,7 @@ def _end_if(asked: Event) -> None:
 
 @contextmanager
 def _asked_to_stop() -> Iterator[Event]:
-    """Set by Ctrl-C and by what ends a service; the frame under way is finished. Asked again, it ends at once."""
+    """Set by SIGINT (Ctrl-C) and SIGTERM; the current frame is finished first. A second signal ends at once."""
     asked = Event()
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
@@ -171,7 +171,7 @@ def _asked_to_stop() -> Iterator[Event]:
 
 
 def _say_where(file: Path) -> None:
-    print(f"cipv: recording to {file}; Ctrl-C ends it", file=sys.stderr)
+    print(f"cipv: recording to {file}; press Ctrl-C to stop", file=sys.stderr)
 
 
 def _say(files: list[Path], frames: int, count: int) -> None:

@@ -1,4 +1,4 @@
-"""`cipv replay`: a recording sent as the car's sensors would, to whoever listens with the same live config."""
+"""`cipv replay`: send a recording as real sensor packets, to any program that listens with the same live config."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ import tyro
 
 from app.commands.support.options import SourceOptions
 from pipeline.common.errors import BadInput
+from pipeline.types.source import RawPackets
 
 
 @dataclass(frozen=True)
 class Replay:
-    """Send a recording as VLP-16 packets, MJPEG, NMEA and CAN, at true timing, to where a live config listens.
+    """Send a recording as VLP-16 packets, MJPEG, NMEA and CAN in real time, to the addresses of a live config.
 
-    Example: cipv replay sim:straight --config car.yaml, and beside it: cipv serve live:car.yaml
+    Example: cipv replay sim:straight --config car.yaml, and in another terminal: cipv serve live:car.yaml
     """
 
     source: SourceOptions
     config: Annotated[Path, tyro.conf.arg(metavar="FILE")]
-    """The live config (`cipv live init`): its ports and addresses are where to send"""
+    """The live config (see `cipv live init`), whose ports and addresses are the targets"""
     speed: float = 1.0
-    """How fast the world runs; the LiDAR turns as it does, so faster leaves sweeps out"""
+    """Playback rate; the LiDAR keeps its rotation rate, so rates above 1 skip sweeps"""
     loop: bool = False
-    """Begin again at the end, until Ctrl-C"""
+    """Start again at the end, until Ctrl-C"""
     faults: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """A YAML list of what shall go wrong, e.g. [{sensor: camera, kind: disconnect, from_s: 5, to_s: 7}]"""
+    """YAML list of faults to inject, e.g. [{sensor: camera, kind: disconnect, from_s: 5, to_s: 7}]"""
 
     def __call__(self) -> int:
         if not 0.05 <= self.speed <= 20.0:
@@ -43,8 +44,10 @@ class Replay:
         config = load(str(self.config))
         faults = load_faults(self.faults) if self.faults is not None else ()
         source = self.source.open()
-        if self.speed != 1.0 and self.source.source.startswith("pcap:"):
-            raise BadInput(f"--speed {self.speed:g}: a capture's packets carry their own times; only 1 is true to them")
+        if self.speed != 1.0 and isinstance(source, RawPackets):
+            raise BadInput(
+                f"--speed {self.speed:g}: the packets of a capture carry their own timestamps, so only 1 is possible"
+            )
         senders = open_senders(config)
         mount = config.lidar.mount.T_ego_sensor() if config.lidar is not None else None
         rounds = count() if self.loop else range(1)
@@ -61,6 +64,6 @@ class Replay:
             for sender in senders.values():
                 sender.close()
         said = ", ".join(f"{number} {sensor}" for sensor, number in sent.events.items())
-        slow = f"; {sent.late} late, put off {sent.slips} times: this machine is too slow" if sent.late else ""
+        slow = f"; {sent.late} late, schedule delayed {sent.slips} times: this machine is too slow" if sent.late else ""
         print(f"cipv: sent {said or 'nothing'}{slow}", file=sys.stderr)
         return 0

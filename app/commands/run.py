@@ -1,4 +1,4 @@
-"""`cipv run`: a recording through the whole line, results as JSON lines and a rerun recording."""
+"""`cipv run`: run the pipeline on a recording, with results as JSON lines and as a rerun recording."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Annotated, Literal, cast
 
 import tyro
 
-from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.commands.support.sensor_wait import Waiting
 from pipeline.detection import Detectors
@@ -28,26 +28,26 @@ Ran = tuple[Frame, Result]
 
 @dataclass(frozen=True)
 class Run:
-    """Run the whole line on a recording and write what it believes of each frame.
+    """Run the pipeline on a recording or on live sensors, and write one result per frame.
 
     Example: cipv run astyx:PATH --out results.jsonl --rrd drive.rrd
     """
 
     source: SourceOptions
-    line: LineOptions = field(default_factory=LineOptions)
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"
-    """Ablation: what a car with only this sensor would believe"""
+    """Ablation: run as if the car had this sensor only"""
     out: Path | None = None
-    """Write one JSON object a frame here; - writes to standard output"""
+    """Write one JSON object per frame to this file; - for standard output"""
     frames: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
-    """Stop after so many frames; live sensors are run until Ctrl-C without it"""
+    """Stop after N frames; without it, live sensors run until Ctrl-C"""
     rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Write a rerun recording here"""
+    """Write a rerun recording to this file"""
 
     def __call__(self) -> int:
-        params = self.line.parameters()
+        params = self.pipeline.parameters()
         source = self.source.open_any()
-        detectors = self.line.open_detectors(source, self.sensors)
+        detectors = self.pipeline.open_detectors(source, self.sensors)
         tally = _Tally()
         with ExitStack() as stack:
             out = None
@@ -56,7 +56,7 @@ class Run:
                 out = sys.stdout if to_stdout else stack.enter_context(self.out.open("w", encoding="utf-8"))
             replay = None
             if self.rrd is not None:
-                from app.views.rerun_view import RerunSink  # half a second to import: only who asks pays
+                from app.views.rerun.view import RerunSink  # takes half a second to import
 
                 replay = stack.enter_context(RerunSink(self.rrd, source.title, params.alignment))
             bar = stack.enter_context(frames_progress())
@@ -124,4 +124,4 @@ class _Tally:
         kinds = ", ".join(f"{self.sources[kind]} {kind}" for kind in ("VL", "V", "L"))
         hurt = f"; {self.degraded} degraded frames" if self.degraded else ""
         mean = self.step_ms / max(self.frames, 1)
-        return f"cipv: {self.frames} frames, {self.with_lead} with a CIPV; {kinds}; {mean:.1f} ms a step{hurt}"
+        return f"cipv: {self.frames} frames, {self.with_lead} with a CIPV; {kinds}; {mean:.1f} ms per step{hurt}"

@@ -1,4 +1,4 @@
-"""`cipv scenarios run`: the paper's experiments and the road testers' in the simulator."""
+"""`cipv scenarios run`: the experiments of the paper, Euro NCAP and ISO 15622 in the simulator."""
 
 from __future__ import annotations
 
@@ -21,34 +21,34 @@ from pipeline.experiments.runner import count_cases, of_suite, run_all
 
 @dataclass(frozen=True)
 class Scenarios:
-    """Drive experiments in the closed loop and report their figures beside the printed ones. Exit status 1 when the
-    CIPV is not right as often as is demanded, in the four scenarios or in curves.
+    """Run experiments in the closed-loop simulator and report their figures next to the published ones. Exits with 1
+    when a required figure is missed.
 
     Example: cipv scenarios run --suite euroncap --report ncap.html --drives ncap-drives
     """
 
     what: tyro.conf.Positional[Literal["run"]]
-    """What to do: drive them"""
+    """What to do"""
     suite: str = "paper"
     """paper, curves, euroncap, iso, all, or the name of one experiment"""
     short: bool = False
-    """A few cases of each only: seconds instead of minutes"""
+    """Run a few cases of each only: seconds instead of minutes"""
     jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 0
-    """Processes; 0 is one a core"""
+    """Number of processes; 0 for one per core"""
     report: Path | None = None
     """Write an HTML file with tables and charts"""
     drives: Path | None = None
-    """Keep every drive in this folder, listed in its index.html and linked from the report; each opens as sim:<file>"""
+    """Save every drive in this folder, listed in index.html and linked from the report; open one as sim:<file>"""
     json: bool = False
     """Print the figures as JSON"""
 
     def __call__(self) -> int:
         experiments = of_suite(self.suite)
         if self.jobs < 0:
-            raise BadInput(f"--jobs {self.jobs}: a number of processes, or 0 for one a core")
+            raise BadInput(f"--jobs {self.jobs}: expected a number of processes, or 0 for one per core")
         if self.report is not None:
             self.report.parent.mkdir(parents=True, exist_ok=True)
-            self.report.open("a").close()  # a place that cannot be written to is told before the drives, not after
+            self.report.open("a").close()  # report an unwritable file before the work, not after it
         folder = ReplayFolder(self.drives) if self.drives is not None else None
         with frames_progress() as progress:
             bar = progress.add_task("driving", total=count_cases(experiments, self.short))
@@ -66,5 +66,5 @@ class Scenarios:
             show(sections)
         failures = [failure for section in sections for failure in section.failures]
         for failure in failures:
-            print(f"does not hold: {failure}", file=sys.stderr)
+            print(f"FAILED: {failure}", file=sys.stderr)
         return 1 if failures else 0

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from app.commands.support.open_with_progress import opened
-from app.commands.support.options import LineOptions, planned
+from app.commands.support.options import PipelineOptions, SourceName, planned
 from app.core.server_address import DEFAULT_PORT
-from app.core.shared_view_state import Looks
+from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from app.labels import URL_VARIABLE
 from app.labels.service.desk import LabelDesk
@@ -29,7 +29,7 @@ from pipeline.types.source import AnySource
 
 if TYPE_CHECKING:
     from app.labels.store.database import Database
-    from app.views.rerun_feed import RerunFeed
+    from app.views.rerun.feed import RerunFeed
 
 
 @dataclass(frozen=True)
@@ -37,21 +37,21 @@ class ServerOptions:
     """Where the dashboard listens."""
 
     host: str = "127.0.0.1"
-    """Address to listen on; other machines (0.0.0.0) get in by a link with a token that is shown at the start"""
+    """Address to listen on. With 0.0.0.0 other machines can connect, using the link with a token printed at startup"""
     port: int | None = None
-    """Port to listen on; without one, the first free from 8420 on"""
+    """Port to listen on; by default the first free one from 8420"""
     allow_host: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
-    """Another name this server may be called by (repeatable), as behind a proxy; then a token is needed"""
+    """Another host name that this server may be reached by, as behind a proxy (repeatable); requires the token"""
     browser: bool = False
-    """Open a browser once the dashboard answers"""
+    """Open a browser once the dashboard is ready"""
     rerun: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
-    """Stream what is shown to a running rerun viewer too, e.g. rerun+http://127.0.0.1:9876/proxy"""
+    """Also stream the shown frames to a running rerun viewer, e.g. rerun+http://127.0.0.1:9876/proxy"""
     labels: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
-    """Keep labels in a team's database, as postgresql://person@host/cipv; else $CIPV_LABELS_URL, sessions/labels.db"""
+    """Label database, e.g. postgresql://person@host/cipv; default: $CIPV_LABELS_URL, then sessions/labels.db"""
 
     def label_desk(self) -> LabelDesk:
-        """DatabaseError when a database that was named cannot be opened. The file of this machine is opened when the
-        first picture is shown; what is wrong with it is then said on the page."""
+        """DatabaseError when a database that was named cannot be opened. The local database is opened once the first
+        picture is shown; an error in it is shown in the dashboard."""
         if self.labels or os.environ.get(URL_VARIABLE):
             return LabelDesk(_open_labels(self.labels))
         return LabelDesk(open_later=lambda: _open_labels(None))
@@ -59,7 +59,7 @@ class ServerOptions:
     def serve(self, engine: Engine) -> int:
         """Until Ctrl-C."""
         on_ready: Callable[[str], None] | None = webbrowser.open if self.browser else None  # type: ignore[assignment]
-        looks = Looks()
+        looks = SharedViewState()
         with ExitStack() as stack:
             scene = stack.enter_context(LateScene(engine, looks))
             if self.rerun is not None:
@@ -86,7 +86,7 @@ def _open_labels(url: str | None) -> Database:
 
 
 def _rerun_feed(engine: Engine, url: str) -> RerunFeed:
-    from app.views.rerun_feed import RerunFeed  # half a second to import: only who asks pays
+    from app.views.rerun.feed import RerunFeed  # takes half a second to import
 
     return RerunFeed(engine, url)
 
@@ -98,26 +98,24 @@ class Serve:
     Example: cipv serve astyx:PATH --port 8420
     """
 
-    source: tyro.conf.Positional[str]
-    """What to open: a session.mcap, pcap:<file>, rosbag:<path>, pcd:<dir>, astyx:<dir>, kitti:<dir>,
-    sim:<scenario or my.yaml>, live:<config.yaml>"""
+    source: SourceName
     server: ServerOptions = field(default_factory=ServerOptions)
-    line: LineOptions = field(default_factory=LineOptions)
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     sensors: Literal["lidar", "camera", "both"] = "both"
-    """Ablation: what a car with only this sensor would believe"""
+    """Ablation: run as if the car had this sensor only"""
     rings: int = 16
-    """KITTI: LiDAR channels to keep, 16 as of a VLP-16 or 64 for all"""
+    """KITTI: LiDAR channels to keep: 16, like a VLP-16, or 64 for all"""
     route: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """The road to be driven, on which GNSS places the car: CSV, GPX, an NMEA log or an earlier session"""
+    """Planned route, on which GNSS places the car: CSV, GPX, an NMEA log or an earlier session"""
 
     def __call__(self) -> int:
         return self.server.serve(self.engine())
 
     def engine(self) -> Engine:
-        """The engine on the source, not started. BadInput when it cannot be opened."""
-        params = self.line.parameters()
+        """The engine for the source, not started yet. BadInput when the source cannot be opened."""
+        params = self.pipeline.parameters()
         route = planned(self.route)
-        # opened here, so that a typing mistake is not said on the page; a large recording is not opened twice
+        # opened here, so that a typo is reported in the terminal; a large recording is not opened twice
         first = {self.source: opened(self.source, self.rings)}
 
         def open_source(uri: str, /, *, progress: Progress) -> AnySource:
@@ -128,28 +126,28 @@ class Serve:
 
         return Engine(
             open_source,
-            lambda source: detector_for(source, self.line.detector),
+            lambda source: detector_for(source, self.pipeline.detector),
             params,
-            preset=self.line.preset,
+            preset=self.pipeline.preset,
             uri=self.source,
             sensors=self.sensors,
             playing=True,
             whole_drives=True,
-            open_lanes=lambda source: lanes_for(source, self.line.lanes),
-            lanes_every=self.line.every(),
+            open_lanes=lambda source: lanes_for(source, self.pipeline.lanes),
+            lanes_every=self.pipeline.every(),
             labels=self.server.label_desk(),
         )
 
 
 @dataclass(frozen=True)
 class Demo:
-    """Open the dashboard on a simulated drive; nothing else is needed.
+    """Open the dashboard on a simulated drive. Needs no data and no sensors.
 
     Example: cipv demo
     """
 
     server: ServerOptions = field(default_factory=ServerOptions)
-    line: LineOptions = field(default_factory=LineOptions)
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
 
     def __call__(self) -> int:
-        return Serve("sim:straight", self.server, self.line)()
+        return Serve("sim:straight", self.server, self.pipeline)()

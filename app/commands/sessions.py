@@ -1,4 +1,4 @@
-"""`cipv import`, `export` and `recover`: sessions and what they are made from."""
+"""`cipv import`, `export` and `recover`: make, cut and repair sessions."""
 
 from __future__ import annotations
 
@@ -10,75 +10,79 @@ from typing import Annotated
 import numpy as np
 import tyro
 
-from app.clips.excerpt import Kind, export_clip
 from app.commands.info import size_text
-from app.commands.support.options import LineOptions, SourceOptions
-from app.commands.support.progress_bars import frames_progress
+from app.commands.support.options import PipelineOptions, SourceOptions
+from app.commands.support.progress_bars import frames_progress, task_progress
 from app.core.playback_clock import timeline_s
 from pipeline.common.errors import BadInput
 from pipeline.detection import Detectors
+from pipeline.params import Params
 from pipeline.recording.rewrite import recover
 from pipeline.recording.save import save
+from pipeline.recording.session.source import SessionSource
 from pipeline.types.source import Source
 
 
 @dataclass(frozen=True)
 class Import:
-    """Make a session of any recording: one MCAP file that opens here, in Foxglove and in rerun.
+    """Convert any recording to a session: one MCAP file that opens in CIPV Studio, Foxglove and rerun.
 
     Example: cipv import astyx:PATH --out drive.mcap
     """
 
     source: SourceOptions
     out: Path
-    """The session to write; a new file ending in .mcap"""
+    """The session to write: a new file ending in .mcap"""
 
     def __call__(self) -> int:
         source = self.source.open()
         with frames_progress() as bar:
-            task = bar.add_task(source.title, total=len(source))
-            save(source, self.out, progress=lambda done, total: bar.update(task, completed=done, total=total))
+            save(source, self.out, progress=task_progress(bar, source.title, len(source)))
         print(f"cipv: {self.out}: {len(source)} frames, {size_text(self.out.stat().st_size)}", file=sys.stderr)
         return 0
 
 
 @dataclass(frozen=True)
 class Export:
-    """Write a recording, or a clip of it, as a rerun recording, a session or a table of its objects.
+    """Write a recording, or a clip of it, as a rerun recording, a session or a table of objects.
 
     Example: cipv export drive.mcap --from 12 --to 20 --rrd clip.rrd --csv clip.csv
     """
 
     source: SourceOptions
     from_s: Annotated[float | None, tyro.conf.arg(name="from", metavar="S")] = None
-    """Begin at this second of the drive"""
+    """Start S seconds into the drive"""
     to_s: Annotated[float | None, tyro.conf.arg(name="to", metavar="S")] = None
-    """End at this second of the drive"""
+    """End S seconds into the drive"""
     rrd: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Write a rerun recording; the line is run anew, with the parameters that were recorded"""
+    """Write a rerun recording; the pipeline runs again, with the recorded parameters unless others are given"""
     mcap: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
     """Write a session"""
     csv: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """Write a row for each object of each frame: the recorded results, else of the line run anew"""
-    line: LineOptions = field(default_factory=LineOptions)
+    """Write one row per object and frame: the recorded results, or those of a new run if there are none"""
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
 
     def __call__(self) -> int:
-        asked: tuple[tuple[Kind, Path | None], ...] = ("mcap", self.mcap), ("rrd", self.rrd), ("csv", self.csv)
-        wanted: dict[Kind, Path] = {kind: path for kind, path in asked if path is not None}
+        from app.clips.clip import Clip  # imports the pipeline, which the other commands here do without
+        from app.clips.csv_table import write_csv
+        from app.clips.exports import write_clip
+
+        wanted = {kind: path for kind in ("mcap", "rrd", "csv") if (path := getattr(self, kind)) is not None}
         if not wanted:
-            raise BadInput("nothing to write; say --rrd FILE, --mcap FILE or --csv FILE")
+            raise BadInput("nothing to write; add --rrd FILE, --mcap FILE or --csv FILE")
         source = self.source.open()
         first, last = _between(source, self.from_s, self.to_s)
-        params = self.line.parameters() if self.line.changes_parameters() else None
-        detectors = self.line.open_detectors(source) if wanted.keys() - {"mcap"} else Detectors()
+        session = source if isinstance(source, SessionSource) else None
+        given = self.pipeline.parameters() if self.pipeline.changes_parameters() else None
+        params = given or (session.params(first) if session is not None else None) or Params()
+        detectors = self.pipeline.open_detectors(source) if wanted.keys() - {"mcap"} else Detectors()
+        clip = Clip.of_source(source, params, first, last, detectors)
         with frames_progress() as bar:
             for kind, path in wanted.items():
-                task = bar.add_task(path.name, total=last + 1 - first)
-
-                def show(done: int, total: int, task: object = task) -> None:
-                    bar.update(task, completed=done, total=total)  # type: ignore[arg-type]
-
-                export_clip(source, first, last, path, kind, params=params, detectors=detectors, progress=show)
+                if kind == "csv" and given is None and session is not None and session.result(first) is not None:
+                    write_csv((session.result(index) for index in range(first, last + 1)), path)
+                else:
+                    write_clip(clip, kind, path, task_progress(bar, path.name))
         for path in wanted.values():
             print(f"cipv: {path}: {last + 1 - first} frames, {size_text(path.stat().st_size)}", file=sys.stderr)
         return 0
@@ -86,26 +90,25 @@ class Export:
 
 @dataclass(frozen=True)
 class Recover:
-    """Save every complete chunk of an MCAP file that was cut off: by a crash, a full disk, a pulled plug.
+    """Save every complete chunk of an MCAP file that was cut off by a crash, a full disk or a power failure.
 
     Example: cipv recover cut.mcap --out whole.mcap
     """
 
     file: tyro.conf.Positional[Path]
-    """The file to read; it stays as it is"""
+    """The file to read; it is not changed"""
     out: Path | None = None
-    """The file to write; else <name>_recovered.mcap beside it"""
+    """The file to write; default: <name>_recovered.mcap next to it"""
 
     def __call__(self) -> int:
         out = self.out or self.file.with_name(f"{self.file.stem}_recovered.mcap")
         with frames_progress() as bar:
-            task = bar.add_task(self.file.name, total=None)
-            saved = recover(self.file, out, lambda done, total: bar.update(task, completed=done, total=total))
+            saved = recover(self.file, out, task_progress(bar, self.file.name))
         lost_bytes = saved.size_bytes - saved.sound_bytes
-        hurt = [f"{size_text(lost_bytes)} at the end were no whole chunk"] if saved.is_cut else []
-        hurt += [f"{saved.lost_chunks} chunks are damaged and left out"] if saved.lost_chunks else []
+        hurt = [f"{size_text(lost_bytes)} at the end are no complete chunk"] if saved.is_cut else []
+        hurt += [f"{saved.lost_chunks} damaged chunks left out"] if saved.lost_chunks else []
         what = f"{saved.messages} messages in {saved.chunks} chunks, {saved.frames} frames"
-        print(f"cipv: {out}: {what}; {'; '.join(hurt) or 'nothing was missing'}")
+        print(f"cipv: {out}: {what}; {'; '.join(hurt) or 'nothing was lost'}")
         return 0
 
 

@@ -1,4 +1,4 @@
-"""What people want of the engine. There is no queue: a newer wish replaces an older one that was not served yet."""
+"""What clients want of the engine. There is no queue: a newer request replaces an older one that was not served yet."""
 
 from __future__ import annotations
 
@@ -13,25 +13,32 @@ from pipeline.params import Params, changes_of, with_changes
 
 @dataclass(frozen=True)
 class Wish:
-    """The standing wishes (playing, speed, loop, params) and the ones served once (uri, target, steps).
-
-    settled: the parameters are meant to stay; false while a slider is being dragged."""
+    """What clients want at one moment: standing values, and requests that are served once."""
 
     params: Params
     preset: str = "default"
+    """The preset that the parameters started from."""
     params_revision: int = 0
+    """Grows with every change of parameters."""
     settled: bool = True
+    """The parameters are meant to stay; false while a slider is being dragged."""
     playing: bool = False
     speed: float = 1.0
+    """Playback rate; 1 is real time."""
     loop: bool = True
+    """Playback starts again at the end of the drive."""
     uri: str | None = None
+    """Served once: the source to open."""
     target: int | None = None
+    """Served once: the frame to seek to."""
     steps: int = 0
+    """Served once: frames to move by."""
     stop: bool = False
+    """The engine shall end."""
 
 
 class Settling(Protocol):
-    """Hears of parameters that are meant to stay."""
+    """Called with changes of parameters that are meant to stay."""
 
     def __call__(self, changes: Mapping[str, tuple[Any, Any]], person: str, *, merges: bool) -> object:
         """changes: by dotted name (and ``preset``), before and after. merges: one step with the change before it."""
@@ -39,21 +46,23 @@ class Settling(Protocol):
 
 
 class Asking(Protocol):
-    """Hears that a person waits for something."""
+    """Called when a client starts to wait for something."""
 
     def __call__(self, *, rests: bool) -> object:
-        """rests: it is not the kind of thing that is soon asked for again."""
+        """rests: the request is not of a kind that usually repeats at once, as drags do."""
         ...
 
 
 PRESET = "preset"
-"""Among changes of parameters, the name of what they started from."""
+"""The name under which changes of parameters hold the preset."""
 
 
 class Control:
-    """The hand-over between any number of callers and the one worker. on_settle: called on the thread of who changed
-    parameters, before that returns, one change after the other. on_ask: called on the thread of who wants another
-    frame, source or parameters, or the end, before the worker takes that; it must be quick."""
+    """Hands requests from any number of threads to the one worker.
+
+    ``on_settle`` is called on the thread that changed parameters, before the call returns, one change after another.
+    ``on_ask`` is called on the thread that asks for another frame, source, parameters or the end, before the worker
+    takes the request; it must be quick."""
 
     def __init__(self, first: Wish) -> None:
         self.on_settle: Settling = lambda changes, person, *, merges: None

@@ -28,7 +28,7 @@ class Newest(Generic[_T]):
                 self.put(value)
 
     def take(self) -> _T | None:
-        """Wait for a value; null at the end, whether or not one is left."""
+        """Wait for a value; None at the end, whether or not one is left."""
         with self._condition:
             self._condition.wait_for(lambda: self._ended or self._value is not None)
             value, self._value = self._value, None

@@ -23,7 +23,7 @@ class BoundedCache(Generic[K, V]):
         return len(self._entries)
 
     def get(self, key: K) -> V | None:
-        """The entry, or null when it is not held. Reading counts as use."""
+        """The entry, or None when it is not held. Reading counts as use."""
         value = self._entries.get(key)
         if value is not None:
             self._entries.move_to_end(key)

@@ -13,7 +13,7 @@ Finite = Annotated[float, Field(gt=-FARTHEST_M, lt=FARTHEST_M, allow_inf_nan=Fal
 Meters = Annotated[float, Field(gt=0.0, le=LARGEST_SIDE_M, allow_inf_nan=False)]
 
 
-class GivenCuboid(BaseModel):
+class CuboidShape(BaseModel):
     """Ego frame, metres: centre x y z, length width height, turn of the length axis in radians."""
 
     model_config = ConfigDict(extra="forbid")

@@ -23,7 +23,7 @@ class PortTaken(BadInput):
 def listen_socket(host: str, port: int, *, strict: bool = False) -> socket.socket:
     """A bound socket on ``port`` or, unless ``strict``, the next free one above it. PortTaken when there is none."""
     if not 0 <= port <= _LAST_PORT:
-        raise PortTaken(f"{port} is no port: 0 to {_LAST_PORT}")
+        raise PortTaken(f"invalid port {port}; expected 0 to {_LAST_PORT}")
     candidates = [port] if strict or port == 0 else range(port, min(port + _PORTS_TO_TRY, _LAST_PORT + 1))
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for candidate in candidates:

@@ -11,7 +11,7 @@ from pipeline.common.geometry import Cuboid
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldCuboid:
     """A labelled cuboid that may be dragged in the 3D view. page: whose it is; track: its label; frame: that the page
     shows it in."""
 
@@ -20,23 +20,23 @@ class Held:
     frame: int
     cuboid: Cuboid
 
-    def is_of(self, other: Held | None) -> bool:
+    def is_of(self, other: HeldCuboid | None) -> bool:
         """The same label in the same frame at the same page, wherever it is."""
         return other is not None and (self.page, self.track, self.frame) == (other.page, other.track, other.frame)
 
 
-OnDrag = Callable[[Held, bool], None]
+OnDrag = Callable[[HeldCuboid, bool], None]
 """What is held, as it is now, and whether the hand has let go."""
 
 
-class Looks:
+class SharedViewState:
     """One selection for everybody, the newest; and how many pages hold a 3D view that they do not show. Any thread."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._selected: int | None = None
         self._hiding: set[object] = set()
-        self._held: Held | None = None
+        self._held: HeldCuboid | None = None
         self._listener: Callable[[], None] = lambda: None
         self._pages: Callable[[int | None], None] = lambda number: None
         self._on_drag: OnDrag = lambda held, ended: None
@@ -78,12 +78,12 @@ class Looks:
         self._listener()
 
     @property
-    def held(self) -> Held | None:
+    def held(self) -> HeldCuboid | None:
         """The newest cuboid that a page lets a hand take in the 3D view."""
         with self._lock:
             return self._held
 
-    def hold(self, held: Held) -> None:
+    def hold(self, held: HeldCuboid) -> None:
         with self._lock:
             self._held = held
         self._listener()
@@ -100,7 +100,7 @@ class Looks:
         """Call ``listener`` when what is held is dragged; there is one."""
         self._on_drag = listener
 
-    def drag(self, held: Held, ended: bool) -> None:
+    def drag(self, held: HeldCuboid, ended: bool) -> None:
         """A hand has this label and has brought it there, whatever else is held by now. Any thread."""
         with self._lock:
             if held.is_of(self._held):

@@ -1,4 +1,4 @@
-"""Whole drives computed in the background: the newest wish first, and never in the way of the frame that is shown."""
+"""Runs over whole drives in the background: the newest request first, and interactive requests take priority."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from app.core.line import DetectionCache
-from app.drive.compute_scheduler import Turn
+from app.core.detection_cache import DetectionCache
+from app.drive.compute_scheduler import ComputeScheduler
 from app.drive.full_run import DriveRun
-from app.drive.open_recording import Recipe, Recording
+from app.drive.open_recording import OpenRecording, RunSetup
 from pipeline.common.errors import BadInput
 from pipeline.inference.cancellation import Stopped
 from pipeline.params import Params
@@ -30,32 +30,38 @@ Phase = Literal["detect", "run", "done", "failed"]
 
 @dataclass(frozen=True)
 class DriveState:
-    """How far the run of the present parameters is; run and base are ids, null without one. revision grows whenever
-    there is something new to fetch. phase detect: networks still look at pictures for the first time."""
+    """How far the run of the present parameters over the whole drive is."""
 
     revision: int = 0
+    """Grows whenever there is something new to fetch."""
     run: int | None = None
+    """Number of the run; None without one."""
     base: int | None = None
+    """Number of the run that it is compared with."""
     done: int = 0
+    """Frames that have been run."""
     total: int = 0
+    """Frames of the drive."""
     running: bool = False
     phase: Phase = "done"
+    """``detect`` while networks run on pictures for the first time, ``run`` afterwards."""
     note: str = ""
+    """Why the run failed."""
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
 
 
-class Drives:
-    """``open`` a recording, ``want`` parameters; read ``recording``. on_change is called on any thread when ``state``
-    changed, at most every 0.25 s while a run goes on."""
+class BackgroundRuns:
+    """``open`` a recording, ``want`` parameters, read ``recording``. ``on_change`` is called on any thread when
+    ``state`` has changed, at most every 0.25 s while a run is in progress."""
 
     def __init__(self, detections: DetectionCache) -> None:
-        self.turn = Turn()
+        self.turn = ComputeScheduler()
         self.on_change: Callable[[], object] = lambda: None
         self._detections = detections
         self._condition = threading.Condition(threading.RLock())
-        self._recording: Recording | None = None
+        self._recording: OpenRecording | None = None
         self._ended = False
         self._revision = 0
         self._told_s = 0.0
@@ -63,17 +69,17 @@ class Drives:
         self._thread = threading.Thread(target=self._work, name="cipv-drives", daemon=True)
 
     @property
-    def recording(self) -> Recording | None:
-        """The open recording; null when there is none whose whole drive can be known."""
+    def recording(self) -> OpenRecording | None:
+        """The open recording; None for live sensors, or when nothing is open."""
         return self._recording
 
     @property
     def state(self) -> DriveState:
         with self._condition:
             recording = self._recording
-            if recording is None or recording.book.current is None:
+            if recording is None or recording.runs.current is None:
                 return DriveState(self._revision)
-            run, base = recording.book.current, recording.book.base
+            run, base = recording.runs.current, recording.runs.base
             phase: Phase = "failed" if run.note else "done" if run.is_complete else self._phase
             return DriveState(
                 self._revision,
@@ -92,7 +98,7 @@ class Drives:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the thread; a network that runs for it is stopped, a read in progress is finished first."""
+        """End the thread. A running network is stopped; a read in progress is finished first."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()
@@ -100,31 +106,31 @@ class Drives:
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(_PATIENCE_S)
 
-    def open(self, recipe: Recipe | None) -> None:
+    def open(self, setup: RunSetup | None) -> None:
         """Another recording, or none."""
         with self._condition:
-            number = self._recording.book.next_number if self._recording else 1
-            self._recording = Recording(recipe, self._detections, number) if recipe is not None else None
+            number = self._recording.runs.next_number if self._recording else 1
+            self._recording = OpenRecording(setup, self._detections, number) if setup is not None else None
             self.changed()
 
     def want(self, params: Params, preset: str) -> None:
-        """Compute the drive with these parameters, if it is not yet. What was being computed gives way."""
+        """Run the drive with these parameters unless that has been done. Other runs wait meanwhile."""
         recording = self._recording
-        if recording is not None and recording.book.want(params, preset):
+        if recording is not None and recording.runs.want(params, preset):
             self.changed()
 
     def offer(self, frame: Frame) -> None:
-        """A frame that the line has just taken: it need not be read and looked at once more."""
+        """Reuse a frame that has just been read and detected in."""
         if self._recording is not None:
             self._recording.inputs.offer(frame)
 
     def state_before(self, index: int, params: Params) -> State | None:
-        """The state in which the whole-drive run comes to a frame; null where it has not come that far."""
+        """The state with which the whole-drive run arrives at a frame; None if it has not got that far."""
         recording = self._recording
         return recording.state_before(index, params) if recording is not None else None
 
     def changed(self) -> None:
-        """There is something new to fetch or to compute."""
+        """Announce that there is something new to fetch or to compute."""
         with self._condition:
             self._revision += 1
             self._told_s = time.monotonic()
@@ -140,18 +146,18 @@ class Drives:
                 self._advance(*work)
             del work  # a recording that is open no more is not kept while there is nothing to do
 
-    def _next(self) -> tuple[Recording, DriveRun] | None:
-        """Wait for a run that is not finished; null at the end."""
+    def _next(self) -> tuple[OpenRecording, DriveRun] | None:
+        """Wait for a run that is not finished; None at the end."""
         with self._condition:
             while not self._ended:
                 recording = self._recording
-                run = recording.book.unfinished() if recording is not None else None
+                run = recording.runs.unfinished() if recording is not None else None
                 if recording is not None and run is not None:
                     return recording, run
                 self._condition.wait()
             return None
 
-    def _advance(self, recording: Recording, run: DriveRun) -> None:
+    def _advance(self, recording: OpenRecording, run: DriveRun) -> None:
         """One frame. Stopped leaves the run as it was."""
         began = time.perf_counter()
         self._phase = "run" if recording.has_been_looked_at(run.done) else "detect"
@@ -162,7 +168,7 @@ class Drives:
         except BadInput as error:
             run.note = str(error)
         except Exception as error:  # whatever a recording or a network does, other runs go on
-            logger.exception("frame %s of %s", run.done, recording.recipe.uri)
+            logger.exception("frame %s of %s", run.done, recording.setup.uri)
             run.note = f"frame {run.done + 1}: {type(error).__name__}: {error}"
         finally:
             run.seconds += time.perf_counter() - began

@@ -19,7 +19,7 @@ SAME_PLACE_M = 0.5
 
 @dataclass(frozen=True)
 class Metric:
-    """One figure of both runs. better: which way is good; null where neither is."""
+    """One figure of both runs. better: which way is good; None where neither is."""
 
     name: str
     unit: str

@@ -1,4 +1,4 @@
-"""Who may compute now: what a person waits for comes first, whole drives get the rest.
+"""Shares the processor: interactive requests take priority, runs over whole drives get the rest.
 
 All share the processor with the page that is drawn, and Python. So the background asks here before each piece of work
 (one frame: some 5 ms, with networks 200). It waits while the foreground is at work, and while a hand moves: who asked
@@ -25,11 +25,11 @@ _CREDIT_S = 0.03
 _LONGEST_WAIT_S = 0.3
 """For a frame that is shown, while a drive plays."""
 _LONGEST_FRONT_S = 2.0
-"""Work in front that never ends, as of sensors that tick faster than the line runs, and hands that never rest slow the
-background down; they do not stop it."""
+"""Work in front that never ends, as with sensors that tick faster than the pipeline runs, and endless input only slow
+the background down; they do not stop it."""
 
 
-class Turn:
+class ComputeScheduler:
     """Shared by the threads in front, those in the background, and whoever asks for something."""
 
     def __init__(self) -> None:
@@ -58,12 +58,12 @@ class Turn:
 
     @property
     def rest_s(self) -> float:
-        """Seconds until the hand is taken to rest."""
+        """Seconds until input is considered to have stopped."""
         return max(0.0, self._rests_at_s - time.monotonic())
 
     @contextmanager
     def foreground(self) -> Iterator[None]:
-        """Work that goes first. Not for waiting: nobody else works meanwhile."""
+        """Work that takes priority. Not for waiting: nothing else runs meanwhile."""
         with self._condition:
             self._in_front += 1
         try:

@@ -28,7 +28,7 @@ def without_pixels(frame: Frame) -> Frame:
 
 
 class InputStore:
-    """The frames of one recording as the line takes them, by index. Any thread.
+    """The frames of one recording as ``step`` takes them, by index. Any thread.
 
     It fills until it is full and then keeps what it has: runs go through a drive from its beginning, and a store that
     let the oldest go would, for a drive that does not fit, never have the frame that is asked for next."""
@@ -44,11 +44,11 @@ class InputStore:
         return len(self._frames)
 
     def get(self, index: int) -> Frame | None:
-        """The frame without pixels; null when it is not held."""
+        """The frame without pixels; None when it is not held."""
         return self._frames.get(index)
 
     def name(self, index: int) -> str | None:
-        """What the recording calls a frame; null when it was not seen yet. Of all frames, also of those not held."""
+        """What the recording calls a frame; None when it was not seen yet. Of all frames, also of those not held."""
         return self._names.get(index)
 
     def offer(self, frame: Frame) -> None:

@@ -1,6 +1,6 @@
 """One frame of a drive as a row of plain values, and one object in it as a record: what timelines and events need.
 
-A row is some 200 bytes and an object 130, so that a whole drive fits where its results would not. Null in a row, NaN
+A row is some 200 bytes and an object 130, so that a whole drive fits where its results would not. None in a row, NaN
 and 0 in a record (``source``) stand for what is not known.
 """
 
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from app.drive.timeline_columns import EXTRA_COLUMNS, ColumnValue
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.evaluation.lead_verdict import Judged
 from pipeline.fusion.rows import LIDAR_RANGE_SIGMA_M
@@ -57,8 +58,7 @@ Objects = npt.NDArray[np.void]
 
 
 class Row(NamedTuple):
-    """One frame. What belongs to the CIPV is null without one. gaps: the sensors that gave nothing, comma-joined.
-    ``judged`` is the verdict against truth, null where there is none."""
+    """One frame. What belongs to the CIPV is None without one."""
 
     t_ns: int
     cipv_id: int | None
@@ -73,16 +73,21 @@ class Row(NamedTuple):
     accel_mps2: float | None
     brake: float | None
     acc_state: str | None
-    next_cipv_id: int | None
-    objects: int
     gaps: str
+    """The sensors without data, joined by commas."""
     vl_disagreement_m: float | None
-    notes: int
     judged: Judged | None
+    """The verdict against truth; None where there is none."""
+    extra: tuple[ColumnValue, ...] = ()
+    """Values of ``EXTRA_COLUMNS``, in their order."""
 
 
-COLUMNS = tuple(name for name in Row._fields if name not in ("t_ns", "judged"))
-"""The names that a page gets, in their order."""
+_OWN_COLUMNS = tuple(name for name in Row._fields if name not in ("t_ns", "judged", "extra"))
+
+
+def column_names() -> tuple[str, ...]:
+    """The columns that ``GET /api/drive`` answers, in their order."""
+    return (*_OWN_COLUMNS, *EXTRA_COLUMNS)
 
 
 def row_of(frame: Frame, result: Result, judged: Judged | None = None) -> Row:
@@ -104,12 +109,10 @@ def row_of(frame: Frame, result: Result, judged: Judged | None = None) -> Row:
         accel_mps2=acc.accel_mps2 if acc else None,
         brake=acc.brake if acc else None,
         acc_state=acc.state if acc else None,
-        next_cipv_id=result.next_cipv.id if result.next_cipv else None,
-        objects=len(result.objects),
         gaps=",".join(_missing(frame)),
         vl_disagreement_m=abs(gap[0]) if gap else None,
-        notes=len(result.notes),
         judged=judged,
+        extra=tuple(column(frame, result) for column in EXTRA_COLUMNS.values()),
     )
 
 
@@ -143,7 +146,8 @@ def objects_of(result: Result) -> Objects:
 
 def columns_json(rows: Sequence[Row]) -> dict[str, list[Any]]:
     """``{"cipv_id": […], …}``, numbers rounded as results are."""
-    return {name: [_plain(getattr(row, name)) for row in rows] for name in COLUMNS}
+    own = {name: [_plain(getattr(row, name)) for row in rows] for name in _OWN_COLUMNS}
+    return own | {name: [_plain(row.extra[place]) for row in rows] for place, name in enumerate(EXTRA_COLUMNS)}
 
 
 def object_json(frames: Iterable[tuple[int, Objects]], object_id: int) -> dict[str, list[Any]]:

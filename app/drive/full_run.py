@@ -23,10 +23,11 @@ _MOST_STATES = 4000
 _THIN_STATES = 500
 
 
-class Kept(NamedTuple):
-    """The state before frame ``at``."""
+class KnownState(NamedTuple):
+    """The pipeline's state before a frame of the whole-drive run."""
 
     at: int
+    """Index of the frame."""
     state: State
 
 
@@ -42,7 +43,7 @@ class DriveRun:
         self._objects: list[Objects] = []
         self._every = max(1, -(-total // _MOST_STATES))
         self._states: dict[int, State] = {}
-        self._head = Kept(0, State())
+        self._head = KnownState(0, State())
 
     @property
     def done(self) -> int:
@@ -62,7 +63,7 @@ class DriveRun:
             self._states[index] = before
         self._rows.append(row_of(frame, result, judged))
         self._objects.append(objects_of(result))
-        self._head = Kept(index + 1, after)
+        self._head = KnownState(index + 1, after)
 
     def rows(self, first: int = 0) -> list[Row]:
         """The rows of frames first … done−1."""
@@ -72,13 +73,13 @@ class DriveRun:
         """(index, records) of every frame that is there."""
         return list(enumerate(self._objects[: self.done]))
 
-    def nearest_state(self, index: int) -> Kept | None:
-        """The last kept state at or before ``index``; null where the pass has not come that far."""
+    def nearest_state(self, index: int) -> KnownState | None:
+        """The last kept state at or before ``index``; None where the pass has not come that far."""
         head, states = self._head, self._states
         if index >= head.at:
             return head if index == head.at else None
         at = next((kept for kept in range(index, -1, -1) if kept in states), None)
-        return Kept(at, states[at]) if at is not None else None
+        return KnownState(at, states[at]) if at is not None else None
 
     def thin(self) -> None:
         """Keep fewer states: a run that is not looked at needs them only once it is taken again."""

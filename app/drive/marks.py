@@ -23,7 +23,7 @@ class MarkRefused(BadInput):
 
 
 @dataclass(frozen=True)
-class Mark:
+class SavedMark:
     """A marked frame of one recording; ``id`` is its number there. t_ns: the frame's stamp, which is what counts for
     one of live sensors. in_session: it went into a session that was being recorded, too."""
 
@@ -35,26 +35,28 @@ class Mark:
 
 
 class Marks:
-    """By recording. Any thread. folder: one small file a recording is kept there; null keeps them in memory only."""
+    """By recording. Any thread. folder: one small file a recording is kept there; None keeps them in memory only."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self._folder = folder
         self._lock = threading.Lock()
-        self._marks: dict[str, list[Mark]] = {}
+        self._marks: dict[str, list[SavedMark]] = {}
 
-    def of(self, uri: str) -> list[Mark]:
+    def of(self, uri: str) -> list[SavedMark]:
         """By frame."""
         with self._lock:
             return sorted(self._loaded(uri), key=lambda mark: (mark.index, mark.id))
 
-    def add(self, uri: str, index: int, text: str = "", *, t_ns: int | None = None, in_session: bool = False) -> Mark:
+    def add(
+        self, uri: str, index: int, text: str = "", *, t_ns: int | None = None, in_session: bool = False
+    ) -> SavedMark:
         """MarkRefused when there are too many, or when they cannot be kept."""
         with self._lock:
             marks = self._loaded(uri)
             if len(marks) >= MOST_MARKS:
-                raise MarkRefused(f"a recording holds {MOST_MARKS} marks at most")
+                raise MarkRefused(f"a recording can have at most {MOST_MARKS} marks")
             number, words = max((each.id for each in marks), default=0) + 1, " ".join(text.split())[:LONGEST_TEXT]
-            mark = Mark(number, index, words, t_ns, in_session)
+            mark = SavedMark(number, index, words, t_ns, in_session)
             self._save(uri, [*marks, mark])
             return mark
 
@@ -67,12 +69,12 @@ class Marks:
                 self._save(uri, rest)
             return len(rest) < len(marks)
 
-    def _loaded(self, uri: str) -> list[Mark]:
+    def _loaded(self, uri: str) -> list[SavedMark]:
         if uri not in self._marks:
             self._marks[uri] = _read(self._file(uri))
         return self._marks[uri]
 
-    def _save(self, uri: str, marks: list[Mark]) -> None:
+    def _save(self, uri: str, marks: list[SavedMark]) -> None:
         file = self._file(uri)
         if file is not None:
             text = json.dumps({"uri": uri, "marks": [asdict(mark) for mark in marks]}, ensure_ascii=False)
@@ -82,7 +84,7 @@ class Marks:
                 partial.write_text(text, encoding="utf-8")
                 os.replace(partial, file)
             except OSError as error:
-                raise MarkRefused(f"{file}: the mark cannot be kept: {error.strerror}") from None
+                raise MarkRefused(f"{file}: the mark cannot be saved: {error.strerror}") from None
         self._marks[uri] = marks
 
     def _file(self, uri: str) -> Path | None:
@@ -92,7 +94,7 @@ class Marks:
         return self._folder / f"{hashlib.sha256(uri.encode()).hexdigest()[:16]}.json"
 
 
-def _read(file: Path | None) -> list[Mark]:
+def _read(file: Path | None) -> list[SavedMark]:
     """What was kept; a file that is missing or damaged holds no marks."""
     if file is None:
         return []
@@ -103,10 +105,10 @@ def _read(file: Path | None) -> list[Mark]:
         return []
 
 
-def _mark(row: dict[str, Any]) -> Mark:
+def _mark(row: dict[str, Any]) -> SavedMark:
     """As it was written; what was written before marks had a time has none."""
     t_ns = row.get("t_ns")
-    return Mark(
+    return SavedMark(
         int(row["id"]),
         int(row["index"]),
         str(row["text"]),

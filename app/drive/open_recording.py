@@ -10,35 +10,37 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from app.core.line import DetectionCache
+from app.core.detection_cache import DetectionCache
 from app.drive.frame_inputs import InputStore
-from app.drive.full_run import DriveRun, Kept, calibration_digest, digest
-from app.drive.run_registry import RunBook
+from app.drive.full_run import DriveRun, KnownState, calibration_digest, digest
+from app.drive.run_registry import RunRegistry
 from pipeline.common.progress import Progress
-from pipeline.detection import Detectors, detect
+from pipeline.detection import Detectors
 from pipeline.evaluation.lead_verdict import LeadRule
 from pipeline.params import Params
-from pipeline.run import Sensors, only
+from pipeline.run import Sensors, sensed
 from pipeline.step import State, step
 from pipeline.types import F64, I64, Frame
 from pipeline.types.source import Mark, Marked, Source, TruthObject, is_simulated
 
 if TYPE_CHECKING:
-    from pipeline.labels.formats.base import Drive
+    from pipeline.labels.formats.base import LabeledDrive
 
 RULE = LeadRule()
 Truth = tuple[TruthObject, ...] | None
 
 
 @dataclass(frozen=True, eq=False)
-class Recipe:
-    """What every run of a recording is made from. source: the one that is shown too, which any thread may read.
-    timeline_s: (total,) each frame's place on the playback timeline."""
+class RunSetup:
+    """What every run of a recording is made from."""
 
     source: Source
+    """Also read for the shown frames; safe on any thread."""
     timeline_s: F64
+    """(total,) place of each frame on the playback timeline, in seconds."""
     detectors: Detectors
     sensors: Sensors
+    """The sensors whose data the pipeline may use."""
 
     @property
     def uri(self) -> str:
@@ -50,21 +52,23 @@ class Recipe:
 
     @property
     def simulated(self) -> bool:
-        """Whether its truth is the simulator's."""
+        """Whether the truth comes from the simulator."""
         return is_simulated(self.source)
 
 
-class Recording:
-    """Frames are read from the source that is shown, also at the same moment."""
+class OpenRecording:
+    """An open recording. Its source may be read at the same time for the shown frame."""
 
-    def __init__(self, recipe: Recipe, detections: DetectionCache, next_number: int) -> None:
-        self.recipe = recipe
-        self.book = RunBook(lambda number, params, preset: DriveRun(number, params, preset, recipe.total), next_number)
+    def __init__(self, setup: RunSetup, detections: DetectionCache, next_number: int) -> None:
+        self.setup = setup
+        self.runs = RunRegistry(
+            lambda number, params, preset: DriveRun(number, params, preset, setup.total), next_number
+        )
         self.inputs = InputStore()
-        self._ask = detections.asker(recipe.uri)
+        self._ask = detections.look_at(setup.uri)
         self._truths: dict[int, Truth] = {}
         self.describing = Lock()
-        self.described: Drive | None = None
+        self.described: LabeledDrive | None = None
         """What files of labels must know of it, once somebody has asked; held by ``describing`` meanwhile."""
 
     def advance(self, run: DriveRun) -> None:
@@ -73,83 +77,83 @@ class Recording:
         run.add(self.input(index), self.truth(index), RULE)
 
     def state_before(self, index: int, params: Params) -> State | None:
-        """The state in which the run of these parameters came to a frame; null where it has not come that far."""
-        run = self.book.of(params)
+        """The state with which the run of these parameters arrived at a frame; None if it has not got that far."""
+        run = self.runs.of(params)
         kept = run.nearest_state(index) if run is not None else None
         return self._onwards(kept, index, params) if kept is not None else None
 
+    def last_known_state(self, index: int, params: Params) -> KnownState:
+        """The last state that is known at or before a frame; that of the beginning where no run has been made."""
+        run = self.runs.of(params)
+        known = run.nearest_state(min(index, run.done)) if run is not None else None
+        return known or KnownState(0, State())
+
     def state_from_start(self, index: int, params: Params) -> State:
-        """The same, computed here as far as no run has come."""
-        run = self.book.of(params)
-        kept = run.nearest_state(min(index, run.done)) if run is not None else None
-        return self._onwards(kept or Kept(0, State()), index, params)
+        """The state in which the run of these parameters arrives at a frame, computed here as far as none has come."""
+        return self._onwards(self.last_known_state(index, params), index, params)
 
     def input(self, index: int) -> Frame:
-        """A frame as the line takes it; its picture may be without pixels."""
+        """A frame as ``step`` takes it; its picture may be without pixels."""
         held = self.inputs.get(index)
         return held if held is not None else self.frame(index)
 
     def frame(self, index: int) -> Frame:
-        """A frame as the line takes it, from the source, with its picture."""
-        frame = self.as_read(index)
-        frame = only(detect(frame, self._detectors, self._ask), self.recipe.sensors)
+        """A frame as ``step`` takes it, from the source, with its picture."""
+        frame = sensed(self.as_read(index), self.setup.detectors, self.setup.sensors, self._ask)
         self.inputs.offer(frame)
         return frame
 
     def has_been_looked_at(self, index: int) -> bool:
-        """Whether no detector has to look at a frame any more before the line runs."""
-        return self._detectors == Detectors() or self.inputs.get(index) is not None
-
-    @property
-    def _detectors(self) -> Detectors:
-        return Detectors() if self.recipe.sensors == "lidar" else self.recipe.detectors
+        """Whether no network has to run on a frame any more."""
+        is_without = self.setup.sensors == "lidar" or self.setup.detectors == Detectors()
+        return is_without or self.inputs.get(index) is not None
 
     def as_read(self, index: int) -> Frame:
-        """A frame as its source gives it: no detector has looked at it."""
-        return self.recipe.source.frame(index)
+        """A frame as its source gives it, without detections."""
+        return self.setup.source.frame(index)
 
     def names(self) -> tuple[str, ...]:
-        """What the recording calls its frames; those that nobody saw yet are read."""
-        return tuple(self.inputs.name(index) or self.as_read(index).name for index in range(self.recipe.total))
+        """The names of all frames; frames that were not read yet are read."""
+        return tuple(self.inputs.name(index) or self.as_read(index).name for index in range(self.setup.total))
 
     @cached_property
     def marks(self) -> tuple[Mark, ...]:
         """What was marked while it was recorded."""
-        return self.recipe.source.marks() if isinstance(self.recipe.source, Marked) else ()
+        return self.setup.source.marks() if isinstance(self.setup.source, Marked) else ()
 
     @cached_property
     def stamps_ns(self) -> I64:
         """(total,) when each frame was."""
-        return np.array([self.recipe.source.t_ns(index) for index in range(self.recipe.total)], np.int64)
+        return np.array([self.setup.source.t_ns(index) for index in range(self.setup.total)], np.int64)
 
     def at_hand(self, index: int) -> Frame:
-        """A frame as the line takes it, its picture without pixels, if it is held; else as its source gives it."""
+        """A frame as ``step`` takes it, without pixels, if it is cached; otherwise as its source gives it."""
         return self.inputs.get(index) or self.as_read(index)
 
     def save(self, path: Path, first: int, last: int, progress: Progress) -> None:
-        """Frames as a session file, with all that the source has."""
+        """Write frames to a session file, with all data of the source."""
         from pipeline.recording.save import save  # MCAP takes 0.2 s to import: only who saves pays
 
-        save(self.recipe.source, path, first, last, progress)
+        save(self.setup.source, path, first, last, progress)
 
     def truth(self, index: int) -> Truth:
-        """The labelled objects of a frame; null when it is not labelled."""
+        """The labelled objects of a frame; None if it is not labelled."""
         if index not in self._truths:
-            self._truths[index] = self.recipe.source.truth(index)
+            self._truths[index] = self.setup.source.truth(index)
         return self._truths[index]
 
     def digest(self, params: Params) -> str:
         """What a run is made from, as twelve characters."""
-        detectors = self.recipe.detectors
+        detectors = self.setup.detectors
         names = [each.name for each in (detectors.boxes, detectors.lanes) if each is not None]
-        return digest(self.recipe.uri, names, self.recipe.sensors, params)
+        return digest(self.setup.uri, names, self.setup.sensors, params)
 
     def calibration_digest(self, params: Params) -> str:
         """With which calibration pictures and points are laid on each other, as twelve characters."""
         return calibration_digest(self.at_hand(0).camera, params)
 
-    def _onwards(self, kept: Kept, index: int, params: Params) -> State:
-        state = kept.state
-        for between in range(kept.at, index):
+    def _onwards(self, known: KnownState, index: int, params: Params) -> State:
+        state = known.state
+        for between in range(known.at, index):
             state, _ = step(state, self.input(between), params)
         return state

@@ -1,4 +1,4 @@
-"""The runs of one recording: which is shown, which is compared against, which a person keeps."""
+"""The runs of one recording: the present one, the base of comparison, and the saved ones."""
 
 from __future__ import annotations
 
@@ -15,16 +15,15 @@ LONGEST_NAME = 80
 
 
 class NoSuchRun(BadInput):
-    """A run that is not, or no longer, there."""
+    """A run that does not exist, or no longer does."""
 
 
 class RunRefused(BadInput):
-    """Something that cannot be done to a run; the text says why."""
+    """An operation that a run does not allow; the text says why."""
 
 
-class RunBook:
-    """Any thread. current: of the present parameters. base: what others are compared against, at first the first one.
-    Runs that nobody kept go when newer ones come."""
+class RunRegistry:
+    """The runs of one recording. Unsaved runs are discarded when newer ones are made. Any thread."""
 
     def __init__(self, new_run: Callable[[int, Params, str], DriveRun], next_number: int = 1) -> None:
         self._new_run = new_run
@@ -36,10 +35,12 @@ class RunBook:
 
     @property
     def current(self) -> DriveRun | None:
+        """The run of the present parameters."""
         return self._current
 
     @property
     def base(self) -> DriveRun | None:
+        """The run that others are compared with; at first the first one."""
         return self._base
 
     @property
@@ -57,16 +58,16 @@ class RunBook:
         with self._lock:
             found = next((run for run in self._runs if run.number == number), None)
         if found is None:
-            raise NoSuchRun(f"there is no run {number}")
+            raise NoSuchRun(f"run {number} not found")
         return found
 
     def of(self, params: Params) -> DriveRun | None:
-        """The run with these parameters; null when there is none."""
+        """The run with these parameters; None when there is none."""
         with self._lock:
             return next((run for run in reversed(self._runs) if run.params == params), None)
 
     def want(self, params: Params, preset: str) -> bool:
-        """Make the run of these parameters the current one; true when it was another before."""
+        """Make the run of these parameters the current one; true if it was another before."""
         with self._lock:
             if self._current is not None and self._current.params == params:
                 return False
@@ -83,17 +84,17 @@ class RunBook:
             return True
 
     def unfinished(self) -> DriveRun | None:
-        """What to compute next: the newest wish before all else, then what it is compared against, then kept ones."""
+        """The run to continue next: the current one, then the base, then saved ones."""
         with self._lock:
             wanted = [self._current, self._base, *(run for run in self._runs if run.kept)]
         return next((run for run in wanted if run is not None and not run.is_complete and not run.note), None)
 
     def keep(self, number: int, name: str) -> DriveRun:
-        """Keep a run under a name, or rename it. RunRefused when too many are kept."""
+        """Save a run under a name, or rename it. RunRefused when too many are saved."""
         with self._lock:
             run = self.get(number)
             if not run.kept and sum(each.kept for each in self._runs) >= MOST_KEPT:
-                raise RunRefused(f"{MOST_KEPT} runs are kept already; delete one first")
+                raise RunRefused(f"{MOST_KEPT} runs are saved already; delete one first")
             run.kept, run.name = True, " ".join(name.split())[:LONGEST_NAME]
             return run
 
@@ -108,7 +109,7 @@ class RunBook:
         with self._lock:
             run = self.get(number)
             if run is self._current or run is self._base:
-                raise RunRefused("the present run and the one it is compared against stay")
+                raise RunRefused("the present run and the base of comparison cannot be deleted")
             self._runs.remove(run)
 
     def _let_go(self) -> None:

@@ -19,8 +19,8 @@ OpenLanes = Callable[[AnySource], Detects[RawLanes] | None]
 
 
 class DetectorPool:
-    """``open_detector`` and ``open_lanes`` give those for a source's pictures; null: none, and nothing is said about
-    it. lanes_every: lanes are looked for in every n-th frame; null: as the lane detector is quick."""
+    """``open_detector`` and ``open_lanes`` give those for a source's pictures; None: none, and nothing is said about
+    it. lanes_every: lanes are looked for in every n-th frame; None: as the lane detector is quick."""
 
     def __init__(
         self,
@@ -32,11 +32,11 @@ class DetectorPool:
         self._open_lanes = open_lanes if sensors != "lidar" else None
         self._lanes_every = lanes_every
         self._open = open_detector if sensors != "lidar" else None
-        self._without = "LiDAR goes on alone." if sensors == "both" else "Without one the camera finds nothing."
+        self._without = "Running on LiDAR alone." if sensors == "both" else "Without it, no object can be detected."
         self._opened: dict[tuple[bool, tuple[int, int] | None], Detects[RawBoxes]] = {}
 
     def both_for(self, source: AnySource, notices: list[Notice]) -> Detectors:
-        """What looks at the source's pictures; what is missing is null, and a notice says so. Nothing where detections
+        """What looks at the source's pictures; what is missing is None, and a notice says so. Nothing where detections
         come with them."""
         if brings_detections(source):
             return Detectors()
@@ -52,7 +52,7 @@ class DetectorPool:
         try:
             lanes = self._open_lanes(source)
         except (DetectorMissing, DetectorError) as error:
-            notices.append(Notice("warning", f"{error} Lane lines are not looked for."))
+            notices.append(Notice("warning", f"{error} No lane detection."))
             return None
         notices += [Notice("info", note) for note in lanes.notes] if lanes is not None else []
         return lanes

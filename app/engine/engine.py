@@ -1,4 +1,4 @@
-"""The one worker: it owns what is open, and shows a ``Snapshot`` after everything it does.
+"""The engine's worker thread: it owns the open source, and publishes a ``Snapshot`` after each thing it does.
 
 Callers say what they want through ``control``; the newest wish wins. What a wish makes of a recording or of sensors is
 its player's: ``app/playing/``.
@@ -10,18 +10,22 @@ import logging
 import threading
 import time
 from dataclasses import replace
+from functools import partial
 from typing import Protocol, cast
 
 from app.core.control import Control, Wish
-from app.core.line import DetectionCache, Line, Tick
-from app.drive.background_runs import Drives
-from app.drive.open_recording import Recipe
+from app.core.detection_cache import DetectionCache
+from app.core.jobs import BackgroundJob, JobStatus
+from app.drive.background_runs import BackgroundRuns
+from app.drive.open_recording import RunSetup
 from app.engine.detector_pool import DetectorPool, OpenDetector, OpenLanes
 from app.engine.player import Player
+from app.engine.processed_frame import ProcessedFrame
 from app.engine.recorded_player import RecordedPlayer
-from app.engine.session_recording import RecordingDesk
-from app.engine.shown import Showing
+from app.engine.seekable_pipeline import SeekablePipeline
+from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Notice, Snapshot
+from app.engine.snapshot_publisher import SnapshotPublisher
 from app.labels.service.desk import LabelDesk
 from pipeline.common.progress import Progress
 from pipeline.detection import Detectors
@@ -36,10 +40,10 @@ _PATIENCE_S = 10.0
 _TELL_EVERY_S = 0.25
 _ABLATION: dict[Sensors, tuple[str, ...]] = {
     "both": (),
-    "lidar": ("by the LiDAR alone: nothing looks at the pictures",),
-    "camera": ("by the camera alone: the LiDAR's points are left out",),
+    "lidar": ("LiDAR only: no detection in the pictures",),
+    "camera": ("Camera only: LiDAR points are not used",),
 }
-"""What people are told who see only a part of what is there."""
+"""Notices about sensors that are left out."""
 
 
 class OpenSource(Protocol):
@@ -50,7 +54,7 @@ class OpenSource(Protocol):
 
 class Engine:
     """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
-    one for a source's pictures; null runs without a camera's detector and says nothing about it; ``open_lanes`` gives
+    one for a source's pictures; None runs without a camera's detector and says nothing about it; ``open_lanes`` gives
     the lane detector, which looks at every ``lanes_every``-th frame. ``whole_drives``: a recording's whole drive is
     computed in the background (``drives``), so that any frame is shown as it is in it. ``desk``: where what is shown
     can be recorded; by default into the folder of this machine's sessions. ``labels``: what people say of it, and the
@@ -69,18 +73,18 @@ class Engine:
         whole_drives: bool = False,
         open_lanes: OpenLanes | None = None,
         lanes_every: int | None = None,
-        desk: RecordingDesk | None = None,
+        desk: SessionRecorder | None = None,
         labels: LabelDesk | None = None,
     ) -> None:
         self.control = Control(Wish(params, preset, uri=uri, playing=playing))
-        self._showing = Showing(Snapshot(params, preset))
-        self.listen, self.wait_for = self._showing.listen, self._showing.wait_for
+        self._publisher = SnapshotPublisher(Snapshot(params, preset))
+        self.listen, self.wait_for = self._publisher.listen, self._publisher.wait_for
         self._open_source = open_source
         self._sensors: Sensors = sensors
         self._detections = DetectionCache()
-        self.drives = Drives(self._detections)
+        self.drives = BackgroundRuns(self._detections)
         self.control.on_ask = self.drives.turn.asked
-        self.desk = desk or RecordingDesk()
+        self.desk = desk or SessionRecorder()
         self.labels = labels or LabelDesk()
         self._whole_drives = whole_drives
         self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every)
@@ -116,7 +120,7 @@ class Engine:
     @property
     def snapshot(self) -> Snapshot:
         """What is shown now. ``listen`` and ``wait_for`` tell what is shown next."""
-        return self._showing.snapshot
+        return self._publisher.snapshot
 
     # ------------------------------------------------------------ the worker
 
@@ -144,24 +148,29 @@ class Engine:
         if player is not None:
             player.wait(wish.params)
         with turn.foreground():
-            tick = player.serve(wish, self.snapshot) if player is not None else None
-            self._show(wish, tick)
+            processed = player.serve(wish, self.snapshot) if player is not None else None
+            self._show(wish, processed)
 
     # ------------------------------------------------------------ opening
 
     def _open(self, uri: str) -> bool:
         """Replace what is open; when it cannot be opened the old one stays, a notice says why, and this is false. One
         that takes long is given up for a newer wish."""
-        self._showing.publish(replace(self.snapshot, busy=f"Opening {uri} …"))
-        try:
-            source = self._open_source(uri, progress=self._opening(uri))
-            if not is_live_source(source) and len(cast("Source", source)) == 0:
-                raise SourceError(f"{uri}: holds no frames")
-        except SourceError as error:
-            self._fail(str(error))
-            return False
-        except _Overtaken:
-            self._showing.publish(replace(self.snapshot, busy=None))
+        self._publisher.publish(replace(self.snapshot, busy=f"Opening {uri} …"))
+        job = BackgroundJob(
+            partial(self._opened, uri),
+            lambda: self._tell_opening(uri, job.status),
+            tell_every_s=_TELL_EVERY_S,
+            is_superseded=self.control.superseded,
+            name=f"opening {uri}",
+        )
+        job.run()
+        source = job.result
+        if job.status.state == "cancelled":
+            self._publisher.publish(replace(self.snapshot, busy=None))
+        if job.status.error is not None:
+            self._fail(job.status.error)
+        if source is None:
             return False
         notices = [Notice("info", text) for text in (*source.notes, *_ABLATION[self._sensors])]
         detectors = self._detectors.both_for(source, notices)
@@ -171,7 +180,7 @@ class Engine:
         player.open()
         self._player = player
         self.labels.open(uri, self.drives.recording)
-        self._showing.publish(
+        self._publisher.publish(
             replace(
                 self.snapshot,
                 uri=uri,
@@ -189,38 +198,35 @@ class Engine:
                 detector=detectors.boxes.name if detectors.boxes else None,
                 lane_detector=detectors.lanes.name if detectors.lanes else None,
                 notices=tuple(notices),
-                tick=None,
+                processed=None,
                 busy=None,
             )
         )
         return True
 
-    def _opening(self, uri: str) -> Progress:
-        """Says how far it is, as often as people can read."""
-        told_s = 0.0
+    def _opened(self, uri: str, progress: Progress) -> AnySource:
+        source = self._open_source(uri, progress=progress)
+        if not is_live_source(source) and len(cast("Source", source)) == 0:
+            raise SourceError(f"{uri}: contains no frames")
+        return source
 
-        def progress(done: int, total: int) -> None:
-            nonlocal told_s
-            if self.control.superseded():
-                raise _Overtaken
-            now_s = time.monotonic()
-            if now_s - told_s >= _TELL_EVERY_S:
-                told_s = now_s
-                self._showing.publish(replace(self.snapshot, busy=f"Opening {uri} … {100 * done // max(1, total)} %"))
-
-        return progress
+    def _tell_opening(self, uri: str, now: JobStatus) -> None:
+        if not now.has_ended:
+            self._publisher.publish(
+                replace(self.snapshot, busy=f"Opening {uri} … {100 * now.done // max(1, now.total)} %")
+            )
 
     def _player_of(self, source: AnySource, detectors: Detectors) -> Player:
         if is_live_source(source):
             # what decodes sensors' packets takes 0.1 s to import: only who has sensors pays
-            from app.engine.live_line import LiveLine
+            from app.engine.live_pipeline import LivePipeline
             from app.engine.live_player import LivePlayer
 
-            return LivePlayer(LiveLine(source, detectors, self._sensors), self.control, self.drives, self.desk)
+            return LivePlayer(LivePipeline(source, detectors, self._sensors), self.control, self.drives, self.desk)
         recording = cast("Source", source)
-        line = Line(recording, detectors, self._detections, self._sensors, self.drives.state_before)
-        recipe = Recipe(recording, line.timeline_s, detectors, self._sensors) if self._whole_drives else None
-        return RecordedPlayer(line, self.control, self.drives, recipe, self.desk)
+        pipeline = SeekablePipeline(recording, detectors, self._detections, self._sensors, self.drives.state_before)
+        setup = RunSetup(recording, pipeline.timeline_s, detectors, self._sensors) if self._whole_drives else None
+        return RecordedPlayer(pipeline, self.control, self.drives, setup, self.desk)
 
     def _close(self) -> None:
         player, self._player = self._player, None
@@ -236,15 +242,15 @@ class Engine:
         if not playing:
             self.control.change(playing=False)
         notices = tuple(n for n in self.snapshot.notices if n.level != "error")
-        self._showing.publish(
+        self._publisher.publish(
             replace(self.snapshot, busy=None, playing=playing, notices=(*notices, Notice("error", text)))
         )
 
-    def _show(self, wish: Wish, tick: Tick | None) -> None:
+    def _show(self, wish: Wish, processed: ProcessedFrame | None) -> None:
         """The next snapshot: the new tick if there is one, and the wishes as they stand."""
         shown, player, standing = self.snapshot, self._player, self.control.peek()
         if player is not None:
-            player.go_on(standing, tick.frame.index if tick is not None else shown.index)
+            player.go_on(standing, processed.frame.index if processed is not None else shown.index)
         shown = replace(
             shown,
             drive=self.drives.state,
@@ -259,24 +265,20 @@ class Engine:
         )
         if player is not None:
             shown = player.health(shown)
-        if tick is not None and player is not None:
+        if processed is not None and player is not None:
             shown = replace(
                 shown,
-                tick=tick,
-                index=tick.frame.index,
-                time_s=player.time_s(tick),
+                processed=processed,
+                index=processed.frame.index,
+                time_s=player.time_s(processed),
                 sequence=shown.sequence + 1,
                 skipped=player.skipped,
                 made_unix_s=time.time(),
                 notices=tuple(n for n in shown.notices if n.level != "error"),
             )
-        self._showing.publish(shown)
-        if tick is not None:
+        self._publisher.publish(shown)
+        if processed is not None:
             self.labels.shown()
-
-
-class _Overtaken(Exception):
-    """Something else is wished for."""
 
 
 def _first_line(error: BaseException) -> str:

@@ -1,4 +1,4 @@
-"""Live sensors that are shown: the line goes on whether or not anybody looks."""
+"""Live sensors in the dashboard: the pipeline runs whether or not anybody looks."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import time
 from dataclasses import replace
 
 from app.core.control import Control, Wish
-from app.core.line import Tick
-from app.drive.background_runs import Drives
-from app.engine.live_line import LiveLine, rerun
-from app.engine.session_recording import RecordingDesk
+from app.drive.background_runs import BackgroundRuns
+from app.engine.live_pipeline import LivePipeline
+from app.engine.processed_frame import ProcessedFrame
+from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Snapshot
 from pipeline.params import Params
 from pipeline.types import Frame
@@ -21,66 +21,66 @@ _HEALTH_EVERY_S = 0.5
 
 
 class LivePlayer:
-    """A ``Player`` of one live line. Paused, the shown tick is held and can be run again with other parameters;
+    """A ``Player`` of live sensors. Paused, the shown tick is held and can be run again with other parameters;
     playing on jumps to now. Every tick goes to the desk, shown or not."""
 
     live = True
     count = 0
     duration_s = 0.0
 
-    def __init__(self, line: LiveLine, control: Control, drives: Drives, desk: RecordingDesk) -> None:
-        self._line, self._control, self._drives, self._desk = line, control, drives, desk
+    def __init__(self, pipeline: LivePipeline, control: Control, drives: BackgroundRuns, desk: SessionRecorder) -> None:
+        self._pipeline, self._control, self._drives, self._desk = pipeline, control, drives, desk
         self._came: Frame | None = None
         self._health_told_s = 0.0
 
     @property
     def source(self) -> LiveSource:
-        return self._line.source
+        return self._pipeline.source
 
     @property
     def skipped(self) -> int:
-        return self._line.source.dropped
+        return self._pipeline.source.dropped
 
     def open(self) -> None:
         """Shown from the first tick on."""
         self._drives.open(None)
-        self._line.open()
+        self._pipeline.open()
         self._control.change(playing=True)
 
     def close(self) -> None:
-        self._line.close()
+        self._pipeline.close()
 
     def wait_s(self, index: int) -> float | None:
         return 0.0  # it waits for its sensors instead
 
     def wait(self, params: Params) -> None:
-        self._came = self._line.wait(params, _WAIT_S)
+        self._came = self._pipeline.wait(params, _WAIT_S)
 
-    def serve(self, wish: Wish, shown: Snapshot) -> Tick | None:
+    def serve(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
         if self._came is not None:
             came, self._came = self._came, None
-            self._desk.take(self._line.run(came, wish.params))
-        held, newest = shown.tick, self._line.tick
+            self._desk.take(self._pipeline.run(came, wish.params))
+        held, newest = shown.processed, self._pipeline.newest
         is_behind = newest is not None and (held is None or newest.frame is not held.frame)
         if wish.playing and is_behind:
             return newest
         if held is not None and wish.params is not shown.params:
-            return rerun(held, wish.params)
+            return held.rerun(wish.params)
         return None
 
     def go_on(self, standing: Wish, index: int) -> None:
         """The drive that is computed beside a recording is not played."""
         self._drives.turn.playing(False)
 
-    def time_s(self, tick: Tick) -> float:
-        return self._line.time_s(tick)
+    def time_s(self, processed: ProcessedFrame) -> float:
+        return self._pipeline.time_s(processed)
 
     def health(self, shown: Snapshot) -> Snapshot:
         now_s = time.monotonic()
         if now_s - self._health_told_s <= _HEALTH_EVERY_S:
             return shown
         self._health_told_s = now_s
-        return replace(shown, streams=self.source.health(), notices=self._line.with_silence(shown.notices))
+        return replace(shown, streams=self.source.health(), notices=self._pipeline.with_silence(shown.notices))
 
     def goes_on_after_failing(self) -> bool:
         """The next tick may do."""

@@ -1,18 +1,18 @@
-"""What the engine's worker asks of whatever is open."""
+"""The interface between the engine's worker and what is open: a recording or live sensors."""
 
 from __future__ import annotations
 
 from typing import Protocol
 
 from app.core.control import Wish
-from app.core.line import Tick
+from app.engine.processed_frame import ProcessedFrame
 from app.engine.snapshot import Snapshot
 from pipeline.params import Params
 from pipeline.types.source import AnySource
 
 
 class Player(Protocol):
-    """A recording or sensors on the line. Used by the worker alone.
+    """Runs the pipeline on a recording or on live sensors. Used by the worker thread alone.
 
     live: sensors. count, duration_s: frames and length of a recording, 0 of sensors. skipped: frames since the opening
     that came and were not shown.
@@ -34,22 +34,22 @@ class Player(Protocol):
         ...
 
     def wait_s(self, index: int) -> float | None:
-        """Seconds until it needs the worker, with this frame shown; null while only a wish or its own call does."""
+        """Seconds until it needs the worker, with this frame shown; None while only a wish or its own call does."""
         ...
 
     def wait(self, params: Params) -> None:
-        """For what the line goes on with, but not long. Others may work meanwhile."""
+        """Wait shortly for the next input of the pipeline. Other threads may work meanwhile."""
         ...
 
-    def serve(self, wish: Wish, shown: Snapshot) -> Tick | None:
-        """What a wish makes of it; null when what is shown stays."""
+    def serve(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
+        """What a wish makes of it; None when what is shown stays."""
         ...
 
     def go_on(self, standing: Wish, index: int) -> None:
         """Make ready for what comes after the frame that is shown from now on."""
         ...
 
-    def time_s(self, tick: Tick) -> float:
+    def time_s(self, processed: ProcessedFrame) -> float:
         """Where a tick is on the timeline."""
         ...
 

@@ -1,4 +1,4 @@
-"""The next frame of a recording that plays, read and looked at before it is due.
+"""Prepare the next frame of a playing recording before it is due: read it and run the networks on it.
 
 Reading, and a network, take longer than everything else. In a thread of their own they keep nobody waiting: a parameter
 that is changed meanwhile is answered at once.
@@ -13,7 +13,7 @@ from collections.abc import Callable
 logger = logging.getLogger("cipv.ahead")
 
 
-class Ahead:
+class ReadAhead:
     """Has ``prepare(index)`` run for one index at a time. ``on_ready`` is called when it has, on the thread that did.
 
     What went wrong is left to who reads the frame in earnest: it goes wrong there again."""

@@ -1,4 +1,4 @@
-"""A recording that is played: by its clock, by steps and by seeking.
+"""Playback of a recording: in real time, by steps and by seeking.
 
 Nothing is queued: late frames are skipped, and a seek that is overtaken by another is dropped on the way.
 """
@@ -8,12 +8,13 @@ from __future__ import annotations
 import time
 
 from app.core.control import Control, Wish
-from app.core.line import Line, Tick
 from app.core.playback_clock import PlaybackClock
-from app.drive.background_runs import Drives
-from app.drive.open_recording import Recipe
-from app.engine.read_ahead import Ahead
-from app.engine.session_recording import RecordingDesk
+from app.drive.background_runs import BackgroundRuns
+from app.drive.open_recording import RunSetup
+from app.engine.processed_frame import ProcessedFrame
+from app.engine.read_ahead import ReadAhead
+from app.engine.seekable_pipeline import SeekablePipeline
+from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Snapshot
 from pipeline.inference.cancellation import Stopped
 from pipeline.params import Params
@@ -24,25 +25,30 @@ _READ_PATIENCE_S = 1.0
 
 
 class RecordedPlayer:
-    """A ``Player`` of one line. recipe: how its whole drive is computed beside it, so that any frame is shown as it is
-    there; null leaves that out. What is shown goes to the desk."""
+    """A ``Player`` of one recording. ``setup`` says how its whole drive is computed in the background, so that any
+    frame is shown as it is there; None leaves that out. What is shown goes to the session recorder."""
 
     live = False
 
     def __init__(
-        self, line: Line, control: Control, drives: Drives, recipe: Recipe | None, desk: RecordingDesk
+        self,
+        pipeline: SeekablePipeline,
+        control: Control,
+        drives: BackgroundRuns,
+        setup: RunSetup | None,
+        desk: SessionRecorder,
     ) -> None:
-        self.source: Source = line.source
-        self.count = len(line.source)
-        self.duration_s = float(line.timeline_s[-1])
+        self.source: Source = pipeline.source
+        self.count = len(pipeline.source)
+        self.duration_s = float(pipeline.timeline_s[-1])
         self.skipped = 0
-        self._line, self._control, self._drives, self._recipe, self._desk = line, control, drives, recipe, desk
+        self._pipeline, self._control, self._drives, self._setup, self._desk = pipeline, control, drives, setup, desk
         self._clock: PlaybackClock | None = None
         self._given_up: int | None = None
-        self._ahead = Ahead(self._prepare, control.change)
+        self._ahead = ReadAhead(self._prepare, control.change)
 
     def open(self) -> None:
-        self._drives.open(self._recipe)
+        self._drives.open(self._setup)
 
     def close(self) -> None:
         self._ahead.end(_READ_PATIENCE_S)
@@ -58,28 +64,28 @@ class RecordedPlayer:
     def wait(self, params: Params) -> None:
         """Its frames are always there."""
 
-    def serve(self, wish: Wish, shown: Snapshot) -> Tick | None:
-        tick = self._served(wish, shown)
-        if tick is not None:
-            if tick.whole:
-                self._drives.offer(tick.frame)
-            self._desk.take(tick)
+    def serve(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
+        processed = self._served(wish, shown)
+        if processed is not None:
+            if processed.whole:
+                self._drives.offer(processed.frame)
+            self._desk.take(processed)
         if wish.settled:
             self._drives.want(wish.params, wish.preset)
-        return tick
+        return processed
 
     def go_on(self, standing: Wish, index: int) -> None:
         if not standing.playing:
             self._clock = None
         elif self._clock is None or self._clock.speed != standing.speed:
-            times = self._line.timeline_s
+            times = self._pipeline.timeline_s
             self._clock = PlaybackClock(times, time.monotonic(), float(times[index]), standing.speed)
         self._drives.turn.playing(self._clock is not None)
         if self._clock is not None:
             self._ahead.want(min(max(index + 1, self._clock.due(time.monotonic())), self.count - 1))
 
-    def time_s(self, tick: Tick) -> float:
-        return float(self._line.timeline_s[tick.frame.index])
+    def time_s(self, processed: ProcessedFrame) -> float:
+        return float(self._pipeline.timeline_s[processed.frame.index])
 
     def health(self, shown: Snapshot) -> Snapshot:
         return shown
@@ -90,7 +96,7 @@ class RecordedPlayer:
 
     # ------------------------------------------------------------ what a wish makes of it
 
-    def _served(self, wish: Wish, shown: Snapshot) -> Tick | None:
+    def _served(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
         index, last = shown.index, self.count - 1
         if wish.uri is not None or wish.target is not None:
             return self._seek(min(max(wish.target or 0, 0), last), wish, at_once=wish.uri is None)
@@ -99,26 +105,26 @@ class RecordedPlayer:
         if wish.steps > 0:
             return self._step(index, min(last, index + wish.steps), wish)
         if wish.params is not shown.params:
-            return self._line.rerun(wish.params)
+            return self._pipeline.rerun(wish.params)
         if wish.playing and shown.playing:
             return self._play(index, wish)
         return self._better(wish, shown)
 
-    def _seek(self, index: int, wish: Wish, *, at_once: bool) -> Tick | None:
+    def _seek(self, index: int, wish: Wish, *, at_once: bool) -> ProcessedFrame | None:
         self._clock = self._given_up = None
-        return self._line.seek(index, wish.params, self._control.superseded, at_once=at_once)
+        return self._pipeline.seek(index, wish.params, self._control.superseded, at_once=at_once)
 
-    def _better(self, wish: Wish, shown: Snapshot) -> Tick | None:
+    def _better(self, wish: Wish, shown: Snapshot) -> ProcessedFrame | None:
         """The paused frame once more, when more is known of it than when it was shown: exactly as in the whole drive,
         or, once the hand rests, after a whole warm-up, which gives way to every wish."""
-        if self._line.can_be_exact():
-            return self._line.rerun(wish.params)
+        if self._pipeline.can_be_exact():
+            return self._pipeline.rerun(wish.params)
         turn = self._drives.turn
         if not self._can_be_whole() or turn.rest_s > 0:
             return None
         try:
             with turn.stoppable():
-                return self._line.seek(shown.index, wish.params, lambda: self._control.waiting)
+                return self._pipeline.seek(shown.index, wish.params, lambda: self._control.waiting)
         except Stopped:
             return None
         except BaseException:
@@ -127,18 +133,18 @@ class RecordedPlayer:
 
     def _can_be_whole(self) -> bool:
         """Whether the frame was wanted at once; what could not be had is not tried again."""
-        tick = self._line.tick
-        return tick is not None and not tick.whole and tick.frame.index != self._given_up
+        processed = self._pipeline.shown
+        return processed is not None and not processed.whole and processed.frame.index != self._given_up
 
-    def _step(self, shown: int, index: int, wish: Wish) -> Tick | None:
+    def _step(self, shown: int, index: int, wish: Wish) -> ProcessedFrame | None:
         """Every frame up to ``index``, none skipped."""
         self._clock = None
-        tick = None
+        processed = None
         for i in range(shown + 1, index + 1):
-            tick = self._line.advance(i, wish.params)
-        return tick
+            processed = self._pipeline.advance(i, wish.params)
+        return processed
 
-    def _play(self, index: int, wish: Wish) -> Tick | None:
+    def _play(self, index: int, wish: Wish) -> ProcessedFrame | None:
         """The next frame that is due and was prepared, if there is one. Frames that are late already are skipped."""
         if self._clock is None:
             return None
@@ -151,7 +157,7 @@ class RecordedPlayer:
                 self._ahead.want(due)
                 return None
             self.skipped += ready - index - 1
-            return self._line.advance(ready, wish.params)
+            return self._pipeline.advance(ready, wish.params)
         if wish.loop:
             return self._seek(0, wish, at_once=False)
         self._control.change(playing=False)
@@ -160,4 +166,4 @@ class RecordedPlayer:
     def _prepare(self, index: int) -> None:
         """On the thread that works ahead."""
         with self._drives.turn.foreground():
-            self._line.prepare(index)
+            self._pipeline.prepare(index)

@@ -1,4 +1,4 @@
-"""Recording what is shown: begun and ended by whoever asks, fed by the engine."""
+"""Recording of the shown frames to a session, started and stopped by any client and fed by the engine."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.core.line import Tick
 from app.core.session_folder import SESSIONS
+from app.engine.processed_frame import ProcessedFrame
 from pipeline.common.errors import BadInput
 from pipeline.types.source import AnySource, LiveSource, is_live_source
 
@@ -20,14 +20,13 @@ if TYPE_CHECKING:
 _LONGEST_NAME = 60
 
 
-class RecordingDesk:
+class SessionRecorder:
     """At most one recording at a time, of one source, into ``folder``. Any thread; ``take`` on the engine's.
 
     A recording holds what was shown: playing a drive at double speed or seeking leaves out what was skipped. Of live
-    sensors it holds every tick that the line ran, also while the page is paused, and every sweep, picture, fix and own
-    motion that came in between. A frame whose result is not exact yet
-    waits, with its marks, for the exact one, until the next frame comes or recording ends.
-    """
+    sensors it contains every tick that the pipeline ran on, also while playback is paused, and every sweep, picture,
+    fix and own motion that came in between. A frame whose result is not exact yet waits, with its marks, for the exact
+    one, until the next frame comes or recording ends."""
 
     def __init__(self, folder: Path = SESSIONS) -> None:
         self._folder = folder
@@ -35,13 +34,13 @@ class RecordingDesk:
         self._recorder: Recorder | None = None
         self._live: LiveSource | None = None
         self._feeding = threading.RLock()
-        self._last: Tick | None = None
+        self._last: ProcessedFrame | None = None
         self._waits = False
         self._marks: list[str] = []
 
     @property
     def state(self) -> RecordingState | None:
-        """Null while nothing is recorded. One that ended by itself stays, with its error, until it is stopped."""
+        """None while nothing is recorded. One that ended by itself stays, with its error, until it is stopped."""
         recorder = self._recorder
         return recorder.state if recorder is not None else None
 
@@ -55,7 +54,7 @@ class RecordingDesk:
                 return self._recorder.state
             self._end()
             if source is None:
-                raise BadInput("nothing is open that could be recorded")
+                raise BadInput("nothing is open to record")
             # what MCAP and its schemas need takes 0.2 s to import: only who records pays
             from pipeline.recording.recorder import Recorder
             from pipeline.recording.save import about
@@ -63,7 +62,7 @@ class RecordingDesk:
             try:
                 recorder = Recorder(new_session(self._folder, source.title), about(source))
             except OSError as error:
-                raise BadInput(f"{self._folder}: no recording can be made: {error.strerror}") from None
+                raise BadInput(f"{self._folder}: cannot record here: {error.strerror}") from None
             with self._feeding:
                 self._live = source if is_live_source(source) else None
                 self._last, self._recorder = None, recorder
@@ -72,7 +71,7 @@ class RecordingDesk:
             return recorder.state
 
     def stop(self) -> RecordingState | None:
-        """End the recording, wait until it is written, and say how it went; null (and no file) when it is empty."""
+        """End the recording, wait until it is written, and say how it went; None (and no file) when it is empty."""
         with self._lock:
             return self._end()
 
@@ -86,28 +85,28 @@ class RecordingDesk:
             self._marks.append(text)
             return self._recorder.state.error is None
 
-    def take(self, tick: Tick) -> None:
-        """A tick that the line ran. The same frame again, with other parameters, is not recorded twice."""
+    def take(self, processed: ProcessedFrame) -> None:
+        """Record a frame that the pipeline has run on. A rerun with other parameters is not recorded again."""
         with self._feeding:
             recorder, last = self._recorder, self._last
             if recorder is None:
                 return
-            if last is not None and last.frame.t_ns == tick.frame.t_ns:
-                if not self._waits or tick.params != last.params:
+            if last is not None and last.frame.t_ns == processed.frame.t_ns:
+                if not self._waits or processed.params != last.params:
                     return
             else:
                 self._write_waiting(recorder)
-            self._last, self._waits = tick, True
-            if tick.exact:
+            self._last, self._waits = processed, True
+            if processed.exact:
                 self._write_waiting(recorder)
 
     def _write_waiting(self, recorder: Recorder) -> None:
         """The frame that waits, if one does, as it is known now."""
         if not self._waits or self._last is None:
             return
-        tick, self._waits = self._last, False
+        processed, self._waits = self._last, False
         received_ns = self._live.now_ns() if self._live is not None else None
-        recorder.put(tick.frame, tick.result, tick.params, received_ns=received_ns)
+        recorder.put(processed.frame, processed.result, processed.params, received_ns=received_ns)
         marks, self._marks = self._marks, []
         for text in marks:
             recorder.mark(text)

@@ -1,12 +1,12 @@
-"""What the engine shows: one immutable picture of everything a view may want at one moment."""
+"""What the engine shows: an immutable snapshot of everything that a view may need."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from app.core.line import Tick
 from app.drive.background_runs import DriveState
+from app.engine.processed_frame import ProcessedFrame
 from app.labels.service.state import LabelState
 from pipeline.params import Params
 from pipeline.types import StreamHealth
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Notice:
-    """A sentence for the person at the page, with the remedy where there is one."""
+    """A sentence shown in the dashboard, with the remedy if there is one."""
 
     level: Literal["info", "warning", "error"]
     text: str
@@ -26,12 +26,7 @@ class Notice:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Playback, source and the newest tick.
-
-    sequence grows whenever a new result was made; time_s is the shown frame's place on the playback timeline.
-    made_unix_s is the wall clock when the result was ready. live: devices, not a recording; streams: how each of them
-    does, now and then, also while none ticks. busy is a sentence while the engine cannot answer.
-    """
+    """Source, playback and the shown frame at one moment."""
 
     params: Params
     preset: str = "default"
@@ -40,24 +35,33 @@ class Snapshot:
     title: str = ""
     rate_hz: float = 0.0
     count: int = 0
+    """Frames of the recording; 0 for live sensors."""
     index: int = 0
     time_s: float = 0.0
+    """Place of the shown frame on the playback timeline, in seconds."""
     duration_s: float = 0.0
     playing: bool = False
     speed: float = 1.0
     loop: bool = True
     busy: str | None = None
+    """What the engine is doing while it cannot serve requests."""
     detector: str | None = None
     lane_detector: str | None = None
     notices: tuple[Notice, ...] = ()
     sequence: int = 0
+    """Grows with every new result."""
     skipped: int = 0
+    """Frames since the source was opened that were not shown in time."""
     made_unix_s: float = 0.0
-    tick: Tick | None = None
+    """Wall-clock time when the result was ready, Unix seconds."""
+    processed: ProcessedFrame | None = None
+    """The shown frame; None before the first one."""
     drive: DriveState = DriveState()
     labels: LabelState = LabelState()
     live: bool = False
+    """Live sensors, not a recording."""
     streams: tuple[StreamHealth, ...] = ()
+    """Health of each live sensor, updated also while no tick arrives."""
     recording: RecordingState | None = None
 
     def state_json(self) -> dict[str, Any]:
@@ -68,7 +72,7 @@ class Snapshot:
             "rate_hz": self.rate_hz,
             "count": self.count,
             "index": self.index,
-            "frame": self.tick.frame.name if self.tick else None,
+            "frame": self.processed.frame.name if self.processed else None,
             "time_s": self.time_s,
             "duration_s": self.duration_s,
             "playing": self.playing,
@@ -81,7 +85,7 @@ class Snapshot:
             "params_revision": self.params_revision,
             "sequence": self.sequence,
             "skipped": self.skipped,
-            "provisional": self.tick is not None and not self.tick.exact,
+            "provisional": self.processed is not None and not self.processed.exact,
             "drive": self.drive.to_json(),
             "can_undo": self.labels.can_undo,
             "can_redo": self.labels.can_redo,

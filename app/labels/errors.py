@@ -24,7 +24,7 @@ class NoSuchLabel(BadInput):
 
 
 class Stale(ActRefused):
-    """Somebody changed an item, of that kind and number, since. theirs: the item as it stands; null where it was
+    """Somebody changed an item, of that kind and number, since. theirs: the item as it stands; None where it was
     removed."""
 
     def __init__(self, text: str, kind: str, number: int, theirs: dict[str, Any] | None) -> None:

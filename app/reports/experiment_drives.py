@@ -17,14 +17,14 @@ from app.core.server_address import DEFAULT_PORT
 from app.reports.html import page, section_html
 from app.reports.svg_charts import chart_svg
 from pipeline.evaluation.report_sections import Linked, Section, Table
-from pipeline.experiments.experiment import Experiment, Replay
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.params import Params, changes_of
 from pipeline.params import to_yaml as params_to_yaml
 from pipeline.simulation.drive_as_scenario import to_yaml
 
 _BY_NETWORK = (
     "In the loop the embedded network looked for vehicles in the drawn pictures, as it does here. It looked for no "
-    "lane lines; a dashboard that does may believe in another path."
+    "lane lines; a dashboard that does may estimate another path."
 )
 _LINK = """<p id="open" hidden>In a dashboard on this machine that is open already: <a href="">open it there</a>, with
 the parameters it drove with.</p>
@@ -44,19 +44,19 @@ class ReplayFolder:
     def __init__(self, folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._folder = folder
-        self._kept: dict[str, tuple[str, list[Replay]]] = {}
+        self._kept: dict[str, tuple[str, list[ExperimentDrive]]] = {}
 
-    def keep(self, experiment: Experiment[Any, Any], replay: Replay) -> None:
+    def keep(self, experiment: Experiment[Any, Any], drive: ExperimentDrive) -> None:
         """Write the drive's three files."""
-        self._kept.setdefault(experiment.name, (experiment.title, []))[1].append(replay)
-        heading = f"{replay.title}\n{_command(replay)}"
-        self._path(replay, ".yaml").write_text(to_yaml(replay.as_seen(), heading), encoding="utf-8")
-        self._path(replay, ".params.yaml").write_text(params_to_yaml(replay.params), encoding="utf-8")
-        self._path(replay, ".html").write_text(_page(replay), encoding="utf-8")
+        self._kept.setdefault(experiment.name, (experiment.title, []))[1].append(drive)
+        heading = f"{drive.title}\n{_command(drive)}"
+        self._path(drive, ".yaml").write_text(to_yaml(drive.as_seen(), heading), encoding="utf-8")
+        self._path(drive, ".params.yaml").write_text(params_to_yaml(drive.params), encoding="utf-8")
+        self._path(drive, ".html").write_text(_page(drive), encoding="utf-8")
 
     def list_all(self) -> None:
         """Write ``index.html``, which leads to every drive."""
-        body = "".join(section_html(_listed(name, title, replays)) for name, (title, replays) in self._kept.items())
+        body = "".join(section_html(_listed(name, title, drives)) for name, (title, drives) in self._kept.items())
         (self._folder / "index.html").write_text(page("Drives", body), encoding="utf-8")
 
     def link_from(self, report: Path) -> str:
@@ -64,38 +64,38 @@ class ReplayFolder:
         between = os.path.relpath(self._folder.resolve(), report.resolve().parent)
         return f"{url_quote(Path(between).as_posix())}/"
 
-    def _path(self, replay: Replay, suffix: str) -> Path:
-        return self._folder / f"{replay.name}{suffix}"
+    def _path(self, drive: ExperimentDrive, suffix: str) -> Path:
+        return self._folder / f"{drive.name}{suffix}"
 
 
-def _listed(name: str, title: str, replays: list[Replay]) -> Section:
-    rows = tuple((Linked(each.title, url_quote(f"{each.name}.html")), " ".join(each.text)) for each in replays)
-    return Section(name, title, tables=(Table(f"{len(replays)} drives", ("drive", "what came of it"), rows),))
+def _listed(name: str, title: str, drives: list[ExperimentDrive]) -> Section:
+    rows = tuple((Linked(each.title, url_quote(f"{each.name}.html")), " ".join(each.text)) for each in drives)
+    return Section(name, title, tables=(Table(f"{len(drives)} drives", ("drive", "what came of it"), rows),))
 
 
-def _command(replay: Replay) -> str:
+def _command(drive: ExperimentDrive) -> str:
     """To be typed in the folder."""
-    lanes = "" if replay.detections is not None else " --lanes off"
-    return f"cipv serve {quote(f'sim:{replay.name}.yaml')} --params {quote(f'{replay.name}.params.yaml')}{lanes}"
+    lanes = "" if drive.detections is not None else " --lanes off"
+    return f"cipv serve {quote(f'sim:{drive.name}.yaml')} --params {quote(f'{drive.name}.params.yaml')}{lanes}"
 
 
-def _page(replay: Replay) -> str:
-    text = [*replay.text, *([_BY_NETWORK] if replay.detections is None else [])]
+def _page(drive: ExperimentDrive) -> str:
+    text = [*drive.text, *([_BY_NETWORK] if drive.detections is None else [])]
     body = (
         "".join(f"<p>{escape(each)}</p>" for each in text)
-        + f'<div class="charts">{"".join(map(chart_svg, replay.charts))}</div>'
-        + f"<h3>See it</h3><p>In this folder: <code>{escape(_command(replay))}</code></p>"
-        + _link(replay)
+        + f'<div class="charts">{"".join(map(chart_svg, drive.charts))}</div>'
+        + f"<h3>See it</h3><p>In this folder: <code>{escape(_command(drive))}</code></p>"
+        + _link(drive)
     )
-    return page(replay.title, body)
+    return page(drive.title, body)
 
 
-def _link(replay: Replay) -> str:
+def _link(drive: ExperimentDrive) -> str:
     """A link as the dashboard's own *Share* makes it."""
-    changed = {name: now for name, (_, now) in changes_of(Params(), replay.params).items()}
+    changed = {name: now for name, (_, now) in changes_of(Params(), drive.params).items()}
     query = urlencode({"preset": "default", "params": json.dumps(changed)}, quote_via=url_quote)
     return (
         _LINK.replace("DASHBOARD", f"http://127.0.0.1:{DEFAULT_PORT}")
-        .replace("FILE", json.dumps(f"{replay.name}.yaml"))
+        .replace("FILE", json.dumps(f"{drive.name}.yaml"))
         .replace("QUERY", query)
     )

@@ -1,5 +1,5 @@
-"""The experiments' report as one HTML file: scenes, tables and charts, light or dark as the reader's system is. Nothing
-is loaded from anywhere."""
+"""A report of experiments or scores as one HTML file: scenes, tables and charts, in the reader's light or dark theme.
+It loads nothing."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ td a { color: inherit; text-decoration-style: dotted; } code { font-size: 13px; 
 
 
 def html(sections: Iterable[Section], title: str, replays: str = "") -> str:
-    """The whole report. replays: what leads from it to the folder of the drives behind it, where they were kept."""
+    """The whole report. replays: relative address of the folder with the saved drives, empty without one."""
     sections = list(sections)
     links = "".join(f'<a href="#{escape(each.name)}">{escape(each.name)}</a>' for each in sections)
     return page(title, f"<nav>{links}</nav>{''.join(section_html(each, replays) for each in sections)}")
@@ -93,16 +93,16 @@ def _cell(cell: AnyCell, decimals: int, replays: str) -> str:
         return f'<td class="word"><a href="{escape(cell.href)}">{escape(in_words(cell.value, decimals))}</a></td>'
     value = cell.value if isinstance(cell, Coloured | Driven) else cell
     tone = cell.tone if isinstance(cell, Coloured) else ""
-    replay = cell.replay if isinstance(cell, Coloured | Driven) else ""
+    drive = cell.drive if isinstance(cell, Coloured | Driven) else ""
     kind = "word" if isinstance(value, str) and not tone else tone
     text = escape(in_words(value, decimals))
-    if replay and replays:
-        text = f'<a href="{escape(replays + replay)}.html" title="See this drive">{text}</a>'
+    if drive and replays:
+        text = f'<a href="{escape(replays + drive)}.html" title="Open this drive">{text}</a>'
     return f'<td class="{kind}">{text}</td>'
 
 
 def in_words(value: Cell, decimals: int) -> str:
-    """As people read it: a dash for null, whole numbers whole."""
+    """As people read it: a dash for None, whole numbers whole."""
     if value is None:
         return "–"
     return f"{value:.{decimals}f}" if isinstance(value, float) else str(value)

@@ -12,8 +12,8 @@ import numpy as np
 from pipeline.evaluation.report_sections import Scene
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.rig import Sensors
-from pipeline.simulation.world import world
-from pipeline.simulation.world.world import World
+from pipeline.simulation.world import world_state
+from pipeline.simulation.world.world_state import World
 from pipeline.types import F64
 
 _BEHIND_M, _AHEAD_M, _ASIDE_M = 12.0, 108.0, 30.0
@@ -25,7 +25,7 @@ _PICTURE_PX, _JPEG_QUALITY = (640, 360), 75
 
 def scene_html(scene: Scene) -> str:
     """A figure with the plan and, below it, the first camera's picture of the same moment."""
-    now = world.at(scene.scenario, scene.t_s)
+    now = world_state.at(scene.scenario, scene.t_s)
     title = f"{scene.title}, at {scene.t_s:.1f} s"
     return (
         f'<figure class="scene"><figcaption>{escape(title)}</figcaption>{plan_svg(scene.scenario, now, title)}'
@@ -71,7 +71,7 @@ def _grid() -> Iterable[str]:
 
 def _ways(scenario: Scenario, now: World) -> Iterable[str]:
     """Where each vehicle will be, in the ego frame of now."""
-    later = [world.at(scenario, now.t_s + t_s) for t_s in np.arange(0.0, _WAY_S, _WAY_STEP_S).tolist()]
+    later = [world_state.at(scenario, now.t_s + t_s) for t_s in np.arange(0.0, _WAY_S, _WAY_STEP_S).tolist()]
     yield _open(now.to_ego(np.array([each.pose[:2] for each in later])), "way ego")
     for number in sorted(state.actor.id for state in now.actors):
         places = [

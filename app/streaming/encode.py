@@ -11,7 +11,7 @@
                         ``points`` × uint8         ring, 0 = lowest beam
                         ``points`` × uint8         ms before the sweep's newest point; 255 unknown
 
-The header holds ``state`` (playback), ``result`` (the contract's object) and ``display``: geometry projected by the
+The header holds ``state`` (playback), ``result`` (docs/reference/results.md) and ``display``: geometry projected by the
 alignment in use, in pixels of the sent picture, so that no view projects anything.
 """
 
@@ -42,17 +42,17 @@ class Encoder:
         self._last: tuple[Picture, int, SentPicture] | None = None
 
     def message(self, snapshot: Snapshot, width_px: int = MAX_WIDTH_PX) -> bytes | None:
-        """The message for the snapshot's tick, its picture at most ``width_px`` wide; null when there is no tick."""
-        if snapshot.tick is None:
+        """The message for the snapshot's tick, its picture at most ``width_px`` wide; None when there is no tick."""
+        if snapshot.processed is None:
             return None
-        frame, result = snapshot.tick.frame, snapshot.tick.result
+        frame, result = snapshot.processed.frame, snapshot.processed.result
         picture = self._picture(frame, width_px)
         scale = picture.scale if picture else 1.0
         aligned = resolve(snapshot.params.alignment, frame.camera)
         header = {
             "type": "frame",
             "made_unix_ms": snapshot.made_unix_s * 1e3,
-            "detect_ms": snapshot.tick.detect_ms,
+            "detect_ms": snapshot.processed.detect_ms,
             "state": snapshot.state_json(),
             "picture": _picture_json(picture, frame),
             "points": len(result.layers.points),
@@ -78,8 +78,8 @@ def pack(header: dict[str, Any], jpeg: bytes, arrays: bytes) -> bytes:
 
 def display_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, Any]:
     """What is drawn over the picture. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom first;
-    ``path`` is the corridor laid on the ground that the sweep shows, null where there is none. ``lanes`` are the ego
-    lane's lines where the camera saw them, null without a lane detector; ``plan_lanes`` the same in the plan, x y in
+    ``path`` is the corridor laid on the ground that the sweep shows, None where there is none. ``lanes`` are the ego
+    lane's lines where the camera saw them, None without a lane detector; ``plan_lanes`` the same in the plan, x y in
     metres; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x that they hold in; ``ranking``
     every object in the order in which it could have led."""
     layers = result.layers
@@ -109,7 +109,7 @@ def _cuboids_json(result: Result, aligned: Alignment | None, scale: float) -> di
 def _on_ground(
     lines: dict[str, F64], ground: Ground | None, aligned: Alignment | None, scale: float
 ) -> dict[str, list[list[float] | None]] | None:
-    """Each (K, 2) ego line as pixels, one a point; null as a whole where no ground or no camera is known."""
+    """Each (K, 2) ego line as pixels, one a point; None as a whole where no ground or no camera is known."""
     if ground is None or aligned is None or not ground.fitted.any():
         return None
     return {

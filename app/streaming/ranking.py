@@ -17,7 +17,7 @@ BEHIND = "behind"
 @dataclass(frozen=True)
 class Ranked:
     """order counts from 1, the CIPV first. stopped_by: the first gate that failed, with its number and limit, or
-    ``BEHIND``; null for the CIPV."""
+    ``BEHIND``; None for the CIPV."""
 
     id: int
     order: int
@@ -53,7 +53,7 @@ def ranking(result: Result) -> list[Ranked]:
 
 
 def stopping_gate(item: FusedObject) -> Gate | None:
-    """The first test that kept an object from being a candidate; null when it passed all."""
+    """The first test that kept an object from being a candidate; None when it passed all."""
     return next((gate for gate in item.gates if not gate.passed and gate.name not in _OF_FUSION), None)
 
 

@@ -10,7 +10,7 @@ for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no m
 ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the picture: the one that all get is
 as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
 ``{"selected": 7}`` and ``{"hides_3d": true}`` are for the views that the server draws. So is ``{"held": {"track": 7,
-"cuboid": …}}``, a label that may be dragged in 3D, or null; the page that holds it hears of the drag as
+"cuboid": …}}``, a label that may be dragged in 3D, or None; the page that holds it hears of the drag as
 ``{"type": "held", "track": 7, "cuboid": …, "ended": true}``. What is picked in 3D comes to all as
 ``{"type": "selected", "id": 7}``.
 """
@@ -29,8 +29,8 @@ from pydantic import BaseModel, Field, ValidationError
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.core.client_role import is_display
-from app.core.request_shapes import GivenCuboid
-from app.core.shared_view_state import Held, Looks
+from app.core.request_shapes import CuboidShape
+from app.core.shared_view_state import HeldCuboid, SharedViewState
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.streaming.picture import MAX_WIDTH_PX, width_for
@@ -48,7 +48,7 @@ class _Held(BaseModel):
 
     track: int = Field(ge=0, lt=2**53)
     frame: int = Field(ge=0, lt=2**53)
-    cuboid: GivenCuboid
+    cuboid: CuboidShape
 
 
 @dataclass
@@ -63,7 +63,7 @@ class Slot:
     """The newest unsent messages of one client, by kind. Lives on the server's event loop.
 
     ``paced``: frames wait for ``painted``. ``traffic``: where frames are counted. picture_px: how wide it shows the
-    picture, null until it says so."""
+    picture, None until it says so."""
 
     def __init__(self, paced: bool = False, traffic: Traffic | None = None) -> None:
         self.picture_px: int | None = None
@@ -125,9 +125,9 @@ class _Encoded:
 class Stream:
     """Between the engine's thread, which publishes, and the clients' slots on the event loop."""
 
-    def __init__(self, looks: Looks | None = None) -> None:
+    def __init__(self, looks: SharedViewState | None = None) -> None:
         self.traffic = Traffic()
-        self._looks = looks or Looks()
+        self._looks = looks or SharedViewState()
         self._looks.on_drag(self._tell_dragged)
         self._looks.on_pick(self._picked)
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -207,9 +207,9 @@ class Stream:
         except ValidationError:
             self._looks.let_go(slot)
         else:
-            self._looks.hold(Held(slot, held.track, held.frame, held.cuboid.value()))
+            self._looks.hold(HeldCuboid(slot, held.track, held.frame, held.cuboid.value()))
 
-    def _tell_dragged(self, held: Held, ended: bool) -> None:
+    def _tell_dragged(self, held: HeldCuboid, ended: bool) -> None:
         """Tell the page that holds it; on a thread of the 3D view's."""
         said = {"track": held.track, "frame": held.frame, "cuboid": held.cuboid._asdict(), "ended": ended}
         message = _dump({"type": "held", **said})
@@ -237,7 +237,7 @@ class Stream:
     def _encoded(self, snapshot: Snapshot) -> _Encoded:
         """The frame of this snapshot, or a newer one."""
         with self._lock:
-            if self._frame.sequence < snapshot.sequence and snapshot.tick is not None:
+            if self._frame.sequence < snapshot.sequence and snapshot.processed is not None:
                 message = self._encoder.message(snapshot, self._width_px)
                 self._frame = _Encoded(snapshot.sequence, message, snapshot)
             return self._frame
@@ -284,7 +284,7 @@ def _object(text: str | None) -> dict[str, Any]:
 
 
 def _number(value: Any, limit: float) -> float | None:
-    """A number within ±limit; else null. What a client says is not to be trusted."""
+    """A number within ±limit; else None. What a client says is not to be trusted."""
     return value if isinstance(value, int | float) and -limit < value < limit else None
 
 
@@ -293,7 +293,7 @@ def _is_id_or_null(value: Any) -> bool:
 
 
 def _width(shown_px: Any) -> int | None:
-    """The width to send to who shows it so wide; null for what is no width."""
+    """The width to send to who shows it so wide; None for what is no width."""
     shown = _number(float(shown_px) if isinstance(shown_px, str) and shown_px.isdecimal() else shown_px, _WIDEST_PX)
     return None if shown is None or shown <= 0 else width_for(shown)
 

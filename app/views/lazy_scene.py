@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from contextlib import ExitStack
 
-from app.core.shared_view_state import Looks
+from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from pipeline.common.garbage_collection import freeze_loaded_objects
 
@@ -13,7 +13,7 @@ from pipeline.common.garbage_collection import freeze_loaded_objects
 class LateScene:
     """A ``SceneFeed`` from the first time its port is asked for. Use it in a ``with`` block."""
 
-    def __init__(self, engine: Engine, looks: Looks) -> None:
+    def __init__(self, engine: Engine, looks: SharedViewState) -> None:
         self._engine, self._looks = engine, looks
         self._lock = threading.Lock()
         self._port: int | None = None
@@ -21,7 +21,7 @@ class LateScene:
         self._ended = False
 
     def port(self) -> int | None:
-        """Where viser listens, on loopback; null at the end. The first to ask waits until it does. Any thread."""
+        """Where viser listens, on loopback; None at the end. The first to ask waits until it does. Any thread."""
         with self._lock:
             if self._port is None and not self._ended:
                 from app.views.scene_feed import SceneFeed

@@ -14,7 +14,7 @@ _UNKNOWN_HEIGHT_M = 1.5
 
 
 def object_on_ray(objects: tuple[FusedObject, ...], origin: Point3, direction: Point3, floor_m: float) -> int | None:
-    """The id of the object that the ray meets first, null when it meets none. Ego frame, metres; ``floor_m`` is the
+    """The id of the object that the ray meets first, None when it meets none. Ego frame, metres; ``floor_m`` is the
     ground's height, on which footprints stand that no LiDAR has measured."""
     start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
     met = [(distance, each.id) for each in objects if (distance := _distance(each, start, along, floor_m)) is not None]
@@ -22,7 +22,7 @@ def object_on_ray(objects: tuple[FusedObject, ...], origin: Point3, direction: P
 
 
 def _distance(each: FusedObject, start: F64, along: F64, floor_m: float) -> float | None:
-    """How far along the ray the object's box is entered, in lengths of ``along``; null where it is missed."""
+    """How far along the ray the object's box is entered, in lengths of ``along``; None where it is missed."""
     if each.cuboid is not None:
         center, size, yaw_rad = np.asarray(each.cuboid.center), np.asarray(each.cuboid.size), each.cuboid.yaw_rad
     elif each.bev is not None:
@@ -37,7 +37,7 @@ def _distance(each: FusedObject, start: F64, along: F64, floor_m: float) -> floa
 
 
 def _entered(start: F64, along: F64, half: F64) -> float | None:
-    """Slab test against the box from −half to half: where the ray enters it, 0 from inside, null where it misses."""
+    """Slab test against the box from −half to half: where the ray enters it, 0 from inside, None where it misses."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ends = np.stack([(-half - start) / along, (half - start) / along])
     level = along == 0.0

@@ -116,7 +116,7 @@ def _scale(values: npt.NDArray[np.floating], low: float, high: float) -> U8:
 
 
 def ground_height_m(result: Result) -> float | None:
-    """Height of the fitted ground at the ego origin; null without one, for example when there was no sweep."""
+    """Height of the fitted ground at the ego origin; None without one, for example when there was no sweep."""
     ground = result.layers.ground
     if ground is None:
         return None
@@ -151,7 +151,7 @@ def ego_cuboid(ground_m: float) -> Cuboid:
 
 
 def flat_outline(each: FusedObject, height_m: float) -> F64 | None:
-    """(5, 3) closed outline of an object's footprint at a height; null when nobody knows where it is."""
+    """(5, 3) closed outline of an object's footprint at a height; None when nobody knows where it is."""
     if each.bev is None:
         return None
     ring = np.asarray([*each.bev, each.bev[0]], dtype=np.float64)

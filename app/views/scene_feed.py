@@ -6,23 +6,23 @@ import threading
 from typing import Any
 
 from app.core.latest_value import Newest
-from app.core.shared_view_state import Looks
+from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
-from app.views.viser_view import ViserView
+from app.views.viser.view import ViserView
 from pipeline.params import ParamsError
 
 
 class SceneFeed:
     """Draws the engine's newest snapshot in viser, while a browser looks: one that hides its 3D view does not. While
-    one is drawn, older ones that wait are dropped: the 3D view may be slower than the line, but never behind it. Use it
-    in a ``with`` block.
+    one is drawn, older ones that wait are dropped: the 3D view may be slower than the pipeline, but never behind it.
+    Use it in a ``with`` block.
 
     drawn: frames drawn so far."""
 
-    def __init__(self, engine: Engine, looks: Looks | None = None) -> None:
+    def __init__(self, engine: Engine, looks: SharedViewState | None = None) -> None:
         self._engine = engine
-        self._looks = looks or Looks()
+        self._looks = looks or SharedViewState()
         self._view = ViserView(engine.snapshot.params, self._moved, on_drag=self._looks.drag, on_pick=self._looks.pick)
         self._newest = Newest[Snapshot]()
         self.drawn = 0
@@ -63,7 +63,7 @@ class SceneFeed:
             self._view.hold(self._looks.held)
             if drawn is None or newest.params is not drawn.params:
                 self._view.set_params(newest.params)
-            if newest.tick is not None and (drawn is None or newest.tick is not drawn.tick):
-                self._view.show(newest.tick.frame, newest.tick.result)
+            if newest.processed is not None and (drawn is None or newest.processed is not drawn.processed):
+                self._view.show(newest.processed.frame, newest.processed.result)
                 self.drawn += 1
             drawn = newest

@@ -68,15 +68,15 @@ class Access:
         self._hosts = frozenset((*LOOPBACK_HOSTS, *names)) - frozenset(WILDCARDS)
 
     def refusal(self, headers: Headers, *, changes: bool, path: str = _API) -> str | None:
-        """Why the request for a path is refused, in one sentence; null when it is welcome."""
+        """Why the request for a path is refused, in one sentence; None when it is welcome."""
         host = headers.get("host", "")
         if not self._knows(_host_name(host)):
-            return f"this server does not answer to the name {host!r}; allow it with --allow-host"
+            return f"host name {host!r} is not allowed; add it with --allow-host"
         origin = headers.get("origin")
         if changes and origin is not None and urlsplit(origin).netloc.lower() != host.lower():
-            return f"a page of {origin} may not do this"
+            return f"request from a page of {origin} refused"
         if path.startswith(_API) and headers.get("sec-fetch-site") not in _OWN_SITES:
-            return "a page of another origin may not ask for this"
+            return "cross-origin request refused"
         return None
 
     def allowed(self, connection: HTTPConnection) -> bool:
@@ -108,7 +108,7 @@ class Guard:
         await answer(scope, receive, _with_headers(send))
 
     def _refused(self, connection: HTTPConnection, changes: bool) -> Response | None:
-        """What is answered instead; null for who is welcome."""
+        """What is answered instead; None for who is welcome."""
         refusal = self._access.refusal(connection.headers, changes=changes, path=connection.scope["path"])
         if refusal is not None:
             return JSONResponse({"detail": refusal}, 403)
@@ -121,7 +121,7 @@ class Guard:
         if role is None:
             return _who_are_you(connection)
         if role == "display" and not _display_may(connection.scope):
-            return JSONResponse({"detail": "the display in the car may not do this"}, 403)
+            return JSONResponse({"detail": "not allowed for the in-vehicle display"}, 403)
         set_role(connection, role)
         return None
 
@@ -169,7 +169,7 @@ def _signed_in(connection: HTTPConnection, token: str) -> Response:
 
 
 def _who_are_you(connection: HTTPConnection) -> Response:
-    sentence = "Open the link with a token that the server showed in its terminal when it started."
+    sentence = "Open the link with the token that the server printed in its terminal at startup."
     headers = {"www-authenticate": "Bearer", "cache-control": "no-store"}
     if "text/html" not in connection.headers.get("accept", ""):
         return JSONResponse({"detail": sentence}, 401, headers)
@@ -192,7 +192,7 @@ def _with_headers(send: Send) -> Send:
 
 
 def _host_name(host: str) -> str | None:
-    """The name in a Host header, without port and brackets; null when it is malformed."""
+    """The name in a Host header, without port and brackets; None when it is malformed."""
     try:
         return urlsplit(f"//{host}").hostname
     except ValueError:

@@ -1,4 +1,4 @@
-"""The API's description: a title for each route, and how it refuses."""
+"""The OpenAPI description: a summary for each route, and how requests are refused."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from app.web.routes.shapes import Refusal
 REFUSALS: dict[int | str, dict[str, Any]] = {
     "4XX": {
         "model": Refusal,
-        "description": "Refused, and nothing was changed: 401 without a token · 403 to another website, or to a role "
-        "that may not · 404 there is no such thing, or not yet · 409 not as things are now · 413 too large · 422 not "
-        "understood",
+        "description": "Refused; nothing was changed: 401 token missing · 403 cross-origin, or not allowed for "
+        "this role · 404 not found, or not yet · 409 conflicts with the present state · 413 too large · 422 invalid",
     }
 }
 """What every route may answer. Naming it takes the framework's own form of a 422 away, which nothing here sends."""

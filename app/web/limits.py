@@ -52,4 +52,4 @@ class BodyLimit:
 
 
 def _too_large(largest: int) -> str:
-    return f"a request may carry {largest >> 20} MiB at most"
+    return f"the request is larger than {largest >> 20} MiB"

@@ -28,18 +28,18 @@ class Metrics:
         self._shown_at: deque[float] = deque(maxlen=_MOST_FRAMES)
         to = self._registry
         self._frames = Counter("cipv_frames", "Results made", registry=to)
-        self._line = Histogram(
-            "cipv_line_seconds", "Of one frame, all stages without the networks", buckets=_BUCKETS_S, registry=to
+        self._pipeline = Histogram(
+            "cipv_line_seconds", "Time for one frame: all stages, without the networks", buckets=_BUCKETS_S, registry=to
         )
         self._detector = Histogram(
             "cipv_detector_seconds",
-            "Of one picture that no cache knew",
+            "Time for one picture that was not cached",
             buckets=_BUCKETS_S,
             registry=to,
         )
         self._latency = Histogram(
             "cipv_result_to_sent_seconds",
-            "From a result to its message for all",
+            "Time from a result to its broadcast message",
             buckets=_BUCKETS_S,
             registry=to,
         )
@@ -48,17 +48,17 @@ class Metrics:
 
     def saw(self, snapshot: Snapshot) -> None:
         """Called by the engine after the stream has taken the snapshot: what is not a new result is not counted."""
-        tick = snapshot.tick
-        if tick is None or snapshot.sequence <= self._sequence:
+        processed = snapshot.processed
+        if processed is None or snapshot.sequence <= self._sequence:
             return
         self._frames.inc(snapshot.sequence - self._sequence)
         self._sequence = snapshot.sequence
         self._shown_at.append(time.monotonic())
-        total_ms = tick.result.timing_ms.get("total")
+        total_ms = processed.result.timing_ms.get("total")
         if total_ms is not None:
-            self._line.observe(total_ms / 1e3)
-        if tick.detect_ms > 0:
-            self._detector.observe(tick.detect_ms / 1e3)
+            self._pipeline.observe(total_ms / 1e3)
+        if processed.detect_ms > 0:
+            self._detector.observe(processed.detect_ms / 1e3)
         self._latency.observe(max(0.0, time.time() - snapshot.made_unix_s))
 
     def render(self) -> bytes:
@@ -82,10 +82,8 @@ class _Now(Collector):
     def collect(self) -> Iterator[Metric]:
         shown, recording, traffic = self._engine.snapshot, self._engine.desk.state, self._stream.traffic
         yield GaugeMetricFamily("cipv_engine_up", "1 while the worker lives", self._engine.alive)
-        yield GaugeMetricFamily("cipv_frames_per_second", "Results a second, last seconds", self._rate_hz())
-        yield GaugeMetricFamily(
-            "cipv_frames_skipped", "Frames of the open source that came too fast to be shown", shown.skipped
-        )
+        yield GaugeMetricFamily("cipv_frames_per_second", "Results per second over the last seconds", self._rate_hz())
+        yield GaugeMetricFamily("cipv_frames_skipped", "Frames of the open source that were skipped", shown.skipped)
         yield GaugeMetricFamily("cipv_clients", "Streams that are open", self._stream.clients)
         yield CounterMetricFamily("cipv_client_frames_sent", "Frames sent, over all clients", traffic.sent)
         yield CounterMetricFamily("cipv_client_frames_dropped", "Frames that a slow client was spared", traffic.dropped)

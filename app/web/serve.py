@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 
 from app.core.server_address import DEFAULT_PORT, is_loopback, listen_socket, reachable
 from app.core.session_folder import SESSIONS
-from app.core.shared_view_state import Looks
+from app.core.shared_view_state import SharedViewState
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.web.tokens import Tokens
@@ -27,7 +27,7 @@ def serve(
     strict_port: bool = False,
     hosts: Iterable[str] = (),
     viser_port: Callable[[], int | None] = lambda: None,
-    looks: Looks | None = None,
+    looks: SharedViewState | None = None,
     on_ready: Callable[[str], None] | None = None,
 ) -> None:
     """Serve until Ctrl-C. Starts and stops the engine; prints the page's address on a line of its own when it answers,
@@ -39,7 +39,7 @@ def serve(
     bound = listen_socket(host, port, strict=strict_port)
     number = bound.getsockname()[1]
     if port not in (0, number):
-        print(f"cipv: port {port} is taken, using {number}", file=sys.stderr)
+        print(f"cipv: port {port} is in use; using {number}", file=sys.stderr)
     address = f"http://{reachable(host)}:{number}"
     engine.labels.kept.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
     engine.start()

@@ -17,31 +17,20 @@ from fastapi.responses import JSONResponse, Response
 from fastapi.staticfiles import StaticFiles
 from starlette.types import Scope
 
-from app.clips.jobs import Jobs
-from app.core.shared_view_state import Looks
+from app.clips.export_queue import ExportQueue
+from app.core.shared_view_state import SharedViewState
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.streaming.stream import Stream
 from app.views.colors import palette_css
-from app.views.rerun_web import ViewerFiles
-from app.views.viser_proxy import viser_router
+from app.views.rerun.web import ViewerFiles
+from app.views.viser.proxy import viser_router
 from app.web.access import Access, Guard
 from app.web.api_description import REFUSALS, titled
 from app.web.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
 from app.web.metrics import Metrics
-from app.web.routes.alignment import alignment_router
-from app.web.routes.clips import clips_router
-from app.web.routes.drive import drive_router
-from app.web.routes.health import health_router
-from app.web.routes.label_acts import label_acts_router
-from app.web.routes.label_files import IMPORT, label_files_router
-from app.web.routes.labels import labels_router
-from app.web.routes.params import params_router
-from app.web.routes.playback import playback_router
-from app.web.routes.project import project_router
-from app.web.routes.recording import recording_router
-from app.web.routes.rerun import rerun_router
-from app.web.routes.runs import runs_router
+from app.web.routers import ROUTERS, Services
+from app.web.routes.labels.files import IMPORT
 from app.web.tokens import Tokens
 
 STATIC = Path(__file__).resolve().parents[2] / "static"
@@ -52,15 +41,16 @@ def create_app(
     viser_port: Callable[[], int | None] = lambda: None,
     hosts: Iterable[str] = (),
     marks: Marks | None = None,
-    looks: Looks | None = None,
+    looks: SharedViewState | None = None,
     tokens: Tokens | None = None,
 ) -> FastAPI:
     """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
-    marked moments are kept; null forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
-    comes must have; null where only this machine can come."""
+    marked moments are kept; None forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
+    comes must have; None where only this machine can come."""
     access = Access(hosts)
     stream = Stream(looks)
-    jobs, viewer, metrics = Jobs(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
+    exports, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
+    services = Services(engine, stream, marks or Marks(), exports, viewer, metrics)
 
     @asynccontextmanager
     async def listening(_: FastAPI) -> AsyncIterator[None]:
@@ -69,7 +59,7 @@ def create_app(
         yield
         for end in ends:
             end()
-        await asyncio.to_thread(jobs.close)
+        await asyncio.to_thread(exports.close)
         viewer.close()
 
     app = FastAPI(
@@ -79,19 +69,8 @@ def create_app(
     app.add_middleware(BodyLimit, files={IMPORT: LARGEST_FILE})
     app.add_middleware(Guard, access=access, tokens=tokens)  # the last one added is the first to be asked
     app.add_exception_handler(RequestValidationError, _one_sentence)
-    app.include_router(health_router(engine, metrics))
-    app.include_router(playback_router(engine, stream))
-    app.include_router(params_router(engine))
-    app.include_router(recording_router(engine))
-    app.include_router(drive_router(engine, engine.drives, marks or Marks()))
-    app.include_router(runs_router(engine, engine.drives))
-    app.include_router(labels_router(engine.labels))
-    app.include_router(label_acts_router(engine.labels))
-    app.include_router(label_files_router(engine.labels))
-    app.include_router(clips_router(engine, jobs))
-    app.include_router(alignment_router(engine))
-    app.include_router(project_router(engine))
-    app.include_router(rerun_router(engine, viewer))
+    for make_router in ROUTERS:
+        app.include_router(make_router(services))
     app.include_router(viser_router(viser_port, access.allowed))
     app.add_api_route("/palette.css", _palette, include_in_schema=False)
     app.mount("/", _Pages(engine.drives.turn.asked), name="pages")
@@ -172,9 +151,9 @@ async def _one_sentence(_: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RequestValidationError)
     first = error.errors()[0]
     if first["type"] == "json_invalid":
-        return _not_understood(f"the body is no JSON: {first['ctx']['error']}")
+        return _not_understood(f"the body is not valid JSON: {first['ctx']['error']}")
     if first["loc"] == ("body",) and first["type"] != "missing":
-        return _not_understood("the body has to be a JSON object, sent as application/json")
+        return _not_understood("the body must be a JSON object, sent as application/json")
     place = ".".join(str(part) for part in first["loc"] if part != "body")
     return _not_understood(f"{place}: {first['msg']}" if place else first["msg"])
 

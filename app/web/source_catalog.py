@@ -3,24 +3,16 @@ folders."""
 
 from __future__ import annotations
 
-from importlib import resources
 from pathlib import Path
 
 from app.core.session_folder import SESSIONS
 from pipeline.common.data_dir import data_dir
-from pipeline.sources import looks_like
+from pipeline.source_kinds import built_in, looks_like
 
 
 def catalog() -> list[tuple[str, str]]:
     """(uri, title) pairs: scenarios, then sessions, then the recordings right below ``CIPV_DATA`` and ``sessions``."""
-    return [*scenarios(), *sessions(), *recordings()]
-
-
-def scenarios() -> list[tuple[str, str]]:
-    """(uri, title) of the simulator's built-in scenarios, by name."""
-    folder = resources.files("pipeline.simulation") / "scenarios"
-    names = sorted(file.name.removesuffix(".yaml") for file in folder.iterdir() if file.name.endswith(".yaml"))
-    return [(f"sim:{name}", f"Simulation · {name.replace('_', ' ')}") for name in names]
+    return [*built_in(), *sessions(), *recordings()]
 
 
 def sessions(folder: Path = SESSIONS) -> list[tuple[str, str]]:

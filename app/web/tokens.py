@@ -36,14 +36,14 @@ class Tokens:
         for role, variable in _VARIABLES.items():
             token = environment.get(variable) or secrets.token_urlsafe(_BYTES)
             if len(token) < SHORTEST or not (token.isascii() and token.replace("-", "").replace("_", "").isalnum()):
-                raise BadInput(f"{variable}: at least {SHORTEST} letters, digits, - or _")
+                raise BadInput(f"{variable}: must have at least {SHORTEST} letters, digits, - or _")
             chosen[role] = token
         if chosen["person"] == chosen["display"]:
-            raise BadInput("CIPV_TOKEN and CIPV_DISPLAY_TOKEN: the same for both would make the display a person")
+            raise BadInput("CIPV_TOKEN and CIPV_DISPLAY_TOKEN must differ")
         return cls(**chosen)
 
     def role_of(self, given: str | None) -> Role | None:
-        """Whose token it is; null for nobody's. Takes as long for every answer."""
+        """Whose token it is; None for nobody's. Takes as long for every answer."""
         digest = _digest(given or "")
         is_person = hmac.compare_digest(digest, _digest(self.person))
         is_display = hmac.compare_digest(digest, _digest(self.display))

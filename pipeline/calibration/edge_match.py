@@ -43,8 +43,8 @@ MOST = 8000
 class EdgeScore:
     """score: 0–1, 1 where no alignment near is better, 0 where the usual one of them is as good. better: changes of
     parameters (``AlignmentParams``; of h_res_deg and v_res_deg a factor) that lead to the best one near, if that is
-    clearly better. sigmas: how far the best stands out. borders: depth edges in the pictures. score is null where too
-    few borders are seen (sigmas null), or where no alignment near stands out."""
+    clearly better. sigmas: how far the best stands out. borders: depth edges in the pictures. score is None where too
+    few borders are seen (sigmas None), or where no alignment near stands out."""
 
     score: float | None
     sigmas: float | None

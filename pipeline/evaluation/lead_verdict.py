@@ -43,7 +43,7 @@ class LeadRule:
 @dataclass(frozen=True)
 class Judged:
     """One frame's verdict. Distances are horizontal ranges to the nearest face, lateral_error_m how far the CIPV lies
-    beside the lead (0: on it), metres; null where there is none."""
+    beside the lead (0: on it), metres; None where there is none."""
 
     frame: str
     verdict: Verdict
@@ -54,7 +54,7 @@ class Judged:
     @property
     def error_m(self) -> float | None:
         """Estimated minus true distance, of every CIPV that lies where the lead is from side to side: also of one whose
-        distance is too far off to be called correct. Null otherwise."""
+        distance is too far off to be called correct. None otherwise."""
         beside = self.lateral_error_m is None or self.lateral_error_m > 0.0
         if beside or self.truth_m is None or self.distance_m is None:
             return None
@@ -85,7 +85,7 @@ def judge(result: Result, truth: Iterable[TruthObject], rule: LeadRule) -> Judge
 
 
 def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judged:
-    """One frame's CIPV against the vehicle that is known to lead; null: none does. A lead beyond the range asked for
+    """One frame's CIPV against the vehicle that is known to lead; None: none does. A lead beyond the range asked for
     counts as none."""
     if lead is not None and nearest_face_m(lead) > rule.max_range_m:
         lead = None

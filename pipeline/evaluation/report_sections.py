@@ -14,12 +14,12 @@ Cell = str | float | int | None
 
 @dataclass(frozen=True)
 class Coloured:
-    """A cell with a colour that means something; the table's caption says what. replay: name of the drive behind it,
+    """A cell with a colour that means something; the table's caption says what. drive: name of the drive behind it,
     where one is kept."""
 
     value: Cell
     tone: Tone
-    replay: str = ""
+    drive: str = ""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Driven:
     """A cell with the drive behind it, by its name."""
 
     value: Cell
-    replay: str
+    drive: str
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ AnyCell = Cell | Coloured | Driven | Linked
 
 @dataclass(frozen=True)
 class Table:
-    """Numbers keep their full precision here; null is shown as a dash. decimals: for people."""
+    """Numbers keep their full precision here; None is shown as a dash. decimals: for people."""
 
     title: str
     columns: tuple[str, ...]

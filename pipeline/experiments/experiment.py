@@ -17,21 +17,24 @@ Suite = Literal["paper", "curves", "euroncap", "iso"]
 
 
 @dataclass(frozen=True)
-class Replay:
-    """A drive that can be seen again. name: fit for a file. scenario: with the ego vehicle as driven, or its script.
-    text: what came of it. detections: what was seen in its pictures; null: what the embedded network saw there."""
+class ExperimentDrive:
+    """The drive behind an outcome, which can be opened again as a scenario."""
 
     name: str
+    """Fit for a file name."""
     title: str
     text: tuple[str, ...]
+    """What happened in it, a paragraph each."""
     scenario: Scenario
+    """With the ego vehicle as it drove, or with its script."""
     params: Params
     sensors: Sensors
     charts: tuple[Chart, ...]
     detections: Detections | None = GIVEN
+    """What was detected in its pictures; None: what the embedded network detected."""
 
     def as_seen(self) -> Scenario:
-        """The scenario with what the line was given in that drive, so that it believes the same again."""
+        """The scenario with the detections of that drive, so that a run gives the same results."""
         return self.scenario.model_copy(update={"sensors": self.sensors, "detections": self.detections})
 
 
@@ -41,14 +44,16 @@ Outcome = TypeVar("Outcome")
 
 @dataclass(frozen=True)
 class Experiment(Generic[Case, Outcome]):
-    """cases: what is to be driven, in short or in full; each can be sent to another process. run: one case to its
-    outcome, a pure function at a module's top level. report: all of them, in order, to a section. replay: the drive
-    behind an outcome."""
+    """Cases to drive, and how their outcomes are reported."""
 
     name: str
     suite: Suite
     title: str
     cases: Callable[[bool], Sequence[Case]]
+    """The cases, fewer of them when called with True; each can be sent to another process."""
     run: Callable[[Case], Outcome]
+    """One case to its outcome: a pure function at a module's top level."""
     report: Callable[[Sequence[Case], Sequence[Outcome]], Section]
-    replay: Callable[[Case, Outcome], Replay]
+    """All cases and outcomes, in order, to a section of the report."""
+    as_drive: Callable[[Case, Outcome], ExperimentDrive]
+    """The drive behind an outcome."""

@@ -1,4 +1,4 @@
-"""What the line sees with in an experiment: which sensors, and whose the camera's boxes are."""
+"""What the pipeline perceives with in an experiment: which sensors, and where the camera's boxes come from."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def eyes_for(boxes: Boxes) -> Eyes:
 
 
 def detections_for(boxes: Boxes) -> Detections | None:
-    """What a replay is given to see in its pictures; null: what the embedded network sees there."""
+    """The detections a drive is replayed with; None: those of the embedded network."""
     return GIVEN if boxes == "truth" else None
 
 

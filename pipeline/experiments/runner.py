@@ -13,7 +13,7 @@ from pipeline.common.errors import BadInput
 from pipeline.evaluation.report_sections import Section
 from pipeline.experiments.curves.experiment import CURVES
 from pipeline.experiments.euro_ncap.experiment import NCAP
-from pipeline.experiments.experiment import Experiment, Replay
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.iso15622.experiment import ISO
 from pipeline.experiments.paper.bev_error import BEV_ERROR
 from pipeline.experiments.paper.braking import BRAKING
@@ -22,7 +22,7 @@ from pipeline.experiments.paper.distance_regression import REGRESSION
 from pipeline.experiments.paper.lidar_range import RANGING
 
 EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, CURVES, BRAKING, NCAP, ISO)
-Keep = Callable[[Experiment[Any, Any], Replay], None]
+Keep = Callable[[Experiment[Any, Any], ExperimentDrive], None]
 SUITES = ("paper", "curves", "euroncap", "iso", "all")
 
 
@@ -75,6 +75,6 @@ def _reported(
     for case, outcome in zip(cases, outcomes, strict=True):
         got.append(outcome)
         if keep is not None:
-            keep(experiment, experiment.replay(case, outcome))
+            keep(experiment, experiment.as_drive(case, outcome))
         done()
     return experiment.report(cases, got)

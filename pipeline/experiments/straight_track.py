@@ -9,10 +9,10 @@ from typing import Any
 from pipeline.common.geometry import closest_on_polygon
 from pipeline.evaluation.report_sections import Chart, Series
 from pipeline.params import Params, with_changes
-from pipeline.simulation.closed_loop import Setup, Tick, drive
+from pipeline.simulation.closed_loop import LoopStep, Setup, drive
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.world.actors import Motion
-from pipeline.simulation.world.world import ActorState
+from pipeline.simulation.world.world_state import ActorState
 
 KMH = 1.0 / 3.6
 """One km/h in m/s."""
@@ -57,10 +57,10 @@ def parameters(controller: str, set_speed_mps: float, changes: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Drive:
+class DriveRecord:
     """A drive towards the target, one value a tick. gap_m: from the bumper to the target's rear. acquired_m: the gap
     when the target first was the CIPV; brakes_m: when any braking was first asked for. impact_mps: relative speed at
-    contact, null without. motions: the ego vehicle's. All null or empty where it did not happen."""
+    contact, None without. motions: the ego vehicle's. All None or empty where it did not happen."""
 
     t_s: tuple[float, ...]
     speed_mps: tuple[float, ...]
@@ -99,12 +99,12 @@ class Drive:
         return max((abs(b - a) / (t1 - t0) for a, b, t0, t1 in changes), default=0.0)
 
 
-def approach(scenario: Scenario, setup: Setup, stop_when_over: bool = True) -> Drive:
-    """Drive until contact, until the danger is over (if so wished), or to the scenario's end."""
+def approach(scenario: Scenario, setup: Setup, stop_when_over: bool = True) -> DriveRecord:
+    """DriveRecord until contact, until the danger is over (if so wished), or to the scenario's end."""
     return record(drive(scenario, setup), stop_when_over)
 
 
-def record(ticks: Iterable[Tick], stop_when_over: bool = True) -> Drive:
+def record(ticks: Iterable[LoopStep], stop_when_over: bool = True) -> DriveRecord:
     rows: list[tuple[float, float, float, float, float, float | None, str]] = []
     motions: list[Motion] = []
     acquired = brakes = impact = None
@@ -124,10 +124,10 @@ def record(ticks: Iterable[Tick], stop_when_over: bool = True) -> Drive:
         if stop_when_over and _over(tick, target):
             break
     times, speeds, accels, gaps, targets, measures, states = tuple(zip(*rows, strict=True)) or ((),) * 7
-    return Drive(times, speeds, accels, gaps, targets, measures, states, acquired, brakes, impact, tuple(motions))
+    return DriveRecord(times, speeds, accels, gaps, targets, measures, states, acquired, brakes, impact, tuple(motions))
 
 
-def drive_charts(drive: Drive) -> tuple[Chart, ...]:
+def drive_charts(drive: DriveRecord) -> tuple[Chart, ...]:
     """Speeds, gap and acceleration over time, as one looks at a drive."""
     t_s = drive.t_s
     seen = [(t, range_m) for t, range_m in zip(t_s, drive.measured_m, strict=True) if range_m is not None]
@@ -143,13 +143,13 @@ def drive_charts(drive: Drive) -> tuple[Chart, ...]:
     )
 
 
-def _over(tick: Tick, target: ActorState) -> bool:
+def _over(tick: LoopStep, target: ActorState) -> bool:
     """The car stands, or has braked down to the speed of a target that goes on as it does."""
     speed, accel = tick.vehicle.speed_mps, tick.vehicle.accel_mps2
     return speed < _STANDING_MPS or (accel < -_BRAKING_MPS2 and speed <= target.speed_mps and not target.braking)
 
 
-def target_of(tick: Tick) -> ActorState:
+def target_of(tick: LoopStep) -> ActorState:
     return next(state for state in tick.world.actors if state.actor.id == TARGET)
 
 
@@ -164,8 +164,8 @@ def true_range_m(target: ActorState) -> float:
     return float((x * x + y * y) ** 0.5)
 
 
-def measured_m(tick: Tick, target: ActorState) -> float | None:
-    """The CIPV's distance where the CIPV is the target; null where there is none or it is something else."""
+def measured_m(tick: LoopStep, target: ActorState) -> float | None:
+    """The CIPV's distance where the CIPV is the target; None where there is none or it is something else."""
     lead = tick.result.cipv
     if lead is None:
         return None

@@ -12,8 +12,8 @@ from pipeline.params import CipvParams, PathParams
 from pipeline.path.corridor import nearest_on_path
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.truth_boxes import in_picture
-from pipeline.simulation.world import world
-from pipeline.simulation.world.world import ActorState, World
+from pipeline.simulation.world import world_state
+from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.types import F64, CameraCalibration, Path, Point2
 
 MAX_M = 60.0
@@ -39,10 +39,10 @@ class Way:
         """The whole drive and 15 s more."""
         alone = scene.model_copy(update={"actors": (), "crossing_actors": ()})
         t_s = np.arange(0.0, scene.duration_s + _LONGEST_S, _STEP_S)
-        return Way(t_s, np.array([world.at(alone, float(t)).pose[:2] for t in t_s]))
+        return Way(t_s, np.array([world_state.at(alone, float(t)).pose[:2] for t in t_s]))
 
     def ahead(self, now: World, at_most_m: float = _AHEAD_M) -> Path | None:
-        """What is left of it, 90 m at most, in the ego frame of now; null while the car stands."""
+        """What is left of it, 90 m at most, in the ego frame of now; None while the car stands."""
         coming = np.vstack([now.pose[:2], self.places[self.t_s > now.t_s]])
         moved = np.hypot(*np.diff(coming, axis=0).T)
         keep = np.concatenate([[True], (moved > _SMALLEST_MOVE_M) & (np.cumsum(moved) < at_most_m)])

@@ -82,7 +82,7 @@ def decode_picture(path: Path) -> tuple[U8, bytes | None]:
 
 
 def picture_size(paths: Iterable[Path]) -> tuple[int, int] | None:
-    """Width and height of the first readable picture; null where there is none."""
+    """Width and height of the first readable picture; None where there is none."""
     for path in paths:
         try:
             bgr, _ = decode_picture(path)
@@ -100,7 +100,7 @@ def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
     is_jpeg = data.startswith(_JPEG_START)
     for start, end in _MARKERS:
         if data.startswith(start) and end not in data[-_END_BYTES:]:
-            raise SourceError(f"{name}: the picture is cut off")
+            raise SourceError(f"{name}: the picture is truncated")
     try:
         picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR) if data else None
     except cv2.error:
@@ -111,7 +111,7 @@ def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
 
 
 def picture_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: list[str]) -> Picture | None:
-    """The picture of a frame; null, and ``notes`` says why, when there is no file, when it is damaged or when it is not
+    """The picture of a frame; None, and ``notes`` says why, when there is no file, when it is damaged or when it is not
     of the size (width, height) of the recording's others."""
     if path is None:
         notes.append("no picture for this frame")
@@ -174,4 +174,4 @@ def check_looks_ahead(camera: CameraCalibration, what: str) -> None:
         u, v = (camera.K @ (forward / forward[2]))[:2]
         if -0.5 <= u / camera.width <= 1.5 and -0.5 <= v / camera.height <= 1.5:
             return
-    raise SourceError(f"{what}: the camera does not look ahead; is its extrinsic given the wrong way round?")
+    raise SourceError(f"{what}: the camera does not look ahead; is its extrinsic inverted?")

@@ -34,7 +34,7 @@ _METRES_A_DEGREE = 111_320.0
 
 class LabelRow(NamedTuple):
     """One line of a label file, ego frame. kind: as KITTI calls it. bbox: pixels of the rectified picture. cuboid and
-    bbox are null where the line says that it knows none. said_more: it knew how far the object is cut or hidden."""
+    bbox are None where the line says that it knows none. said_more: it knew how far the object is cut or hidden."""
 
     kind: str
     label: str
@@ -58,7 +58,7 @@ def parse_labels(data: bytes, T_rect_ego: F64) -> tuple[TruthObject, ...]:
             continue
         row = parse_row(fields, T_ego_rect)
         if row.cuboid is None:
-            raise SourceError("a KITTI label without place or size")
+            raise SourceError("a KITTI label without position or size")
         objects.append(truth_of(row, row.cuboid))
     return tuple(objects)
 
@@ -76,10 +76,10 @@ def parse_row(fields: Sequence[str], T_ego_rect: F64) -> LabelRow:
     try:
         truncated, occluded, _, x1, y1, x2, y2, *place = (float(field) for field in fields[1:_LABEL_FIELDS])
     except ValueError:
-        raise SourceError("a KITTI label with something else than numbers") from None
+        raise SourceError("a KITTI label with a field that is not a number") from None
     box: Box = (x1, y1, x2, y2)
     if not all(math.isfinite(value) and abs(value) < _LARGEST_PX for value in (truncated, occluded, *box)):
-        raise SourceError("a KITTI label with impossible numbers")
+        raise SourceError("a KITTI label with invalid numbers")
     cuboid = cuboid_from_label(place, T_ego_rect) if tuple(place) != NO_CUBOID else None
     seen = box if box != NO_BOX else None
     return LabelRow(fields[0], label_name(fields[0]), cuboid, seen, said_more=truncated > 0.0 or occluded > 0.0)
@@ -101,7 +101,7 @@ def cuboid_from_label(numbers: Sequence[float], T_ego_rect: F64) -> Cuboid:
     no place and size."""
     height, width, length, x, y, z, rotation_y = numbers
     if not np.all(np.isfinite(numbers)) or np.abs(numbers).max() > 1e4 or min(height, width, length) <= 0.0:
-        raise SourceError("a KITTI label without place or size")
+        raise SourceError("a KITTI label without position or size")
     center = transform(T_ego_rect, np.array([[x, y - height / 2, z]]))[0]
     along = T_ego_rect[:3, :3] @ np.array([np.cos(rotation_y), 0.0, -np.sin(rotation_y)])
     return Cuboid(
@@ -129,8 +129,8 @@ def cuboid_to_label(cuboid: Cuboid, T_rect_ego: F64) -> tuple[float, ...]:
 
 
 class Oxts(NamedTuple):
-    """One record of the inertial unit. yaw_rate_radps: positive to the left. quality: null without a satellite fix. The
-    place is the Velodyne's, WGS 84; course clockwise from north, null when the car stands."""
+    """One record of the inertial unit. yaw_rate_radps: positive to the left. quality: None without a satellite fix. The
+    place is the Velodyne's, WGS 84; course clockwise from north, None when the car stands."""
 
     speed_mps: float
     yaw_rate_radps: float

@@ -25,7 +25,7 @@ _LONGEST_SENTENCE = 256
 
 
 class BadSentence(ValueError):
-    """A line that is no whole sentence; the text is why."""
+    """A line that is not a complete sentence; the text is why."""
 
 
 class NmeaReader:
@@ -99,7 +99,7 @@ class NmeaReader:
         is_moving = course is not None and speed_mps >= _SLOWEST_COURSE_MPS
         lat_deg, lon_deg = float(place.latitude), float(place.longitude)
         if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
-            raise ValueError("a place that is not on the Earth")
+            raise ValueError("a position that is not on the Earth")
         return GnssFix(
             _unix_ns(self._date, self._moment, near_ns),
             lat_deg,
@@ -115,7 +115,7 @@ class NmeaReader:
 def _parse(line: str) -> Any:
     """pynmea2's sentence. BadSentence when the line is damaged or has no checksum: garbage often looks like text."""
     if len(line) > _LONGEST_SENTENCE or "*" not in line:
-        raise BadSentence("no whole sentence")
+        raise BadSentence("not a complete sentence")
     try:
         return pynmea2.parse(line.strip(), check=True)
     except (pynmea2.ParseError, ValueError, TypeError, IndexError, AttributeError) as error:

@@ -47,9 +47,9 @@ def parse_pcd(data: bytes, name: str, notes: list[str]) -> Rows:
     else:
         rows = _compressed(body, header, name)
     if not len(rows):
-        raise SourceError(f"{name}: no points in it")
+        raise SourceError(f"{name}: no points")
     if len(rows) < header.points:
-        notes.append(f"{name}: {len(rows)} of {header.points} points are there")
+        notes.append(f"{name}: {len(rows)} of {header.points} points read")
     return rows
 
 
@@ -59,17 +59,17 @@ def _header(data: bytes, name: str) -> _Header:
     while "DATA" not in lines:
         end = data.find(b"\n", at, _MAX_HEADER)
         if end < 0:
-            raise SourceError(f"{name}: no PCD file: its header does not end")
+            raise SourceError(f"{name}: not a PCD file: its header does not end")
         words = data[at:end].decode("ascii", "replace").split()
         at = end + 1
         if words and not words[0].startswith("#"):
             if words[0] not in _LINES:
-                raise SourceError(f"{name}: no PCD file")
+                raise SourceError(f"{name}: not a PCD file")
             lines[words[0]] = words[1:]
     try:
         return _Header(_dtype(lines), _points(lines), _encoding(lines), at)
     except (KeyError, ValueError, IndexError):
-        raise SourceError(f"{name}: its header makes no sense") from None
+        raise SourceError(f"{name}: its header is invalid") from None
 
 
 def _dtype(lines: dict[str, list[str]]) -> np.dtype[np.void]:
@@ -81,7 +81,7 @@ def _dtype(lines: dict[str, list[str]]) -> np.dtype[np.void]:
     parts: list[tuple[str, str, tuple[int, ...]]] = []
     for index, (field, size, kind, count) in enumerate(zip(fields, sizes, kinds, counts, strict=True)):
         if not 0 < count <= 4096:
-            raise ValueError("a field of no size")
+            raise ValueError("a field without a size")
         taken = field == "_" or any(field == other for other, _, _ in parts)
         plain = "<" + _TYPES[kind, size]
         parts.append((f"_{index}" if taken else field, plain, () if count == 1 else (count,)))
@@ -91,7 +91,7 @@ def _dtype(lines: dict[str, list[str]]) -> np.dtype[np.void]:
 def _points(lines: dict[str, list[str]]) -> int:
     points = int(lines["POINTS"][0]) if "POINTS" in lines else int(lines["WIDTH"][0]) * int(lines["HEIGHT"][0])
     if not 0 <= points <= _MAX_POINTS:
-        raise ValueError("an impossible number of points")
+        raise ValueError("an invalid number of points")
     return points
 
 
@@ -136,10 +136,10 @@ def _compressed(body: bytes, header: _Header, name: str) -> Rows:
     """LZF, field after field (all x, then all y, …)."""
     expected = header.points * header.dtype.itemsize
     if len(body) < 8:
-        raise SourceError(f"{name}: the file is cut off")
+        raise SourceError(f"{name}: the file is truncated")
     packed, unpacked = (int(value) for value in np.frombuffer(body, "<u4", count=2))
     if unpacked != expected or len(body) < 8 + packed:
-        raise SourceError(f"{name}: the file is cut off or damaged")
+        raise SourceError(f"{name}: the file is truncated or damaged")
     flat = np.zeros(unpacked, dtype=np.uint8)
     if _unpack_lzf(np.frombuffer(body, np.uint8, count=packed, offset=8), flat) != unpacked:
         raise SourceError(f"{name}: its compressed points are damaged")

@@ -22,7 +22,7 @@ _VLP16 = len(VLP16_ELEVATIONS_DEG)
 
 class Cloud(NamedTuple):
     """xyz: (N, 3) float32, the sensor's axes. intensity: (N,) float32, 0–255. time_s: after the cloud's stamp, or
-    null."""
+    None."""
 
     xyz: F32
     intensity: F32
@@ -50,12 +50,12 @@ def cloud_of(raw: npt.NDArray[np.void], t_ns: int, notes: list[str]) -> Cloud:
     """
     names = {name for name in raw.dtype.names or () if raw.dtype[name].shape == ()}
     if not {"x", "y", "z"} <= names:
-        raise SourceError("a cloud without x, y and z")
+        raise SourceError("a point cloud without x, y and z")
     with np.errstate(invalid="ignore", over="ignore"):  # signalling NaNs and huge numbers of a damaged file
         xyz = np.column_stack([raw[axis].astype(np.float32) for axis in "xyz"])
         good = np.all(np.abs(xyz) < _FARTHEST_M, axis=1) & np.any(xyz != 0.0, axis=1)
         if not good.any():
-            raise SourceError("no LiDAR points in it")
+            raise SourceError("no LiDAR points")
         xyz, kept = np.ascontiguousarray(xyz[good]), raw[good]
         ring, channels = _rings(kept, xyz, names, notes)
         return Cloud(xyz, _intensity(kept, names), ring, channels, _times(kept, t_ns, names))
@@ -74,7 +74,7 @@ def _rings(kept: npt.NDArray[np.void], xyz: F32, names: set[str], notes: list[st
     elevation = np.degrees(np.arctan2(xyz[:, 2], np.hypot(xyz[:, 0], xyz[:, 1])))
     name = next((name for name in _RING_NAMES if name in names and np.issubdtype(kept.dtype[name], np.integer)), None)
     if name is None or int(kept[name].max()) > 255 or int(kept[name].min()) < 0:
-        notes.append("no ring numbers: given by elevation, as a VLP-16's")
+        notes.append("no ring numbers: assigned by elevation, as on a VLP-16")
         ring = np.rint((elevation - VLP16_ELEVATIONS_DEG[0]) / 2.0)
         return np.clip(ring, 0, _VLP16 - 1).astype(np.uint8), _VLP16
     ring = kept[name].astype(np.int64)
@@ -89,7 +89,7 @@ def _rings(kept: npt.NDArray[np.void], xyz: F32, names: set[str], notes: list[st
 
 
 def _times(kept: npt.NDArray[np.void], t_ns: int, names: set[str]) -> F32 | None:
-    """Seconds after the stamp; null when there are none, or they make no sense."""
+    """Seconds after the stamp; None when there are none, or they make no sense."""
     name = next((name for name in _SECONDS if name in names), None)
     if name is None:
         return None

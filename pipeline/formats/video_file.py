@@ -38,7 +38,7 @@ class VideoFile:
         except (av.FFmpegError, OSError, ValueError) as error:
             raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
         if not len(stamps):
-            raise SourceError(f"{path.name}: no pictures in it")
+            raise SourceError(f"{path.name}: no pictures")
         first = int(stamps[0])
         self.times_ns: Times = np.rint((stamps - first) * tick_ns).astype(np.int64)
         self._lock = Lock()
@@ -112,7 +112,7 @@ def _stamps(container: av.container.InputContainer, progress: Progress) -> tuple
     """Presentation stamps of every picture, ascending, and nanoseconds a tick; nothing is decoded. progress: of the
     file's bytes."""
     if not container.streams.video:
-        raise ValueError("no video in it")
+        raise ValueError("no video stream")
     stream = container.streams.video[0]
     if stream.time_base is None:
         raise ValueError("its pictures have no times")

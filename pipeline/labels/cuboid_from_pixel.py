@@ -34,7 +34,7 @@ class NothingThere(BadInput):
 
 @dataclass(frozen=True)
 class Lifted:
-    """how: one sentence. points: that it was laid on, 0 when its distance comes from the picture. bbox: null when
+    """how: one sentence. points: that it was laid on, 0 when its distance comes from the picture. bbox: None when
     nobody drew one and none was detected there."""
 
     cuboid: Cuboid
@@ -52,7 +52,7 @@ def lift(
     """
     alignment = resolve(params.alignment, frame.camera)
     if alignment is None:
-        raise NothingThere("the camera is not calibrated: nobody knows where a pixel looks")
+        raise NothingThere("the camera is not calibrated, so a pixel has no known direction")
     if bbox is None and pixel is not None:
         bbox = _detected_at(frame, pixel)
     points, ground = _points_of(frame, alignment, bbox, pixel)
@@ -67,7 +67,7 @@ def lift(
         raise NothingThere("no points and no detection there: draw a box around it")
     law = _by_height(frame, params, alignment, label, bbox)
     if law.distance_m is None or law.sigma_m is None:
-        raise NothingThere(f"no points there, and a {label}'s box like this tells no distance")
+        raise NothingThere(f"no points there, and a {label}'s box like this gives no distance")
     how = f"no points there: about {law.distance_m:.0f} ± {law.sigma_m:.0f} m by its height in the picture"
     return Lifted(_at_height(alignment, label, bbox, law, ground), bbox, 0, how)
 
@@ -89,7 +89,7 @@ def _detected_at(frame: Frame, pixel: tuple[float, float]) -> Box | None:
 def _points_of(
     frame: Frame, alignment: Alignment, bbox: Box | None, pixel: tuple[float, float] | None
 ) -> tuple[F32 | None, Ground | None]:
-    """(the points of what is there, null for too few; the ground, null without a sweep)."""
+    """(the points of what is there, None for too few; the ground, None without a sweep)."""
     if frame.sweep is None:
         return None, None
     sweep = frame.sweep.points

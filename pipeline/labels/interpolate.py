@@ -171,7 +171,9 @@ def _share(t_ns: Sequence[int], first: int, frame: int, last: int) -> float:
 
 def _require_forward(times_ns: Sequence[int]) -> None:
     if any(after <= before for before, after in pairwise(times_ns)):
-        raise BadInput("the recording's clock steps back between these keyframes: what lies between them is not known")
+        raise BadInput(
+            "the recording's clock steps back between these keyframes: positions between them cannot be interpolated"
+        )
 
 
 def _mixed(a: Box, b: Box, share: float) -> Box:

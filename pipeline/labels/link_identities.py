@@ -3,7 +3,7 @@ should be by its own speed.
 
 One to one, at least total distance. Of one whose speed is known it is at most 2 m from there, and what 10 m/s add; one
 that was seen once may have come up to 50 m/s along its own axis, as an oncoming car does, and little to its side. None
-goes across a gap in which the line's trackers start anew.
+goes across a gap in which the pipeline's trackers start anew.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pipeline.types import F64
 from pipeline.types.source import TruthObject
 
 MAX_GAP_S = TimeParams().reset_gap_s
-"""After a longer gap the line's trackers start anew, so nothing is compared across it."""
+"""After a longer gap the pipeline's trackers start anew, so nothing is compared across it."""
 _LINK_M, _LINK_MPS = 2.0, 10.0
 _FIRST_MPS, _FIRST_ASIDE_M = 50.0, 1.0
 _NEVER = 1e6

@@ -21,7 +21,7 @@ it is kept, so that it is not proposed again."""
 @dataclass(frozen=True)
 class Origin:
     """Who made a label. name: the person, or the file or run that it came from. params, calibration: digests of what
-    the pipeline ran with; null for the other makers. t_unix_ms: when. how: what its place was measured by, where a
+    the pipeline ran with; None for the other makers. t_unix_ms: when. how: what its place was measured by, where a
     person only pointed at it; empty otherwise."""
 
     maker: Literal["pipeline", "person", "import"]
@@ -34,7 +34,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class Sighting:
-    """A track in one frame. cuboid: null where only the picture shows it. bbox: pixels of the raw picture; null where
+    """A track in one frame. cuboid: None where only the picture shows it. bbox: pixels of the raw picture; None where
     only the LiDAR shows it. keyframe: put there by a person or an import; otherwise interpolated between keyframes."""
 
     frame: int

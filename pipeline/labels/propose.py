@@ -59,7 +59,7 @@ class Proposals:
 
 
 def propose(frames: Mapping[int, Sequence[Seen]], leads: Mapping[int, int | None], origin: Origin) -> Proposals:
-    """frames: what was seen in each, by index. leads: the CIPV's number of each frame, null for none."""
+    """frames: what was seen in each, by index. leads: the CIPV's number of each frame, None for none."""
     by_id: dict[int, dict[int, Seen]] = {}
     for index in sorted(frames):
         for seen in frames[index]:
@@ -102,7 +102,7 @@ def known_as(proposals: Sequence[LabelTrack], known: Sequence[LabelTrack]) -> di
 
 
 def _track(number: int, life: Mapping[int, Seen], leads: bool, origin: Origin) -> LabelTrack | None:
-    """Null for what is not proposed."""
+    """None for what is not proposed."""
     seen = [index for index, each in life.items() if not each.carried]
     names = [each.label for each in life.values() if each.label in ROAD_USERS]
     is_worth_it = leads or ((names or any(each.in_path for each in life.values())) and len(seen) >= _FEWEST)
@@ -119,7 +119,7 @@ def _track(number: int, life: Mapping[int, Seen], leads: bool, origin: Origin) -
 
 
 def _of_class(cuboid: Cuboid | None, label: str) -> Cuboid | None:
-    """Null for one that no vehicle of a class fills."""
+    """None for one that no vehicle of a class fills."""
     if cuboid is None:
         return None
     (length, width, height), (longest, widest, tallest) = cuboid.size, largest_size_m(label)
@@ -128,8 +128,10 @@ def _of_class(cuboid: Cuboid | None, label: str) -> Cuboid | None:
 
 
 def _whole(sightings: tuple[Sighting, ...], label: str) -> tuple[Sighting, ...]:
-    """With cuboids of one size, at least the class's usual one and at most its largest: the line shows what was seen of
-    a vehicle, and that is often its rear alone. The side that was seen stays where it is."""
+    """The same track with cuboids of one size, between the usual and the largest one of its class.
+
+    The pipeline measures what was seen of a vehicle, often its rear alone. The side that was seen stays in place.
+    """
     seen = np.array([each.cuboid.size for each in sightings if each.cuboid is not None]).reshape(-1, 3)
     if not len(seen):
         return sightings

@@ -17,7 +17,7 @@ def truth_labels(
     source: Source,
     frames: tuple[str, ...],
     origin: Origin,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> tuple[LabelSet, tuple[str, ...]]:
     """(labels, what is to be said of them). frames: the names of the recording's frames."""
     stamps = tuple(source.t_ns(index) for index in range(len(frames)))

@@ -5,11 +5,10 @@ vehicle. Its turn comes from the points when they show two sides, else it stays.
 size only grows to hold what is seen; the sides that are turned to us are laid on the points, and the rest of the
 vehicle is behind them. It stands on the ground.
 
-The turn is the closeness fit's that the line uses (``pipeline.lidar.boxes``). Open3D's minimal oriented box, which fits
-all three axes or, on flattened points, the smallest area, is further off on every real recording at hand: the median
-error of the yaw of 65 labelled cars of Astyx is 3° to 5° (flattened 2.5°) against 1.6°, of 20 of KITTI 3.5° (3.2°)
-against 0.6°.
-"""
+The yaw comes from the closeness fit of the pipeline (``pipeline.lidar.boxes``). Open3D's minimal oriented box, which
+fits all three axes or, on flattened points, the smallest area, is further off on every real recording at hand: the
+median error of the yaw of 65 labelled cars of Astyx is 3° to 5° (flattened 2.5°) against 1.6°, of 20 of KITTI 3.5°
+(3.2°) against 0.6°."""
 
 from __future__ import annotations
 

@@ -83,14 +83,14 @@ def _wrong_with(sighting: Sighting) -> str:
     if sighting.bbox is not None:
         x1, y1, x2, y2 = sighting.bbox
         if not (_below(sighting.bbox, _LARGEST_PX) and x1 < x2 and y1 < y2):
-            return "the box is none"
+            return "invalid box"
     return ""
 
 
 def _check_leads(labels: LabelSet) -> None:
     for each in labels.leads:
         _require(0 <= each.first <= each.last < len(labels.frames), f"a lead from frame {each.first} to {each.last}")
-        _require(isinstance(each.lead, str) or _fits(each.lead), "a lead that is no track")
+        _require(isinstance(each.lead, str) or _fits(each.lead), "the lead is not a track")
     _check_apart([each for each in labels.leads if each.state != "rejected"])
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.recording import topics
-from pipeline.recording.mcap_reader import McapFile
-from pipeline.recording.provenance import About
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.mcap.reader import McapFile
+from pipeline.recording.session.provenance import About
+from pipeline.recording.session.source import SessionSource
 from pipeline.types.source import Source, SourceError
 
 _GAP_STEPS = 1.5
@@ -20,7 +20,7 @@ _GAP_STEPS = 1.5
 
 @dataclass(frozen=True)
 class Rhythm:
-    """How something came over time. rate_hz: over the whole of it, null for fewer than two or all at once;
+    """How something came over time. rate_hz: over the whole of it, None for fewer than two or all at once;
     usual_step_s: the median step, which is shorter where there are gaps. gaps: steps of more than 1.5 usual ones;
     longest_gap_s: the longest step of all. duration_s: all steps together, but those back in time."""
 
@@ -46,7 +46,7 @@ class TopicInfo:
 
 @dataclass(frozen=True)
 class Info:
-    """about: null for a file that is no session of ours. frames: by header time, where there are frames. problem: null
+    """about: None for a file that is no session of ours. frames: by header time, where there are frames. problem: None
     for a whole file."""
 
     path: str

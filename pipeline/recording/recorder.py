@@ -1,4 +1,4 @@
-"""Recording beside the line: a thread of its own writes, and nothing ever waits for the disk.
+"""Recording beside the pipeline: a thread of its own writes, and nothing ever waits for the disk.
 
 What is put, and what sensors send in between, goes into a bounded queue. When the disk is too slow, what does not fit
 is dropped, counted by kind, logged, and noted in the session itself. A chunk goes to the system when it is full and at
@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from pipeline.params import Params
-from pipeline.recording.provenance import About
 from pipeline.recording.segments import NEVER, Rotation, Segments
-from pipeline.recording.velodyne_scan import RawLidar
+from pipeline.recording.session.provenance import About
+from pipeline.recording.session.velodyne_scan import RawLidar
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
 from pipeline.types.camera_shot import Shot
 
@@ -55,7 +55,7 @@ class _Job(NamedTuple):
 @dataclass(frozen=True)
 class RecordingState:
     """How a recording does. file: the newest of ``files``. seconds, bytes: over all of them. dropped: frames, batches
-    of packets, sweeps, pictures and samples that did not fit. error: why it ended by itself, null while all is well."""
+    of packets, sweeps, pictures and samples that did not fit. error: why it ended by itself, None while all is well."""
 
     file: Path
     files: tuple[Path, ...]
@@ -78,7 +78,7 @@ class RecordingState:
 
 
 class Recorder:
-    """Starts at once; a ``Tap`` of live sensors too. BadInput when there is such a file already, OSError when it cannot
+    """Starts at once; a ``Tap`` of live sensors too. BadInput when file already exists, OSError when it cannot
     be made. ``stop`` it in the end. ``queued``: how many frames may wait for the disk. ``raw_lidar``: packets instead
     of clouds. hangs: whether ``stop`` has given up on the disk."""
 
@@ -115,7 +115,7 @@ class Recorder:
         received_ns: int | None = None,
     ) -> bool:
         """Record a frame, what was believed of it and with which parameters. Returns at once; false when it was
-        dropped. received_ns: when a live frame was made, by its source's clock; null for one from a recording."""
+        dropped. received_ns: when a live frame was made, by its source's clock; None for one from a recording."""
         return self._put(lambda segments: segments.write(frame, result, params, received_ns=received_ns), "frames")
 
     def put_packets(self, packets: list[tuple[int, bytes]]) -> bool:
@@ -265,7 +265,7 @@ class Recorder:
             self._segments.write_mark(self._marks.popleft()[1])
 
     def _fail(self, error: Exception) -> None:
-        """Recording ends here; the line goes on."""
+        """Recording ends here; the pipeline goes on."""
         reason = (error.strerror if isinstance(error, OSError) else None) or f"{type(error).__name__}: {error}"
         with self._lock:
             self._error = f"recording stopped: {reason}; {self._segments.kept_frames} frames until then are kept"

@@ -20,9 +20,9 @@ from mcap.writer import MCAP0_MAGIC, Writer
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
-from pipeline.recording.mcap_index import read_summary, summary_start
-from pipeline.recording.mcap_output import CHUNK_BYTES
-from pipeline.recording.mcap_reader import McapFile, Stored
+from pipeline.recording.mcap.index import read_summary, summary_start
+from pipeline.recording.mcap.output import CHUNK_BYTES
+from pipeline.recording.mcap.reader import McapFile, Stored
 
 _PIECE_BYTES = 1 << 20
 _CRC_BYTES = 4
@@ -43,7 +43,7 @@ def relabel(file: McapFile, out: Path, labels: bytes, t_ns: int, progress: Progr
         try:
             target = out.open("x+b")
         except FileExistsError:
-            raise BadInput(f"{out}: there is such a file already; choose another name or remove it") from None
+            raise BadInput(f"{out}: file already exists; choose another name or remove it") from None
         try:
             with target:
                 before = file.directory.chunks[place - 1]
@@ -78,7 +78,7 @@ def _copy(source: BufferedReader, target: BinaryIO, end: int, progress: Progress
         progress(done, end)
         count = source.readinto(piece[: end - done])
         if not count:
-            raise OSError(f"{source.name}: it became shorter while it was read")
+            raise OSError(f"{source.name}: it shrank while being read")
         target.write(piece[:count])
         done += count
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
-from pipeline.recording.frame_list import FrameList
-from pipeline.recording.mcap_output import Output
-from pipeline.recording.mcap_reader import McapFile, Stored
-from pipeline.recording.messages import Damaged
-from pipeline.recording.session_source import SessionSource
-from pipeline.recording.tick import Tick, tick_from, tick_message
-from pipeline.recording.velodyne_scan import PACKETS_BEFORE_NS
+from pipeline.recording.errors import Damaged
+from pipeline.recording.mcap.output import Output
+from pipeline.recording.mcap.reader import McapFile, Stored
+from pipeline.recording.session.frame_list import FrameList
+from pipeline.recording.session.frame_record import FrameRecord, frame_record_from, frame_record_message
+from pipeline.recording.session.source import SessionSource
+from pipeline.recording.session.velodyne_scan import PACKETS_BEFORE_NS
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def clip(
 
 def _with_references_moved(stored: Stored, to_ns: Mapping[int, int]) -> Stored:
     try:
-        return stored._replace(data=tick_message(tick_from(stored.data).moved(to_ns)))
+        return stored._replace(data=frame_record_message(frame_record_from(stored.data).moved(to_ns)))
     except Damaged:
         return stored
 
@@ -111,7 +111,7 @@ def _referred(source: SessionSource, last: int, first_ns: int) -> list[tuple[int
     found: set[tuple[int, str]] = set()
     for stored in source.file.messages((topics.FRAMES,), first_ns, source.log_time_ns(last)):
         try:
-            references = tick_from(stored.data).references()
+            references = frame_record_from(stored.data).references()
         except Damaged:
             continue
         found |= {(at_ns, topic) for topic, at_ns in references.items() if at_ns < first_ns}
@@ -128,7 +128,7 @@ def _copy(messages: Iterable[Stored], file: McapFile, out: Path) -> tuple[int, i
             output.add(stored.channel, stored.log_time_ns, stored.publish_time_ns, stored.data)
             copied += 1
             if stored.channel == topics.channel(topics.FRAMES):
-                tick = _tick_or_nothing(stored)
+                tick = _record_or_nothing(stored)
                 frames.add(stored.log_time_ns, stored.publish_time_ns if tick is None else tick.t_ns, tick)
         if topics.METADATA in file.directory.metadata:
             frames.attach(output)
@@ -139,9 +139,9 @@ def _copy(messages: Iterable[Stored], file: McapFile, out: Path) -> tuple[int, i
     return copied, len(frames)
 
 
-def _tick_or_nothing(stored: Stored) -> Tick | None:
+def _record_or_nothing(stored: Stored) -> FrameRecord | None:
     """With the frame's own time; its message's publish time cannot be before 1970."""
     try:
-        return tick_from(stored.data)
+        return frame_record_from(stored.data)
     except Damaged:
         return None

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.common.progress import Progress, silent
-from pipeline.recording.provenance import About
 from pipeline.recording.relabel import relabel
 from pipeline.recording.rewrite import clip
-from pipeline.recording.session_source import SessionSource
-from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.session.provenance import About
+from pipeline.recording.session.source import SessionSource
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.types.source import AnySource, Recorded, Source
 
 
@@ -21,10 +21,10 @@ def save(
     progress: Progress = silent,
     labels: bytes | None = None,
 ) -> None:
-    """Write frames ``first`` to ``last`` (both included; null: to the end) to a new file, inputs and labels.
+    """Write frames ``first`` to ``last`` (both included; None: to the end) to a new file, inputs and labels.
 
-    A part of a session keeps all that is in it: results, marks, parameters, labels. Run on either, the line gives the
-    same results. labels: a file of labels to put in, in place of any that are there.
+    A part of a session keeps all that is in it: results, marks, parameters, labels. The pipeline gives the same results
+    on either. labels: a file of labels to put in, in place of any that are there.
 
     BadInput when ``out`` exists; whatever ends this early leaves no file behind.
     """

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.params import Params
-from pipeline.recording.log_time import SessionClock
-from pipeline.recording.mcap_output import Compression
-from pipeline.recording.provenance import About
-from pipeline.recording.session_writer import SessionWriter
-from pipeline.recording.velodyne_scan import RawLidar
+from pipeline.recording.mcap.output import Compression
+from pipeline.recording.session.log_time import SessionClock
+from pipeline.recording.session.provenance import About
+from pipeline.recording.session.velodyne_scan import RawLidar
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.types import EgoState, Frame, GnssFix, Result, Sweep
 from pipeline.types.camera_shot import Shot
 from pipeline.types.source import TruthObject
@@ -19,7 +19,7 @@ from pipeline.types.source import TruthObject
 
 @dataclass(frozen=True)
 class Rotation:
-    """When a recording goes on in a new file; null is never. max_s: of recorded time."""
+    """When a recording goes on in a new file; None is never. max_s: of recorded time."""
 
     max_bytes: float | None = None
     max_s: float | None = None

@@ -14,7 +14,7 @@ from pipeline.common.user_file_errors import first_complaint, read_yaml
 from pipeline.replay.messages import Sensor
 from pipeline.replay.wire import WireEvent
 
-Kind = Literal["silence", "garbage", "duplicate", "out_of_order", "clock_jump", "disconnect"]
+FaultKind = Literal["silence", "garbage", "duplicate", "out_of_order", "clock_jump", "disconnect"]
 
 
 class Fault(BaseModel):
@@ -25,7 +25,7 @@ class Fault(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     sensor: Sensor
-    kind: Kind
+    kind: FaultKind
     from_s: float = Field(ge=0.0)
     to_s: float = Field(gt=0.0)
     by_s: float = 7.0

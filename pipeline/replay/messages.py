@@ -8,9 +8,8 @@ from typing import Literal, NamedTuple
 
 import cv2
 
-from pipeline.sources.pcap import PcapSource
 from pipeline.types import EgoState, Frame, GnssFix, Picture, Sweep
-from pipeline.types.source import Source
+from pipeline.types.source import RawPackets, Source
 
 Sensor = Literal["lidar", "camera", "gnss", "ego"]
 _JPEG_QUALITY = 95
@@ -28,7 +27,7 @@ class Message(NamedTuple):
 def of_recording(source: Source, first: int = 0, last: int | None = None) -> Iterator[Message]:
     """Frames ``first`` to ``last`` as messages. A picture without a stamp is taken at its frame's tick. A capture's
     LiDAR packets are sent as they were."""
-    if isinstance(source, PcapSource):
+    if isinstance(source, RawPackets):
         packets = (Message(t_ns, "lidar", payload) for t_ns, payload in source.packets())
         others = (message for message in _of_frames(source, first, last) if message.sensor != "lidar")
         return heapq.merge(packets, others, key=lambda message: message.t_ns)

@@ -16,8 +16,8 @@ from pipeline.formats.velodyne import PACKET_BYTES, POSITION_BYTES
 from pipeline.replay.camera_server import CameraServer
 from pipeline.replay.messages import Sensor
 from pipeline.replay.nmea_writer import sentences
-from pipeline.sources.live.can import load_dbc
 from pipeline.sources.live.config import CanConfig, GnssConfig, LidarConfig, LiveConfig, SignalConfig
+from pipeline.sources.live.devices.can import load_dbc
 from pipeline.types import EgoState, GnssFix
 
 _LOOPBACK = "127.0.0.1"
@@ -44,7 +44,7 @@ def open_senders(config: LiveConfig) -> dict[Sensor, Sender]:
     if config.camera is not None and config.camera.url is not None:
         senders["camera"] = CameraSender(config.camera.url)
     elif config.camera is not None:
-        raise BadInput("camera: only a camera with a url can be played to; give http://127.0.0.1:PORT/")
+        raise BadInput("camera: replay needs a camera with a url, such as http://127.0.0.1:PORT/")
     if config.gnss is not None:
         senders["gnss"] = _gnss_sender(config.gnss)
     if config.ego is not None and config.ego.can is not None:
@@ -82,7 +82,7 @@ class CameraSender:
     def __init__(self, url: str) -> None:
         parts = urlsplit(url)
         if parts.scheme != "http" or parts.hostname is None:
-            raise BadInput(f"camera: {url}: only http can be played to")
+            raise BadInput(f"camera: {url}: replay sends over http only")
         self._server = CameraServer(parts.hostname, parts.port or 80)
 
     def send(self, payload: bytes, stamp_ns: int) -> None:
@@ -210,7 +210,7 @@ def _gnss_sender(config: GnssConfig) -> Sender:
     if config.tcp is not None:
         host, _, port = config.tcp.rpartition(":")
         return TcpNmeaSender(host, int(port))
-    raise BadInput("gnss: a serial line cannot be played to; give tcp or udp_port")
+    raise BadInput("gnss: replay cannot send to a serial line; set tcp or udp_port")
 
 
 def _said(payload: GnssFix | bytes, stamp_ns: int) -> bytes:

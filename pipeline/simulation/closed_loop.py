@@ -1,6 +1,6 @@
-"""The closed loop: the world as the sensors see it → the line → pedals → the vehicle → the next world.
+"""The closed loop: the world as the sensors see it → the pipeline → pedals → the vehicle → the next world.
 
-    world.at ─► Sensors ─► boxes (truth or network) ─► step ─► AccCommand ─► vehicle, in 5 ms steps ─┐
+    world_state.at ─► Sensors ─► boxes (truth or network) ─► step ─► AccCommand ─► vehicle, in 5 ms steps ─┐
        └──────────────────────────────────────────────────────────────────────────────────────────◄┘
 
 Deterministic: the same scenario, parameters and seed give the same drive.
@@ -21,10 +21,10 @@ from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.detection_model import BoxNoise
 from pipeline.simulation.sensors.rig import Sensors
-from pipeline.simulation.world import actors, world
+from pipeline.simulation.world import actors, world_state
 from pipeline.simulation.world import ego_vehicle as vehicle
 from pipeline.simulation.world.ego_vehicle import Pedals, VehicleModel, VehicleState
-from pipeline.simulation.world.world import World
+from pipeline.simulation.world.world_state import World
 from pipeline.step import State, step
 from pipeline.types import AccCommand, Frame, Result
 from pipeline.vision.detector import Detector
@@ -70,7 +70,7 @@ class NetworkEyes:
 @dataclass(frozen=True)
 class Setup:
     """What drives: parameters, sensors in use, eyes, and the car. closed: its pedals move the car; otherwise the car
-    follows its script, and what the line would do is only noted."""
+    follows its script, and what the pipeline would do is only recorded."""
 
     params: Params = field(default_factory=Params)
     sensors: Sensed = "both"
@@ -80,7 +80,7 @@ class Setup:
 
 
 @dataclass(frozen=True)
-class Tick:
+class LoopStep:
     """One moment of a drive. vehicle: as it was when the sensors looked; ``result`` is what came of it."""
 
     index: int
@@ -94,7 +94,7 @@ class Tick:
         return self.world.t_s
 
 
-def drive(scenario: Scenario, setup: Setup) -> Iterator[Tick]:
+def drive(scenario: Scenario, setup: Setup) -> Iterator[LoopStep]:
     """Every tick of the scenario, until its end or for as long as the caller wants more."""
     warm_up()
     period_s = 1.0 / scenario.rate_hz
@@ -105,10 +105,10 @@ def drive(scenario: Scenario, setup: Setup) -> Iterator[Tick]:
         t_s = index * period_s
         if not setup.closed:
             car = _scripted(scenario, t_s)
-        now = world.at(scenario, t_s, car.motion())
+        now = world_state.at(scenario, t_s, car.motion())
         frame = _look(sensors, setup, scenario, now, index)
         state, result = step(state, frame, setup.params)
-        yield Tick(index, now, frame, result, car)
+        yield LoopStep(index, now, frame, result, car)
         if setup.closed:
             car = _drive_on(vehicle.command(car, _pedals(result.acc), setup.model), scenario, period_s, setup.model)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from functools import cached_property
 from math import ceil
-from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
 from pipeline.common.errors import BadInput
 from pipeline.common.user_file_errors import first_complaint, given_path, parse_yaml, read_yaml
+from pipeline.simulation.built_in import FOLDER, names
 from pipeline.simulation.drawing.lens import ORDINARY, CameraModel
 from pipeline.simulation.sensors.detection_model import Detections
 from pipeline.simulation.sensors.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
@@ -19,7 +19,6 @@ from pipeline.simulation.world.actors import Actor, Motion, Script, motion
 from pipeline.simulation.world.intersection_ways import CrossingActor, Route, route
 from pipeline.simulation.world.roads import Road, Strict
 
-_FOLDER = Path(__file__).parent / "scenarios"
 _GAP_STEP_S, _GAP_HALVINGS = 0.25, 10
 
 
@@ -39,8 +38,8 @@ Moment = tuple[float, float, float, float, float, float]
 
 class Scenario(Strict):
     """driven: the ego vehicle's motion as a closed loop drove it, a moment a tick; where it is given, the ego
-    vehicle moves so and not by its script. sensors: those that the line is given. detections: what is found in the
-    pictures; null: what detectors find that look at them."""
+    vehicle moves so and not by its script. sensors: those that the pipeline is given. detections: what is found in the
+    pictures; None: what detectors find that look at them."""
 
     title: str
     seed: int = Field(default=0, ge=0)
@@ -120,18 +119,13 @@ def _gap_m(scenario: Scenario, actor: Actor, t_s: float) -> float:
     return actor.place_m(road, ego.start_m, actor.travelled_m(t_s)) - actor.size()[0] / 2 - own_m
 
 
-def names() -> tuple[str, ...]:
-    """The built-in scenarios."""
-    return tuple(sorted(path.stem for path in _FOLDER.glob("*.yaml")))
-
-
 def load(name_or_path: str) -> Scenario:
     """A built-in scenario by its name, or any file that ends in .yaml. ScenarioError says what is wrong."""
     path = given_path(name_or_path, ScenarioError) if name_or_path.endswith((".yaml", ".yml")) else None
     if path is None:
         if name_or_path not in names():
             raise ScenarioError(f"no scenario named {name_or_path!r}; there are {', '.join(names())}")
-        path = _FOLDER / f"{name_or_path}.yaml"
+        path = FOLDER / f"{name_or_path}.yaml"
     return _checked(read_yaml(path, path.name, ScenarioError), path.name)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any, TypeVar, cast
 
 from pipeline.types import Frame, Route
-from pipeline.types.source import AnySource, LiveSource, Source
+from pipeline.types.source import AnySource, LiveSource, Source, is_simulated
 
 S = TypeVar("S", Source, LiveSource, AnySource)
 
@@ -21,6 +21,7 @@ class _AlongRoute:
 
     def __init__(self, source: Any, route: Route) -> None:
         self._source, self._route = source, route
+        self.is_simulated = is_simulated(source)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._source, name)

@@ -31,7 +31,7 @@ from pipeline.formats.file_reading import (
 )
 from pipeline.formats.text_rows import parse_rows
 from pipeline.types import F64, CameraCalibration, Frame, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _CHANNELS = 16
 _HALF_ROTATION_NS = 50_000_000
@@ -47,20 +47,25 @@ _RING_OF_LASER = np.array([laser // 2 + 8 * (laser % 2) for laser in range(_CHAN
 """VLP-16 lasers fire −15°, +1°, −13°, +3°, … (Velodyne manual 63-9243, table 9-1); rings count upwards."""
 
 
+def open_recording(uri: str, rest: str, how: Opening) -> AstyxSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return AstyxSource(uri, rest)
+
+
 class AstyxSource:
     """A folder of Astyx HiRes2019 frames."""
 
     def __init__(self, uri: str, path: str) -> None:
         folder = recording_folder(path)
         self.uri, self.title = uri, folder.resolve().name
-        self.notes: tuple[str, ...] = ("camera without stamps: taken at mid-sweep", "no ego speed recorded")
+        self.notes: tuple[str, ...] = ("camera without time stamps: mid-sweep assumed", "no ego speed recorded")
         self._sweeps = files_by_name(folder / "lidar_vlp16", (".txt",))
         self._pictures = files_by_name(folder / "camera_front", (".jpg", ".jpeg", ".png"))
         self._labels = files_by_name(folder / "groundtruth_obj3d", (".json",))
         self._calibrations = files_by_name(folder / "calibration", (".json",))
         self._names = in_order(self._sweeps.keys() | self._pictures.keys())
         if not self._names:
-            raise SourceError(f"{path}: no Astyx recording: neither lidar_vlp16/*.txt nor camera_front/*.jpg in it")
+            raise SourceError(f"{path}: not an Astyx recording: neither lidar_vlp16/*.txt nor camera_front/*.jpg in it")
         if not self._calibrations:
             raise SourceError(f"{path}: no calibration/*.json")
         self._size = picture_size(self._pictures.values()) or _NOMINAL_SIZE
@@ -137,9 +142,9 @@ def parse_sweep(data: bytes, file: str, t_ns: int, T_ego_lidar: F64, notes: list
     kept = rows[good]
     bad += len(rows) - len(kept)
     if not len(kept):
-        raise SourceError(f"{file}: no LiDAR points in it")
+        raise SourceError(f"{file}: no LiDAR points")
     if bad > 0:
-        notes.append(f"{file}: {bad} unreadable rows left out")
+        notes.append(f"{file}: {bad} unreadable rows skipped")
     points = np.empty((len(kept), 4), dtype=np.float32)
     points[:, :3] = transform(T_ego_lidar, kept[:, :3])
     points[:, 3] = kept[:, 3]
@@ -188,7 +193,7 @@ def _read_calibration(path: Path, size: tuple[int, int]) -> tuple[F64, CameraCal
 
 
 def _first_stamp_ns(path: Path | None) -> int | None:
-    """The tick of a sweep: the first row's stamp (µs since the hour) and half a rotation. Null when unreadable."""
+    """The tick of a sweep: the first row's stamp (µs since the hour) and half a rotation. None when unreadable."""
     if path is None:
         return None
     try:

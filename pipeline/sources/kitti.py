@@ -27,7 +27,7 @@ from pipeline.formats.kitti_calibration import KittiCalibration, parse_object_ca
 from pipeline.formats.kitti_records import parse_labels, parse_oxts, parse_timestamps
 from pipeline.sources.hdl64_rings import keep_rings, match_vlp16, ring_elevations_deg, turns
 from pipeline.types import F32, F64, EgoState, Frame, GnssFix, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _STEP_NS = 100_000_000
 _RINGS = 64
@@ -49,6 +49,11 @@ class _Files:
     camera_stamps: tuple[int, ...]
 
 
+def open_recording(uri: str, rest: str, how: Opening) -> KittiSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return KittiSource(uri, rest, how.rings)
+
+
 class KittiSource:
     """A KITTI drive. rings: 16 keeps the rings that a VLP-16 would have, 64 keeps all."""
 
@@ -60,7 +65,7 @@ class KittiSource:
         self._files = _raw_files(folder) if _is_raw(folder) else _object_files(folder)
         self._names = in_order(self._files.sweeps.keys() | self._files.pictures.keys())
         if not self._names:
-            raise SourceError(f"{path}: no KITTI recording: {_what_it_holds(folder)}")
+            raise SourceError(f"{path}: not a KITTI recording: {_what_it_holds(folder)}")
         self._size = self._picture_size()
         self._calibration = self._first_calibration(path)
         self._ticks = _ticks(self._names, self._files)
@@ -206,7 +211,7 @@ class KittiSource:
         if self._channels:
             notes.append(f"{len(self._channels)} of a VLP-16's 16 rings remain: the HDL-64 reaches only about +3°")
         if not self._files.lidar_stamps and not self._files.camera_stamps:
-            notes.append("no time stamps: taken as 10 Hz")
+            notes.append("no time stamps: 10 Hz assumed")
         if not self._files.oxts:
             notes.append("no ego speed recorded")
         return tuple(notes)
@@ -217,15 +222,15 @@ def parse_velodyne(data: bytes, file: str, notes: list[str]) -> F32:
     kilometre are left out and counted in ``notes``, as is a cut last point. SourceError when none is left."""
     whole = len(data) // 16
     if len(data) % 16:
-        notes.append(f"{file}: cut off in the middle of a point")
+        notes.append(f"{file}: truncated in the middle of a point")
     raw = np.frombuffer(data, dtype="<f4", count=whole * 4).reshape(-1, 4)
     with np.errstate(invalid="ignore"):  # comparing a signalling NaN of a damaged file
         good = np.all(np.abs(raw[:, :3]) < 1000.0, axis=1) & (raw[:, 3] >= 0.0) & (raw[:, 3] <= 1.0)
     kept = raw[good]
     if not len(kept):
-        raise SourceError(f"{file}: no LiDAR points in it")
+        raise SourceError(f"{file}: no LiDAR points")
     if len(kept) < len(raw):
-        notes.append(f"{file}: {len(raw) - len(kept)} unreadable points left out")
+        notes.append(f"{file}: {len(raw) - len(kept)} unreadable points skipped")
     return np.ascontiguousarray(kept * np.array([1.0, 1.0, 1.0, 255.0]), dtype=np.float32)
 
 

@@ -18,7 +18,7 @@ from pipeline.formats.point_cloud_fields import cloud_of
 from pipeline.sources import rig as rig_files
 from pipeline.sources.uri_options import split_options
 from pipeline.types import Frame, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _STEP_NS = 100_000_000
 _PICTURES = ("", "images", "image", "camera", "image_02")
@@ -27,6 +27,11 @@ _CLOUDS = ("", "pcd", "lidar", "velodyne", "points")
 _NUMBER = re.compile(r"^\d+(\.\d+)?$")
 _EPOCH_S = 631_152_000  # 1990: smaller numbers count frames
 _UNITS_NS = ((10**18, 1), (10**15, 1_000), (10**12, 1_000_000))
+
+
+def open_recording(uri: str, rest: str, how: Opening) -> PcdSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return PcdSource(uri, rest)
 
 
 class PcdSource:
@@ -92,7 +97,7 @@ class PcdSource:
         return cloud.sweep(t_ns, self._T_ego_lidar)
 
     def _about(self) -> tuple[str, ...]:
-        notes = [] if self._has_times else ["no time stamps in the files' names: taken as 10 Hz"]
+        notes = [] if self._has_times else ["no time stamps in the file names: 10 Hz assumed"]
         if self._pictures and self._camera is None:
             notes.append("the camera has no calibration: LiDAR and camera are not fused")
         return (*notes, "no ego speed recorded")
@@ -108,7 +113,7 @@ def _rig(folder: Path, options: dict[str, str]) -> rig_files.Rig:
 
 
 def _stamp_ns(name: str) -> int | None:
-    """The time that a file's name is; null when it is none."""
+    """The time that a file's name is; None when it is none."""
     if not _NUMBER.match(name):
         return None
     whole, _, fraction = name.partition(".")

@@ -59,7 +59,7 @@ def load_route(path: str) -> Route:
         raise RouteError(f"{path}: {error.strerror}") from None
     reader = _reader(file.suffix.lower(), text)
     if zone and reader is not _csv:
-        raise RouteError(f"{path}: only CSV has places of a UTM zone")
+        raise RouteError(f"{path}: UTM coordinates are read from CSV only")
     rows, sigma_m = _csv(text, path, zone) if reader is _csv else reader(text, path)
     return _route(file.stem, rows, sigma_m, path)
 
@@ -74,7 +74,7 @@ def from_fixes(name: str, fixes: Iterable[GnssFix]) -> Route:
 def _route(name: str, rows: Rows, sigma_m: float, path: str) -> Route:
     good = [(lat, lon) for lat, lon in rows if abs(lat) <= 84.0 and abs(lon) <= 180.0 and (lat, lon) != (0.0, 0.0)]
     if len(set(good)) < 2:
-        raise RouteError(f"{path}: no route in it: {len(set(good))} places on the Earth, at least 2 are needed")
+        raise RouteError(f"{path}: no route: {len(set(good))} distinct positions on the Earth, at least 2 are needed")
     lat, lon = np.array(good).T
     return Route(name, lat.copy(), lon.copy(), sigma_m)
 
@@ -126,7 +126,7 @@ def _from_utm(lines: list[list[str]], east: int, north: int, zone_at: int | None
     epsg = {utm_epsg(each) for each in named}
     if len(epsg) != 1 or None in epsg:
         wrong = f"not one UTM zone: {', '.join(sorted(named))[:80]}" if named - {""} else "its UTM zone is not said"
-        raise RouteError(f"{path}: {wrong}; a column zone (32N) or epsg (32632) says it, or {path}?epsg=32632")
+        raise RouteError(f"{path}: {wrong}; add a column zone (32N) or epsg (32632), or open {path}?epsg=32632")
     pairs = [(_number(row[east]), _number(row[north])) for row in rows]
     places = [(x, y) for x, y in pairs if x is not None and y is not None]
     to_degrees = Transformer.from_crs(epsg.pop(), 4326, always_xy=True)
@@ -135,7 +135,7 @@ def _from_utm(lines: list[list[str]], east: int, north: int, zone_at: int | None
 
 
 def utm_epsg(zone: str) -> int | None:
-    """EPSG code of a UTM zone on WGS 84 given as one (32632, EPSG:32632) or as number and hemisphere (32N); null for
+    """EPSG code of a UTM zone on WGS 84 given as one (32632, EPSG:32632) or as number and hemisphere (32N); None for
     anything else. Letters of latitude bands are not taken: band S lies in the north."""
     match = re.fullmatch(r"(?:EPSG:)?(32[67])(\d\d)|(\d{1,2}) ?([NS])", zone.strip().upper())
     if match is None:
@@ -174,7 +174,7 @@ def _nmea(text: str, path: str) -> tuple[Rows, float]:
 
 
 def _nmea_place(line: str) -> tuple[str, tuple[float, float], float] | None:
-    """Kind, latitude and longitude in degrees, and sigma in metres; null for a sentence of another kind, without a fix,
+    """Kind, latitude and longitude in degrees, and sigma in metres; None for a sentence of another kind, without a fix,
     with a wrong checksum, or with something else where its numbers should be."""
     try:
         sentence = pynmea2.parse(line[line.index("$") :].strip(), check=True)
@@ -189,7 +189,7 @@ def _nmea_place(line: str) -> tuple[str, tuple[float, float], float] | None:
 
 
 def _from_session(path: str, name: str) -> Route:
-    from pipeline.recording.session_source import SessionSource  # half a second of imports: only who opens one pays
+    from pipeline.recording.session.source import SessionSource  # half a second of imports: only who opens one pays
 
     session = SessionSource(f"mcap:{path}", path)
     try:

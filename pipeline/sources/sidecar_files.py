@@ -49,7 +49,7 @@ class Beside:
         offset_s = number_option(options, "video_offset_s", 0.0) + rig.camera.time_offset_ms / 1e3
         self._video_begins_ns = begin_ns + round(offset_s * 1e9)
         if self._video is not None and not offset_s:
-            self.notes.append("the video is taken to begin with the recording; ?video_offset_s= shifts it")
+            self.notes.append("the video is assumed to start with the recording; ?video_offset_s= shifts it")
         if self._video is not None and self._camera is None:
             self.notes.append("the camera has no calibration: LiDAR and camera are not fused")
         sentences = _named(recording, options, "nmea", _NMEA_SUFFIXES)
@@ -135,5 +135,5 @@ def _fixes_of(path: Path, near_ns: int, notes: list[str]) -> list[GnssFix]:
     fixes += [last] if last is not None else []
     notes.append(f"{len(fixes)} GNSS fixes from {path.name}, by the receiver's own time")
     if reader.bad:
-        notes.append(f"{path.name}: {reader.bad} damaged lines left out")
+        notes.append(f"{path.name}: {reader.bad} damaged lines skipped")
     return fixes

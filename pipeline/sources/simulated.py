@@ -15,15 +15,22 @@ from pipeline.simulation import scenario
 from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.rig import Sensors
 from pipeline.simulation.sensors.truth_lanes import lane_points
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.types import Frame, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _TRUTH_RANGE_M = 120.0
 
 
+def open_recording(uri: str, rest: str, how: Opening) -> SimulatedSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return SimulatedSource(uri, rest)
+
+
 class SimulatedSource:
-    """The frames of one scenario. notes: what the scenario keeps from the line, or gives it."""
+    """The frames of one scenario."""
+
+    is_simulated = True
 
     def __init__(self, uri: str, name: str) -> None:
         try:
@@ -33,7 +40,7 @@ class SimulatedSource:
         self.uri, self.title, self.rate_hz = uri, self._scenario.title, self._scenario.rate_hz
         self.notes = tuple(_notes(self._scenario))
         self._step_ns = round(1e9 / self.rate_hz)
-        last = world.at(self._scenario, self._scenario.duration_s)
+        last = world_state.at(self._scenario, self._scenario.duration_s)
         self._sensors = Sensors(self._scenario, last.s_m)
 
     def __len__(self) -> int:
@@ -62,11 +69,11 @@ class SimulatedSource:
         self.t_ns(index)
         return truth_of(self._world(index))
 
-    def _world(self, index: int) -> world.World:
-        return world.at(self._scenario, self.t_ns(index) / 1e9)
+    def _world(self, index: int) -> world_state.World:
+        return world_state.at(self._scenario, self.t_ns(index) / 1e9)
 
 
-def sensed(frame: Frame, now: world.World, scene: scenario.Scenario) -> Frame:
+def sensed(frame: Frame, now: world_state.World, scene: scenario.Scenario) -> Frame:
     """The frame as far as the scenario's car senses it, with the detections that the scenario gives. The picture stays
     where nobody looks at it: people still want to see it."""
     if scene.sensors == "lidar":
@@ -85,15 +92,15 @@ def sensed(frame: Frame, now: world.World, scene: scenario.Scenario) -> Frame:
 
 def _notes(scene: scenario.Scenario) -> Iterator[str]:
     if scene.sensors == "lidar":
-        yield "This drive goes by the LiDAR alone; nothing looks at its pictures."
+        yield "This drive uses the LiDAR alone; its pictures are shown but not analysed."
         return
     if scene.sensors == "camera":
-        yield "This drive goes by the camera alone; it has no LiDAR."
+        yield "This drive uses the camera alone; it has no LiDAR."
     if scene.detections is not None:
-        yield "What is seen in this drive's pictures is given: the truth, with a detector's errors. No network looks."
+        yield "Detections come with this drive: the truth, with a detector's errors. No network runs."
 
 
-def truth_of(now: world.World) -> tuple[TruthObject, ...]:
+def truth_of(now: world_state.World) -> tuple[TruthObject, ...]:
     """Every vehicle that is at least partly ahead of the LiDAR and within 120 m, hidden ones too."""
     return tuple(
         TruthObject(state.actor.kind, state.cuboid, state.actor.id)

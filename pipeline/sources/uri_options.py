@@ -13,7 +13,7 @@ def split_options(rest: str, known: tuple[str, ...]) -> tuple[str, dict[str, str
     options: dict[str, str] = {}
     for name, value in parse_qsl(query, keep_blank_values=True):
         if name not in known:
-            raise SourceError(f"{rest}: no option {name!r}; there are {', '.join(known)}")
+            raise SourceError(f"{rest}: unknown option {name!r}; the options are {', '.join(known)}")
         if name in options or not value:
             raise SourceError(f"{rest}: option {name!r} {'is given twice' if name in options else 'has no value'}")
         options[name] = value

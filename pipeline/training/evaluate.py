@@ -17,7 +17,7 @@ from scipy.stats import binomtest
 
 from pipeline.common.geometry import iou_matrix
 from pipeline.params import DetectionParams
-from pipeline.simulation.scenario import names
+from pipeline.simulation.built_in import names
 from pipeline.simulation.sensors.camera import HEIGHT, WIDTH, calibration
 from pipeline.training.labels import CLASSES, Label, labels
 from pipeline.training.scenes import Moment, drive, moments

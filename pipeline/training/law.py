@@ -17,7 +17,7 @@ from pipeline.common.geometry import closest_on_polygon, iou_matrix, transform
 from pipeline.inference.distance_laws import keep_law
 from pipeline.inference.model_registry import EMBEDDED
 from pipeline.params import DetectionParams, DistanceParams
-from pipeline.simulation.scenario import names
+from pipeline.simulation.built_in import names
 from pipeline.simulation.sensors.camera import HEIGHT, WIDTH, calibration
 from pipeline.training.evaluate import EDGES_M, JUDGE_SEEDS, MATCH_IOU
 from pipeline.training.labels import labels

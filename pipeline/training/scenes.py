@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.simulation.scenario import Scenario, load
 from pipeline.simulation.sensors.camera import DrawnCamera
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.simulation.world.actors import SIZES_M
 from pipeline.simulation.world.roads import Road
 from pipeline.simulation.world.roadside import Roadside
@@ -38,10 +38,10 @@ class Moment:
     """A picture (720, 1280, 3) uint8 blue green red and the world it shows."""
 
     picture: U8
-    world: world.World
+    world: world_state.World
 
 
-def moments(seed: int, count: int, wanted: Callable[[world.World], bool] = lambda _: True) -> Iterator[Moment]:
+def moments(seed: int, count: int, wanted: Callable[[world_state.World], bool] = lambda _: True) -> Iterator[Moment]:
     """Those of ``count`` pictures whose world is wanted, the others are not drawn. Equal seeds give equal pictures,
     different seeds share no road, traffic or backdrop."""
     rng = np.random.default_rng([seed, 11])
@@ -51,7 +51,7 @@ def moments(seed: int, count: int, wanted: Callable[[world.World], bool] = lambd
             road = random_road(rng)
             backdrop = int(rng.integers(1 << 31))
             camera = DrawnCamera(road, Roadside.build(road, backdrop, 0.0, _ROAD_M), backdrop)
-        now = world.at(random_traffic(rng, road, models), float(rng.uniform(0.0, _LONGEST_CHANGE_S)))
+        now = world_state.at(random_traffic(rng, road, models), float(rng.uniform(0.0, _LONGEST_CHANGE_S)))
         if rng.random() < _SOME_TURNED:
             now = _turned(rng, now)
         now = without_collisions(now)
@@ -59,7 +59,7 @@ def moments(seed: int, count: int, wanted: Callable[[world.World], bool] = lambd
             yield Moment(camera.picture(now), now)
 
 
-def without_collisions(now: world.World) -> world.World:
+def without_collisions(now: world_state.World) -> world_state.World:
     """The same world without those whom random braking and turning put into the ego vehicle: no camera can see from
     inside of a truck."""
     length, width, _ = SIZES_M["car"]
@@ -68,7 +68,7 @@ def without_collisions(now: world.World) -> world.World:
     return replace(now, actors=tuple(itertools.compress(now.actors, clear)))
 
 
-def _turned(rng: np.random.Generator, now: world.World) -> world.World:
+def _turned(rng: np.random.Generator, now: world_state.World) -> world_state.World:
     """The same world with some of its cars turned any way, as crossings and turns show them."""
     actors = tuple(
         replace(state, cuboid=state.cuboid._replace(yaw_rad=float(rng.uniform(-np.pi, np.pi))))
@@ -181,8 +181,8 @@ def _lane_change(rng: np.random.Generator, road: Road, lane: int) -> list[dict[s
 def drive(name: str, step_s: float) -> Iterator[Moment]:
     """A built-in scenario, or any scenario file, as moments ``step_s`` apart."""
     scenario = load(name)
-    end_m = world.at(scenario, scenario.duration_s).s_m + _BEYOND_M
+    end_m = world_state.at(scenario, scenario.duration_s).s_m + _BEYOND_M
     camera = DrawnCamera(scenario.road, Roadside.build(scenario.road, scenario.seed, 0.0, end_m), scenario.seed)
     for t_s in np.arange(0.0, scenario.duration_s, step_s).tolist():
-        now = world.at(scenario, t_s)
+        now = world_state.at(scenario, t_s)
         yield Moment(camera.picture(now), now)

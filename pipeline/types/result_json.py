@@ -1,4 +1,6 @@
-"""A ``Result`` as one JSON object per frame that scripts, labels and scores read (version 1 of its form).
+"""A ``Result`` as one JSON object per frame that scripts, labels and scores read: the results contract, version 1.
+
+``docs/reference/results.md`` defines every field. "The contract" anywhere in the code is that page.
 
 Metres, metres per second, radians and pixels rounded to four decimals; nanoseconds are whole. What is unknown is
 null: a number that is not finite is unknown too, so NaN and infinity never reach a file. Keys come in a fixed order,
@@ -21,7 +23,8 @@ _DECIMALS = 4
 
 
 def to_json(result: Result) -> dict[str, Any]:
-    """The result in the contract's form: plain dicts, lists, strings, booleans, finite numbers and nulls.
+    """The result in the form of ``docs/reference/results.md``: plain dicts, lists, strings, booleans, finite
+    numbers and nulls.
 
     ``Result.layers`` stays out: it is for views.
     """

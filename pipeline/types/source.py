@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol, TypeGuard, runtime_checkable
 
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
+from pipeline.common.progress import Progress, silent
 from pipeline.params import SyncParams
 from pipeline.types import F64, Box, CameraCalibration, EgoState, Frame, GnssFix, StreamHealth, Sweep
 from pipeline.types.camera_shot import Shot
@@ -179,7 +180,33 @@ class InParts(Protocol):
         ...
 
 
+@runtime_checkable
+class RawPackets(Protocol):
+    """A recording of the LiDAR's own packets."""
+
+    def packets(self) -> Iterator[tuple[int, bytes]]:
+        """Every data and position packet as it was captured: when (unix ns), and its payload."""
+        ...
+
+
+@runtime_checkable
+class Simulated(Protocol):
+    """A source that knows whether the simulator drew its pictures, which detectors of real pictures do worse on."""
+
+    is_simulated: bool
+
+
 AnySource = Source | LiveSource
+
+
+@dataclass(frozen=True)
+class Opening:
+    """How a recording is to be opened. Each kind of source takes what concerns it."""
+
+    rings: int = 16
+    """How many rings to keep of a LiDAR that has more."""
+    progress: Progress = silent
+    """Told how much was read, where a whole file has to be."""
 
 
 def is_live_source(source: AnySource) -> TypeGuard[LiveSource]:
@@ -188,5 +215,5 @@ def is_live_source(source: AnySource) -> TypeGuard[LiveSource]:
 
 
 def is_simulated(source: AnySource) -> bool:
-    """Whether its pictures are rendered by the simulator, which decides the default detectors."""
-    return (source.origin if isinstance(source, Recorded) else source.uri).startswith("sim:")
+    """Whether the simulator drew its pictures, also where they were recorded since."""
+    return isinstance(source, Simulated) and source.is_simulated

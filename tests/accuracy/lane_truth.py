@@ -18,9 +18,9 @@ from pipeline.simulation import scenario
 from pipeline.simulation.drawing.road_markings import edge_paint_m
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.rig import Sensors
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.simulation.world.roads import Road
-from pipeline.simulation.world.world import World
+from pipeline.simulation.world.world_state import World
 from pipeline.step import State
 from pipeline.types import RawLanes
 from pipeline.types.lane import EgoLane, LaneLine
@@ -47,10 +47,10 @@ def errors(
 ) -> Iterator[LaneError]:
     """Drive a built-in scenario's ``frames`` (consecutive); the lane detector looks at every ``every``-th one."""
     played = scenario.load(name)
-    sensors = Sensors(played, world.at(played, played.duration_s).s_m)
+    sensors = Sensors(played, world_state.at(played, played.duration_s).s_m)
     detectors, state = Detectors(None, detector, every), State()
     for index in frames:
-        now = world.at(played, index / played.rate_hz)
+        now = world_state.at(played, index / played.rate_hz)
         frame = sensors.frame(now, index, round(index / played.rate_hz * 1e9))
         _, state, result = advance(state, frame, params or Params(), detectors)
         yield from _compared(index, result.layers.lanes, true_lines(played, now))

@@ -18,14 +18,20 @@ from pipeline.simulation.sensors.lidar import Lidar
 from pipeline.simulation.sensors.lidar_model import LidarModel
 from pipeline.simulation.sensors.lidar_rays import BOX_FIELDS
 from pipeline.simulation.sensors.lidar_scene import vehicle_boxes
-from pipeline.simulation.world.actors import Kind, Vehicle
-from pipeline.simulation.world.world import ActorState
+from pipeline.simulation.world.actors import Vehicle, VehicleKind
+from pipeline.simulation.world.world_state import ActorState
 from pipeline.sources.astyx import AstyxSource, parse_calibration
 from pipeline.types import F64, Sweep
 from pipeline.types.source import TruthObject
 
 BIN_M = 10.0
-_KINDS: dict[str, Kind] = {"car": "car", "truck": "truck", "trailer": "truck", "bus": "bus", "motorcycle": "motorcycle"}
+_KINDS: dict[str, VehicleKind] = {
+    "car": "car",
+    "truck": "truck",
+    "trailer": "truck",
+    "bus": "bus",
+    "motorcycle": "motorcycle",
+}
 _PICTURE_SIZE = (2048, 618)
 _AROUND_M, _OFF_GROUND_M = 0.2, 0.15
 _FLAT_RINGS, _FIT_M, _FIT_OFF_M = 5, 16.0, (0.6, 0.25, 0.12, 0.12)

@@ -24,7 +24,7 @@ def with_the_line(loader, name):
 importlib.machinery.SourceFileLoader.get_code = with_the_line
 
 from app.commands.params import ListParams
-from app.commands.support.options import LineOptions
+from app.commands.support.options import PipelineOptions
 from app.web.routes.params import describe
 from pipeline.params import Params, from_yaml, to_yaml, with_changes
 
@@ -35,8 +35,8 @@ def printed(command):
     return out.getvalue()
 
 file = pathlib.Path(sys.argv[1])
-changed = LineOptions(set=("cluster.brand_new=0.8",))
-file.write_text(printed(ListParams(line=changed, yaml=True)), encoding="utf-8")
+changed = PipelineOptions(set=("cluster.brand_new=0.8",))
+file.write_text(printed(ListParams(pipeline=changed, yaml=True)), encoding="utf-8")
 clusters = next(section for section in describe() if section["name"] == "cluster")
 print(json.dumps({
     "schema": Params.model_json_schema()["$defs"]["ClusterParams"]["properties"]["brand_new"],

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
-from app.bench.devtools import CHROMIUM, FLAGS
+from app.bench.page.devtools import CHROMIUM, FLAGS
 from app.core.server_address import listen_socket
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from app.web.server import Server, create_app
 from pipeline.detection import detector_for
 from pipeline.inference.runtime import DetectorMissing
@@ -97,10 +97,10 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         detectors.append(CountedDetector(source))
         return detectors[-1]
 
-    desk = RecordingDesk(tmp_path_factory.mktemp("sessions"))
+    desk = SessionRecorder(tmp_path_factory.mktemp("sessions"))
     engine = Engine(open_source, open_counted, Params(), uri="sim:straight", whole_drives=True, desk=desk)
     engine.start()
-    engine.wait_for(lambda s: s.tick is not None, 120)
+    engine.wait_for(lambda s: s.processed is not None, 120)
     running = Site(engine, 0, detectors)
     running.start()
     yield running

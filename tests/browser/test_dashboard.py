@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 def test_it_opens_and_shows_the_frame_everywhere(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
-    tick = site.engine.snapshot.tick
+    tick = site.engine.snapshot.processed
     assert tick is not None
     assert frame_name(page) == tick.result.frame
     assert page.locator("#objects tbody tr").count() == len(tick.result.objects)
@@ -32,7 +32,7 @@ def test_it_opens_and_shows_the_frame_everywhere(open_page: OpenPage, site: Site
 def test_the_banner_says_what_the_result_says(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
-    tick = site.engine.snapshot.tick
+    tick = site.engine.snapshot.processed
     assert tick is not None
     cipv = tick.result.cipv
     assert cipv is not None, "there is a lead at this frame"
@@ -71,7 +71,7 @@ def test_a_slider_on_the_paused_frame_changes_picture_and_table_without_the_netw
     runs, before, camera = site.network_runs, table(page), pixels(page, "#camera")
     page.locator("[data-param='cluster.tolerance_m'] input[type=range]").fill("0.2")
     expect(page.locator("[data-section=cluster] .count")).to_have_text("1 changed")
-    site.engine.wait_for(lambda s: s.params.cluster.tolerance_m == 0.2 and s.tick.params is s.params, WAIT_S)
+    site.engine.wait_for(lambda s: s.params.cluster.tolerance_m == 0.2 and s.processed.params is s.params, WAIT_S)
     expect(page.locator("#objects tbody")).not_to_have_text(before)
     assert repainted(page, "#camera", camera)
     assert site.engine.snapshot.index == START
@@ -88,7 +88,7 @@ def test_h_res_moves_the_projected_points_and_chooses_its_model(open_page: OpenP
     runs, camera = site.network_runs, pixels(page, "#camera")
     slider = page.locator("[data-param='alignment.h_res_deg'] input[type=range]")
     slider.fill(str(float(slider.input_value()) * 1.3))
-    site.engine.wait_for(lambda s: s.params.alignment.model == "angular" and s.tick.params is s.params, WAIT_S)
+    site.engine.wait_for(lambda s: s.params.alignment.model == "angular" and s.processed.params is s.params, WAIT_S)
     expect(page.locator("[data-param='alignment.model'] button[aria-pressed=true]")).to_have_text("angular")
     assert repainted(page, "#camera", camera)
     assert site.network_runs == runs
@@ -106,7 +106,7 @@ def test_parameters_can_be_searched_and_a_preset_chosen(open_page: OpenPage, sit
 def test_a_selected_object_is_explained(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
-    tick = site.engine.snapshot.tick
+    tick = site.engine.snapshot.processed
     assert tick is not None
     rejection = tick.result.rejected[0]
     plan, camera = pixels(page, "#bev"), pixels(page, "#camera")
@@ -123,7 +123,7 @@ def test_a_selected_object_is_explained(open_page: OpenPage, site: Site):
 def test_a_click_in_the_picture_or_the_plan_selects(open_page: OpenPage, site: Site):
     page = open_page()
     wait_for_frame(page, START)
-    tick = site.engine.snapshot.tick
+    tick = site.engine.snapshot.processed
     assert tick is not None
     assert tick.frame.picture is not None
     lead = tick.result.cipv
@@ -174,7 +174,7 @@ def test_every_row_of_the_table_follows_and_the_focus_stays_with_its_object(open
         site.engine.control.seek(index)
         wait_for_frame(page, index)
         table(page)
-        tick = site.engine.snapshot.tick
+        tick = site.engine.snapshot.processed
         assert tick is not None
         objects = {str(item.id): item for item in tick.result.objects}
         said[index] = rows.evaluate_all(SAID)

@@ -9,7 +9,7 @@ from urllib.parse import parse_qs, urlsplit
 from playwright.sync_api import Browser
 
 from app.reports.experiment_drives import ReplayFolder
-from pipeline.experiments.experiment import Replay
+from pipeline.experiments.experiment import ExperimentDrive
 from pipeline.experiments.iso15622.experiment import ISO
 from pipeline.experiments.straight_track import parameters
 from pipeline.simulation import scenario
@@ -19,7 +19,7 @@ from pipeline.sources import open_source
 def test_the_link_holds_place_and_parameters_after_a_move(browser: Browser, tmp_path: Path) -> None:
     folder = ReplayFolder(tmp_path / "made")
     params = parameters("AEB", 20.0)
-    folder.keep(ISO, Replay("a+b_0", "A drive", ("Passed.",), scenario.load("straight"), params, "lidar", ()))
+    folder.keep(ISO, ExperimentDrive("a+b_0", "A drive", ("Passed.",), scenario.load("straight"), params, "lidar", ()))
     folder.list_all()
     moved = (tmp_path / "made").rename(tmp_path / "mine & #2, 100 %")
     page = browser.new_page()

@@ -36,7 +36,7 @@ def car(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Site, Replay
     engine.start()
     engine.wait_for(lambda s: s.live, WAIT_MS / 1e3)
     with Replaying(load(config), live_car.messages(*clip, SENDS_S)) as sending:
-        engine.wait_for(lambda s: s.tick is not None, WAIT_MS / 1e3)
+        engine.wait_for(lambda s: s.processed is not None, WAIT_MS / 1e3)
         site = Site(engine, 0)
         site.start()
         yield site, sending

@@ -26,8 +26,8 @@ def page(open_page: OpenPage, site: Site, paused_in_traffic: None) -> Page:
     site.engine.wait_for(lambda s: s.drive.done == s.drive.total == COUNT, WAIT_S)
     recording = site.engine.drives.recording
     assert recording is not None
-    assert recording.book.current is not None
-    recording.book.compare_with(recording.book.current.number)
+    assert recording.runs.current is not None
+    recording.runs.compare_with(recording.runs.current.number)
     site.engine.drives.changed()
     page = open_page()
     wait_for_frame(page, START)
@@ -43,8 +43,8 @@ def test_find_where_the_lead_changed_and_say_why(page: Page, site: Site):
     page.locator("#events .event").nth(place).click()
     wait_for_frame(page, at)
     shown = site.engine.wait_for(lambda s: s.index == at, WAIT_S)
-    assert shown.tick is not None
-    result = shown.tick.result
+    assert shown.processed is not None
+    result = shown.processed.result
     assert result.cipv is not None
     assert (result.cipv.id, at) == (ids[at], shown.index), "the page shows what the continuous run found"
 
@@ -216,21 +216,21 @@ def test_a_change_that_is_taken_back_while_its_figures_are_on_their_way_is_no_co
     """The run is gone when the server is asked about it; the fixture sees that nothing was refused."""
     recording = site.engine.drives.recording
     assert recording is not None
-    book = recording.book
-    base = book.base
+    registry = recording.runs
+    base = registry.base
     assert base is not None
     asked: list[Route] = []
     page.route(re.compile("/api/compare"), lambda route: route.continue_() if asked else asked.append(route))
     site.engine.control.change_params(WIDE)
     while not asked:
         page.evaluate("() => new Promise(requestAnimationFrame)")
-    gone = book.current
+    gone = registry.current
     assert gone is not None
     assert gone is not base
     site.engine.control.set_params(Params(), "default")
     site.engine.wait_for(lambda s: s.drive.run == base.number, WAIT_S)
-    if gone in book.all():
-        book.delete(gone.number)
+    if gone in registry.all():
+        registry.delete(gone.number)
     with page.expect_response(re.compile("/api/compare")):
         asked[0].continue_()
     expect(page.locator("#timeline-facts")).not_to_contain_text("frames differ")

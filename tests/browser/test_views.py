@@ -137,7 +137,7 @@ def test_a_click_on_a_point_selects_its_object(open_page: OpenPage):
 
 def test_what_lies_under_the_pointer_is_named(open_page: OpenPage, site: Site):
     page = opened(open_page)
-    tick = site.engine.snapshot.tick
+    tick = site.engine.snapshot.processed
     assert tick is not None
     lead = tick.result.cipv
     assert lead is not None
@@ -154,7 +154,7 @@ def test_what_lies_under_the_pointer_is_named(open_page: OpenPage, site: Site):
 def test_a_failed_test_of_the_selected_object_is_drawn_with_its_number(open_page: OpenPage, site: Site):
     """In the picture at its box, in the plan as a dimension from the path's middle."""
     page = opened(open_page)
-    tick = site.engine.snapshot.tick
+    tick = site.engine.snapshot.processed
     assert tick is not None
     aside = next(
         item

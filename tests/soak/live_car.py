@@ -21,7 +21,7 @@ from pipeline.replay.replayer import replay
 from pipeline.replay.senders import open_senders
 from pipeline.simulation import scenario
 from pipeline.simulation.sensors.rig import Sensors
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.sources.live.config import load
 from pipeline.types import CameraCalibration, Frame
 
@@ -34,10 +34,10 @@ LEAD_M = (22.0, 25.5)
 def clip() -> tuple[list[Frame], list[bytes]]:
     """``SPAN`` frames of the LiDAR, and three pictures to each."""
     drive = scenario.load(SCENARIO)
-    sensors = Sensors(drive, world.at(drive, drive.duration_s).s_m)
+    sensors = Sensors(drive, world_state.at(drive, drive.duration_s).s_m)
     frames, jpegs = [], []
     for number in range(3 * SPAN):
-        frame = sensors.frame(world.at(drive, FROM_S + number / 30.0), number, 0)
+        frame = sensors.frame(world_state.at(drive, FROM_S + number / 30.0), number, 0)
         if number % 3 == 0:
             frames.append(frame)
         assert frame.picture is not None

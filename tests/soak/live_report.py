@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.recording.session_source import SessionSource
-from pipeline.recording.tick import tick_from
+from pipeline.recording.session.frame_record import frame_record_from
+from pipeline.recording.session.source import SessionSource
 from pipeline.recording.topics import FRAMES, IMAGE, POINTS
 from pipeline.replay.faults import Fault
 from tests.soak import live_car
@@ -78,7 +78,9 @@ def report(
 
 def _sweeps_taken(session: SessionSource) -> int:
     """How many sweeps came, at least: a frame's number counts the ticks before it that nobody took, too."""
-    ticks = [tick_from(stored.data) for stored in session.file.messages((FRAMES,))][1:]  # the first was under way
+    ticks = [frame_record_from(stored.data) for stored in session.file.messages((FRAMES,))][
+        1:
+    ]  # the first was under way
     first = int(ticks[0].sweep is not None)
     return first + sum(int(b.name) - int(a.name) for a, b in pairwise(ticks) if b.sweep is not None)
 

@@ -17,7 +17,7 @@ import numpy as np
 import yaml
 
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from pipeline.common.data_dir import data_dir
 from pipeline.detection import detector_for, lanes_for
 from pipeline.inference.model_registry import EMBEDDED
@@ -120,7 +120,7 @@ def _soak(folder: Path, seconds: float, networks: Networks, others: list[int]) -
     faults, config = faults_for(seconds), config_file(folder)
     faults_path = folder / "faults.yaml"
     faults_path.write_text(yaml.safe_dump([fault.model_dump() for fault in faults]), encoding="utf-8")
-    watcher, desk = Watcher(), RecordingDesk(folder)
+    watcher, desk = Watcher(), SessionRecorder(folder)
     lanes_every: list[int] = []
 
     def open_lanes(source: AnySource) -> LaneDetector | None:
@@ -144,7 +144,7 @@ def _soak(folder: Path, seconds: float, networks: Networks, others: list[int]) -
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as car:
         os.sched_setaffinity(car.pid, others)
         watcher.start_ns = int(_line(car.stdout))
-        engine.wait_for(lambda s: s.tick is not None, PATIENCE_S)
+        engine.wait_for(lambda s: s.processed is not None, PATIENCE_S)
         desk.start(engine.source)
         memory, cpu_s = Memory(), _cpu_s()
         told = json.loads(_line(car.stdout))

@@ -39,7 +39,7 @@ class Watcher:
     _sequence: int = 0
 
     def __call__(self, snapshot: Snapshot) -> None:
-        tick = snapshot.tick
+        tick = snapshot.processed
         self.errors |= {notice.text for notice in snapshot.notices if notice.level == "error"}
         if tick is None or snapshot.sequence == self._sequence:
             return

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.common.geometry import Cuboid
-from pipeline.labels.formats.base import Drive, FormatName, Shot
-from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
+from pipeline.labels.formats.base import LabeledDrive, Shot
+from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Sighting
 from tests.pipeline.labels.formats.sets import IMPORT, camera
 
@@ -20,14 +20,14 @@ LIMIT_S = 10.0
 
 
 @pytest.fixture(scope="module")
-def drive() -> Drive:
+def drive() -> LabeledDrive:
     eye = camera()
     shots = (Shot(f"{i:06d}", i * 10**8, eye, (1280, 720), eye.T_camera_ego) for i in range(FRAMES))
-    return Drive("sim:long", tuple(shots))
+    return LabeledDrive("sim:long", tuple(shots))
 
 
 @pytest.fixture(scope="module")
-def labels(drive: Drive) -> LabelSet:
+def labels(drive: LabeledDrive) -> LabelSet:
     tracks = []
     for number in range(TRACKS):
         cuboid = Cuboid((10.0 + number, 0.0, 0.5), (4.0, 1.8, 1.5), 0.1)
@@ -38,7 +38,7 @@ def labels(drive: Drive) -> LabelSet:
 
 
 @pytest.mark.parametrize("name", [name for name in FORMATS if name != "mcap"])
-def test_a_hundred_thousand_labels(name: FormatName, labels: LabelSet, drive: Drive, tmp_path: Path) -> None:
+def test_a_hundred_thousand_labels(name: FormatName, labels: LabelSet, drive: LabeledDrive, tmp_path: Path) -> None:
     began = time.perf_counter()
     export_labels(labels, drive, name, tmp_path / "out")
     assert time.perf_counter() - began < LIMIT_S

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from app.core.line import DetectionCache, Line
+from app.core.detection_cache import DetectionCache
+from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from pipeline.detection import Detectors
@@ -29,12 +30,12 @@ def resident_bytes() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE
 
 
-def play(line: Line, encoder: Encoder, frames: range) -> int:
+def play(pipeline: SeekablePipeline, encoder: Encoder, frames: range) -> int:
     """One round; the bytes that a browser would have got."""
     sent = 0
     for index in frames:
-        tick = line.advance(index, Params())
-        message = encoder.message(Snapshot(Params(), tick=tick, index=index))
+        tick = pipeline.advance(index, Params())
+        message = encoder.message(Snapshot(Params(), processed=tick, index=index))
         sent += len(message or b"")
     return sent
 
@@ -42,13 +43,13 @@ def play(line: Line, encoder: Encoder, frames: range) -> int:
 def growth(uri: str, detector: Detector | None, frames: int | None, warm_up: int, rounds: int) -> tuple[float, int]:
     """Bytes grown after the first ``warm_up`` rounds, and the resident size then."""
     source = open_source(uri)
-    line, encoder = Line(source, Detectors(detector), DetectionCache(), "both"), Encoder()
+    pipeline, encoder = SeekablePipeline(source, Detectors(detector), DetectionCache(), "both"), Encoder()
     shown = range(min(frames or len(source), len(source)))
     for _ in range(warm_up):
-        assert play(line, encoder, shown) > 10_000 * len(shown)
+        assert play(pipeline, encoder, shown) > 10_000 * len(shown)
     before = resident_bytes()
     for _ in range(rounds):
-        play(line, encoder, shown)
+        play(pipeline, encoder, shown)
     return resident_bytes() - before, before
 
 

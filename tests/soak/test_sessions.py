@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from pipeline.recording.rewrite import recover
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from tests.conftest import ROOT
 
 pytestmark = pytest.mark.soak
@@ -31,7 +31,7 @@ import resource, sys
 from dataclasses import replace
 from pathlib import Path
 import cv2, numpy as np
-from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.types import Picture
 from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, sweep
 
@@ -56,7 +56,7 @@ import json, resource, sys, time
 from pathlib import Path
 import numpy as np
 from pipeline.recording.info import info
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 
 path, limit = sys.argv[1], int(sys.argv[2])
 resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))

@@ -1,4 +1,4 @@
-"""Opening what a person named, and a bar for as long as that takes."""
+"""Open a source, with a progress bar for as long as that takes."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ _LONGEST_NAME = 40
 
 
 def opened(uri: str, rings: int = 16) -> AnySource:
-    """What a person named; a bar shows how far it is where a whole file has to be read first. SourceError as of
-    ``open_any``."""
+    """Open a recording or live sensors; a bar shows progress while a whole file has to be read. Raises what
+    ``open_any`` raises."""
     with _reading(uri) as told:
         return open_any(uri, rings=rings, progress=told)
 
 
 def opened_recording(uri: str, rings: int = 16) -> Source:
-    """The same of a recording alone."""
+    """The same for recordings only."""
     with _reading(uri) as told:
         return open_source(uri, rings=rings, progress=told)
 
 
 @contextmanager
 def _reading(uri: str) -> Iterator[progress.Progress]:
-    """Whom to tell; the bar comes with the first word, so that there is none for what is opened at once."""
+    """The progress callback. The bar appears with the first report, so that sources that open at once show none."""
     name = PurePath(uri.partition("?")[0]).name[-_LONGEST_NAME:]
     with ExitStack() as stack:
         bars: list[Progress] = []

@@ -14,9 +14,11 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from pipeline.common.progress import Progress as Told
+
 
 def frames_progress() -> Progress:
-    """A bar that counts frames and vanishes when done."""
+    """A bar that counts frames."""
     return _bar(MofNCompleteColumn())
 
 
@@ -26,12 +28,18 @@ def bytes_progress() -> Progress:
 
 
 def share_progress() -> Progress:
-    """A bar that shows how much is done."""
+    """A bar that shows a percentage."""
     return _bar(TaskProgressColumn())
 
 
+def task_progress(bar: Progress, name: str, total: int | None = None) -> Told:
+    """Add a task to the bar, and return the callback that reports its progress."""
+    task = bar.add_task(name, total=total)
+    return lambda done, of: bar.update(task, completed=done, total=of)
+
+
 def _bar(count: ProgressColumn) -> Progress:
-    """Vanishes when done; there is none where nobody looks, as in a log."""
+    """Disappears when done, and is not shown when standard error is not a terminal."""
     columns = (TextColumn("{task.description}"), BarColumn(), count, TimeRemainingColumn())
     console = Console(stderr=True)
     return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)

@@ -1,4 +1,4 @@
-"""What live sensors are waited for, said on standard error."""
+"""Which live sensors deliver no data yet, on standard error."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pipeline.types.source import LiveSource
 
 
 class Waiting:
-    """Says it whenever that has changed. Called while no sensor ticks."""
+    """Prints the sensors that are waited for whenever they change. Called while there is no tick."""
 
     def __init__(self, live: LiveSource) -> None:
         self._live = live

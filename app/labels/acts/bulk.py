@@ -8,30 +8,31 @@ from dataclasses import replace
 from typing import cast
 
 from app.drive.full_run import DriveRun
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.drive.run_results import seen_of
 from app.labels.acts.leads import clear
 from app.labels.acts.tags import put_tag
 from app.labels.errors import ActRefused
-from app.labels.service.tasks import Progress, Work, to_nobody
+from app.labels.service.tasks import TaskWork
 from app.labels.store.draft import Draft
 from app.labels.store.drive_labels import DriveLabels
 from app.labels.store.frame_ranges import free_spans
 from app.labels.wording import frames_text, outside_text
+from pipeline.common.progress import Progress, silent
 from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.labels.propose import Proposals, known_as, propose
 from pipeline.labels.recorded_truth import truth_labels
 
 
-def proposing(labels: DriveLabels, recording: Recording, person: str, first: int, last: int) -> Work:
+def proposing(labels: DriveLabels, recording: OpenRecording, person: str, first: int, last: int) -> TaskWork:
     """The present run's objects in frames first … last as proposals. ActRefused while the run has not come that far."""
-    run = recording.book.current
-    last = min(last, recording.recipe.total - 1)
+    run = recording.runs.current
+    last = min(last, recording.setup.total - 1)
     if run is None or run.done <= last:
         done = run.done if run is not None else 0
         raise ActRefused(f"{done} of {last + 1} frames are computed: wait, or propose these")
     if first > last:
-        raise ActRefused(outside_text(first, last, recording.recipe.total))
+        raise ActRefused(outside_text(first, last, recording.setup.total))
 
     def work(progress: Progress) -> str:
         progress(0, 2)
@@ -45,7 +46,7 @@ def proposing(labels: DriveLabels, recording: Recording, person: str, first: int
 
 
 def put_proposals(
-    labels: DriveLabels, found: Proposals, person: str, first: int, last: int, progress: Progress = to_nobody
+    labels: DriveLabels, found: Proposals, person: str, first: int, last: int, progress: Progress = silent
 ) -> str:
     """Into the labels of a drive, in one act; a sentence of what came of it. Nothing is written when ``progress``
     raises."""
@@ -67,7 +68,7 @@ def put_proposals(
 
 
 def importing(
-    labels: DriveLabels, found: LabelSet, person: str, notes: Sequence[str], progress: Progress = to_nobody
+    labels: DriveLabels, found: LabelSet, person: str, notes: Sequence[str], progress: Progress = silent
 ) -> str:
     """Labels of this drive from elsewhere, in one act, beside those that are there; a sentence of what came of it. A
     track whose number is taken gets another; one that is there already, place for place, is not there twice, and is
@@ -124,7 +125,7 @@ def _put_tracks(draft: Draft, tracks: Sequence[LabelTrack], known: list[int]) ->
 def _numbered(numbers: Mapping[int, int], track: int, what: str) -> int:
     """The number that a track of the file has here."""
     if track not in numbers:
-        raise ActRefused(f"{what} is #{track}, and no such track comes with it or is here")
+        raise ActRefused(f"{what} is #{track}: track not found in file or database")
     return numbers[track]
 
 
@@ -146,21 +147,21 @@ def _as_they_are(draft: Draft) -> list[LabelTrack]:
     ]
 
 
-def importing_truth(labels: DriveLabels, recording: Recording, person: str) -> Work:
+def importing_truth(labels: DriveLabels, recording: OpenRecording, person: str) -> TaskWork:
     """The truth that comes with the recording."""
 
     def work(progress: Progress) -> str:
-        source = recording.recipe.source
+        source = recording.setup.source
         origin = Origin("import", source.title, int(time.time() * 1000))
         found, notes = truth_labels(source, recording.names(), origin, progress)
         if not found.tracks:
-            raise ActRefused("no frame of this recording comes with truth")
+            raise ActRefused("this recording comes with no ground truth")
         return importing(labels, found, person, notes, progress)
 
     return work
 
 
-def _proposals(recording: Recording, run: DriveRun, first: int, last: int) -> Proposals:
+def _proposals(recording: OpenRecording, run: DriveRun, first: int, last: int) -> Proposals:
     rows = run.rows()[: last + 1]
     frames = {index: seen_of(records) for index, records in run.objects() if first <= index <= last}
     leads = {index: rows[index].cipv_id for index in range(first, last + 1)}

@@ -25,7 +25,7 @@ def set_lead(draft: Draft, scope: Scope, act: SetLead) -> str:
 def clear_lead(draft: Draft, scope: Scope, act: ClearLead) -> str:
     scope.check(act.first, act.last)
     if not clear(draft, act.first, act.last):
-        raise ActRefused(f"nobody has said who leads in {frames_text(act.first, act.last)}")
+        raise ActRefused(f"no lead is labelled in {frames_text(act.first, act.last)}")
     return f"lead of {frames_text(act.first, act.last)}: not said"
 
 
@@ -34,7 +34,7 @@ def trim_lead(draft: Draft, scope: Scope, act: TrimLead) -> str:
     scope.check(act.first, act.last)
     old = cast("LeadRange", draft.get("lead", act.range, act.revision).value)
     if old.state == "rejected":
-        raise ActRefused("that range is rejected: paint who leads there")
+        raise ActRefused("that range is rejected: label the lead there instead")
     if (old.first, old.last) != (act.first, act.last):
         state = old.state if old.origin.maker == "person" else "corrected"
         new = replace(old, first=act.first, last=act.last, state=state, origin=by_person(draft), reviewer="")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import ValidationError
 
-from app.core.request_shapes import GivenCuboid
-from app.drive.open_recording import Recording
+from app.core.request_shapes import CuboidShape
+from app.drive.open_recording import OpenRecording
 from app.labels.acts.requests import AddMeasured, Lift, Refit, SetSighting
 from app.labels.acts.scope import Scope
 from app.labels.errors import ActRefused, BadAct
@@ -23,7 +23,7 @@ _DECIMALS = 4
 
 
 def measured(
-    labels: DriveLabels, recording: Recording, params: Params, act: Refit | Lift
+    labels: DriveLabels, recording: OpenRecording, params: Params, act: Refit | Lift
 ) -> tuple[SetSighting | AddMeasured, str]:
     """What is measured in the sensors' data for a person, as the act that it comes to, and how it was found. BadInput
     where there is nothing to measure."""
@@ -50,7 +50,7 @@ def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> t
     else:
         seen = lift(frame, params, track.label, sighting.bbox)
         if not seen.points:
-            raise ActRefused(f"#{act.track}: {seen.how}; that is too rough for a label: draw it")
+            raise ActRefused(f"#{act.track}: {seen.how}; too rough for a label: draw it by hand")
         cuboid, note = seen.cuboid, seen.how
     placed = SetSighting(
         kind="set_sighting",
@@ -67,19 +67,19 @@ def lifted(frame: Frame, params: Params, act: Lift) -> tuple[AddMeasured, str]:
     """A new track from where something is in the picture, with the parameters that are in use. BadInput where neither
     points nor picture tell where it is."""
     if (act.bbox is None) == (act.pixel is None):
-        raise BadAct("either a box or a pixel")
+        raise BadAct("provide either a box or a pixel")
     if act.bbox is not None and not (act.bbox[0] < act.bbox[2] and act.bbox[1] < act.bbox[3]):
-        raise BadAct("the box is none")
+        raise BadAct("invalid box")
     found = lift(frame, params, canonical(act.label), act.bbox, act.pixel)
     cuboid, how = _given(found.cuboid), found.how
     return AddMeasured(kind="lift", label=act.label, frame=frame.index, cuboid=cuboid, bbox=found.bbox, how=how), how
 
 
-def _given(cuboid: Cuboid) -> GivenCuboid:
+def _given(cuboid: Cuboid) -> CuboidShape:
     """ActRefused for one that nobody could have drawn."""
     x, y, z = (round(value, _DECIMALS) for value in cuboid.center)
     length, width, height = (round(value, _DECIMALS) for value in cuboid.size)
     try:
-        return GivenCuboid(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
+        return CuboidShape(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
     except ValidationError:
         raise ActRefused(f"the points there are {length:.0f} × {width:.0f} × {height:.0f} m: no vehicle") from None

@@ -29,7 +29,7 @@ def _named(text: str) -> str:
 def _commented(text: str) -> str:
     cleaned = _clean(text)
     if not cleaned:
-        raise ValueError("a comment says what is to be looked at")
+        raise ValueError("a comment is needed: say what to check")
     return cleaned
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from app.core.request_shapes import Finite, GivenCuboid, Meters
+from app.core.request_shapes import CuboidShape, Finite, Meters
 from app.labels.acts.request_fields import MOST_FRAMES, Comment, Id, Index, Line, Strict, Word
 from app.labels.errors import BadAct
 from app.labels.store.values import ItemKind
@@ -23,13 +23,13 @@ class Placed(Strict):
     """Where something is in one frame. bbox: x1 y1 x2 y2 in pixels of the raw picture."""
 
     frame: Index
-    cuboid: GivenCuboid | None = None
+    cuboid: CuboidShape | None = None
     bbox: tuple[Finite, Finite, Finite, Finite] | None = None
 
     def sighting(self) -> Sighting:
         """As a keyframe. BadAct for a box that is none, or when nothing is there."""
         if self.cuboid is None and self.bbox is None:
-            raise BadAct("neither a cuboid nor a box")
+            raise BadAct("provide a cuboid or a box")
         sighting = Sighting(self.frame, self.cuboid.value() if self.cuboid else None, self.bbox)
         try:
             return check_sighting(sighting, frames_text(self.frame))
@@ -212,7 +212,7 @@ class SetPath(Strict):
     def lines(self) -> tuple[tuple[Point2, ...] | None, tuple[Point2, ...] | None]:
         """BadAct when there is neither."""
         if self.left is None and self.right is None:
-            raise BadAct("neither a left nor a right line")
+            raise BadAct("provide a left or a right line")
         return (
             tuple(self.left) if self.left is not None else None,
             tuple(self.right) if self.right is not None else None,

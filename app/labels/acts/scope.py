@@ -48,5 +48,5 @@ def corrected(draft: Draft, track: LabelTrack, *, placed: bool = False) -> None:
 def stated(item: Item) -> Stated:
     """Its value, which has a state. BadAct for a tag."""
     if item.kind == "tag":
-        raise BadAct("a tag is neither accepted nor rejected")
+        raise BadAct("tags cannot be accepted or rejected")
     return cast("Stated", item.value)

@@ -45,7 +45,9 @@ def split(draft: Draft, scope: Scope, act: Split) -> str:
     there = draft.sightings(track.id)
     later: Frames = {frame: each for frame, each in there.items() if frame >= act.frame}
     if not later or len(later) == len(there):
-        raise ActRefused(f"#{track.id} cannot be split at {frames_text(act.frame)}: it is on one side of it only")
+        raise ActRefused(
+            f"#{track.id} cannot be split at {frames_text(act.frame)}: it has labels on one side of that frame only"
+        )
     number = draft.next_number("track")
     corrected(draft, track)
     draft.add("track", replace(track_of(draft, track.id), id=number, comment=""))

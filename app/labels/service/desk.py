@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.core.control import Control, Wish
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.labels.acts.requests import Import, Lift, Propose, Refit
 from app.labels.service.opened import KeptLabels, Opened
 from app.labels.service.param_write_queue import SettlingQueue
 from app.labels.service.state import LabelState
 from app.labels.service.tasks import Tasks
 from pipeline.common.errors import BadInput
-from pipeline.labels.formats.base import FormatName
+from pipeline.labels.formats.registry import FormatName
 from pipeline.params import Params
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ _PATIENCE_S = 10.0
 
 
 @dataclass(frozen=True)
-class Done:
+class ActDone:
     """An act that is on disk, or changed nothing, and the labels that it was done to: those stay what they are when
     something else is opened meanwhile."""
 
@@ -88,8 +88,8 @@ class LabelDesk:
             self._thread.join(_PATIENCE_S)
         self.kept.close()
 
-    def open(self, uri: str, recording: Recording | None) -> None:
-        """Something else was opened; null for what has no frames to label. Its labels are looked for a little later,
+    def open(self, uri: str, recording: OpenRecording | None) -> None:
+        """Something else was opened; None for what has no frames to label. Its labels are looked for a little later,
         when it is shown."""
         self.tasks.cancel()
         with self._lock:
@@ -105,7 +105,7 @@ class LabelDesk:
         return self._state
 
     @property
-    def recording(self) -> Recording:
+    def recording(self) -> OpenRecording:
         """What can be labelled. NoSuchLabel when nothing can."""
         return self._open.framed()
 
@@ -118,7 +118,7 @@ class LabelDesk:
 
     @property
     def drive(self) -> str | None:
-        """The key of the open recording; null for what has no frames to label."""
+        """The key of the open recording; None for what has no frames to label."""
         return self._open.key
 
     @cached_property
@@ -130,7 +130,7 @@ class LabelDesk:
 
     # ------------------------------------------------------------ acts
 
-    def act(self, person: str, act: Any, drive: str, act_id: str | None = None) -> Done:
+    def act(self, person: str, act: Any, drive: str, act_id: str | None = None) -> ActDone:
         """Do it; on disk when this returns. Whatever refuses it. drive: the key of the recording that is meant.
         act_id: of who sends it; what was sent before is not done again."""
         recording, labels = self._open.named(drive)
@@ -148,11 +148,11 @@ class LabelDesk:
             self._settling.finish()
             done = labels.log.act(doing.kind, person, lambda draft: do(draft, scope, doing), act_id=act_id, note=note)
             self.refresh()
-        return Done(done, labels)
+        return ActDone(done, labels)
 
-    def move(self, way: Way, person: str, drive: str | None, act_id: str | None = None) -> Done:
+    def move(self, way: Way, person: str, drive: str | None, act_id: str | None = None) -> ActDone:
         """Undo or redo, across labels and parameters; what is only being tried is undone first. ActRefused when there
-        is nothing to, or somebody else is in the way. drive, act_id: as in ``act``; null for what has no frames to
+        is nothing to, or somebody else is in the way. drive, act_id: as in ``act``; None for what has no frames to
         label."""
         labels = self._open.meant(drive)
         self._settling.finish()
@@ -162,13 +162,13 @@ class LabelDesk:
             if acted is None and way == "undo" and self._forget_tried(act_id):
                 from app.labels.store.act_log import Acted
 
-                return Done(Acted(labels.revision, None, "what was being tried"), labels)
+                return ActDone(Acted(labels.revision, None, "what was being tried"), labels)
             if acted is None:
                 acted = labels.log.move(way, person, self._control.check, act_id=act_id)
             if acted.params:
                 self._control.restore(acted.params)
         self.refresh()
-        return Done(acted, labels)
+        return ActDone(acted, labels)
 
     def begin(self, person: str, act: Propose | Import, drive: str, act_id: str | None = None) -> int:
         """Something that takes a while; its number. ActRefused while another one goes on, or when it cannot be done.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 What = Literal["unlabelled", "disagreement", "proposed", "sent_back", "unreviewed"]
 Key = tuple[ItemKind, int]
-"""Kind and number of a label."""
+"""TaskKind and number of a label."""
 _NOTHING: dict[What, str] = {
     "unlabelled": "who leads is said in every frame there",
     "disagreement": "the pipeline and the accepted labels agree there",
@@ -41,7 +41,7 @@ class Place:
 @dataclass(frozen=True)
 class Asked:
     """What is looked for, beyond which frame, which way. after: of several labels in that frame, the one that was
-    looked at; null to go beyond the frame. person: who asks."""
+    looked at; None to go beyond the frame. person: who asks."""
 
     what: What
     frame: int

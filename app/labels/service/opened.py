@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.labels.errors import ActRefused, NoSuchLabel
 from pipeline.common.garbage_collection import freeze_loaded_objects
 
@@ -37,7 +37,7 @@ class KeptLabels:
         """Whether there may be some from before, and others may change them."""
         return self.is_open or self._open_later is not None
 
-    def of(self, uri: str, recording: Recording | None) -> DriveLabels:
+    def of(self, uri: str, recording: OpenRecording | None) -> DriveLabels:
         """Of a recording, or of what has no frames to label. BadInput when the database cannot be opened."""
         from app.labels.store.drive_labels import DriveLabels
 
@@ -58,10 +58,10 @@ class KeptLabels:
 
 @dataclass(eq=False)
 class Opened:
-    """What is open. recording: null for what has no frames to label. kept: where its labels are."""
+    """What is open. recording: None for what has no frames to label. kept: where its labels are."""
 
     uri: str
-    recording: Recording | None
+    recording: OpenRecording | None
     kept: KeptLabels
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _labels: DriveLabels | None = None
@@ -76,13 +76,13 @@ class Opened:
 
     @property
     def key(self) -> str | None:
-        """Of the recording; null for what has no frames to label."""
+        """Of the recording; None for what has no frames to label."""
         return self.labels.info.key if self.recording is not None else None
 
-    def framed(self) -> Recording:
+    def framed(self) -> OpenRecording:
         """What can be labelled. NoSuchLabel when nothing can."""
         if self.recording is None:
-            raise NoSuchLabel("no recording is open that could be labelled")
+            raise NoSuchLabel("no recording is open")
         return self.recording
 
     def meant(self, drive: str | None) -> DriveLabels:
@@ -92,7 +92,7 @@ class Opened:
             raise ActRefused("another recording is open now")
         return self.labels
 
-    def named(self, drive: str) -> tuple[Recording, DriveLabels]:
+    def named(self, drive: str) -> tuple[OpenRecording, DriveLabels]:
         """ActRefused when it is not the recording with this key, NoSuchLabel when it has no frames to label."""
         return self.framed(), self.meant(drive)
 
@@ -103,7 +103,7 @@ def _temporary() -> Database:
     return Database.temporary()
 
 
-def _info(uri: str, recording: Recording | None) -> DriveInfo:
+def _info(uri: str, recording: OpenRecording | None) -> DriveInfo:
     from app.labels.store.drive_labels import info_of, info_of_uri
 
-    return info_of_uri(uri) if recording is None else info_of(recording.recipe.source, recording.names)
+    return info_of_uri(uri) if recording is None else info_of(recording.setup.source, recording.names)

@@ -69,7 +69,7 @@ class SettlingQueue:
         """Wait until all are written, so that what comes next comes after them. ActRefused when that takes too long."""
         with self._changed:
             if not self._changed.wait_for(lambda: not self._waiting, _PATIENCE_S):
-                raise ActRefused("a change of parameters before this is still on its way to the database")
+                raise ActRefused("an earlier parameter change is still being saved")
 
     def stop(self) -> None:
         """What is on its way is written first, if the database lets it."""
@@ -107,7 +107,7 @@ class SettlingQueue:
 
 
 def _written(change: _Change) -> str | None:
-    """Why it was not; null when it was."""
+    """Why it was not; None when it was."""
     try:
         change.log().settle(change.changes, change.person, merges=change.merges)
     except BadInput as error:

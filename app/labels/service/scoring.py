@@ -50,7 +50,7 @@ class LabelScores:
         self._scores: dict[tuple[int, int], DriveScore | None] = {}
 
     def truth(self, labels: DriveLabels) -> tuple[int, DriveTruth | None]:
-        """(revision, what people stand behind; null while that is nothing)."""
+        """(revision, what people stand behind; None while that is nothing)."""
         with self._lock:
             revision = labels.revision
             if self._of is None or self._of[0] is not labels or self._of[1] != revision:
@@ -62,7 +62,7 @@ class LabelScores:
             return revision, self._truth
 
     def score(self, labels: DriveLabels, run: DriveRun) -> DriveScore | None:
-        """One run's; null where no labelled frame has a result yet."""
+        """One run's; None where no labelled frame has a result yet."""
         revision, truth = self.truth(labels)
         key = (run.number, run.done)
         with self._lock:
@@ -93,7 +93,7 @@ class LabelScores:
         )
 
     def judged_rows(self, labels: DriveLabels, run: DriveRun) -> list[Row] | None:
-        """A run's rows, judged by labels instead of what the recording came with; null where they judge nothing. Asked
+        """A run's rows, judged by labels instead of what the recording came with; None where they judge nothing. Asked
         for while a run goes on: only who leads is looked at."""
         _, truth = self.truth(labels)
         rows = run.rows()

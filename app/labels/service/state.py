@@ -22,7 +22,7 @@ class LabelState:
     trouble: str = ""
 
     def to_json(self) -> dict[str, Any] | None:
-        """Null for what cannot be labelled."""
+        """None for what cannot be labelled."""
         if not self.labelled:
             return None
         return {

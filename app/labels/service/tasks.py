@@ -1,123 +1,103 @@
-"""What takes longer than an answer may: one task at a time, which says how far it is and how it ended."""
+"""Label work that takes longer than an answer may: one task at a time, which reports progress and how it ended."""
 
 from __future__ import annotations
 
-import logging
 import threading
-import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from app.core.jobs import BackgroundJob
 from app.labels.errors import ActRefused
-from pipeline.common.errors import BadInput
+from pipeline.common.progress import Progress
 
-logger = logging.getLogger("cipv.labels")
-
-Kind = Literal["propose", "import"]
+TaskKind = Literal["propose", "import"]
 _PATIENCE_S = 10.0
 _TELL_EVERY_S = 0.1
 
-
-class Cancelled(Exception):
-    """Something else was opened, or the program ends."""
+TaskWork = Callable[[Progress], str]
+"""Does the work, and returns one sentence that says what came of it."""
 
 
 @dataclass(frozen=True)
 class TaskState:
-    """How far it is. id: its number, which who began it was told. error: why it failed. It stays until the next one
-    begins, or what it was about is closed."""
+    """A task at one moment. It stays until the next one begins, or until its recording is closed."""
 
     id: int
-    what: Kind
+    """Its number, as whoever began it was told."""
+    what: TaskKind
     done: int = 0
+    """Units of work finished."""
     total: int = 0
+    """Units of work in all; 0 until the work first reports."""
     note: str = ""
+    """What came of it, once it is done."""
     error: str | None = None
+    """Why it failed."""
     running: bool = True
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
 
 
-Progress = Callable[[int, int], None]
-"""done, total. Raises Cancelled when nobody waits for it any more."""
-Work = Callable[[Progress], str]
-"""Does it, and says in a sentence what came of it."""
-
-
-def to_nobody(done: int, total: int) -> None:
-    """Progress of what is waited for until its end."""
+@dataclass(frozen=True, eq=False)
+class _Task:
+    id: int
+    what: TaskKind
+    job: BackgroundJob[str]
+    thread: threading.Thread
 
 
 class Tasks:
-    """Any thread. on_change is called when ``state`` is another, while a task goes on ten times a second at most."""
+    """Any thread. ``on_change`` is called when ``state`` has changed, at most ten times a second while a task runs."""
 
     def __init__(self, on_change: Callable[[], object]) -> None:
         self._on_change = on_change
         self._lock = threading.Lock()
-        self._state: TaskState | None = None
-        self._thread: threading.Thread | None = None
-        self._turn = 0
-        self._told_s = 0.0
+        self._task: _Task | None = None
+        self._last_thread: threading.Thread | None = None
+        self._number = 0
 
     @property
     def state(self) -> TaskState | None:
-        """Null while there was none."""
-        return self._state
+        """None while there is no task to tell of."""
+        task = self._task
+        if task is None:
+            return None
+        now = task.job.status
+        return TaskState(task.id, task.what, now.done, now.total, task.job.result or "", now.error, not now.has_ended)
 
-    def begin(self, what: Kind, work: Work) -> int:
-        """Its number. ActRefused while another one runs."""
+    def begin(self, what: TaskKind, work: TaskWork) -> int:
+        """Start a task and return its number. ActRefused while another one runs."""
         with self._lock:
-            if self._state is not None and self._state.running:
-                raise ActRefused(f"{self._state.what} is still going on")
-            self._turn += 1
-            turn = self._turn
-            self._state = TaskState(turn, what)
-            self._thread = threading.Thread(target=self._run, args=(turn, work), name="cipv-label-task", daemon=True)
-        self._thread.start()
+            if self._task is not None and not self._task.job.status.has_ended:
+                raise ActRefused(f"{self._task.what} is still running")
+            self._number += 1
+            number = self._number
+            job = BackgroundJob(
+                work, lambda: self._changed(number), tell_every_s=_TELL_EVERY_S, name=f"label task {what}"
+            )
+            thread = threading.Thread(target=job.run, name="cipv-label-task", daemon=True)
+            self._task, self._last_thread = _Task(number, what, job, thread), thread
+        thread.start()
         self._on_change()
-        return turn
+        return number
 
     def cancel(self) -> None:
-        """It is not waited for; what it has not written yet it never will."""
+        """Drop the task; what it has not written yet is never written."""
         with self._lock:
-            self._turn += 1
-            self._state = None
+            if self._task is not None:
+                self._task.job.cancel()
+            self._task = None
 
     def stop(self) -> None:
+        """Drop the task and wait for its thread, but not for ever."""
         self.cancel()
-        thread = self._thread
+        thread = self._last_thread
         if thread is not None and thread.is_alive() and thread is not threading.current_thread():
             thread.join(_PATIENCE_S)
 
-    def _run(self, turn: int, work: Work) -> None:
-        def progress(done: int, total: int) -> None:
-            self._tell(turn, done=done, total=total)
-
-        try:
-            self._tell(turn, note=work(progress), running=False)
-        except Cancelled:
-            return
-        except BadInput as error:
-            self._fail(turn, str(error))
-        except Exception as error:  # whatever a recording does, the program goes on
-            logger.exception("a task on labels")
-            self._fail(turn, f"{type(error).__name__}: {error}")
-
-    def _fail(self, turn: int, text: str) -> None:
-        try:
-            self._tell(turn, error=text, running=False)
-        except Cancelled:
-            return
-
-    def _tell(self, turn: int, **values: Any) -> None:
-        with self._lock:
-            if turn != self._turn or self._state is None:
-                raise Cancelled
-            self._state = replace(self._state, **values)
-            now = time.monotonic()
-            if self._state.running and now - self._told_s < _TELL_EVERY_S:
-                return
-            self._told_s = now
-        self._on_change()
+    def _changed(self, number: int) -> None:
+        task = self._task
+        if task is not None and task.id == number:
+            self._on_change()

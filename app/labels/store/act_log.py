@@ -29,7 +29,7 @@ _LONGEST_HISTORY = 200
 
 @dataclass(frozen=True)
 class Acted:
-    """What was done. revision: the drive's; act: its number, null when nothing changed. note: what there is to say
+    """What was done. revision: the drive's; act: its number, None when nothing changed. note: what there is to say
     of it besides. params: what parameters of this program are to be now, by name."""
 
     revision: int
@@ -93,7 +93,7 @@ class Log:
             return Acted(draft.number, draft.number, what, note)
 
     def sent_before(self, act_id: str | None, person: str) -> Acted | None:
-        """What was answered to the act that was sent with this id; null when there is none. ActRefused when it is
+        """What was answered to the act that was sent with this id; None when there is none. ActRefused when it is
         another person's."""
         with self._database.reading() as connection:
             return self._sent_before(connection, act_id, person)
@@ -242,7 +242,7 @@ class Log:
         if row is None:
             return None
         if row.person != person:
-            raise ActRefused("an act of somebody else has that id")
+            raise ActRefused("another person's act has this id")
         what = row.what if row.target is None else self._steps.acts_of(connection, row.target)[-1][1]
         return Acted(row.number, row.number, what, row.note)
 

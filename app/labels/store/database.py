@@ -49,7 +49,7 @@ class Database:
             brought = ", which `make install` brings" if error.name == "psycopg" else ""
             raise DatabaseError(f"labels: {error.name or error} is not installed{brought}") from None
         except (ArgumentError, NoSuchModuleError) as error:
-            raise DatabaseError(f"labels: no database address that is understood: {_first_line(error)}") from None
+            raise DatabaseError(f"labels: invalid database address: {_first_line(error)}") from None
         self.is_sqlite = self._engine.dialect.name == "sqlite"
         with self.writing() as connection:
             if not self.is_sqlite:
@@ -62,7 +62,7 @@ class Database:
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise DatabaseError(f"{file}: labels cannot be kept there: {error.strerror}") from None
+            raise DatabaseError(f"{file}: labels cannot be stored there: {error.strerror}") from None
         return Database(URL.create("sqlite", database=str(file)))
 
     @staticmethod
@@ -129,7 +129,7 @@ def open_database(url: str | None = None) -> Database:
 
 
 def migrate(connection: Connection, at: str | None, name: str) -> None:
-    """From revision ``at``, null for an empty database. DatabaseError when nobody here knows that revision."""
+    """From revision ``at``, None for an empty database. DatabaseError when nobody here knows that revision."""
     from alembic import command  # half a second to import, which only the first start pays
     from alembic.config import Config
     from alembic.script import ScriptDirectory
@@ -139,7 +139,7 @@ def migrate(connection: Connection, at: str | None, name: str) -> None:
     config.attributes["connection"] = connection
     known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
     if at is not None and at not in known:
-        raise DatabaseError(f"labels, {name}: written by a newer program; this one does not know its form")
+        raise DatabaseError(f"labels, {name}: written by a newer version of this program")
     command.upgrade(config, HEAD)
 
 
@@ -154,7 +154,7 @@ def _engine(url: URL) -> Engine:
             url = url.set(drivername="postgresql+psycopg")
         patience = f"-c lock_timeout={int(_BUSY_S * 1e3)}ms"
         return create_engine(url, pool_pre_ping=True, connect_args={"connect_timeout": _CONNECT_S, "options": patience})
-    raise ArgumentError(f"{url.get_backend_name()}: sqlite or postgresql is kept labels in")
+    raise ArgumentError(f"{url.get_backend_name()}: labels are stored in sqlite or postgresql")
 
 
 def _as_sqlite(connection: Any, _: Any) -> None:

@@ -37,12 +37,12 @@ class Draft:
         self._params: dict[str, tuple[Any, Any]] = {}
         self._given: dict[ItemKind, int] = {}
         self._tracks: set[int] | None = None
-        """Numbers of all that ever were; null until somebody asks."""
+        """Numbers of all that ever were; None until somebody asks."""
 
     # ------------------------------------------------------------ reading
 
     def find(self, kind: ItemKind, number: int) -> Item | None:
-        """As it stands; null when it is not there."""
+        """As it stands; None when it is not there."""
         key = (kind, number)
         if key not in self._before:
             self._before[key] = read_item(self._connection, self._drive_id, kind, number)
@@ -102,7 +102,7 @@ class Draft:
     # ------------------------------------------------------------ changing
 
     def put(self, kind: ItemKind, number: int, value: Value | None) -> None:
-        """Change an item, make it, or with null remove it; a removed track's sightings go with it."""
+        """Change an item, make it, or with None remove it; a removed track's sightings go with it."""
         self.find(kind, number)
         self._after[(kind, number)] = value
         if kind == "track" and value is None:
@@ -145,7 +145,7 @@ class Draft:
         return self.next_number("track") if is_given or track.id == 0 else track.id
 
     def put_sightings(self, track: int, frames: Frames) -> None:
-        """Change some of a track's sightings; null takes one away. The track itself counts as changed."""
+        """Change some of a track's sightings; None takes one away. The track itself counts as changed."""
         if not frames:
             return
         self.find("track", track)
@@ -195,7 +195,7 @@ class Draft:
         )
 
     def changed_by(self, kind: ItemKind, number: int) -> str | None:
-        """Who did the last act on an item that is in force: what was taken back, and taking back, are not. Null when
+        """Who did the last act on an item that is in force: what was taken back, and taking back, are not. None when
         there is none."""
         return self._connection.scalars(
             select(ActRow.person)
@@ -227,7 +227,7 @@ class Draft:
         if kind != "track":
             return Content(before, {}), Content(after, {})
         if after is None and before is None:
-            raise ActRefused(f"sightings of a track {number} that is not there")
+            raise ActRefused(f"sightings of track {number}, which does not exist")
         was, now = self._frames_before.get(number, {}), self._frames_after.get(number, {})
         frames = [frame for frame in now if was[frame] != now[frame]]
         return Content(before, {f: was[f] for f in frames}), Content(after, {f: now[f] for f in frames})

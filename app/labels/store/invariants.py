@@ -73,7 +73,7 @@ def _check_named(draft: Draft, gone: set[int]) -> None:
             else:
                 missing = names & gone
             if missing:
-                raise ActRefused(f"{name_of(kind, item.id)} names #{min(missing)}, which would not be there")
+                raise ActRefused(f"{name_of(kind, item.id)} names #{min(missing)}, which would no longer exist")
 
 
 def _tracks_of(item: Item) -> set[int]:

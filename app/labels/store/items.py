@@ -30,7 +30,7 @@ def read_items(connection: Connection, drive_id: int, kind: ItemKind) -> dict[in
 
 
 def read_item(connection: Connection, drive_id: int, kind: ItemKind, number: int) -> Item | None:
-    """Null when it is not, or no longer, there."""
+    """None when it is not, or no longer, there."""
     row = connection.execute(
         select(ItemRow.id, ItemRow.revision, ItemRow.value).where(
             ItemRow.drive_id == drive_id, ItemRow.kind == kind, ItemRow.id == number, ItemRow.removed.is_(False)

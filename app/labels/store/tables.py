@@ -44,7 +44,7 @@ class ItemRow(Base):
 
 
 class SightingRow(Base):
-    """A track in one frame. Ego frame, metres, radians; box in pixels; null where there is none."""
+    """A track in one frame. Ego frame, metres, radians; box in pixels; None where there is none."""
 
     __tablename__ = "sighting"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)

@@ -68,7 +68,7 @@ class Steps:
         connection.execute(update(ActRow).where(self._mine(person), ActRow.status == "undone").values(status="dropped"))
 
     def before(self, connection: Connection, number: int, person: str, names: set[str]) -> int | None:
-        """The step of act ``number``, when it nudged the same parameters; else null."""
+        """The step of act ``number``, when it nudged the same parameters; else None."""
         row = connection.execute(
             select(ActRow.step, ActRow.kind, ActRow.person, ActRow.station, ActRow.status).where(
                 ActRow.drive_id == self._drive_id, ActRow.number == number
@@ -82,7 +82,7 @@ class Steps:
         return row.step if set(before) == names else None
 
     def changed_since(self, connection: Connection, change: Any, person: str) -> str | None:
-        """Who else changed the same thing after ``change``, the last one; null when nobody did. A parameter is changed
+        """Who else changed the same thing after ``change``, the last one; None when nobody did. A parameter is changed
         by acts in force on this station alone, and by who has a name."""
         wanted = [
             ChangeRow.drive_id == self._drive_id,

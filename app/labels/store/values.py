@@ -21,7 +21,7 @@ ItemKind = Literal["track", "lead", "path", "event", "tag"]
 KINDS: tuple[ItemKind, ...] = get_args(ItemKind)
 Value = LabelTrack | LeadRange | PathLabel | EventLabel | FrameTag
 Frames = Mapping[int, Sighting | None]
-"""Sightings of one track by frame; null where there is none (any more)."""
+"""Sightings of one track by frame; None where there is none (any more)."""
 
 _ADAPTERS: dict[ItemKind, TypeAdapter[Any]] = {
     "track": TypeAdapter(LabelTrack),
@@ -93,7 +93,7 @@ def sighting_of(row: Any) -> Sighting:
 
 
 def pack_content(kind: ItemKind, content: Content) -> bytes | None:
-    """Null for an item that is not there, and has no frames."""
+    """None for an item that is not there, and has no frames."""
     if content.value is None and not any(content.frames.values()):
         return None
     return pack(

@@ -14,21 +14,17 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.labels.acts.bulk import importing
 from app.labels.errors import ActRefused, BadAct
-from app.labels.service.tasks import Progress, Work, to_nobody
+from app.labels.service.tasks import TaskWork
 from app.labels.store.drive_labels import DriveLabels
 from pipeline.common.errors import BadInput
-from pipeline.labels.formats.base import Drive, FormatName, drive_of
-from pipeline.labels.formats.registry import export_labels, import_labels
+from pipeline.common.progress import Progress, silent
+from pipeline.labels.formats.base import LabeledDrive, drive_of
+from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
 
-_SUFFIXES: dict[FormatName, str] = {
-    "native": ".json", "mcap": ".mcap", "openlabel": ".json", "coco": ".json", "csv": ".csv",
-    "kitti": "", "kitti-tracking": "", "nuscenes": "",
-}  # fmt: skip
-"""Of the file; the others are folders."""
 _LARGEST_UNPACKED = 512 << 20
 _MOST_PARTS = 100_000
 _ENCRYPTED = 1
@@ -53,11 +49,11 @@ class Exported:
     lost: tuple[str, ...]
 
 
-def exported(recording: Recording, labels: LabelSet, name: FormatName) -> Exported:
+def exported(recording: OpenRecording, labels: LabelSet, name: FormatName) -> Exported:
     """A file, of a format that makes a folder a .zip of it. BadInput when it cannot be."""
     folder = Path(tempfile.mkdtemp(prefix="cipv-export-"))
     try:
-        out = folder / f"labels-{name}{_SUFFIXES[name]}"
+        out = folder / f"labels-{name}{FORMATS[name].suffix}"
         lost = export_labels(labels, drive_for(recording), name, out)
         file = _zipped(out) if out.is_dir() else out
     except BaseException:
@@ -66,12 +62,14 @@ def exported(recording: Recording, labels: LabelSet, name: FormatName) -> Export
     return Exported(file, folder, lost)
 
 
-def importing_file(labels: DriveLabels, recording: Recording, person: str, file: Path, name: FormatName) -> Work:
+def importing_file(
+    labels: DriveLabels, recording: OpenRecording, person: str, file: Path, name: FormatName
+) -> TaskWork:
     """Labels of an uploaded file; a format that is a folder comes as a .zip of it."""
 
     def work(progress: Progress) -> str:
         with _removed(file), tempfile.TemporaryDirectory(prefix="cipv-import-") as folder:
-            path = file if _SUFFIXES[name] else _unzipped(file, Path(folder))
+            path = file if FORMATS[name].suffix else _unzipped(file, Path(folder))
             drive = drive_for(recording, progress)
             origin = Origin("import", f"{name} file of {person}", int(time.time() * 1000))
             try:
@@ -83,12 +81,12 @@ def importing_file(labels: DriveLabels, recording: Recording, person: str, file:
     return work
 
 
-def drive_for(recording: Recording, progress: Progress = to_nobody) -> Drive:
+def drive_for(recording: OpenRecording, progress: Progress = silent) -> LabeledDrive:
     """What formats must know of the drive: looked for once while it is open, and read from its source only where no
     run has."""
     with recording.describing:
         if recording.described is None:
-            recording.described = drive_of(recording.recipe.source, progress, recording.at_hand)
+            recording.described = drive_of(recording.setup.source, progress, recording.at_hand)
         return recording.described
 
 
@@ -113,13 +111,13 @@ def _unzipped(file: Path, folder: Path) -> Path:
             for each in parts:
                 name = PurePosixPath(each.filename)
                 if name.is_absolute() or ".." in name.parts or "\\" in each.filename:
-                    raise BadAct(f"the .zip holds a file that leads out of it: {each.filename!r}")
+                    raise BadAct(f"the .zip contains a path outside its folder: {each.filename!r}")
                 target = folder / name
                 target.parent.mkdir(parents=True, exist_ok=True)
                 with packed.open(each) as source, target.open("xb") as out:
                     _copied(source, out, each.file_size)
     except _BROKEN_ZIP as error:
-        raise ActRefused(f"no .zip of a folder: {error}") from None
+        raise ActRefused(f"not a valid .zip: {error}") from None
     inside = list(folder.iterdir())
     return inside[0] if len(inside) == 1 and inside[0].is_dir() and inside[0].name.startswith("labels") else folder
 
@@ -128,7 +126,7 @@ def _copied(source: IO[bytes], out: IO[bytes], size: int) -> None:
     """Never more than the .zip says it holds."""
     data = source.read(size + 1)
     if len(data) > size:
-        raise ValueError("a file in it is longer than it says")
+        raise ValueError("a file in it is longer than declared")
     out.write(data)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from fastapi import APIRouter, HTTPException
 from pydantic import BaseModel
 
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
 from pipeline.calibration.depth_edges import edge_scene
@@ -19,7 +19,7 @@ from pipeline.types import Frame
 
 FRAMES = 20
 """Frames that are looked at, over the whole drive or the last shown ones: one sweep of 16 rings has few borders."""
-_NOTHING = "No frame has both a picture and LiDAR points to lie on it"
+_NOTHING = "No frame has both a picture and LiDAR points in it"
 APART_NS = 500_000_000
 """Of live sensors, frames nearer to each other than this show the same once more."""
 
@@ -44,9 +44,9 @@ def alignment_router(engine: Engine) -> APIRouter:
 
     @router.get("/score")
     def score() -> Score:
-        """How well the borders of what the LiDAR sees lie on the edges of the pictures, against the same with the mount
-        turned by up to 3°. Of a recording, frames of the whole drive are looked at, which takes a second the first
-        time; of live sensors, those that were shown when it was asked for. 404 when nothing is shown."""
+        """Score the alignment of LiDAR and camera. Compares how well depth borders match picture edges with the same
+        for the mount rotated by up to 3°. Uses frames of the whole recording, which takes a second the first time; for
+        live sensors, the frames shown at each request. 404 when nothing is shown."""
         recording, shown = engine.drives.recording, engine.snapshot
         seen = scenes.of_shown(shown) if recording is None else scenes.of_recording(recording)
         return _json(edge_score(seen, engine.control.peek().params.alignment), len(seen))
@@ -59,23 +59,23 @@ class _Scenes:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._of: Recording | str | None = None
+        self._of: OpenRecording | str | None = None
         self._newest_ns = 0
         self._seen: deque[Seen] = deque(maxlen=FRAMES)
 
-    def of_recording(self, recording: Recording) -> list[Seen]:
+    def of_recording(self, recording: OpenRecording) -> list[Seen]:
         with self._lock:
             if self._of is not recording:
                 self._begin(recording)
-                for index in np.unique(np.linspace(0, recording.recipe.total - 1, FRAMES).round().astype(int)).tolist():
+                for index in np.unique(np.linspace(0, recording.setup.total - 1, FRAMES).round().astype(int)).tolist():
                     self._look(recording.as_read(index))
             return list(self._seen)
 
     def of_shown(self, shown: Snapshot) -> list[Seen]:
         """404 when nothing is."""
-        if shown.tick is None or shown.uri is None:
+        if shown.processed is None or shown.uri is None:
             raise HTTPException(404, "nothing is shown yet")
-        frame = shown.tick.frame
+        frame = shown.processed.frame
         with self._lock:
             if self._of != shown.uri:
                 self._begin(shown.uri)
@@ -83,7 +83,7 @@ class _Scenes:
                 self._look(frame)
             return list(self._seen)
 
-    def _begin(self, of: Recording | str) -> None:
+    def _begin(self, of: OpenRecording | str) -> None:
         self._of = of
         self._seen.clear()
 
@@ -111,18 +111,18 @@ def _brief(found: EdgeScore) -> str:
     if found.borders < FEWEST:
         return "too few borders"
     if found.score is None:
-        return "nothing stands out"
+        return "no clear best"
     return f"{100 * found.score:.0f} %" + (f" · better {_words(found.better)}" if found.better else "")
 
 
 def _sentence(found: EdgeScore) -> str:
     if found.borders < FEWEST:
-        return "Too few borders of what the LiDAR sees lie in the pictures to say how well they match"
+        return "Too few LiDAR depth borders in the pictures for a score"
     if found.score is None:
-        return f"No mount within {REACH_DEG:.0f}° meets the pictures' edges clearly better than the others: no score"
+        return f"No mount rotation within {REACH_DEG:.0f}° matches the picture edges clearly best: no score"
     if found.better:
-        return f"The LiDAR's borders meet the pictures' edges better with {_words(found.better)}"
-    return f"No mount within {REACH_DEG:.0f}° meets the pictures' edges clearly better than this one"
+        return f"LiDAR depth borders match the picture edges better with {_words(found.better)}"
+    return f"No mount rotation within {REACH_DEG:.0f}° matches the picture edges clearly better than the present one"
 
 
 def _words(better: Mapping[str, float]) -> str:

@@ -1,16 +1,23 @@
-"""/api/clip and /api/jobs: a part of the drive as a file, made in the background."""
+"""/api/clip and /api/jobs: export a part of the drive as a file, in the background."""
 
 from __future__ import annotations
+
+from typing import Annotated
 
 from fastapi import APIRouter, HTTPException
 from fastapi.responses import FileResponse
 from pydantic import BaseModel, Field
 
-from app.clips.exports import Clip, Kind, submit
-from app.clips.jobs import Job, Jobs, JobState
+from app.clips.clip import Clip
+from app.clips.export_queue import ExportQueue, ExportStatus
+from app.clips.exports import EXPORTERS, submit
+from app.core.jobs import JobState
 from app.engine.engine import Engine
+from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes import Done, file_of
+from app.web.routes.shapes import StatusJson, file_of
+
+ClipKind = Annotated[str, *one_of(EXPORTERS)]
 
 
 class ClipChoice(BaseModel):
@@ -18,7 +25,7 @@ class ClipChoice(BaseModel):
 
     first: int = Field(ge=0)
     last: int = Field(ge=0)
-    kind: Kind
+    kind: ClipKind
 
 
 class JobJson(BaseModel):
@@ -41,42 +48,42 @@ class JobList(BaseModel):
     jobs: list[JobJson]
 
 
-def clips_router(engine: Engine, jobs: Jobs) -> APIRouter:
+def clips_router(engine: Engine, jobs: ExportQueue) -> APIRouter:
     """Routes over exports."""
     router = APIRouter(prefix="/api", tags=["clips"])
 
     @router.post("/clip", status_code=202)
     def export(body: ClipChoice) -> JobJson:
-        """Begin to write a clip with the present parameters. 409 when it is none."""
+        """Export a clip with the present parameters. Runs in the background; 409 for an invalid range."""
         with refusing():
             return _json(submit(jobs, clip_of(engine, body.first, body.last), body.kind))
 
     @router.get("/jobs")
     def every() -> JobList:
-        """Exports, the oldest first."""
+        """List exports, oldest first."""
         return JobList(jobs=[_json(job) for job in jobs.all()])
 
     @router.get("/jobs/{number}")
     def one(number: str) -> JobJson:
-        """How far an export is."""
+        """Get the progress of an export."""
         job = jobs.get(number)
         if job is None:
-            raise HTTPException(404, "there is no such export")
+            raise HTTPException(404, "export not found")
         return _json(job)
 
     @router.delete("/jobs/{number}")
-    def cancel(number: str) -> Done:
-        """Stop an export, or forget one that has ended."""
+    def cancel(number: str) -> StatusJson:
+        """Cancel an export, or delete a finished one."""
         if not jobs.cancel(number):
-            raise HTTPException(404, "there is no such export")
-        return Done(status="removed")
+            raise HTTPException(404, "export not found")
+        return StatusJson(status="removed")
 
     @router.get("/jobs/{number}/file", response_class=FileResponse, responses=file_of("application/octet-stream"))
     def download(number: str) -> FileResponse:
-        """The file of an export that is done."""
+        """Download the file of a finished export."""
         job, path = jobs.get(number), jobs.path(number)
         if job is None or path is None:
-            raise HTTPException(404, "there is no such file")
+            raise HTTPException(404, "file not found")
         return FileResponse(path, filename=job.file, media_type="application/octet-stream")
 
     return router
@@ -89,5 +96,5 @@ def clip_of(engine: Engine, first: int, last: int) -> Clip:
     return Clip(recording, engine.control.peek().params, first, last, engine.drives.turn, shown.title, shown.rate_hz)
 
 
-def _json(job: Job) -> JobJson:
+def _json(job: ExportStatus) -> JobJson:
     return JobJson(**vars(job))

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, HTTPException, Query
 from pydantic import BaseModel, Field
 
-from app.drive.background_runs import Drives
-from app.drive.events import Event, Kind, Severity, find_events, marks_by_time, recorded_marks
+from app.drive.background_runs import BackgroundRuns
+from app.drive.events import event_kinds, find_events
+from app.drive.events.event import Event, Severity
+from app.drive.events.marks import marks_by_time, recorded_marks
 from app.drive.frame_rows import columns_json, object_json
 from app.drive.full_run import DriveRun
 from app.drive.marks import LIVE, LONGEST_TEXT, MarkRefused, Marks
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
+from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
-from app.web.routes.shapes import Done
+from app.web.routes.shapes import StatusJson
 
 
 class Columns(BaseModel):
@@ -47,10 +50,13 @@ class Curve(BaseModel):
     vl_gap_m: list[float | None]
 
 
+EventKind = Annotated[str, *one_of(event_kinds())]
+
+
 class EventJson(BaseModel):
     """Something that happened. ids: of the objects it is about. mark: its number, when a person made it."""
 
-    kind: Kind
+    kind: EventKind
     index: int
     t_s: float
     text: str
@@ -83,39 +89,39 @@ class MarkJson(BaseModel):
     in_session: bool
 
 
-def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
+def drive_router(engine: Engine, drives: BackgroundRuns, marks: Marks) -> APIRouter:
     """Routes over the whole-drive runs."""
     router = APIRouter(prefix="/api", tags=["drive"])
     known = _EventsOnce()
 
     @router.get("/drive")
     def drive(first: int = Query(0, alias="from", ge=0)) -> Columns:
-        """The run of the present parameters, from a frame on; ask again from ``done`` while ``run`` stays the same."""
+        """Get the columns of the present run from a frame on. Ask again from ``done`` while ``run`` stays the same."""
         recording = open_recording(drives)
         return columns_of(recording, current(recording), first)
 
     @router.get("/drive/object/{object_id}")
     def curve(object_id: int, run: int | None = None) -> Curve:
-        """One object over the drive; numbers of objects are those of the run."""
+        """Get the curves of one object over the drive. Object numbers are those of the run."""
         recording = open_recording(drives)
         with refusing():
-            of = current(recording) if run is None else recording.book.get(run)
+            of = current(recording) if run is None else recording.runs.get(run)
         return Curve(id=object_id, run=of.number, **object_json(of.objects(), object_id))
 
     @router.get("/drive/events")
     def events() -> Events:
-        """What happened, by frame, marks among it. While a run goes on, only what it has come to. Of live sensors there
-        are marks alone, those made since they were opened: ``t_s`` is theirs, ``index`` the count of ticks."""
+        """List events and marks by frame. While a run is in progress, up to the frame it has reached. For live sensors,
+        the marks made since they were opened: ``t_s`` is their time, ``index`` the tick count."""
         recording = drives.recording
-        run = recording.book.current if recording is not None else None
+        run = recording.runs.current if recording is not None else None
         if recording is None or run is None:
             return Events(run=None, events=_live_marks(engine.snapshot, marks))
         marked = [
-            Event("mark", mark.index, mark.text or "marked", mark=mark.id) for mark in marks.of(recording.recipe.uri)
+            Event("mark", mark.index, mark.text or "marked", mark=mark.id) for mark in marks.of(recording.setup.uri)
         ]
         marked += recorded_marks(run.rows(), recording.marks)
-        marked += marks_by_time(marks.of(LIVE), recording.stamps_ns, round(1e9 / recording.recipe.source.rate_hz))
-        times = recording.recipe.timeline_s
+        marked += marks_by_time(marks.of(LIVE), recording.stamps_ns, round(1e9 / recording.setup.source.rate_hz))
+        times = recording.setup.timeline_s
         found = sorted([*known.of(run), *marked], key=lambda event: event.index)
         return Events(
             run=run.number,
@@ -126,18 +132,18 @@ def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
 
     @router.post("/marks", status_code=201)
     def mark(body: NewMark) -> MarkJson:
-        """Mark a moment; it is kept with the recording, and lands in the session that is being recorded. Of live
-        sensors the shown moment is marked; the mark is kept by its time, and is on every recording of that time."""
+        """Mark a frame. The mark is stored with the recording, and written to the session that is being recorded. For
+        live sensors it marks the shown tick, is stored by its time, and appears on every recording of that time."""
         shown = engine.snapshot
         if shown.uri is None:
             raise HTTPException(409, "no recording is open")
-        if shown.live and shown.tick is None:
-            raise HTTPException(409, "the sensors have shown nothing yet")
+        if shown.live and shown.processed is None:
+            raise HTTPException(409, "no data from the sensors yet")
         index = shown.index if body.index is None or shown.live else body.index
         if not shown.live and index >= max(shown.count, 1):
             raise HTTPException(422, f"index: the recording has {shown.count} frames")
         in_session = index == shown.index and engine.desk.mark(body.text or "marked")
-        t_ns = shown.tick.frame.t_ns if shown.live and shown.tick is not None else None
+        t_ns = shown.processed.frame.t_ns if shown.live and shown.processed is not None else None
         try:
             made = marks.add(_marks_of(shown), index, body.text, t_ns=t_ns, in_session=in_session)
         except MarkRefused as error:
@@ -147,13 +153,13 @@ def drive_router(engine: Engine, drives: Drives, marks: Marks) -> APIRouter:
         return MarkJson(id=made.id, index=made.index, t_s=t_s, text=made.text, in_session=in_session)
 
     @router.delete("/marks/{number}")
-    def unmark(number: int) -> Done:
-        """Take a mark away."""
+    def unmark(number: int) -> StatusJson:
+        """Remove a mark."""
         shown = engine.snapshot
         if shown.uri is None or not marks.remove(_marks_of(shown), number):
-            raise HTTPException(404, f"there is no mark {number}")
+            raise HTTPException(404, f"mark {number} not found")
         drives.changed()
-        return Done(status="removed")
+        return StatusJson(status="removed")
 
     return router
 
@@ -163,16 +169,16 @@ def _marks_of(shown: Snapshot) -> str:
     return LIVE if shown.live else shown.uri or ""
 
 
-def _time_s(drives: Drives, index: int) -> float:
+def _time_s(drives: BackgroundRuns, index: int) -> float:
     recording = drives.recording
-    return float(recording.recipe.timeline_s[index]) if recording is not None else 0.0
+    return float(recording.setup.timeline_s[index]) if recording is not None else 0.0
 
 
 def _live_marks(shown: Snapshot, marks: Marks) -> list[EventJson]:
     """Those made since the sensors were opened, by time."""
-    if not shown.live or shown.tick is None:
+    if not shown.live or shown.processed is None:
         return []
-    opened_ns = shown.tick.frame.t_ns - round(shown.time_s * 1e9)
+    opened_ns = shown.processed.frame.t_ns - round(shown.time_s * 1e9)
     made = [(mark.t_ns, mark) for mark in marks.of(LIVE) if mark.t_ns is not None and mark.t_ns >= opened_ns]
     return [
         EventJson(**Event("mark", mark.index, mark.text or "marked", mark=mark.id).to_json((t_ns - opened_ns) / 1e9))
@@ -180,24 +186,24 @@ def _live_marks(shown: Snapshot, marks: Marks) -> list[EventJson]:
     ]
 
 
-def current(recording: Recording) -> DriveRun:
+def current(recording: OpenRecording) -> DriveRun:
     """The run of the present parameters; 404 while there is none."""
-    run = recording.book.current
+    run = recording.runs.current
     if run is None:
-        raise HTTPException(404, "no run has begun yet")
+        raise HTTPException(404, "no run has started yet")
     return run
 
 
-def columns_of(recording: Recording, run: DriveRun, first: int) -> Columns:
-    """A run's columns from a frame on."""
+def columns_of(recording: OpenRecording, run: DriveRun, first: int) -> Columns:
+    """Get the columns of a run from a frame on."""
     rows = run.rows(first)
     return Columns(
         run=run.number,
-        uri=recording.recipe.uri,
+        uri=recording.setup.uri,
         count=run.total,
         first=min(first, run.done),
         done=first + len(rows) if rows else min(first, run.done),
-        t_s=[round(float(t), 4) for t in recording.recipe.timeline_s] if first == 0 else [],
+        t_s=[round(float(t), 4) for t in recording.setup.timeline_s] if first == 0 else [],
         columns=columns_json(rows),
     )
 

@@ -1,4 +1,4 @@
-"""/healthz and /metrics: for who watches over the server."""
+"""/healthz and /metrics: for monitoring."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from app.web.metrics import Metrics
 
 
 class Health(BaseModel):
-    """engine: false when the worker has ended, of which nothing recovers but a new start."""
+    """engine: false when the worker thread has ended; only a restart of the server helps."""
 
     status: Literal["ok", "failed"]
     engine: bool
 
 
 def health_router(engine: Engine, metrics: Metrics) -> APIRouter:
-    """Routes for supervisors and for Prometheus."""
+    """Routes for process supervisors and Prometheus."""
     router = APIRouter(tags=["health"])
 
     @router.get("/healthz", responses={503: {"model": Health, "description": "The worker has ended"}})
     @router.get("/api/healthz", responses={503: {"model": Health, "description": "The worker has ended"}})
     def healthz(response: Response) -> Health:
-        """Whether the server and its worker live: 200, else 503. /healthz needs no token."""
+        """Check whether the server and its worker are alive: 200, otherwise 503. Needs no token."""
         if engine.alive:
             return Health(status="ok", engine=True)
         response.status_code = 503
@@ -34,7 +34,7 @@ def health_router(engine: Engine, metrics: Metrics) -> APIRouter:
 
     @router.get("/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}})
     def read() -> Response:
-        """Figures in Prometheus' text format. Where tokens are needed, Prometheus sends one as its bearer token."""
+        """Get metrics in Prometheus' text format. Where tokens are required, send one as the bearer token."""
         return Response(metrics.render(), media_type=CONTENT_TYPE_LATEST)
 
     return router

@@ -1,4 +1,4 @@
-"""/api/params: what can be tuned, its values, and changing them."""
+"""/api/params: the parameters, their values, and changing them."""
 
 from __future__ import annotations
 
@@ -25,18 +25,20 @@ _ANSWER: dict[int | str, dict[str, Any]] = {200: {"model": ParamsJson}}
 class Step(BaseModel):
     """A change of parameters that can be undone."""
 
-    person: PersonOrNobody = Field("", description="Whose step it is to undo; anyone's without a name")
+    person: PersonOrNobody = Field("", description="Who can undo the change; anyone without a name")
 
 
 class Changes(Step):
-    """Dotted names with their new values; null, where permitted, takes the calibration's or the detector's own."""
+    """New values by dotted name; null, where permitted, means the value of the calibration or the detector."""
 
     changes: dict[str, Any] = Field(min_length=1, examples=[{"cluster.z_weight": 0.4}])
-    final: bool = Field(True, description="False while a slider is dragged: shown, but no step and no whole-drive run")
+    final: bool = Field(
+        True, description="False while a slider is dragged: no undo step, and no run over the whole drive"
+    )
 
 
 class Replacement(Step):
-    """A preset, and what differs from it."""
+    """A preset, and the values that differ from it."""
 
     preset: str = Field("default", examples=list(PRESETS))
     values: dict[str, Any] = Field(default_factory=dict, examples=[{"cluster.z_weight": 0.4}])
@@ -54,13 +56,13 @@ def params_router(engine: Engine) -> APIRouter:
 
     @router.get("/params", responses=_ANSWER)
     def read(person: Annotated[PersonOrNobody, Query()] = "") -> Response:
-        """Sections with every parameter's bounds, step, unit and help; values; what null means now. can_undo, can_redo:
-        of the person, across labels and parameters."""
+        """List all parameters with bounds, step, unit, help and values, and what null stands for now. can_undo,
+        can_redo: for this person, across labels and parameters."""
         return _params_json(engine, person)
 
     @router.patch("/params", responses=_ANSWER)
     def change(body: Changes) -> Response:
-        """Change some parameters. The shown frame is run again at once. 422 with one sentence for a bad value."""
+        """Change some parameters. The shown frame is rerun at once. 422 for an invalid value."""
         try:
             engine.control.change_params(body.changes, final=body.final, person=body.person)
         except ParamsError as error:
@@ -69,7 +71,7 @@ def params_router(engine: Engine) -> APIRouter:
 
     @router.post("/params", responses=_ANSWER)
     def replace_all(body: Replacement) -> Response:
-        """Replace every parameter: a preset's values, then those that are given."""
+        """Replace all parameters. Values that are not given are those of the preset."""
         try:
             params = with_changes(preset(body.preset), body.values)
             engine.control.set_params(params, body.preset, person=body.person)
@@ -79,22 +81,22 @@ def params_router(engine: Engine) -> APIRouter:
 
     @router.post("/params/undo", responses=_ANSWER)
     def undo() -> Response:
-        """Back to the parameters before the last change that nobody put a name to. 409 when there is none. A page
-        undoes by POST /api/labels/undo, which goes across labels and parameters."""
+        """Undo the last anonymous change of parameters. 409 when there is none. The dashboard uses POST
+        /api/labels/undo, which covers labels and parameters."""
         with refusing():
             engine.labels.move("undo", "", engine.labels.drive)
         return _params_json(engine)
 
     @router.post("/params/redo", responses=_ANSWER)
     def redo() -> Response:
-        """The change that was undone last, again. 409 when there is none."""
+        """Redo the change that was undone last. 409 when there is none."""
         with refusing():
             engine.labels.move("redo", "", engine.labels.drive)
         return _params_json(engine)
 
     @router.post("/params/preset", responses=_ANSWER)
     def choose_preset(body: PresetChoice) -> Response:
-        """Replace every parameter by a preset's."""
+        """Load a preset. Replaces all parameters."""
         try:
             engine.control.set_params(preset(body.name), body.name, person=body.person)
         except ParamsError as error:
@@ -103,7 +105,7 @@ def params_router(engine: Engine) -> APIRouter:
 
     @router.get("/params.yaml", response_class=Response, responses=file_of("application/yaml"))
     def download() -> Response:
-        """The values as a file for `cipv run --params`."""
+        """Download the parameters as a file for `cipv run --params`."""
         headers = {"content-disposition": 'attachment; filename="cipv-params.yaml"'}
         return Response(to_yaml(engine.control.peek().params), media_type="application/yaml", headers=headers)
 
@@ -123,7 +125,7 @@ def describe() -> list[dict[str, Any]]:
 
 
 def effective(frame: Frame | None, params: Params) -> dict[str, float]:
-    """What a parameter that is null stands for, from the shown frame's calibration and its detector's distance law."""
+    """What None stands for in each parameter, from the shown frame's calibration and its detector's distance law."""
     boxes = frame.raw_boxes if frame is not None else None
     law = (boxes.law if boxes is not None else REAL_VEHICLES).at_focal(params.distance.reference_focal_px)
     answer = {
@@ -145,9 +147,8 @@ def effective(frame: Frame | None, params: Params) -> dict[str, float]:
 
 
 def _params_json(engine: Engine, person: str = "") -> Response:
-    """It is made beside the frame that a change runs again, for which a person waits: what never changes is encoded
-    once."""
-    wish, tick = engine.control.peek(), engine.snapshot.tick
+    """Built while a person waits for the rerun of the shown frame, so the constant part is encoded once only."""
+    wish, processed = engine.control.peek(), engine.snapshot.processed
     can_undo, can_redo = engine.labels.possible(person)
     answer = {
         "preset": wish.preset,
@@ -158,7 +159,7 @@ def _params_json(engine: Engine, person: str = "") -> Response:
         "sections": _sections(),
         "values": flat(wish.params),
         "base": _base(wish.preset),
-        "effective": effective(tick.frame if tick else None, wish.params),
+        "effective": effective(processed.frame if processed else None, wish.params),
     }
     return Response(msgspec.json.encode(answer), media_type="application/json")
 

@@ -8,18 +8,18 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from app.engine.engine import Engine
 from app.streaming.stream import Stream
-from app.web.routes.shapes import Done, ResultJson, SourceJson, SourcesJson, StateJson
+from app.web.routes.shapes import ResultJson, SourceJson, SourcesJson, StateJson, StatusJson
 from app.web.source_catalog import catalog
 from pipeline.types.result_json import to_json
 
 
 class PlaybackChange(BaseModel):
-    """What to change; absent fields stay as they are. ``step`` pauses and moves by that many frames."""
+    """What to change; absent fields stay as they are. ``step`` pauses and moves by this many frames."""
 
     model_config = ConfigDict(extra="forbid")
 
     playing: bool | None = None
-    seek: int | None = Field(None, ge=0, description="Frame index; beyond the end is the last frame")
+    seek: int | None = Field(None, ge=0, description="Frame index; clamped to the last frame")
     step: int | None = Field(None, ge=-1000, le=1000)
     speed: float | None = Field(None, ge=0.1, le=10.0, description="1 is real time")
     loop: bool | None = None
@@ -37,20 +37,20 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
 
     @router.get("/state", responses={200: {"model": StateJson}})
     def state() -> JSONResponse:
-        """Source, position, playback, notices."""
+        """Get the state: source, position, playback, notices."""
         return JSONResponse(engine.snapshot.state_json())
 
     @router.get("/result", responses={200: {"model": ResultJson}})
     def result() -> JSONResponse:
-        """The shown frame's result; 404 before there is one."""
-        tick = engine.snapshot.tick
-        if tick is None:
+        """Get the result of the shown frame. 404 before there is one."""
+        processed = engine.snapshot.processed
+        if processed is None:
             raise HTTPException(404, "no frame is shown yet")
-        return JSONResponse(to_json(tick.result))
+        return JSONResponse(to_json(processed.result))
 
     @router.post("/playback", status_code=202)
-    def playback(body: PlaybackChange) -> Done:
-        """Ask for a change; the stream brings what comes of it."""
+    def playback(body: PlaybackChange) -> StatusJson:
+        """Control playback. The answer arrives with the stream."""
         standing = body.model_dump(include={"playing", "speed", "loop"}, exclude_none=True)
         if standing:
             engine.control.change(**standing)
@@ -58,19 +58,19 @@ def playback_router(engine: Engine, stream: Stream) -> APIRouter:
             engine.control.seek(body.seek)
         if body.step is not None:
             engine.control.step(body.step)
-        return Done(status="accepted")
+        return StatusJson(status="accepted")
 
     @router.get("/sources")
     def sources() -> SourcesJson:
-        """What can be opened without typing, and what is open."""
+        """List the sources that the dashboard offers, and the open one."""
         offered = [SourceJson(uri=uri, title=title) for uri, title in catalog()]
         return SourcesJson(open=engine.snapshot.uri, sources=offered)
 
     @router.post("/source", status_code=202)
-    def open_source(body: SourceChoice) -> Done:
-        """Open another recording. One that cannot be opened leaves the old one, with a notice."""
+    def open_source(body: SourceChoice) -> StatusJson:
+        """Open a source. If it cannot be opened, the present one stays open and a notice says why."""
         engine.control.change(uri=body.uri.strip(), target=None, steps=0)
-        return Done(status="accepted")
+        return StatusJson(status="accepted")
 
     @router.websocket("/stream")
     async def stream_frames(socket: WebSocket) -> None:

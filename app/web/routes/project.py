@@ -1,5 +1,4 @@
-"""/api/project: where cuboids lie in the shown picture, and where a pixel of it looks. The page that draws a
-cuboid under a hand asks here."""
+"""/api/project: project cuboids to the shown picture and cast rays from its pixels, for drawing cuboids in the page."""
 
 from __future__ import annotations
 
@@ -7,7 +6,7 @@ import numpy as np
 from fastapi import APIRouter
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.core.request_shapes import Finite, GivenCuboid
+from app.core.request_shapes import CuboidShape, Finite
 from app.engine.engine import Engine
 from pipeline.alignment.projection import resolve
 from pipeline.common.geometry import corners_of
@@ -22,18 +21,18 @@ class Given(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
 
-    cuboids: list[GivenCuboid] = Field(max_length=MOST_CUBOIDS)
+    cuboids: list[CuboidShape] = Field(max_length=MOST_CUBOIDS)
 
 
 class Projected(BaseModel):
-    """For each cuboid the pixels of its 8 corners in the camera's own picture, the four at the bottom first; null where
-    a corner lies behind the camera. pixels is null where nothing says how LiDAR and camera lie to each other."""
+    """For each cuboid the pixels of its 8 corners in the original picture, the bottom four first; null for a corner
+    behind the camera. pixels is null without an extrinsic calibration of LiDAR and camera."""
 
     pixels: list[list[Pixel | None]] | None
 
 
 class GivenPixel(BaseModel):
-    """A pixel of the camera's own picture."""
+    """A pixel of the original picture."""
 
     model_config = ConfigDict(extra="forbid")
 
@@ -41,8 +40,7 @@ class GivenPixel(BaseModel):
 
 
 class Ray(BaseModel):
-    """Where a pixel looks: from a point, in a direction, ego frame. Null where nothing says how LiDAR and camera lie to
-    each other."""
+    """The viewing ray of a pixel: origin and direction in the ego frame. Null without an extrinsic calibration."""
 
     start: tuple[float, float, float] | None
     toward: tuple[float, float, float] | None
@@ -54,10 +52,10 @@ def project_router(engine: Engine) -> APIRouter:
 
     @router.post("/project")
     def project(body: Given) -> Projected:
-        """Cuboids as the shown frame's camera sees them with the present parameters."""
+        """Project cuboids to the shown picture with the present parameters."""
         shown = engine.snapshot
-        tick = shown.tick
-        aligned = resolve(shown.params.alignment, tick.frame.camera) if tick is not None else None
+        processed = shown.processed
+        aligned = resolve(shown.params.alignment, processed.frame.camera) if processed is not None else None
         if aligned is None:
             return Projected(pixels=None)
         if not body.cuboids:
@@ -69,9 +67,9 @@ def project_router(engine: Engine) -> APIRouter:
 
     @router.post("/project/ray")
     def ray(body: GivenPixel) -> Ray:
-        """What a pixel of the shown frame looks along with the present parameters."""
+        """Get the viewing ray of a pixel in the shown picture with the present parameters."""
         shown = engine.snapshot
-        aligned = resolve(shown.params.alignment, shown.tick.frame.camera) if shown.tick is not None else None
+        aligned = resolve(shown.params.alignment, shown.processed.frame.camera) if shown.processed is not None else None
         if aligned is None:
             return Ray(start=None, toward=None)
         start, (toward,) = aligned.rays(np.array([body.pixel]))

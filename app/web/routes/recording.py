@@ -1,4 +1,4 @@
-"""/api/recording: recording what is shown into a session."""
+"""/api/recording: record the shown frames to a session."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class RecordingChoice(BaseModel):
-    """on: begin, or end."""
+    """on: start, or stop."""
 
     on: bool
 
@@ -27,8 +27,8 @@ def recording_router(engine: Engine) -> APIRouter:
 
     @router.get("/recording")
     def read() -> RecordingJson | None:
-        """How the recording does; null while there is none. ``state.recording`` of the stream and of /api/state is the
-        same."""
+        """Get the state of the recording. Null while nothing is recorded. The same as ``state.recording`` in the stream
+        and in /api/state."""
         return _json(engine.desk.state)
 
     @router.post("/recording")

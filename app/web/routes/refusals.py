@@ -7,8 +7,8 @@ from contextlib import contextmanager
 
 from fastapi import HTTPException
 
-from app.drive.background_runs import Drives
-from app.drive.open_recording import Recording
+from app.drive.background_runs import BackgroundRuns
+from app.drive.open_recording import OpenRecording
 from app.drive.run_registry import NoSuchRun
 from app.labels.errors import BadAct, DatabaseError, NoSuchLabel, Stale
 from pipeline.common.errors import BadInput
@@ -32,8 +32,8 @@ def refusing() -> Iterator[None]:
         raise HTTPException(409, str(error)) from None
 
 
-def open_recording(drives: Drives) -> Recording:
+def open_recording(drives: BackgroundRuns) -> OpenRecording:
     """The recording whose whole drive is computed; 404 when there is none, as with live sensors."""
     if drives.recording is None:
-        raise HTTPException(404, "no recording is open; live sensors are to be recorded first, and the session opened")
+        raise HTTPException(404, "no recording is open; for live sensors, record a session and open it")
     return drives.recording

@@ -1,4 +1,4 @@
-"""/rerun and /api/rerun: the drive in rerun's web viewer, every file of which comes from here."""
+"""/rerun and /api/rerun: the drive in rerun's web viewer, all files of which are served locally."""
 
 from __future__ import annotations
 
@@ -13,13 +13,14 @@ from fastapi.responses import FileResponse
 from pydantic import BaseModel
 from starlette.background import BackgroundTask
 
-from app.clips.exports import WRITERS
+from app.clips.exports import write_clip
 from app.engine.engine import Engine
-from app.views.rerun_start_options import Opening
-from app.views.rerun_web import FILES, ViewerFiles
+from app.views.rerun.start_options import RerunStartOptions
+from app.views.rerun.web import FILES, ViewerFiles
 from app.web.routes.clips import clip_of
 from app.web.routes.refusals import open_recording, refusing
 from app.web.routes.shapes import file_of
+from pipeline.common.progress import silent
 
 AROUND = 50
 """Frames before and behind the shown one that are opened by default."""
@@ -49,11 +50,11 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
 
     @router.get("/api/rerun/open")
     def address(
-        first: int | None = Query(None, ge=0, description="From this frame on; else from the shown one"),
-        compact: bool = Query(False, description="Laid out for a narrow pane"),
+        first: int | None = Query(None, ge=0, description="First frame; default: the shown one"),
+        compact: bool = Query(False, description="Layout for a narrow pane"),
     ) -> Address:
-        """The address for a frame or a tab: the drive from the shown frame on, standing still there (a recording cannot
-        say where the viewer's cursor is). 409 in one sentence when there is no web viewer here."""
+        """Get the address of the drive in the web viewer, paused at the shown frame. The clip begins there, since a
+        recording cannot set the viewer's cursor. 409 when the web viewer is not available."""
         with refusing():
             open_recording(engine.drives)
             for name in FILES:
@@ -66,19 +67,19 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
     def replay(
         first: int | None = Query(None, ge=0),
         last: int | None = Query(None, ge=0),
-        paused: bool = Query(False, description="The viewer opens it standing still"),
-        compact: bool = Query(False, description="Laid out for a narrow pane"),
+        paused: bool = Query(False, description="Start paused"),
+        compact: bool = Query(False, description="Layout for a narrow pane"),
     ) -> FileResponse:
-        """The drive as a rerun recording, with the present parameters: by default what is around the shown frame, at
-        most 600 frames."""
+        """Download a clip as a rerun recording, with the present parameters. By default the frames around the shown
+        one, at most 600."""
         span = _span(engine, first, last)
-        clip = replace(clip_of(engine, *span), opening=Opening(paused, compact))
+        clip = replace(clip_of(engine, *span), start=RerunStartOptions(paused, compact))
         file = tempfile.NamedTemporaryFile(prefix="cipv-", suffix=".rrd", delete=False)  # noqa: SIM115
         path = Path(file.name)
         file.close()
         try:
             with refusing():
-                WRITERS["rrd"](clip, path, lambda done, total: None)
+                write_clip(clip, "rrd", path, silent)
         except BaseException:
             path.unlink(missing_ok=True)
             raise

@@ -1,4 +1,4 @@
-"""/api/runs: what other parameters would have made of the drive. Keep, name, compare, take, delete."""
+"""/api/runs: what other parameters would have made of the drive. Save, name, compare, use, delete."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any, Literal
 from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, Field
 
-from app.drive.background_runs import Drives, Phase
+from app.drive.background_runs import BackgroundRuns, Phase
 from app.drive.compare import compare
 from app.drive.frame_rows import Row
 from app.drive.full_run import DriveRun
-from app.drive.open_recording import Recording
+from app.drive.open_recording import OpenRecording
 from app.drive.run_registry import LONGEST_NAME
 from app.engine.engine import Engine
 from app.labels.errors import DatabaseError
@@ -29,7 +29,8 @@ _NAMED_CHANGES = 3
 
 
 class Run(BaseModel):
-    """name: a person's. label: what it changes against the base. digest: equal when it is made from the same."""
+    """name: given by a person. label: what it changes against the base. digest: equal for equal inputs and
+    parameters."""
 
     id: int
     name: str
@@ -46,7 +47,7 @@ class Run(BaseModel):
 
 
 class Runs(BaseModel):
-    """run: of the present parameters. base: what it is compared against."""
+    """run: the run of the present parameters. base: the run that it is compared against."""
 
     base: int | None
     run: int | None
@@ -60,8 +61,8 @@ class Name(BaseModel):
 
 
 class ComparisonJson(BaseModel):
-    """differing: first and last frame of ranges whose lead differs; first: what differs where a range begins. truth:
-    who judges: what people labelled here, else the labels that come with the recording, or the simulator."""
+    """differing: first and last frame of each range whose lead differs. first: what differs where a range begins.
+    truth: the source of truth: labels made here, otherwise labels that come with the recording, or the simulator."""
 
     base: int
     run: int
@@ -74,77 +75,77 @@ class ComparisonJson(BaseModel):
     judged: int
 
 
-def runs_router(engine: Engine, drives: Drives) -> APIRouter:
+def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
     """Routes over the runs of the open recording."""
     router = APIRouter(prefix="/api", tags=["what if"])
 
     @router.get("/runs")
     def runs() -> Runs:
-        """Every run of the open recording, the oldest first."""
+        """List the runs of the open recording, oldest first."""
         return _runs_json(drives.recording)
 
     @router.get("/runs/{number}/columns")
     def columns(number: int, first: int = Query(0, alias="from", ge=0)) -> Columns:
-        """A run's columns from a frame on."""
+        """Get the columns of a run from a frame on."""
         recording = open_recording(drives)
         with refusing():
-            return columns_of(recording, recording.book.get(number), first)
+            return columns_of(recording, recording.runs.get(number), first)
 
     @router.post("/runs/{number}/keep")
     def keep(number: int, body: Name) -> Runs:
-        """Keep a run under a name, or rename it. Others go when newer ones come."""
+        """Save a run under a name, or rename it. Unsaved runs are discarded when newer ones are made."""
         recording = open_recording(drives)
         with refusing():
-            recording.book.keep(number, body.name)
+            recording.runs.keep(number, body.name)
         drives.changed()
         return _runs_json(recording)
 
     @router.post("/runs/{number}/base")
     def base(number: int) -> Runs:
-        """Compare against this one from now on."""
+        """Make a run the base of comparison."""
         recording = open_recording(drives)
         with refusing():
-            recording.book.compare_with(number)
+            recording.runs.compare_with(number)
         drives.changed()
         return _runs_json(recording)
 
     @router.post("/runs/{number}/use")
     def use(number: int) -> Runs:
-        """Take a run's parameters: a change that can be undone."""
+        """Use the parameters of a run. The change can be undone."""
         recording = open_recording(drives)
         with refusing():
-            run = recording.book.get(number)
+            run = recording.runs.get(number)
         engine.control.set_params(run.params, run.preset)
         drives.want(run.params, run.preset)
         return _runs_json(recording)
 
     @router.delete("/runs/{number}")
     def delete(number: int) -> Runs:
-        """Forget a run. The present one and the base stay."""
+        """Delete a run. The present run and the base cannot be deleted."""
         recording = open_recording(drives)
         with refusing():
-            recording.book.delete(number)
+            recording.runs.delete(number)
         drives.changed()
         return _runs_json(recording)
 
     @router.get("/runs/{number}/params.yaml", response_class=Response, responses=file_of("application/yaml"))
     def preset_file(number: int) -> Response:
-        """A run's parameters as a file for `cipv run --params`."""
+        """Download the parameters of a run as a file for `cipv run --params`."""
         with refusing():
-            params = open_recording(drives).book.get(number).params
+            params = open_recording(drives).runs.get(number).params
         headers = {"content-disposition": f'attachment; filename="cipv-run-{number}.yaml"'}
         return Response(to_yaml(params), media_type="application/yaml", headers=headers)
 
     @router.get("/compare")
     def comparison(base: int | None = None, run: int | None = None) -> ComparisonJson:
-        """Two runs side by side; without numbers the base and the present one."""
+        """Compare two runs. Defaults to the base and the present run."""
         recording = open_recording(drives)
         with refusing():
-            new = recording.book.get(run) if run is not None else current(recording)
-            old = recording.book.get(base) if base is not None else recording.book.base or new
+            new = recording.runs.get(run) if run is not None else current(recording)
+            old = recording.runs.get(base) if base is not None else recording.runs.base or new
         judged = _judged_by_labels(engine.labels, old, new)
         found = compare(*(judged or (old.rows(), new.rows())))
-        truth: Literal["labels", "recording", "simulator"] = "simulator" if recording.recipe.simulated else "recording"
+        truth: Literal["labels", "recording", "simulator"] = "simulator" if recording.setup.simulated else "recording"
         return ComparisonJson(
             base=old.number,
             run=new.number,
@@ -161,8 +162,8 @@ def runs_router(engine: Engine, drives: Drives) -> APIRouter:
 
 
 def _judged_by_labels(desk: LabelDesk, base: DriveRun, run: DriveRun) -> tuple[list[Row], list[Row]] | None:
-    """The rows of both, judged by what people labelled here; null where they stand behind nothing, and the truth that
-    comes with the recording judges; also while their database is away."""
+    """The rows of both, judged by labels made here; None where no label is accepted, or while the label database is
+    unavailable: then the truth that comes with the recording judges."""
     try:
         labels = desk.labels
         first, second = desk.scores.judged_rows(labels, base), desk.scores.judged_rows(labels, run)
@@ -173,7 +174,7 @@ def _judged_by_labels(desk: LabelDesk, base: DriveRun, run: DriveRun) -> tuple[l
 
 
 def label_of(changes: dict[str, tuple[Any, Any]], preset: str) -> str:
-    """A run's name by itself: what it changes, or where it started."""
+    """The label of a run: what it changes, or the preset it started from."""
     if not changes:
         return f"preset {preset}"
     named = [f"{name} {old} → {new}" for name, (old, new) in list(changes.items())[:_NAMED_CHANGES]]
@@ -181,19 +182,19 @@ def label_of(changes: dict[str, tuple[Any, Any]], preset: str) -> str:
     return ", ".join(named) + (f" and {rest} more" if rest else "")
 
 
-def _runs_json(recording: Recording | None) -> Runs:
+def _runs_json(recording: OpenRecording | None) -> Runs:
     if recording is None:
         return Runs(base=None, run=None, runs=[])
-    book = recording.book
-    base, run = book.base, book.current
+    registry = recording.runs
+    base, run = registry.base, registry.current
     return Runs(
         base=base.number if base else None,
         run=run.number if run else None,
-        runs=[_run_json(recording, each, base or each) for each in book.all()],
+        runs=[_run_json(recording, each, base or each) for each in registry.all()],
     )
 
 
-def _run_json(recording: Recording, run: DriveRun, base: DriveRun) -> Run:
+def _run_json(recording: OpenRecording, run: DriveRun, base: DriveRun) -> Run:
     changes = changes_of(base.params, run.params)
     return Run(
         id=run.number,

@@ -1,4 +1,4 @@
-"""What the API answers, as types: the contract's result, the state of the stream, the parameters.
+"""What the API answers, as types: the result (docs/reference/results.md), the state of the stream, the parameters.
 
 Answers are made elsewhere and sent as they are; these say what is in them, to OpenAPI and to who writes a client. A
 test holds each against real answers, key by key.
@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from app.labels.service.tasks import Kind
+from app.labels.service.tasks import TaskKind
 
 Point = tuple[float, float]
 Sees = Literal["V", "L", "VL"]
@@ -27,7 +27,7 @@ class _Exact(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-class Done(_Exact):
+class StatusJson(_Exact):
     """status: what became of the request."""
 
     status: str
@@ -201,7 +201,7 @@ class LabelTaskJson(_Exact):
     """Something on labels that takes a while. It stays, with its note or error, until the next one begins."""
 
     id: int
-    what: Kind
+    what: TaskKind
     done: int
     total: int
     note: str

@@ -21,8 +21,8 @@ from pipeline.labels.link_identities import MAX_GAP_S
 from pipeline.params import AebParams
 from pipeline.types import AccCommand, Result
 
-Kind = Literal["warning", "braking"]
-_ACTING: dict[Kind, frozenset[str]] = {
+AlarmKind = Literal["warning", "braking"]
+_ACTING: dict[AlarmKind, frozenset[str]] = {
     "warning": frozenset({"warn", "partial_brake", "full_brake"}),
     "braking": frozenset({"partial_brake", "full_brake"}),
 }
@@ -30,10 +30,10 @@ _ACTING: dict[Kind, frozenset[str]] = {
 
 @dataclass(frozen=True)
 class Alarm:
-    """One danger, or one alarm without any. due_ns, acted_ns: null where there was none. delay_s: acted after it was
-    due; negative: before. true_ttc_s: of the true lead when it acted, null where it had none."""
+    """One danger, or one alarm without any. due_ns, acted_ns: None where there was none. delay_s: acted after it was
+    due; negative: before. true_ttc_s: of the true lead when it acted, None where it had none."""
 
-    kind: Kind
+    kind: AlarmKind
     due_ns: int | None
     acted_ns: int | None
     true_ttc_s: float | None
@@ -89,7 +89,7 @@ def _due(ttc_s: float, needed_mps2: float) -> Callable[[_Moment], bool]:
     return lambda moment: moment.ttc_s < ttc_s or moment.needed_mps2 > needed_mps2
 
 
-def _of_kind(kind: Kind, moments: Sequence[_Moment], is_due: Callable[[_Moment], bool]) -> list[Alarm]:
+def _of_kind(kind: AlarmKind, moments: Sequence[_Moment], is_due: Callable[[_Moment], bool]) -> list[Alarm]:
     """Each danger with the first alarm that overlaps it, then the alarms that overlap none."""
     dangers = _runs(moments, is_due)
     acts = _runs(moments, lambda moment: moment.acc.state in _ACTING[kind])
@@ -103,7 +103,7 @@ def _of_kind(kind: Kind, moments: Sequence[_Moment], is_due: Callable[[_Moment],
     return sorted(found, key=lambda alarm: alarm.t_ns)
 
 
-def _alarm(kind: Kind, due_ns: int | None, acted: _Moment | None) -> Alarm:
+def _alarm(kind: AlarmKind, due_ns: int | None, acted: _Moment | None) -> Alarm:
     if acted is None:
         return Alarm(kind, due_ns, None, None)
     return Alarm(kind, due_ns, acted.t_ns, acted.ttc_s if acted.ttc_s < inf else None)

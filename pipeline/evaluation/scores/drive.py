@@ -34,7 +34,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class FrameScore:
-    """One labelled frame. index: in the recording. judged: null where nobody knows who leads."""
+    """One labelled frame. index: in the recording. judged: None where nobody knows who leads."""
 
     index: int
     t_ns: int
@@ -46,7 +46,7 @@ class FrameScore:
 @dataclass(frozen=True)
 class DriveScore:
     """One drive. judged_s: how long the lead was judged; guarded_s: for how much of it ego speed was known, and with it
-    warning and braking. tracking: null without trackeval."""
+    warning and braking. tracking: None without trackeval."""
 
     uri: str
     frames: tuple[FrameScore, ...]
@@ -96,7 +96,7 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
 
 
 def judged(result: Result, known: FrameTruth, rules: Rules) -> Judged | None:
-    """One labelled frame's verdict; null where nobody knows who leads."""
+    """One labelled frame's verdict; None where nobody knows who leads."""
     if known.lead_box is not None:
         return judge_lead_box(result, known.lead_box[1])
     return judge_lead(result, known.lead, rules.lead) if known.lead_known else None

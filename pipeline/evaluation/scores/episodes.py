@@ -13,7 +13,7 @@ from pipeline.labels.link_identities import MAX_GAP_S
 
 @dataclass(frozen=True)
 class Moment:
-    """One frame in which it is known who leads. lead: null where none does; chosen: the CIPV's number."""
+    """One frame in which it is known who leads. lead: None where none does; chosen: the CIPV's number."""
 
     t_ns: int
     lead: int | None
@@ -23,7 +23,7 @@ class Moment:
 
 @dataclass(frozen=True)
 class Acquisition:
-    """One lead from when it leads. range_m: in the first frame in which it was rightly chosen, null when it never was;
+    """One lead from when it leads. range_m: in the first frame in which it was rightly chosen, None when it never was;
     after_s: how long that took. from_start: it led already when the recording began, so nobody knows since when.
     drop_outs: how often it was lost again, without any CIPV."""
 
@@ -37,7 +37,7 @@ class Acquisition:
 
 @dataclass(frozen=True)
 class CutIn:
-    """A vehicle that comes between. latency_s: from when it leads until it is the CIPV; null when it never was."""
+    """A vehicle that comes between. latency_s: from when it leads until it is the CIPV; None when it never was."""
 
     lead: int
     t_ns: int
@@ -116,7 +116,7 @@ def cut_ins(
 
 
 def _labelled(reigns: Sequence[Sequence[Moment]], tick: int, lead: int) -> CutIn | None:
-    """Of an event: the lead's next reign, or the one it falls into. Null where who leads then is not known."""
+    """Of an event: the lead's next reign, or the one it falls into. None where who leads then is not known."""
     reign = next((each for each in reigns if each[0].lead == lead and each[-1].t_ns >= tick), None)
     if reign is None:
         return None

@@ -30,11 +30,11 @@ def errors_section(run: Drives) -> Section:
     every = _all_errors(run)
     return Section(
         "errors",
-        "Errors by distance and by sensor",
+        "Errors by range and sensor",
         (
-            "Sizes of errors: smallest, largest, mean. Distance: to the nearest point. Lateral and longitudinal: of "
-            "the middle of the nearest face. Speed: relative to ego, along the car's axis, against what neighbouring "
-            "labelled frames show.",
+            "Absolute errors: smallest, largest, mean. Distance: to the nearest point. Lateral and longitudinal: of "
+            "the middle of the nearest face. Speed: relative to ego, along the car's axis, against the motion that "
+            "neighbouring labelled frames show.",
         ),
         (Table("Errors, m and m/s", COLUMNS, error_rows(run), decimals=3),),
         tuple(_scatter(title, unit, name, every) for name, (title, unit) in _CHARTS.items()),
@@ -55,7 +55,7 @@ def _scatter(title: str, unit: str, name: str, errors: Sequence[Error]) -> Chart
     for source in SOURCES:
         pairs = [(e.range_m, value) for e in errors if e.source == source and (value := getattr(e, name)) is not None]
         lines.append(Series.of_points(source, pairs))
-    return Chart(title, "true range m", f"believed − true {unit}", tuple(lines))
+    return Chart(title, "true range m", f"estimated − true {unit}", tuple(lines))
 
 
 def error_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:

@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from pipeline.evaluation.scores.alarms import Alarm, Kind
+from pipeline.evaluation.scores.alarms import Alarm, AlarmKind
 from pipeline.evaluation.scores.drive import DriveScore
 from pipeline.evaluation.scores.tracking import Counts, hota_of, idf1_sums, mota_sums, precision_sums, recall_sums
 
@@ -25,22 +25,25 @@ RESAMPLES, CONFIDENCE, SEED = 1000, 0.95, 0
 
 
 def ratio(parts: Sequence[Sums]) -> float | None:
-    """Sums over drives, divided; null when there is nothing to divide by."""
+    """Sums over drives, divided; None when there is nothing to divide by."""
     over, under = sum(part[0] for part in parts), sum(part[1] for part in parts)
     return over / under if under else None
 
 
 @dataclass(frozen=True)
 class Figure:
-    """name: for scripts. part: what one drive brings. whole: of the parts of all, null where there is nothing to
-    say."""
+    """One score: how it is called, and how it is computed over drives."""
 
     name: str
+    """For scripts."""
     title: str
+    """For reports."""
     unit: str
     better: Literal["higher", "lower"]
     part: Callable[[DriveScore], Any]
+    """The contribution of one drive."""
     whole: Callable[[Sequence[Any]], float | None] = ratio
+    """The score from the contributions of all drives; None where it is undefined."""
 
     def of(self, drives: Drives) -> float | None:
         return self.whole([self.part(drive) for drive in drives])
@@ -54,21 +57,24 @@ class Interval:
 
 @dataclass(frozen=True)
 class Measured:
-    """A figure's value, and where it lies with 95 % confidence; null where fewer than two drives have it."""
+    """The value of a figure."""
 
     figure: Figure
     value: float | None
+    """None where it is undefined."""
     interval: Interval | None
+    """95 % confidence interval; None where fewer than two drives have the figure."""
 
 
 @dataclass(frozen=True)
 class Compared:
-    """A figure of two runs on the same drives. interval: of run minus base, drives drawn in pairs."""
+    """A figure of two runs over the same drives."""
 
     figure: Figure
     base: float | None
     run: float | None
     interval: Interval | None
+    """95 % confidence interval of run minus base, from drives resampled in pairs."""
 
     @property
     def difference(self) -> float | None:
@@ -100,8 +106,8 @@ def _difference(figure: Figure, pairs: Sequence[tuple[Any, Any]]) -> float | Non
 
 
 def bootstrap(parts: Sequence[Any], whole: Callable[[Sequence[Any]], float | None]) -> Interval | None:
-    """Where a figure lies with 95 % confidence when drives are drawn anew with replacement. The draws are always the
-    same. Null where fewer than two drives have the figure."""
+    """Where a figure lies with 95 % confidence when drives are resampled with replacement, always with the same
+    seed. None where fewer than two drives have the figure."""
     if sum(whole([part]) is not None for part in parts) < 2:
         return None
     draws = np.sort(np.random.default_rng(SEED).integers(len(parts), size=(RESAMPLES, len(parts))), axis=1)
@@ -169,19 +175,19 @@ def _hota(parts: Sequence[Counts | None]) -> float | None:
     return None if value is None else 100.0 * value
 
 
-def _alarms(kind: Kind, drive: DriveScore) -> list[Alarm]:
+def _alarms(kind: AlarmKind, drive: DriveScore) -> list[Alarm]:
     return [alarm for alarm in drive.alarms if alarm.kind == kind]
 
 
-def _delay(kind: Kind, drive: DriveScore) -> Sums:
+def _delay(kind: AlarmKind, drive: DriveScore) -> Sums:
     return _sums(alarm.delay_s for alarm in _alarms(kind, drive))
 
 
-def _never_acted(kind: Kind, drive: DriveScore) -> Sums:
+def _never_acted(kind: AlarmKind, drive: DriveScore) -> Sums:
     return _sums(100.0 * (each.acted_ns is None) for each in _alarms(kind, drive) if each.due_ns is not None)
 
 
-def _without_danger(kind: Kind, drive: DriveScore) -> Sums:
+def _without_danger(kind: AlarmKind, drive: DriveScore) -> Sums:
     return float(sum(alarm.due_ns is None for alarm in _alarms(kind, drive))), drive.guarded_s / 60.0
 
 
@@ -189,7 +195,7 @@ FIGURES: tuple[Figure, ...] = (
     Figure("cipv_correct", "CIPV correct", "%", "higher", partial(_percent, ("correct", "none"))),
     Figure("lead_missed", "lead missed", "%", "lower", partial(_percent, ("missed",))),
     Figure("cipv_false", "CIPV without a lead", "%", "lower", partial(_percent, ("false",))),
-    Figure("cipv_wrong", "CIPV not where the lead is", "%", "lower", partial(_percent, ("wrong",))),
+    Figure("cipv_wrong", "wrong CIPV", "%", "lower", partial(_percent, ("wrong",))),
     Figure("switches", "switches", "a minute", "lower", partial(_a_minute, _switches)),
     Figure("drop_outs", "drop-outs", "a minute", "lower", partial(_a_minute, _drop_outs)),
     Figure("acquired_m", "acquisition distance", "m", "higher", partial(_acquired, "range_m")),

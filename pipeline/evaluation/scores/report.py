@@ -80,18 +80,18 @@ def _scores(run: Drives) -> Section:
     judged = sum(frame.judged is not None for drive in run for frame in drive.frames)
     seconds, rule = sum(drive.judged_s for drive in run), LeadRule()
     text = [
-        f"{judged} frames with a known lead or none, {seconds:.1f} s of {_many(len(run), 'drive')}. Missed: there is a "
-        f"lead, none is chosen. Not where the lead is: another vehicle, or the lead at a distance over "
-        f"{100 * rule.range_slack:.0f} % (and {rule.range_slack_m:.0f} m) off. Errors are mean absolute ones, of every "
-        "labelled vehicle that an object stands for.",
-        f"Vehicles are looked for to {MAX_RANGE_M:.0f} m and 35° to either side. Two places are one within "
-        f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class claims to be no vehicle: it counts where one is, "
-        "so the LiDAR alone never detects falsely. Detection and tracking are judged in frames whose vehicles are all "
-        "labelled: there, one that nobody labelled counts as a false detection.",
+        f"{judged} frames with a known lead or known to have none, {seconds:.1f} s of {_many(len(run), 'drive')}. "
+        "Missed: there is a lead, but no CIPV is chosen. Wrong: the CIPV is another vehicle, or the lead with its "
+        f"distance off by more than {100 * rule.range_slack:.0f} % and {rule.range_slack_m:.0f} m. Errors are mean "
+        "absolute errors of every labelled vehicle that an object matches.",
+        f"Vehicles are scored up to {MAX_RANGE_M:.0f} m and 35° to either side. Two positions match within "
+        f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class does not claim to be a vehicle: it counts where "
+        "there is one, so the LiDAR alone has no false detections. Detection and tracking are scored in frames whose "
+        "vehicles are all labelled; an object there without a label counts as a false detection.",
     ]
     if len(run) < FEW:
         text.append(
-            "Confidence intervals come from drawing whole drives anew: one drive alone has none, and those of fewer "
+            "Confidence intervals resample whole drives: a single drive has none, and those of fewer "
             f"than {FEW} are too narrow."
         )
     if not tracking.is_available():
@@ -172,7 +172,7 @@ def _moments(run: Drives, link: Link) -> Section:
             "Due: by the emergency brake's own limits, from the labelled lead's range and closing speed.",
         ),
     )
-    return Section("moments", "What happened when", (), tuple(table for table in tables if table.rows))
+    return Section("moments", "Timeline of events", (), tuple(table for table in tables if table.rows))
 
 
 # ---------------------------------------------------------------- frames to look at
@@ -183,7 +183,7 @@ def _worst(run: Drives, link: Link) -> Section:
         "worst",
         "Worst frames",
         ("A link opens the dashboard at the frame, where `cipv serve` runs.",),
-        (_frames("The lead wrong first, then its distance", worst(run, MOST), link),),
+        (_frames("Wrong leads first, then the largest distance errors", worst(run, MOST), link),),
     )
 
 
@@ -224,12 +224,12 @@ def _comparison(base: Drives, run: Drives, link: Link) -> Section:
         "comparison",
         "Against the base",
         (
-            "The same frames, judged by the same truth. Better or worse is said of what the interval sets apart from "
+            "The same frames, judged by the same truth. Better or worse is reported where the interval excludes "
             f"0, from {FEW} drives on.",
         ),
         (
             Table("Two runs", columns, rows),
-            _frames("Frames that changed for the worse or the better", changed(base, run, MOST), link),
+            _frames("Frames with another verdict", changed(base, run, MOST), link),
         ),
     )
 

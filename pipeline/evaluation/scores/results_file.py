@@ -35,7 +35,7 @@ def read_results(path: FilePath) -> list[Result]:
     results.sort(key=lambda result: result.t_ns)
     twice = next((a.frame for a, b in pairwise(results) if a.t_ns == b.t_ns), None)
     if twice is not None:
-        raise BadInput(f"{path}: two results of one time, at frame {twice}; is it the output of several runs?")
+        raise BadInput(f"{path}: two results with the same time, at frame {twice}; is this the output of several runs?")
     return results
 
 

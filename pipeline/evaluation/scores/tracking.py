@@ -42,7 +42,7 @@ def is_available() -> bool:
 
 def of_frames(frames: Sequence[tuple[Result, FrameTruth]]) -> Counts | None:
     """A drive's labelled frames, in order. Those that are not labelled whole are left out: a vehicle that nobody has
-    looked at is not there falsely. Null where no vehicle's place is labelled in the others, and without trackeval."""
+    looked at is not there falsely. None where no vehicle's place is labelled in the others, and without trackeval."""
     truths, believed = [], []
     for result, truth in frames:
         if not truth.whole:
@@ -88,7 +88,7 @@ def idf1_sums(counts: Counts) -> tuple[int, int]:
 
 
 def hota_of(drives: Sequence[Counts]) -> float | None:
-    """HOTA of several drives as one, 0–1; null where no vehicle is there."""
+    """HOTA of several drives as one, 0–1; None where no vehicle is there."""
     metrics = _metrics()
     if metrics is None or not any(recall_sums(drive)[1] for drive in drives):
         return None

@@ -20,8 +20,8 @@ from pipeline.types import Box, Point2
 from pipeline.types.source import Source, TruthObject
 
 _NOT_FOLLOWED = (
-    "The labels follow no identity over time: vehicles are linked from frame to frame by nearness. Figures of identity "
-    "rest on that, and speed is judged of leads only."
+    "The labels have no identities over time: vehicles are linked from frame to frame by distance. Identity scores "
+    "depend on that, and speed is scored for leads only."
 )
 _COUNTED = ("accepted", "corrected")
 
@@ -32,9 +32,9 @@ class NoTruth(BadInput):
 
 @dataclass(frozen=True)
 class FrameTruth:
-    """A labelled frame. lead: null where none leads. lead_known: false where one can't tell, or the lead's place is not
+    """A labelled frame. lead: None where none leads. lead_known: false where one can't tell, or the lead's place is not
     labelled. velocity_mps: relative to ego in the turning ego frame, by object id, of those that neighbouring frames
-    show. lead_box: the lead's id and picture box where only the picture shows it; ``lead`` is null then. whole: every
+    show. lead_box: the lead's id and picture box where only the picture shows it; ``lead`` is None then. whole: every
     vehicle in it is labelled. unplaced: picture boxes of labelled vehicles whose place nobody knows."""
 
     t_ns: int
@@ -50,7 +50,7 @@ class FrameTruth:
 @dataclass(frozen=True)
 class DriveTruth:
     """uri: of the recording. ticks: of all its frames. frames: the labelled ones, by tick. cut_ins: tick and object of
-    each labelled cut-in; null where nobody labels them, and the true leads tell. notes: what a person should know."""
+    each labelled cut-in; None where nobody labels them, and the true leads tell. notes: what a person should know."""
 
     uri: str
     ticks: tuple[int, ...]
@@ -86,7 +86,8 @@ def _over_time(frames: Mapping[int, FrameTruth], followed: bool) -> tuple[dict[i
         jumps = frozenset((tick, key) for tick, key in jumps if _lead_of(moving[tick]) == key)
     tracks = len({key for _, key in jumps})
     told = f"{tracks} {'track jumps' if tracks == 1 else 'tracks jump'} in {len(jumps)}"
-    note = f"{told} {'place' if len(jumps) == 1 else 'places'}, as no vehicle moves: speed is not judged there."
+    places = "place" if len(jumps) == 1 else "places"
+    note = f"{told} {places} faster than any vehicle moves: speed is not scored there."
     return moving, (*(() if followed else (_NOT_FOLLOWED,)), *((note,) if jumps else ()))
 
 
@@ -132,7 +133,7 @@ def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
         is_known = lead is not None or box is not None or said == "none"
         frames[tick] = replace(known, lead=lead, lead_known=is_known, lead_box=box)
     if not frames:
-        raise NoTruth(f"{labels.source}: none of these labels has been accepted")
+        raise NoTruth(f"{labels.source}: none of these labels is accepted")
     events = [each for each in labels.events if each.kind == "cut_in" and each.state in _COUNTED and each.tracks]
     cut_ins = tuple((labels.t_ns[each.frame], each.tracks[0]) for each in events) or None
     followed = len(frames) < 2 or any(len(track.sightings) > 1 for track in tracks.values()) or not tracks
@@ -149,25 +150,25 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
     for lead in sorted({each.lead for each in ranges if isinstance(each.lead, int) and each.lead in proposed}):
         count = sum(each.last - each.first + 1 for each in ranges if each.lead == lead)
         frames_text = f"{count} {'frame' if count == 1 else 'frames'}"
-        notes.append(f"#{lead} leads in {frames_text} but is only proposed: not judged until it is accepted.")
+        notes.append(f"#{lead} leads in {frames_text} but is only proposed: not scored until accepted.")
     if proposed:
         notes.append(f"{len(proposed)} of {len(labels.tracks)} tracks are only proposed and do not count.")
     own, places = _as_proposed(labels)
     if own:
         notes.append(
-            f"{own} of {places} labelled places are as the pipeline proposed them: there it is compared with itself."
+            f"{own} of {places} labelled positions are as the pipeline proposed them: there it is compared with itself."
         )
     whole = sum(frame.whole for frame in frames.values())
     if whole == len(frames):
         return notes
     if not ranges:
-        notes.append("Nobody says who leads: that is judged only where every vehicle is labelled.")
+        notes.append("No lead is labelled: the choice of the lead is scored only where every vehicle is labelled.")
     unsaid = len(frames) - whole - left
     why = [
         f"In {left} a vehicle is only proposed: accept or reject it." if left else "",
-        f"Of {unsaid} nobody says that every vehicle is labelled: tag them “{WHOLE_TAG}”." if unsaid else "",
+        f"Of {unsaid} no one has confirmed that every vehicle is labelled: tag them “{WHOLE_TAG}”." if unsaid else "",
     ]
-    judged = f"Detection and tracking are judged in {whole} of {len(frames)} labelled frames."
+    judged = f"Detection and tracking are scored in {whole} of {len(frames)} labelled frames."
     notes.append(" ".join((judged, *filter(None, why))))
     return notes
 

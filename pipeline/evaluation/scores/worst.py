@@ -14,7 +14,7 @@ _WEIGHT: dict[Verdict, int] = {"none": 0, "correct": 0, "missed": 1, "wrong": 2,
 
 @dataclass(frozen=True)
 class Bad:
-    """One frame. before: the other run's verdict, where two are compared. Metres; null where there is none."""
+    """One frame. before: the other run's verdict, where two are compared. Metres; None where there is none."""
 
     uri: str
     index: int

@@ -1,4 +1,4 @@
-"""The drives of the experiment on curves: every frame through the line once for each source of the path, and judged.
+"""The drives of the experiment on curves: every frame is run and judged once for each source of the path.
 
 Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge and no nearer
 vehicle hides it. Missing one that has just come into sight is not counted before confirmation can be through
@@ -24,8 +24,8 @@ from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.detection_model import BoxNoise, LineNoise
 from pipeline.simulation.sensors.rig import Sensors
 from pipeline.simulation.sensors.truth_lanes import lane_points
-from pipeline.simulation.world import world
-from pipeline.simulation.world.world import ActorState, World
+from pipeline.simulation.world import world_state
+from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.step import State, step
 from pipeline.types import Frame, Path, Result
 from pipeline.warm_up import warm_up
@@ -53,7 +53,7 @@ Verdict = Literal["right", "missed", "decoy", "none", "false", "undecided"]
 
 @dataclass(frozen=True)
 class Frames:
-    """One drive with one set of sources, an entry a frame: verdicts, range of the true lead (null without), whether the
+    """One drive with one set of sources, an entry a frame: verdicts, range of the true lead (None without), whether the
     car that cuts in is known by then, and (N, 4) the path's errors at 10, 30, 60, 100 m (NaN where the true way ends)
     with its sigmas there."""
 
@@ -67,10 +67,10 @@ class Frames:
 
 
 def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[World, Frame]]:
-    """Each moment of a drive along its script, with given detections. lines null: the road has none."""
+    """Each moment of a drive along its script, with given detections. lines None: the road has none."""
     sensors = Sensors(scene, scene.ego.start_m + scene.ego.travelled_m(scene.duration_s))
     for index in range(scene.frame_count()):
-        now = world.at(scene, index / scene.rate_hz)
+        now = world_state.at(scene, index / scene.rate_hz)
         frame = sensors.frame(now, index, round(now.t_s * 1e9), picture=False)
         assert frame.camera is not None
         found = truth_boxes.boxes(now, frame.camera, BOXES, scene.seed, index)
@@ -80,8 +80,8 @@ def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[Wor
 
 @dataclass(frozen=True)
 class Moment:
-    """A frame and what is true then, whatever the line believes. lead: the first vehicle in the lane within reach, null
-    without one; doubtful: nobody can say. beyond: the first within a third more than the reach."""
+    """A frame and what is true then, whatever the pipeline estimates. lead: the first vehicle in the lane within reach,
+    None without one; doubtful: nobody can say. beyond: the first within a third more than the reach."""
 
     now: World
     frame: Frame
@@ -93,7 +93,7 @@ class Moment:
 
     @property
     def lead_m(self) -> float | None:
-        """The range of the lead's rear, null without a decidable lead."""
+        """The range of the lead's rear, None without a decidable lead."""
         if self.lead is None or self.is_doubtful:
             return None
         return float(np.hypot(*self.lead.cuboid.center[:2]) - self.lead.cuboid.size[0] / 2)
@@ -116,7 +116,7 @@ def moments(scene: Scenario, frames: Iterable[tuple[World, Frame]], reach_m: flo
 def driven(
     scene: Scenario, reach_m: float, names: Sequence[str] = tuple(SOURCES), over_line_s: float | None = None
 ) -> dict[str, Frames]:
-    """Every frame once through the sensors, and through the line once for each set of sources, by their names.
+    """Every frame once through the sensors, and through the pipeline once for each set of sources, by their names.
     over_line_s: when a wheel of vehicle 2 is over the line, where it cuts in."""
     warm_up()
     settings = {name: with_changes(Params(), SOURCES[name]) for name in names}

@@ -2,8 +2,8 @@
 
 Bends at 3 m/s² lateral acceleration, S-curves and straights; a lead in the lane draws away while cars drive in the
 lanes beside it at 20–100 m. Detections are given: true boxes with the errors measured of the embedded detector, a
-simulated LiDAR. Every frame goes through the line with each source of the path alone, with none, without a route, and
-with all fused. Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge
+simulated LiDAR. Every frame goes through the pipeline with each source of the path alone, with none, without a route,
+and with all fused. Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge
 and no nearer vehicle hides it. Missing one that has just come into sight is not counted before confirmation can be
 through (``true_lead.InSight``).
 """
@@ -19,7 +19,7 @@ import numpy as np
 from pipeline.evaluation.report_sections import Cell, Chart, Scene, Section, Series, Table
 from pipeline.experiments.curves import scenarios
 from pipeline.experiments.curves.drives import BOXES, LIDAR_ALONE, LINES, SOURCES, Frames, driven
-from pipeline.experiments.experiment import Experiment, Replay
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.params import CipvParams, Params
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.detection_model import Detections
@@ -28,7 +28,7 @@ LONGEST_WRONG_S = 0.3
 
 
 @dataclass(frozen=True)
-class Case:
+class CurveCase:
     """kind: follow, or a car that cuts in."""
 
     kind: Literal["follow", "cut_in"]
@@ -39,21 +39,21 @@ class Case:
 Outcome = dict[str, Frames]
 
 
-def cases(short: bool) -> list[Case]:
+def cases(short: bool) -> list[CurveCase]:
     if short:
-        return [Case("follow", "r125", 0), Case("cut_in", "r250", 0)]
-    follow = [Case("follow", name, seed) for name in scenarios.LAYOUTS for seed in range(6)]
-    return [*follow, *(Case("cut_in", name, seed) for name in scenarios.LAYOUTS for seed in range(2))]
+        return [CurveCase("follow", "r125", 0), CurveCase("cut_in", "r250", 0)]
+    follow = [CurveCase("follow", name, seed) for name in scenarios.LAYOUTS for seed in range(6)]
+    return [*follow, *(CurveCase("cut_in", name, seed) for name in scenarios.LAYOUTS for seed in range(2))]
 
 
-def run(case: Case) -> Outcome:
+def run(case: CurveCase) -> Outcome:
     layout = scenarios.LAYOUTS[case.layout]
     scene, over_line_s = _scenario(case)
     names = ("fused",) if case.kind == "cut_in" else tuple(SOURCES)
     return driven(scene, layout.reach_m, names, over_line_s)
 
 
-def _scenario(case: Case) -> tuple[Scenario, float | None]:
+def _scenario(case: CurveCase) -> tuple[Scenario, float | None]:
     """And when the wheel of who cuts in is over the line."""
     layout = scenarios.LAYOUTS[case.layout]
     return (
@@ -61,11 +61,11 @@ def _scenario(case: Case) -> tuple[Scenario, float | None]:
     )
 
 
-def replay(case: Case, outcome: Outcome) -> Replay:
+def as_drive(case: CurveCase, outcome: Outcome) -> ExperimentDrive:
     """The drive with all sources of the path fused."""
     fused = outcome["fused"]
     share, frames = share_right([fused])
-    return Replay(
+    return ExperimentDrive(
         f"curves_{case.kind}_{case.layout}_{case.seed}",
         f"{scenarios.LAYOUTS[case.layout].title}: "
         f"{'cut-in' if case.kind == 'cut_in' else 'following'}, run {case.seed}",
@@ -122,7 +122,7 @@ def longest_wrong_s(drive: Frames) -> float:
 
 def told_before_line_s(drive: Frames) -> float | None:
     """By how many seconds before its wheel was over the line the car that cuts in was told and stayed so; negative:
-    after it. Null: never."""
+    after it. None: never."""
     assert drive.over_line_s is not None
     if not drive.told[-1]:
         return None
@@ -130,7 +130,7 @@ def told_before_line_s(drive: Frames) -> float | None:
     return drive.over_line_s - drive.t_s[since]
 
 
-def report(cases: Sequence[Case], outcomes: Sequence[Outcome]) -> Section:
+def report(cases: Sequence[CurveCase], outcomes: Sequence[Outcome]) -> Section:
     follows = _by_layout("follow", cases, outcomes)
     cut_ins = _by_layout("cut_in", cases, outcomes)
     return Section(
@@ -169,7 +169,9 @@ _CHOICE_COLUMNS = ("road", "sources", "to 60 m", "frames", "to the reach", "fram
 _PATH_COLUMNS = ("road", "sources", "10 m", "30 m", "60 m", "100 m", "error/σ at 30 m", "error/σ at 60 m")
 
 
-def _by_layout(kind: str, cases: Sequence[Case], outcomes: Sequence[Outcome]) -> dict[str, dict[str, list[Frames]]]:
+def _by_layout(
+    kind: str, cases: Sequence[CurveCase], outcomes: Sequence[Outcome]
+) -> dict[str, dict[str, list[Frames]]]:
     found: dict[str, dict[str, list[Frames]]] = {}
     for case, outcome in zip(cases, outcomes, strict=True):
         if case.kind == kind:
@@ -248,4 +250,4 @@ def _verdict(layout: str, by_source: dict[str, list[Frames]]) -> str:
     )
 
 
-CURVES = Experiment("curves", "curves", "Curves", cases, run, report, replay)
+CURVES = Experiment("curves", "curves", "Curves", cases, run, report, as_drive)

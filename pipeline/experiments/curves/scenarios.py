@@ -22,7 +22,7 @@ Shape = Literal["straight", "bend", "s_curve"]
 
 @dataclass(frozen=True)
 class Layout:
-    """A road and a speed on it; radius_m of its bends, null when straight. reach_m: how far ahead the choice is judged.
+    """A road and a speed on it; radius_m of its bends, None when straight. reach_m: how far ahead the choice is judged.
     wanted: the share of frames that must be right."""
 
     name: str

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pipeline.experiments.experiment import Replay
+from pipeline.experiments.experiment import ExperimentDrive
 from pipeline.experiments.perception import SENSORS, Boxes, boxes_said, detections_for, eyes_for
-from pipeline.experiments.straight_track import KMH, Drive, approach, drive_charts, parameters, scene
+from pipeline.experiments.straight_track import KMH, DriveRecord, approach, drive_charts, parameters, scene
 from pipeline.params import Params
 from pipeline.run import Sensors
 from pipeline.simulation.closed_loop import Setup
@@ -23,15 +23,15 @@ BRAKED_KMH = 50.0
 START_TTC_S = 4.0
 RUN_UP_S = 1.5
 SPEED_TOLERANCE_MPS = 1.0 * KMH
-Kind = tuple[Sensors, str, Boxes]
-SETUPS: tuple[Kind, ...] = (
+SensorSetup = tuple[Sensors, str, Boxes]
+SETUPS: tuple[SensorSetup, ...] = (
     ("both", "AEB", "truth"),
     ("lidar", "AEB", "truth"),
     ("both", "ACC", "truth"),
     ("lidar", "ACC", "truth"),
     ("both", "ACC + AEB", "truth"),
 )
-NETWORK: Kind = ("both", "AEB", "network")
+NETWORK: SensorSetup = ("both", "AEB", "network")
 NETWORK_SAMPLE: tuple[tuple[Test, float, int], ...] = (
     *(("CCRs", speed, 100) for speed in (20.0, 40.0, 60.0, 80.0)),
     *(("CCRs", 40.0, overlap) for overlap in (-50, 50)),
@@ -40,13 +40,13 @@ NETWORK_SAMPLE: tuple[tuple[Test, float, int], ...] = (
 """What is driven with the embedded network on drawn pictures too, beside the lead that brakes at 6 m/s² 40 m ahead."""
 
 
-def kind_said(kind: Kind) -> str:
+def kind_said(kind: SensorSetup) -> str:
     sensors, controller, boxes = kind
     return f"{SENSORS[sensors]}, {controller}{boxes_said(boxes)}"
 
 
 @dataclass(frozen=True)
-class Case:
+class EuroNcapCase:
     """speed_kmh: of the ego car. overlap: %. gap_m, decel_mps2: CCRb only. boxes: whose the camera's are."""
 
     test: Test
@@ -59,7 +59,7 @@ class Case:
     boxes: Boxes = "truth"
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> SensorSetup:
         return self.sensors, self.controller, self.boxes
 
     @property
@@ -85,10 +85,10 @@ class Result:
 
     impact_kmh: float
     void: str
-    drive: Drive | None = field(default=None, compare=False)
+    drive: DriveRecord | None = field(default=None, compare=False)
 
 
-def cases(short: bool) -> list[Case]:
+def cases(short: bool) -> list[EuroNcapCase]:
     speeds = {"CCRs": range(10, 81, 5), "CCRm": range(30, 81, 5)} if not short else {"CCRs": (30, 60), "CCRm": (50,)}
     overlaps = (-50, 100) if short else OVERLAPS
     found = []
@@ -96,9 +96,9 @@ def cases(short: bool) -> list[Case]:
         grid: list[tuple[Test, float, int]] = [
             (test, float(speed), overlap) for test in ("CCRs", "CCRm") for speed in speeds[test] for overlap in overlaps
         ]
-        found += [Case(test, speed, overlap, sensors, controller) for test, speed, overlap in grid]
+        found += [EuroNcapCase(test, speed, overlap, sensors, controller) for test, speed, overlap in grid]
         found += [
-            Case("CCRb", BRAKED_KMH, 100, sensors, controller, gap, decel)
+            EuroNcapCase("CCRb", BRAKED_KMH, 100, sensors, controller, gap, decel)
             for decel in (2.0, 6.0)
             for gap in (12.0, 40.0)
             if not short or (decel, gap) == (6.0, 40.0)
@@ -106,21 +106,21 @@ def cases(short: bool) -> list[Case]:
     if short:
         return found
     sensors, controller, boxes = NETWORK
-    sample = [Case(*each, sensors, controller, boxes=boxes) for each in NETWORK_SAMPLE]
-    return [*found, *sample, Case("CCRb", BRAKED_KMH, 100, sensors, controller, 40.0, 6.0, boxes)]
+    sample = [EuroNcapCase(*each, sensors, controller, boxes=boxes) for each in NETWORK_SAMPLE]
+    return [*found, *sample, EuroNcapCase("CCRb", BRAKED_KMH, 100, sensors, controller, 40.0, 6.0, boxes)]
 
 
-def run(case: Case) -> Result:
+def run(case: EuroNcapCase) -> Result:
     """One approach, driven."""
     drive = approach(scenario(case), Setup(_params(case), case.sensors, eyes_for(case.boxes)))
     return Result((drive.impact_mps or 0.0) / KMH, _void(case, drive), drive)
 
 
-def _params(case: Case) -> Params:
+def _params(case: EuroNcapCase) -> Params:
     return parameters(case.controller, case.speed_kmh * KMH)
 
 
-def scenario(case: Case) -> Scenario:
+def scenario(case: EuroNcapCase) -> Scenario:
     speed = case.speed_kmh * KMH
     aside = (1.0 - abs(case.overlap) / 100.0) * EGO_WIDTH_M * (1.0 if case.overlap < 0 else -1.0)
     target: dict[str, object] = {"offset_m": aside, "colour": "#8e9aa3"}
@@ -138,12 +138,12 @@ def scenario(case: Case) -> Scenario:
     return scene({0.0: speed}, target, RUN_UP_S + 14.0, seed=0)
 
 
-def replay(case: Case, result: Result) -> Replay:
+def as_drive(case: EuroNcapCase, result: Result) -> ExperimentDrive:
     """The drive of one cell."""
     assert result.drive is not None
     ended = f"Impact at {result.impact_kmh:.0f} km/h." if result.impact_kmh else "The impact was avoided."
     title = f"{case.test}, {case.at}: {kind_said(case.kind)}"
-    return Replay(
+    return ExperimentDrive(
         case.name,
         title,
         (f"Void: {result.void}." if result.void else ended,),
@@ -155,7 +155,7 @@ def replay(case: Case, result: Result) -> Replay:
     )
 
 
-def _void(case: Case, drive: Drive) -> str:
+def _void(case: EuroNcapCase, drive: DriveRecord) -> str:
     """Why the approach was not as the protocol wants it: speed within 0 to +1 km/h from the test's start until the car
     brakes by itself, which it may not do before the start."""
     wanted = case.speed_kmh * KMH

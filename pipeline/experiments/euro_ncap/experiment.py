@@ -15,13 +15,13 @@ from pipeline.experiments.euro_ncap.drives import (
     OVERLAPS,
     RUN_UP_S,
     START_TTC_S,
-    Case,
-    Kind,
+    EuroNcapCase,
     Result,
+    SensorSetup,
     Test,
+    as_drive,
     cases,
     kind_said,
-    replay,
     run,
     scenario,
 )
@@ -31,7 +31,7 @@ from pipeline.experiments.perception import SENSORS
 from pipeline.experiments.straight_track import KMH
 
 
-def report(cases: Sequence[Case], results: Sequence[Result]) -> Section:
+def report(cases: Sequence[EuroNcapCase], results: Sequence[Result]) -> Section:
     done = dict(zip(cases, results, strict=True))
     kinds = list(dict.fromkeys(case.kind for case in cases))
     tables = [_summary(kinds, done), _r152(done)]
@@ -59,7 +59,7 @@ def report(cases: Sequence[Case], results: Sequence[Result]) -> Section:
     )
 
 
-def _summary(kinds: list[Kind], done: dict[Case, Result]) -> Table:
+def _summary(kinds: list[SensorSetup], done: dict[EuroNcapCase, Result]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for kind in kinds:
         for test in ("CCRs", "CCRm", "CCRb"):
@@ -74,7 +74,7 @@ def _summary(kinds: list[Kind], done: dict[Case, Result]) -> Table:
     return Table("What each gives", columns, tuple(rows), decimals=1)
 
 
-def _grid(test: Test, name: str, done: dict[Case, Result]) -> Table:
+def _grid(test: Test, name: str, done: dict[EuroNcapCase, Result]) -> Table:
     mine = {(case.speed_kmh, case.overlap): (case, result) for case, result in done.items() if case.test == test}
     overlaps = [overlap for overlap in OVERLAPS if any(key[1] == overlap for key in mine)]
     rows = tuple(
@@ -84,7 +84,7 @@ def _grid(test: Test, name: str, done: dict[Case, Result]) -> Table:
     return Table(f"{test}: {name}", ("speed", *(f"{overlap} %" for overlap in overlaps)), rows, decimals=0)
 
 
-def _braked(name: str, done: dict[Case, Result]) -> Table:
+def _braked(name: str, done: dict[EuroNcapCase, Result]) -> Table:
     mine = {(case.decel_mps2, case.gap_m): (case, result) for case, result in done.items() if case.test == "CCRb"}
     gaps = sorted({gap for _, gap in mine})
     rows = tuple(
@@ -94,7 +94,7 @@ def _braked(name: str, done: dict[Case, Result]) -> Table:
     return Table(f"CCRb at 50 km/h: {name}", ("lead brakes", *(f"{gap:.0f} m" for gap in gaps)), rows, decimals=0)
 
 
-def _cell(found: tuple[Case, Result] | None) -> Cell | Coloured:
+def _cell(found: tuple[EuroNcapCase, Result] | None) -> Cell | Coloured:
     if found is None:
         return None
     case, result = found
@@ -102,7 +102,7 @@ def _cell(found: tuple[Case, Result] | None) -> Cell | Coloured:
     return Coloured(result.void or result.impact_kmh, tone, case.name)
 
 
-def _r152(done: dict[Case, Result]) -> Table:
+def _r152(done: dict[EuroNcapCase, Result]) -> Table:
     """Standing and moving targets, full overlap, AEB alone, against the Regulation's limits."""
     rows: list[tuple[Cell | Coloured, ...]] = []
     for test in ("CCRs", "CCRm"):
@@ -123,17 +123,19 @@ def _r152(done: dict[Case, Result]) -> Table:
     return Table("UN R152: largest relative impact speed", columns, tuple(rows), caption, 0)
 
 
-def _passes(case: Case, result: Result, limit_kmh: float) -> Coloured:
+def _passes(case: EuroNcapCase, result: Result, limit_kmh: float) -> Coloured:
     return Coloured(result.impact_kmh, "green" if result.impact_kmh <= limit_kmh else "red", case.name)
 
 
-def _verdict(done: dict[Case, Result]) -> str:
+def _verdict(done: dict[EuroNcapCase, Result]) -> str:
     """AEB alone: how many cells fused ends slower than the LiDAR alone, and how many faster."""
     pairs = [
         (result, done[other])
         for case, result in done.items()
         if case.kind == ("both", "AEB", "truth")
-        and (other := Case(case.test, case.speed_kmh, case.overlap, "lidar", "AEB", case.gap_m, case.decel_mps2))
+        and (
+            other := EuroNcapCase(case.test, case.speed_kmh, case.overlap, "lidar", "AEB", case.gap_m, case.decel_mps2)
+        )
         in done
     ]
     counted = [(fused.impact_kmh, lidar.impact_kmh) for fused, lidar in pairs if not fused.void and not lidar.void]
@@ -145,4 +147,4 @@ def _verdict(done: dict[Case, Result]) -> str:
     )
 
 
-NCAP = Experiment("ncap", "euroncap", "Euro NCAP car-to-car rear grid", cases, run, report, replay)
+NCAP = Experiment("ncap", "euroncap", "Euro NCAP car-to-car rear grid", cases, run, report, as_drive)

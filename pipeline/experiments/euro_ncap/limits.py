@@ -29,5 +29,5 @@ def impact_tone(speed_kmh: float, impact_kmh: float) -> Tone:
 
 
 def r152_limit_kmh(relative_kmh: float) -> float | None:
-    """The impact speed that the Regulation permits; null beyond the speeds that it covers."""
+    """The impact speed that the Regulation permits; None beyond the speeds that it covers."""
     return next((limit for up_to, limit in R152_LIMITS if relative_kmh <= up_to), None)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from pipeline.evaluation.report_sections import AnyCell, Chart, Coloured, Scene, Section, Series, Table
-from pipeline.experiments.experiment import Experiment, Replay
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.iso15622.scenarios import BEND_FROM_M, CURVE_LATERAL_MPS2, RADII_M, Test, scenario
 from pipeline.experiments.perception import COMPARED, GIVEN_SAID, SENSORS
 from pipeline.experiments.straight_track import gap_m, measured_m, parameters, target_of, true_range_m
@@ -31,7 +31,7 @@ _KEPT = 0.95
 
 
 @dataclass(frozen=True)
-class Case:
+class FollowingCase:
     """value: radius, m (curve), or speed, km/h (all others)."""
 
     test: Test
@@ -51,8 +51,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """acquired_m: range when the lead first was the CIPV, null if never. kept: share of the frames from then on in
-    which it was. smallest_gap_m: range to the lead. smallest_time_gap_s: that over own speed, while driving; null when
+    """acquired_m: range when the lead first was the CIPV, None if never. kept: share of the frames from then on in
+    which it was. smallest_gap_m: range to the lead. smallest_time_gap_s: that over own speed, while driving; None when
     it never drove. touched: there was contact. t_s, range_m, speed_mps, motions of the ego vehicle: each tick."""
 
     acquired_m: float | None
@@ -66,7 +66,7 @@ class Outcome:
     motions: tuple[Motion, ...] = ()
 
 
-def cases(short: bool) -> list[Case]:
+def cases(short: bool) -> list[FollowingCase]:
     plan: dict[Test, tuple[float, ...]] = (
         {"stop": (50.0,)}
         if short
@@ -80,7 +80,7 @@ def cases(short: bool) -> list[Case]:
     )
     seeds = range(1 if short else 3)
     return [
-        Case(test, value, sensors, seed)
+        FollowingCase(test, value, sensors, seed)
         for test, values in plan.items()
         for value in values
         for sensors in COMPARED
@@ -88,7 +88,7 @@ def cases(short: bool) -> list[Case]:
     ]
 
 
-def run(case: Case) -> Outcome:
+def run(case: FollowingCase) -> Outcome:
     driven = _scenario(case)
     rows: list[_Row] = []
     touched = False
@@ -103,7 +103,7 @@ def run(case: Case) -> Outcome:
     return _outcome(rows, touched)
 
 
-def _scenario(case: Case) -> Scenario:
+def _scenario(case: FollowingCase) -> Scenario:
     return scenario(case.test, case.value, case.seed)
 
 
@@ -112,12 +112,12 @@ def _params(driven: Scenario) -> Params:
     return parameters("ACC", speed, {"acc.brake_limit_mps2": ACC_BRAKE_MPS2})
 
 
-def replay(case: Case, outcome: Outcome) -> Replay:
+def as_drive(case: FollowingCase, outcome: Outcome) -> ExperimentDrive:
     """The drive of one run."""
     driven = _scenario(case)
     title = f"{case.test.capitalize()}, {case.at}: {SENSORS[case.sensors]}, run {case.seed}"
     seen_m, gap_s = outcome.acquired_m, outcome.smallest_time_gap_s
-    return Replay(
+    return ExperimentDrive(
         case.name,
         title,
         (
@@ -165,8 +165,8 @@ def _outcome(rows: list[_Row], touched: bool) -> Outcome:
     )
 
 
-def report(cases: Sequence[Case], outcomes: Sequence[Outcome]) -> Section:
-    driven: dict[Key, dict[Case, Outcome]] = {}
+def report(cases: Sequence[FollowingCase], outcomes: Sequence[Outcome]) -> Section:
+    driven: dict[Key, dict[FollowingCase, Outcome]] = {}
     for case, outcome in zip(cases, outcomes, strict=True):
         driven.setdefault((case.test, case.value, case.sensors), {})[case] = outcome
     groups = {key: list(by_case.values()) for key, by_case in driven.items()}
@@ -206,7 +206,7 @@ _COLUMNS = (
 )
 
 
-def _row(by_case: dict[Case, Outcome]) -> tuple[AnyCell, ...]:
+def _row(by_case: dict[FollowingCase, Outcome]) -> tuple[AnyCell, ...]:
     """The runs of one test with one set of sensors; its last cell leads to the first that did not pass."""
     first, group = next(iter(by_case)), list(by_case.values())
     shown = next((case for case, each in by_case.items() if not passed(each)), first)
@@ -259,4 +259,4 @@ def _chart(test: Test, value: float, groups: dict[Key, list[Outcome]]) -> Chart:
     return Chart(f"{test}, {name}: range to the lead", "time s", "range m", lines)
 
 
-ISO = Experiment("iso", "iso", "ACC after the manner of ISO 15622", cases, run, report, replay)
+ISO = Experiment("iso", "iso", "ACC after the manner of ISO 15622", cases, run, report, as_drive)

@@ -18,13 +18,13 @@ from pipeline.alignment.projection import Pinhole, project_cuboid
 from pipeline.common.geometry import iou_matrix
 from pipeline.decision.path_position import near_face_middle
 from pipeline.evaluation.report_sections import Cell, Chart, Section, Series, Table
-from pipeline.experiments.experiment import Experiment, Replay
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.paper import layouts
 from pipeline.experiments.paper.layouts import LAYOUTS
 from pipeline.experiments.perception import COMPARED, SENSORS, Boxes, boxes_said, detections_for, eyes_for
 from pipeline.experiments.straight_track import parameters, target_of, true_range_m
 from pipeline.run import Sensors
-from pipeline.simulation.closed_loop import Setup, Tick, drive
+from pipeline.simulation.closed_loop import LoopStep, Setup, drive
 from pipeline.simulation.scenario import Scenario
 
 MAX_M = 60.0
@@ -44,7 +44,7 @@ PRINTED: dict[tuple[str, str], tuple[float, ...]] = {
 
 
 @dataclass(frozen=True)
-class Case:
+class BevCase:
     """layout: a, b or c. boxes: whose the camera's are."""
 
     layout: str
@@ -53,17 +53,17 @@ class Case:
     boxes: Boxes = "truth"
 
     @property
-    def kind(self) -> Kind:
+    def kind(self) -> BevVariant:
         """What runs that differ by their seed alone have in common."""
         return self.layout, self.sensors, self.boxes
 
 
-Kind = tuple[str, Sensors, Boxes]
+BevVariant = tuple[str, Sensors, Boxes]
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """The target in one frame: its true range, and where it was believed to be; null when no object stands for it."""
+    """The target in one frame: its true range, and where it was believed to be; None when no object stands for it."""
 
     range_m: float
     error: Error | None
@@ -79,23 +79,23 @@ class Error:
     longitudinal_m: float
 
 
-def cases(short: bool) -> list[Case]:
+def cases(short: bool) -> list[BevCase]:
     """The network looks in one layout only: a drawn picture takes ten times as long as all the rest."""
-    given = [Case(each.layout, each.seed, sensors) for sensors in COMPARED for each in layouts.cases(short)]
-    return given if short else given + [Case("a", seed, boxes="network") for seed in range(_BY_NETWORK)]
+    given = [BevCase(each.layout, each.seed, sensors) for sensors in COMPARED for each in layouts.cases(short)]
+    return given if short else given + [BevCase("a", seed, boxes="network") for seed in range(_BY_NETWORK)]
 
 
-def run(case: Case) -> list[Sighting]:
+def run(case: BevCase) -> list[Sighting]:
     setup = Setup(_PARAMS, case.sensors, eyes_for(case.boxes), closed=False)
     return [seen for tick in drive(_scenario(case), setup) if (seen := sighting(tick)) is not None]
 
 
-def replay(case: Case, seen: list[Sighting]) -> Replay:
+def as_drive(case: BevCase, seen: list[Sighting]) -> ExperimentDrive:
     """The drive of one run."""
     errors = [each.error for each in seen if each.error is not None]
     who = f"{SENSORS[case.sensors]}{boxes_said(case.boxes)}"
     far_m = max((abs(error.distance_m) for error in errors), default=0.0)
-    return Replay(
+    return ExperimentDrive(
         f"bev_error_{case.layout}_{case.sensors}_{case.boxes}_{case.seed}",
         f"Place of fused objects: {LAYOUTS[case.layout]}, {who}, run {case.seed}",
         (f"Placed in {len(errors)} of {len(seen)} frames, {far_m:.1f} m off in range at most.",),
@@ -107,13 +107,13 @@ def replay(case: Case, seen: list[Sighting]) -> Replay:
     )
 
 
-def _scenario(case: Case) -> Scenario:
-    return layouts.scenario(layouts.Case(case.layout, case.seed))
+def _scenario(case: BevCase) -> Scenario:
+    return layouts.scenario(layouts.LayoutCase(case.layout, case.seed))
 
 
-def sighting(tick: Tick) -> Sighting | None:
+def sighting(tick: LoopStep) -> Sighting | None:
     """Of the object that stands for the target: the one whose place in the picture overlaps the target's most, however
-    far off its distance is. One that is carried stands for nothing. Null beyond 60 m and beside the car."""
+    far off its distance is. One that is carried stands for nothing. None beyond 60 m and beside the car."""
     target, camera = target_of(tick), tick.frame.camera
     assert camera is not None
     truth_m = true_range_m(target)
@@ -137,8 +137,8 @@ def sighting(tick: Tick) -> Sighting | None:
     return Sighting(truth_m, best)
 
 
-def report(cases: Sequence[Case], runs: Sequence[list[Sighting]]) -> Section:
-    by_kind: dict[Kind, list[Sighting]] = {}
+def report(cases: Sequence[BevCase], runs: Sequence[list[Sighting]]) -> Section:
+    by_kind: dict[BevVariant, list[Sighting]] = {}
     for case, run in zip(cases, runs, strict=True):
         by_kind.setdefault(case.kind, []).extend(run)
     rows: list[tuple[Cell, ...]] = []
@@ -172,7 +172,7 @@ def report(cases: Sequence[Case], runs: Sequence[list[Sighting]]) -> Section:
     )
 
 
-def _verdict(layout: str, by_kind: dict[Kind, list[Sighting]]) -> str:
+def _verdict(layout: str, by_kind: dict[BevVariant, list[Sighting]]) -> str:
     """Fused against the LiDAR alone, which drove the same runs without a camera: how often each knows where the car is,
     and how well in range where both do."""
     title = LAYOUTS[layout].capitalize()
@@ -231,4 +231,4 @@ def _figures(seen: list[Sighting], source: str) -> tuple[Cell, ...]:
     return tuple(figures)
 
 
-BEV_ERROR = Experiment("bev_error", "paper", "Place of fused objects (Table 4)", cases, run, report, replay)
+BEV_ERROR = Experiment("bev_error", "paper", "Place of fused objects (Table 4)", cases, run, report, as_drive)

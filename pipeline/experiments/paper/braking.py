@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from statistics import mean
 
 from pipeline.evaluation.report_sections import AnyCell, Chart, Driven, Scene, Section, Series, Table
-from pipeline.experiments.experiment import Experiment, Replay
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.paper.closed_forms import LEAD_DECEL_MPS2, PAPER, Manoeuvre, closed_forms
 from pipeline.experiments.perception import COMPARED, SENSORS, Boxes, boxes_said, detections_for, eyes_for
-from pipeline.experiments.straight_track import KMH, Drive, approach, drive_charts, parameters, scene
+from pipeline.experiments.straight_track import KMH, DriveRecord, approach, drive_charts, parameters, scene
 from pipeline.params import Params
 from pipeline.run import Sensors
 from pipeline.simulation.closed_loop import Setup
@@ -31,7 +31,7 @@ _CLEAR_MPS, _CLEAR_M = 0.3, 0.3
 
 
 @dataclass(frozen=True)
-class Case:
+class BrakingCase:
     manoeuvre: Manoeuvre
     sensors: Sensors
     controller: str
@@ -50,10 +50,10 @@ class Case:
         return f"{self.manoeuvre}_{SENSORS[self.sensors]}_{controller}_{self.boxes}_{self.seed}".lower()
 
 
-def cases(short: bool) -> list[Case]:
+def cases(short: bool) -> list[BrakingCase]:
     manoeuvres: tuple[Manoeuvre, ...] = ("CCRs",) if short else ("CCRs", "CCRm", "CCRb")
     fast = [
-        Case(manoeuvre, sensors, controller, seed)
+        BrakingCase(manoeuvre, sensors, controller, seed)
         for manoeuvre in manoeuvres
         for sensors in COMPARED
         for controller in ("ACC", "ACC + AEB")
@@ -61,30 +61,30 @@ def cases(short: bool) -> list[Case]:
     ]
     if short:
         return fast
-    return fast + [Case(each, "both", "ACC + AEB", seed, "network") for each in manoeuvres for seed in range(3)]
+    return fast + [BrakingCase(each, "both", "ACC + AEB", seed, "network") for each in manoeuvres for seed in range(3)]
 
 
-def run(case: Case) -> Drive:
+def run(case: BrakingCase) -> DriveRecord:
     """One manoeuvre, driven."""
     setup = Setup(_params(case), case.sensors, eyes_for(case.boxes))
     return approach(_scenario(case), setup, stop_when_over=case.manoeuvre != "CCRm")
 
 
-def _scenario(case: Case) -> Scenario:
+def _scenario(case: BrakingCase) -> Scenario:
     speed = PAPER[case.manoeuvre].speed_kmh * KMH
     target, duration_s = _target(case.manoeuvre, speed)
     return scene({0.0: speed}, target, duration_s, case.seed)
 
 
-def _params(case: Case) -> Params:
+def _params(case: BrakingCase) -> Params:
     return parameters(case.controller, PAPER[case.manoeuvre].speed_kmh * KMH)
 
 
-def replay(case: Case, drive: Drive) -> Replay:
+def as_drive(case: BrakingCase, drive: DriveRecord) -> ExperimentDrive:
     """The drive of one run."""
     title = f"{case.manoeuvre}: {_label(case)}, run {case.seed}"
     impact = f"Impact at {drive.impact_mps / KMH:.0f} km/h." if drive.impact_mps is not None else "No impact."
-    return Replay(
+    return ExperimentDrive(
         case.name,
         title,
         (impact, f"Smallest gap {drive.smallest_gap_m:.1f} m."),
@@ -96,7 +96,7 @@ def replay(case: Case, drive: Drive) -> Replay:
     )
 
 
-def _label(case: Case) -> str:
+def _label(case: BrakingCase) -> str:
     return f"{SENSORS[case.sensors]}, {case.controller}{boxes_said(case.boxes)}"
 
 
@@ -114,7 +114,7 @@ def _target(manoeuvre: Manoeuvre, speed_mps: float) -> tuple[dict[str, object], 
     }, 20.0
 
 
-def report(cases: Sequence[Case], drives: Sequence[Drive]) -> Section:
+def report(cases: Sequence[BrakingCase], drives: Sequence[DriveRecord]) -> Section:
     done = list(zip(cases, drives, strict=True))
     groups = dict.fromkeys(case.key for case in cases)
     rows = [_row(key, {case.name: drive for case, drive in done if case.key == key}) for key in groups]
@@ -131,7 +131,7 @@ def report(cases: Sequence[Case], drives: Sequence[Drive]) -> Section:
         (Table("Drives", _COLUMNS, tuple(rows)), closed_forms()),
         tuple(chart for manoeuvre in manoeuvres for chart in _charts(manoeuvre, done)),
         scenes=tuple(
-            Scene(each, _scenario(Case(each, "both", "ACC + AEB", 0)), _SHOWN_AT_S[each]) for each in manoeuvres
+            Scene(each, _scenario(BrakingCase(each, "both", "ACC + AEB", 0)), _SHOWN_AT_S[each]) for each in manoeuvres
         ),
     )
 
@@ -153,7 +153,7 @@ _COLUMNS = (
 )
 
 
-def _row(key: Key, by_name: dict[str, Drive]) -> tuple[AnyCell, ...]:
+def _row(key: Key, by_name: dict[str, DriveRecord]) -> tuple[AnyCell, ...]:
     drives = list(by_name.values())
     worst = max(by_name, key=lambda name: (by_name[name].impact_mps or 0.0, -by_name[name].smallest_gap_m))
     impacts = [drive.impact_mps / KMH for drive in drives if drive.impact_mps is not None]
@@ -179,7 +179,7 @@ def _mean(values: Iterable[float | None]) -> float | None:
     return mean(known) if known else None
 
 
-def _verdict(manoeuvre: Manoeuvre, done: list[tuple[Case, Drive]]) -> str:
+def _verdict(manoeuvre: Manoeuvre, done: list[tuple[BrakingCase, DriveRecord]]) -> str:
     """Fused against the LiDAR alone, in words, with AEB."""
 
     def worst(sensors: Sensors) -> tuple[float, float]:
@@ -200,7 +200,7 @@ def _ends(worst: tuple[float, float]) -> str:
     return f"in an impact at {worst[0] / KMH:.0f} km/h" if worst[0] > 0.0 else f"{-worst[1]:.1f} m before contact"
 
 
-def _charts(manoeuvre: Manoeuvre, done: list[tuple[Case, Drive]]) -> tuple[Chart, Chart]:
+def _charts(manoeuvre: Manoeuvre, done: list[tuple[BrakingCase, DriveRecord]]) -> tuple[Chart, Chart]:
     first = [(case, drive) for case, drive in done if case.manoeuvre == manoeuvre and case.seed == 0]
 
     def lines(values: str, scale: float) -> tuple[Series, ...]:
@@ -219,4 +219,4 @@ def _charts(manoeuvre: Manoeuvre, done: list[tuple[Case, Drive]]) -> tuple[Chart
     )
 
 
-BRAKING = Experiment("braking", "paper", "Braking: CCRs, CCRm and CCRb", cases, run, report, replay)
+BRAKING = Experiment("braking", "paper", "Braking: CCRs, CCRm and CCRb", cases, run, report, as_drive)

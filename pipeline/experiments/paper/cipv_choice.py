@@ -16,13 +16,13 @@ from typing import Literal
 from pipeline.decision.path_position import near_face_middle
 from pipeline.evaluation.lead_verdict import switches
 from pipeline.evaluation.report_sections import AnyCell, Chart, Driven, Scene, Section, Series, Table
-from pipeline.experiments.experiment import Experiment, Replay
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.perception import GIVEN_SAID, SENSORS
 from pipeline.experiments.true_lead import MAX_M, InSight, Way, range_m, same_place, true_lead
 from pipeline.params import CipvParams, Params
 from pipeline.run import Sensors
 from pipeline.simulation import scenario
-from pipeline.simulation.closed_loop import Setup, Tick, drive
+from pipeline.simulation.closed_loop import LoopStep, Setup, drive
 from pipeline.simulation.scenario import Scenario
 
 SCENARIOS = {
@@ -41,7 +41,7 @@ begun, so short a time ago that it cannot be confirmed yet."""
 
 
 @dataclass(frozen=True)
-class Case:
+class ChoiceCase:
     scene: str
     sensors: Sensors
     seed: int
@@ -54,7 +54,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame's verdict, with the true lead's id and range and the chosen object's id; null where there is none."""
+    """One frame's verdict, with the true lead's id and range and the chosen object's id; None where there is none."""
 
     t_s: float
     verdict: Verdict
@@ -64,12 +64,14 @@ class Frame:
     chosen_m: float | None
 
 
-def cases(short: bool) -> list[Case]:
+def cases(short: bool) -> list[ChoiceCase]:
     scenes = ("straight", "turn_across_left") if short else tuple(SCENARIOS)
-    return [Case(scene, sensors, seed) for scene in scenes for sensors in SENSORS for seed in range(1 if short else 5)]
+    return [
+        ChoiceCase(scene, sensors, seed) for scene in scenes for sensors in SENSORS for seed in range(1 if short else 5)
+    ]
 
 
-def run(case: Case) -> list[Frame]:
+def run(case: ChoiceCase) -> list[Frame]:
     scene = _scenario(case)
     setup = Setup(Params(), case.sensors, closed=False)
     way, in_sight, frames = Way.of(scene), InSight(), []
@@ -82,15 +84,15 @@ def run(case: Case) -> list[Frame]:
     return frames
 
 
-def _scenario(case: Case) -> Scenario:
+def _scenario(case: ChoiceCase) -> Scenario:
     scene = scenario.load(case.scene)
     return scene.model_copy(update={"seed": scene.seed + 100 * case.seed})
 
 
-def replay(case: Case, frames: list[Frame]) -> Replay:
+def as_drive(case: ChoiceCase, frames: list[Frame]) -> ExperimentDrive:
     """The drive of one run."""
     counted = sum(frame.verdict not in UNDECIDABLE for frame in frames)
-    return Replay(
+    return ExperimentDrive(
         case.name,
         f"{SCENARIOS[case.scene].capitalize()}: {SENSORS[case.sensors]}, run {case.seed}",
         (f"Right in {100.0 * _share_correct([frames]):.1f} % of {counted} decidable frames.",),
@@ -101,7 +103,7 @@ def replay(case: Case, frames: list[Frame]) -> Replay:
     )
 
 
-def judge(way: Way, tick: Tick, in_sight: InSight) -> Frame:
+def judge(way: Way, tick: LoopStep, in_sight: InSight) -> Frame:
     """The frame's CIPV against the vehicle that the car will really meet first."""
     lead, doubtful = true_lead(tick.world, way.ahead(tick.world))
     chosen = tick.result.chosen()
@@ -140,7 +142,7 @@ def acquired_m(frames: Sequence[Frame]) -> list[float]:
     return list(first.values())
 
 
-def report(cases: Sequence[Case], runs: Sequence[list[Frame]]) -> Section:
+def report(cases: Sequence[ChoiceCase], runs: Sequence[list[Frame]]) -> Section:
     scenes = list(dict.fromkeys(case.scene for case in cases))
     driven: dict[Key, dict[str, list[Frame]]] = {(scene, sensors): {} for scene in scenes for sensors in SENSORS}
     for case, run in zip(cases, runs, strict=True):
@@ -176,7 +178,7 @@ def report(cases: Sequence[Case], runs: Sequence[list[Frame]]) -> Section:
         scenes=tuple(
             Scene(SCENARIOS[name].capitalize(), scene, _SHOWN_AT * scene.duration_s)
             for name in scenes
-            for scene in (_scenario(Case(name, "both", 0)),)
+            for scene in (_scenario(ChoiceCase(name, "both", 0)),)
         ),
     )
 
@@ -244,4 +246,4 @@ def _chart(scene: str, groups: dict[Key, list[list[Frame]]]) -> Chart:
     return Chart(title, "time s", "distance m", (Series.of_points("truth", truth), *seen))
 
 
-CHOOSING = Experiment("choosing", "paper", "Choosing the CIPV", cases, run, report, replay)
+CHOOSING = Experiment("choosing", "paper", "Choosing the CIPV", cases, run, report, as_drive)

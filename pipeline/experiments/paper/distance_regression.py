@@ -15,15 +15,15 @@ import numpy as np
 
 from pipeline.common.geometry import closest_on_polygon, transform
 from pipeline.evaluation.report_sections import Chart, Section, Series, Table
-from pipeline.experiments.experiment import Experiment, Replay
-from pipeline.experiments.paper.layouts import LAYOUTS, Case, cases, scenario, scenes
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
+from pipeline.experiments.paper.layouts import LAYOUTS, LayoutCase, cases, scenario, scenes
 from pipeline.experiments.perception import GIVEN_SAID
 from pipeline.experiments.straight_track import TARGET, true_range_m
 from pipeline.params import DistanceParams, Params, preset
 from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.camera import calibration
 from pipeline.simulation.sensors.detection_model import BoxNoise
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.types import REAL_VEHICLES, CameraCalibration
 from pipeline.vision.distance import PowerLaw, fit_power_law, height_at_reference, is_cut
 
@@ -39,12 +39,12 @@ class Sample:
     range_m: float
 
 
-def run(case: Case) -> list[Sample]:
+def run(case: LayoutCase) -> list[Sample]:
     scene = scenario(case)
     camera = calibration(scene.camera)
     samples = []
     for index in range(scene.frame_count()):
-        now = world.at(scene, index / scene.rate_hz)
+        now = world_state.at(scene, index / scene.rate_hz)
         raw = truth_boxes.boxes(now, camera, BoxNoise(), case.seed, index)
         target = next(state for state in now.actors if state.actor.id == TARGET)
         for box in raw.boxes.tolist():
@@ -54,9 +54,9 @@ def run(case: Case) -> list[Sample]:
     return samples
 
 
-def replay(case: Case, samples: list[Sample]) -> Replay:
+def as_drive(case: LayoutCase, samples: list[Sample]) -> ExperimentDrive:
     """The drive of one run."""
-    return Replay(
+    return ExperimentDrive(
         f"regression_{case.layout}_{case.seed}",
         f"Distance from box height: {LAYOUTS[case.layout]}, run {case.seed}",
         (f"{len(samples)} boxes.",),
@@ -67,12 +67,12 @@ def replay(case: Case, samples: list[Sample]) -> Replay:
     )
 
 
-def _depth_m(target: world.ActorState, camera: CameraCalibration) -> float:
+def _depth_m(target: world_state.ActorState, camera: CameraCalibration) -> float:
     x, y = closest_on_polygon(target.cuboid.footprint())
     return float(transform(camera.T_camera_ego, np.array([[x, y, target.cuboid.center[2]]]))[0, 2])
 
 
-def report(cases: Sequence[Case], runs: Sequence[list[Sample]]) -> Section:
+def report(cases: Sequence[LayoutCase], runs: Sequence[list[Sample]]) -> Section:
     done = list(zip(cases, runs, strict=True))
     train = [each for case, run in done if case.layout == "a" and case.seed % 2 == 0 for each in run]
     free = fit_power_law([each.height_px for each in train], [each.depth_m for each in train])
@@ -185,4 +185,4 @@ def _by_bin(layout: str, samples: list[Sample], law: PowerLaw) -> Series:
     return Series(LAYOUTS[layout], tuple(middles), tuple(means))
 
 
-REGRESSION = Experiment("regression", "paper", "Distance from box height", cases, run, report, replay)
+REGRESSION = Experiment("regression", "paper", "Distance from box height", cases, run, report, as_drive)

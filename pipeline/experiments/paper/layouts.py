@@ -23,22 +23,24 @@ COLOURS = ("#a3202a", "#e8e8e6", "#15181c", "#5b6f86", "#c9a227")
 
 
 @dataclass(frozen=True)
-class Case:
+class LayoutCase:
     """layout: a, b or c."""
 
     layout: str
     seed: int
 
 
-def cases(short: bool) -> list[Case]:
-    return [Case(layout, seed) for layout in LAYOUTS for seed in range(2 if short else 20)]
+def cases(short: bool) -> list[LayoutCase]:
+    return [LayoutCase(layout, seed) for layout in LAYOUTS for seed in range(2 if short else 20)]
 
 
 def scenes() -> tuple[Scene, ...]:
-    return tuple(Scene(title.capitalize(), scenario(Case(layout, 0)), _SHOWN_AT_S) for layout, title in LAYOUTS.items())
+    return tuple(
+        Scene(title.capitalize(), scenario(LayoutCase(layout, 0)), _SHOWN_AT_S) for layout, title in LAYOUTS.items()
+    )
 
 
-def scenario(case: Case) -> Scenario:
+def scenario(case: LayoutCase) -> Scenario:
     """Cars are 1.48 m tall give or take 4 cm, as one class of cars is."""
     rng = np.random.default_rng([case.seed, list(LAYOUTS).index(case.layout)])
     size = (float(rng.normal(4.5, 0.15)), float(rng.normal(1.82, 0.03)), float(rng.normal(1.48, 0.04)))

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipeline.evaluation.report_sections import Chart, Scene, Section, Series, Table
-from pipeline.experiments.experiment import Experiment, Replay
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.straight_track import parameters, scene, target_of, true_range_m
-from pipeline.simulation.closed_loop import Setup, Tick, drive
+from pipeline.simulation.closed_loop import LoopStep, Setup, drive
 from pipeline.simulation.scenario import Scenario
-from pipeline.simulation.world.actors import Kind
+from pipeline.simulation.world.actors import VehicleKind
 
 PRINTED = {"mean error %": 2.14, "largest error m": 0.47, "recognised to m": 35.0}
 _SPEED_MPS = 10.0
@@ -28,8 +28,8 @@ COLOURS = ("#a3202a", "#e8e8e6", "#15181c", "#5b6f86")
 
 
 @dataclass(frozen=True)
-class Case:
-    kind: Kind
+class RangeCase:
+    kind: VehicleKind
     seed: int
 
 
@@ -41,17 +41,17 @@ class Sighting:
     measured_m: float | None
 
 
-def cases(short: bool) -> list[Case]:
-    kinds: tuple[Kind, ...] = ("car",) if short else ("car", "van", "truck", "motorcycle")
-    return [Case(kind, seed) for kind in kinds for seed in range(2 if short else 10)]
+def cases(short: bool) -> list[RangeCase]:
+    kinds: tuple[VehicleKind, ...] = ("car",) if short else ("car", "van", "truck", "motorcycle")
+    return [RangeCase(kind, seed) for kind in kinds for seed in range(2 if short else 10)]
 
 
-def run(case: Case) -> list[Sighting]:
+def run(case: RangeCase) -> list[Sighting]:
     setup = Setup(_PARAMS, "lidar", closed=False)
     return [Sighting(true_range_m(target_of(tick)), _measured_m(tick)) for tick in drive(_scenario(case), setup)]
 
 
-def _scenario(case: Case) -> Scenario:
+def _scenario(case: RangeCase) -> Scenario:
     target = {
         "kind": case.kind,
         "colour": COLOURS[case.seed % len(COLOURS)],
@@ -62,11 +62,11 @@ def _scenario(case: Case) -> Scenario:
     return scene({0.0: _SPEED_MPS}, target, duration_s, case.seed)
 
 
-def replay(case: Case, seen: list[Sighting]) -> Replay:
+def as_drive(case: RangeCase, seen: list[Sighting]) -> ExperimentDrive:
     """The drive of one run."""
     errors = [abs(each.measured_m - each.true_m) for each in seen if each.measured_m is not None]
     largest = f"; largest error {max(errors):.2f} m" if errors else ""
-    return Replay(
+    return ExperimentDrive(
         f"ranging_{case.kind}_{case.seed}",
         f"LiDAR range check: {case.kind}, run {case.seed}",
         (f"{len(errors)} of {len(seen)} sweeps hold it{largest}.",),
@@ -77,7 +77,7 @@ def replay(case: Case, seen: list[Sighting]) -> Replay:
     )
 
 
-def _measured_m(tick: Tick) -> float | None:
+def _measured_m(tick: LoopStep) -> float | None:
     """The range of the nearest object in the car's lane, where nothing else stands, however far off it is; carried ones
     are guesses and do not count."""
     ahead = [
@@ -104,7 +104,7 @@ def recognised_to_m(sightings: Sequence[Sighting]) -> float | None:
     return reached
 
 
-def report(cases: Sequence[Case], runs: Sequence[list[Sighting]]) -> Section:
+def report(cases: Sequence[RangeCase], runs: Sequence[list[Sighting]]) -> Section:
     kinds = list(dict.fromkeys(case.kind for case in cases))
     by_kind = {
         kind: [each for case, run in zip(cases, runs, strict=True) if case.kind == kind for each in run]
@@ -135,7 +135,7 @@ def report(cases: Sequence[Case], runs: Sequence[list[Sighting]]) -> Section:
                 tuple(_errors(kind, seen) for kind, seen in by_kind.items()),
             ),
         ),
-        scenes=tuple(Scene(f"A standing {kind}", _scenario(Case(kind, 0)), _SHOWN_AT_S) for kind in kinds),
+        scenes=tuple(Scene(f"A standing {kind}", _scenario(RangeCase(kind, 0)), _SHOWN_AT_S) for kind in kinds),
     )
 
 
@@ -179,4 +179,4 @@ def _errors(kind: str, seen: list[Sighting]) -> Series:
     )
 
 
-RANGING = Experiment("ranging", "paper", "LiDAR range check", cases, run, report, replay)
+RANGING = Experiment("ranging", "paper", "LiDAR range check", cases, run, report, as_drive)

@@ -37,7 +37,7 @@ class SensorClock:
 
     @property
     def offset_ns(self) -> int | None:
-        """Host time less the sensor's, as it stands; null without host time."""
+        """Host time less the sensor's, as it stands; None without host time."""
         return None if self._offset_ns is None else round(self._offset_ns)
 
     def follow_gps(self, locked: bool) -> None:

@@ -211,7 +211,7 @@ class RotationCutter:
 
 
 def _turns(earlier: Placed, later: Placed) -> int | None:
-    """How often the head passed behind the car between two packets; null when their azimuths disagree with their
+    """How often the head passed behind the car between two packets; None when their azimuths disagree with their
     times."""
     advance = (later.time_us - earlier.time_us) * later.rate_cdeg_us
     expected = earlier.phase_cdeg + advance
@@ -228,7 +228,7 @@ def _follows(suspect: Placed, placed: Placed) -> bool:
 
 
 def _host_gap_us(last: Placed, t_host_ns: int | None) -> int | None:
-    """By the host's clock, how long after ``last`` a packet came; null when one of them has no host time."""
+    """By the host's clock, how long after ``last`` a packet came; None when one of them has no host time."""
     return None if last.t_host_ns is None or t_host_ns is None else (t_host_ns - last.t_host_ns) // 1000
 
 

@@ -40,7 +40,7 @@ class Vlp16Decoder:
     def push(self, data: bytes, t_host_ns: int | None = None) -> Sweep | None:
         """Take one data packet; the sweep that it completes, if it is the first of the next rotation.
 
-        t_host_ns: when it was received (or, in a file, captured); null where nobody knows. Never raises: what is no
+        t_host_ns: when it was received (or, in a file, captured); None where nobody knows. Never raises: what is no
         packet of a VLP-16 is refused and counted by reason.
         """
         rotation = self._cutter.push(data, t_host_ns)
@@ -52,7 +52,7 @@ class Vlp16Decoder:
         return self._decode(rotation) if rotation is not None else None
 
     def _decode(self, rotation: Rotation) -> Sweep | None:
-        """The sweep of a rotation; null when it holds no return."""
+        """The sweep of a rotation; None when it holds no return."""
         from velodyne_decoder import PacketVector, VelodynePacket
 
         packets = rotation.packets

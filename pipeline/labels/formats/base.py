@@ -6,33 +6,33 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
 
 from pipeline.alignment.projection import Pinhole, project_cuboids
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid, corners_of
 from pipeline.common.progress import Progress, silent
-from pipeline.labels.formats.parts import Part
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.types import F32, F64, Box, CameraCalibration, EgoState, Frame
 from pipeline.types.source import InParts, Rectified, Source
 
-FormatName = Literal["native", "mcap", "openlabel", "kitti", "kitti-tracking", "nuscenes", "coco", "csv"]
 _FILE_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}")
 _FEWEST_PAIRS = 3
 
 
 @dataclass(frozen=True)
 class Shot:
-    """One frame, without its data. camera: null where there is none. size: width and height of its picture in pixels.
-    T_rect_ego: (4, 4) to the frame that KITTI's labels are in: the recording's rectified camera 0 if it has one, else
-    the camera itself."""
+    """One frame, without its data."""
 
     name: str
+    """The recording's own name of the frame."""
     t_ns: int
     camera: CameraCalibration | None = None
+    """None where the camera has no calibration."""
     size: tuple[int, int] | None = None
+    """Width and height of its picture in pixels."""
     T_rect_ego: F64 | None = None
+    """(4, 4), takes ego points to the frame of KITTI's labels: the recording's rectified camera 0 if it has one, else
+    the camera itself."""
     ego: EgoState | None = None
 
 
@@ -41,13 +41,14 @@ def _no_points(frame: int) -> F32 | None:
 
 
 @dataclass(frozen=True)
-class Drive:
-    """The recording that labels belong to. points: (N, 4) float32 of a frame's sweep, null without one; read when
-    asked for."""
+class LabeledDrive:
+    """The recording that labels belong to."""
 
     uri: str
     shots: tuple[Shot, ...]
+    """Every frame, in order."""
     points: Callable[[int], F32 | None] = field(default=_no_points, compare=False)
+    """Gives the (N, 4) float32 x y z intensity of a frame's sweep, None without one; read on demand."""
 
     @property
     def frames(self) -> tuple[str, ...]:
@@ -73,7 +74,7 @@ def drive_of(
     source: Source,
     progress: Progress = silent,
     frame_of: Callable[[int], Frame] | None = None,
-) -> Drive:
+) -> LabeledDrive:
     """What is known of every frame, without points and pictures where the source can tell it so. frame_of: who may
     have whole frames already; a picture's pixels are not asked for."""
     read = frame_of or source.frame
@@ -91,7 +92,7 @@ def drive_of(
         sweep = source.sweep(index) if isinstance(source, InParts) else read(index).sweep
         return sweep.points if sweep is not None else None
 
-    return Drive(source.uri, tuple(shots), points)
+    return LabeledDrive(source.uri, tuple(shots), points)
 
 
 def _size(frame: Frame) -> tuple[int, int] | None:
@@ -101,31 +102,22 @@ def _size(frame: Frame) -> tuple[int, int] | None:
 
 @dataclass(frozen=True)
 class Imported:
-    """What was read. notes: what the file said that labels do not keep, and what it did not say."""
+    """What was read from a file of labels."""
 
     labels: LabelSet
     notes: tuple[str, ...] = ()
+    """What the file says that labels cannot hold, and what it does not say."""
 
 
-Write = Callable[[LabelSet, Drive, Path], tuple[str, ...]]
+Write = Callable[[LabelSet, LabeledDrive, Path], tuple[str, ...]]
 """Labels that hold nothing but what the format can, the drive, where to. Gives sentences about what was written
 otherwise than it was."""
 
-Read = Callable[[Path, Drive, Origin], Imported]
+Read = Callable[[Path, LabeledDrive, Origin], Imported]
 """The file or folder, the drive, and who made labels of which the file does not say that."""
 
 
-@dataclass(frozen=True)
-class Format:
-    """One kind of file or folder. holds: what it has a place for."""
-
-    name: FormatName
-    holds: frozenset[Part]
-    write: Write
-    read: Read
-
-
-def check_extrinsic(labels: LabelSet, drive: Drive, what: str) -> None:
+def check_extrinsic(labels: LabelSet, drive: LabeledDrive, what: str) -> None:
     """BadInput when cuboids and boxes of the same sightings lie apart in the picture: the sign of an extrinsic that was
     taken the wrong way round, or of labels of another recording."""
     count, apart = 0, 0
@@ -140,7 +132,7 @@ def check_extrinsic(labels: LabelSet, drive: Drive, what: str) -> None:
     if count >= _FEWEST_PAIRS and apart > count / 2:
         raise BadInput(
             f"{what}: {apart} of {count} cuboids do not fall where their boxes are in the picture; "
-            "is an extrinsic taken the wrong way round?"
+            "is an extrinsic inverted?"
         )
 
 
@@ -161,7 +153,7 @@ def _touch(one: Box | None, other: Box) -> bool:
 def make_folder(out: Path) -> Path:
     """A folder to write into, made if need be. BadInput when files are in it already: old labels among the new."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise BadInput(f"{out}: there is something there already; choose another name or remove it")
+        raise BadInput(f"{out}: the folder is not empty; choose another name or remove it")
     out.mkdir(parents=True, exist_ok=True)
     return out
 
@@ -173,4 +165,4 @@ def write_file(out: Path, data: bytes) -> None:
         with out.open("xb") as file:
             file.write(data)
     except FileExistsError:
-        raise BadInput(f"{out}: there is such a file already; choose another name or remove it") from None
+        raise BadInput(f"{out}: file already exists; choose another name or remove it") from None

@@ -13,7 +13,7 @@ from pathlib import Path
 from pydantic import BaseModel, Field, TypeAdapter
 
 from pipeline.common.errors import BadInput
-from pipeline.labels.formats.base import Drive, Imported, write_file
+from pipeline.labels.formats.base import Imported, LabeledDrive, write_file
 from pipeline.labels.formats.reading import parse_as, read_bytes
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
 from pipeline.types import Box
@@ -50,12 +50,12 @@ class _Coco(BaseModel):
 _FILE = TypeAdapter(_Coco)
 
 
-def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
+def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     """BadInput when the recording has no pictures, whose size the format wants."""
     categories = {name: place for place, name in enumerate(sorted({track.label for track in labels.tracks}), start=1)}
     size = next((shot.size for shot in drive.shots if shot.size is not None), None)
     if size is None:
-        raise BadInput("COCO is about pictures; this recording has none")
+        raise BadInput("COCO labels pictures; this recording has none")
     names = drive.file_names()
     content = {
         "info": {"description": drive.uri, "version": "1.0"},
@@ -84,7 +84,7 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
     )
 
 
-def read(path: Path, drive: Drive, origin: Origin) -> Imported:
+def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     """Boxes without ``track_id`` are tracks of their own."""
     coco = parse_as(_FILE, read_bytes(path), str(path))
     frames = _frames(coco.images, drive, str(path))
@@ -94,7 +94,7 @@ def read(path: Path, drive: Drive, origin: Origin) -> Imported:
     for each in coco.annotations:
         what = f"{path}, annotation {each.id}"
         if each.image_id not in frames or each.category_id not in categories:
-            raise BadInput(f"{what}: an image or category that is not there")
+            raise BadInput(f"{what}: an image or category that does not exist")
         x, y, width, height = each.bbox
         label, sighting = (
             categories[each.category_id],
@@ -105,7 +105,7 @@ def read(path: Path, drive: Drive, origin: Origin) -> Imported:
             continue
         of_track, sightings = found.setdefault(each.track_id, (label, {}))
         if sighting.frame in sightings or label != of_track:
-            raise BadInput(f"{what}: track {each.track_id} is there twice, or of two classes")
+            raise BadInput(f"{what}: track {each.track_id} occurs twice, or with two classes")
         sightings[sighting.frame] = sighting
     tracks = [
         LabelTrack(number, label, tuple(sightings[frame] for frame in sorted(sightings)), "accepted", origin)
@@ -140,7 +140,7 @@ def _annotations(labels: LabelSet, categories: dict[str, int]) -> list[dict[str,
     ]
 
 
-def _frames(images: list[_Image], drive: Drive, what: str) -> dict[int, int]:
+def _frames(images: list[_Image], drive: LabeledDrive, what: str) -> dict[int, int]:
     """Image id → frame: by ``frame_index`` where it is said, else by the file's name without its ending."""
     by_name = {name: index for index, name in enumerate(drive.file_names())}
     frames: dict[int, int] = {}
@@ -149,6 +149,6 @@ def _frames(images: list[_Image], drive: Drive, what: str) -> dict[int, int]:
         if index is None:
             index = by_name.get(Path(image.file_name).stem)
         if index is None or not 0 <= index < len(drive.shots):
-            raise BadInput(f"{what}: image {image.id} ({image.file_name[:60]}) is no frame of {drive.uri}")
+            raise BadInput(f"{what}: image {image.id} ({image.file_name[:60]}) is not a frame of {drive.uri}")
         frames[image.id] = index
     return frames

@@ -18,7 +18,7 @@ from pydantic import TypeAdapter
 
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import closest_on_polygon
-from pipeline.labels.formats.base import Drive, Imported, write_file
+from pipeline.labels.formats.base import Imported, LabeledDrive, write_file
 from pipeline.labels.formats.reading import fit, read_bytes
 from pipeline.labels.model import LabelSet, Lead, LeadRange, Origin, State
 
@@ -32,7 +32,7 @@ _STATE: TypeAdapter[State] = TypeAdapter(State)
 _MAKER: TypeAdapter[Literal["pipeline", "person", "import"]] = TypeAdapter(Literal["pipeline", "person", "import"])
 
 
-def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
+def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(_COLUMNS)
@@ -45,21 +45,21 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
     return (f"{rejected:,} rejected ranges of the lead left out: a frame has one lead here",) if rejected else ()
 
 
-def read(path: Path, drive: Drive, origin: Origin) -> Imported:
+def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     data = read_bytes(path).decode("utf-8-sig", "replace")
     found: dict[int, LeadRange | None] = {}
     try:
         rows = csv.DictReader(io.StringIO(data, newline=""), strict=True)
         if not {"frame", "lead"} <= set(rows.fieldnames or ()):
-            raise BadInput(f"{path}: a table of the lead has at least the columns frame and lead")
+            raise BadInput(f"{path}: a lead table needs at least the columns frame and lead")
         for row in rows:
             what = f"{path}, line {rows.line_num}"
             frame = _frame(row, drive, what)
             if frame in found:
-                raise BadInput(f"{what}: frame {frame} is there twice")
+                raise BadInput(f"{what}: frame {frame} occurs twice")
             found[frame] = _range(row, frame, origin, what)
     except csv.Error as error:
-        raise BadInput(f"{path}: no table: {error}") from None
+        raise BadInput(f"{path}: not a CSV table: {error}") from None
     leads = _joined([each for _, each in sorted(found.items()) if each is not None])
     return Imported(replace(drive.empty(), leads=tuple(leads)))
 
@@ -83,7 +83,7 @@ def _seen(labels: LabelSet, lead: LeadRange | None, index: int) -> tuple[str, ..
     return track.label, f"{distance_m:.3f}", f"{x:.3f}", f"{y:.3f}"
 
 
-def _frame(row: dict[str, str], drive: Drive, what: str) -> int:
+def _frame(row: dict[str, str], drive: LabeledDrive, what: str) -> int:
     frame = _whole(row["frame"], what)
     if not 0 <= frame < len(drive.shots):
         raise BadInput(f"{what}: frame {frame} of {len(drive.shots)}")
@@ -93,13 +93,13 @@ def _frame(row: dict[str, str], drive: Drive, what: str) -> int:
 
 
 def _range(row: dict[str, str], frame: int, origin: Origin, what: str) -> LeadRange | None:
-    """What one row says, as a range of one frame; null where nobody has said who leads."""
+    """What one row says, as a range of one frame; None where nobody has said who leads."""
     text = (row["lead"] or "").strip()
     if not text:
         return None
     lead: Lead = "none" if text == "none" else "unknown" if text == "unknown" else _whole(text, what)
     if isinstance(lead, int) and lead < 0:
-        raise BadInput(f"{what}: a lead that is no track")
+        raise BadInput(f"{what}: the lead is not a track")
     state: State = fit(_STATE, row.get("state") or "accepted", f"{what}, state")
     by = _origin(row, what) if row.get("maker") else origin
     return LeadRange(frame, frame, lead, state, by, row.get("comment") or "", row.get("reviewer") or "")
@@ -136,5 +136,5 @@ def _whole(text: str | None, what: str) -> int:
     text = (text or "").strip()
     digits = text.removeprefix("-")
     if not (digits.isascii() and digits.isdecimal() and len(text) < _LONGEST_NUMBER):
-        raise BadInput(f"{what}: {text[:_LONGEST_NUMBER]!r} is no number")
+        raise BadInput(f"{what}: {text[:_LONGEST_NUMBER]!r} is not a number")
     return int(text)

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter
 
 from pipeline.common.errors import BadInput
-from pipeline.labels.formats.base import Drive, Imported, write_file
+from pipeline.labels.formats.base import Imported, LabeledDrive, write_file
 from pipeline.labels.formats.reading import fit, parse_json, read_bytes
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel
 from pipeline.labels.validate import check
@@ -40,14 +40,14 @@ def from_json(data: bytes, what: str) -> LabelSet:
     """The labels as they were written. BadInput, beginning with ``what``, when these are none."""
     outer: Any = parse_json(data, what)
     if not isinstance(outer, dict) or outer.get("format") != KIND:
-        raise BadInput(f"{what}: no {KIND} file")
+        raise BadInput(f"{what}: not a {KIND} file")
     version = outer.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or not 1 <= version <= VERSION:
         raise BadInput(f"{what}: {KIND} of version {str(version)[:20]}; this program reads up to {VERSION}")
     inner = outer.get("labels")
     unknown = sorted(inner.keys() - {field.name for field in fields(LabelSet)}) if isinstance(inner, dict) else []
     if unknown:
-        raise BadInput(f"{what}: labels have no field {unknown[0][:40]!r}")
+        raise BadInput(f"{what}: unknown field {unknown[0][:40]!r}")
     if version < 2 and isinstance(inner, dict) and isinstance(inner.get("tags"), list):
         inner = {**inner, "tags": [as_range(tag) if isinstance(tag, dict) else tag for tag in inner["tags"]]}
     return check(fit(_LABELS, inner, what), what)
@@ -60,16 +60,16 @@ def as_range(tag: Mapping[str, Any]) -> dict[str, Any]:
     return body | {"first": frame, "last": frame}
 
 
-def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
+def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     write_file(out, _bytes(labels))
     return ()
 
 
-def read(path: Path, drive: Drive, origin: Origin) -> Imported:
+def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     return onto(from_json(read_bytes(path), str(path)), drive, str(path))
 
 
-def onto(labels: LabelSet, drive: Drive, what: str) -> Imported:
+def onto(labels: LabelSet, drive: LabeledDrive, what: str) -> Imported:
     """Labels of this drive, or of one that it is a clip of or that is a clip of it, counted by this drive's frames.
 
     Frames are known by their name and time. BadInput when the two have no frame in common.

@@ -72,39 +72,55 @@ def _lost(labels: LabelSet, holds: frozenset[Part]) -> list[str]:
     missing = EVERYTHING - holds
     sightings = [each for track in labels.tracks for each in track.sightings]
     counted = {
-        "leads": (len(labels.leads), "{} of the lead not written: no place for them", "range", "ranges"),
-        "paths": (len(labels.paths), "{} of the ego path not written: no place for them", "frame", "frames"),
-        "events": (len(labels.events), "{} not written: no place for them", "event", "events"),
-        "tags": (len(labels.tags), "{} not written: no place for them", "frame tag", "frame tags"),
+        "leads": (len(labels.leads), "{} of the lead not written: the format cannot hold them", "range", "ranges"),
+        "paths": (len(labels.paths), "{} of the ego path not written: the format cannot hold them", "frame", "frames"),
+        "events": (len(labels.events), "{} not written: the format cannot hold them", "event", "events"),
+        "tags": (len(labels.tags), "{} not written: the format cannot hold them", "frame tag", "frame tags"),
         "comments": (sum(bool(each.comment) for each in _marked(labels)), "{} not written", "comment", "comments"),
         "reviews": (sum(bool(each.reviewer) for each in _marked(labels)), "{} not written", "review", "reviews"),
     }
     lost = [_count(*counted[part]) for part in counted if part in missing]
     if {"cuboids", "boxes"} <= missing:
-        tracks = _count(len(labels.tracks), "{} not written: no place for them", "track")
+        tracks = _count(len(labels.tracks), "{} not written: the format cannot hold them", "track")
         return [tracks, *lost, *_lost_marks(labels, missing)]
     without = sum(not _has_place(each, holds) for each in sightings)
-    lost.append(_count(without, "{} not written: nothing of it has a place", "sighting"))
+    lost.append(_count(without, "{} not written: the format holds neither of their shapes", "sighting"))
     if not holds >= _SIGHTING:
         lost.append(_count(sum(not t.sightings for t in labels.tracks), "{} without sightings not written", "track"))
     if "cuboids" in missing:
-        lost.append(_count(sum(s.cuboid is not None for s in sightings), "{} not written: no place for them", "cuboid"))
+        lost.append(
+            _count(
+                sum(s.cuboid is not None for s in sightings), "{} not written: the format cannot hold them", "cuboid"
+            )
+        )
     if "boxes" in missing:
-        lost.append(_count(sum(s.bbox is not None for s in sightings), "{} of pictures not written: no place", "box"))
+        lost.append(
+            _count(
+                sum(s.bbox is not None for s in sightings),
+                "{} in pictures not written: the format cannot hold them",
+                "box",
+            )
+        )
     if "identities" in missing:
         lost.append(_count(sum(len(t.sightings) > 1 for t in labels.tracks), "{} lose their identity", "track"))
-        lost.append("" if not labels.tracks else "the tracks' numbers are not written: no place for them")
+        lost.append("" if not labels.tracks else "the tracks' numbers are not written: the format cannot hold them")
     if "keyframes" in missing:
-        lost.append(_count(sum(not s.keyframe for s in sightings), "{} not told from keyframes", "interpolated place"))
+        lost.append(
+            _count(sum(not s.keyframe for s in sightings), "{} written like keyframes", "interpolated position")
+        )
     return lost + _lost_marks(labels, missing)
 
 
 def _lost_marks(labels: LabelSet, missing: frozenset[Part]) -> list[str]:
     states, lost = [each.state for each in _marked(labels)], []
     if "states" in missing:
-        lost.append(_count(states.count("rejected"), "{} left out: rejected, which it cannot say", "label"))
-        lost.append(_count(states.count("proposed"), "{} written as if true: nobody has looked at it yet", "label"))
-        lost.append(_count(states.count("corrected"), "{} not told from accepted ones", "corrected label"))
+        lost.append(
+            _count(states.count("rejected"), "{} left out: rejected, and the format has no such state", "label")
+        )
+        lost.append(
+            _count(states.count("proposed"), "{} written as if accepted: nobody has reviewed them yet", "label")
+        )
+        lost.append(_count(states.count("corrected"), "{} written like accepted ones", "corrected label"))
     if "origins" in missing and (labels.tracks or labels.leads):
         lost.append("who made each label, when and with which parameters is not written")
     if "name" in missing and labels.name != "working":

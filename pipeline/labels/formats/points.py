@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from pipeline.common.geometry import Cuboid
-from pipeline.labels.formats.base import Drive
+from pipeline.labels.formats.base import LabeledDrive
 from pipeline.labels.model import LabelSet
 from pipeline.types import F32, F64, I64
 
@@ -19,7 +19,7 @@ _TOGETHER = 16
 """Frames that a reader takes at once: neighbours lie in one chunk of a session, which is then unpacked once."""
 
 
-def points_inside(labels: LabelSet, drive: Drive) -> dict[tuple[int, int], int]:
+def points_inside(labels: LabelSet, drive: LabeledDrive) -> dict[tuple[int, int], int]:
     """(track, frame) → points in the cuboid; frames without a LiDAR have none."""
     by_frame: dict[int, list[tuple[int, Cuboid]]] = {}
     for track in labels.tracks:

@@ -18,7 +18,7 @@ def read_bytes(path: Path) -> bytes:
     """The whole file. BadInput when it cannot be read, or is larger than any labels are."""
     try:
         if path.stat().st_size > _LARGEST_BYTES:
-            raise BadInput(f"{path}: larger than 1 GiB; these are no labels")
+            raise BadInput(f"{path}: larger than 1 GiB; this is not a label file")
         return path.read_bytes()
     except (OSError, ValueError) as error:
         raise BadInput(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
@@ -30,7 +30,7 @@ def parse_json(data: bytes, what: str) -> Any:
         return json.loads(data.decode("utf-8"), parse_constant=_refuse)
     except (ValueError, RecursionError) as error:
         reason = "nested too deep" if isinstance(error, RecursionError) else str(error)
-        raise BadInput(f"{what}: no JSON: {reason}") from None
+        raise BadInput(f"{what}: not JSON: {reason}") from None
 
 
 def parse_as(adapter: TypeAdapter[T], data: bytes, what: str) -> T:
@@ -51,4 +51,4 @@ def fit(adapter: TypeAdapter[T], value: Any, what: str) -> T:
 
 
 def _refuse(word: str) -> Any:
-    raise ValueError(f"{word} is no number")
+    raise ValueError(f"{word} is not a number")

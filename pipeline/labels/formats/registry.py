@@ -1,63 +1,115 @@
-"""Every format by name, and the two things that are done with one."""
+"""Every format of labels, declared once, and the two things that are done with one.
+
+A new format is one file with ``write`` and ``read``, and one entry in ``FORMATS``: the commands' ``--format``, the API
+and the page list what is here. Nothing of a format is imported before it is used.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 from pipeline.common.errors import BadInput
 from pipeline.common.garbage_collection import gc_paused
-from pipeline.labels.formats import (
-    coco,
-    kitti,
-    lead_csv,
-    native,
-    nuscenes,
-    nuscenes_read,
-    openlabel,
-    openlabel_read,
-    session,
-)
-from pipeline.labels.formats.base import Drive, Format, FormatName, Imported, check_extrinsic
+from pipeline.labels.formats.base import Imported, LabeledDrive, Read, Write, check_extrinsic
 from pipeline.labels.formats.parts import EVERYTHING, Part, reduce
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.labels.validate import check
 
+
+@dataclass(frozen=True)
+class Format:
+    """One kind of file or folder that holds labels."""
+
+    name: str
+    """As commands, the API and stored choices call it."""
+    title: str
+    """As people call it."""
+    about: str
+    """What it is, in a few words."""
+    suffix: str
+    """Of the file; empty where the format is a folder, which is sent and taken as a .zip."""
+    holds: frozenset[Part]
+    """What it has a place for; the rest of a label set is left out, and said."""
+    writer: str
+    """``module:function`` that writes labels, see ``base.Write``."""
+    reader: str
+    """``module:function`` that reads them back, see ``base.Read``."""
+
+    def write(self, labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
+        """Write labels that hold nothing but what the format can. Returns sentences about what was written otherwise
+        than it was."""
+        write: Write = _imported(self.writer)
+        return write(labels, drive, out)
+
+    def read(self, path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
+        """Read the file or folder; ``origin`` is taken where the file does not say who made a label. BadInput in one
+        sentence when it cannot be read."""
+        read: Read = _imported(self.reader)
+        return read(path, drive, origin)
+
+
+def _imported(name: str) -> Any:
+    module, _, function = name.partition(":")
+    return getattr(import_module(module), function)
+
+
+_OURS = "pipeline.labels.formats"
 _SHAPES: frozenset[Part] = frozenset(("cuboids", "boxes"))
 _TRACKED: frozenset[Part] = frozenset(("cuboids", "identities"))
 _BOXES: frozenset[Part] = frozenset(("boxes", "identities"))
 _LEADS: frozenset[Part] = frozenset(("leads", "states", "origins", "comments", "reviews"))
 
-FORMATS: dict[FormatName, Format] = {
+FORMATS: dict[str, Format] = {
     each.name: each
     for each in (
-        Format("native", EVERYTHING, native.write, native.read),
-        Format("mcap", EVERYTHING, session.write, session.read),
-        Format("openlabel", EVERYTHING, openlabel.write, openlabel_read.read),
-        Format("kitti", _SHAPES, kitti.write_objects, kitti.read_objects),
-        Format("kitti-tracking", _SHAPES | {"identities"}, kitti.write_tracking, kitti.read_tracking),
-        Format("nuscenes", _TRACKED, nuscenes.write, nuscenes_read.read),
-        Format("coco", _BOXES, coco.write, coco.read),
-        Format("csv", _LEADS, lead_csv.write, lead_csv.read),
+        Format("native", "CIPV Studio", "all labels", ".json", EVERYTHING,
+               f"{_OURS}.native:write", f"{_OURS}.native:read"),
+        Format("mcap", "MCAP session", "labels as a channel", ".mcap", EVERYTHING,
+               f"{_OURS}.session:write", f"{_OURS}.session:read"),
+        Format("openlabel", "OpenLABEL", "ASAM OpenLABEL 1.0", ".json", EVERYTHING,
+               f"{_OURS}.openlabel.write:write", f"{_OURS}.openlabel.read:read"),
+        Format("nuscenes", "nuScenes", "JSON tables", "", _TRACKED,
+               f"{_OURS}.nuscenes.write:write", f"{_OURS}.nuscenes.read:read"),
+        Format("kitti", "KITTI object", "one file per frame", "", _SHAPES,
+               f"{_OURS}.kitti.files:write_objects", f"{_OURS}.kitti.files:read_objects"),
+        Format("kitti-tracking", "KITTI tracking", "single file", "", _SHAPES | {"identities"},
+               f"{_OURS}.kitti.files:write_tracking", f"{_OURS}.kitti.files:read_tracking"),
+        Format("coco", "COCO", "image boxes", ".json", _BOXES,
+               f"{_OURS}.coco:write", f"{_OURS}.coco:read"),
+        Format("csv", "CSV", "lead per frame", ".csv", _LEADS,
+               f"{_OURS}.lead_csv:write", f"{_OURS}.lead_csv:read"),
     )
-}
+}  # fmt: skip
+"""By name, in the order in which the page lists them."""
+
+if TYPE_CHECKING:
+    FormatName = str
+else:
+    FormatName = Literal[tuple(FORMATS)]
+"""The names as a type, for the choices of commands and of the API."""
 
 
-def export_labels(labels: LabelSet, drive: Drive, name: FormatName, out: Path) -> tuple[str, ...]:
+def export_labels(labels: LabelSet, drive: LabeledDrive, name: FormatName, out: Path) -> tuple[str, ...]:
     """Write labels of a drive as a new file or folder. Returns a sentence for each thing that the format cannot hold.
 
-    BadInput when the labels are of another recording or cannot be, when ``out`` exists, or when the format needs what
-    the recording has not (KITTI: a camera).
+    BadInput when the labels are of another recording or are not valid, when ``out`` exists, or when the format needs
+    what the recording does not have (KITTI: a camera).
     """
+    from pipeline.labels.formats.native import onto  # pydantic's adapter of a whole label set
+
     kind = FORMATS[name]
     with gc_paused():
-        placed = native.onto(check(labels, "these labels"), drive, "these labels")
+        placed = onto(check(labels, "these labels"), drive, "these labels")
         kept, lost = reduce(placed.labels, kind.holds)
         return (*placed.notes, *lost, *kind.write(kept, drive, out))
 
 
-def import_labels(path: Path, drive: Drive, name: FormatName, origin: Origin) -> Imported:
-    """Read a file or folder as labels of a drive. BadInput in one sentence when it is none, or not of this drive."""
+def import_labels(path: Path, drive: LabeledDrive, name: FormatName, origin: Origin) -> Imported:
+    """Read a file or folder as labels of a drive. BadInput in one sentence when it is not a file of this format, or not
+    of this drive."""
     kind = FORMATS[name]
     if not path.exists():
         raise BadInput(f"{path}: no such file")

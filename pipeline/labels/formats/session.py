@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.common.errors import BadInput
-from pipeline.labels.formats.base import Drive, Imported
+from pipeline.labels.formats.base import Imported, LabeledDrive
 from pipeline.labels.formats.native import from_json, onto, to_json
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.sources import open_source
 
 
-def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
+def write(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
     """The whole recording as a new session, with these labels in place of any that it had."""
     from pipeline.recording.save import save  # half a second of imports: only who writes a session pays
 
@@ -20,9 +20,9 @@ def write(labels: LabelSet, drive: Drive, out: Path) -> tuple[str, ...]:
     return ()
 
 
-def read(path: Path, drive: Drive, origin: Origin) -> Imported:
+def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     """Of this session, a clip of it, or one that it is a clip of. BadInput when there are no labels in it."""
-    from pipeline.recording.session_source import SessionSource
+    from pipeline.recording.session.source import SessionSource
 
     session = SessionSource(str(path), str(path))
     try:

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.simulation.drawing.canvas import Canvas
 from pipeline.simulation.world.lines import Line
 from pipeline.simulation.world.roads import Crossing, Road
-from pipeline.simulation.world.world import LIDAR_HEIGHT_M, World
+from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
 from pipeline.types import F64
 
 _GRASS = (66, 118, 92)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.simulation.drawing.canvas import Canvas, Colour, Ints, Point
 from pipeline.simulation.world.roadside import RAIL_HIGH_M, RAIL_LOW_M, Thing
-from pipeline.simulation.world.world import LIDAR_HEIGHT_M
+from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M
 from pipeline.types import F64
 
 _GREENS = np.array([[46.0, 92.0, 60.0], [52.0, 112.0, 84.0], [44.0, 104.0, 96.0], [58.0, 98.0, 58.0]])

@@ -18,7 +18,7 @@ from pipeline.simulation.drawing.roadside_shapes import add_thing
 from pipeline.simulation.drawing.vehicle_meshes import mesh
 from pipeline.simulation.world.roads import Road
 from pipeline.simulation.world.roadside import Roadside
-from pipeline.simulation.world.world import LIDAR_HEIGHT_M, ActorState, World
+from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, ActorState, World
 from pipeline.types import U8, CameraCalibration
 
 WIDTH, HEIGHT, DIAGONAL_FOV_DEG = 1280, 720, 78.0

@@ -37,7 +37,7 @@ class LineNoise(Strict):
 
 
 class Detections(Strict):
-    """Vehicles and lane lines, with their errors; null: none are looked for."""
+    """Vehicles and lane lines, with their errors; None: none are looked for."""
 
     boxes: BoxNoise | None = None
     lines: LineNoise | None = None

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.simulation.sensors.gnss_model import GnssModel
-from pipeline.simulation.world.world import World
+from pipeline.simulation.world.world_state import World
 from pipeline.types import F64, GnssFix
 
 _A_M, _F = 6_378_137.0, 1.0 / 298.257223563

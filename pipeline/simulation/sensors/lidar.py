@@ -22,7 +22,7 @@ from pipeline.simulation.sensors.lidar_model import VLP16, LidarModel
 from pipeline.simulation.sensors.lidar_rays import CHANNELS, COLUMNS_PER_RAD, Ints, cast, directions, firing_times_s
 from pipeline.simulation.sensors.lidar_scene import MATERIALS, MAX_RANGE_M, ROAD, scene_boxes
 from pipeline.simulation.world.roadside import Roadside
-from pipeline.simulation.world.world import LIDAR_HEIGHT_M, World
+from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
 from pipeline.types import F32, F64, Sweep
 
 _LEVEL_ROAD = np.array([-LIDAR_HEIGHT_M, 0.0, 0.0])

@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.simulation.sensors.lidar_rays import BOX_FIELDS
-from pipeline.simulation.world.actors import Kind
+from pipeline.simulation.world.actors import VehicleKind
 from pipeline.simulation.world.roadside import Roadside, Thing
-from pipeline.simulation.world.world import LIDAR_HEIGHT_M, ActorState, World
+from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, ActorState, World
 from pipeline.types import F64
 
 MAX_RANGE_M = 100.0
@@ -31,7 +31,7 @@ _DARKEST = 0.35
 
 # The top of bonnet and boot lid slopes and sends light away as glass does.
 # along the length: middle and extent; extent across; from and to height: shares of the vehicle's size; material
-_PARTS: dict[Kind, tuple[tuple[float, float, float, float, float, int], ...]] = {
+_PARTS: dict[VehicleKind, tuple[tuple[float, float, float, float, float, int], ...]] = {
     "car": (
         (0.0, 1.0, 1.0, 0.17, 0.66, PAINT),
         (0.0, 0.98, 0.98, 0.66, 0.70, GLASS),

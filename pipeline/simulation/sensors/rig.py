@@ -1,4 +1,4 @@
-"""The ego vehicle's sensors in one scenario: any moment of the world as the ``Frame`` that the line takes.
+"""The ego vehicle's sensors in one scenario: any moment of the world as the ``Frame`` that the pipeline takes.
 
 Recorded drives and closed loops see the world through this one place, so both see the same.
 """
@@ -16,7 +16,7 @@ from pipeline.simulation.sensors.camera import DrawnCamera, calibration
 from pipeline.simulation.sensors.lidar import Lidar
 from pipeline.simulation.world.planned_route import planned_route
 from pipeline.simulation.world.roadside import Roadside
-from pipeline.simulation.world.world import World
+from pipeline.simulation.world.world_state import World
 from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Route, Sweep
 
 _BEFORE_M, _BEYOND_M = 100.0, 600.0

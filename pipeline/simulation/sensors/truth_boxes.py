@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.alignment.projection import Pinhole, project_cuboid
 from pipeline.simulation.sensors.detection_model import BoxNoise
 from pipeline.simulation.world.actors import SIZES_M
-from pipeline.simulation.world.world import ActorState, World
+from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.types import F64, Box, CameraCalibration, DistanceLaw, RawBoxes
 
 LABELS = {"car": "car", "van": "car", "truck": "truck", "bus": "bus", "motorcycle": "motorcycle"}

@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.alignment.projection import Pinhole
 from pipeline.simulation.sensors.detection_model import LineNoise
 from pipeline.simulation.world.roads import Road
-from pipeline.simulation.world.world import LIDAR_HEIGHT_M, World
+from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
 from pipeline.types import CameraCalibration, RawLanes
 
 _FROM_M, _STEP_M = 4.0, 0.5

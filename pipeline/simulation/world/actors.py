@@ -14,7 +14,7 @@ from pydantic import Field, field_validator, model_validator
 from pipeline.simulation.world.roads import Road, Strict
 
 Extent = Annotated[float, Field(ge=0.3, le=30.0)]
-Kind = Literal["car", "van", "truck", "bus", "motorcycle"]
+VehicleKind = Literal["car", "van", "truck", "bus", "motorcycle"]
 SIZES_M: dict[str, tuple[float, float, float]] = {
     "car": (4.5, 1.82, 1.48),
     "van": (5.3, 2.0, 2.05),
@@ -22,8 +22,8 @@ SIZES_M: dict[str, tuple[float, float, float]] = {
     "bus": (11.5, 2.5, 3.1),
     "motorcycle": (2.2, 0.8, 1.45),
 }
-"""Length, width and height of each kind as it is simulated. These are not ``pipeline.fusion.vehicle_sizes``, which
-the line takes for what it has not measured: a drive in which the two were equal would flatter it."""
+"""Length, width and height of each kind as simulated, in metres. Deliberately not ``pipeline.fusion.vehicle_sizes``,
+which the pipeline assumes for what it has not measured: equal values would flatter it."""
 
 
 _SLOPE_S = 0.05
@@ -109,10 +109,10 @@ class Script(Speeds):
 
 
 class Vehicle(Strict):
-    """What a vehicle is. size_m: length, width, height; null takes the kind's usual size."""
+    """What a vehicle is. size_m: length, width, height; None takes the kind's usual size."""
 
     id: int = Field(ge=1)
-    kind: Kind
+    kind: VehicleKind
     colour: str = Field(default="#8090a0", pattern="^#[0-9a-fA-F]{6}$")
     size_m: tuple[Extent, Extent, Extent] | None = None
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import gnss
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.types import Route
 
 SIGMA_M = 0.02
@@ -18,7 +18,7 @@ def planned_route(scenario: Scenario) -> Route:
     """Along the ego lane from 40 m behind the start to 400 m beyond the script's end, lane changes where the script has
     them."""
     alone = scenario.model_copy(update={"actors": (), "crossing_actors": ()})
-    drive = [world.at(alone, t) for t in np.arange(0.0, scenario.duration_s + _STEP_S, _STEP_S).tolist()]
+    drive = [world_state.at(alone, t) for t in np.arange(0.0, scenario.duration_s + _STEP_S, _STEP_S).tolist()]
     s, d = np.array([[now.s_m, now.d_m] for now in drive]).T
     at = np.arange(s[0] - _BEFORE_M, s[-1] + _BEYOND_M, _SPACING_M)
     forward = np.concatenate([[True], np.diff(np.maximum.accumulate(s)) > 0.0])

@@ -51,7 +51,7 @@ class Segment(Strict):
         rest = {key: value for key, value in given.items() if key != "radius_m"}
         radius = given["radius_m"]
         if "curvature_per_m" in rest:
-            raise ValueError("radius_m and curvature_per_m say the same thing; keep one")
+            raise ValueError("give radius_m or curvature_per_m, not both")
         if not isinstance(radius, int | float) or isinstance(radius, bool) or not abs(radius) >= 5.0:
             raise ValueError("radius_m must be a number of at least 5 (to the left) or at most −5 (to the right)")
         return {**rest, "curvature_per_m": 1.0 / radius}

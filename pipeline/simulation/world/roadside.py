@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.simulation.world.roads import Road
-from pipeline.simulation.world.world import World
+from pipeline.simulation.world.world_state import World
 from pipeline.types import F64
 
 ThingKind = Literal["rail", "post", "tree", "building", "gantry_leg", "gantry_sign"]

@@ -1,0 +1,1 @@
+"""Live sensors: devices read as they deliver, synchronised into ticks."""

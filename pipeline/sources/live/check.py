@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
+from pipeline.sources.live.devices.lidar import LidarInput
 from pipeline.sources.live.gnss_motion import yaw_rate_lag_s
-from pipeline.sources.live.lidar import LidarInput
 from pipeline.sources.live.source import LiveSensors
 from pipeline.types import StreamHealth
 
@@ -19,9 +19,9 @@ _ENOUGH_HZ = 5.0
 @dataclass(frozen=True)
 class SensorReport:
     """clock_offset_ms: host time less the sensor's, the shortest delay on the way included; of a VLP-16, which counts
-    from the full hour, at most half an hour either way; null where the sensor sends no time. pps: what the LiDAR says
-    of the pulse per second; null where it says nothing. skew_ms: median of picture less sweep, over the ticks. cost:
-    what it costs that a receiver whose speed is the own speed sends so seldom; null where it costs nothing."""
+    from the full hour, at most half an hour either way; None where the sensor sends no time. pps: what the LiDAR says
+    of the pulse per second; None where it says nothing. skew_ms: median of picture less sweep, over the ticks. cost:
+    what it costs that a receiver whose speed is the own speed sends so seldom; None where it costs nothing."""
 
     health: StreamHealth
     clock_offset_ms: float | None = None

@@ -43,7 +43,7 @@ class FollowedClock:
 
     @property
     def offset_ms(self) -> float | None:
-        """Host time less the sensor's, the shortest delay on the way included; null before the first message."""
+        """Host time less the sensor's, the shortest delay on the way included; None before the first message."""
         return None if self._own.offset_ns is None else self._own.offset_ns / 1e6
 
     def to_host_ns(self, stamp_ns: int, arrived_ns: int) -> int:

@@ -171,7 +171,7 @@ class LiveConfig(Strict):
     @model_validator(mode="after")
     def _check(self) -> LiveConfig:
         if self.lidar is None and self.camera is None:
-            raise ValueError("neither lidar nor camera: nothing to look with")
+            raise ValueError("neither lidar nor camera: at least one is needed")
         if self.ego is not None and self.ego.source == "gnss" and self.gnss is None:
             raise ValueError("ego takes its speed from gnss, but there is no gnss")
         return self

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 TEMPLATE = """\
-# The sensors of one car. Leave out what the car does not have; `cipv live check FILE` tests each one.
-# The ego frame is x forward, y left, z up, in metres from the LiDAR (without one: from where the camera's mount says).
+# The sensors of one car. Delete what the car does not have; `cipv live check FILE` tests each sensor.
+# The ego frame is x forward, y left, z up, in metres from the LiDAR; without a LiDAR, the camera's mount defines it.
 title: My car
 
 lidar:                      # Velodyne on the network
   model: VLP-16
   data_port: 2368
-  position_port: 8308       # PPS and GPS state; null where it is not sent
-  interface: 0.0.0.0        # address of the network card; 0.0.0.0 listens on all
+  position_port: 8308       # PPS and GPS state; null if the sensor does not send it
+  interface: 0.0.0.0        # address of the network interface; 0.0.0.0 listens on all
   multicast_group: null     # for example 239.0.0.1 when the sensor sends to a group
-  time_offset_ms: 0         # added to its times
-  mount:                    # how it is tilted: points are levelled with this
+  time_offset_ms: 0         # added to its time stamps
+  mount:                    # pose of the sensor; points are levelled with it
     x_m: 0.0
     y_m: 0.0
     z_m: 0.0
@@ -23,11 +23,11 @@ lidar:                      # Velodyne on the network
     yaw_deg: 0.0            # positive looks left
 
 camera:                     # exactly one of device, url, file
-  url: http://192.168.1.20:8080/video   # MJPEG or RTSP (rtsp://…); its JPEGs are kept as they come
-  # device: 0               # a camera plugged in; better its path below /dev/v4l/by-id/, which stays its own
-  # file: drive.mp4         # a video played in a loop, to try things out
-  time_offset_ms: 0         # added to its times; without a stamp of its own, minus the time from exposure to arrival
-  calibration:              # without it LiDAR and camera are not fused
+  url: http://192.168.1.20:8080/video   # MJPEG or RTSP (rtsp://…); JPEGs are stored unchanged
+  # device: 0               # a local camera; its path below /dev/v4l/by-id/ is more stable than a number
+  # file: drive.mp4         # a video played in a loop, for trials
+  time_offset_ms: 0         # added to its time stamps; for a camera without stamps, minus its latency
+  calibration:              # without it, LiDAR and camera are not fused
     fx_px: 907.0
     fy_px: 907.0
     cx_px: 640.0
@@ -37,7 +37,7 @@ camera:                     # exactly one of device, url, file
     distortion: []          # k1 k2 p1 p2 [k3 [k4 k5 k6]], as OpenCV gives them
     mount: {x_m: -1.5, y_m: 0.0, z_m: 0.9, roll_deg: 0.0, pitch_deg: 0.0, yaw_deg: 0.0}
 
-gnss:                       # NMEA (GGA, RMC, GST if it is there), best 5 a second; exactly one of serial, tcp, udp_port
+gnss:                       # NMEA (GGA, RMC, optionally GST), preferably at 5 Hz; exactly one of serial, tcp, udp_port
   serial: /dev/ttyACM0
   baud: 115200
   # tcp: 192.168.1.30:9001
@@ -45,14 +45,14 @@ gnss:                       # NMEA (GGA, RMC, GST if it is there), best 5 a seco
   # interface: 0.0.0.0      # for udp_port
   time_offset_ms: 0
 
-ego:                        # own speed and yaw rate
+ego:                        # ego speed and yaw rate
   source: gnss              # gnss, or can with the lines below
   time_offset_ms: 0
   # can:
-  #   interface: socketcan  # any of python-can's
+  #   interface: socketcan  # any interface of python-can
   #   channel: can0
   #   bitrate: 500000
   #   dbc: car.dbc
-  #   speed_mps: {message: WHEEL_SPEEDS, signal: SPEED, factor: 0.27778}        # here km/h in the DBC
-  #   yaw_rate_radps: {message: GYRO, signal: YAW_RATE, factor: 0.0174533}      # here °/s to the left
+  #   speed_mps: {message: WHEEL_SPEEDS, signal: SPEED, factor: 0.27778}        # when the DBC has km/h
+  #   yaw_rate_radps: {message: GYRO, signal: YAW_RATE, factor: 0.0174533}      # when the DBC has °/s to the left
 """

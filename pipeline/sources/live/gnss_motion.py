@@ -24,7 +24,7 @@ class MotionFromGnss:
         self._courses: deque[tuple[int, float]] = deque()
 
     def push(self, fix: GnssFix) -> EgoState:
-        """Speed as measured; the yaw rate (left positive) once there is course for it, else null."""
+        """Speed as measured; the yaw rate (left positive) once there is course for it, else None."""
         courses = self._courses
         if courses and not 0 < fix.t_ns - courses[-1][0] <= _LONGEST_NS:
             courses.clear()
@@ -38,13 +38,13 @@ class MotionFromGnss:
 
 
 def yaw_rate_lag_s(rate_hz: float) -> float | None:
-    """By how much the yaw rate lags behind the car, of a receiver that sends so often; null where it is never known."""
+    """By how much the yaw rate lags behind the car, of a receiver that sends so often; None where it is never known."""
     span_s = ceil(_SPAN_NS / 1e9 * rate_hz - 1e-3) / rate_hz
     return span_s / 2.0 if span_s <= _LONGEST_NS / 1e9 else None
 
 
 def _turning_left_radps(courses: list[tuple[int, float]]) -> float | None:
-    """Slope of the line through (t_ns, course clockwise from north), its sign turned; null where it is too short."""
+    """Slope of the line through (t_ns, course clockwise from north), its sign turned; None where it is too short."""
     if not courses or courses[-1][0] - courses[0][0] < _SPAN_NS:
         return None
     t_s = np.array([(t - courses[0][0]) / 1e9 for t, _ in courses])

@@ -38,16 +38,16 @@ class StreamStats:
         self._newest_ns = t_ns
 
     def since_ns(self, now_ns: int) -> int | None:
-        """How long ago the last message came; null before the first."""
+        """How long ago the last message came; None before the first."""
         return now_ns - self._arrived[-1] if self._arrived else None
 
     def period_ns(self) -> int | None:
-        """Middle of the last gaps between messages; null until enough came."""
+        """Middle of the last gaps between messages; None until enough came."""
         times = np.array(list(self._arrived)[-16:])
         return int(np.median(np.diff(times))) if len(times) >= _FEWEST else None
 
     def health(self, now_ns: int) -> StreamHealth:
-        """As of now. Rate and jitter are over the last three seconds and null while fewer than three messages came in
+        """As of now. Rate and jitter are over the last three seconds and None while fewer than three messages came in
         them; jitter is the standard deviation of the gaps between arrivals."""
         arrived = list(self._arrived)  # at once: a reader's thread may add to it meanwhile
         times = np.array([t for t in arrived if now_ns - t <= _WINDOW_NS], dtype=np.int64)

@@ -1,7 +1,7 @@
 """``live:<config.yaml>``: the sensors of one car as a source of ticks, the newest only.
 
 Readers' threads put what comes into the synchroniser; whoever wants a frame takes the newest tick out of it. There is
-no queue between them, so what is shown is never older than the sensors and the line make it.
+no queue between them, so what is shown is never older than the sensors and the pipeline make it.
 """
 
 from __future__ import annotations
@@ -12,25 +12,30 @@ from dataclasses import replace
 from typing import TypeVar
 
 from pipeline.params import SyncParams
-from pipeline.sources.live.camera import CameraInput
-from pipeline.sources.live.can import CanInput
 from pipeline.sources.live.clock import HostClock
-from pipeline.sources.live.config import LiveConfig
-from pipeline.sources.live.gnss import GnssInput
+from pipeline.sources.live.config import LiveConfig, load
+from pipeline.sources.live.devices.camera import CameraInput
+from pipeline.sources.live.devices.can import CanInput
+from pipeline.sources.live.devices.gnss import GnssInput
+from pipeline.sources.live.devices.lidar import LidarInput
+from pipeline.sources.live.devices.sensor_input import Input
 from pipeline.sources.live.gnss_motion import MotionFromGnss
 from pipeline.sources.live.health import StreamStats, not_delivering
-from pipeline.sources.live.lidar import LidarInput
-from pipeline.sources.live.sensor_input import Input
 from pipeline.sources.live.sync import Stream, Synchroniser, Together
 from pipeline.sources.rig import calibration_for
 from pipeline.types import F64, EgoState, Frame, GnssFix, Picture, StreamHealth, Sweep
 from pipeline.types.camera_shot import Shot
-from pipeline.types.source import Tap
+from pipeline.types.source import Opening, Tap
 
 T = TypeVar("T")
 
 _LOOK_AGAIN_S = 0.005
 """How often a tick that waits for its picture, or for the LiDAR's silence, is looked at when nothing arrives."""
+
+
+def open_sensors(uri: str, rest: str, how: Opening) -> LiveSensors:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when the config file cannot be used."""
+    return LiveSensors(uri, load(rest))
 
 
 class LiveSensors:
@@ -94,19 +99,19 @@ class LiveSensors:
 
     @property
     def lidar_mount(self) -> tuple[F64, int] | None:
-        """T_ego_lidar (4, 4) and what is added to the LiDAR's stamps in ns; null when there is none."""
+        """T_ego_lidar (4, 4) and what is added to the LiDAR's stamps in ns; None when there is none."""
         lidar = self.inputs.get("lidar")
         return (lidar.T_ego_lidar, lidar.offset_ns) if isinstance(lidar, LidarInput) else None
 
     def tap(self, tap: Tap | None) -> None:
-        """Have what comes told from now on; null ends that. What is told twice or at an impossible time is not."""
+        """Have what comes told from now on; None ends that. What is told twice or at an impossible time is not."""
         self._tap = tap
         lidar = self.inputs.get("lidar")
         if isinstance(lidar, LidarInput):
             lidar.on_packet = tap.packet if tap is not None else None
 
     def next(self, timeout_s: float, params: SyncParams | None = None) -> Frame | None:
-        """The newest tick not given yet; null when none came in time."""
+        """The newest tick not given yet; None when none came in time."""
         together = self._wait(timeout_s, params or SyncParams())
         return self._frame(together) if together is not None else None
 
@@ -209,11 +214,11 @@ def _about(config: LiveConfig) -> tuple[str, ...]:
     """What a person should know about this set of sensors."""
     notes = []
     if config.lidar is None:
-        notes.append("no LiDAR: the camera ticks")
+        notes.append("no LiDAR: frames follow the camera")
     if config.camera is None:
-        notes.append("no camera: LiDAR goes on alone")
+        notes.append("no camera: the pipeline runs on LiDAR alone")
     elif config.camera.calibration is None:
         notes.append("the camera has no calibration: LiDAR and camera are not fused")
     if config.ego is None:
-        notes.append("no own speed: neither gnss nor CAN gives it")
+        notes.append("no ego speed: neither gnss nor can provides it")
     return tuple(notes)

@@ -74,7 +74,7 @@ class Stream(Generic[T]):
         return min(reversed(around), key=lambda item: abs(item.t_ns - t_ns), default=None)
 
     def period_ns(self) -> int | None:
-        """The usual step from one message to the next; null while there is one at most."""
+        """The usual step from one message to the next; None while there is one at most."""
         steps = sorted(later.t_ns - earlier.t_ns for earlier, later in pairwise(self._kept))
         return steps[len(steps) // 2] if steps else None
 
@@ -107,7 +107,7 @@ class Synchroniser(Generic[P]):
         self._taken = (0, 0)
 
     def tick(self, now_ns: int, params: SyncParams) -> Together[P] | None:
-        """The newest tick not given yet; null when there is none, or its picture is still on the way."""
+        """The newest tick not given yet; None when there is none, or its picture is still on the way."""
         sweep = self._newer(self.sweeps.newest())
         if sweep is not None:
             if self._picture_is_coming(sweep, now_ns, params):
@@ -179,7 +179,7 @@ class Synchroniser(Generic[P]):
 
 
 def _own_motion_at(stream: Stream[T], t_ns: int, offset_ms: float) -> T | None:
-    """What a speedometer or receiver said nearest to a moment; null when that is further away than it holds."""
+    """What a speedometer or receiver said nearest to a moment; None when that is further away than it holds."""
     at_ns = t_ns - round(offset_ms * 1e6)
     item = stream.nearest(at_ns)
     return item.value if item is not None and abs(item.t_ns - at_ns) <= _holds_for_ns(stream.period_ns()) else None

@@ -60,7 +60,7 @@ class _Section(NamedTuple):
 
 
 class Capture:
-    """One file. size: in bytes. damage: why reading ended before the file did, null while it has not."""
+    """One file. size: in bytes. damage: why reading ended before the file did, None while it has not."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -174,7 +174,7 @@ def _resolution_ns(options: bytes, order: str) -> float | int:
 
 
 def _udp(data: bytes, link: int) -> tuple[int, bytes] | None:
-    """(destination port, payload) of a frame that holds one whole UDP datagram; null when it does not."""
+    """(destination port, payload) of a frame that holds one whole UDP datagram; None when it does not."""
     at = _LINK_BYTES.get(link)
     if at is None or len(data) < at + 28:
         return None

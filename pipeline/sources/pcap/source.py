@@ -30,7 +30,7 @@ from pipeline.sources.pcap.capture import Capture, Datagram
 from pipeline.sources.sidecar_files import OPTIONS, Beside, rig_of
 from pipeline.sources.uri_options import number_option, split_options
 from pipeline.types import F64, Frame, GnssFix, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _DATA_PORT = 2368
 _LOOK_AT = 2000
@@ -38,6 +38,11 @@ _LOOK_AT = 2000
 _TELL_EVERY = 4 << 20
 """Bytes between two words of progress."""
 _NMEA = slice(0xCA, 0x14E)  # PPS state and sentence of a position packet
+
+
+def open_recording(uri: str, rest: str, how: Opening) -> PcapSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return PcapSource(uri, rest, how.progress)
 
 
 class PcapSource:
@@ -160,7 +165,7 @@ class _Index:
         """Why there is no sweep in it."""
         counts = self._cutter.counts
         if counts.models:
-            return f"packets of another Velodyne, {counts.models.most_common(1)[0][0]}; only the VLP-16 is read"
+            return f"packets of a Velodyne {counts.models.most_common(1)[0][0]}; only the VLP-16 is supported"
         says = [f"no whole sweep in {counts.packets} packets to port {port}"] if counts.packets else []
         says = says or [f"no packets of a VLP-16 to port {port} in it"]
         says += [counts.about_refused()] if counts.refused else []

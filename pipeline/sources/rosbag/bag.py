@@ -71,11 +71,11 @@ def bag_path(path: str) -> Path:
         if not bag.exists():
             raise SourceError(f"{path}: no such file or folder")
         if bag.is_dir() and not (bag / "metadata.yaml").is_file():
-            raise SourceError(f"{path}: no ROS 2 bag: no metadata.yaml in it")
+            raise SourceError(f"{path}: not a ROS 2 bag: it has no metadata.yaml")
     except (OSError, RuntimeError, ValueError) as error:
         raise SourceError(f"{path}: cannot be opened: {_in_words(error)}") from None
     if bag.is_file() and bag.suffix not in _SUFFIXES:
-        raise SourceError(f"{path}: no bag; their names end in {', '.join(_SUFFIXES)}")
+        raise SourceError(f"{path}: not a bag; file names end in {', '.join(_SUFFIXES)}")
     return bag
 
 

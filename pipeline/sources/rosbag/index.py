@@ -50,7 +50,7 @@ class Stream:
 
 
 class BagIndex:
-    """What the pass found. damage: why it ended before the bag did, null when it did not."""
+    """What the pass found. damage: why it ended before the bag did, None when it did not."""
 
     def __init__(self, bag: Bag, topics: TopicMap, progress: Progress = silent) -> None:
         self.damage: str | None = None

@@ -1,4 +1,4 @@
-"""ROS messages → what the line takes. A message that does not say what it should raises BadMessage with the reason."""
+"""ROS messages → the types of the pipeline. A message that cannot be used raises BadMessage with the reason."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ def cloud(message: Any, t_ns: int, notes: list[str]) -> Cloud:
     count, step = int(message.width) * int(message.height), int(message.point_step)
     data = np.asarray(message.data, dtype=np.uint8)
     if not 0 < step <= 4096 or count > _MAX_POINTS:
-        raise BadMessage("a cloud of an impossible size")
+        raise BadMessage("a point cloud of an invalid size")
     order = ">" if message.is_bigendian else "<"
     rows, row_step = int(message.height), int(message.row_step) or int(message.width) * step
     if row_step < int(message.width) * step or len(data) < rows * row_step:
-        raise BadMessage("a cloud that is cut off")
+        raise BadMessage("a truncated point cloud")
     packed = data[: rows * row_step].reshape(rows, row_step)[:, : int(message.width) * step].reshape(-1)
     fields = {}
     for field in message.fields:
@@ -63,7 +63,7 @@ def cloud(message: Any, t_ns: int, notes: list[str]) -> Cloud:
         if kind is not None and int(field.count) == 1 and int(field.offset) + int(kind[1]) <= step:
             fields[str(field.name)] = (order + kind, int(field.offset))
     if not fields:
-        raise BadMessage("a cloud without fields")
+        raise BadMessage("a point cloud without fields")
     dtype = np.dtype(
         {
             "names": list(fields),
@@ -103,10 +103,10 @@ def _raw_picture(message: Any, data: npt.NDArray[np.uint8]) -> U8:
     encoding = str(message.encoding).lower()
     encoding = {"8uc1": "mono8", "8uc3": "bgr8"}.get(encoding, encoding)
     if encoding != "bgr8" and encoding not in _CONVERSIONS:
-        raise BadMessage(f"pictures in {message.encoding}, which is not read")
+        raise BadMessage(f"unsupported image encoding {message.encoding}")
     channels = _CHANNELS.get(encoding, 1)
     if not (0 < width <= 16384 and 0 < height <= 16384) or step < width * channels or len(data) < height * step:
-        raise BadMessage("a picture that is cut off")
+        raise BadMessage("a truncated picture")
     pixels = data[: height * step].reshape(height, step)[:, : width * channels]
     pixels = np.ascontiguousarray(pixels).reshape((height, width, channels) if channels > 1 else (height, width))
     try:
@@ -117,7 +117,7 @@ def _raw_picture(message: Any, data: npt.NDArray[np.uint8]) -> U8:
 
 
 def fix(message: Any, t_ns: int, before: GnssFix | None) -> GnssFix | None:
-    """A NavSatFix; speed and course, which it does not say, follow from the fix before. Null without a fix."""
+    """A NavSatFix; speed and course, which it does not say, follow from the fix before. None without a fix."""
     status = int(message.status.status)
     lat_deg, lon_deg, alt_m = (float(value) for value in (message.latitude, message.longitude, message.altitude))
     if status < 0 or not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
@@ -148,5 +148,5 @@ def own_motion(message: Any, t_ns: int) -> EgoState:
     """An Odometry's forward speed and yaw rate."""
     speed_mps, yaw_rate_radps = float(message.twist.twist.linear.x), float(message.twist.twist.angular.z)
     if not (abs(speed_mps) < 200.0 and abs(yaw_rate_radps) < 10.0):
-        raise BadMessage("odometry with an impossible speed")
+        raise BadMessage("odometry with an invalid speed")
     return EgoState(t_ns, speed_mps, yaw_rate_radps)

@@ -36,7 +36,7 @@ class TransformTree:
             self._neighbours.setdefault(child, {})[parent] = inverse(T_parent_child)
 
     def find(self, target: str, source: str) -> F64 | None:
-        """T_target_source (4, 4); null when they are not connected."""
+        """T_target_source (4, 4); None when they are not connected."""
         target, source = _name(target), _name(source)
         found: dict[str, F64] = {target: np.eye(4)}
         queue = deque([target])
@@ -64,7 +64,7 @@ class TransformTree:
 def calibration(
     info: Any, tree: TransformTree, lidar: str, T_ego_lidar: F64, notes: list[str]
 ) -> CameraCalibration | None:
-    """The camera of a CameraInfo, seen from the ego frame. Null, and ``notes`` says why, when the bag does not say."""
+    """The camera of a CameraInfo, seen from the ego frame. None, and ``notes`` says why, when the bag does not say."""
     camera = _name(str(info.header.frame_id))
     T_camera_lidar = tree.find(camera, lidar)
     if T_camera_lidar is None:
@@ -101,7 +101,7 @@ def _distortion(info: Any) -> F64:
     values = np.asarray(info.d if hasattr(info, "d") else info.D, dtype=np.float64)
     lengths = _DISTORTIONS.get(str(info.distortion_model))
     if lengths is None:
-        raise SourceError(f"distortion model {info.distortion_model} is not read")
+        raise SourceError(f"distortion model {info.distortion_model} is not supported")
     if not np.any(values):
         return np.empty(0)
     if len(values) not in lengths or not np.all(np.isfinite(values)):

@@ -24,11 +24,16 @@ from pipeline.sources.rosbag.topics import ROLES, map_topics
 from pipeline.sources.sidecar_files import rig_of
 from pipeline.sources.uri_options import split_options
 from pipeline.types import CameraCalibration, EgoState, Frame, Picture, Sweep
-from pipeline.types.source import SourceError, TruthObject
+from pipeline.types.source import Opening, SourceError, TruthObject
 
 _PICTURE_WITHIN_NS = 100_000_000
 _OWN_WITHIN_NS, _FIX_WITHIN_NS = 500_000_000, 1_500_000_000
 _MESSAGES_A_SWEEP = 3
+
+
+def open_recording(uri: str, rest: str, how: Opening) -> RosbagSource:
+    """Called by name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    return RosbagSource(uri, rest, how.progress)
 
 
 class RosbagSource:
@@ -42,14 +47,14 @@ class RosbagSource:
         self._bag, self._lock = Bag(file), Lock()
         topics = map_topics(self._bag.topics, options)
         if topics.lidar is None and topics.camera is None:
-            raise SourceError(f"{path}: neither LiDAR nor pictures in it; its topics are {_listed(self._bag)}")
+            raise SourceError(f"{path}: no LiDAR and no picture topic; its topics are {_listed(self._bag)}")
         self._index = BagIndex(self._bag, topics, progress)
         self._ticks = self._ticking(path)
         notes = [topics.about(self._bag.topics), *self._about_times()]
         self._place(rig_of(file.resolve(), options), notes)
         self._own, self._fixes = self._own_motion(notes)
         if self._index.damage:
-            notes.append(f"damaged: {self._index.damage}; what lies before it is read")
+            notes.append(f"damaged: {self._index.damage}; everything before it is read")
         self.notes = tuple(notes)
         steps = np.diff(self._ticks.times_ns)
         self.rate_hz = round(1e9 / float(np.median(steps)), 2) if len(steps) and np.median(steps) > 0 else 10.0
@@ -98,9 +103,9 @@ class RosbagSource:
         counts = self._index.counts
         if counts is not None and counts.models:
             model = counts.models.most_common(1)[0][0]
-            raise SourceError(f"{path}: packets of another Velodyne, {model}; only the VLP-16 is read")
+            raise SourceError(f"{path}: packets of a Velodyne {model}; only the VLP-16 is supported")
         why = self._index.damage or (counts.about_refused() if counts is not None else "")
-        raise SourceError(f"{path}: not one whole sweep or picture in it{'; ' + why if why else ''}")
+        raise SourceError(f"{path}: no complete sweep or picture{'; ' + why if why else ''}")
 
     def _place(self, rig: rig_files.Rig, notes: list[str]) -> None:
         """Where sensors sit: by a rig file, else by what the bag says."""
@@ -121,7 +126,7 @@ class RosbagSource:
         if not own and fixes:
             follow = MotionFromGnss()
             own = [follow.push(fix) for fix in sorted(fixes, key=lambda fix: fix.t_ns)]
-            notes.append("own speed from GNSS places")
+            notes.append("ego speed from GNSS positions")
         if not own:
             notes.append("no ego speed recorded")
         return Timeline([each.t_ns for each in own], own), Timeline([fix.t_ns for fix in fixes], fixes)
@@ -130,10 +135,15 @@ class RosbagSource:
         notes = []
         for role, stream in (("LiDAR", self._index.lidar), ("camera", self._index.camera)):
             if stream is not None and stream.without_header:
-                notes.append(f"{role}: {stream.without_header} messages without a time: taken when they were recorded")
+                notes.append(
+                    f"{role}: {stream.without_header} messages without a time stamp: their recording time is used"
+                )
         counts = self._index.counts
         if counts is not None:
-            notes.append("LiDAR packets are cut behind the car; times are the sensor's own steps, set by the driver's")
+            notes.append(
+                "LiDAR packets are split into sweeps behind the car; times follow the sensor's clock, "
+                "set by the driver's stamps"
+            )
             notes += [counts.about_refused()] if counts.refused else []
             notes += [f"{counts.lost} packets lost"] if counts.lost else []
         return notes
@@ -149,7 +159,7 @@ class RosbagSource:
             message = self._message(lidar, recorded_ns, t_ns)
             if message is not None:
                 return messages.cloud(message, t_ns, notes).sweep(t_ns, self._T_ego_lidar)
-            notes.append("LiDAR: its message is not there any more")
+            notes.append("LiDAR: its message is missing")
         except (BagError, messages.BadMessage) as error:
             notes.append(f"LiDAR: {error}")
         return None
@@ -186,13 +196,13 @@ class RosbagSource:
             message = self._message(camera, int(camera.recorded_ns[index]), wanted_ns)
             if message is not None:
                 return messages.picture(message, wanted_ns)
-            notes.append("camera: its message is not there any more")
+            notes.append("camera: its message is missing")
         except (BagError, messages.BadMessage) as error:
             notes.append(f"camera: {error}")
         return None
 
     def _message(self, stream: Stream, recorded_ns: int, t_ns: int) -> Any:
-        """The message that was written then and is of that time; null when there is none. BagError when the bag is
+        """The message that was written then and is of that time; None when there is none. BagError when the bag is
         damaged there."""
         # a bag is read at one place at a time
         with self._lock, closing(self._bag.messages([stream.topic], recorded_ns)) as found:

@@ -27,7 +27,7 @@ _UNLIKELY = ("depth", "thermal", "ir", "mask", "debug", "rear", "back", "left", 
 
 
 class TopicMap(NamedTuple):
-    """Topic of each role; null where the bag has none."""
+    """Topic of each role; None where the bag has none."""
 
     lidar: str | None
     camera: str | None

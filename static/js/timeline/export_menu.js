@@ -12,6 +12,7 @@ const KINDS = [
   ["mp4", "MP4", "camera with overlay"],
   ["csv", "CSV", "one row per frame"],
   ["html", "HTML report", "single page"],
+  ["ply", "PLY", "LiDAR points, up to 300 frames"],
 ];
 const POLL_MS = 300;
 

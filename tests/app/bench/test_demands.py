@@ -32,7 +32,7 @@ def test_what_is_slower_is_said(demand: Any) -> None:
     row[demand.figure] *= 1.01 if demand.at_most is not None else 0.99
     (sentence,) = broken(slower)
     assert sentence.startswith(f"{demand.stage}: {demand.figure}")
-    assert "wanted at" in sentence
+    assert "required: at" in sentence
 
 
 def test_the_page_is_judged_by_its_own_demands_also_while_a_drive_is_computed() -> None:
@@ -43,7 +43,7 @@ def test_the_page_is_judged_by_its_own_demands_also_while_a_drive_is_computed() 
     assert list(broken(page_rows(measured), PAGE_DEMANDS)) == []
     computed["seek"]["median_ms"] += 1.0
     (sentence,) = broken(page_rows(measured), PAGE_DEMANDS)
-    assert sentence == "seek while computed: median_ms is 151.00, wanted at most 150"
+    assert sentence == "seek while computed: median_ms is 151.00; required: at most 150"
 
 
 def test_what_was_not_measured_is_said_but_for_absent_peers_and_recordings() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.bench.devtools import CHROMIUM, browser
+from app.bench.page.devtools import CHROMIUM, browser
 from pipeline.common.errors import BadInput
 
 pytestmark = pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no {CHROMIUM}")

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from app.bench import devtools
 from app.bench.labelled import many
-from app.bench.page import _revision_of, _spread, figures
+from app.bench.page import devtools
+from app.bench.page.measure import _revision_of, _spread, figures
 from pipeline.common.errors import BadInput
 from pipeline.labels.model import LabelSet
 from pipeline.labels.validate import check

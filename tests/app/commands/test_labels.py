@@ -9,8 +9,8 @@ from unittest.mock import Mock
 import pytest
 
 from app.cli import main
-from pipeline.labels.formats.base import FormatName
-from pipeline.recording import session_source
+from pipeline.labels.formats.registry import FormatName
+from pipeline.recording.session import source as session_source
 from tests.pipeline.recording.frames import full, write
 
 
@@ -33,14 +33,14 @@ def drive(tmp_path: Path) -> Path:
 
 def test_truth_goes_out_and_comes_back(drive: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cipv("labels", "export", drive, "--format", "openlabel", "--out", tmp_path / "out.json") == 0
-    assert "tracks 1, sightings 3, ranges of the lead 0" in capsys.readouterr().err
+    assert "tracks 1, sightings 3, lead ranges 0" in capsys.readouterr().err
     file = tmp_path / "labels.json"
     assert cipv("labels", "import", drive, tmp_path / "out.json", "--format", "openlabel", "--out", file) == 0
     labels = json.loads(file.read_text())
     assert (labels["format"], labels["version"]) == ("cipv-labels", 2)
     assert [track["id"] for track in labels["labels"]["tracks"]] == [7]
     assert cipv("labels", "export", drive, "--labels", file, "--format", "csv", "--out", tmp_path / "lead.csv") == 0
-    assert "cipv: 1 track not written: no place for them" in capsys.readouterr().err
+    assert "cipv: 1 track not written: the format cannot hold them" in capsys.readouterr().err
 
 
 READ: dict[FormatName, tuple[int, int]] = {

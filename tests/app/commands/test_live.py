@@ -33,7 +33,7 @@ def test_init_writes_a_file_once(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert load(str(path)).lidar is not None
     path.write_text("lidar: {}", encoding="utf-8")
     assert ended("live", "init", str(path)) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "file already exists" in capsys.readouterr().err
     assert path.read_text(encoding="utf-8") == "lidar: {}"
 
 

@@ -11,9 +11,9 @@ import yaml
 
 from app.cli import main
 from app.commands.record import Record
-from app.commands.support.options import LineOptions, SourceOptions
+from app.commands.support.options import PipelineOptions, SourceOptions
 from pipeline.params import SyncParams
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from pipeline.types import Frame
 from tests.app.engine.test_live_engine import Sensors
 from tests.pipeline.sources.live.bench import endless
@@ -37,7 +37,7 @@ def test_what_was_recorded_until_an_error_is_a_whole_session(tmp_path: Path, mon
     monkeypatch.setattr(SourceOptions, "open_any", lambda self: sensors)
     out = tmp_path / "drive.mcap"
     with pytest.raises(RuntimeError, match="unplugged"):
-        Record(SourceOptions("live:test"), out, LineOptions(lanes="off"))()
+        Record(SourceOptions("live:test"), out, PipelineOptions(lanes="off"))()
     session = SessionSource("a", str(out))
     assert (len(session), session.file.directory.is_cut) == (2, False)
     received_ns = [session.log_time_ns(index) for index in range(2)]
@@ -63,10 +63,10 @@ def test_sensors_that_give_nothing_are_said_and_leave_no_file(
     sensors = Silent()
     sensors.state = "absent"
     monkeypatch.setattr(SourceOptions, "open_any", lambda self: sensors)
-    assert Record(SourceOptions("live:test"), tmp_path, LineOptions(lanes="off"))() == 1
+    assert Record(SourceOptions("live:test"), tmp_path, PipelineOptions(lanes="off"))() == 1
     said = capsys.readouterr().err
     assert said.count("cipv: waiting for sensors: lidar absent") == 1
-    assert "nothing to keep" in said
+    assert "no data received; nothing saved" in said
     assert list(tmp_path.iterdir()) == []
     assert sensors.tapped is None
 
@@ -89,10 +89,10 @@ def test_ticks_that_the_line_was_too_slow_for_are_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(SourceOptions, "open_any", lambda self: Overwhelming())
-    assert Record(SourceOptions("live:test"), tmp_path / "a.mcap", LineOptions(lanes="off"))() == 0
+    assert Record(SourceOptions("live:test"), tmp_path / "a.mcap", PipelineOptions(lanes="off"))() == 0
     said = capsys.readouterr().err
     assert "2 frames" in said
-    assert "the line was too slow for 4 ticks" in said
+    assert "the pipeline was too slow for 4 ticks" in said
 
 
 @pytest.mark.parametrize("arguments", [(), ("--packets",)], ids=["clouds", "packets"])

@@ -17,7 +17,7 @@ from pipeline.common.fast_replace import evolve
 from pipeline.evaluation.report_sections import Section
 from pipeline.experiments.euro_ncap.experiment import NCAP
 from pipeline.experiments.paper import braking
-from pipeline.experiments.straight_track import Drive
+from pipeline.experiments.straight_track import DriveRecord
 from pipeline.params import Params, from_yaml
 from pipeline.sources import open_source
 
@@ -69,9 +69,9 @@ def test_the_report_leads_to_every_drive_wherever_both_are_moved(
 
 
 def test_the_worst_drives_are_linked_from_the_braking_table(tmp_path: Path) -> None:
-    case, lidar = braking.Case("CCRs", "both", "ACC", 0), braking.Case("CCRs", "lidar", "ACC", 0)
+    case, lidar = braking.BrakingCase("CCRs", "both", "ACC", 0), braking.BrakingCase("CCRs", "lidar", "ACC", 0)
     gap_m, unseen, off = (9.0, 7.0), (None, None), ("off", "off")
-    drive = Drive((0.0, 0.1), (20.0, 19.0), (0.0, -1.0), gap_m, (0.0, 0.0), unseen, off, None, None, 5.0)
+    drive = DriveRecord((0.0, 0.1), (20.0, 19.0), (0.0, -1.0), gap_m, (0.0, 0.0), unseen, off, None, None, 5.0)
     twin = evolve(drive, impact_mps=8.0)
     again = evolve(case, seed=1)
     pair = [evolve(each, controller="ACC + AEB") for each in (case, lidar)]
@@ -111,4 +111,4 @@ def test_a_demand_that_does_not_hold_fails_the_command(
     assert ended.value.code == code
     out, err = capsys.readouterr()
     assert json.loads(out)[0]["failures"] == list(failures)
-    assert ("does not hold: Left turn" in err) is bool(failures)
+    assert ("FAILED: Left turn" in err) is bool(failures)

@@ -14,7 +14,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from app.cli import main
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from pipeline.sources import open_source
 from tests.conftest import ROOT
 from tests.pipeline.recording.frames import ABOUT, full, same, write
@@ -77,7 +77,7 @@ def test_import_makes_a_session_that_is_never_written_over(tmp_path: Path, capsy
     assert cipv("import", first, "--out", tmp_path / "b.mcap") == 0
     assert same(open_source(str(tmp_path / "b.mcap")).frame(2), full(2))
     assert cipv("import", first, "--out", tmp_path / "b.mcap") == 2
-    assert "there is such a file already" in capsys.readouterr().err
+    assert "file already exists" in capsys.readouterr().err
 
 
 def test_export_writes_a_clip_in_each_form(recorded: Path, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ PERIOD_NS = 100_000_000
 def row(index: int, cipv_id: int | None = None, **values: Any) -> Row:
     """Frame ``index`` at 10 Hz with every sensor there; a CIPV is seen by both at 30 m."""
     lead: dict[str, Any] = {} if cipv_id is None else {"source": "VL", "carried": False, "distance_m": 30.0}
-    plain = dict.fromkeys(Row._fields) | {"objects": 0, "gaps": "", "notes": 0}
+    plain = dict.fromkeys(Row._fields) | {"gaps": "", "extra": ()}
     return Row(**(plain | {"t_ns": index * PERIOD_NS, "cipv_id": cipv_id} | lead | values))
 
 

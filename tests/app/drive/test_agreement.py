@@ -64,14 +64,14 @@ def page(open_it: Callable[[], Source], detector: Detects[RawBoxes], params: Par
     )
     engine.start()
     try:
-        engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+        engine.wait_for(lambda s: s.processed is not None, WAIT_S)
         yield engine
     finally:
         engine.stop()
 
 
 def at(index: int) -> Callable[[Snapshot], bool]:
-    return lambda s: s.tick is not None and s.index == index
+    return lambda s: s.processed is not None and s.index == index
 
 
 def is_done(params: Params) -> Callable[[Snapshot], bool]:
@@ -85,11 +85,11 @@ def assert_same_everywhere(engine: Engine, expected: list[str], seeks: int = 30)
     for index in order[:seeks]:
         engine.control.seek(index)
         shown = engine.wait_for(at(index), WAIT_S)
-        assert shown.tick is not None
+        assert shown.processed is not None
         assert not shown.state_json()["provisional"]
-        assert body(shown.tick.result) == expected[index], f"frame {index}, sought"
+        assert body(shown.processed.result) == expected[index], f"frame {index}, sought"
     seen: dict[int, str] = {}
-    end = engine.listen(lambda s: seen.update({s.index: body(s.tick.result)}) if s.tick else None)
+    end = engine.listen(lambda s: seen.update({s.index: body(s.processed.result)}) if s.processed else None)
     engine.control.seek(0)
     engine.wait_for(at(0), WAIT_S)
     engine.control.step(2)
@@ -140,13 +140,13 @@ def test_a_frame_shown_too_early_says_so_and_becomes_the_command_lines():
             engine.start()
             engine.control.seek(25)
             early = engine.wait_for(at(25), WAIT_S)
-            assert early.tick is not None
+            assert early.processed is not None
             assert early.state_json()["provisional"]
-            assert body(early.tick.result) != expected[25], "a short warm-up has seen the car less often"
-        late = engine.wait_for(lambda s: s.tick is not None and s.tick.exact and s.index == 25, WAIT_S)
-        assert late.tick is not None
+            assert body(early.processed.result) != expected[25], "a short warm-up has seen the car less often"
+        late = engine.wait_for(lambda s: s.processed is not None and s.processed.exact and s.index == 25, WAIT_S)
+        assert late.processed is not None
         assert late.sequence > early.sequence
-        assert body(late.tick.result) == expected[25]
+        assert body(late.processed.result) == expected[25]
     finally:
         engine.stop()
 
@@ -161,12 +161,14 @@ def test_while_a_slider_is_dragged_the_frame_is_provisional_and_no_drive_is_comp
         assert dragged.state_json()["provisional"]
         recording = engine.drives.recording
         assert recording is not None
-        assert [each.params for each in recording.book.all()] == [Params()]
+        assert [each.params for each in recording.runs.all()] == [Params()]
         revision = engine.control.change_params({"cipv.confirm_hits": 6})
-        shown = engine.wait_for(lambda s: s.params_revision == revision and s.tick is not None and s.tick.exact, WAIT_S)
-        assert shown.tick is not None
+        shown = engine.wait_for(
+            lambda s: s.params_revision == revision and s.processed is not None and s.processed.exact, WAIT_S
+        )
+        assert shown.processed is not None
         expected = from_command_line(Recording(), CountingDetector(), shown.params)
-        assert body(shown.tick.result) == expected[20]
+        assert body(shown.processed.result) == expected[20]
 
 
 @pytest.mark.parametrize("sensors", ["lidar", "camera"])

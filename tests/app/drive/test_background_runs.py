@@ -7,14 +7,13 @@ from dataclasses import replace
 
 import pytest
 
-from app.core.line import DetectionCache
+from app.core.detection_cache import DetectionCache
 from app.core.playback_clock import timeline_s
-from app.drive.background_runs import Drives
+from app.drive.background_runs import BackgroundRuns
 from app.drive.frame_inputs import InputStore, without_pixels
 from app.drive.full_run import DriveRun, digest
-from app.drive.open_recording import Recipe
-from app.drive.open_recording import Recording as DriveRecording
-from app.drive.run_registry import MOST_KEPT, MOST_UNKEPT, NoSuchRun, RunBook, RunRefused
+from app.drive.open_recording import OpenRecording, RunSetup
+from app.drive.run_registry import MOST_KEPT, MOST_UNKEPT, NoSuchRun, RunRefused, RunRegistry
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
 from pipeline.run import Sensors, run
@@ -28,36 +27,36 @@ def with_hits(hits: int) -> Params:
     return with_changes(Params(), {"cipv.confirm_hits": hits})
 
 
-def recipe(recording: Recording, detector: CountingDetector | None = None) -> Recipe:
+def setup(recording: Recording, detector: CountingDetector | None = None) -> RunSetup:
     times = timeline_s([recording.t_ns(i) for i in range(len(recording))], recording.rate_hz)
-    return Recipe(recording, times, Detectors(detector or CountingDetector()), "both")
+    return RunSetup(recording, times, Detectors(detector or CountingDetector()), "both")
 
 
-def opened(recording: Recording, detector: CountingDetector | None = None) -> DriveRecording:
-    return DriveRecording(recipe(recording, detector), DetectionCache(), 1)
+def opened(recording: Recording, detector: CountingDetector | None = None) -> OpenRecording:
+    return OpenRecording(setup(recording, detector), DetectionCache(), 1)
 
 
 @pytest.fixture
-def drives() -> Iterator[Drives]:
-    drives = Drives(DetectionCache())
+def drives() -> Iterator[BackgroundRuns]:
+    drives = BackgroundRuns(DetectionCache())
     yield drives
     drives.stop()
 
 
-def wait_done(drives: Drives) -> DriveRun:
+def wait_done(drives: BackgroundRuns) -> DriveRun:
     """The run of the newest wish, once it is done; woken by the drives themselves."""
     assert drives.recording is not None
     with drives._condition:
         assert drives._condition.wait_for(lambda: not drives.state.running, WAIT_S)
-    run_ = drives.recording.book.current
+    run_ = drives.recording.runs.current
     assert run_ is not None
     return run_
 
 
-def completed(recording: DriveRecording, params: Params) -> DriveRun:
+def completed(recording: OpenRecording, params: Params) -> DriveRun:
     """The run of these parameters, computed here to its end."""
-    recording.book.want(params, "default")
-    run_ = recording.book.current
+    recording.runs.want(params, "default")
+    run_ = recording.runs.current
     assert run_ is not None
     while not run_.is_complete:
         recording.advance(run_)
@@ -78,7 +77,7 @@ def test_a_run_keeps_what_the_plain_line_says():
 
 @pytest.mark.parametrize(("sensors", "before"), [("both", False), ("camera", False), ("lidar", True)])
 def test_where_no_detector_is_asked_nothing_is_waited_for(sensors: Sensors, before: bool):
-    recording = DriveRecording(replace(recipe(Recording()), sensors=sensors), DetectionCache(), 1)
+    recording = OpenRecording(replace(setup(Recording()), sensors=sensors), DetectionCache(), 1)
     assert recording.has_been_looked_at(0) is before
     recording.frame(0)
     assert recording.has_been_looked_at(0)
@@ -86,8 +85,8 @@ def test_where_no_detector_is_asked_nothing_is_waited_for(sensors: Sensors, befo
 
 def test_states_are_those_of_the_pass_at_every_frame_also_when_few_are_kept():
     recording = opened(Recording())
-    recording.book.want(Params(), "default")
-    of = recording.book.current
+    recording.runs.want(Params(), "default")
+    of = recording.runs.current
     assert of is not None
     of._every = 4
     states = [State()]
@@ -110,10 +109,10 @@ def test_another_run_asks_neither_source_nor_network():
         assert (len(source.reads), detector.calls) == (30, 30)
 
 
-def test_the_newest_wish_wins_and_the_base_is_finished_after_it(drives: Drives):
+def test_the_newest_wish_wins_and_the_base_is_finished_after_it(drives: BackgroundRuns):
     drives.start()
     with drives.turn.foreground():
-        drives.open(recipe(Recording()))
+        drives.open(setup(Recording()))
         for hits in (3, 4, 5):
             drives.want(with_hits(hits), "default")
     newest = wait_done(drives)
@@ -122,15 +121,15 @@ def test_the_newest_wish_wins_and_the_base_is_finished_after_it(drives: Drives):
     recording = drives.recording
     assert recording is not None
     with drives._condition:
-        assert drives._condition.wait_for(lambda: recording.book.unfinished() is None, WAIT_S)
-    hits = {each.params.cipv.confirm_hits: each.done for each in recording.book.all()}
+        assert drives._condition.wait_for(lambda: recording.runs.unfinished() is None, WAIT_S)
+    hits = {each.params.cipv.confirm_hits: each.done for each in recording.runs.all()}
     assert hits == {3: 30, 5: 30}, "the one in between was overtaken before it began"
-    assert recording.book.base is recording.book.get(1)
+    assert recording.runs.base is recording.runs.get(1)
 
 
-def test_going_back_to_parameters_of_before_computes_nothing_again(drives: Drives):
+def test_going_back_to_parameters_of_before_computes_nothing_again(drives: BackgroundRuns):
     drives.start()
-    drives.open(recipe(Recording()))
+    drives.open(setup(Recording()))
     drives.want(with_hits(3), "default")
     first = wait_done(drives)
     drives.want(with_hits(4), "default")
@@ -139,9 +138,11 @@ def test_going_back_to_parameters_of_before_computes_nothing_again(drives: Drive
     assert wait_done(drives) is first
 
 
-def test_a_frame_that_cannot_be_read_fails_the_run_and_says_which(drives: Drives, caplog: pytest.LogCaptureFixture):
+def test_a_frame_that_cannot_be_read_fails_the_run_and_says_which(
+    drives: BackgroundRuns, caplog: pytest.LogCaptureFixture
+):
     drives.start()
-    drives.open(recipe(Recording(broken=frozenset({7}))))
+    drives.open(setup(Recording(broken=frozenset({7}))))
     drives.want(Params(), "default")
     failed = wait_done(drives)
     assert (failed.done, drives.state.phase) == (7, "failed")
@@ -150,11 +151,11 @@ def test_a_frame_that_cannot_be_read_fails_the_run_and_says_which(drives: Drives
     assert drives.state_before(9, Params()) is None
 
 
-def test_nothing_of_a_drive_is_read_or_looked_at_while_somebody_is_in_front(drives: Drives):
+def test_nothing_of_a_drive_is_read_or_looked_at_while_somebody_is_in_front(drives: BackgroundRuns):
     source, detector = Recording(), CountingDetector()
     drives.start()
     with drives.turn.foreground():
-        drives.open(recipe(source, detector))
+        drives.open(setup(source, detector))
         drives.want(Params(), "default")
         assert not source.reading.wait(0.05)
     assert wait_done(drives).is_complete
@@ -162,10 +163,12 @@ def test_nothing_of_a_drive_is_read_or_looked_at_while_somebody_is_in_front(driv
 
 
 @pytest.mark.parametrize("stopped_at", [1, 7, 30])
-def test_a_network_that_is_stopped_for_who_asks_looks_again_and_nothing_is_lost(drives: Drives, stopped_at: int):
+def test_a_network_that_is_stopped_for_who_asks_looks_again_and_nothing_is_lost(
+    drives: BackgroundRuns, stopped_at: int
+):
     detector = SlowDetector(slow_at=stopped_at)
     drives.start()
-    drives.open(recipe(Recording(), detector))
+    drives.open(setup(Recording(), detector))
     drives.want(Params(), "default")
     assert detector.slow.wait(WAIT_S)
     drives.turn.asked(rests=True)
@@ -175,7 +178,7 @@ def test_a_network_that_is_stopped_for_who_asks_looks_again_and_nothing_is_lost(
     assert repr(of.rows()) == repr(undisturbed.rows())
 
 
-def test_without_a_recording_there_is_nothing_to_say(drives: Drives):
+def test_without_a_recording_there_is_nothing_to_say(drives: BackgroundRuns):
     drives.start()
     drives.open(None)
     drives.want(Params(), "default")
@@ -238,11 +241,11 @@ def test_a_digest_is_the_same_when_and_only_when_a_run_is_made_from_the_same():
     assert len({one, *others}) == 5
 
 
-def book() -> RunBook:
-    return RunBook(lambda number, params, preset: DriveRun(number, params, preset, 30))
+def book() -> RunRegistry:
+    return RunRegistry(lambda number, params, preset: DriveRun(number, params, preset, 30))
 
 
-def begun(of: RunBook, hits: int) -> DriveRun:
+def begun(of: RunRegistry, hits: int) -> DriveRun:
     """A run that has come some way."""
     of.want(with_hits(hits), "default")
     assert of.current is not None
@@ -261,7 +264,7 @@ def test_runs_that_nobody_kept_go_when_newer_ones_come():
     numbers = [each.number for each in runs.all()]
     assert numbers == [1, 2, *range(12 - MOST_UNKEPT - 1, 12)]
     assert runs.get(1).name == "first one"
-    with pytest.raises(NoSuchRun, match="no run 4"):
+    with pytest.raises(NoSuchRun, match="run 4 not found"):
         runs.get(4)
 
 
@@ -281,6 +284,6 @@ def test_no_more_than_a_dozen_runs_are_kept():
     runs = book()
     for hits in range(1, MOST_KEPT + 1):
         runs.keep(begun(runs, hits).number, "")
-    with pytest.raises(RunRefused, match="kept already"):
+    with pytest.raises(RunRefused, match="saved already"):
         runs.keep(begun(runs, 19).number, "")
     runs.keep(1, "renamed")

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 
 from app.drive import compute_scheduler as turn_module
-from app.drive.compute_scheduler import Turn
+from app.drive.compute_scheduler import ComputeScheduler
 from app.engine.engine import Engine
 from pipeline.inference.cancellation import Stopped, of_this_thread
 from pipeline.params import Params, SyncParams
@@ -29,7 +29,7 @@ class Piece:
 
     begun: the piece may begin. options: of the network's run. ended: how the piece did, ``done`` or ``stopped``."""
 
-    def __init__(self, turn: Turn, *, to_the_end: bool = False) -> None:
+    def __init__(self, turn: ComputeScheduler, *, to_the_end: bool = False) -> None:
         self.begun, self.answer, self.options, self.ended = threading.Event(), threading.Event(), Options(), ""
         self._turn, self._to_the_end = turn, to_the_end
         self._thread = threading.Thread(target=self._work, daemon=True)
@@ -66,14 +66,14 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def turn() -> Iterator[Turn]:
-    turn = Turn()
+def turn() -> Iterator[ComputeScheduler]:
+    turn = ComputeScheduler()
     yield turn
     turn.end()
 
 
 @contextmanager
-def hand_rests(turn: Turn, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def hand_rests(turn: ComputeScheduler, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The time in which a hand moves is over after what is done here."""
     monkeypatch.setattr(turn_module, "HAND_RESTS_S", 0.0)
     with turn.foreground():
@@ -81,13 +81,13 @@ def hand_rests(turn: Turn, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
-def test_nobody_in_front_keeps_nobody_waiting(turn: Turn) -> None:
+def test_nobody_in_front_keeps_nobody_waiting(turn: ComputeScheduler) -> None:
     piece = Piece(turn)
     assert piece.begun.wait(WAIT_S)
     assert piece.finish() == "done"
 
 
-def test_the_background_waits_while_somebody_works_in_front(turn: Turn) -> None:
+def test_the_background_waits_while_somebody_works_in_front(turn: ComputeScheduler) -> None:
     with turn.foreground():
         piece = Piece(turn)
         assert piece.waits
@@ -95,7 +95,7 @@ def test_the_background_waits_while_somebody_works_in_front(turn: Turn) -> None:
     assert piece.finish() == "done"
 
 
-def test_the_background_waits_while_a_hand_moves(turn: Turn, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_background_waits_while_a_hand_moves(turn: ComputeScheduler, monkeypatch: pytest.MonkeyPatch) -> None:
     turn.asked()
     piece = Piece(turn)
     assert piece.waits, "it was not served yet"
@@ -108,7 +108,7 @@ def test_the_background_waits_while_a_hand_moves(turn: Turn, monkeypatch: pytest
     assert piece.finish() == "done"
 
 
-def test_what_is_asked_for_once_keeps_nobody_waiting_once_it_is_served(turn: Turn) -> None:
+def test_what_is_asked_for_once_keeps_nobody_waiting_once_it_is_served(turn: ComputeScheduler) -> None:
     turn.asked(rests=True)
     assert turn.rest_s == 0
     piece = Piece(turn)
@@ -117,7 +117,7 @@ def test_what_is_asked_for_once_keeps_nobody_waiting_once_it_is_served(turn: Tur
 
 
 @pytest.mark.parametrize("rests", [False, True])
-def test_a_network_that_runs_in_the_background_is_stopped_for_who_asks(turn: Turn, rests: bool) -> None:
+def test_a_network_that_runs_in_the_background_is_stopped_for_who_asks(turn: ComputeScheduler, rests: bool) -> None:
     piece = Piece(turn)
     assert piece.begun.wait(WAIT_S)
     assert not piece.options.terminate
@@ -126,7 +126,7 @@ def test_a_network_that_runs_in_the_background_is_stopped_for_who_asks(turn: Tur
     assert piece.finish() == "stopped"
 
 
-def test_a_clip_that_a_person_waits_for_goes_after_who_asks_and_is_not_stopped(turn: Turn) -> None:
+def test_a_clip_that_a_person_waits_for_goes_after_who_asks_and_is_not_stopped(turn: ComputeScheduler) -> None:
     with turn.foreground():
         piece = Piece(turn, to_the_end=True)
         assert piece.waits
@@ -136,7 +136,7 @@ def test_a_clip_that_a_person_waits_for_goes_after_who_asks_and_is_not_stopped(t
     assert piece.finish() == "done"
 
 
-def test_a_frame_that_is_shown_while_playing_stops_no_network(turn: Turn) -> None:
+def test_a_frame_that_is_shown_while_playing_stops_no_network(turn: ComputeScheduler) -> None:
     turn.playing(True)
     piece = Piece(turn)
     assert piece.begun.wait(WAIT_S)
@@ -146,7 +146,7 @@ def test_a_frame_that_is_shown_while_playing_stops_no_network(turn: Turn) -> Non
     assert piece.finish() == "done"
 
 
-def test_who_asks_stops_nothing_of_their_own_that_was_begun_after(turn: Turn) -> None:
+def test_who_asks_stops_nothing_of_their_own_that_was_begun_after(turn: ComputeScheduler) -> None:
     turn.asked()
     with turn.stoppable(), of_this_thread().ends(Options()):
         pass
@@ -157,7 +157,7 @@ def test_who_asks_stops_nothing_of_their_own_that_was_begun_after(turn: Turn) ->
 
 
 def test_work_in_front_that_never_ends_does_not_stop_the_background(
-    turn: Turn, monkeypatch: pytest.MonkeyPatch
+    turn: ComputeScheduler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(turn_module, "_LONGEST_FRONT_S", 0.01)
     with turn.foreground():
@@ -166,7 +166,9 @@ def test_work_in_front_that_never_ends_does_not_stop_the_background(
         assert piece.finish() == "done"
 
 
-def test_a_hand_that_never_rests_does_not_stop_the_background(turn: Turn, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_hand_that_never_rests_does_not_stop_the_background(
+    turn: ComputeScheduler, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What has waited for so long, also by being stopped again and again, is stopped no more."""
     monkeypatch.setattr(turn_module, "_LONGEST_FRONT_S", 0.01)
     turn.asked()
@@ -177,7 +179,7 @@ def test_a_hand_that_never_rests_does_not_stop_the_background(turn: Turn, monkey
     assert piece.finish() == "done"
 
 
-def test_time_spent_on_what_was_stopped_counts_as_waiting(turn: Turn) -> None:
+def test_time_spent_on_what_was_stopped_counts_as_waiting(turn: ComputeScheduler) -> None:
     piece = Piece(turn)
     assert piece.begun.wait(WAIT_S)
     since = turn._overdue_at_s
@@ -191,7 +193,7 @@ def test_time_spent_on_what_was_stopped_counts_as_waiting(turn: Turn) -> None:
 
 
 def test_while_a_drive_plays_the_background_pays_for_its_work_and_goes_on_after_a_shown_frame(
-    turn: Turn, monkeypatch: pytest.MonkeyPatch
+    turn: ComputeScheduler, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now_s = [time.monotonic()]
     monkeypatch.setattr(turn_module.time, "monotonic", lambda: now_s[0])
@@ -211,7 +213,9 @@ def test_while_a_drive_plays_the_background_pays_for_its_work_and_goes_on_after_
     assert piece.finish() == "done"
 
 
-def test_a_drive_that_plays_without_showing_frames_stops_nobody(turn: Turn, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_drive_that_plays_without_showing_frames_stops_nobody(
+    turn: ComputeScheduler, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """As one whose frames are read too slowly."""
     monkeypatch.setattr(turn_module, "_LONGEST_WAIT_S", 0.01)
     turn.playing(True)
@@ -221,7 +225,7 @@ def test_a_drive_that_plays_without_showing_frames_stops_nobody(turn: Turn, monk
     assert piece.finish() == "done"
 
 
-def test_who_ends_lets_everybody_go(turn: Turn) -> None:
+def test_who_ends_lets_everybody_go(turn: ComputeScheduler) -> None:
     with turn.foreground():
         piece = Piece(turn)
         turn.end()

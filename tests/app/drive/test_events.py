@@ -10,7 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.drive.events import DISAGREEMENT_FRAMES, Event, find_events, recorded_marks
+from app.drive.events import find_events
+from app.drive.events.event import Event
+from app.drive.events.marks import recorded_marks
+from app.drive.events.sensors import DISAGREEMENT_FRAMES
 from app.drive.frame_rows import Objects, Row, objects_of, row_of
 from pipeline.detection import Detectors, detector_for
 from pipeline.params import Params

@@ -28,7 +28,7 @@ def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Start]:
             engine.start()
             stack.callback(engine.stop)
             stack.callback(recording.gate.set)
-            engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+            engine.wait_for(lambda s: s.processed is not None, WAIT_S)
             return engine, recording, detector
 
         yield begin

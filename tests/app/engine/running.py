@@ -28,7 +28,7 @@ def body(result: Result) -> str:
 
 def at(index: int) -> Callable[[Snapshot], bool]:
     """The frame is shown, after a whole warm-up."""
-    return lambda s: s.tick is not None and s.index == index and s.tick.whole
+    return lambda s: s.processed is not None and s.index == index and s.processed.whole
 
 
 def played(recording: Recording, first: int, last: int, params: Params, looked_from: int = 0) -> Result:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from app.commands.support.options import LineOptions
+from app.commands.support.options import PipelineOptions
 from app.engine.detector_pool import DetectorPool
 from app.engine.snapshot import Notice
 from pipeline.common.errors import BadInput
@@ -43,7 +43,7 @@ def test_a_missing_lane_network_is_said_and_boxes_go_on() -> None:
     detectors, notices = both(missing)
     assert detectors.boxes is not None
     assert detectors.lanes is None
-    assert notices == [Notice("warning", "No lane network 'x'. Lane lines are not looked for.")]
+    assert notices == [Notice("warning", "No lane network 'x'. No lane detection.")]
 
 
 def test_lidar_alone_opens_no_detector() -> None:
@@ -60,7 +60,7 @@ def test_nothing_is_opened_for_a_drive_that_brings_its_detections(
     source = open_source(f"sim:{file}")
     notices: list[Notice] = []
     pool = DetectorPool(lambda _: pytest.fail("opened"), "both", lambda _: pytest.fail("opened"))
-    assert pool.both_for(source, notices) == LineOptions().open_detectors(source) == Detectors()
+    assert pool.both_for(source, notices) == PipelineOptions().open_detectors(source) == Detectors()
     assert (notices, capsys.readouterr().err) == ([], "")
 
 
@@ -81,4 +81,4 @@ def test_a_network_looks_at_no_older_pictures_of_a_slow_recording(tmp_path: Path
 @pytest.mark.parametrize("every", [0, -2])
 def test_a_rate_that_is_none_is_refused(every: int) -> None:
     with pytest.raises(BadInput, match=f"--lanes-every {every}"):
-        LineOptions(lanes_every=every).open_detectors(Recording())
+        PipelineOptions(lanes_every=every).open_detectors(Recording())

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from app.core.line import WARM_UP_FRAMES, DetectionCache, Line
+from app.core.detection_cache import DetectionCache
 from app.drive import compute_scheduler
+from app.engine.seekable_pipeline import WARM_UP_FRAMES, SeekablePipeline
 from app.engine.snapshot import Snapshot
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
@@ -18,16 +19,16 @@ def test_opens_paused_on_the_first_frame_and_finds_the_car(start: Start):
     engine, recording, _ = start()
     shown = engine.snapshot
     assert (shown.index, shown.playing, shown.count) == (0, False, len(recording))
-    assert shown.tick is not None
-    assert shown.tick.result.cipv is not None
-    assert shown.tick.result.cipv.distance_m == pytest.approx(30.0, abs=0.2)
+    assert shown.processed is not None
+    assert shown.processed.result.cipv is not None
+    assert shown.processed.result.cipv.distance_m == pytest.approx(30.0, abs=0.2)
 
 
 @pytest.mark.parametrize("index", [1, WARM_UP_FRAMES, WARM_UP_FRAMES + 1, 25])
 def test_a_seek_gives_the_bytes_of_playing_there_from_its_warm_up(start: Start, index: int):
     engine, recording, _ = start()
     engine.control.seek(index)
-    tick = engine.wait_for(at(index), WAIT_S).tick
+    tick = engine.wait_for(at(index), WAIT_S).processed
     assert tick is not None
     expected = played(recording, max(0, index - WARM_UP_FRAMES), index, Params())
     assert body(tick.result) == body(expected)
@@ -38,7 +39,7 @@ def test_a_frame_wanted_at_once_is_shown_after_two_reads_and_again_after_a_whole
     shown: list[tuple[bool, int, str]] = []
     recording.reads.clear()
     calls = detector.calls
-    engine.listen(lambda s: shown.append((s.tick.whole, detector.calls - calls, body(s.tick.result))))
+    engine.listen(lambda s: shown.append((s.processed.whole, detector.calls - calls, body(s.processed.result))))
     engine.control.seek(20)
     engine.wait_for(at(20), WAIT_S)
     assert recording.reads == [19, 20, *range(10, 19)]
@@ -47,13 +48,13 @@ def test_a_frame_wanted_at_once_is_shown_after_two_reads_and_again_after_a_whole
     assert warmed == (True, 11, body(played(recording, 10, 20, Params())))
     engine.control.seek(22)
     seen = engine.wait_for(lambda s: s.index == 22, WAIT_S)
-    assert seen.tick is not None
-    assert not seen.tick.whole, "21 has not been read"
+    assert seen.processed is not None
+    assert not seen.processed.whole, "21 has not been read"
     engine.wait_for(at(22), WAIT_S)
     engine.control.seek(21)
     seen = engine.wait_for(lambda s: s.index == 21, WAIT_S)
-    assert seen.tick is not None
-    assert seen.tick.whole, "all that it needs is at hand"
+    assert seen.processed is not None
+    assert seen.processed.whole, "all that it needs is at hand"
 
 
 def test_a_warm_up_that_fails_is_not_tried_again(start: Start):
@@ -74,10 +75,10 @@ def test_a_warm_up_gives_way_to_a_seek_also_while_a_network_runs_for_it(start: S
     assert detector.slow.wait(WAIT_S), "it was asked at opening, for the frame at once, and for the warm-up"
     shown = engine.snapshot
     assert shown.index == 20
-    assert shown.tick is not None
-    assert not shown.tick.whole
+    assert shown.processed is not None
+    assert not shown.processed.whole
     engine.control.seek(5)
-    found = engine.wait_for(at(5), WAIT_S).tick
+    found = engine.wait_for(at(5), WAIT_S).processed
     assert found is not None
     assert body(found.result) == body(played(Recording(), 0, 5, Params()))
     assert detector.stopped == 1
@@ -92,8 +93,8 @@ def test_the_warm_up_waits_until_the_hand_rests(start: Start, monkeypatch: pytes
     recording.reads.clear()
     engine.control.change(loop=False)
     shown = engine.wait_for(lambda s: not s.loop, WAIT_S)
-    assert shown.tick is not None
-    assert not shown.tick.whole
+    assert shown.processed is not None
+    assert not shown.processed.whole
     assert recording.reads == []
     monkeypatch.setattr(compute_scheduler, "HAND_RESTS_S", 0.0)
     engine.control.seek(20)
@@ -107,7 +108,7 @@ def test_a_seek_depends_on_nothing_before_it(start: Start):
         engine.control.seek(detour)
         engine.wait_for(at(detour), WAIT_S)
         engine.control.seek(20)
-        tick = engine.wait_for(at(20), WAIT_S).tick
+        tick = engine.wait_for(at(20), WAIT_S).processed
         assert tick is not None
         bodies.append(body(tick.result))
     assert len(set(bodies)) == 1
@@ -117,7 +118,7 @@ def test_steps_go_through_every_frame_and_back(start: Start):
     engine, recording, _ = start()
     recording.reads.clear()
     engine.control.step(3)
-    tick = engine.wait_for(at(3), WAIT_S).tick
+    tick = engine.wait_for(at(3), WAIT_S).processed
     assert recording.reads == [1, 2, 3]
     assert tick is not None
     assert body(tick.result) == body(played(recording, 0, 3, Params()))
@@ -146,16 +147,18 @@ def test_a_parameter_on_a_paused_frame_runs_neither_network_nor_reading(start: S
     revision = engine.control.set_params(with_changes(Params(), {"detection.min_score": 0.9}))
     after = engine.wait_for(lambda s: s.params_revision == revision, WAIT_S)
     assert (detector.calls, len(recording.reads)) == (calls, reads)
-    assert before.tick is not None
-    assert after.tick is not None
-    assert after.tick.before is before.tick.before
-    assert after.tick.frame is before.tick.frame
+    assert before.processed is not None
+    assert after.processed is not None
+    assert after.processed.before is before.processed.before
+    assert after.processed.frame is before.processed.frame
     assert after.sequence == before.sequence + 1
-    assert body(after.tick.result) != body(before.tick.result), "the box scored 0.8 is below the new threshold"
+    assert body(after.processed.result) != body(before.processed.result), (
+        "the box scored 0.8 is below the new threshold"
+    )
     revision = engine.control.set_params(Params())
     again = engine.wait_for(lambda s: s.params_revision == revision, WAIT_S)
-    assert again.tick is not None
-    assert body(again.tick.result) == body(before.tick.result)
+    assert again.processed is not None
+    assert body(again.processed.result) == body(before.processed.result)
 
 
 def test_a_frame_that_was_seen_costs_no_network_again(start: Start):
@@ -207,10 +210,10 @@ def test_a_parameter_is_answered_while_the_next_frame_is_still_being_read(start:
     engine.control.change(playing=True)
     assert recording.reading.wait(WAIT_S), "it reads the next frame"
     engine.control.change_params({"cluster.tolerance_m": 0.4})
-    shown = engine.wait_for(lambda s: s.params.cluster.tolerance_m == 0.4 and s.tick is not None, WAIT_S)
+    shown = engine.wait_for(lambda s: s.params.cluster.tolerance_m == 0.4 and s.processed is not None, WAIT_S)
     assert shown.index == 0
-    assert shown.tick is not None
-    assert shown.tick.params is shown.params, "run again with it"
+    assert shown.processed is not None
+    assert shown.processed.params is shown.params, "run again with it"
     recording.gate.set()
     engine.wait_for(lambda s: s.index > 0, WAIT_S)
 
@@ -246,41 +249,43 @@ def test_a_view_that_fails_takes_nothing_with_it(start: Start, caplog: pytest.Lo
 def test_a_frame_wanted_at_once_does_not_wait_for_lanes_and_says_so():
     lanes, known = CountingLanes(), []
     detectors = Detectors(CountingDetector(), lanes, lanes_every=3)
-    line = Line(Recording(), detectors, DetectionCache(), "both", lambda index, params: State() if known else None)
-    hurried = line.seek(20, Params(), at_once=True)
+    pipeline = SeekablePipeline(
+        Recording(), detectors, DetectionCache(), "both", lambda index, params: State() if known else None
+    )
+    hurried = pipeline.seek(20, Params(), at_once=True)
     assert hurried is not None
     assert (lanes.calls, hurried.whole, hurried.exact) == (0, False, False)
     assert hurried.frame.raw_lanes is None
     known.append(20)
-    assert not line.can_be_exact(), "run again it would be without lanes again"
-    again = line.rerun(Params())
+    assert not pipeline.can_be_exact(), "run again it would be without lanes again"
+    again = pipeline.rerun(Params())
     assert again is not None
     assert (lanes.calls, again.whole, again.exact) == (0, False, False)
-    hurried = line.seek(21, Params(), at_once=True)
+    hurried = pipeline.seek(21, Params(), at_once=True)
     assert hurried is not None
     assert (lanes.calls, hurried.whole, hurried.exact) == (0, False, False), "21 is one for lanes"
-    whole = line.seek(21, Params())
+    whole = pipeline.seek(21, Params())
     assert whole is not None
     assert (lanes.calls, whole.whole, whole.exact) == (1, True, True)
     assert whole.frame.raw_lanes is not None
     known.clear()
     for index, seen in ((22, 1), (21, 1)):
-        line.seek(index, Params(), at_once=True)
+        pipeline.seek(index, Params(), at_once=True)
         assert lanes.calls == seen
-    assert line.tick is not None
-    assert line.tick.frame.raw_lanes is not None, "known lanes are used"
+    assert pipeline.shown is not None
+    assert pipeline.shown.frame.raw_lanes is not None, "known lanes are used"
 
 
 def test_the_first_frame_waits_for_lanes_so_that_what_plays_from_it_is_exact(start: Start):
     lanes = CountingLanes()
     engine, _, _ = start(open_lanes=lambda _: lanes)
-    shown = engine.snapshot.tick
+    shown = engine.snapshot.processed
     assert shown is not None
     assert (lanes.calls, shown.whole, shown.exact) == (1, True, True)
 
 
 def test_a_line_abandons_a_seek_and_keeps_its_tick():
-    line = Line(Recording(), Detectors(CountingDetector()), DetectionCache(), "both")
-    first = line.seek(4, Params())
-    assert line.seek(20, Params(), superseded=lambda: True) is None
-    assert line.tick is first
+    pipeline = SeekablePipeline(Recording(), Detectors(CountingDetector()), DetectionCache(), "both")
+    first = pipeline.seek(4, Params())
+    assert pipeline.seek(20, Params(), superseded=lambda: True) is None
+    assert pipeline.shown is first

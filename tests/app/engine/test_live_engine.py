@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from app.engine.engine import Engine
-from app.engine.live_line import LiveLine
-from app.engine.session_recording import RecordingDesk
+from app.engine.live_pipeline import LivePipeline
+from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Snapshot
 from pipeline.common.progress import Progress
 from pipeline.detection import Detectors
 from pipeline.params import Params, SyncParams, with_changes
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from pipeline.types import U8, CameraCalibration, Frame, GnssFix, RawLanes, StreamHealth
 from pipeline.types.camera_shot import Shot
 from pipeline.types.source import AnySource, SourceError, Tap
@@ -93,7 +93,7 @@ Start = Callable[..., tuple[Engine, Sensors, CountingDetector]]
 def start() -> Iterator[Start]:
     engines: list[Engine] = []
 
-    def begin(desk: RecordingDesk | None = None) -> tuple[Engine, Sensors, CountingDetector]:
+    def begin(desk: SessionRecorder | None = None) -> tuple[Engine, Sensors, CountingDetector]:
         sensors, detector = Sensors(), CountingDetector()
 
         def open_source(uri: str, *, progress: Progress) -> AnySource:
@@ -115,7 +115,7 @@ def start() -> Iterator[Start]:
 
 
 def shows(index: int) -> Callable[[Snapshot], bool]:
-    return lambda s: s.tick is not None and s.index == index
+    return lambda s: s.processed is not None and s.index == index
 
 
 def shown_after(engine: Engine, sensors: Sensors, index: int) -> Snapshot:
@@ -130,9 +130,9 @@ def test_ticks_are_shown_as_they_come(start: Start) -> None:
     state = shown.state_json()
     assert (state["live"], state["playing"], state["count"], state["provisional"]) == (True, True, 0, False)
     assert state["time_s"] == pytest.approx(0.3)
-    assert shown.tick is not None
-    assert {item.source for item in shown.tick.result.objects} == {"VL"}
-    assert shown.tick.detect_ms > 0.0
+    assert shown.processed is not None
+    assert {item.source for item in shown.processed.result.objects} == {"VL"}
+    assert shown.processed.detect_ms > 0.0
     assert sensors.asked_with == Params().sync
     assert [notice.text for notice in shown.notices] == ["no own speed"]
 
@@ -149,8 +149,8 @@ def test_paused_the_frame_is_held_while_the_line_goes_on_and_playing_jumps_to_no
     assert engine.snapshot.index == 0, "held"
     engine.control.change(playing=True)
     now = engine.wait_for(shows(3), WAIT_S)
-    assert now.tick is not None
-    assert max(item.hits for item in now.tick.result.objects) == 4, "the line saw every tick"
+    assert now.processed is not None
+    assert max(item.hits for item in now.processed.result.objects) == 4, "the line saw every tick"
 
 
 def test_a_parameter_runs_the_held_frame_again_without_a_network(start: Start) -> None:
@@ -164,11 +164,11 @@ def test_a_parameter_runs_the_held_frame_again_without_a_network(start: Start) -
     again = engine.wait_for(lambda s: s.params_revision == revision and s.sequence > held.sequence, WAIT_S)
     assert again.index == held.index
     assert detector.calls == calls
-    assert again.tick is not None
-    assert held.tick is not None
-    assert again.tick.before is held.tick.before
-    assert {item.seen_by for item in held.tick.result.objects} == {"VL"}
-    assert {item.seen_by for item in again.tick.result.objects} == {"L"}
+    assert again.processed is not None
+    assert held.processed is not None
+    assert again.processed.before is held.processed.before
+    assert {item.seen_by for item in held.processed.result.objects} == {"VL"}
+    assert {item.seen_by for item in again.processed.result.objects} == {"L"}
 
 
 def test_sensors_offsets_reach_the_sensors_while_they_run(start: Start) -> None:
@@ -197,7 +197,7 @@ def test_what_the_line_left_out_is_counted(start: Start) -> None:
 
 
 def test_a_session_of_them_is_on_their_own_steady_timeline(start: Start, tmp_path: Path) -> None:
-    engine, sensors, _ = start(RecordingDesk(tmp_path))
+    engine, sensors, _ = start(SessionRecorder(tmp_path))
     engine.desk.start(engine.source)
     for index in range(3):
         shown_after(engine, sensors, index)
@@ -211,7 +211,7 @@ def test_a_session_of_them_is_on_their_own_steady_timeline(start: Start, tmp_pat
 
 def test_what_comes_between_ticks_is_recorded_until_the_end(start: Start, tmp_path: Path) -> None:
     """``now_ns`` of these sensors is their ticks' time and 10¹⁸."""
-    engine, sensors, _ = start(RecordingDesk(tmp_path))
+    engine, sensors, _ = start(SessionRecorder(tmp_path))
     engine.desk.start(engine.source)
     tap = sensors.tapped
     assert tap is not None
@@ -236,12 +236,12 @@ def test_what_comes_between_ticks_is_recorded_until_the_end(start: Start, tmp_pa
 
 def test_lanes_are_looked_for_as_often_as_the_line_runs_whatever_is_dropped() -> None:
     sensors, lanes = Sensors(), NoLanes()
-    line = LiveLine(sensors, Detectors(None, lanes, lanes_every=3), "both")
+    pipeline = LivePipeline(sensors, Detectors(None, lanes, lanes_every=3), "both")
     for index in range(1, 22, 3):
         sensors.give(index)
-        came = line.wait(Params(), WAIT_S)
+        came = pipeline.wait(Params(), WAIT_S)
         assert came is not None
-        line.run(came, Params())
+        pipeline.run(came, Params())
     assert lanes.calls == 3
 
 
@@ -249,7 +249,7 @@ def test_opening_a_recording_gives_the_sensors_back_and_the_other_way_round(star
     engine, sensors, _ = start()
     shown_after(engine, sensors, 0)
     engine.control.change(uri="test:car")
-    recording = engine.wait_for(lambda s: s.uri == "test:car" and s.tick is not None, WAIT_S)
+    recording = engine.wait_for(lambda s: s.uri == "test:car" and s.processed is not None, WAIT_S)
     assert sensors.is_open is False
     assert (recording.live, recording.count) == (False, 30)
     engine.control.change(uri="live:test")

@@ -10,10 +10,11 @@ import httpx
 import numpy as np
 import pytest
 
-from app.drive.events import Event, marks_by_time
-from app.drive.marks import Mark, Marks
+from app.drive.events.event import Event
+from app.drive.events.marks import marks_by_time
+from app.drive.marks import Marks, SavedMark
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from app.web.server import create_app
 from pipeline.params import Params
 from pipeline.sources import open_source
@@ -43,7 +44,7 @@ class Car:
             uri=self.sensors.uri,
             playing=True,
             whole_drives=True,
-            desk=RecordingDesk(sessions),
+            desk=SessionRecorder(sessions),
         )
         self.app = create_app(self.engine, marks=Marks(marks))
 
@@ -124,16 +125,16 @@ def test_the_alignment_of_live_sensors_is_scored_from_what_they_show(car: Car, c
 @pytest.mark.parametrize(
     ("name", "mark", "frames"),
     [
-        ("at a frame's very time", Mark(1, 99, "", 2000), [2]),
-        ("near a frame", Mark(1, 99, "", 1960), [2]),
-        ("before the recording", Mark(1, 99, "", 500), []),
-        ("after it", Mark(1, 99, "", 9000), []),
-        ("without a time", Mark(1, 1), []),
-        ("in a session, which has it itself", Mark(1, 99, "", 2000, in_session=True), []),
+        ("at a frame's very time", SavedMark(1, 99, "", 2000), [2]),
+        ("near a frame", SavedMark(1, 99, "", 1960), [2]),
+        ("before the recording", SavedMark(1, 99, "", 500), []),
+        ("after it", SavedMark(1, 99, "", 9000), []),
+        ("without a time", SavedMark(1, 1), []),
+        ("in a session, which has it itself", SavedMark(1, 99, "", 2000, in_session=True), []),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_marks_by_time(name: str, mark: Mark, frames: list[int]):
+def test_marks_by_time(name: str, mark: SavedMark, frames: list[int]):
     stamps = np.array([800, 1000, 2000, 3000], np.int64)
     assert marks_by_time([mark], stamps, 100) == [Event("mark", frame, "marked") for frame in frames]
     assert marks_by_time([mark], stamps[:0], 100) == []

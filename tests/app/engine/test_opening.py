@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import app.engine.engine as engine_module
-from app.core.line import DetectionCache, Line
+from app.core.detection_cache import DetectionCache
 from app.engine.engine import Engine
+from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
 from pipeline.common.progress import Progress
 from pipeline.detection import Detectors
@@ -70,7 +71,7 @@ def test_what_takes_long_to_open_is_given_up_for_something_else(slowly: tuple[En
     engine.control.change(uri="test:other")
     opens.goes_on.release()
     assert opens.given_up.wait(WAIT_S)
-    shown = engine.wait_for(lambda s: s.uri == "test:other" and s.tick is not None, WAIT_S)
+    shown = engine.wait_for(lambda s: s.uri == "test:other" and s.processed is not None, WAIT_S)
     assert (shown.busy, [n for n in shown.notices if n.level == "error"]) == (None, [])
 
 
@@ -85,15 +86,15 @@ def test_with_another_recording_nothing_of_the_old_one_is_told():
     )
     engine.start()
     try:
-        old = engine.wait_for(lambda s: s.tick is not None and s.drive.run is not None, WAIT_S).drive.run
+        old = engine.wait_for(lambda s: s.processed is not None and s.drive.run is not None, WAIT_S).drive.run
         engine.control.seek(5)
         engine.wait_for(at(5), WAIT_S)
         told: list[Snapshot] = []
         engine.listen(told.append)
         engine.control.change(uri="test:other")
-        engine.wait_for(lambda s: s.uri == "test:other" and s.tick is not None and s.drive.run is not None, WAIT_S)
+        engine.wait_for(lambda s: s.uri == "test:other" and s.processed is not None and s.drive.run is not None, WAIT_S)
         first = next(s for s in told if s.uri == "test:other")
-        assert first.tick is None
+        assert first.processed is None
         assert (first.drive.run, first.index, first.time_s) == (None, 0, 0.0)
         assert all(s.drive.run != old for s in told if s.uri == "test:other")
     finally:
@@ -115,10 +116,10 @@ def test_a_recording_replaced_under_its_name_is_looked_at_anew(tmp_path: Path):
     file.write_text("before")
     cache, detector, source = DetectionCache(), CountingDetector(), Recording(f"sim:{file}")
     for calls in (1, 1):
-        Line(source, Detectors(detector), cache, "both").seek(0, Params())
+        SeekablePipeline(source, Detectors(detector), cache, "both").seek(0, Params())
         assert detector.calls == calls
     file.write_text("and after")
-    Line(source, Detectors(detector), cache, "both").seek(0, Params())
+    SeekablePipeline(source, Detectors(detector), cache, "both").seek(0, Params())
     assert detector.calls == 2
 
 
@@ -144,10 +145,10 @@ def test_without_a_detector_lidar_goes_on_alone_and_the_page_is_told_the_remedy(
     engine = Engine(opener(Recording()), missing, Params(), uri="test:car")
     engine.start()
     try:
-        shown = engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+        shown = engine.wait_for(lambda s: s.processed is not None, WAIT_S)
         assert any("cipv models pull" in n.text and n.level == "warning" for n in shown.notices)
-        assert shown.tick is not None
-        assert {item.source for item in shown.tick.result.objects} == {"L"}
+        assert shown.processed is not None
+        assert {item.source for item in shown.processed.result.objects} == {"L"}
     finally:
         engine.stop()
 
@@ -157,7 +158,7 @@ def test_what_a_detector_has_to_say_is_said_on_the_page():
     engine = Engine(opener(Recording()), lambda _: network, Params(), uri="test:car")
     engine.start()
     try:
-        shown = engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+        shown = engine.wait_for(lambda s: s.processed is not None, WAIT_S)
         assert [n.text for n in shown.notices] == [*Recording().notes, "it knows simulated cars only"]
     finally:
         engine.stop()
@@ -165,7 +166,7 @@ def test_what_a_detector_has_to_say_is_said_on_the_page():
 
 @pytest.mark.parametrize(
     ("sensors", "told"),
-    [("both", []), ("lidar", ["by the LiDAR alone"]), ("camera", ["by the camera alone"])],
+    [("both", []), ("lidar", ["LiDAR only"]), ("camera", ["Camera only"])],
     ids=["both", "LiDAR", "camera"],
 )
 def test_a_car_with_only_one_sensor_is_told_on_the_page(start: Start, sensors: str, told: list[str]):
@@ -188,7 +189,7 @@ def test_the_detector_is_asked_for_again_where_pictures_are_drawn():
     try:
         for uri in ("test:car", "test:other", "sim:car", "test:car"):
             engine.control.change(uri=uri)
-            engine.wait_for(lambda s, uri=uri: s.uri == uri and s.tick is not None, WAIT_S)
+            engine.wait_for(lambda s, uri=uri: s.uri == uri and s.processed is not None, WAIT_S)
         assert asked == ["test:car", "sim:car"]
     finally:
         engine.stop()
@@ -197,7 +198,7 @@ def test_the_detector_is_asked_for_again_where_pictures_are_drawn():
 @pytest.mark.parametrize(("sensors", "sources"), [("lidar", {"L"}), ("camera", {"V"}), ("both", {"VL"})])
 def test_sensors_can_be_taken_away(start: Start, sensors: str, sources: set[str]):
     engine, _, detector = start(sensors=sensors)
-    tick = engine.snapshot.tick
+    tick = engine.snapshot.processed
     assert tick is not None
     assert {item.source for item in tick.result.objects} == sources
     assert tick.frame.picture is not None, "people still want to see the picture"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from app.engine.read_ahead import Ahead
+from app.engine.read_ahead import ReadAhead
 
 WAIT_S = 20.0
 
@@ -39,7 +39,7 @@ def work() -> Iterator[Work]:
 
 def test_it_prepares_what_is_wanted_and_says_so(work: Work):
     work.gate.set()
-    ahead = Ahead(work.prepare, work.told.release)
+    ahead = ReadAhead(work.prepare, work.told.release)
     assert (ahead.ready, ahead.busy) == (None, False)
     ahead.want(7)
     assert work.told.acquire(timeout=WAIT_S)
@@ -50,7 +50,7 @@ def test_it_prepares_what_is_wanted_and_says_so(work: Work):
 
 
 def test_a_newer_wish_replaces_one_that_was_not_begun(work: Work):
-    ahead = Ahead(work.prepare, work.told.release)
+    ahead = ReadAhead(work.prepare, work.told.release)
     ahead.want(1)
     assert work.begun.acquire(timeout=WAIT_S)
     for index in (2, 3, 1, 4):
@@ -66,7 +66,7 @@ def test_a_newer_wish_replaces_one_that_was_not_begun(work: Work):
 def test_what_cannot_be_prepared_is_ready_all_the_same(work: Work):
     """Reading it in earnest says what is wrong."""
     work.gate.set()
-    ahead = Ahead(work.prepare, work.told.release)
+    ahead = ReadAhead(work.prepare, work.told.release)
     ahead.want(-1)
     assert work.told.acquire(timeout=WAIT_S)
     assert ahead.ready == -1
@@ -75,7 +75,7 @@ def test_what_cannot_be_prepared_is_ready_all_the_same(work: Work):
 
 def test_who_ends_it_with_patience_leaves_no_thread_behind():
     before = set(threading.enumerate())
-    ahead = Ahead(lambda index: None, lambda: None)
+    ahead = ReadAhead(lambda index: None, lambda: None)
     assert set(threading.enumerate()) - before
     ahead.end(patience_s=60.0)
     assert set(threading.enumerate()) <= before

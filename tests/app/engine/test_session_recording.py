@@ -11,15 +11,16 @@ from typing import Any
 import httpx
 import pytest
 
-from app.core.line import DetectionCache, Line
+from app.core.detection_cache import DetectionCache
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk, new_session
+from app.engine.seekable_pipeline import SeekablePipeline
+from app.engine.session_recording import SessionRecorder, new_session
 from app.web.server import create_app
 from app.web.source_catalog import sessions
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
 from pipeline.recording.segments import Segments
-from pipeline.recording.session_source import Mark, SessionSource
+from pipeline.recording.session.source import Mark, SessionSource
 from pipeline.run import run
 from pipeline.types.result_json import to_json
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
@@ -32,10 +33,10 @@ WAIT_S = 30.0
 @pytest.fixture
 def engine(tmp_path: Path) -> Iterator[Engine]:
     first, second = Recording(), Recording("test:other", count=5)
-    desk = RecordingDesk(tmp_path / "sessions")
+    desk = SessionRecorder(tmp_path / "sessions")
     engine = Engine(opener(first, second), lambda _: CountingDetector(), Params(), uri=first.uri, desk=desk)
     engine.start()
-    engine.wait_for(lambda shown: shown.tick is not None, WAIT_S)
+    engine.wait_for(lambda shown: shown.processed is not None, WAIT_S)
     yield engine
     engine.stop()
 
@@ -70,9 +71,11 @@ def client(engine: Engine) -> Iterator[Client]:
 def show(engine: Engine, index: int) -> dict[str, Any]:
     """Seek, wait, and what is believed of the frame once all is known of it."""
     engine.control.seek(index)
-    shown = engine.wait_for(lambda shown: shown.tick is not None and shown.index == index and shown.tick.whole, WAIT_S)
-    assert shown.tick is not None
-    return to_json(shown.tick.result)
+    shown = engine.wait_for(
+        lambda shown: shown.processed is not None and shown.index == index and shown.processed.whole, WAIT_S
+    )
+    assert shown.processed is not None
+    return to_json(shown.processed.result)
 
 
 def without_timing(result: dict[str, Any] | None) -> dict[str, Any]:
@@ -107,12 +110,12 @@ def test_what_is_shown_between_start_and_stop_is_in_the_session(client: Client, 
 
 
 def test_a_frame_waits_for_its_exact_result_and_its_marks_with_it(tmp_path: Path) -> None:
-    desk, source = RecordingDesk(tmp_path), Recording()
-    line = Line(source, Detectors(CountingDetector()), DetectionCache(), "both")
-    exact = line.seek(8, Params())
+    desk, source = SessionRecorder(tmp_path), Recording()
+    pipeline = SeekablePipeline(source, Detectors(CountingDetector()), DetectionCache(), "both")
+    exact = pipeline.seek(8, Params())
     assert exact is not None
     guess = replace(exact, result=replace(exact.result, notes=("a guess",)), exact=False)
-    last = line.seek(20, Params())
+    last = pipeline.seek(20, Params())
     assert last is not None
     assert not last.exact
     desk.start(source)
@@ -155,7 +158,7 @@ def test_opening_something_else_ends_it(client: Client, engine: Engine) -> None:
     file = client.post("/api/recording", json={"on": True}).json()["file"]
     show(engine, 3)
     client.post("/api/source", json={"uri": "test:other"})
-    engine.wait_for(lambda shown: shown.uri == "test:other" and shown.tick is not None, WAIT_S)
+    engine.wait_for(lambda shown: shown.uri == "test:other" and shown.processed is not None, WAIT_S)
     assert client.get("/api/recording").json() is None
     assert SessionSource("a", file).notes == ("made for a test",), "the file is whole"
 
@@ -166,7 +169,7 @@ def test_what_goes_wrong_is_one_sentence(
     (tmp_path / "sessions").write_text("in the way")
     answer = client.post("/api/recording", json={"on": True})
     assert answer.status_code == 409
-    assert "no recording can be made" in answer.json()["detail"]
+    assert "cannot record here" in answer.json()["detail"]
     (tmp_path / "sessions").unlink()
 
     def fail(*_: object, **__: object) -> None:
@@ -186,7 +189,7 @@ def test_what_goes_wrong_is_one_sentence(
 
 
 def test_nothing_open_is_nothing_to_record(tmp_path: Path) -> None:
-    engine = Engine(opener(), None, Params(), desk=RecordingDesk(tmp_path))
+    engine = Engine(opener(), None, Params(), desk=SessionRecorder(tmp_path))
     with loop_apart() as run:
         assert Client(engine, run).post("/api/recording", json={"on": True}).status_code == 409
     assert not list(tmp_path.iterdir())

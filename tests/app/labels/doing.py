@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from app.core.request_shapes import GivenCuboid
+from app.core.request_shapes import CuboidShape
 from app.labels.acts.registry import do
 from app.labels.acts.requests import Act, AddTrack, Relabel
 from app.labels.acts.scope import Scope
@@ -17,8 +17,8 @@ from pipeline.labels.model import LabelSet
 ACT: TypeAdapter[Any] = TypeAdapter(Act)
 
 
-def cuboid(x: float = 20.0) -> GivenCuboid:
-    return GivenCuboid(center=(x, 0.0, 0.7), size=(4.0, 1.8, 1.5), yaw_rad=0.0)
+def cuboid(x: float = 20.0) -> CuboidShape:
+    return CuboidShape(center=(x, 0.0, 0.7), size=(4.0, 1.8, 1.5), yaw_rad=0.0)
 
 
 def act(labels: DriveLabels, person: str, doing: object) -> Acted:

@@ -12,7 +12,7 @@ from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
 from app.labels.service.desk import LabelDesk
 from app.labels.store.database import Database
-from app.web.routes.label_shapes import LabelsOfPerson
+from app.web.routes.labels.shapes import LabelsOfPerson
 from app.web.server import create_app
 from pipeline.params import Params
 from pipeline.types.source import TruthObject

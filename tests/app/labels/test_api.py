@@ -6,8 +6,8 @@ import httpx
 import pytest
 
 from app.engine.engine import Engine
-from app.web.routes.label_score_shapes import ScoreJson
-from app.web.routes.label_shapes import Window
+from app.web.routes.labels.score_shapes import ScoreJson
+from app.web.routes.labels.shapes import Window
 from app.web.server import create_app
 from app.web.tokens import Tokens
 from pipeline.labels.model import WHOLE_TAG
@@ -53,7 +53,7 @@ def test_a_lead_whose_track_is_only_proposed_judges_nothing_and_it_is_said(
     done = act(client, kind="accept", items=[{"kind": "lead", "id": lead["id"], "revision": lead["revision"]}]).json()
     assert done["what"].endswith(f"; #{track['id']} is still proposed")
     score = ScoreJson.model_validate(client.get("/api/labels/score").json())
-    said = f"#{track['id']} leads in 30 frames but is only proposed: not judged until it is accepted."
+    said = f"#{track['id']} leads in 30 frames but is only proposed: not scored until accepted."
     assert (score.judged, score.metrics, score.errors, score.notes[0]) == (0, [], [], said)
     following = client.get("/api/labels/next", params={"what": "disagreement", "frame": 0}).json()
     assert (following["frame"], following["why"]) == (None, f"no frame is judged: {said}")
@@ -225,7 +225,7 @@ def test_live_sensors_and_nothing_cannot_be_labelled() -> None:
         with serving(create_app(engine)) as address, httpx.Client(base_url=address, timeout=WAIT_S) as client:
             assert client.get("/api/state").json()["labels"] is None
             answer = act(client, kind="tag", first=0, last=0, tag="x")
-            assert answer.json()["detail"] == "no recording is open that could be labelled"
+            assert answer.json()["detail"] == "no recording is open"
             assert answer.status_code == 404
     finally:
         engine.stop()

@@ -14,8 +14,9 @@ from app.engine.engine import Engine
 from app.labels.transfer import files
 from app.web.limits import LARGEST_FILE
 from pipeline.common.progress import Progress
-from pipeline.labels.formats.base import Drive, drive_of
+from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.native import from_json
+from pipeline.labels.formats.registry import FORMATS
 from pipeline.types import Frame
 from pipeline.types.source import Source
 from tests.app.labels.site import act, drive, labels, move, ref, task
@@ -56,7 +57,7 @@ def test_what_is_there_already_is_not_imported_twice(engine: Engine, client: htt
 def test_a_drive_is_looked_through_once_while_it_is_open(client: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
     looked: list[str] = []
 
-    def look(source: Source, progress: Progress, frame_of: Callable[[int], Frame]) -> Drive:
+    def look(source: Source, progress: Progress, frame_of: Callable[[int], Frame]) -> LabeledDrive:
         looked.append(source.uri)
         return drive_of(source, progress, frame_of)
 
@@ -65,6 +66,12 @@ def test_a_drive_is_looked_through_once_while_it_is_open(client: httpx.Client, m
     assert [answer.status_code for answer in answers] == [200] * 3
     assert answers[0].content == answers[2].content
     assert len(looked) == 1
+
+
+def test_every_format_is_listed_with_what_the_page_says_of_it(client: httpx.Client) -> None:
+    listed = client.get("/api/labels/formats").json()
+    assert [each["name"] for each in listed] == list(FORMATS)
+    assert listed[0] == {"name": "native", "title": "CIPV Studio", "about": "all labels"}
 
 
 @pytest.mark.parametrize("name", ["native", "openlabel", "kitti-tracking"])
@@ -117,14 +124,14 @@ FLAGS, METHOD, DATA = (6, 8), (8, 10), 30 + len("a.txt")
 @pytest.mark.parametrize(
     ("name", "body", "says"),
     [
-        ("native", b"these are no labels", "the file: no JSON"),
-        ("kitti", b"these are no labels", "no .zip of a folder"),
-        ("kitti", packed(**{"..__..__out.txt": "x"}), "leads out of it"),
+        ("native", b"these are no labels", "the file: not JSON"),
+        ("kitti", b"these are no labels", "not a valid .zip"),
+        ("kitti", packed(**{"..__..__out.txt": "x"}), "path outside its folder"),
         ("kitti", spoilt(*FLAGS, 1), "the .zip needs a password"),
         ("kitti", spoilt(*METHOD, 99), "compression method is not supported"),
         ("kitti", spoilt(DATA, None, 0xFF), "Error -3 while decompressing data"),
-        ("kitti", spoilt(DATA + 9, None, 0xFF, zipfile.ZIP_LZMA), "no .zip of a folder: Corrupt input data"),
-        ("kitti", spoilt(DATA + 1, None, 0xFF, zipfile.ZIP_BZIP2), "no .zip of a folder: Invalid data stream"),
+        ("kitti", spoilt(DATA + 9, None, 0xFF, zipfile.ZIP_LZMA), "not a valid .zip: Corrupt input data"),
+        ("kitti", spoilt(DATA + 1, None, 0xFF, zipfile.ZIP_BZIP2), "not a valid .zip: Invalid data stream"),
         ("openlabel", b"{}", "the file: "),
     ],
 )

@@ -36,7 +36,7 @@ def test_what_is_sent_again_is_answered_as_before_and_done_once(engine: Engine, 
         first, again = (sent(path, **body).json() for _ in range(2))
         assert first["act"] is not None
         assert again == first
-        assert sent(path, "Bob", **body).json() == {"detail": "an act of somebody else has that id"}
+        assert sent(path, "Bob", **body).json() == {"detail": "another person's act has this id"}
     there = labels(client)
     assert (len(there["tags"]), len(there["tracks"])) == (1, 1)
     number = next(numbers)

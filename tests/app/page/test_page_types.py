@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.web.server import create_app
@@ -39,7 +39,7 @@ def typedefs(text: str) -> dict[str, set[str]]:
 @pytest.fixture(scope="module")
 def sent(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Any]]:
     """One real message of each kind, by the name of its type."""
-    desk = RecordingDesk(tmp_path_factory.mktemp("sessions"))
+    desk = SessionRecorder(tmp_path_factory.mktemp("sessions"))
     with running(desk, whole_drives=True, source=Recording(count=30)) as engine:
         engine.control.seek(28)
         with serving(create_app(engine)) as address, httpx.Client(base_url=address, timeout=WAIT_S) as client:
@@ -58,7 +58,7 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         assert answer.status_code == 200, (path, answer.text)
         return answer.json()
 
-    engine.wait_for(lambda shown: shown.index == 28 and shown.tick is not None, WAIT_S)
+    engine.wait_for(lambda shown: shown.index == 28 and shown.processed is not None, WAIT_S)
     assert client.post("/api/marks", json={"text": "here"}).status_code == 201
     # the first run is the base only once a second one stands beside it
     engine.wait_for(lambda shown: not shown.state_json()["drive"]["running"], WAIT_S)

@@ -12,13 +12,13 @@ import pytest
 from app.reports.scene_pictures import plan_svg, scene_html
 from pipeline.evaluation.report_sections import Scene
 from pipeline.simulation import scenario
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 
 
 @pytest.mark.parametrize("name", ["straight", "turn_across_left"])
 def test_the_plan_has_everybody_where_they_are(name: str) -> None:
     scene = scenario.load(name)
-    now = world.at(scene, 5.0)
+    now = world_state.at(scene, 5.0)
     svg = plan_svg(scene, now, name)
     cars = re.findall(r'<polygon class="car"[^>]*points="([^"]+)"', svg)
     assert len(cars) == len(now.actors) > 1

@@ -11,7 +11,8 @@ import cv2
 import numpy as np
 import pytest
 
-from app.core.line import DetectionCache, Line
+from app.core.detection_cache import DetectionCache
+from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
 from app.streaming.picture import MAX_WIDTH_PX, encode_picture, width_for
@@ -41,9 +42,9 @@ def snapshot(params: Params | None = None, index: int = 3, **frame_changes: Any)
     recording = Recording()
     original = recording.frame
     recording.frame = lambda i: replace(original(i), **frame_changes)  # type: ignore[method-assign]
-    line = Line(recording, Detectors(CountingDetector()), DetectionCache(), "both")
+    pipeline = SeekablePipeline(recording, Detectors(CountingDetector()), DetectionCache(), "both")
     return Snapshot(
-        params, uri=recording.uri, count=len(recording), index=index, sequence=1, tick=line.seek(index, params)
+        params, uri=recording.uri, count=len(recording), index=index, sequence=1, processed=pipeline.seek(index, params)
     )
 
 
@@ -65,19 +66,19 @@ def taken_apart(message: bytes) -> tuple[dict[str, Any], bytes, dict[str, np.nda
 def test_the_header_holds_the_contracts_result_and_the_state():
     shown = snapshot()
     header, _, _ = taken_apart(Encoder().message(shown) or b"")
-    assert shown.tick is not None
-    assert header["result"] == json.loads(json.dumps(to_json(shown.tick.result)))
+    assert shown.processed is not None
+    assert header["result"] == json.loads(json.dumps(to_json(shown.processed.result)))
     assert header["state"]["index"] == 3
     assert header["state"]["frame"] == "000003"
 
 
 def test_points_are_the_sweep_in_centimetres_and_where_the_alignment_puts_them():
     shown = snapshot()
-    assert shown.tick is not None
+    assert shown.processed is not None
     _, _, arrays = taken_apart(Encoder().message(shown) or b"")
-    points = shown.tick.result.layers.points
+    points = shown.processed.result.layers.points
     np.testing.assert_allclose(arrays["xyz"] / 100.0, points[:, :3], atol=0.0051)
-    aligned = resolve(shown.params.alignment, shown.tick.frame.camera)
+    aligned = resolve(shown.params.alignment, shown.processed.frame.camera)
     assert aligned is not None
     expected = aligned.project(points[:, :3].astype(np.float64))
     seen = ~np.isnan(expected[:, 0])
@@ -87,8 +88,8 @@ def test_points_are_the_sweep_in_centimetres_and_where_the_alignment_puts_them()
 
 def test_each_point_says_what_it_is_and_whose():
     shown = snapshot()
-    assert shown.tick is not None
-    result = shown.tick.result
+    assert shown.processed is not None
+    result = shown.processed.result
     _, _, arrays = taken_apart(Encoder().message(shown) or b"")
     for value, code in ((GROUND, 0), (UNCLUSTERED, 1), (DROPPED, 3)):
         np.testing.assert_array_equal(arrays["kind"] == code, result.layers.kind == value)
@@ -109,10 +110,10 @@ def test_moving_the_alignment_moves_the_points_in_the_picture():
 
 def test_the_cameras_own_jpeg_goes_through_untouched():
     shown = snapshot()
-    assert shown.tick is not None
+    assert shown.processed is not None
     _, jpeg, _ = taken_apart(Encoder().message(shown) or b"")
-    assert shown.tick.frame.picture is not None
-    assert jpeg == shown.tick.frame.picture.encoded
+    assert shown.processed.frame.picture is not None
+    assert jpeg == shown.processed.frame.picture.encoded
 
 
 @pytest.mark.parametrize(
@@ -153,9 +154,9 @@ def test_a_frame_that_lacks_something_still_makes_a_message(missing: str):
 
 def test_the_corridor_lies_on_the_ground_that_was_fitted():
     shown = snapshot()
-    assert shown.tick is not None
-    result = shown.tick.result
-    aligned = resolve(shown.params.alignment, shown.tick.frame.camera)
+    assert shown.processed is not None
+    result = shown.processed.result
+    aligned = resolve(shown.params.alignment, shown.processed.frame.camera)
     assert aligned is not None
     header, _, _ = taken_apart(Encoder().message(shown) or b"")
     flat = np.column_stack([result.path.left, np.full(len(result.path.left), GROUND_M)])
@@ -172,16 +173,16 @@ def lane_line(side: Side, offset_m: float) -> LaneLine:
 
 def test_lane_lines_are_drawn_in_the_picture_and_in_the_plan():
     shown = snapshot()
-    assert shown.tick is not None
+    assert shown.processed is not None
     lane = EgoLane(lane_line("left", 1.8), None, "classical", 0.0, 0.0, None, np.array([0.0, 0.0, GROUND_M]))
-    layers = replace(shown.tick.result.layers, lanes=lane)
-    tick = replace(shown.tick, result=replace(shown.tick.result, layers=layers))
-    display = taken_apart(Encoder().message(replace(shown, tick=tick)) or b"")[0]["display"]
+    layers = replace(shown.processed.result.layers, lanes=lane)
+    tick = replace(shown.processed, result=replace(shown.processed.result, layers=layers))
+    display = taken_apart(Encoder().message(replace(shown, processed=tick)) or b"")[0]["display"]
     left = display["plan_lanes"]["left"]
     assert left[0] == pytest.approx([4.0, 1.8 + 0.016])
     assert left[-1] == pytest.approx([30.0, 1.8 + 0.9])
     assert display["plan_lanes"]["right"] == display["lanes"]["right"] == []
-    aligned = resolve(shown.params.alignment, shown.tick.frame.camera)
+    aligned = resolve(shown.params.alignment, shown.processed.frame.camera)
     assert aligned is not None
     expected = aligned.project(np.array([[30.0, 2.7, GROUND_M]]))[0]
     assert display["lanes"]["left"][-1] == pytest.approx(expected.tolist(), abs=3.0)
@@ -190,8 +191,8 @@ def test_lane_lines_are_drawn_in_the_picture_and_in_the_plan():
 
 def test_points_keep_their_intensity_ring_and_age():
     original = snapshot()
-    assert original.tick is not None
-    sweep = original.tick.frame.sweep
+    assert original.processed is not None
+    sweep = original.processed.frame.sweep
     assert sweep is not None
     _, _, untimed = taken_apart(Encoder().message(original) or b"")
     np.testing.assert_array_equal(untimed["ring"], sweep.ring)
@@ -206,7 +207,7 @@ def test_points_keep_their_intensity_ring_and_age():
 
 
 def test_reflectance_between_0_and_1_uses_all_shades():
-    sweep = snapshot().tick.frame.sweep  # type: ignore[union-attr]
+    sweep = snapshot().processed.frame.sweep  # type: ignore[union-attr]
     assert sweep is not None
     points = sweep.points.copy()
     points[:, 3] = np.linspace(0.0, 1.0, len(points))

@@ -18,8 +18,9 @@ from starlette.applications import Starlette
 from starlette.routing import WebSocketRoute
 from websockets.sync.client import ClientConnection, connect
 
-from app.core.line import DetectionCache, Line
+from app.core.detection_cache import DetectionCache
 from app.core.server_address import listen_socket
+from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
 from app.streaming.picture import MAX_WIDTH_PX
 from app.streaming.stream import FRAMES_UNDER_WAY, Stream
@@ -75,12 +76,12 @@ def site() -> Iterator[Site]:
 def _first() -> Snapshot:
     """A frame with a picture wider than any page needs, of noise: its JPEG is large."""
     recording = Recording()
-    line = Line(recording, Detectors(CountingDetector(), None), DetectionCache(), "both")
-    tick = line.seek(0, Params())
+    pipeline = SeekablePipeline(recording, Detectors(CountingDetector(), None), DetectionCache(), "both")
+    tick = pipeline.seek(0, Params())
     assert tick is not None
     noise = np.random.default_rng(0).integers(0, 255, (900, 2560, 3), np.uint8)
     tick = replace(tick, frame=replace(tick.frame, picture=Picture(0, noise)))
-    return Snapshot(Params(), uri=recording.uri, count=1, tick=tick)
+    return Snapshot(Params(), uri=recording.uri, count=1, processed=tick)
 
 
 def next_header(client: ClientConnection) -> dict[str, Any]:

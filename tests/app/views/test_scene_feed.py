@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from app.core.shared_view_state import Looks
+from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from app.views.lazy_scene import LateScene
 from app.views.scene_feed import SceneFeed
@@ -23,7 +23,7 @@ def engine() -> Iterator[Engine]:
     recording = Recording()
     started = Engine(opener(recording), lambda _: CountingDetector(), Params(), uri=recording.uri)
     started.start()
-    started.wait_for(lambda shown: shown.tick is not None, WAIT_S)
+    started.wait_for(lambda shown: shown.processed is not None, WAIT_S)
     yield started
     started.stop()
 
@@ -46,7 +46,7 @@ def test_who_comes_to_look_sees_the_present_frame_and_the_ones_after(engine: Eng
 
 
 def test_a_page_that_hides_its_3d_view_costs_nothing_until_it_shows_it_again(engine: Engine, open_scene: Any) -> None:
-    looks, page = Looks(), object()
+    looks, page = SharedViewState(), object()
     with SceneFeed(engine, looks) as feed:
         client = open_scene(feed.port)
         client.look()
@@ -61,13 +61,13 @@ def test_a_page_that_hides_its_3d_view_costs_nothing_until_it_shows_it_again(eng
 
 
 def test_what_is_clicked_in_the_3d_view_is_selected_everywhere(engine: Engine, open_scene: Any) -> None:
-    tick = engine.snapshot.tick
+    tick = engine.snapshot.processed
     assert tick is not None
     target = next(each for each in tick.result.objects if each.cuboid is not None)
     assert target.cuboid is not None
     x, y, _ = target.cuboid.center
     picked: queue.Queue[int | None] = queue.Queue()
-    looks = Looks()
+    looks = SharedViewState()
     looks.on_pick(picked.put)
     with SceneFeed(engine, looks) as feed:
         client = open_scene(feed.port)
@@ -82,9 +82,9 @@ def test_what_is_clicked_in_the_3d_view_is_selected_everywhere(engine: Engine, o
 
 
 def test_what_is_selected_at_a_page_is_marked_in_the_3d_view(engine: Engine, open_scene: Any) -> None:
-    tick = engine.snapshot.tick
+    tick = engine.snapshot.processed
     assert tick is not None
-    looks = Looks()
+    looks = SharedViewState()
     with SceneFeed(engine, looks) as feed:
         client = open_scene(feed.port)
         client.look()
@@ -108,7 +108,7 @@ def _is_cloud(message: dict[str, Any]) -> bool:
 
 
 def test_it_is_started_when_somebody_first_asks_where_it_is(engine: Engine, open_scene: Any) -> None:
-    with LateScene(engine, Looks()) as late:
+    with LateScene(engine, SharedViewState()) as late:
         port = late.port()
         assert late.port() == port
         client = open_scene(port)

@@ -10,7 +10,7 @@ import pytest
 from websockets.sync.client import ClientConnection, connect
 
 from app.core.server_address import listen_socket
-from app.core.shared_view_state import Looks
+from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from app.web.server import Server, create_app
 from pipeline.params import Params
@@ -24,18 +24,18 @@ def engine() -> Iterator[Engine]:
     first, second = Recording(), Recording("test:other", count=5)
     engine = Engine(opener(first, second), lambda _: CountingDetector(), Params(), uri=first.uri)
     engine.start()
-    engine.wait_for(lambda shown: shown.tick is not None, WAIT_S)
+    engine.wait_for(lambda shown: shown.processed is not None, WAIT_S)
     yield engine
     engine.stop()
 
 
 @pytest.fixture(scope="module")
-def looks() -> Looks:
-    return Looks()
+def looks() -> SharedViewState:
+    return SharedViewState()
 
 
 @pytest.fixture(scope="module")
-def address(engine: Engine, looks: Looks) -> Iterator[str]:
+def address(engine: Engine, looks: SharedViewState) -> Iterator[str]:
     """Where a real server answers."""
     bound = listen_socket("127.0.0.1", 0)
     address = f"http://127.0.0.1:{bound.getsockname()[1]}"
@@ -75,5 +75,5 @@ def _at_the_start(engine: Engine) -> None:
     engine.control.set_params(Params(), "default")
     engine.control.change(uri="test:car", playing=False, target=None, steps=0)
     engine.wait_for(
-        lambda s: s.sequence > before and s.uri == "test:car" and s.index == 0 and s.tick is not None, WAIT_S
+        lambda s: s.sequence > before and s.uri == "test:car" and s.index == 0 and s.processed is not None, WAIT_S
     )

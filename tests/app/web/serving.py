@@ -10,7 +10,7 @@ from fastapi import FastAPI
 
 from app.core.server_address import listen_socket
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from app.web.server import Server
 from pipeline.params import Params
 from pipeline.types.source import Source
@@ -21,7 +21,7 @@ WAIT_S = 60.0
 
 @contextmanager
 def running(
-    desk: RecordingDesk | None = None, *, whole_drives: bool = False, source: Source | None = None
+    desk: SessionRecorder | None = None, *, whole_drives: bool = False, source: Source | None = None
 ) -> Iterator[Engine]:
     """An engine on a made-up recording, or another, which shows its first frame."""
     recording = source if source is not None else Recording()
@@ -35,7 +35,7 @@ def running(
     )
     engine.start()
     try:
-        engine.wait_for(lambda shown: shown.tick is not None, WAIT_S)
+        engine.wait_for(lambda shown: shown.processed is not None, WAIT_S)
         yield engine
     finally:
         engine.stop()

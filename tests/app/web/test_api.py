@@ -11,7 +11,7 @@ import pytest
 import yaml
 from websockets.sync.client import ClientConnection
 
-from app.core.shared_view_state import Looks
+from app.core.shared_view_state import SharedViewState
 from app.engine.engine import Engine
 from app.web.routes import params
 from pipeline.params import Params, from_yaml
@@ -23,7 +23,7 @@ from tests.app.web.asking import WAIT_S, reach
 def test_health_state_and_result(client: httpx.Client, engine: Engine):
     assert client.get("/api/healthz").json() == {"status": "ok", "engine": True}
     assert client.get("/api/state").json()["title"] == "a car"
-    tick = engine.snapshot.tick
+    tick = engine.snapshot.processed
     assert tick is not None
     assert client.get("/api/result").json() == json.loads(json.dumps(to_json(tick.result)))
 
@@ -122,7 +122,7 @@ def test_a_preset_replaces_everything(client: httpx.Client):
 
 def test_another_recording_is_opened(client: httpx.Client, engine: Engine):
     assert client.post("/api/source", json={"uri": "test:other"}).status_code == 202
-    assert reach(engine, lambda s: s.uri == "test:other" and s.tick is not None).count == 5
+    assert reach(engine, lambda s: s.uri == "test:other" and s.processed is not None).count == 5
 
 
 REFUSED = {
@@ -149,7 +149,9 @@ def test_bad_input_is_refused_with_one_sentence(client: httpx.Client, name: str)
     assert client.get("/api/params").json()["values"] == before
 
 
-def test_what_is_picked_in_the_3d_view_comes_to_the_pages(looks: Looks, stream: Callable[..., ClientConnection]):
+def test_what_is_picked_in_the_3d_view_comes_to_the_pages(
+    looks: SharedViewState, stream: Callable[..., ClientConnection]
+):
     page = stream()
     page.recv(timeout=WAIT_S)
     looks.pick(7)

@@ -15,7 +15,7 @@ from starlette.routing import BaseRoute, Route
 from websockets.sync.client import connect
 
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from app.web.routes import shapes
 from app.web.server import create_app
 from pipeline.params import Params
@@ -30,7 +30,7 @@ BYTES = {"type": "string", "format": "binary"}
 
 @pytest.fixture(scope="module")
 def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Engine]:
-    with running(RecordingDesk(tmp_path_factory.mktemp("sessions"))) as engine:
+    with running(SessionRecorder(tmp_path_factory.mktemp("sessions"))) as engine:
         yield engine
 
 
@@ -106,8 +106,8 @@ def test_every_operation_says_what_it_does_and_what_it_answers(app: FastAPI):
 
 def test_a_route_is_called_by_what_it_does(app: FastAPI):
     titles = {name: operation["summary"] for name, operation in operations(app).items()}
-    assert titles["GET /api/result"] == "The shown frame's result"
-    assert titles["GET /api/jobs/{number}"] == "How far an export is"
+    assert titles["GET /api/result"] == "Get the result of the shown frame"
+    assert titles["GET /api/jobs/{number}"] == "Get the progress of an export"
     assert [name for name, title in titles.items() if len(title.split()) < 2 or title.endswith(".")] == []
 
 
@@ -130,9 +130,9 @@ def test_a_refusal_is_described_as_it_is_sent(client: httpx.Client, app: FastAPI
 @pytest.mark.parametrize(
     ("body", "kind", "said"),
     [
-        (b"{playing: yes", "application/json", "the body is no JSON: "),
-        (b"[1, 2]", "application/json", "the body has to be a JSON object"),
-        (b"{}", "text/plain", "the body has to be a JSON object"),
+        (b"{playing: yes", "application/json", "the body is not valid JSON: "),
+        (b"[1, 2]", "application/json", "the body must be a JSON object"),
+        (b"{}", "text/plain", "the body must be a JSON object"),
     ],
 )
 def test_a_body_that_is_none_is_said_in_words(client: httpx.Client, body: bytes, kind: str, said: str):
@@ -164,7 +164,7 @@ ANSWERS: dict[str, type[BaseModel]] = {
 @pytest.mark.parametrize("path", ANSWERS)
 def test_what_is_said_of_an_answer_is_what_is_in_it(client: httpx.Client, engine: Engine, path: str):
     engine.control.seek(20)
-    engine.wait_for(lambda shown: shown.index == 20 and shown.tick is not None, WAIT_S)
+    engine.wait_for(lambda shown: shown.index == 20 and shown.processed is not None, WAIT_S)
     answer = client.get(path).json()
     model = ANSWERS[path].model_validate(answer)
     assert model.model_dump(exclude_unset=True).keys() == answer.keys() == ANSWERS[path].model_fields.keys()

@@ -17,9 +17,9 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 from websockets.sync.client import connect
 
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from app.web.limits import LARGEST_BODY, LARGEST_FILE
-from app.web.routes.label_files import IMPORT
+from app.web.routes.labels.files import IMPORT
 from app.web.server import create_app
 from app.web.tokens import Tokens
 from tests.app.web.serving import WAIT_S, running, serving
@@ -30,7 +30,7 @@ EVIL = "http://evil.example"
 
 @pytest.fixture(scope="module")
 def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Engine]:
-    with running(RecordingDesk(tmp_path_factory.mktemp("sessions"))) as engine:
+    with running(SessionRecorder(tmp_path_factory.mktemp("sessions"))) as engine:
         yield engine
 
 
@@ -299,7 +299,7 @@ def test_a_length_beyond_the_limit_is_refused_before_a_byte_of_it(address: str, 
         connection.request("POST", path, headers={"cookie": cookie, "content-length": length})
         answer = connection.getresponse()
         assert answer.status == 413
-        assert f"{largest >> 20} MiB at most" in answer.read().decode()
+        assert f"larger than {largest >> 20} MiB" in answer.read().decode()
         connection.close()
 
 

@@ -70,7 +70,7 @@ def test_it_passes_over_a_taken_port_answers_and_ends_with_open_streams(taken_po
             program.send_signal(signal.SIGINT)
             _, errors = program.communicate(timeout=30)
         assert program.returncode == 0
-        assert errors.strip() == f"cipv: port {taken_port} is taken, using {port}"
+        assert errors.strip() == f"cipv: port {taken_port} is in use; using {port}"
     finally:
         program.kill()
         program.wait()

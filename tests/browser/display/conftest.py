@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.browser.conftest import WAIT_MS, Site
@@ -57,7 +57,7 @@ def own(tmp_path: Path) -> Iterator[tuple[Site, Recording]]:
         Params(),
         uri=recording.uri,
         playing=True,
-        desk=RecordingDesk(tmp_path),
+        desk=SessionRecorder(tmp_path),
     )
     engine.start()
     site = Site(engine, 0)

@@ -47,7 +47,7 @@ def used_bytes(devtools: CDPSession) -> tuple[float, dict[str, int]]:
 def fed(browser: Browser, own: tuple[Site, Recording]) -> Iterator[Page]:
     """The display on a paused recording with a lead, ready to be fed."""
     site, _ = own
-    site.engine.wait_for(lambda s: s.tick is not None and s.tick.result.cipv is not None, WAIT_S)
+    site.engine.wait_for(lambda s: s.processed is not None and s.processed.result.cipv is not None, WAIT_S)
     context = browser.new_context(viewport={"width": 800, "height": 480})
     context.add_init_script(KEEP_SOCKET)
     page = context.new_page()

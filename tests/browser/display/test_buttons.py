@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import expect
 
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from app.web.server import create_app
 from app.web.tokens import Tokens
 from pipeline.params import Params
@@ -57,14 +57,14 @@ def test_recording_is_begun_and_ended_in_sight(open_display: OpenDisplay, own: t
 
 
 def test_a_refusal_is_said(open_display: OpenDisplay, tmp_path: Path):
-    engine = Engine(opener(), None, Params(), desk=RecordingDesk(tmp_path))
+    engine = Engine(opener(), None, Params(), desk=SessionRecorder(tmp_path))
     engine.start()
     try:
         with serving(create_app(engine)) as address:
             page = open_display(address, quiet=False)
             is_now(page, "waiting")
             page.locator("#record").tap()
-            expect(page.locator("#answer")).to_have_text("✕ Recording failed: nothing is open that could be recorded")
+            expect(page.locator("#answer")).to_have_text("✕ Recording failed: nothing is open to record")
             page.locator("#mark").tap()
             expect(page.locator("#answer")).to_have_text("✕ Mark failed: no recording is open")
     finally:

@@ -17,7 +17,7 @@ from playwright.sync_api import Page, expect
 from app.drive.open_recording import RULE
 from app.drive.run_results import results_of
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
 from pipeline.common.geometry import Cuboid, closest_on_polygon
 from pipeline.detection import detector_for
 from pipeline.evaluation.scores.drive import Rules, score_drive
@@ -59,7 +59,7 @@ def astyx(clip: str, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]
         Params(),
         uri=clip,
         whole_drives=True,
-        desk=RecordingDesk(tmp_path_factory.mktemp("sessions")),
+        desk=SessionRecorder(tmp_path_factory.mktemp("sessions")),
     )
     engine.start()
     running = Site(engine, 0)
@@ -155,7 +155,7 @@ def score_of(page: Page, labels: Labels) -> dict[str, str]:
 def exported_score(engine: Engine, labels: Labels) -> dict[str, str]:
     """The same figures of the labels as a file."""
     known = of_labels(from_json(json.dumps(labels.get("/export?format=native")).encode(), "the export"), RULE)
-    run = engine.labels.recording.book.current
+    run = engine.labels.recording.runs.current
     assert run is not None
     score = score_drive(results_of(run), known, Rules(RULE))
     values = {f"{each.title}, {each.unit}": each.of([score]) for each in FIGURES}
@@ -315,7 +315,7 @@ def test_the_drive_is_labelled_with_and_without_proposals(
     assert figures == exported_score(astyx.engine, labels), "the exported file says the same"
     notes = page.locator(".label-score .notes")
     expect(notes).not_to_contain_text("Detection and tracking")
-    expect(notes).to_contain_text("labelled places are as the pipeline proposed them")
+    expect(notes).to_contain_text("labelled positions are as the pipeline proposed them")
     every = page.locator(".label-score .errors tr[data-vehicles=all][data-seen=any] td")
     assert int(every.first.inner_text()) >= COUNT, "each frame has its lead at least"
     assert page.locator(".label-score").evaluate("(pane) => pane.scrollWidth <= pane.clientWidth"), (

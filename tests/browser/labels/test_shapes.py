@@ -72,7 +72,7 @@ def test_a_hand_in_the_3d_view_moves_it_in_every_view(hand: Hand, labels: Labels
 
 def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, site: Site):
     page = hand.page
-    tick = site.engine.snapshot.tick
+    tick = site.engine.snapshot.processed
     assert tick is not None
     assert tick.frame.picture is not None
     height, width = tick.frame.picture.bgr.shape[:2]
@@ -116,7 +116,7 @@ def foot_of(labels: Labels, cuboid: dict[str, Any]) -> tuple[float, float]:
 
 
 def test_a_cuboid_is_dragged_over_the_road_in_the_picture(hand: Hand, labels: Labels, site: Site):
-    page, tick = hand.page, site.engine.snapshot.tick
+    page, tick = hand.page, site.engine.snapshot.processed
     assert tick is not None
     assert tick.frame.picture is not None
     height, width = tick.frame.picture.bgr.shape[:2]

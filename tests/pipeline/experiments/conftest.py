@@ -9,23 +9,23 @@ from pathlib import Path
 import pytest
 
 from pipeline.detection import Detectors
-from pipeline.experiments.experiment import Replay
+from pipeline.experiments.experiment import ExperimentDrive
 from pipeline.run import run
 from pipeline.simulation.drive_as_scenario import to_yaml
 from pipeline.sources import open_source
 from pipeline.types import Result
 
-SeeAgain = Callable[[Replay, int], list[Result]]
+SeeAgain = Callable[[ExperimentDrive, int], list[Result]]
 
 
 @pytest.fixture
 def see_again(tmp_path: Path) -> SeeAgain:
     """What the line believes in the first frames of a kept drive whose detections are given, opened as a file."""
 
-    def believed(replay: Replay, frames: int) -> list[Result]:
-        file = tmp_path / f"{replay.name}.yaml"
-        file.write_text(to_yaml(replay.as_seen()), encoding="utf-8")
-        drive = run(open_source(f"sim:{file}"), replay.params, Detectors())
+    def believed(driven: ExperimentDrive, frames: int) -> list[Result]:
+        file = tmp_path / f"{driven.name}.yaml"
+        file.write_text(to_yaml(driven.as_seen()), encoding="utf-8")
+        drive = run(open_source(f"sim:{file}"), driven.params, Detectors())
         return [result for _, result in islice(drive, frames)]
 
     return believed

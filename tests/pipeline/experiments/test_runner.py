@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import pytest
 
 from pipeline.evaluation.report_sections import Chart, Coloured, Section, Series, Table, as_json
-from pipeline.experiments.experiment import Experiment, Replay
+from pipeline.experiments.experiment import Experiment, ExperimentDrive
 from pipeline.experiments.runner import EXPERIMENTS, SUITES, NoSuchSuite, count_cases, of_suite, run_all
 from pipeline.params import Params
 from pipeline.simulation.scenario import Ego, Scenario
@@ -26,10 +26,10 @@ def _report(cases: Sequence[int], outcomes: Sequence[int]) -> Section:
     return Section("squares", "Squares", (), (Table("t", ("n", "n²"), tuple(zip(cases, outcomes, strict=True))),))
 
 
-def _replay(case: int, outcome: int) -> Replay:
+def _replay(case: int, outcome: int) -> ExperimentDrive:
     road = Road.model_validate({"segments": [{"length_m": 100.0}]})
     scenario = Scenario(title="a drive", duration_s=1.0, road=road, ego=Ego(lane=-1, speed_mps={0.0: 5.0}))
-    return Replay(f"square_{case}", f"{case}²", (str(outcome),), scenario, Params(), "both", ())
+    return ExperimentDrive(f"square_{case}", f"{case}²", (str(outcome),), scenario, Params(), "both", ())
 
 
 SQUARES = Experiment("squares", "paper", "Squares", _cases, _square, _report, _replay)
@@ -54,9 +54,9 @@ def test_every_suite_has_experiments(suite: str) -> None:
 
 
 def test_every_drive_of_an_experiment_is_kept() -> None:
-    kept: list[tuple[str, Replay]] = []
-    run_all(of_suite("regression"), short=True, jobs=1, keep=lambda each, replay: kept.append((each.name, replay)))
-    assert len({replay.name for _, replay in kept}) == count_cases(of_suite("regression"), short=True)
+    kept: list[tuple[str, ExperimentDrive]] = []
+    run_all(of_suite("regression"), short=True, jobs=1, keep=lambda each, as_drive: kept.append((each.name, as_drive)))
+    assert len({driven.name for _, driven in kept}) == count_cases(of_suite("regression"), short=True)
     assert {name for name, _ in kept} == {"regression"}
 
 

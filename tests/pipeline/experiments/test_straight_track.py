@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import pytest
 
-from pipeline.experiments.straight_track import Drive, approach, gap_m, parameters, scene, true_range_m
+from pipeline.experiments.straight_track import DriveRecord, approach, gap_m, parameters, scene, true_range_m
 from pipeline.simulation.closed_loop import Setup
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 
 
-def by_hand(accel_mps2: list[float], speed_mps: list[float], impact_mps: float | None = None) -> Drive:
+def by_hand(accel_mps2: list[float], speed_mps: list[float], impact_mps: float | None = None) -> DriveRecord:
     n = len(accel_mps2)
     times = tuple(0.1 * k for k in range(n))
     gaps = tuple(10.0 - k for k in range(n))
-    return Drive(
+    return DriveRecord(
         times, tuple(speed_mps), tuple(accel_mps2), gaps, (0.0,) * n, (None,) * n, ("off",) * n, None, None, impact_mps
     )
 
@@ -33,7 +33,7 @@ def test_an_impact_leaves_no_gap() -> None:
 
 def test_gap_is_to_the_rear_and_range_to_the_nearest_point() -> None:
     scenario = scene({0.0: 10.0}, {"ahead_m": 30.0, "speed_mps": {0.0: 0.0}, "offset_m": 4.0}, 1.0, 0)
-    target = world.at(scenario, 0.0).actors[0]
+    target = world_state.at(scenario, 0.0).actors[0]
     assert gap_m(target) == pytest.approx(30.0)
     assert true_range_m(target) == pytest.approx((30.0**2 + (4.0 - 0.91) ** 2) ** 0.5)
 

@@ -7,13 +7,13 @@ import pytest
 
 from pipeline.experiments.true_lead import InSight, Way, true_lead
 from pipeline.simulation.sensors.camera import calibration
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from tests.pipeline.simulation.worlds import with_actors
 
 
 def lead_of(actors: str, segments: str = "{length_m: 2000}") -> int | None:
     scene = with_actors(actors, segments)
-    now = world.at(scene, 0.0)
+    now = world_state.at(scene, 0.0)
     lead, doubtful = true_lead(now, Way.of(scene).ahead(now))
     assert not doubtful
     return lead.actor.id if lead is not None else None
@@ -43,7 +43,7 @@ def test_in_a_curve_the_lead_is_on_the_way_driven_not_straight_ahead() -> None:
     bend = "{length_m: 100}, {length_m: 300, radius_m: 50}"
     assert lead_of("{id: 1, kind: car, lane: -2, ahead_m: 45, speed_mps: {0: 20}}", bend) == 1
     scene = with_actors("{id: 1, kind: car, lane: -2, ahead_m: 45, speed_mps: {0: 20}}", bend)
-    now = world.at(scene, 0.0)
+    now = world_state.at(scene, 0.0)
     assert now.actors[0].cuboid.center[1] > 5.0, "it stands well to the left of straight ahead"
     path = Way.of(scene).ahead(now)
     assert path is not None
@@ -52,7 +52,7 @@ def test_in_a_curve_the_lead_is_on_the_way_driven_not_straight_ahead() -> None:
 
 def test_one_at_the_edge_is_doubtful() -> None:
     scene = with_actors("{id: 1, kind: car, lane: -2, offset_m: 1.5, ahead_m: 30, speed_mps: {0: 20}}")
-    now = world.at(scene, 0.0)
+    now = world_state.at(scene, 0.0)
     assert true_lead(now, Way.of(scene).ahead(now))[1]
 
 
@@ -65,7 +65,7 @@ def test_what_has_just_come_into_sight_cannot_be_confirmed_yet() -> None:
     )
     camera, in_sight, hidden, confirmable = calibration(), InSight(), [], []
     for k in range(40):
-        now = world.at(scene, k / 10)
+        now = world_state.at(scene, k / 10)
         in_sight = in_sight.then(now, camera)
         hidden.append(in_sight.is_hidden(1))
         confirmable.append(in_sight.is_confirmable(1))

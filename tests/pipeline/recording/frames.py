@@ -11,8 +11,8 @@ import numpy as np
 
 from pipeline.common.geometry import Cuboid
 from pipeline.params import Params
-from pipeline.recording.provenance import About
-from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.session.provenance import About
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Route, StreamHealth, Sweep
 from pipeline.types.source import TruthObject
 

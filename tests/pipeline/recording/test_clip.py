@@ -13,8 +13,8 @@ from pipeline.common.errors import BadInput
 from pipeline.params import Params, with_changes
 from pipeline.recording.info import info, rhythm
 from pipeline.recording.save import save
-from pipeline.recording.session_source import SessionSource
-from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.session.source import SessionSource
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.sources import open_source
 from pipeline.types import Frame
 from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, TRUTH, full, picture, same

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from pipeline.common.errors import BadInput
-from pipeline.recording import mcap_output
 from pipeline.recording.info import info
+from pipeline.recording.mcap import output as mcap_output
 from pipeline.recording.rewrite import recover
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from pipeline.sources import SourceError
 from tests.pipeline.recording.frames import full, same, sweep, write
 

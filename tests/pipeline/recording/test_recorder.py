@@ -24,8 +24,8 @@ from pipeline.recording import recorder as recorder_module
 from pipeline.recording.recorder import Recorder, RecordingState
 from pipeline.recording.rewrite import recover
 from pipeline.recording.segments import Rotation, Segments
-from pipeline.recording.session_source import Mark, SessionSource
-from pipeline.recording.velodyne_scan import RawLidar
+from pipeline.recording.session.source import Mark, SessionSource
+from pipeline.recording.session.velodyne_scan import RawLidar
 from pipeline.types.camera_shot import Shot
 from tests.conftest import ROOT
 from tests.pipeline.recording.frames import ABOUT, PERIOD_NS, full, picture, same, sweep

@@ -8,13 +8,14 @@ import pytest
 from mcap.reader import make_reader
 
 from pipeline.common.errors import BadInput
-from pipeline.recording import mcap_output, topics
-from pipeline.recording.mcap_reader import McapFile, Stored
+from pipeline.recording import topics
+from pipeline.recording.mcap import output as mcap_output
+from pipeline.recording.mcap.reader import McapFile, Stored
 from pipeline.recording.relabel import relabel
 from pipeline.recording.rewrite import clip
 from pipeline.recording.save import save
-from pipeline.recording.session_source import SessionSource
-from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.session.source import SessionSource
+from pipeline.recording.session.writer import SessionWriter
 from tests.pipeline.recording.frames import ABOUT, full, same
 
 FRAMES = 12

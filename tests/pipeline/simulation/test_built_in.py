@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from pipeline.common.geometry import Cuboid
-from pipeline.simulation import scenario
-from pipeline.simulation.world import world
-from pipeline.simulation.world.world import ActorState, World
+from pipeline.simulation import built_in, scenario
+from pipeline.simulation.world import world_state
+from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.types import F64
 
-NAMES = scenario.names()
+NAMES = built_in.names()
 EGO = Cuboid((-2.3, 0.0, 0.0), (4.6, 1.9, 1.5), 0.0)
 
 
 @cache
 def drive(name: str) -> tuple[World, ...]:
     built_in = scenario.load(name)
-    return tuple(world.at(built_in, i / 5) for i in range(round(built_in.duration_s * 5)))
+    return tuple(world_state.at(built_in, i / 5) for i in range(round(built_in.duration_s * 5)))
 
 
 def actor(now: World, number: int) -> ActorState:

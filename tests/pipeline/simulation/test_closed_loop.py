@@ -7,7 +7,7 @@ from itertools import pairwise
 import pytest
 
 from pipeline.params import Params, with_changes
-from pipeline.simulation.closed_loop import NetworkEyes, Setup, Tick, drive
+from pipeline.simulation.closed_loop import LoopStep, NetworkEyes, Setup, drive
 from pipeline.simulation.scenario import Scenario
 from pipeline.types import RawBoxes
 from tests.pipeline.simulation.worlds import with_actors
@@ -19,7 +19,7 @@ def short(actors: str, seconds: float = 4.0) -> Scenario:
     return with_actors(actors).model_copy(update={"duration_s": seconds})
 
 
-def ticks(setup: Setup, actors: str = SLOWER) -> list[Tick]:
+def ticks(setup: Setup, actors: str = SLOWER) -> list[LoopStep]:
     return list(drive(short(actors), setup))
 
 

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.simulation import scenario
+from pipeline.simulation import built_in, scenario
 from pipeline.simulation.scenario import Scenario, ScenarioError
-from pipeline.simulation.world import world
-from pipeline.simulation.world.world import ActorState, World
+from pipeline.simulation.world import world_state
+from pipeline.simulation.world.world_state import ActorState, World
 
 FILES = {
     name: (Path(scenario.__file__).parent / "scenarios" / f"{name}.yaml").read_text(encoding="utf-8")
-    for name in scenario.names()
+    for name in built_in.names()
 }
 STRAIGHT = FILES["straight"]
 
@@ -54,12 +54,12 @@ def test_damage_is_survived(name: str, share: float, drop: int, extra: str) -> N
         parsed = scenario.parse(text[:at] + extra + text[at + drop :], "t.yaml")
     except ScenarioError:
         return
-    world.at(parsed, 1.0)
+    world_state.at(parsed, 1.0)
 
 
 def test_every_built_in_scenario_loads() -> None:
-    assert "straight" in scenario.names()
-    for name in scenario.names():
+    assert "straight" in built_in.names()
+    for name in built_in.names():
         assert scenario.load(name).frame_count() > 0
 
 
@@ -69,7 +69,7 @@ def test_every_built_in_scenario_loads() -> None:
 @pytest.fixture(scope="module")
 def drive() -> list[World]:
     built_in = scenario.load("straight")
-    return [world.at(built_in, i / 10) for i in range(built_in.frame_count())]
+    return [world_state.at(built_in, i / 10) for i in range(built_in.frame_count())]
 
 
 def actor(now: World, number: int) -> ActorState:

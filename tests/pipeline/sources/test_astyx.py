@@ -85,11 +85,11 @@ def test_an_index_outside_is_refused(astyx: Path) -> None:
     ("damage", "note"),
     [
         (lambda folder: (folder / "lidar_vlp16/000002.txt").unlink(), "no LiDAR file for this frame"),
-        (lambda folder: (folder / "lidar_vlp16/000002.txt").write_bytes(b""), "000002.txt: no LiDAR points in it"),
+        (lambda folder: (folder / "lidar_vlp16/000002.txt").write_bytes(b""), "000002.txt: no LiDAR points"),
         (lambda folder: (folder / "lidar_vlp16/000002.txt").write_bytes(bytes(range(256)) * 9), "no LiDAR points"),
         (lambda folder: (folder / "camera_front/000002.jpg").unlink(), "no picture for this frame"),
         (lambda folder: (folder / "camera_front/000002.jpg").write_bytes(b""), "000002.jpg: not a readable picture"),
-        (lambda folder: (folder / "camera_front/000002.jpg").write_bytes(b"\xff\xd8\xff\xe0x"), "picture is cut off"),
+        (lambda folder: (folder / "camera_front/000002.jpg").write_bytes(b"\xff\xd8\xff\xe0x"), "picture is truncated"),
         (lambda folder: (folder / "calibration/000002.json").write_text("{"), "first calibration is used"),
     ],
 )
@@ -112,7 +112,7 @@ def test_bad_rows_are_left_out_and_counted(astyx: Path) -> None:
     frame = opened(astyx).frame(0)
     assert frame.sweep is not None
     assert len(frame.sweep.points) == len(LIDAR_ROWS)
-    assert frame.notes == ("000001.txt: 6 unreadable rows left out",)
+    assert frame.notes == ("000001.txt: 6 unreadable rows skipped",)
 
 
 def test_a_picture_of_another_size_is_left_out(astyx: Path) -> None:
@@ -144,7 +144,7 @@ def _invert_camera(sensors: list[dict]) -> None:
     [
         (_scale_rotation, "calibration 000001.json: T_to_ref_COS of lidar_vlp16 is not a rigid transform"),
         (_mirror, "is not a rigid transform"),
-        (_invert_camera, "does not look ahead; is its extrinsic given the wrong way round"),
+        (_invert_camera, "does not look ahead; is its extrinsic inverted"),
         (lambda sensors: sensors.pop(), "not an Astyx calibration"),
         (
             lambda sensors: sensors[2]["calib_data"].update(K=[[1, 2], [3, 4]]),

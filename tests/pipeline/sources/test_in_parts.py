@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.recording.tick import CameraRecord
+from pipeline.recording.session.frame_record import CameraRecord
 from pipeline.sources import open_source
 from pipeline.types import Frame
 from pipeline.types.source import InParts, Source

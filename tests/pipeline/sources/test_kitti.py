@@ -125,11 +125,11 @@ def test_oxts_needs_all_fields() -> None:
     [
         (b"", "no LiDAR points"),
         (b"garbage", "no LiDAR points"),
-        (rings_file()[:-7], "cut off in the middle of a point"),
+        (rings_file()[:-7], "truncated in the middle of a point"),
         (np.array([[10, 1, 9, 0.5]], dtype="<f4").tobytes(), "none of its rings lies where a VLP-16 has one"),
         (rings_file(60), "60 rings instead of 64"),
         (rings_file(70), "70 rings instead of 64"),
-        (np.array([[np.nan, 0, 0, 0.5]], dtype="<f4").tobytes() + rings_file(), "1 unreadable points left out"),
+        (np.array([[np.nan, 0, 0, 0.5]], dtype="<f4").tobytes() + rings_file(), "1 unreadable points skipped"),
     ],
 )
 def test_a_damaged_sweep_says_so(kitti: Path, content: bytes, note: str) -> None:
@@ -144,7 +144,7 @@ def test_a_cut_picture_says_so(kitti: Path) -> None:
     path.write_bytes(path.read_bytes()[:-20])
     frame = open_source(f"kitti:{kitti}").frame(2)
     assert frame.picture is None
-    assert frame.notes == ("0000000002.png: the picture is cut off",)
+    assert frame.notes == ("0000000002.png: the picture is truncated",)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_an_inverted_velodyne_calibration_is_noticed(kitti_raw: Path) -> None:
     T = T_ego_rect()
     rotation, place = (" ".join(map(str, part.ravel())) for part in (T[:3, :3], T[:3, 3]))
     (kitti_raw.parent / "calib_velo_to_cam.txt").write_text(f"R: {rotation}\nT: {place}\n")
-    with pytest.raises(SourceError, match="wrong way round"):
+    with pytest.raises(SourceError, match="is its extrinsic inverted"):
         open_source(f"kitti:{kitti_raw}")
 
 

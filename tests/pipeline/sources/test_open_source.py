@@ -13,8 +13,8 @@ from pipeline.sources import SourceError, open_any, open_source
 @pytest.mark.parametrize(
     ("uri", "says"),
     [
-        ("nosuch:thing", "no kind of source named 'nosuch'; there are astyx, kitti, mcap, pcap, pcd, rosbag, sim"),
-        ("", "not a source; type one of astyx:"),
+        ("nosuch:thing", "no kind of source is called 'nosuch'; type one of session.mcap, pcap:<file>, rosbag:<path>"),
+        ("", "not a source; type one of session.mcap, pcap:<file>"),
         ("/somewhere/else", "/somewhere/else: not a source"),
         ("C:\\drives\\one", "not a source"),
         ("astyx:", "no folder given"),
@@ -35,9 +35,9 @@ def test_a_wrong_uri_gives_one_sentence(uri: str, says: str) -> None:
     assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(("uri", "listed"), [("foo", "sim:…, live:…"), ("nosuch:thing", "sim, live")])
-def test_live_sensors_are_named_where_they_are_taken_and_only_there(uri: str, listed: str) -> None:
-    with pytest.raises(SourceError, match=f"{listed}$"):
+@pytest.mark.parametrize("uri", ["foo", "nosuch:thing"])
+def test_live_sensors_are_named_where_they_are_taken_and_only_there(uri: str) -> None:
+    with pytest.raises(SourceError, match=r"sim:<scenario or my.yaml>, live:<config.yaml>$"):
         open_any(uri)
     with pytest.raises(SourceError) as error:
         open_source(uri)
@@ -57,7 +57,7 @@ def test_an_empty_folder_and_a_file_are_told_apart(scheme: str, tmp_path: Path) 
 @pytest.mark.parametrize("scheme", ["astyx", "kitti"])
 def test_a_folder_of_something_else_is_refused(scheme: str, tmp_path: Path) -> None:
     (tmp_path / "holiday.txt").write_text("x")
-    with pytest.raises(SourceError, match=r"no (Astyx|KITTI) recording"):
+    with pytest.raises(SourceError, match=r"not an? (Astyx|KITTI) recording"):
         open_source(f"{scheme}:{tmp_path}")
 
 

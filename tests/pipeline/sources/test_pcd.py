@@ -47,14 +47,14 @@ def test_padding_and_repeated_names_are_room() -> None:
 
 WRONG = {
     "empty": (b"", "its header does not end"),
-    "not text": (bytes(range(256)) * 40, "no PCD file"),
-    "something else": (b"ply\nformat ascii\n", "no PCD file"),
-    "no points": (pcd(ROWS[:0]), "no points in it"),
-    "unknown type": (pcd(ROWS).replace(b"TYPE F", b"TYPE Q"), "its header makes no sense"),
-    "too few sizes": (pcd(ROWS).replace(b"SIZE 4 ", b"SIZE "), "its header makes no sense"),
-    "too many points": (pcd(ROWS).replace(b"POINTS ", b"POINTS 99999999"), "its header makes no sense"),
-    "unknown encoding": (pcd(ROWS).replace(b"DATA binary", b"DATA zipped"), "its header makes no sense"),
-    "compressed, cut": (pcd(ROWS, "binary_compressed")[:-50], "cut off or damaged"),
+    "not text": (bytes(range(256)) * 40, "not a PCD file"),
+    "something else": (b"ply\nformat ascii\n", "not a PCD file"),
+    "no points": (pcd(ROWS[:0]), "no points"),
+    "unknown type": (pcd(ROWS).replace(b"TYPE F", b"TYPE Q"), "its header is invalid"),
+    "too few sizes": (pcd(ROWS).replace(b"SIZE 4 ", b"SIZE "), "its header is invalid"),
+    "too many points": (pcd(ROWS).replace(b"POINTS ", b"POINTS 99999999"), "its header is invalid"),
+    "unknown encoding": (pcd(ROWS).replace(b"DATA binary", b"DATA zipped"), "its header is invalid"),
+    "compressed, cut": (pcd(ROWS, "binary_compressed")[:-50], "truncated or damaged"),
     "compressed, spoiled": (pcd(ROWS, "binary_compressed")[:-50] + bytes([255]) * 50, "compressed points are damaged"),
 }
 
@@ -71,7 +71,7 @@ def test_a_cut_file_gives_what_is_there(encoding: str) -> None:
     notes: list[str] = []
     rows = parse_pcd(pcd(ROWS, encoding)[:-60], "a.pcd", notes)
     assert 0 < len(rows) < len(ROWS)
-    assert notes == [f"a.pcd: {len(rows)} of {len(ROWS)} points are there"]
+    assert notes == [f"a.pcd: {len(rows)} of {len(ROWS)} points read"]
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
@@ -106,7 +106,7 @@ def test_names_that_are_no_times_are_ten_a_second(tmp_path: Path) -> None:
         (tmp_path / f"{name}.pcd").write_bytes(pcd(ROWS))
     source = open_source(f"pcd:{tmp_path}")
     assert [source.t_ns(index) for index in range(2)] == [0, 100_000_000]
-    assert source.notes[0] == "no time stamps in the files' names: taken as 10 Hz"
+    assert source.notes[0] == "no time stamps in the file names: 10 Hz assumed"
     assert [source.frame(index).name for index in range(2)] == ["000001", "000002"]
 
 
@@ -141,7 +141,7 @@ def test_a_damaged_file_degrades_its_frame(tmp_path: Path) -> None:
     (folder / f"{STAMPS_NS[0]}.pcd").write_bytes(b"garbage")
     source = open_source(f"pcd:{folder}")
     assert source.frame(0).sweep is None
-    assert source.frame(0).notes == (f"{STAMPS_NS[0]}.pcd: no PCD file: its header does not end",)
+    assert source.frame(0).notes == (f"{STAMPS_NS[0]}.pcd: not a PCD file: its header does not end",)
     assert source.frame(1).sweep is not None
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pyproj import Transformer
 
-from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.sources import open_source
 from pipeline.sources.along_route import along_route
 from pipeline.sources.route_files import RouteError, from_fixes, load_route
@@ -68,7 +68,7 @@ def test_places_of_a_utm_zone(tmp_path: Path, text: str, asked: str) -> None:
         pytest.param("easting,northing\n1,2\n3,4\n", "?epsg=61N", "not one UTM zone: 61N", id="no such zone"),
         pytest.param("east,north,zone\n1,2,32N\n3,4,33N\n", "", "not one UTM zone: 32N, 33N", id="two zones"),
         pytest.param("lat,lon\n48,11\n48.1,11\n", "?epsg=32632", "no columns named easting and", id="degrees"),
-        pytest.param(GGA, "?epsg=32632", "only CSV has places of a UTM zone", id="another kind of file"),
+        pytest.param(GGA, "?epsg=32632", "UTM coordinates are read from CSV only", id="another kind of file"),
     ],
 )
 def test_a_utm_zone_that_is_missing_or_wrong_is_said(tmp_path: Path, text: str, asked: str, says: str) -> None:
@@ -113,14 +113,14 @@ def test_nmea_logs_say_how_good_they_are(tmp_path: Path, text: str, sigma_m: flo
 @pytest.mark.parametrize(
     ("name", "text", "says"),
     [
-        pytest.param("a.csv", "", "no route in it", id="empty"),
+        pytest.param("a.csv", "", "no route:", id="empty"),
         pytest.param("a.csv", "a,b\n1,2\n", "no columns named lat and lon", id="other columns"),
-        pytest.param("a.csv", "lat,lon\n48,11\n48,11\n", "1 places on the Earth", id="one place"),
-        pytest.param("a.csv", "lat,lon\n480,11\n481,11\n", "0 places on the Earth", id="not on the Earth"),
+        pytest.param("a.csv", "lat,lon\n48,11\n48,11\n", "1 distinct positions on the Earth", id="one place"),
+        pytest.param("a.csv", "lat,lon\n480,11\n481,11\n", "0 distinct positions on the Earth", id="not on the Earth"),
         pytest.param("a.csv", 'lat,lon\n"48,11\n' + "48.1,11.2\n" * 20_000, "not CSV: field larger", id="open quote"),
         pytest.param("a.gpx", "<gpx", "not XML", id="cut off"),
         pytest.param("a.gpx", '<!DOCTYPE x [<!ENTITY a "b">]><gpx/>', "no document type", id="entities"),
-        pytest.param("a.nmea", GGA.replace("E,4,", "E,0,"), "no route in it", id="no fix, wrong checksums"),
+        pytest.param("a.nmea", GGA.replace("E,4,", "E,0,"), "no route:", id="no fix, wrong checksums"),
     ],
 )
 def test_what_is_no_route_is_told_in_one_sentence(tmp_path: Path, name: str, text: str, says: str) -> None:
@@ -141,7 +141,7 @@ def test_an_earlier_drive() -> None:
     route = from_fixes("drive", fixes)
     assert route.lat_deg.tolist() == [fix.lat_deg for fix in fixes]
     assert route.sigma_m == 0.01
-    with pytest.raises(RouteError, match="no route in it"):
+    with pytest.raises(RouteError, match="no route:"):
         from_fixes("nothing", [])
 
 
@@ -155,7 +155,7 @@ def test_of_an_earlier_session_the_fixes_alone_are_read(tmp_path: Path, monkeypa
     writer.write(replace(full(3), gnss=None))
     writer.close()
     for decoder in ("sweep_from", "picture_from"):
-        monkeypatch.setattr(f"pipeline.recording.session_source.{decoder}", lambda *of: pytest.fail("decoded"))
+        monkeypatch.setattr(f"pipeline.recording.session.source.{decoder}", lambda *of: pytest.fail("decoded"))
     route = load_route(str(tmp_path / "earlier.mcap"))
     first = frames[0].gnss
     assert first is not None

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.camera import DrawnCamera, calibration
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.training.labels import CLASSES, Label, labels
 
@@ -29,7 +29,7 @@ def _scenario(*actors: dict[str, Any]) -> Scenario:
 
 
 def _labels(*actors: dict[str, Any]) -> dict[int, Label]:
-    return {label.actor_id: label for label in labels(world.at(_scenario(*actors), 0.0), calibration())}
+    return {label.actor_id: label for label in labels(world_state.at(_scenario(*actors), 0.0), calibration())}
 
 
 @pytest.mark.parametrize("ahead_m", [8.0, 30.0, 90.0])
@@ -46,7 +46,7 @@ def test_the_box_is_where_the_vehicle_is_drawn() -> None:
     """Two pictures that differ in the car's paint alone differ inside its box and up to its edges."""
     pictures, found = [], None
     for colour in ("#ff0000", "#0000ff"):
-        now = world.at(_scenario({"ahead_m": 5.0, "lane": -2, "colour": colour}), 0.0)
+        now = world_state.at(_scenario({"ahead_m": 5.0, "lane": -2, "colour": colour}), 0.0)
         scenario = _scenario()
         camera = DrawnCamera(scenario.road, Roadside.build(scenario.road, 1, 0.0, 700.0), 1)
         pictures.append(camera.picture(now).astype(int))

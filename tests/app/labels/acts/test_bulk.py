@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
+from app.core.jobs import Cancelled
 from app.labels.acts.bulk import importing, put_proposals
 from app.labels.errors import ActRefused
-from app.labels.service.tasks import Cancelled
 from app.labels.store.database import Database
 from app.labels.store.drive_labels import DriveLabels
 from pipeline.common.geometry import Cuboid

@@ -74,5 +74,5 @@ def test_a_range_that_comes_to_one_that_says_the_same_is_one_with_it(labels: Dri
 def test_the_lead_can_be_unsaid(labels: DriveLabels) -> None:
     act(labels, kind="clear_lead", first=0, last=15)
     assert [each[:3] for each in leads(labels)] == [(16, 20, 1)]
-    with pytest.raises(ActRefused, match="nobody has said who leads in frames 1–16"):
+    with pytest.raises(ActRefused, match="no lead is labelled in frames 1–16"):
         act(labels, kind="clear_lead", first=0, last=15)

@@ -22,7 +22,7 @@ def test_a_split_track_is_two_and_the_lead_follows(labels: DriveLabels) -> None:
     assert [each.frame for each in track(labels, 1).sightings] == [10, 11, 12, 13]
     assert [each.frame for each in track(labels, 3).sightings] == list(range(14, 21))
     assert [each[:3] for each in leads(labels)] == [(10, 13, 1), (14, 20, 3)]
-    with pytest.raises(ActRefused, match="on one side of it only"):
+    with pytest.raises(ActRefused, match="on one side of that frame only"):
         act(labels, kind="split", track=1, frame=14)
 
 

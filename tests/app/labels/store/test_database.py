@@ -63,15 +63,15 @@ def test_a_database_of_a_newer_program_is_left_alone(file: Path) -> None:
     with first.writing() as connection:
         connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
     first.close()
-    with pytest.raises(DatabaseError, match="written by a newer program"):
+    with pytest.raises(DatabaseError, match="written by a newer version of this program"):
         Database.in_file(file)
 
 
 @pytest.mark.parametrize(
     ("url", "says"),
     [
-        ("nonsense", "no database address"),
-        ("mysql://somewhere/labels", "no database address"),
+        ("nonsense", "invalid database address"),
+        ("mysql://somewhere/labels", "invalid database address"),
         ("sqlite:////nowhere/at/all/labels.db", "unable to open"),
         ("postgresql://me:secret@127.0.0.1:1/labels", "127.0.0.1:1"),
     ],
@@ -117,7 +117,7 @@ def test_a_file_that_is_no_database_is_said(file: Path) -> None:
     with pytest.raises(DatabaseError, match="not a database"):
         Database.in_file(file)
     (file.parent / "a file").write_text("")
-    with pytest.raises(DatabaseError, match="labels cannot be kept there"):
+    with pytest.raises(DatabaseError, match="labels cannot be stored there"):
         Database.in_file(file.parent / "a file" / "labels.db")
 
 

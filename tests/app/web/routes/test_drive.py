@@ -11,15 +11,15 @@ import httpx
 import pytest
 import yaml
 
-from app.drive.frame_rows import COLUMNS
+from app.drive.frame_rows import column_names
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.web.server import create_app
 from pipeline.calibration.edge_match import FEWEST
 from pipeline.detection import Detectors
 from pipeline.params import Params, from_yaml, preset, with_changes
-from pipeline.recording.provenance import About
-from pipeline.recording.session_writer import SessionWriter
+from pipeline.recording.session.provenance import About
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.run import run
 from pipeline.sources import open_source
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
@@ -50,7 +50,9 @@ def _at_the_start(engine: Engine) -> None:
     engine.control.set_params(Params(), "default")
     before = engine.drives.recording
     engine.control.change(uri="test:car", playing=False, target=None, steps=0)
-    engine.wait_for(lambda s: engine.drives.recording is not before and s.index == 0 and s.tick is not None, WAIT_S)
+    engine.wait_for(
+        lambda s: engine.drives.recording is not before and s.index == 0 and s.processed is not None, WAIT_S
+    )
     computed(engine)
 
 
@@ -79,7 +81,7 @@ def test_columns_are_the_command_lines(client: httpx.Client, engine: Engine):
     results = [result for _, result in run(Recording(), Params(), Detectors(CountingDetector()))]
     assert (answer["count"], answer["from"], answer["done"]) == (30, 0, 30)
     assert answer["t_s"] == pytest.approx([0.1 * n for n in range(30)])
-    assert tuple(answer["columns"]) == COLUMNS
+    assert tuple(answer["columns"]) == column_names()
     assert answer["columns"]["cipv_id"] == [r.cipv.id if r.cipv else None for r in results]
     assert answer["columns"]["distance_m"] == [round(r.cipv.distance_m, 4) if r.cipv else None for r in results]
     assert answer["columns"]["gaps"] == [""] * 30
@@ -286,7 +288,7 @@ def test_without_a_whole_drive_the_routes_say_so():
     engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car")
     engine.start()
     try:
-        engine.wait_for(lambda s: s.tick is not None, WAIT_S)
+        engine.wait_for(lambda s: s.processed is not None, WAIT_S)
         with client_of(engine) as client:
             for route in ("/api/drive", "/api/compare", "/api/rerun.rrd", "/api/rerun/open"):
                 assert client.get(route).status_code == 404

@@ -32,7 +32,7 @@ def client(engine: Engine) -> Iterator[httpx.Client]:
 
 def test_corners_lie_where_the_line_sees_them(engine: Engine, client: httpx.Client):
     found = client.post("/api/project", json={"cuboids": [AHEAD, AHEAD | {"yaw_rad": 1.0}]}).json()["pixels"]
-    tick = engine.snapshot.tick
+    tick = engine.snapshot.processed
     assert tick is not None
     aligned = resolve(engine.snapshot.params.alignment, tick.frame.camera)
     assert aligned is not None
@@ -54,7 +54,7 @@ def test_nothing_is_asked_and_nothing_is_answered(client: httpx.Client):
 def test_a_pixel_looks_along_what_is_seen_there(
     engine: Engine, client: httpx.Client, place: tuple[float, float, float]
 ):
-    tick = engine.snapshot.tick
+    tick = engine.snapshot.processed
     assert tick is not None
     aligned = resolve(engine.snapshot.params.alignment, tick.frame.camera)
     assert aligned is not None

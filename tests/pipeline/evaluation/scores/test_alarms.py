@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pipeline.evaluation.scores.alarms import Alarm, Kind, alarms
+from pipeline.evaluation.scores.alarms import Alarm, AlarmKind, alarms
 from pipeline.params import AebParams
 from tests.pipeline.evaluation.scores.drives import TICK_NS, believed, truth
 
@@ -13,7 +13,7 @@ CLOSING = truth(*({1: (40.0 - n, 0.0)} for n in range(30)))
 margin: 16.5 m) from 16 m on (frame 24)."""
 
 
-def of_kind(states: list[str | None], kind: Kind) -> list[Alarm]:
+def of_kind(states: list[str | None], kind: AlarmKind) -> list[Alarm]:
     pairs = [(believed(n, [], None, state), CLOSING.frames[n * TICK_NS]) for n, state in enumerate(states)]
     return [alarm for alarm in alarms(pairs, AebParams()) if alarm.kind == kind]
 

@@ -165,13 +165,13 @@ def test_a_vehicle_that_nobody_looked_at_is_not_claimed_falsely() -> None:
 def test_no_lead_is_derived_where_a_nearer_vehicle_may_not_be_labelled() -> None:
     known = of_labels(labels(track(4, 30.0), track(5, 20.0, state="proposed")), RULE)
     assert leads(known) == ["?", "?", "?"]
-    assert any("who leads" in note for note in known.notes)
+    assert any("No lead is labelled" in note for note in known.notes)
 
 
 def test_a_lead_that_is_only_proposed_is_said() -> None:
     known = of_labels(labels(track(4, 30.0, state="proposed"), leads=LED), RULE)
     assert leads(known) == ["?", "?", "?"]
-    assert "#4 leads in 3 frames but is only proposed: not judged until it is accepted." in known.notes
+    assert "#4 leads in 3 frames but is only proposed: not scored until accepted." in known.notes
 
 
 def test_labels_that_nobody_accepted_are_no_truth() -> None:
@@ -258,9 +258,9 @@ def test_what_a_person_should_know_is_said() -> None:
     assert [frame.velocity_mps for frame in known.frames.values()] == [{}, {}, {}]
     notes = " ".join(known.notes)
     assert "1 track jumps in 3 places" in notes
-    assert "3 of 3 labelled places are as the pipeline proposed them" in notes
+    assert "3 of 3 labelled positions are as the pipeline proposed them" in notes
     assert "In 3 a vehicle is only proposed" in notes
-    assert "nobody says that every vehicle" not in notes
+    assert "no one has confirmed that every vehicle" not in notes
     by_hand = " ".join(of_labels(labels(track(4, 30.0, by=PERSON), tags=TAGGED), RULE).notes)
-    assert "Of 1 nobody says that every vehicle is labelled: tag them “all labelled”" in by_hand
+    assert "Of 1 no one has confirmed that every vehicle is labelled: tag them “all labelled”" in by_hand
     assert not any(words in by_hand for words in ("jump", "as the pipeline proposed", "only proposed"))

@@ -8,8 +8,8 @@ import pytest
 from pipeline.common.fast_replace import evolve
 from pipeline.experiments.curves import experiment, scenarios
 from pipeline.experiments.curves.drives import SOURCES, Frames, seen
-from pipeline.experiments.curves.experiment import Case, Outcome, longest_wrong_s, share_right, told_before_line_s
-from pipeline.simulation.world import world
+from pipeline.experiments.curves.experiment import CurveCase, Outcome, longest_wrong_s, share_right, told_before_line_s
+from pipeline.simulation.world import world_state
 from pipeline.sources.simulated import sensed
 
 
@@ -47,7 +47,7 @@ def test_told_before_the_wheel_is_over_the_line() -> None:
     ids=["before", "after", "never"],
 )
 def test_a_cut_in_that_is_told_too_late_is_a_demand_that_fails(told: tuple[bool, ...], fails: bool) -> None:
-    case = Case("cut_in", "straight", 0)
+    case = CurveCase("cut_in", "straight", 0)
     cut_in = {"fused": drive(*["right"] * 4, told=told, over_line_s=0.2)}
     assert bool(experiment.report([case], [cut_in]).failures) is fails
 
@@ -55,18 +55,18 @@ def test_a_cut_in_that_is_told_too_late_is_a_demand_that_fails(told: tuple[bool,
 @pytest.mark.parametrize("layout", scenarios.LAYOUTS.values(), ids=lambda layout: layout.name)
 def test_the_roads_bend_as_hard_as_said(layout: scenarios.Layout) -> None:
     scene = scenarios.scenario(layout, 0)
-    hardest = max(abs(now.speed_mps * now.yaw_rate_radps) for now in (world.at(scene, t / 5) for t in range(60)))
+    hardest = max(abs(now.speed_mps * now.yaw_rate_radps) for now in (world_state.at(scene, t / 5) for t in range(60)))
     assert hardest == pytest.approx(0.0 if layout.radius_m is None else 3.0, abs=0.2)
     sides = {seed: scenarios.scenario(layout, seed).road.segments for seed in (0, 1)}
     assert layout.radius_m is None or sides[0] != sides[1], "to the left, and to the right"
 
 
 @pytest.fixture(scope="module")
-def outcomes() -> dict[Case, Outcome]:
+def outcomes() -> dict[CurveCase, Outcome]:
     return {case: experiment.run(case) for case in experiment.cases(short=True)}
 
 
-def test_in_a_bend_of_125_m_the_lead_is_the_cipv(outcomes: dict[Case, Outcome]) -> None:
+def test_in_a_bend_of_125_m_the_lead_is_the_cipv(outcomes: dict[CurveCase, Outcome]) -> None:
     """Fused: in 99 % of the frames to 60 m, never 0.3 s on a decoy; a straight guess shows what is at stake."""
     (outcome,) = (outcome for case, outcome in outcomes.items() if case.kind == "follow")
     share, frames = share_right([outcome["fused"]], 60.0)
@@ -78,12 +78,12 @@ def test_in_a_bend_of_125_m_the_lead_is_the_cipv(outcomes: dict[Case, Outcome]) 
     assert share_right([outcome["yaw rate"]])[0] > share_right([outcome["straight guess"]])[0] + 0.3
 
 
-def test_a_drive_seen_again_has_the_boxes_and_lines_that_it_had(outcomes: dict[Case, Outcome]) -> None:
+def test_a_drive_seen_again_has_the_boxes_and_lines_that_it_had(outcomes: dict[CurveCase, Outcome]) -> None:
     case, outcome = next((case, outcome) for case, outcome in outcomes.items() if case.kind == "follow")
-    kept = experiment.replay(case, outcome)
+    kept = experiment.as_drive(case, outcome)
     scene = kept.as_seen()
     _, driven = next(iter(seen(scene)))
-    now = world.at(scene, 0.0)
+    now = world_state.at(scene, 0.0)
     again = sensed(evolve(driven, raw_boxes=None, raw_lanes=None), now, scene)
     for ours, theirs in ((again.raw_boxes, driven.raw_boxes), (again.raw_lanes, driven.raw_lanes)):
         assert ours is not None
@@ -92,14 +92,14 @@ def test_a_drive_seen_again_has_the_boxes_and_lines_that_it_had(outcomes: dict[C
     assert len(kept.charts[0].series[0].x) > 90
 
 
-def test_a_cut_in_is_told_before_the_wheel_is_over_the_line(outcomes: dict[Case, Outcome]) -> None:
+def test_a_cut_in_is_told_before_the_wheel_is_over_the_line(outcomes: dict[CurveCase, Outcome]) -> None:
     (outcome,) = (outcome for case, outcome in outcomes.items() if case.kind == "cut_in")
     before_s = told_before_line_s(outcome["fused"])
     assert before_s is not None
     assert before_s >= 0.0
 
 
-def test_the_report_says_what_held(outcomes: dict[Case, Outcome]) -> None:
+def test_the_report_says_what_held(outcomes: dict[CurveCase, Outcome]) -> None:
     section = experiment.report(list(outcomes), list(outcomes.values()))
     assert any(text.startswith("R = 125 m, 70 km/h: right in ") for text in section.text)
     choice, path, cut_in = section.tables

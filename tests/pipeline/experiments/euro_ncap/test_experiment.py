@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pipeline.evaluation.report_sections import Coloured
-from pipeline.experiments.euro_ncap.drives import OVERLAPS, SETUPS, Case, Result, Test, cases, replay, run
+from pipeline.experiments.euro_ncap.drives import OVERLAPS, SETUPS, EuroNcapCase, Result, Test, as_drive, cases, run
 from pipeline.experiments.euro_ncap.experiment import report
 
 
@@ -21,9 +21,9 @@ def test_a_braking_lead_brakes_twice_as_hard_from_two_gaps() -> None:
 
 
 def test_aeb_avoids_a_standing_car_at_40_and_without_brakes_there_is_an_impact() -> None:
-    fused = Case("CCRs", 40.0, 100, "both", "AEB")
+    fused = EuroNcapCase("CCRs", 40.0, 100, "both", "AEB")
     assert run(fused) == Result(0.0, "")
-    blind = run(Case("CCRs", 80.0, 100, "lidar", "AEB"))
+    blind = run(EuroNcapCase("CCRs", 80.0, 100, "lidar", "AEB"))
     assert not blind.void
     assert 5.0 < blind.impact_kmh < 80.0, "too fast for the LiDAR's reach, but braked"
 
@@ -38,9 +38,9 @@ def test_the_network_drives_a_sample_of_the_grid_and_every_drive_has_a_name_of_i
 
 
 def test_a_cell_can_be_driven_again_as_it_was() -> None:
-    case = Case("CCRs", 40.0, 100, "both", "AEB")
+    case = EuroNcapCase("CCRs", 40.0, 100, "both", "AEB")
     result = run(case)
-    kept = replay(case, result)
+    kept = as_drive(case, result)
     assert result.drive is not None
     assert len(kept.scenario.driven) == len(result.drive.speed_mps)
     assert kept.scenario.driven[-1][2] == pytest.approx(result.drive.speed_mps[-1], abs=1e-6)
@@ -48,11 +48,13 @@ def test_a_cell_can_be_driven_again_as_it_was() -> None:
 
 
 def test_a_car_that_brakes_before_the_start_makes_the_run_void() -> None:
-    assert run(Case("CCRb", 50.0, 100, "both", "ACC", 12.0, 2.0)).void == "braked before the start"
+    assert run(EuroNcapCase("CCRb", 50.0, 100, "both", "ACC", 12.0, 2.0)).void == "braked before the start"
 
 
 def test_the_report_has_a_coloured_cell_for_each_run() -> None:
-    chosen = [Case("CCRs", 30.0, overlap, sensors, "AEB") for sensors in ("both", "lidar") for overlap in (-50, 100)]
+    chosen = [
+        EuroNcapCase("CCRs", 30.0, overlap, sensors, "AEB") for sensors in ("both", "lidar") for overlap in (-50, 100)
+    ]
     section = report(chosen, [Result(0.0, ""), Result(8.0, ""), Result(30.0, ""), Result(0.0, "speed off")])
     grids = {table.title: table.rows for table in section.tables}
     assert grids["CCRs: fused, AEB"] == (

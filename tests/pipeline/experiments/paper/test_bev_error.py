@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from pipeline.experiments.paper.bev_error import PRINTED, Case, Error, Sighting, cases, replay, report, run
+from pipeline.experiments.paper.bev_error import PRINTED, BevCase, Error, Sighting, as_drive, cases, report, run
 from tests.pipeline.experiments.conftest import SeeAgain
 
 
 def test_errors_are_small_near_honest_far_and_stand_beside_the_print(see_again: SeeAgain) -> None:
-    cases = [Case("a", 0, "lidar"), Case("a", 0), Case("b", 0)]
+    cases = [BevCase("a", 0, "lidar"), BevCase("a", 0), BevCase("b", 0)]
     runs = [run(case) for case in cases]
     section = report(cases, runs)
     rows = {(row[0], row[1], row[2]): row[3:] for row in section.tables[0].rows}
@@ -25,7 +25,7 @@ def test_errors_are_small_near_honest_far_and_stand_beside_the_print(see_again: 
     left = rows["one lane left", "VL", "measured"]
     assert left[7] < 1.0, "lateral mean: the car is in its own lane"  # type: ignore[operator]
     assert any("better than the LiDAR alone, which does in" in text for text in section.text)
-    again = see_again(replay(cases[1], runs[1]), 50)
+    again = see_again(as_drive(cases[1], runs[1]), 50)
     seen = {each.range_m + each.error.distance_m for each in runs[1] if each.error is not None}
     believed = [item.distance_m for result in again for item in result.objects if item.source == "VL"]
     assert len(believed) > 5
@@ -48,7 +48,7 @@ def test_the_verdict_is_what_was_measured(fused_m: float | None, lidar_m: float,
     far = Error("V", 2.0, 0.0, 0.0) if fused_m is not None else None
     fused = [Sighting(20.0, near), Sighting(20.0, Error("VL", fused_m or 0.2, 0.0, 0.0)), Sighting(50.0, far)]
     lidar = [Sighting(20.0, Error("L", lidar_m, 0.0, 0.0)), Sighting(20.0, Error("L", lidar_m, 0.0, 0.0))]
-    text = report([Case("a", 0), Case("a", 0, "lidar")], [fused, [*lidar, Sighting(50.0, None)]]).text
+    text = report([BevCase("a", 0), BevCase("a", 0, "lidar")], [fused, [*lidar, Sighting(50.0, None)]]).text
     (verdict,) = (each for each in text if each.startswith("Straight ahead: fused places"))
     assert f"frames, {says[0]} than the LiDAR alone, which does" in verdict
     assert says[1] is None or f"on average, {says[1]} than the LiDAR alone" in verdict
@@ -58,7 +58,7 @@ def test_the_verdict_is_what_was_measured(fused_m: float | None, lidar_m: float,
 def test_however_far_off_it_counts() -> None:
     """What is placed 20 m off and 6 m aside is an error of 20 m and 6 m, not an object of something else."""
     seen = [Sighting(50.0, Error("V", 20.0, 6.0, 19.0)), Sighting(40.0, None)]
-    row = report([Case("a", 0)], [seen]).tables[0].rows[3]
+    row = report([BevCase("a", 0)], [seen]).tables[0].rows[3]
     assert row[3:5] == (1, 1)
     assert row[6] == 20.0
     assert row[9] == 6.0

@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 
 from pipeline.common.fast_replace import evolve
-from pipeline.experiments.paper.braking import Case, cases, report, run
+from pipeline.experiments.paper.braking import BrakingCase, cases, report, run
 from pipeline.experiments.paper.closed_forms import PAPER
 
 
 def test_towards_a_standing_car_both_sensors_brake_earlier_than_the_lidar() -> None:
-    cases = [Case("CCRs", sensors, "ACC + AEB", 0) for sensors in ("lidar", "both")]
+    cases = [BrakingCase("CCRs", sensors, "ACC + AEB", 0) for sensors in ("lidar", "both")]
     lidar, fused = (run(case) for case in cases)
     assert lidar.acquired_m is not None
     assert fused.acquired_m is not None
@@ -22,12 +22,12 @@ def test_towards_a_standing_car_both_sensors_brake_earlier_than_the_lidar() -> N
 
 
 def test_the_same_case_gives_the_same_drive() -> None:
-    case = Case("CCRb", "both", "ACC + AEB", 3)
+    case = BrakingCase("CCRb", "both", "ACC + AEB", 3)
     assert run(case) == run(case)
 
 
 def test_with_the_embedded_network_in_the_loop_it_stops_behind_a_braking_lead() -> None:
-    drive = run(Case("CCRb", "both", "ACC + AEB", 0, "network"))
+    drive = run(BrakingCase("CCRb", "both", "ACC + AEB", 0, "network"))
     assert drive.acquired_m is not None
     assert drive.impact_mps is None
     assert drive.speed_mps[-1] < 0.1
@@ -37,18 +37,18 @@ def test_with_the_embedded_network_in_the_loop_it_stops_behind_a_braking_lead() 
 def test_the_column_of_boxes_says_which_runs_had_the_network() -> None:
     full = cases(False)
     assert {case.manoeuvre for case in full if case.boxes == "network"} == set(PAPER)
-    drive = run(Case("CCRb", "lidar", "ACC", 0))
-    section = report([Case("CCRb", "both", "ACC + AEB", 0, "network"), *_pair()], [drive] * 3)
+    drive = run(BrakingCase("CCRb", "lidar", "ACC", 0))
+    section = report([BrakingCase("CCRb", "both", "ACC + AEB", 0, "network"), *_pair()], [drive] * 3)
     assert [row[3] for row in section.tables[0].rows] == ["network", None, "truth"]
 
 
 def test_what_differs_by_centimetres_is_no_better() -> None:
-    drive = run(Case("CCRb", "lidar", "ACC + AEB", 0))
+    drive = run(BrakingCase("CCRb", "lidar", "ACC + AEB", 0))
     nearly = evolve(drive, gap_m=tuple(gap + 0.02 for gap in drive.gap_m))
     clearly = evolve(drive, gap_m=tuple(gap + 2.0 for gap in drive.gap_m))
     assert "no better than" in report(_pair(), [drive, nearly]).text[1]
     assert "no better than" not in report(_pair(), [drive, clearly]).text[1]
 
 
-def _pair() -> list[Case]:
-    return [Case("CCRb", "lidar", "ACC + AEB", 0), Case("CCRb", "both", "ACC + AEB", 0)]
+def _pair() -> list[BrakingCase]:
+    return [BrakingCase("CCRb", "lidar", "ACC + AEB", 0), BrakingCase("CCRb", "both", "ACC + AEB", 0)]

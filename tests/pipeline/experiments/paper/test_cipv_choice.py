@@ -6,16 +6,25 @@ import pytest
 
 from pipeline.evaluation.lead_verdict import switches
 from pipeline.evaluation.report_sections import as_json
-from pipeline.experiments.paper.cipv_choice import UNDECIDABLE, Case, Frame, Verdict, acquired_m, replay, report, run
+from pipeline.experiments.paper.cipv_choice import (
+    UNDECIDABLE,
+    ChoiceCase,
+    Frame,
+    Verdict,
+    acquired_m,
+    as_drive,
+    report,
+    run,
+)
 from pipeline.experiments.perception import SENSORS
 from pipeline.experiments.true_lead import MAX_M
-from pipeline.simulation import scenario
+from pipeline.simulation import built_in
 from tests.pipeline.experiments.conftest import SeeAgain
 
 
 @pytest.mark.parametrize(("verdict", "fails"), [("correct", False), ("missed", True), ("new", False)])
 def test_one_wrong_frame_of_the_fused_fails_the_suite(verdict: Verdict, fails: bool) -> None:
-    cases = [Case("straight", sensors, 0) for sensors in SENSORS]
+    cases = [ChoiceCase("straight", sensors, 0) for sensors in SENSORS]
     good, other = Frame(0.0, "correct", 1, 20.0, 1, 20.0), Frame(0.1, verdict, 1, 20.0, None, None)
     section = report(cases, [[good], [good], [good, other]])
     assert bool(section.failures) is fails
@@ -24,12 +33,12 @@ def test_one_wrong_frame_of_the_fused_fails_the_suite(verdict: Verdict, fails: b
 
 def test_every_decidable_frame_is_right(see_again: SeeAgain) -> None:
     """One drive of the suite's twenty: the one in which a false alarm beside the lead once took its box."""
-    case = Case("straight", "both", 8)
+    case = ChoiceCase("straight", "both", 8)
     frames = run(case)
     judged = [frame.verdict for frame in frames if frame.verdict not in UNDECIDABLE]
     assert len(judged) > 50
     assert set(judged) <= {"correct", "none"}
-    again = see_again(replay(case, frames), 40)
+    again = see_again(as_drive(case, frames), 40)
     near = [result.cipv.id if result.cipv and result.cipv.distance_m <= MAX_M else None for result in again]
     assert near == [frame.chosen for frame in frames[:40]], "seen again, it chooses the same"
 
@@ -53,8 +62,8 @@ def test_switches_and_first_acquisition() -> None:
 
 
 def test_on_a_straight_road_fused_sees_more_than_the_lidar() -> None:
-    assert "straight" in scenario.names()
-    cases = [Case("straight", sensors, 0) for sensors in ("lidar", "both")]
+    assert "straight" in built_in.names()
+    cases = [ChoiceCase("straight", sensors, 0) for sensors in ("lidar", "both")]
     runs = [run(case) for case in cases]
     table = as_json(report(cases, runs))["tables"][0]
     rows = {row[1]: row for row in table["rows"]}

@@ -6,13 +6,13 @@ import pytest
 
 from pipeline.evaluation.report_sections import Table
 from pipeline.experiments.paper.distance_regression import report, run
-from pipeline.experiments.paper.layouts import Case, cases, scenario
+from pipeline.experiments.paper.layouts import LayoutCase, cases, scenario
 from pipeline.simulation.sensors import truth_boxes
 
 
 @pytest.fixture(scope="module")
 def laws() -> Table:
-    chosen = [*cases(False)[:8], *(Case(layout, seed) for layout in "bc" for seed in range(6))]
+    chosen = [*cases(False)[:8], *(LayoutCase(layout, seed) for layout in "bc" for seed in range(6))]
     return report(chosen, [run(case) for case in chosen]).tables[0]
 
 
@@ -34,7 +34,7 @@ def test_a_law_fitted_here_beats_one_from_elsewhere(laws: Table) -> None:
 
 
 def test_layouts_stand_where_they_say_and_cars_differ_from_run_to_run() -> None:
-    scenes = {layout: scenario(Case(layout, 0)) for layout in "abc"}
+    scenes = {layout: scenario(LayoutCase(layout, 0)) for layout in "abc"}
     lanes = {layout: scene.actors[0].lane - scene.ego.lane for layout, scene in scenes.items()}
     assert lanes == {"a": 0, "b": 1, "c": 2}
-    assert len({scenario(Case("a", seed)).actors[0].size_m for seed in range(5)}) == 5
+    assert len({scenario(LayoutCase("a", seed)).actors[0].size_m for seed in range(5)}) == 5

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pipeline.experiments.paper.lidar_range import PRINTED, Case, Sighting, recognised_to_m, replay, report, run
+from pipeline.experiments.paper.lidar_range import PRINTED, RangeCase, Sighting, as_drive, recognised_to_m, report, run
 from tests.pipeline.experiments.conftest import SeeAgain
 
 
 def test_near_it_is_exact_and_far_it_is_blind(see_again: SeeAgain) -> None:
-    cases = [Case("car", 0), Case("car", 1)]
+    cases = [RangeCase("car", 0), RangeCase("car", 1)]
     runs = [run(case) for case in cases]
     for sightings in runs:
         assert sightings[0].true_m > 95.0
@@ -16,7 +16,7 @@ def test_near_it_is_exact_and_far_it_is_blind(see_again: SeeAgain) -> None:
         assert all(abs(each.measured_m - each.true_m) < 1.0 for each in near if each.measured_m is not None)
         far = [each for each in sightings if each.true_m > 85.0]
         assert sum(each.measured_m is not None for each in far) < 0.2 * len(far)
-    again = see_again(replay(cases[0], runs[0]), 75)
+    again = see_again(as_drive(cases[0], runs[0]), 75)
     in_lane = [[item.distance_m for item in result.objects if item.in_path and not item.carried] for result in again]
     measured = [[each.measured_m] if each.measured_m is not None else [] for each in runs[0][:75]]
     assert in_lane == measured, "seen again, the LiDAR alone measures the same"

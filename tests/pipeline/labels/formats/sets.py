@@ -12,7 +12,7 @@ import pytest
 from hypothesis import strategies as st
 
 from pipeline.common.geometry import Cuboid, inverse, rotation
-from pipeline.labels.formats.base import Drive, Shot
+from pipeline.labels.formats.base import LabeledDrive, Shot
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.types import CameraCalibration, EgoState
 
@@ -32,13 +32,13 @@ def camera(distortion: tuple[float, ...] = (), pitch_rad: float = 0.03) -> Camer
     return CameraCalibration(K, np.array(distortion), inverse(T_ego_camera), 1280, 720)
 
 
-def drive(of: CameraCalibration | None = None, yaw_rate_radps: float | None = 0.1) -> Drive:
+def drive(of: CameraCalibration | None = None, yaw_rate_radps: float | None = 0.1) -> LabeledDrive:
     eye = of if of is not None else camera()
     shots = tuple(
         Shot(f"{i:06d}", 10**9 + i * 10**8, eye, (1280, 720), eye.T_camera_ego, EgoState(0, 12.0, yaw_rate_radps))
         for i in range(COUNT)
     )
-    return Drive("sim:somewhere", shots)
+    return LabeledDrive("sim:somewhere", shots)
 
 
 NUMBERS = st.floats(-80.0, 80.0, allow_subnormal=False)

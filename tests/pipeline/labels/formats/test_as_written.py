@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 
 from pipeline.common.geometry import Cuboid
-from pipeline.labels.formats.base import FormatName
-from pipeline.labels.formats.registry import export_labels, import_labels
+from pipeline.labels.formats.registry import FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelTrack, LeadRange, Origin, Sighting
 from tests.pipeline.labels.formats.sets import IMPORT, drive
 from tests.pipeline.labels.formats.test_round_trip import full_set

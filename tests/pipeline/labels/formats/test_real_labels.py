@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.labels.formats.base import Drive, drive_of
+from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.registry import export_labels, import_labels
 from pipeline.labels.recorded_truth import LINKED, truth_labels
 from pipeline.recording.save import save
@@ -15,7 +15,7 @@ from tests.pipeline.labels.formats.sets import IMPORT, assert_same
 
 
 @pytest.fixture(scope="module")
-def kitti(data_dir: Path) -> tuple[Path, Drive]:
+def kitti(data_dir: Path) -> tuple[Path, LabeledDrive]:
     folder = data_dir / "kitti_0052"
     if not folder.is_dir():
         pytest.skip(f"no KITTI drive at {folder}")
@@ -23,7 +23,7 @@ def kitti(data_dir: Path) -> tuple[Path, Drive]:
 
 
 @pytest.fixture(scope="module")
-def astyx(data_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Drive]:
+def astyx(data_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, LabeledDrive]:
     """Every fourth frame of the recording."""
     whole, part = data_dir / "astyx", tmp_path_factory.mktemp("astyx")
     if not whole.is_dir():
@@ -38,7 +38,7 @@ def astyx(data_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[str
     return uri, drive_of(open_source(uri))
 
 
-def test_kitti_lines_are_what_they_were(kitti: tuple[Path, Drive], tmp_path: Path) -> None:
+def test_kitti_lines_are_what_they_were(kitti: tuple[Path, LabeledDrive], tmp_path: Path) -> None:
     """All but what labels do not keep: how far an object is cut or hidden, and that a van is one."""
     folder, drive = kitti
     found = import_labels(folder / "label_2", drive, "kitti", IMPORT)
@@ -46,7 +46,7 @@ def test_kitti_lines_are_what_they_were(kitti: tuple[Path, Drive], tmp_path: Pat
     assert (len(found.labels.tracks), len(sightings)) == (8, 24)
     assert None not in [each.bbox for each in sightings]
     assert "9 Van are taken for class 'car'" in found.notes
-    assert any(note.startswith("how far 17 objects are cut or hidden") for note in found.notes)
+    assert any(note.startswith("truncation and occlusion of 17 objects") for note in found.notes)
     export_labels(found.labels, drive, "kitti", tmp_path / "out")
     for path in sorted((folder / "label_2").iterdir()):
         theirs = [line.split() for line in path.read_text().splitlines() if not line.startswith("DontCare")]
@@ -62,7 +62,9 @@ def test_kitti_lines_are_what_they_were(kitti: tuple[Path, Drive], tmp_path: Pat
     assert_same(again.labels, found.labels)
 
 
-def test_the_truth_of_a_kitti_recording_is_what_its_label_files_say(kitti: tuple[Path, Drive], tmp_path: Path) -> None:
+def test_the_truth_of_a_kitti_recording_is_what_its_label_files_say(
+    kitti: tuple[Path, LabeledDrive], tmp_path: Path
+) -> None:
     """Boxes in the picture, who is who, and what is taken for another class: also of a session made of it."""
     folder, drive = kitti
     found = import_labels(folder / "label_2", drive, "kitti", IMPORT)
@@ -76,7 +78,9 @@ def test_the_truth_of_a_kitti_recording_is_what_its_label_files_say(kitti: tuple
     assert not any("no box" in each for each in lost)
 
 
-def test_kitti_export_opens_as_a_kitti_recording_with_the_same_truth(kitti: tuple[Path, Drive], tmp_path: Path) -> None:
+def test_kitti_export_opens_as_a_kitti_recording_with_the_same_truth(
+    kitti: tuple[Path, LabeledDrive], tmp_path: Path
+) -> None:
     folder, drive = kitti
     labels = import_labels(folder / "label_2", drive, "kitti", IMPORT).labels
     export_labels(labels, drive, "kitti", tmp_path / "out")
@@ -92,7 +96,7 @@ def test_kitti_export_opens_as_a_kitti_recording_with_the_same_truth(kitti: tupl
 
 
 @pytest.mark.parametrize("name", ["kitti", "kitti-tracking", "nuscenes", "openlabel", "native"])
-def test_astyx_truth_comes_back(astyx: tuple[str, Drive], name: str, tmp_path: Path) -> None:
+def test_astyx_truth_comes_back(astyx: tuple[str, LabeledDrive], name: str, tmp_path: Path) -> None:
     uri, drive = astyx
     labels, notes = truth_labels(open_source(uri), drive.frames, IMPORT)
     assert len(labels.tracks) > 20

@@ -14,11 +14,11 @@ from hypothesis import HealthCheck, given, settings
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.labels.formats import base, native
-from pipeline.labels.formats.base import Drive, FormatName
-from pipeline.labels.formats.registry import FORMATS, export_labels, import_labels
+from pipeline.labels.formats.base import LabeledDrive
+from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, Origin, PathLabel, Sighting
 from pipeline.recording.rewrite import clip
-from pipeline.recording.session_source import SessionSource
+from pipeline.recording.session.source import SessionSource
 from pipeline.sources import open_source
 from tests.pipeline.labels.formats.sets import IMPORT, assert_same, assert_same_alone, camera, drive, label_sets, plain
 from tests.pipeline.recording.frames import full, write
@@ -26,7 +26,7 @@ from tests.pipeline.recording.frames import full, write
 SCRATCH = count()
 
 
-def there_and_back(labels: LabelSet, here: Drive, name: FormatName, folder: Path) -> LabelSet:
+def there_and_back(labels: LabelSet, here: LabeledDrive, name: FormatName, folder: Path) -> LabelSet:
     out = folder / f"{name}{next(SCRATCH)}"
     export_labels(labels, here, name, out)
     return import_labels(out, here, name, IMPORT).labels
@@ -108,12 +108,12 @@ LOSSES: dict[FormatName, tuple[str, ...]] = {
     "openlabel": (),
     "kitti": (
         "2 ranges of the lead", "1 frame of the ego path", "1 event", "1 frame tag", "2 comments", "2 reviews",
-        "1 track lose their identity", "1 interpolated place", "2 labels left out: rejected",
-        "1 label written as if true", "1 corrected label", "who made each label", "'frozen'", "tracks' numbers",
-        "1 track without sightings", "1 objects have no box", "cut or hidden", "3 frames have no file",
+        "1 track lose their identity", "1 interpolated position", "2 labels left out: rejected",
+        "1 label written as if accepted", "1 corrected label", "who made each label", "'frozen'", "tracks' numbers",
+        "1 track without sightings", "1 objects have no box", "truncation and occlusion", "3 frames have no file",
     ),
     "kitti-tracking": ("2 ranges of the lead", "2 labels left out: rejected", "1 event", "who made each label"),
-    "nuscenes": ("3 boxes of pictures not written", "1 sighting not written", "pictures and point"),
+    "nuscenes": ("3 boxes in pictures not written", "1 sighting not written", "pictures and point"),
     "coco": ("3 cuboids not written", "1 sighting not written", "1 frame tag"),
     "csv": ("4 tracks not written", "1 frame of the ego path", "1 rejected ranges", "'frozen'"),
 }  # fmt: skip
@@ -145,7 +145,7 @@ def test_the_same_labels_give_the_same_bytes(tmp_path: Path) -> None:
 
 def test_labels_of_a_drive_are_also_labels_of_its_clip() -> None:
     here = drive()
-    clip = Drive(here.uri, here.shots[1:4])
+    clip = LabeledDrive(here.uri, here.shots[1:4])
     placed = native.onto(full_set(), clip, "labels")
     assert [(r.first, r.last, r.lead) for r in placed.labels.leads] == [(0, 0, 3), (1, 2, "none")]
     assert [(t.id, [s.frame for s in t.sightings]) for t in placed.labels.tracks] == [(3, [0]), (4, [1]), (5, [1])]

@@ -12,15 +12,15 @@ from pipeline.alignment.projection import Pinhole
 from pipeline.simulation.drawing.canvas import NEAR_M, clip_near
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors import camera
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.types import F64, U8
 from tests.pipeline.simulation.worlds import with_actors
 
 
-def draw(scene: Scenario, t_s: float = 0.0) -> tuple[U8, world.World]:
+def draw(scene: Scenario, t_s: float = 0.0) -> tuple[U8, world_state.World]:
     roadside = Roadside.build(scene.road, scene.seed, 0.0, 600.0)
-    now = world.at(scene, t_s)
+    now = world_state.at(scene, t_s)
     return camera.DrawnCamera(scene.road, roadside, scene.seed).picture(now), now
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from pipeline.simulation.sensors import gnss
 from pipeline.simulation.sensors.gnss_model import GnssModel
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.types import GnssFix
 from tests.pipeline.simulation.worlds import with_actors
 
@@ -17,7 +17,7 @@ QUIET = {"sigma_m": 0.0, "sigma_up_m": 0.0, "sigma_speed_mps": 0.0, "sigma_cours
 
 
 def fix_at(t_s: float, index: int = 0, seed: int = 1, speed: float = 20.0, **model: float) -> GnssFix:
-    return gnss.fix(world.at(with_actors(speed=speed), t_s), GnssModel(**model), seed, index, 5)
+    return gnss.fix(world_state.at(with_actors(speed=speed), t_s), GnssModel(**model), seed, index, 5)
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_driving_along_x_goes_where_x_points(x_axis_deg: float, lat_sign: int, l
 
 def test_a_left_turn_counts_down_on_the_compass() -> None:
     scene = with_actors(segments="{length_m: 900, radius_m: 100}")
-    courses = [gnss.fix(world.at(scene, t), GnssModel(**QUIET), 1, 0, 0).course_rad for t in (0.0, 1.0)]
+    courses = [gnss.fix(world_state.at(scene, t), GnssModel(**QUIET), 1, 0, 0).course_rad for t in (0.0, 1.0)]
     assert courses[0] is not None
     assert courses[1] is not None
     assert courses[1] < courses[0]

@@ -12,7 +12,7 @@ from pipeline.simulation.sensors import lidar_rays
 from pipeline.simulation.sensors.lidar import Lidar
 from pipeline.simulation.sensors.lidar_model import LidarModel
 from pipeline.simulation.sensors.lidar_scene import PAINT, WALL
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.simulation.world.roadside import Roadside
 from pipeline.types import F64, Sweep
 from tests.pipeline.simulation.worlds import with_actors
@@ -21,7 +21,7 @@ NOTHING = Roadside((), np.empty(0), np.empty((0, 3)))
 
 
 def sweep_of(actors: str, index: int = 0, **model: object) -> Sweep:
-    now = world.at(with_actors(actors), 0.0)
+    now = world_state.at(with_actors(actors), 0.0)
     return Lidar(LidarModel.model_validate(model)).sweep(now, NOTHING, 1, index, 0)
 
 
@@ -39,10 +39,10 @@ def test_the_firing_pattern_is_a_vlp16s() -> None:
 
 def test_an_empty_road_is_rings_on_the_ground() -> None:
     sweep = sweep_of("")
-    assert np.abs(sweep.points[:, 2] + world.LIDAR_HEIGHT_M).max() < 0.02
+    assert np.abs(sweep.points[:, 2] + world_state.LIDAR_HEIGHT_M).max() < 0.02
     reach = np.hypot(sweep.points[:, 0], sweep.points[:, 1])
     for ring in range(7):
-        expected = world.LIDAR_HEIGHT_M / np.tan(np.radians(15 - 2 * ring))
+        expected = world_state.LIDAR_HEIGHT_M / np.tan(np.radians(15 - 2 * ring))
         assert np.median(reach[sweep.ring == ring]) == pytest.approx(expected, rel=0.01)
     assert sweep.ring.max() == 7, "what looks up meets nothing"
     assert sweep.points[:, 0].min() > -0.1, "the front half only"
@@ -60,11 +60,11 @@ def test_every_ray_ends_at_the_nearest_box(given_boxes: list[tuple[float, ...]])
     """Against a reference that tries every ray with every box."""
     rows = np.array([[*box[:6], np.cos(box[6]), np.sin(box[6]), WALL, 0, 0, 0, 1] for box in given_boxes])
     rays = lidar_rays.directions()
-    ground = np.array([-world.LIDAR_HEIGHT_M, 0.0, 0.0])
+    ground = np.array([-world_state.LIDAR_HEIGHT_M, 0.0, 0.0])
     range_m, _, _ = lidar_rays.cast(rays, np.zeros(len(rays)), rows, ground, 0)
     flat = rays.reshape(-1, 3)
     with np.errstate(divide="ignore"):
-        expected = np.where(flat[:, 2] < 0.0, -world.LIDAR_HEIGHT_M / flat[:, 2], np.inf)
+        expected = np.where(flat[:, 2] < 0.0, -world_state.LIDAR_HEIGHT_M / flat[:, 2], np.inf)
     for x, y, z, half_l, half_w, half_h, c, s in rows[:, :8]:
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         direction, start = flat @ turn, -np.array([x, y, z]) @ turn
@@ -120,7 +120,7 @@ def test_the_same_index_gives_the_same_noise() -> None:
 
 def cloud_of(scene: Scenario, t_s: float = 0.0, **model: object) -> F64:
     sensor = Lidar(LidarModel.model_validate({"range_sigma_m": 0.0, "dropout": 0.0, **model}))
-    return sensor.sweep(world.at(scene, t_s), NOTHING, 1, 0, 0).points[:, :3].astype(np.float64)
+    return sensor.sweep(world_state.at(scene, t_s), NOTHING, 1, 0, 0).points[:, :3].astype(np.float64)
 
 
 def rear_x(points: F64, y_m: float) -> float:
@@ -164,7 +164,7 @@ def test_moving_boxes_are_met_where_they_are_at_each_rays_time() -> None:
 def count(colour: str = "#8090a0", ahead_m: float = 24.0, **model: object) -> int:
     car = f"{{id: 1, kind: van, lane: -2, colour: '{colour}', ahead_m: {ahead_m}, speed_mps: {{0: 20}}}}"
     sensor = Lidar(LidarModel.model_validate(model))
-    sweeps = [sensor.sweep(world.at(with_actors(car), 0.0), NOTHING, 1, i, 0).points for i in range(20)]
+    sweeps = [sensor.sweep(world_state.at(with_actors(car), 0.0), NOTHING, 1, i, 0).points for i in range(20)]
     x, y, z = np.concatenate(sweeps)[:, :3].T
     return int(np.count_nonzero((x > ahead_m - 0.5) & (np.abs(y) < 1.1) & (z > -0.2)))
 
@@ -201,6 +201,6 @@ def test_a_tilted_sensor_sees_the_same_world() -> None:
     scene = with_actors("{id: 1, kind: truck, lane: -2, ahead_m: 14, speed_mps: {0: 20}}")
     tilted = cloud_of(scene, up_m=0.4, pitch_deg=3.0, roll_deg=-2.0, yaw_deg=4.0)
     low = tilted[tilted[:, 2] < -0.4]
-    assert np.abs(low[:, 2] + world.LIDAR_HEIGHT_M).max() < 0.06
+    assert np.abs(low[:, 2] + world_state.LIDAR_HEIGHT_M).max() < 0.06
     assert rear_x(tilted, 0.0) == pytest.approx(14.0, abs=0.1)
     assert len(tilted) > 0.5 * len(cloud_of(scene))

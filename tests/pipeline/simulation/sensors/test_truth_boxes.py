@@ -9,7 +9,7 @@ from pipeline.common.geometry import iou_matrix
 from pipeline.simulation.sensors import truth_boxes
 from pipeline.simulation.sensors.camera import calibration
 from pipeline.simulation.sensors.detection_model import BoxNoise
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.types import RawBoxes
 from tests.pipeline.simulation.worlds import with_actors
 
@@ -18,7 +18,7 @@ PERFECT = BoxNoise(lasting_share=0.0, frame_share=0.0, edge_px=0.0, missed=0.0)
 
 def look(actors: str, noise: BoxNoise = PERFECT, seed: int = 1, index: int = 0) -> RawBoxes:
     scene = with_actors(actors)
-    return truth_boxes.boxes(world.at(scene, 0.0), calibration(scene.camera), noise, seed, index)
+    return truth_boxes.boxes(world_state.at(scene, 0.0), calibration(scene.camera), noise, seed, index)
 
 
 def car(number: int, ahead_m: float, lane: int = -2, kind: str = "car") -> str:

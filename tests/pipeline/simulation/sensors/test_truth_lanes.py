@@ -12,9 +12,9 @@ from pipeline.simulation.sensors import gnss
 from pipeline.simulation.sensors.camera import calibration
 from pipeline.simulation.sensors.detection_model import LineNoise
 from pipeline.simulation.sensors.truth_lanes import lane_points
-from pipeline.simulation.world import world
+from pipeline.simulation.world import world_state
 from pipeline.simulation.world.planned_route import planned_route
-from pipeline.simulation.world.world import LIDAR_HEIGHT_M
+from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M
 from tests.pipeline.simulation.worlds import with_actors
 
 
@@ -22,7 +22,7 @@ from tests.pipeline.simulation.worlds import with_actors
 def test_the_points_lie_on_the_roads_lines(segments: str) -> None:
     """Brought back to the road, near points are on a line; there are four lines on three lanes."""
     scene = with_actors(segments=segments)
-    camera, now = calibration(scene.camera), world.at(scene, 1.0)
+    camera, now = calibration(scene.camera), world_state.at(scene, 1.0)
     raw = lane_points(now, scene.road, camera, LineNoise(), 1, 10)
     assert set(raw.line.tolist()) == {0, 1, 2, 3}
     eye, ray = Pinhole(camera.K, camera.distortion, camera.T_camera_ego).rays(raw.points.astype(np.float64))
@@ -38,7 +38,7 @@ def test_the_points_lie_on_the_roads_lines(segments: str) -> None:
 
 def test_the_same_moment_gives_the_same_points_and_another_others() -> None:
     scene = with_actors()
-    now, camera = world.at(scene, 0.0), calibration(scene.camera)
+    now, camera = world_state.at(scene, 0.0), calibration(scene.camera)
     first, again, other = (lane_points(now, scene.road, camera, LineNoise(), 1, index).points for index in (0, 0, 1))
     assert np.array_equal(first, again)
     assert not np.array_equal(first[:50], other[:50])
@@ -52,10 +52,10 @@ def test_the_planned_route_is_the_way_driven(name: str) -> None:
     line = lay_out(route)
     assert line is not None
     for t_s in np.linspace(0.0, scene.duration_s, 12).tolist():
-        fix = gnss.fix(world.at(scene, t_s), scene.gnss, 1, round(10 * t_s), 0)
+        fix = gnss.fix(world_state.at(scene, t_s), scene.gnss, 1, round(10 * t_s), 0)
         x, y, _ = to_grid(line.epsg, fix.lat_deg, fix.lon_deg)
         assert np.hypot(*(line.places - (x, y)).T).min() < 0.6, "half a step along, centimetres aside"
-    ends = world.at(scene, scene.duration_s)
+    ends = world_state.at(scene, scene.duration_s)
     x, y, _ = to_grid(line.epsg, fix.lat_deg, fix.lon_deg)
     nearest = int(np.argmin(np.hypot(*(line.places - (x, y)).T)))
     assert len(line.places) - nearest > 300, "and it goes on beyond the end"

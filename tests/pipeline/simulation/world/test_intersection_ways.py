@@ -10,8 +10,8 @@ import yaml
 
 from pipeline.simulation import scenario
 from pipeline.simulation.scenario import Scenario, ScenarioError
-from pipeline.simulation.world import world
-from pipeline.simulation.world.world import ActorState
+from pipeline.simulation.world import world_state
+from pipeline.simulation.world.world_state import ActorState
 
 TOWN = {
     "segments": [{"length_m": 2000}],
@@ -33,7 +33,7 @@ def crossed(angle_deg: float = 90.0, **actor: object) -> Scenario:
 
 
 def seen(scene: Scenario, t_s: float) -> ActorState:
-    return world.at(scene, t_s).actors[0]
+    return world_state.at(scene, t_s).actors[0]
 
 
 EGO_LANE_Y, OTHER_LANE_Y, CROSS_X = 0.0, 3.5, 100.0

@@ -18,11 +18,11 @@ from pipeline.replay.faults import Fault, disturb
 from pipeline.replay.messages import Message
 from pipeline.replay.nmea_writer import sentences
 from pipeline.replay.wire import WireEvent, to_wire
-from pipeline.sources.live.camera import CameraInput
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LiveConfig
-from pipeline.sources.live.gnss import GnssInput
-from pipeline.sources.live.lidar import LidarInput
+from pipeline.sources.live.devices.camera import CameraInput
+from pipeline.sources.live.devices.gnss import GnssInput
+from pipeline.sources.live.devices.lidar import LidarInput
 from pipeline.sources.live.source import LiveSensors
 from pipeline.types import Frame, GnssFix, Sweep
 

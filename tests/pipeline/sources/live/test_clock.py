@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.replay.wire import WireEvent
 from pipeline.sources.live.clock import FollowedClock, HostClock
-from pipeline.sources.live.lidar import LidarInput
+from pipeline.sources.live.devices.lidar import LidarInput
 from tests.pipeline.formats.velodyne.test_position import position
 from tests.pipeline.sources.live.bench import MS, SECOND, START, Bench, Taken, sent
 

@@ -62,7 +62,7 @@ def test_defaults_of_the_written_file_are_the_programs() -> None:
         ("a camera that looks back", "camera: {device: 0, calibration: {fx_px: 900, fy_px: 900, cx_px: 640, cy_px: 360,"
          " width_px: 1280, height_px: 720, mount: {yaw_deg: 180}}}", "the camera does not look ahead"),
         ("a device out of range", "camera: {device: 64}", "camera.device: 0 to 63, or a path"),
-        ("a device that is no number", "camera: {device: true}", "camera.device: 0 to 63, or a path"),
+        ("a device that is not a number", "camera: {device: true}", "camera.device: 0 to 63, or a path"),
         ("a path that is no device", "camera: {device: drive.mp4}", "camera.device: 0 to 63, or a path"),
         ("a list", "- 1", "expected sensors"),
         ("not YAML", "lidar: {", "not YAML"),
@@ -88,8 +88,8 @@ def test_live_is_no_recording(tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="a recording is needed"):
         open_source(f"live:{path}")
     assert open_live(f"live:{path}").notes == (
-        "no camera: LiDAR goes on alone",
-        "no own speed: neither gnss nor CAN gives it",
+        "no camera: the pipeline runs on LiDAR alone",
+        "no ego speed: neither gnss nor can provides it",
     )
 
 

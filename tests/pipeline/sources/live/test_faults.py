@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.params import SyncParams
 from pipeline.replay.faults import Fault
-from pipeline.sources.live.gnss import GnssInput
-from pipeline.sources.live.lidar import LidarInput
+from pipeline.sources.live.devices.gnss import GnssInput
+from pipeline.sources.live.devices.lidar import LidarInput
 from tests.pipeline.formats.test_nmea import whole
 from tests.pipeline.sources.live.bench import START, Bench, Taken, sent, small_sweep
 

@@ -13,7 +13,7 @@ from pipeline.replay.messages import of_frame, of_recording
 from pipeline.run import advance
 from pipeline.sources import open_source
 from pipeline.sources.live.check import check
-from pipeline.sources.live.lidar import LidarInput
+from pipeline.sources.live.devices.lidar import LidarInput
 from pipeline.sources.live.source import LiveSensors
 from pipeline.sources.pcap import PcapSource
 from pipeline.step import State
@@ -116,7 +116,7 @@ def test_two_programs_on_one_port_are_told_so(sensors: list[LiveSensors]) -> Non
     told: list[LiveSensors] = []
     for _ in range(600):
         both[0].next(0.05)
-        told = [each for each in both if "is taken by another program" in each.health()[0].note]
+        told = [each for each in both if "is in use by another program" in each.health()[0].note]
         if told:
             break
     assert len(told) == 1, "whichever came second"

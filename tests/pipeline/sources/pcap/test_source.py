@@ -25,7 +25,7 @@ def opened(folder: Path, data: bytes, options: str = "") -> Source:
 def test_everything_beside_is_found(tmp_path: Path) -> None:
     source = open_source(f"pcap:{write_capture(tmp_path / 'c') / 'drive.pcap'}")
     assert (len(source), source.rate_hz, source.title) == (3, 10.0, "drive")
-    assert any("taken to begin with the recording" in note for note in source.notes)
+    assert any("assumed to start with the recording" in note for note in source.notes)
     assert any("4 GNSS fixes from drive.nmea" in note for note in source.notes)
     for index, grey in enumerate(
         (20, 80, 120)
@@ -117,7 +117,7 @@ WRONG = {
     "no file": ("pcap:", "no file given"),
     "missing": ("pcap:{folder}/missing.pcap", "no such file"),
     "folder": ("pcap:{folder}", "not a file"),
-    "option": ("pcap:{file}?colour=red", "no option 'colour'; there are port, video"),
+    "option": ("pcap:{file}?colour=red", "unknown option 'colour'; the options are port, video"),
     "twice": ("pcap:{file}?port=1&port=2", "given twice"),
     "no number": ("pcap:{file}?port=many", "port=many: not a number"),
     "no video": ("pcap:{file}?video=other.mp4", "video=other.mp4: no such file"),
@@ -150,7 +150,7 @@ def test_a_disc_that_fails_is_named() -> None:
 
 def test_another_velodyne_is_named(tmp_path: Path) -> None:
     others = [(t_ns, port, with_byte(packet, PRODUCT, 0x21)) for t_ns, port, packet in lidar(2)]
-    with pytest.raises(SourceError, match=r"drive.pcap: packets of another Velodyne, HDL-32E; only the VLP-16 is read"):
+    with pytest.raises(SourceError, match=r"drive.pcap: packets of a Velodyne HDL-32E; only the VLP-16 is supported"):
         opened(tmp_path, pcap(others))
 
 

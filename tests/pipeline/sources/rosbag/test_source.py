@@ -87,7 +87,7 @@ def test_frames_in_any_order_are_the_same(tmp_path: Path) -> None:
 def test_packets_are_cut_anew(kind: Kind, tmp_path: Path) -> None:
     source = open_source(f"rosbag:{write_packet_bag(path_of(tmp_path, kind), kind)}")
     assert len(source) == 4
-    assert any("cut behind the car" in note for note in source.notes)
+    assert any("split into sweeps behind the car" in note for note in source.notes)
     for index in range(4):
         frame = source.frame(index)
         assert frame.t_ns == pytest.approx(START_NS + index * STEP_NS, abs=2_000)
@@ -132,7 +132,7 @@ def test_a_message_without_a_time_is_taken_when_it_was_recorded(tmp_path: Path) 
             bag.write("/points", cloud, HEADER_NS + index * STEP_NS + RECORDED_LATER_NS)
     source = open_source(f"rosbag:{tmp_path / 'drive'}")
     assert source.t_ns(1) == HEADER_NS + STEP_NS + RECORDED_LATER_NS
-    assert "LiDAR: 2 messages without a time: taken when they were recorded" in source.notes
+    assert "LiDAR: 2 messages without a time stamp: their recording time is used" in source.notes
     assert source.frame(1).sweep is not None
 
 
@@ -156,7 +156,7 @@ def test_clouds_without_rings_and_times(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "drive", "db3") as bag:
         bag.write("/points", bag.cloud(ring_wall(0), HEADER_NS, plain), HEADER_NS)
     frame = open_source(f"rosbag:{tmp_path / 'drive'}").frame(0)
-    assert frame.notes == ("no ring numbers: given by elevation, as a VLP-16's",)
+    assert frame.notes == ("no ring numbers: assigned by elevation, as on a VLP-16",)
     assert frame.sweep is not None
     assert frame.sweep.time_s is None
     assert np.array_equal(frame.sweep.ring, ring_wall(0).ring)
@@ -198,14 +198,14 @@ def test_a_transform_to_the_cameras_body_will_do(tmp_path: Path) -> None:
 WRONG = {
     "nothing": ("rosbag:", "no bag given"),
     "missing": ("rosbag:{0}/missing.bag", "no such file or folder"),
-    "other folder": ("rosbag:{0}", "no metadata.yaml in it"),
-    "other file": ("rosbag:{0}/notes.txt", "their names end in .bag"),
+    "other folder": ("rosbag:{0}", "it has no metadata.yaml"),
+    "other file": ("rosbag:{0}/notes.txt", "file names end in .bag"),
     "garbage": ("rosbag:{0}/garbage.bag", "garbage.bag: cannot be read as a bag"),
     "garbage db3": ("rosbag:{0}/garbage.db3", "garbage.db3: cannot be read as a bag"),
     "no such topic": ("rosbag:{0}/drive?lidar=/nope", "lidar=/nope: no such topic; there are /fix, /front/camera_info"),
     "wrong kind": ("rosbag:{0}/drive?lidar=/fix", "lidar=/fix: its messages are NavSatFix, not PointCloud2 or"),
-    "no option": ("rosbag:{0}/drive?radar=/x", "no option 'radar'"),
-    "nothing left": ("rosbag:{0}/drive?lidar=none&camera=none", "neither LiDAR nor pictures in it; its topics are"),
+    "no option": ("rosbag:{0}/drive?radar=/x", "unknown option 'radar'"),
+    "nothing left": ("rosbag:{0}/drive?lidar=none&camera=none", "no LiDAR and no picture topic; its topics are"),
 }
 
 
@@ -227,7 +227,7 @@ def test_another_velodyne_is_named(tmp_path: Path) -> None:
 
     with BagWriter(tmp_path / "drive", "db3") as bag:
         bag.write("/velodyne_packets", bag.scan([(with_byte(p, PRODUCT, 0x28), t) for p, t in drive(1)]), HEADER_NS)
-    with pytest.raises(SourceError, match=r"packets of another Velodyne, VLP-32C; only the VLP-16 is read"):
+    with pytest.raises(SourceError, match=r"packets of a Velodyne VLP-32C; only the VLP-16 is supported"):
         open_source(f"rosbag:{tmp_path / 'drive'}")
 
 

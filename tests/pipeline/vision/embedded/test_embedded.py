@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.inference.model_registry import EMBEDDED
 from pipeline.simulation.sensors.camera import HEIGHT, WIDTH
-from pipeline.simulation.world.world import World
+from pipeline.simulation.world.world_state import World
 from pipeline.training.evaluate import JUDGE_SEEDS, LEAD_M, Bin, evaluate, within
 from pipeline.training.scenes import drive, moments
 from pipeline.vision.detector import Detector, open_detector

@@ -35,7 +35,7 @@ def _rewrite(table: sa.TableClause, key: tuple[str, ...], how: dict[str, Callabl
 
 
 def _content(data: bytes | None) -> bytes | None:
-    """Null where the tag was not there."""
+    """None where the tag was not there."""
     if data is None:
         return None
     body = unpack(data)

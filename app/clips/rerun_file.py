@@ -1,0 +1,17 @@
+"""A clip as a recording for the rerun viewer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app.clips.clip import Clip, clip_frames
+from pipeline.common.progress import Progress
+
+
+def write(clip: Clip, path: Path, progress: Progress) -> None:
+    """A ``.rrd`` file. ReplayError when it cannot be written."""
+    from app.views.rerun.view import RerunSink  # takes half a second to import
+
+    with RerunSink(path, clip.title, clip.params.alignment, clip.start) as sink:
+        for frame, result in clip_frames(clip, progress):
+            sink.show(frame, result)

@@ -1,0 +1,13 @@
+"""A clip as a session (MCAP): the recording's own data, without the pipeline."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from app.clips.clip import Clip
+from pipeline.common.progress import Progress
+
+
+def write(clip: Clip, path: Path, progress: Progress) -> None:
+    """The frames with all that their source has of them."""
+    clip.recording.save(path, clip.first, clip.last, progress)

@@ -1,0 +1,118 @@
+"""`cipv labels`: labels of recordings in the database, as files of other tools, and back. The line and the database are
+imported by who uses them: they take two seconds."""
+
+from __future__ import annotations
+
+import getpass
+import json
+import time
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import tyro
+
+from app.commands.labels.files import Database, ExportLabels, ImportLabels, Person, say
+from app.commands.support.options import PipelineOptions, SourceOptions
+from app.commands.support.progress_bars import frames_progress
+
+
+@dataclass(frozen=True)
+class ProposeLabels:
+    """Run the pipeline on a recording and save its objects as proposed labels, to be accepted or corrected in the
+    dashboard. Objects that a person has reviewed already are not proposed again.
+
+    Example: cipv labels propose astyx:PATH
+    """
+
+    source: SourceOptions
+    pipeline: PipelineOptions = field(default_factory=PipelineOptions)
+    database: Database = None
+    """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
+    person: Person = field(default_factory=getpass.getuser)
+    """Author of the change, who can undo it in the dashboard"""
+
+    def __call__(self) -> int:
+        from app.drive.full_run import calibration_digest, digest
+        from app.labels.acts.bulk import put_proposals
+        from app.labels.store.database import open_database
+        from app.labels.store.drive_labels import DriveLabels, info_of
+        from pipeline.labels.model import Origin
+        from pipeline.labels.propose import Seen, propose
+        from pipeline.run import run
+
+        params, source = self.pipeline.parameters(), self.source.open()
+        detectors = self.pipeline.open_detectors(source)
+        frames: dict[int, list[Seen]] = {}
+        leads: dict[int, int | None] = {}
+        names, calibration = [], ""
+        with frames_progress() as bar:
+            task = bar.add_task(source.title, total=len(source))
+            for frame, result in run(source, params, detectors):
+                frames[frame.index] = [
+                    Seen(each.id, each.label, each.cuboid, each.bbox, each.in_path, each.carried)
+                    for each in result.objects
+                ]
+                leads[frame.index] = result.cipv.id if result.cipv is not None else None
+                names.append(frame.name)
+                calibration = calibration or calibration_digest(frame.camera, params)
+                bar.update(task, completed=len(names))
+        looked = [each.name for each in (detectors.boxes, detectors.lanes) if each is not None]
+        made_from = digest(source.uri, looked, "both", params)
+        origin = Origin("pipeline", "cipv labels propose", int(time.time() * 1000), made_from, calibration)
+        found = propose(frames, leads, origin)
+        database = open_database(self.database)
+        try:
+            kept = DriveLabels(database, info_of(source, lambda: tuple(names)))
+            say(put_proposals(kept, found, self.person, 0, len(names) - 1))
+        finally:
+            database.close()
+        return 0
+
+
+@dataclass(frozen=True)
+class ListLabels:
+    """List every recording with labels in the database.
+
+    Example: cipv labels list --json
+    """
+
+    database: Database = None
+    """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
+    json: bool = False
+    """Print the list as JSON"""
+
+    def __call__(self) -> int:
+        from app.labels.store.database import open_database
+        from app.labels.store.drive_labels import known_drives
+
+        database = open_database(self.database)
+        try:
+            drives = known_drives(database)
+        finally:
+            database.close()
+        if self.json:
+            print(json.dumps(drives, indent=2))
+            return 0
+        for drive in drives:
+            print(
+                f"{drive['title']}: frames {drive['count']:,}, tracks {drive['tracks']:,}, acts {drive['revision']:,}, "
+                f"first opened as {drive['uri']}"
+            )
+        if not drives:
+            say(f"{database.name}: no labels yet")
+        return 0
+
+
+@dataclass(frozen=True)
+class Labels:
+    """Labels of recordings: propose, list, export and import."""
+
+    action: (
+        Annotated[ProposeLabels, tyro.conf.subcommand("propose")]
+        | Annotated[ListLabels, tyro.conf.subcommand("list")]
+        | Annotated[ExportLabels, tyro.conf.subcommand("export")]
+        | Annotated[ImportLabels, tyro.conf.subcommand("import")]
+    )
+
+    def __call__(self) -> int:
+        return self.action()

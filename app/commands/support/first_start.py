@@ -1,0 +1,25 @@
+"""Compile numba kernels and Python bytecode once, in ``make install``, so that the first start need not."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from pipeline.detection import Detectors, detector_for, lanes_for
+from pipeline.params import Params
+from pipeline.run import run
+from pipeline.sources import open_source
+
+STARTED = ("app.cli", "app.commands.serve", "app.web.server", "app.views.scene_feed", "app.labels.store.drive_labels")
+"""Of the dashboard; what they import comes with them."""
+
+
+def main() -> None:
+    """Import the dashboard's modules, and run the pipeline on one frame of its demo."""
+    for name in STARTED:
+        import_module(name)
+    source = open_source("sim:straight")
+    next(iter(run(source, Params(), Detectors(detector_for(source), lanes_for(source)))))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""What detectors found, kept so that no network looks at the same picture twice."""
+
+from __future__ import annotations
+
+import threading
+from time import perf_counter
+from typing import cast
+
+from app.core.lru import BoundedCache
+from pipeline.detection import Detects, Seen
+from pipeline.sources.fingerprint import fingerprint
+from pipeline.types import U8, Frame, RawBoxes, RawLanes
+
+_CACHED_ANSWERS = 8192
+
+
+class DetectionCache:
+    """Detections by (source, frame, detector), bounded. It outlives the source, so that reopening a recording runs no
+    network, unless the recording's files have changed. Any thread."""
+
+    def __init__(self, limit: int = _CACHED_ANSWERS) -> None:
+        self._lock = threading.Lock()
+        self._answers: BoundedCache[tuple[str, int, str], RawBoxes | RawLanes] = BoundedCache(limit, lambda _: 1)
+
+    def look_at(self, uri: str) -> CachedLook:
+        """How detectors are asked about the pictures of one source, as its files are now."""
+        return CachedLook(self, fingerprint(uri))
+
+    def get(self, key: tuple[str, int, str]) -> RawBoxes | RawLanes | None:
+        with self._lock:
+            return self._answers.get(key)
+
+    def put(self, key: tuple[str, int, str], answer: RawBoxes | RawLanes) -> None:
+        with self._lock:
+            self._answers.put(key, answer)
+
+
+class CachedLook:
+    """A ``pipeline.run.Look`` that asks the cache first. For one thread; ``clone`` it for a second one."""
+
+    def __init__(self, cache: DetectionCache, source: str) -> None:
+        self.spent_ms = 0.0
+        """How long detectors have run for it in all, in milliseconds."""
+        self._cache, self._source = cache, source
+
+    def clone(self) -> CachedLook:
+        """The same for a second thread."""
+        return CachedLook(self._cache, self._source)
+
+    def knows(self, detector: Detects[Seen], index: int) -> bool:
+        """Whether the detections of a frame are in the cache."""
+        return self._cache.get((self._source, index, detector.name)) is not None
+
+    def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
+        key = (self._source, frame.index, detector.name)
+        held = self._cache.get(key)
+        if held is not None:
+            return cast("Seen", held)
+        start = perf_counter()
+        found = detector.detect(bgr)
+        self.spent_ms += (perf_counter() - start) * 1e3
+        self._cache.put(key, found)
+        return found

@@ -1,0 +1,149 @@
+"""Work that takes longer than an answer may: one job with progress, cancellation, and a result or an error.
+
+A job decides neither where it runs nor what comes after it: exports wait in a queue, label tasks get a thread of their
+own, and opening a recording runs on the engine's worker.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Generic, Literal, TypeVar
+
+from pipeline.common.errors import BadInput
+from pipeline.common.progress import Progress
+
+logger = logging.getLogger("cipv.jobs")
+
+JobState = Literal["waiting", "running", "done", "failed", "cancelled"]
+ResultT = TypeVar("ResultT")
+
+
+class Cancelled(Exception):
+    """Raised by a job's progress callback inside its work once the job has been cancelled."""
+
+
+@dataclass(frozen=True)
+class JobStatus:
+    """A job at one moment."""
+
+    state: JobState = "waiting"
+    """``done``, ``failed`` and ``cancelled`` are final."""
+    done: int = 0
+    """Units of work finished; the work chooses the unit."""
+    total: int = 0
+    """Units of work in all; 0 until the work first reports."""
+    error: str | None = None
+    """One sentence that says why the job failed."""
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the state is final."""
+        return self.state not in ("waiting", "running")
+
+    @property
+    def fraction(self) -> float:
+        """Progress from 0 to 1."""
+        return 1.0 if self.state == "done" else self.done / max(self.total, 1)
+
+
+def _never() -> bool:
+    return False
+
+
+class BackgroundJob(Generic[ResultT]):
+    """One piece of work. Call ``run`` once, on the thread that is to do it; everything else is safe on any thread.
+
+    Args:
+        work: does the work and returns its result. It is given a ``Progress`` to call with (done, total), which raises
+            ``Cancelled`` once the job has been cancelled.
+        on_change: called on the working thread after each change of ``status``: at most every ``tell_every_s`` while
+            the work goes on, and always at its end.
+        tell_every_s: shortest time between two calls of ``on_change`` for progress, in seconds.
+        is_superseded: polled whenever the work reports progress; true cancels the job.
+        name: what the log calls it.
+    """
+
+    def __init__(
+        self,
+        work: Callable[[Progress], ResultT],
+        on_change: Callable[[], object] = lambda: None,
+        *,
+        tell_every_s: float = 0.0,
+        is_superseded: Callable[[], bool] = _never,
+        name: str = "job",
+    ) -> None:
+        self._work: Callable[[Progress], ResultT] | None = work
+        self._on_change = on_change
+        self._tell_every_s = tell_every_s
+        self._is_superseded = is_superseded
+        self._name = name
+        self._lock = threading.Lock()
+        self._status = JobStatus()
+        self._result: ResultT | None = None
+        self._told_s = -float("inf")
+
+    @property
+    def status(self) -> JobStatus:
+        """How far it is, or how it ended."""
+        return self._status
+
+    @property
+    def result(self) -> ResultT | None:
+        """What the work returned; None until the job is done."""
+        return self._result
+
+    def cancel(self) -> bool:
+        """End the job as soon as its work next reports progress. False when it has ended already."""
+        with self._lock:
+            if self._status.has_ended:
+                return False
+            self._status = replace(self._status, state="cancelled")
+            self._work = None  # it may hold a whole recording
+            return True
+
+    def run(self) -> None:
+        """Do the work, here and now. Never raises: an error becomes ``status.error``."""
+        with self._lock:
+            work, self._work = self._work, None
+            if work is None:
+                return
+            self._status = replace(self._status, state="running")
+        try:
+            result = work(self._progress)
+        except Cancelled:
+            self._end("cancelled")
+        except BadInput as error:
+            self._end("failed", error=str(error))
+        except Exception as error:  # one job that fails takes nothing else with it
+            logger.exception("%s", self._name)
+            self._end("failed", error=f"{type(error).__name__}: {_first_line(error)}")
+        else:
+            self._end("done", result)
+
+    def _progress(self, done: int, total: int) -> None:
+        if self._is_superseded():
+            self.cancel()
+        with self._lock:
+            if self._status.state == "cancelled":
+                raise Cancelled
+            self._status = replace(self._status, done=done, total=total)
+            now_s = time.monotonic()
+            if now_s - self._told_s < self._tell_every_s:
+                return
+            self._told_s = now_s
+        self._on_change()
+
+    def _end(self, state: JobState, result: ResultT | None = None, error: str | None = None) -> None:
+        with self._lock:
+            if self._status.state != "cancelled":  # work that was cancelled in its last moment stays cancelled
+                self._result = result  # before the state, so that a job that is done has its result
+                self._status = replace(self._status, state=state, error=error)
+        self._on_change()
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).splitlines() or ["no reason given"])[0]

@@ -1,0 +1,67 @@
+"""One event of a drive, and what events are found in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from app.drive.frame_rows import Objects, Row
+from pipeline.params import Params
+
+Severity = Literal["info", "notice", "warning", "alarm"]
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened on a drive. Object numbers are those of the run."""
+
+    kind: str
+    """One of ``app.drive.events.event_kinds()``."""
+    index: int
+    """The frame at which it happened."""
+    text: str
+    """What changed, in a sentence."""
+    ids: tuple[int, ...] = ()
+    """The objects it is about, the most important first."""
+    severity: Severity = "info"
+    mark: int | None = None
+    """Number of a person's mark; None for other events and for marks that are part of the recording, which cannot be
+    removed."""
+
+    def to_json(self, t_s: float) -> dict[str, Any]:
+        return {
+            "kind": self.kind,
+            "index": self.index,
+            "t_s": t_s,
+            "text": self.text,
+            "ids": list(self.ids),
+            "severity": self.severity,
+            "mark": self.mark,
+        }
+
+
+class RunRows(NamedTuple):
+    """Frames 0 … N−1 of one run, and its parameters."""
+
+    rows: Sequence[Row]
+    objects: Sequence[Objects]
+    params: Params
+
+    def starts_anew(self, index: int) -> bool:
+        """Whether all trackers were reset at a frame, as after a gap in the recording."""
+        step_s = (self.rows[index].t_ns - self.rows[index - 1].t_ns) / 1e9 if index else 0.0
+        return not 0.0 < step_s <= self.params.time.reset_gap_s
+
+
+class EventFinder(NamedTuple):
+    """One function that finds events."""
+
+    kinds: tuple[str, ...]
+    """The kinds of event that it can find."""
+    find: Callable[[RunRows], Iterable[Event]]
+
+
+def ids(*numbers: int | None) -> tuple[int, ...]:
+    """The object numbers that there are."""
+    return tuple(number for number in numbers if number is not None)

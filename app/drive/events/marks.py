@@ -1,0 +1,32 @@
+"""Marks as events: those that are part of the recording, and those that people made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.drive.events.event import Event
+from app.drive.frame_rows import Row
+from app.drive.marks import SavedMark
+from pipeline.types import I64
+from pipeline.types.source import Mark
+
+
+def recorded_marks(rows: Sequence[Row], marks: Sequence[Mark]) -> list[Event]:
+    """Marks made while it was recorded, at the frames they were made at; those of frames not run yet are left out."""
+    index_of = {row.t_ns: index for index, row in enumerate(rows)}
+    return [Event("mark", index_of[mark.t_ns], mark.text) for mark in marks if mark.t_ns in index_of]
+
+
+def marks_by_time(marks: Sequence[SavedMark], t_ns: I64, within_ns: int) -> list[Event]:
+    """Marks made of live sensors, at the frames stamped nearest and no farther than so much. Those of other times, and
+    those that are part of a session, are left out. t_ns: (N,) the frames' stamps."""
+    found = []
+    for mark in marks:
+        if mark.t_ns is None or mark.in_session or not len(t_ns):
+            continue
+        index = int(np.argmin(np.abs(t_ns - mark.t_ns)))
+        if abs(int(t_ns[index]) - mark.t_ns) <= within_ns:
+            found.append(Event("mark", index, mark.text or "marked"))
+    return found

@@ -1,0 +1,81 @@
+"""The pipeline on live sensors: each tick runs at most once, and only the newest.
+
+There is no way back. Ticks that were not taken in time are dropped, so that what is shown is as recent as the sensors
+and the pipeline allow. For one thread.
+"""
+
+from __future__ import annotations
+
+from time import monotonic, perf_counter
+
+from app.engine.processed_frame import ProcessedFrame
+from app.engine.snapshot import Notice
+from pipeline.detection import Detectors, Detects, LiveDetectors, Seen
+from pipeline.params import Params
+from pipeline.run import Sensors, advance
+from pipeline.sources.live.health import not_delivering
+from pipeline.step import State
+from pipeline.types import U8, Frame
+from pipeline.types.source import LiveSource
+
+_SILENCE_S = 1.0
+
+
+class LivePipeline:
+    """``open`` the sensors, then ``wait`` for a frame and ``run`` it, over and over; ``close``."""
+
+    def __init__(self, source: LiveSource, detectors: Detectors, sensors: Sensors) -> None:
+        self.source = source
+        self.newest: ProcessedFrame | None = None
+        """The tick that was run last."""
+        self._detectors, self._sensors = LiveDetectors(detectors), sensors
+        self._first_ns: int | None = None
+        self._ticked_s = monotonic()
+        self._silence: Notice | None = None
+
+    def open(self) -> None:
+        self.source.start()
+
+    def close(self) -> None:
+        self.source.close()
+
+    def wait(self, params: Params, timeout_s: float) -> Frame | None:
+        """The newest tick of the sensors; None when none arrived in time."""
+        return self.source.next(timeout_s, params.sync)
+
+    def run(self, frame: Frame, params: Params) -> ProcessedFrame:
+        """Run the pipeline on what ``wait`` returned."""
+        self._ticked_s = monotonic()
+        self._first_ns = frame.t_ns if self._first_ns is None else self._first_ns
+        before = self.newest.after if self.newest is not None else State()
+        ask = _TimedLook()
+        frame, after, result = advance(before, frame, params, self._detectors.of(frame), self._sensors, ask)
+        self.newest = ProcessedFrame(before, frame, after, result, params, ask.spent_ms, exact=True)
+        return self.newest
+
+    def with_silence(self, notices: tuple[Notice, ...]) -> tuple[Notice, ...]:
+        """The notices, plus one that names the sensors it waits for once no tick has arrived for a second."""
+        others = tuple(notice for notice in notices if notice is not self._silence)
+        if monotonic() - self._ticked_s < _SILENCE_S:
+            self._silence = None
+            return others
+        missing = not_delivering(self.source.health()) or "no data yet"
+        self._silence = Notice("warning", f"Waiting for sensors: {missing}")
+        return (*others, self._silence)
+
+    def time_s(self, processed: ProcessedFrame) -> float:
+        """Seconds since the first tick."""
+        return (processed.frame.t_ns - (self._first_ns or processed.frame.t_ns)) / 1e9
+
+
+class _TimedLook:
+    """Asks detectors straight away, and measures how long they take."""
+
+    def __init__(self) -> None:
+        self.spent_ms = 0.0
+
+    def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
+        start = perf_counter()
+        found = detector.detect(bgr)
+        self.spent_ms += (perf_counter() - start) * 1e3
+        return found

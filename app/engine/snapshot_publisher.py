@@ -1,0 +1,50 @@
+"""Where the worker puts what is shown, and where everybody else reads it or listens for it."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+
+from app.engine.snapshot import Snapshot
+
+logger = logging.getLogger("cipv.engine")
+
+Listener = Callable[[Snapshot], None]
+
+
+class SnapshotPublisher:
+    """Holds the newest snapshot. ``publish`` on the worker's thread, the rest on any."""
+
+    def __init__(self, first: Snapshot) -> None:
+        self.snapshot = first
+        self._listeners: list[Listener] = []
+        self._changed = threading.Condition()
+
+    def listen(self, listener: Listener) -> Callable[[], None]:
+        """Call ``listener`` on the worker's thread after every change; it must be quick. Returns how to end that."""
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener)
+
+    def wait_for(self, condition: Callable[[Snapshot], bool], timeout_s: float) -> Snapshot:
+        """The first snapshot that satisfies ``condition``; TimeoutError when none came."""
+        with self._changed:
+            if not self._changed.wait_for(lambda: condition(self.snapshot), timeout_s):
+                raise TimeoutError(f"nothing of the kind within {timeout_s:g} s; last: {self.snapshot.state_json()}")
+            return self.snapshot
+
+    def publish(self, snapshot: Snapshot) -> None:
+        """Show it, and tell the listeners if it is another."""
+        with self._changed:
+            changed = snapshot != self.snapshot
+            self.snapshot = snapshot
+            self._changed.notify_all()
+        if changed:
+            for listener in tuple(self._listeners):
+                self._tell(listener, snapshot)
+
+    def _tell(self, listener: Listener, snapshot: Snapshot) -> None:
+        try:
+            listener(snapshot)
+        except Exception:  # a view that fails must not affect the engine or other views
+            logger.exception("a view failed on frame %s", snapshot.index)

@@ -1,0 +1,266 @@
+"""The 3D view in a browser: one viser server on loopback that shows the newest frame to whoever looks.
+
+Every scene node has a fixed name and is replaced in place, so a view that runs for days holds as many nodes as the
+picture has parts, and a browser that joins late gets the present state from viser itself.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, get_args
+
+import numpy as np
+import rich
+import viser
+
+from app.core.shared_view_state import HeldCuboid, OnDrag
+from app.views import scene
+from app.views.colors import Role, rgb
+from app.views.ray_picking import object_on_ray
+from app.views.viser import nodes as viser_nodes
+from app.views.viser.gizmo import CuboidGizmo
+from app.views.viser.gui import OnChange, ParamsGui
+from app.views.viser.nodes import Strokes
+from pipeline.params import Params
+from pipeline.types import Frame, FusedObject, Point3, Result
+
+OnPick = Callable[[int | None], None]
+HOST = "127.0.0.1"
+CAMERA_FOV_DEG = 48.0
+_LABELS = ("vehicles and in path", "all", "none")
+_ARROW_S = 1.0
+
+
+class Pose(NamedTuple):
+    """Where an eye is, at what it looks, and which way is up there. Ego frame, metres."""
+
+    eye: Point3
+    target: Point3
+    up: Point3
+
+
+POSES = {
+    "Follow": Pose((-16.0, 0.0, 9.0), (20.0, 0.0, -1.0), (0.0, 0.0, 1.0)),
+    "Top": Pose((28.0, 0.0, 75.0), (28.01, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    "Driver": Pose((-1.9, 0.36, 0.75), (30.0, 0.36, -0.2), (0.0, 0.0, 1.0)),
+}
+"""Behind and above the car, from above with the road upwards, and from the driver's seat."""
+
+
+@dataclass(frozen=True)
+class _Display:
+    """What the person looking has chosen."""
+
+    color_by: scene.ColorBy = "kind"
+    point_size_m: float = 0.06
+    labels: str = _LABELS[0]
+    picture: bool = True
+
+
+class ViserView:
+    """Starts the server at once. ``port`` 0 takes a free one; a taken port silently becomes the next: read ``port``.
+
+    ``on_change(name, value)`` hears of every slider that a person moves, on a thread of viser's; ``on_drag(held,
+    ended)`` of a held cuboid that is dragged; ``on_pick(id)`` of every click into the scene: the object that was met,
+    or None.
+    """
+
+    def __init__(
+        self,
+        params: Params,
+        on_change: OnChange = lambda name, value: None,
+        port: int = 0,
+        on_drag: OnDrag = lambda held, ended: None,
+        on_pick: OnPick = lambda number: None,
+    ) -> None:
+        self._lock = threading.Lock()
+        self._shown: tuple[Frame, Result] | None = None
+        self._display = _Display()
+        self._labels = 0
+        self._selected: int | None = None
+        with _silent():
+            self._server = viser.ViserServer(HOST, port, label="CIPV Studio", verbose=False)
+        self._server.gui.configure_theme(
+            dark_mode=True, show_logo=False, show_share_button=False, control_width="small"
+        )
+        self._server.gui.main_panel.minimize()  # the scene first: a pane of the dashboard is small
+        camera = self._server.initial_camera
+        camera.position, camera.look_at, camera.up = POSES["Follow"]
+        camera.fov = math.radians(CAMERA_FOV_DEG)
+        self._scene = self._server.scene
+        self._gizmo = CuboidGizmo(self._scene, on_drag)
+        self._server.on_client_disconnect(self._left)
+        self._add_static()
+        self._add_cameras()
+        self._add_display_options()
+        self._params = ParamsGui(self._server.gui, params, on_change)
+        self._scene.on_click()(lambda click: on_pick(self._met(click.ray_origin, click.ray_direction)))
+
+    @property
+    def watchers(self) -> int:
+        """How many browsers hold this view."""
+        return len(self._server.get_clients())
+
+    def on_watched(self, callback: Callable[[], None]) -> None:
+        """Call ``callback``, on a thread of viser's, when a browser comes to look."""
+        self._server.on_client_connect(lambda _: callback())
+
+    @property
+    def port(self) -> int:
+        """The port it listens on, on loopback."""
+        return self._server.get_port()
+
+    def show(self, frame: Frame, result: Result) -> None:
+        """Show this frame to everybody, now and to whoever joins later. Safe from any thread."""
+        with self._lock:
+            self._shown = (frame, result)
+            self._draw()
+
+    def select(self, number: int | None) -> None:
+        """Mark this object, or none."""
+        with self._lock:
+            if number != self._selected:
+                self._selected = number
+                self._draw()
+
+    def hold(self, held: HeldCuboid | None) -> None:
+        """Show a cuboid with handles to move, turn and resize it by; None for none."""
+        self._gizmo.hold(held)
+
+    def set_params(self, params: Params) -> None:
+        """Put the sliders where the parameters are; ``on_change`` does not hear of it."""
+        self._params.set(params)
+
+    def close(self) -> None:
+        """Stop the server and disconnect everybody."""
+        with _silent():
+            self._server.stop()
+
+    async def _left(self, client: viser.ClientHandle) -> None:  # on the loop: after whatever it said before
+        self._gizmo.leave(client.client_id)
+
+    def _met(self, origin: Point3, direction: Point3) -> int | None:
+        """The object that a click's ray meets."""
+        with self._lock:
+            shown = self._shown
+        if shown is None:
+            return None
+        return object_on_ray(shown[1].objects, origin, direction, scene.ground_height_m(shown[1]) or 0.0)
+
+    # ------------------------------------------------------------ what never changes
+
+    def _add_static(self) -> None:
+        viser_nodes.floor(self._scene, 0.0)
+        self._scene.world_axes.visible = False
+
+    def _add_cameras(self) -> None:
+        """One button a pose; it moves the camera of whoever pressed it."""
+        group = self._server.gui.add_button_group("Camera", tuple(POSES))
+
+        def take(event: viser.GuiEvent[Any]) -> None:
+            if event.client is None:
+                return
+            pose, camera = POSES[event.target.value], event.client.camera
+            with event.client.atomic():
+                camera.up_direction, camera.position, camera.look_at = pose.up, pose.eye, pose.target
+
+        group.on_click(take)
+
+    def _add_display_options(self) -> None:
+        gui, start = self._server.gui, self._display
+        with gui.add_folder("Display", expand_by_default=False):
+            color_by = gui.add_dropdown("Colour by", get_args(scene.ColorBy), initial_value=start.color_by)
+            size = gui.add_slider("Point size (m)", 0.02, 0.4, 0.01, start.point_size_m)
+            labels = gui.add_dropdown("Labels", _LABELS, initial_value=start.labels)
+            picture = gui.add_checkbox("Camera picture", start.picture)
+
+        def chosen(_: Any) -> None:
+            with self._lock:
+                self._display = _Display(color_by.value, size.value, labels.value, picture.value)
+                self._draw()
+
+        for handle in (color_by, size, labels, picture):
+            handle.on_update(chosen)
+
+    # ------------------------------------------------------------ one frame
+
+    def _draw(self) -> None:
+        if self._shown is None:
+            return
+        frame, result = self._shown
+        ground_m = scene.ground_height_m(result)
+        floor_m = 0.0 if ground_m is None else ground_m
+        with self._server.atomic():
+            self._draw_points(result)
+            self._draw_objects(frame, result, floor_m)
+            self._draw_labels(result, floor_m)
+            viser_nodes.path(self._scene, result.path, floor_m)
+            viser_nodes.lanes(self._scene, scene.lane_lines(result), floor_m)
+            viser_nodes.floor(self._scene, floor_m)
+            viser_nodes.picture(self._scene, frame, self._display.picture)
+
+    def _draw_points(self, result: Result) -> None:
+        points = result.layers.points
+        viser_nodes.cloud(
+            self._scene, points[:, :3], scene.point_colors(result, self._display.color_by), self._display.point_size_m
+        )
+
+    def _draw_objects(self, frame: Frame, result: Result, floor_m: float) -> None:
+        cuboids, footprints, rays, velocities = Strokes(), Strokes(), Strokes(), Strokes()
+        eye = viser_nodes.camera_position(frame)
+        for each in result.objects:
+            outline = scene.flat_outline(each, floor_m + 0.05)
+            if outline is None:
+                continue
+            color, middle = scene.object_color(each, result), outline[:-1].mean(axis=0)
+            if each.cuboid is not None:
+                cuboids.add(scene.cuboid_edges(each.cuboid), color)
+            else:
+                footprints.add(np.stack([outline[:-1], outline[1:]], axis=1), color)
+                rays.add(np.array([[eye, middle]]), color)
+            if each.velocity_mps is not None and scene.stands_out(each, result):
+                velocities.add(np.stack([middle, middle + np.array([*each.velocity_mps, 0.0]) * _ARROW_S]), color)
+        viser_nodes.lines(self._scene, "/cuboids", cuboids, 2.5)
+        viser_nodes.lines(self._scene, "/footprints", footprints, 2.5)
+        viser_nodes.lines(self._scene, "/rays", rays, 1.0)
+        viser_nodes.arrows(self._scene, velocities)
+        by_id = {each.id: each for each in result.objects}
+        following = None if result.next_cipv is None else result.next_cipv.id
+        marked: tuple[tuple[str, int | None, Role, float], ...] = (
+            ("/cipv", scene.cipv_id(result), "cipv", 0.25),
+            ("/next_cipv", following, "cipv", 0.08),
+            ("/selection", self._selected, "ego", 0.2),
+        )
+        for name, number, role, opacity in marked:
+            found = None if number is None else by_id.get(number)
+            viser_nodes.filled(self._scene, name, found, rgb(role), opacity, floor_m)
+
+    def _draw_labels(self, result: Result, floor_m: float) -> None:
+        """Labels are numbered places that objects share, not nodes of their own: ids come and go without end."""
+        named = [each for each in result.objects if self._has_label(each, result) and each.bev is not None]
+        for place in range(max(len(named), self._labels)):
+            if place < len(named):
+                each = named[place]
+                viser_nodes.label(self._scene, place, scene.object_text(each), scene.top_of(each, floor_m))
+            else:
+                viser_nodes.label(self._scene, place, "", None)
+        self._labels = max(len(named), self._labels)
+
+    def _has_label(self, each: FusedObject, result: Result) -> bool:
+        if self._display.labels == "all" or each.id == self._selected:
+            return True
+        return self._display.labels == _LABELS[0] and scene.stands_out(each, result)
+
+
+class _silent:
+    """viser prints its own address, which is not the one people should open."""
+
+    def __enter__(self) -> None:
+        self._was = rich.get_console().quiet
+        rich.get_console().quiet = True
+
+    def __exit__(self, *_: object) -> None:
+        rich.get_console().quiet = self._was

@@ -1,0 +1,63 @@
+"""Every part of the API, in the order in which OpenAPI lists them.
+
+To add one, write a module in ``app/web/routes`` with a function that makes its router, and register it in ``ROUTERS``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fastapi import APIRouter
+
+from app.clips.export_queue import ExportQueue
+from app.drive.marks import Marks
+from app.engine.engine import Engine
+from app.streaming.stream import Stream
+from app.views.rerun.web import ViewerFiles
+from app.web.metrics import Metrics
+from app.web.routes.alignment import alignment_router
+from app.web.routes.clips import clips_router
+from app.web.routes.drive import drive_router
+from app.web.routes.health import health_router
+from app.web.routes.help import help_router
+from app.web.routes.labels.acts import label_acts_router
+from app.web.routes.labels.files import label_files_router
+from app.web.routes.labels.reading import labels_router
+from app.web.routes.params import params_router
+from app.web.routes.playback import playback_router
+from app.web.routes.project import project_router
+from app.web.routes.recording import recording_router
+from app.web.routes.rerun import rerun_router
+from app.web.routes.runs import runs_router
+
+
+@dataclass(frozen=True, eq=False)
+class Services:
+    """What the routes work with."""
+
+    engine: Engine
+    stream: Stream
+    marks: Marks
+    exports: ExportQueue
+    viewer: ViewerFiles
+    """The files of rerun's web viewer."""
+    metrics: Metrics
+
+
+ROUTERS: list[Callable[[Services], APIRouter]] = [
+    lambda on: health_router(on.engine, on.metrics),
+    lambda on: playback_router(on.engine, on.stream),
+    lambda on: params_router(on.engine),
+    lambda on: recording_router(on.engine),
+    lambda on: drive_router(on.engine, on.engine.drives, on.marks),
+    lambda on: runs_router(on.engine, on.engine.drives),
+    lambda on: labels_router(on.engine.labels),
+    lambda on: label_acts_router(on.engine.labels),
+    lambda on: label_files_router(on.engine.labels),
+    lambda on: clips_router(on.engine, on.exports),
+    lambda on: alignment_router(on.engine),
+    lambda on: project_router(on.engine),
+    lambda on: rerun_router(on.engine, on.viewer),
+    lambda on: help_router(),
+]

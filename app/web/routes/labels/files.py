@@ -1,0 +1,120 @@
+"""/api/labels/export, import and versions: labels as files, and frozen label sets."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, HTTPException, Query, Request, Response
+from fastapi.responses import FileResponse, JSONResponse
+from starlette.background import BackgroundTask
+from starlette.requests import ClientDisconnect
+
+from app.labels.acts.request_fields import Person
+from app.labels.service.desk import LabelDesk
+from app.labels.store.values import LONGEST_ITEM, LONGEST_NAME
+from app.labels.wording import WORKING
+from app.web.routes.labels.act_shapes import TaskBegun
+from app.web.routes.labels.file_shapes import VERSION_NAME, FormatJson, LostJson, NativeFile, NewVersion, VersionJson
+from app.web.routes.refusals import refusing
+from app.web.routes.shapes import file_of
+from pipeline.labels.formats.registry import FORMATS, FormatName
+
+IMPORT = "/api/labels/import"
+_BYTES = "application/octet-stream"
+_FILE = file_of(_BYTES)
+_TAKES_A_FILE = {
+    "requestBody": {"required": True, "content": {_BYTES: {"schema": {"type": "string", "format": "binary"}}}}
+}
+"""In OpenAPI's words: the body is read piece by piece, so the framework does not see that there is one."""
+VersionName = Annotated[str, Query(max_length=LONGEST_NAME, pattern=VERSION_NAME)]
+
+
+def label_files_router(desk: LabelDesk) -> APIRouter:
+    """Routes over files of labels."""
+    router = APIRouter(prefix="/api/labels", tags=["labels"])
+
+    @router.post("/import", status_code=202, responses={202: {"model": TaskBegun}}, openapi_extra=_TAKES_A_FILE)
+    async def take(
+        request: Request,
+        person: Annotated[Person, Query()],
+        drive: Annotated[str, Query(max_length=LONGEST_ITEM)],
+        format: FormatName = "native",
+    ) -> Response:
+        """Import labels that another tool made. The body is the file; for a format that is a folder, a .zip of
+        it. They come beside those that are there, as one act. state.labels.task tells how far it is. drive: id of the
+        recording that is meant; 409 when another one is open."""
+        path = _new_file()
+        try:
+            with path.open("wb") as file:
+                async for piece in request.stream():
+                    await asyncio.to_thread(file.write, piece)
+            with refusing():
+                number = await asyncio.to_thread(desk.begin_import, person, path, format, drive)
+        except BaseException as error:
+            path.unlink(missing_ok=True)
+            if isinstance(error, ClientDisconnect):  # nobody hears it, but it is no trouble of this program
+                raise HTTPException(400, "the upload was incomplete") from None
+            raise
+        return JSONResponse({"status": "begun", "what": "import", "task": number}, 202)
+
+    @router.get("/formats")
+    def formats() -> list[FormatJson]:
+        """Every format in which labels can be exported and imported."""
+        return [FormatJson(name=each.name, title=each.title, about=each.about) for each in FORMATS.values()]
+
+    @router.get("/export", response_class=FileResponse, responses=_FILE)
+    def export(format: FormatName = "native", version: VersionName = WORKING) -> FileResponse:
+        """Download all labels as a file, or as a .zip for a format that is a folder. The header X-Cipv-Lost counts the
+        kinds of information that the format cannot express; /api/labels/export/notes lists them."""
+        from app.labels.transfer.files import exported  # the formats' libraries: only who exchanges labels pays
+
+        with refusing():
+            made = exported(desk.recording, desk.labels.label_set(version), format)
+        return FileResponse(
+            made.file,
+            filename=made.file.name,
+            media_type=_BYTES,
+            headers={"x-cipv-lost": str(len(made.lost))},
+            background=BackgroundTask(shutil.rmtree, made.folder, ignore_errors=True),
+        )
+
+    @router.get("/export/notes")
+    def notes(format: FormatName = "native", version: VersionName = WORKING) -> LostJson:
+        """List what a format cannot express, one sentence each, before exporting."""
+        from pipeline.labels.formats.parts import reduce
+
+        with refusing():
+            _, lost = reduce(desk.labels.label_set(version), FORMATS[format].holds)
+        return LostJson(lost=list(lost))
+
+    @router.get("/versions", responses={200: {"model": list[VersionJson]}})
+    def versions() -> Response:
+        """List frozen label sets, oldest first."""
+        with refusing():
+            return JSONResponse([vars(version) for version in desk.labels.versions()])
+
+    @router.post("/versions", status_code=201)
+    def freeze(body: NewVersion) -> VersionJson:
+        """Freeze all labels as they are now under a name. 409 when the name is taken."""
+        with refusing():
+            return VersionJson(**vars(desk.labels.freeze(body.name, body.person)))
+
+    @router.get("/versions/{name}", responses={200: {"model": NativeFile}})
+    def version(name: str) -> Response:
+        """Download a frozen label set in the native format."""
+        with refusing():
+            return Response(desk.labels.version_json(name), media_type="application/json")
+
+    return router
+
+
+def _new_file() -> Path:
+    """An empty temporary file that only this user can read; the caller removes it."""
+    handle, name = tempfile.mkstemp(prefix="cipv-upload-")
+    os.close(handle)
+    return Path(name)

@@ -1,0 +1,231 @@
+"""KITTI's object labels, a file a frame in ``label_2``, and tracking labels, a file a drive in ``label_02``.
+
+Both are in the rectified camera's frame, so the calibration is written beside them, and theirs is used where it is
+there (Geiger et al. 2012, "Are we ready for autonomous driving?", and the development kits' readme files).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.common.errors import BadInput
+from pipeline.formats.file_reading import check_looks_ahead, files_by_name
+from pipeline.formats.kitti_calibration import parse_object_calibration
+from pipeline.formats.kitti_records import DONT_CARE, LabelRow, kind_of, truth_of
+from pipeline.labels.formats.base import Imported, LabeledDrive, Shot, make_folder
+from pipeline.labels.formats.kitti import rows as kitti_rows
+from pipeline.labels.formats.reading import read_bytes
+from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
+from pipeline.labels.recorded_truth import LINKED, renamed, tracks_of
+from pipeline.types import F64, CameraCalibration
+
+_OBJECT, _TRACKING, _CALIBRATION = "label_2", "label_02", "calib"
+_SEQUENCE = "0000"
+_USUAL_SIZE = (1242, 375)
+_LARGEST_ID = 2**63
+
+
+def write_objects(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
+    """``label_2/NAME.txt`` and ``calib/NAME.txt`` for each frame with an object in it."""
+    found: dict[int, list[tuple[str, Sighting]]] = {}
+    for track, sighting in _sightings(labels):
+        found.setdefault(sighting.frame, []).append((track.label, sighting))
+    views = {frame: _view(drive.shots[frame]) for frame in found}
+    make_folder(out)
+    for folder in (_OBJECT, _CALIBRATION):
+        (out / folder).mkdir()
+    names = drive.file_names()
+    for frame, seen in sorted(found.items()):
+        T_rect_ego, camera = views[frame]
+        lines = (kitti_rows.to_line(label, sighting, T_rect_ego, camera) for label, sighting in seen)
+        (out / _OBJECT / f"{names[frame]}.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+        calibration = _object_calibration(T_rect_ego, camera)
+        (out / _CALIBRATION / f"{names[frame]}.txt").write_text(calibration, encoding="utf-8")
+    empty = len(drive.shots) - len(found)
+    nothing = (f"{empty:,} frames have no file: nothing is labelled in them",) if empty else ()
+    return (*_changes(labels, drive), *nothing)
+
+
+def write_tracking(labels: LabelSet, drive: LabeledDrive, out: Path) -> tuple[str, ...]:
+    """``label_02/0000.txt`` and ``calib/0000.txt``; all frames in the first one's calibration, as the format has it."""
+    shot = next((each for each in drive.shots if each.camera is not None), None)
+    T_rect_ego, camera = _view(shot or Shot("", 0))
+    rows = sorted(
+        (sighting.frame, track.id, kitti_rows.to_line(track.label, sighting, T_rect_ego, camera))
+        for track, sighting in _sightings(labels)
+    )
+    make_folder(out)
+    for folder in (_TRACKING, _CALIBRATION):
+        (out / folder).mkdir()
+    text = "".join(f"{frame} {number} {line}\n" for frame, number, line in rows)
+    (out / _TRACKING / f"{_SEQUENCE}.txt").write_text(text, encoding="utf-8")
+    calibration = _tracking_calibration(T_rect_ego, camera)
+    (out / _CALIBRATION / f"{_SEQUENCE}.txt").write_text(calibration, encoding="utf-8")
+    return _changes(labels, drive)
+
+
+def read_objects(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
+    """A folder with ``label_2`` in it, such a folder, or one file of it. Who is who over time is as with the labels of
+    a recording that is opened."""
+    home, files = _files(path, _OBJECT)
+    frames = {name: index for index, name in enumerate(drive.file_names())}
+    known = {frames[name]: (name, file) for name, file in files.items() if name in frames}
+    if not known:
+        raise BadInput(f"{path}: no label file is named like a frame of {drive.uri}")
+    rows: dict[int, list[LabelRow]] = {}
+    for frame, (name, file) in sorted(known.items()):
+        T_rect_ego, camera = _view_beside(home, name, drive.shots[frame])
+        rows[frame] = [kitti_rows.from_fields(fields, T_rect_ego, camera, what) for fields, what in _lines(file)]
+    objects = {
+        frame: tuple(truth_of(row, row.cuboid) for row in found if row.cuboid is not None)
+        for frame, found in rows.items()
+    }
+    tracks = tracks_of(objects, drive.t_ns, origin)
+    flat = [(frame, row) for frame, found in rows.items() for row in found if row.cuboid is None]
+    alone = tuple(
+        LabelTrack(len(tracks) + n, row.label, (Sighting(frame, None, row.bbox),), "accepted", origin)
+        for n, (frame, row) in enumerate(flat, start=1)
+    )
+    unknown = len(files) - len(known)
+    notes = (
+        f"{unknown} files are named as no frame of this recording: left out" if unknown else "",
+        LINKED if tracks else "",
+        f"{len(flat):,} objects without a cuboid are a track each" if flat else "",
+    )
+    labels = replace(drive.empty(), tracks=(*tracks, *alone))
+    return Imported(labels, (*filter(None, notes), *_notes([row for found in rows.values() for row in found])))
+
+
+def read_tracking(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
+    """A folder with ``label_02`` in it, such a folder with one file, or the file."""
+    home, files = _files(path, _TRACKING)
+    if len(files) != 1:
+        raise BadInput(f"{path}: {len(files)} tracking files; name one of them")
+    ((name, file),) = files.items()
+    shot = next((each for each in drive.shots if each.camera is not None), Shot("", 0))
+    T_rect_ego, camera = _view_beside(home, name, shot)
+    found: dict[int, tuple[str, dict[int, Sighting]]] = {}
+    rows: list[LabelRow] = []
+    for (frame_text, id_text, *fields), what in _lines(file, skip=2):
+        frame, number = _whole(frame_text, len(drive.shots), what), _whole(id_text, _LARGEST_ID, what)
+        row = kitti_rows.from_fields(fields, T_rect_ego, camera, what)
+        label, sightings = found.setdefault(number, (row.label, {}))
+        if frame in sightings or label != row.label:
+            raise BadInput(f"{what}: track {number} occurs twice, or with two classes")
+        sightings[frame] = Sighting(frame, row.cuboid, row.bbox)
+        rows.append(row)
+    tracks = [
+        LabelTrack(number, label, tuple(sightings[frame] for frame in sorted(sightings)), "accepted", origin)
+        for number, (label, sightings) in sorted(found.items())
+    ]
+    labels = replace(drive.empty(), tracks=tuple(tracks))
+    return Imported(labels, _notes(rows))
+
+
+def _sightings(labels: LabelSet) -> Iterator[tuple[LabelTrack, Sighting]]:
+    """By track, then frame."""
+    in_order = sorted(labels.tracks, key=lambda track: track.id)
+    return ((track, sighting) for track in in_order for sighting in track.sightings)
+
+
+def _view(shot: Shot) -> tuple[F64, CameraCalibration]:
+    """Where labels of a frame are, and its camera. BadInput without one."""
+    if shot.camera is None or shot.T_rect_ego is None:
+        raise BadInput("KITTI labels are in the camera's frame; this recording has no camera calibration")
+    check_looks_ahead(shot.camera, "the recording's calibration")
+    return shot.T_rect_ego, shot.camera
+
+
+def _view_beside(home: Path, name: str, shot: Shot) -> tuple[F64, CameraCalibration | None]:
+    """As ``_view``, but of the calibration beside the labels where there is one."""
+    file = home / _CALIBRATION / f"{name}.txt"
+    if not file.is_file():
+        return _view(shot)
+    text = read_bytes(file).replace(b"R_rect ", b"R0_rect: ").replace(b"Tr_velo_cam ", b"Tr_velo_to_cam: ")
+    size = (shot.camera.width, shot.camera.height) if shot.camera is not None else _USUAL_SIZE
+    return parse_object_calibration(text, str(file), size).T_rect_ego, shot.camera
+
+
+def _files(path: Path, folder: str) -> tuple[Path, dict[str, Path]]:
+    """(where ``calib`` may be, label files by name). BadInput when there are none."""
+    if path.is_file():
+        return path.parent.parent, {path.stem: path}
+    inside = path / folder if (path / folder).is_dir() else path
+    files = files_by_name(inside, (".txt",))
+    if not files:
+        raise BadInput(f"{path}: not KITTI labels: neither {folder}/*.txt nor *.txt in it")
+    return inside.parent, files
+
+
+def _lines(file: Path, skip: int = 0) -> Iterator[tuple[list[str], str]]:
+    """(fields, where) of each line; regions of which KITTI says nothing are passed over."""
+    for number, line in enumerate(read_bytes(file).decode("utf-8", "replace").splitlines(), start=1):
+        fields, what = line.split(), f"{file}, line {number}"
+        if 0 < len(fields) <= skip:
+            raise BadInput(f"{what}: not a KITTI label")
+        if fields and fields[skip] != DONT_CARE:
+            yield fields, what
+
+
+def _whole(text: str, limit: int, what: str) -> int:
+    if not (text.isascii() and text.isdecimal() and len(text) < 20 and int(text) < limit):
+        raise BadInput(f"{what}: {text[:20]!r} is not a frame or track of this recording")
+    return int(text)
+
+
+def _changes(labels: LabelSet, drive: LabeledDrive) -> tuple[str, ...]:
+    """What is written otherwise than it was."""
+    found = list(_sightings(labels))
+    changes = [
+        f"class {label!r} is written as {kind_of(label)} and will be read as another"
+        for label in sorted({track.label for track, _ in found})
+        if not kitti_rows.is_kept(label)
+    ]
+    cameras = [drive.shots[sighting.frame].camera for _, sighting in found if sighting.bbox is not None]
+    if any(camera is not None and camera.distortion.size for camera in cameras):
+        changes.append("boxes are moved to the undistorted picture, as in KITTI")
+    if found:
+        changes.append("truncation and occlusion are unknown: written as -1")
+    without = sum(sighting.bbox is None for _, sighting in found)
+    if without:
+        changes.append(f"{without:,} objects have no box in the picture: written as -1")
+    return tuple(changes)
+
+
+def _notes(rows: list[LabelRow]) -> tuple[str, ...]:
+    notes = renamed((row.kind, row.label) for row in rows if row.kind != kind_of(row.label))
+    more = sum(row.said_more for row in rows)
+    if more:
+        notes.append(f"truncation and occlusion of {more:,} objects are dropped: labels cannot hold them")
+    return tuple(notes)
+
+
+def _object_calibration(T_rect_ego: F64, camera: CameraCalibration) -> str:
+    projection = _numbers(_projection(T_rect_ego, camera))
+    return (
+        "".join(f"P{number}: {projection}\n" for number in range(4))
+        + f"R0_rect: {_numbers(np.eye(3))}\nTr_velo_to_cam: {_numbers(T_rect_ego[:3])}\n"
+        + f"Tr_imu_to_velo: {_numbers(np.eye(4)[:3])}\n"
+    )
+
+
+def _tracking_calibration(T_rect_ego: F64, camera: CameraCalibration) -> str:
+    """The same under the names that the tracking benchmark has for it, two of them without a colon."""
+    names = {"R0_rect:": "R_rect", "Tr_velo_to_cam:": "Tr_velo_cam", "Tr_imu_to_velo:": "Tr_imu_velo"}
+    text = _object_calibration(T_rect_ego, camera)
+    for ours, theirs in names.items():
+        text = text.replace(ours, theirs)
+    return text
+
+
+def _projection(T_rect_ego: F64, camera: CameraCalibration) -> F64:
+    """(3, 4) from the labels' frame to pixels."""
+    return np.asarray(camera.K @ (camera.T_camera_ego @ np.linalg.inv(T_rect_ego))[:3])
+
+
+def _numbers(values: F64) -> str:
+    return " ".join(f"{value:.12e}" for value in values.ravel())

@@ -1,0 +1,7 @@
+"""What can be wrong with a recorded message."""
+
+from __future__ import annotations
+
+
+class Damaged(Exception):
+    """A message that is not what its topic says; the text is for a frame's notes."""

@@ -1,0 +1,69 @@
+"""One chunk of an MCAP file, unpacked. Its messages stay where they are until somebody wants one: a frame's tick is a
+thousandth of what lies beside it."""
+
+from __future__ import annotations
+
+import io
+import struct
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Schema
+from mcap.stream_reader import get_chunk_data_stream
+
+from pipeline.recording.errors import Damaged
+from pipeline.recording.mcap.index import RECORD_HEAD
+
+_LARGEST_CHUNK_BYTES = 1 << 30
+_MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+
+
+class Place(NamedTuple):
+    """Where a message lies in ``UnpackedChunk.data``."""
+
+    channel_id: int
+    log_time_ns: int
+    publish_time_ns: int
+    start: int
+    end: int
+
+
+@dataclass(frozen=True)
+class UnpackedChunk:
+    """messages: in the order of the file. named: the schemas and channels that it tells of, a channel's schema before
+    it."""
+
+    data: bytes
+    messages: tuple[Place, ...]
+    named: tuple[Schema | Channel, ...]
+
+
+NOTHING = UnpackedChunk(b"", (), ())
+"""What a chunk holds that cannot be read."""
+
+
+def unpack(content: bytes) -> UnpackedChunk:
+    """content: of the chunk's record. Damaged bytes make the decompressors and the library raise whatever they like;
+    Damaged for what they do not see."""
+    chunk = Chunk.read(ReadDataStream(io.BytesIO(content)))
+    if chunk.uncompressed_size > _LARGEST_CHUNK_BYTES:
+        raise Damaged("a chunk of an invalid size")
+    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+    data = stream.read(length)
+    messages: list[Place] = []
+    named: list[Schema | Channel] = []
+    offset = 0
+    while offset < length:
+        opcode, size = RECORD_HEAD.unpack_from(data, offset)
+        start, offset = offset + RECORD_HEAD.size, offset + RECORD_HEAD.size + size
+        if offset > length:
+            raise Damaged("a chunk that ends within a message")
+        if opcode == Opcode.MESSAGE:
+            channel_id, _, log_time_ns, publish_time_ns = _MESSAGE_HEAD.unpack_from(data, start)
+            messages.append(Place(channel_id, log_time_ns, publish_time_ns, start + _MESSAGE_HEAD.size, offset))
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
+            kind = Schema if opcode == Opcode.SCHEMA else Channel
+            named.append(kind.read(ReadDataStream(io.BytesIO(data[start:offset]))))
+    return UnpackedChunk(data, tuple(messages), tuple(named))

@@ -1,0 +1,168 @@
+"""An MCAP file being written so that what is on disk is whole at any moment, but for its last chunk."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Literal
+
+from mcap.data_stream import RecordBuilder
+from mcap.records import DataEnd, Footer
+from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
+
+from pipeline.common.errors import BadInput
+from pipeline.recording.topics import PROFILE, Channel
+
+CHUNK_BYTES = 1280 * 1024
+"""A chunk is what a crash can cost and what a seek must unpack. What would make one larger begins the next: a frame of
+a full sweep (0.6 MB) and its picture (0.4 MB) is one chunk, and a seek reads nothing else."""
+_NEVER = 2**62
+"""The library's own limit, which counts after the message: ours alone decides."""
+
+Compression = Literal["lz4", "zstd"]
+_COMPRESSION = {"lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
+
+
+class _Stream:
+    """What ``mcap.writer`` writes to: straight to the system, all that it is given."""
+
+    def __init__(self, path: Path) -> None:
+        self.file = path.open("xb", buffering=0)
+
+    def write(self, data: bytes) -> int:
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self.file.write(rest) :]
+        return len(data)
+
+    def tell(self) -> int:
+        return self.file.tell()
+
+    def flush(self) -> None:
+        """Nothing is held back."""
+
+
+class Output:
+    """A new MCAP file. ``add`` messages, ``flush`` now and then, ``close`` in the end.
+
+    Nothing is buffered below the chunk: when it is closed, by size or by ``flush``, its bytes are with the system, and
+    survive the death of this process. ``flush(to_disk=True)`` waits until they survive the machine's, too.
+
+    When the file can take no more, ``add``, ``flush`` and ``close`` raise OSError with the file's name, after they cut
+    it back to its last whole chunk and ended it there: it stays a file that any reader opens.
+    """
+
+    def __init__(self, path: Path, compression: Compression = "zstd", profile: str = PROFILE) -> None:
+        try:
+            self._stream = _Stream(path)
+        except FileExistsError:
+            raise BadInput(f"{path}: file already exists; choose another name or remove it") from None
+        self.path = path
+        self._channels: dict[Channel, int] = {}
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._sequences: dict[int, int] = {}
+        self._sound_bytes = 0
+        self._pending_bytes = 0
+        self._is_open = True
+        self._writer = Writer(self._stream, _NEVER, _COMPRESSION[compression])  # type: ignore[arg-type]
+        with self._failing_neatly():
+            self._writer.start(profile, "cipv-studio")
+
+    @property
+    def is_open(self) -> bool:
+        """False once it was closed or could take no more."""
+        return self._is_open
+
+    @property
+    def bytes_written(self) -> int:
+        """Size of the file, without the chunk in progress."""
+        return self._sound_bytes
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether a chunk is in progress."""
+        return self._pending_bytes > 0
+
+    def add(self, channel: Channel, log_time_ns: int, publish_time_ns: int, data: bytes) -> None:
+        """Append a message. publish_time_ns: the header's time; before 1970 it becomes 0, MCAP knows no earlier."""
+        if self.is_pending and self._pending_bytes + len(data) > CHUNK_BYTES:
+            self.flush()
+        with self._failing_neatly():
+            number = self._channels.get(channel) or self._register(channel)
+            self._sequences[number] += 1
+            published_ns = max(publish_time_ns, 0)
+            self._writer.add_message(number, log_time_ns, data, published_ns, self._sequences[number])
+        self._pending_bytes += len(data)
+        if self._pending_bytes >= CHUNK_BYTES:
+            self.flush()
+
+    def add_metadata(self, name: str, values: dict[str, str]) -> None:
+        with self._failing_neatly():
+            self._writer.add_metadata(name, values)
+
+    def add_attachment(self, name: str, media_type: str, data: bytes, log_time_ns: int = 0) -> None:
+        """After every message so far: the chunk in progress is closed first."""
+        with self._failing_neatly():
+            self._writer.flush()
+            self._pending_bytes = 0
+            self._writer.add_attachment(log_time_ns, log_time_ns, name, media_type, data)
+
+    def flush(self, *, to_disk: bool = False) -> None:
+        """Close the chunk in progress."""
+        with self._failing_neatly():
+            self._writer.flush()
+            self._pending_bytes = 0
+            if to_disk:
+                os.fsync(self._stream.file.fileno())
+
+    def close(self) -> None:
+        """Write the summary and close the file. Safe to call twice."""
+        if not self._is_open:
+            return
+        with self._failing_neatly():
+            self._writer.finish()
+            os.fsync(self._stream.file.fileno())
+        self._is_open = False
+        self._stream.file.close()
+
+    def discard(self) -> None:
+        """Close the file and remove it: what it was to hold could not be made."""
+        self._is_open = False
+        self._stream.file.close()
+        self.path.unlink(missing_ok=True)
+
+    def _register(self, channel: Channel) -> int:
+        schema = channel.schema_name, channel.schema_encoding, channel.schema_data
+        if schema not in self._schemas:
+            self._schemas[schema] = self._writer.register_schema(*schema) if channel.schema_name else 0
+        number = self._writer.register_channel(
+            channel.topic, channel.message_encoding, self._schemas[schema], dict(channel.metadata)
+        )
+        self._channels[channel], self._sequences[number] = number, 0
+        return number
+
+    @contextmanager
+    def _failing_neatly(self) -> Iterator[None]:
+        """Each call of the writer leaves whole records behind, or is undone."""
+        if not self._is_open:
+            raise ValueError(f"{self.path} is closed")
+        try:
+            yield
+            self._sound_bytes = self._stream.tell()
+        except OSError as error:
+            self._is_open = False
+            self._cut_back()
+            raise OSError(error.errno, error.strerror, str(self.path)) from None
+
+    def _cut_back(self) -> None:
+        """End the file after its last whole chunk, without a summary: 50 bytes in the place of what did not fit."""
+        end = RecordBuilder()
+        DataEnd(0).write(end)
+        Footer(0, 0, 0).write(end)
+        with contextlib.suppress(OSError), self._stream.file as file:
+            file.truncate(self._sound_bytes)
+            file.seek(self._sound_bytes)
+            file.write(end.end() + MCAP0_MAGIC)

@@ -1,0 +1,1 @@
+"""What a session holds, as messages, and how it is read and written."""

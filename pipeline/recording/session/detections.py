@@ -1,0 +1,74 @@
+"""What a recording brings of detections, inside a tick. Networks' own are not kept: they are made anew, by whichever
+network looks at the session. Those of a drive that gives them belong to it, number for number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.recording.errors import Damaged
+from pipeline.types import DistanceLaw, Frame, RawBoxes, RawLanes
+
+
+@dataclass(frozen=True)
+class BoxesRecord:
+    """``RawBoxes``, its arrays as rows of numbers."""
+
+    model: str
+    boxes: tuple[tuple[float, float, float, float], ...]
+    scores: tuple[float, ...]
+    labels: tuple[str, ...]
+    law: DistanceLaw
+
+    def raw(self) -> RawBoxes:
+        """Damaged when a box lacks its score or its class."""
+        if not len(self.boxes) == len(self.scores) == len(self.labels):
+            raise Damaged("the given boxes cannot be read")
+        boxes = np.array(self.boxes, np.float32).reshape(-1, 4)
+        return RawBoxes(self.model, boxes, np.array(self.scores, np.float32), self.labels, self.law)
+
+
+@dataclass(frozen=True)
+class LanesRecord:
+    """``RawLanes``, its arrays as rows of numbers."""
+
+    model: str
+    points: tuple[tuple[float, float], ...]
+    scores: tuple[float, ...]
+    line: tuple[int, ...]
+
+    def raw(self) -> RawLanes:
+        """Damaged when a point lacks its score or its line."""
+        if not len(self.points) == len(self.scores) == len(self.line):
+            raise Damaged("the given lane lines cannot be read")
+        points = np.array(self.points, np.float32).reshape(-1, 2)
+        return RawLanes(self.model, points, np.array(self.scores, np.float32), np.array(self.line, np.int32))
+
+
+@dataclass(frozen=True)
+class Given:
+    """The detections that a frame came with; None where nothing was looked for."""
+
+    boxes: BoxesRecord | None = None
+    lanes: LanesRecord | None = None
+
+
+def given_of(frame: Frame) -> Given | None:
+    """None for a frame whose detections are for networks to find."""
+    if not frame.detections_given:
+        return None
+    return Given(
+        _boxes(frame.raw_boxes) if frame.raw_boxes is not None else None,
+        _lanes(frame.raw_lanes) if frame.raw_lanes is not None else None,
+    )
+
+
+def _boxes(raw: RawBoxes) -> BoxesRecord:
+    boxes = tuple((x1, y1, x2, y2) for x1, y1, x2, y2 in raw.boxes.tolist())
+    return BoxesRecord(raw.model, boxes, tuple(raw.scores.tolist()), raw.labels, raw.law)
+
+
+def _lanes(raw: RawLanes) -> LanesRecord:
+    points = tuple((u, v) for u, v in raw.points.tolist())
+    return LanesRecord(raw.model, points, tuple(raw.scores.tolist()), tuple(raw.line.tolist()))

@@ -1,0 +1,197 @@
+"""What one message of ``/frames`` says: everything the pipeline knew in a frame, the bulky parts by reference.
+
+Viewers need Foxglove's schemas, which cannot hold all of a ``Frame`` exactly (a rotation becomes a quaternion, a course
+has no place). So a tick keeps the small things itself, number for number, and names the messages of the point cloud,
+the picture and the route by their log times, which are unique within a topic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Annotated, TypeVar
+
+import numpy as np
+from pydantic import AfterValidator, Field, TypeAdapter, ValidationError
+
+from pipeline.formats.file_reading import camera_matrix, rigid_transform
+from pipeline.recording import topics
+from pipeline.recording.errors import Damaged
+from pipeline.recording.session.detections import Given
+from pipeline.types import F64, CameraCalibration, EgoState, GnssFix, Route, StreamHealth
+from pipeline.types.source import SourceError, TruthObject
+
+_INT64 = 2**63
+Nanoseconds = Annotated[int, Field(ge=-_INT64, lt=_INT64)]
+_Size = Annotated[int, Field(ge=1, le=65536)]
+_DISTORTIONS = (0, 4, 5, 8)
+
+
+@dataclass(frozen=True)
+class SweepRef:
+    """The point cloud stored at ``at_ns`` (log time)."""
+
+    at_ns: Nanoseconds
+    t_ns: Nanoseconds
+    channels: Annotated[int, Field(ge=1, le=255)]
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class PictureRef:
+    """The picture stored at ``at_ns``; t_ns None where the camera gave no stamp."""
+
+    at_ns: Nanoseconds
+    t_ns: Nanoseconds | None
+
+
+@dataclass(frozen=True)
+class PacketsRef:
+    """A sweep that is stored as the sensor's packets, received shortly before the tick. t_ns: the sweep's stamp, which
+    is the decoder's and ``offset_ns``. T_ego_lidar: (4, 4), row by row."""
+
+    t_ns: Nanoseconds
+    offset_ns: Nanoseconds
+    T_ego_lidar: tuple[float, ...]
+
+
+def _known_distortion(values: tuple[float, ...]) -> tuple[float, ...]:
+    if len(values) not in _DISTORTIONS:
+        raise ValueError(f"{len(values)} distortion coefficients")
+    return values
+
+
+@dataclass(frozen=True)
+class CameraRecord:
+    """``CameraCalibration`` with its matrices row by row. at_ns: where ``/camera/calibration`` and ``/tf`` have it."""
+
+    at_ns: Nanoseconds
+    K: tuple[float, ...]
+    distortion: Annotated[tuple[float, ...], AfterValidator(_known_distortion)]
+    T_camera_ego: tuple[float, ...]
+    width: _Size
+    height: _Size
+    road_z_m: float | None = None
+
+    @staticmethod
+    def of(camera: CameraCalibration, at_ns: int) -> CameraRecord:
+        def numbers(values: F64) -> tuple[float, ...]:
+            return tuple(float(value) for value in values.ravel())
+
+        matrices = numbers(camera.K), numbers(camera.distortion), numbers(camera.T_camera_ego)
+        return CameraRecord(at_ns, *matrices, camera.width, camera.height, camera.road_z_m)
+
+    def calibration(self) -> CameraCalibration:
+        """Damaged when the matrices are none of a camera."""
+        if len(self.K) != 9 or len(self.T_camera_ego) != 16:
+            raise Damaged("the camera's calibration has a wrong shape")
+        try:
+            K = camera_matrix(np.reshape(self.K, (3, 3)), "calibration: K")
+            T_camera_ego = rigid_transform(np.reshape(self.T_camera_ego, (4, 4)), "calibration: T_camera_ego")
+        except SourceError as error:
+            raise Damaged(str(error)) from None
+        return CameraCalibration(K, np.array(self.distortion), T_camera_ego, self.width, self.height, self.road_z_m)
+
+
+R = TypeVar("R", SweepRef | None, PictureRef | None, CameraRecord | None)
+
+
+@dataclass(frozen=True)
+class FrameRecord:
+    """One frame of a session, as in ``Frame``. params_at_ns: where ``/params`` has what it was run with, None when a
+    session holds inputs alone. truth: its labels, None where nobody labelled it. given: detections it came with."""
+
+    name: str
+    t_ns: Nanoseconds
+    notes: tuple[str, ...] = ()
+    sweep: SweepRef | None = None
+    packets: PacketsRef | None = None
+    picture: PictureRef | None = None
+    camera: CameraRecord | None = None
+    ego: EgoState | None = None
+    gnss: GnssFix | None = None
+    streams: tuple[StreamHealth, ...] = ()
+    timing_ms: dict[str, float] = field(default_factory=dict)
+    route_at_ns: Nanoseconds | None = None
+    params_at_ns: Nanoseconds | None = None
+    truth: tuple[TruthObject, ...] | None = None
+    given: Given | None = None
+
+    def references(self) -> dict[str, int]:
+        """Topic → log time of every message that this tick needs besides its own."""
+        named = {
+            topics.POINTS: self.sweep.at_ns if self.sweep else None,
+            topics.IMAGE: self.picture.at_ns if self.picture else None,
+            topics.CALIBRATION: self.camera.at_ns if self.camera else None,
+            topics.TF: self.camera.at_ns if self.camera else None,
+            topics.ROUTE: self.route_at_ns,
+            topics.PARAMS: self.params_at_ns,
+        }
+        return {topic: at_ns for topic, at_ns in named.items() if at_ns is not None}
+
+    def moved(self, to_ns: Mapping[int, int]) -> FrameRecord:
+        """The same tick after messages it refers to were moved, from log time to log time."""
+
+        def at(before_ns: int | None) -> int | None:
+            return None if before_ns is None else to_ns.get(before_ns, before_ns)
+
+        def moved_ref(ref: R) -> R:
+            return ref if ref is None else replace(ref, at_ns=to_ns.get(ref.at_ns, ref.at_ns))
+
+        return replace(
+            self,
+            sweep=moved_ref(self.sweep),
+            picture=moved_ref(self.picture),
+            camera=moved_ref(self.camera),
+            route_at_ns=at(self.route_at_ns),
+            params_at_ns=at(self.params_at_ns),
+        )
+
+
+@dataclass(frozen=True)
+class _RouteRecord:
+    name: str
+    lat_deg: tuple[float, ...]
+    lon_deg: tuple[float, ...]
+    sigma_m: float
+
+
+_FRAME_RECORD, _ROUTE = TypeAdapter(FrameRecord), TypeAdapter(_RouteRecord)
+_EGO, _STREAMS = TypeAdapter(EgoState), TypeAdapter(dict[str, tuple[StreamHealth, ...]])
+
+
+def frame_record_message(tick: FrameRecord) -> bytes:
+    """JSON. What is not finite becomes null."""
+    return _FRAME_RECORD.dump_json(tick)
+
+
+def frame_record_from(data: bytes) -> FrameRecord:
+    """Damaged when the message is no tick."""
+    try:
+        return _FRAME_RECORD.validate_json(data)
+    except ValidationError as error:
+        raise Damaged(f"a message of /frames cannot be read: {error.errors()[0]['msg']}") from None
+
+
+def ego_message(ego: EgoState) -> bytes:
+    return _EGO.dump_json(ego)
+
+
+def health_message(streams: tuple[StreamHealth, ...]) -> bytes:
+    return _STREAMS.dump_json({"streams": streams})
+
+
+def route_message(route: Route) -> bytes:
+    lat_deg, lon_deg = (tuple(map(float, values)) for values in (route.lat_deg, route.lon_deg))
+    return _ROUTE.dump_json(_RouteRecord(route.name, lat_deg, lon_deg, route.sigma_m))
+
+
+def route_from(data: bytes) -> Route:
+    """Damaged when the message is no route."""
+    try:
+        record = _ROUTE.validate_json(data)
+    except ValidationError:
+        raise Damaged("a message of /route cannot be read") from None
+    if len(record.lat_deg) != len(record.lon_deg):
+        raise Damaged("a message of /route cannot be read")
+    return Route(record.name, np.array(record.lat_deg), np.array(record.lon_deg), record.sigma_m)

@@ -1,0 +1,76 @@
+"""Raw LiDAR packets as ``velodyne_msgs/VelodyneScan``: what ROS's Velodyne driver records, and many programs read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pipeline.formats.file_reading import rigid_transform
+from pipeline.formats.velodyne import PACKET_BYTES, Vlp16Decoder
+from pipeline.formats.velodyne.ros import PACKET, SCAN, typestore
+from pipeline.recording.errors import Damaged
+from pipeline.recording.mcap.reader import McapFile
+from pipeline.recording.session.frame_record import PacketsRef
+from pipeline.recording.topics import PACKETS
+from pipeline.types import F64, Sweep
+from pipeline.types.source import SourceError
+
+PACKETS_BEFORE_NS, _PACKETS_AFTER_NS = 800_000_000, 200_000_000
+"""How long before and after the tick the packets of its sweep may have been received."""
+_SAME_SWEEP_NS = 40_000_000
+"""Stamps of a sweep decoded with and without what came long before differ by far less; sweeps lie 100 ms apart."""
+_HEADER, _TIME = "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
+
+
+@dataclass(frozen=True)
+class RawLidar:
+    """What it takes to make sweeps of a sensor's packets. T_ego_lidar: (4, 4), where it sits. offset_ns: what is added
+    to its stamps."""
+
+    T_ego_lidar: F64
+    offset_ns: int = 0
+
+    def reference(self, sweep: Sweep) -> PacketsRef:
+        """What a tick says of a sweep that is not stored itself."""
+        return PacketsRef(sweep.t_ns, self.offset_ns, tuple(float(value) for value in self.T_ego_lidar.ravel()))
+
+
+def sweep_of_packets(ref: PacketsRef, at_ns: int, file: McapFile) -> Sweep:
+    """The sweep of a tick stored at log time ``at_ns``, decoded anew. Damaged when its packets are not there."""
+    try:
+        decoder = Vlp16Decoder(rigid_transform(np.reshape(ref.T_ego_lidar, (4, 4)), "T_ego_lidar"))
+    except (SourceError, ValueError):
+        raise Damaged("the LiDAR's mount cannot be read") from None
+    scans = file.messages((PACKETS,), at_ns - PACKETS_BEFORE_NS, at_ns + _PACKETS_AFTER_NS)
+    packets = [packet for stored in scans for packet in packets_from(stored.data)]
+    sweeps = [decoder.push(payload, t_ns) for t_ns, payload in packets] + [decoder.flush()]
+    wanted_ns = ref.t_ns - ref.offset_ns
+    near = [each for each in sweeps if each is not None and abs(each.t_ns - wanted_ns) < _SAME_SWEEP_NS]
+    if not near:
+        raise Damaged("the session lacks the packets of this sweep")
+    return replace(min(near, key=lambda each: abs(each.t_ns - wanted_ns)), t_ns=ref.t_ns)
+
+
+def scan_message(packets: list[tuple[int, bytes]]) -> bytes:
+    """CDR of (when received in ns, payload) each, oldest first. Payloads of another length than a VLP-16's are left
+    out: the message has no room for them."""
+    types = typestore().types
+    stamp, header, packet = types[_TIME], types[_HEADER], types[PACKET]
+    whole = [(t_ns, payload) for t_ns, payload in packets if len(payload) == PACKET_BYTES]
+    first_ns = packets[0][0] if packets else 0
+    message = types[SCAN](
+        header(stamp(*divmod(first_ns, 1_000_000_000)), "lidar"),
+        [packet(stamp(*divmod(t_ns, 1_000_000_000)), np.frombuffer(data, dtype=np.uint8)) for t_ns, data in whole],
+    )
+    return bytes(typestore().serialize_cdr(message, SCAN))
+
+
+def packets_from(data: bytes) -> list[tuple[int, bytes]]:
+    """Back from ``scan_message``. Damaged when it is none."""
+    try:
+        scan: Any = typestore().deserialize_cdr(data, SCAN)
+    except Exception as error:  # damaged bytes make the library raise whatever they like
+        raise Damaged(f"a message of /lidar/packets cannot be read: {error}") from None
+    return [(each.stamp.sec * 1_000_000_000 + each.stamp.nanosec, each.data.tobytes()) for each in scan.packets]

@@ -1,0 +1,86 @@
+"""A VLP-16 on the network: data packets to sweeps, position packets to what its clock follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from pipeline.formats.velodyne import BadPacket, Vlp16Decoder, read_position
+from pipeline.sources.live.clock import HostClock
+from pipeline.sources.live.config import LidarConfig
+from pipeline.sources.live.devices.device_reader import Read, Reader
+from pipeline.sources.live.devices.sensor_input import Deliver, whole_hours_off
+from pipeline.sources.live.devices.udp import read_datagrams
+from pipeline.sources.live.health import StreamStats
+from pipeline.types import Sweep
+
+
+class LidarInput:
+    """pps: what the last position packet said of the pulse per second; None before one came. follows_gps: the sensor's
+    time is UTC past the hour. T_ego_lidar: (4, 4), where it sits. offset_ns: what is added to its stamps. on_packet:
+    told each data packet and when it arrived."""
+
+    def __init__(self, config: LidarConfig, clock: HostClock, deliver: Deliver[Sweep]) -> None:
+        self.stats = StreamStats("lidar")
+        self.stats.note = f"nothing on UDP port {config.data_port} yet"
+        self.pps: str | None = None
+        self.follows_gps = False
+        self._clock, self._deliver = clock, deliver
+        self.offset_ns = round(config.time_offset_ms * 1e6)
+        self.T_ego_lidar = config.mount.T_ego_sensor()
+        self.on_packet: Callable[[bytes, int], object] | None = None
+        self._decoder = Vlp16Decoder(self.T_ego_lidar)
+        self.stats.refused = self._decoder.counts.refused  # by the decoder; those of the position port are added
+        listen = partial(read_datagrams, interface=config.interface, group=config.multicast_group)
+        listeners = [("lidar", partial(listen, config.data_port, receive=self.receive))]
+        if config.position_port is not None:
+            listeners.append(("lidar-position", partial(listen, config.position_port, receive=self.receive_position)))
+        self.readers: tuple[Reader, ...] = tuple(
+            Reader(name, _until_stopped(read), self._say) for name, read in listeners
+        )
+
+    def clock_offset_ms(self) -> float | None:
+        offset_ns = self._decoder.clock.offset_ns
+        return None if offset_ns is None else whole_hours_off(offset_ns)
+
+    def utc_to_host_ns(self, utc_ns: int, near_ns: int) -> int | None:
+        """UTC on the host's timeline, by the LiDAR's clock; None while that does not follow GPS."""
+        offset_ns = self._decoder.clock.offset_ns
+        if not self.follows_gps or offset_ns is None:
+            return None
+        return near_ns + round(whole_hours_off(utc_ns + offset_ns - near_ns) * 1e6)
+
+    def receive(self, packet: bytes, wall_ns: int) -> None:
+        """Take a data packet, received at ``wall_ns`` of the system's clock. The decoder's own clock maps to the host's
+        timeline; it is not told of GPS, whose time is not the host's."""
+        arrived_ns = self._clock.of_wall_ns(wall_ns)
+        on_packet = self.on_packet
+        if on_packet is not None:
+            on_packet(packet, arrived_ns)
+        sweep = self._decoder.push(packet, arrived_ns)
+        counts = self._decoder.counts
+        self.stats.lost = counts.lost
+        if counts.models and self.stats.since_ns(arrived_ns) is None:
+            self.stats.note = f"packets of a {', '.join(counts.models)}, not of a VLP-16"
+        if sweep is not None:
+            self.stats.note = ""
+            t_ns = sweep.t_ns + self.offset_ns
+            self.stats.arrived(arrived_ns, t_ns)
+            self._deliver(t_ns, sweep, arrived_ns)
+
+    def receive_position(self, packet: bytes, wall_ns: int) -> None:
+        """Take a position packet."""
+        try:
+            position = read_position(packet)
+        except BadPacket as bad:
+            self.stats.refused[f"{bad.reason} on the position port"] += 1
+            return
+        self.pps, self.follows_gps = position.pps, position.locked
+
+    def _say(self, text: str) -> None:
+        self.stats.note = text
+
+
+def _until_stopped(read: Callable[..., None]) -> Read:
+    """A reading whose ``stop`` is given last."""
+    return lambda stop: read(stop=stop)

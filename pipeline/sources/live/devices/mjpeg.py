@@ -1,0 +1,122 @@
+"""MJPEG over HTTP (multipart/x-mixed-replace), read with the standard library: every JPEG stays as the camera made it,
+and the stamp that many cameras send with each is kept, which video libraries drop."""
+
+from __future__ import annotations
+
+import http.client
+from collections.abc import Callable, Mapping
+from urllib.parse import urlsplit
+
+from pipeline.sources.live.devices.device_reader import CONNECT_S, SILENCE_S, DeviceLost, Stop
+
+_LARGEST = 32 << 20
+_LONGEST_LINE = 8192
+_MOST_LINES = 100
+"""Between two pictures: a part's headers are a handful."""
+_STAMPS = ("x-timestamp", "x-sendtimestamp")
+"""Seconds since 1970, as mjpg-streamer, µStreamer and others send it."""
+
+Receive = Callable[[bytes, int | None], None]
+"""Takes a JPEG and its own stamp, µs since 1970, if it has one."""
+
+
+class _Stopped(Exception):
+    """Asked to end in the middle of a part."""
+
+
+class NotMjpeg(Exception):
+    """The address answers, with something else."""
+
+
+def read_mjpeg(url: str, receive: Receive, stop: Stop) -> None:
+    """Read until ``stop``. DeviceLost when the camera cannot be reached, ends or falls silent; NotMjpeg when the
+    address gives no MJPEG."""
+    connection = _connection(url)
+    try:
+        parts = urlsplit(url)
+        connection.connect()
+        connection.sock.settimeout(SILENCE_S)
+        connection.request("GET", (parts.path or "/") + (f"?{parts.query}" if parts.query else ""))
+        with connection.getresponse() as response:
+            if response.status != http.client.OK:
+                raise DeviceLost(f"{url}: HTTP {response.status} {response.reason}")
+            if not response.headers.get_content_type().startswith("multipart/"):
+                raise NotMjpeg
+            while not stop:
+                receive(*_next_part(response, url, stop))
+    except _Stopped:
+        return
+    except TimeoutError:
+        raise DeviceLost(f"{url}: does not answer") from None
+    except (http.client.HTTPException, ValueError) as error:
+        raise DeviceLost(f"{url}: not understood: {type(error).__name__}") from None
+    except OSError as error:
+        raise DeviceLost(f"{url}: {error.strerror or error}") from None
+    finally:
+        connection.close()
+
+
+def _connection(url: str) -> http.client.HTTPConnection:
+    try:
+        parts = urlsplit(url)
+        kind = http.client.HTTPSConnection if parts.scheme == "https" else http.client.HTTPConnection
+        return kind(parts.hostname or "", parts.port, timeout=CONNECT_S)
+    except ValueError:
+        raise DeviceLost(f"{url}: not an address") from None
+
+
+def _next_part(response: http.client.HTTPResponse, url: str, stop: Stop) -> tuple[bytes, int | None]:
+    """One JPEG: its headers say how long it is; of a camera that does not say, up to the JPEG's end."""
+    headers = _headers(response, url, stop)
+    length = headers.get("content-length", "")
+    if length.isdecimal() and 0 < int(length) <= _LARGEST:
+        data = response.read(int(length))
+        if len(data) < int(length):
+            raise DeviceLost(f"{url}: the camera closed the connection")
+        return data, _stamp_us(headers)
+    return _until_jpeg_end(response, url, stop), _stamp_us(headers)
+
+
+def _headers(response: http.client.HTTPResponse, url: str, stop: Stop) -> Mapping[str, str]:
+    """Of the next part: lines after its boundary, up to an empty one. DeviceLost when they do not end."""
+    headers: dict[str, str] = {}
+    for _ in range(_MOST_LINES):
+        line = _line(response, url, stop)
+        if len(line) == _LONGEST_LINE:
+            break
+        if line in (b"\r\n", b"\n"):
+            if headers:
+                return headers
+            continue
+        name, colon, value = line.decode("latin-1").partition(":")
+        if colon:
+            headers[name.strip().lower()] = value.strip()
+    raise DeviceLost(f"{url}: not understood: headers without end")
+
+
+def _until_jpeg_end(response: http.client.HTTPResponse, url: str, stop: Stop) -> bytes:
+    data = bytearray()
+    while not data.endswith(b"\xff\xd9") and len(data) < _LARGEST:
+        line = _line(response, url, stop)
+        end = line.find(b"\xff\xd9") if data or line.startswith(b"\xff\xd8") else -1
+        data += line if end < 0 else line[: end + 2]
+    return bytes(data)
+
+
+def _line(response: http.client.HTTPResponse, url: str, stop: Stop) -> bytes:
+    """The next one with its end, or as much as a line may have."""
+    if stop:
+        raise _Stopped
+    line = response.readline(_LONGEST_LINE)
+    if not line:
+        raise DeviceLost(f"{url}: the camera closed the connection")
+    return line
+
+
+def _stamp_us(headers: Mapping[str, str]) -> int | None:
+    for name in _STAMPS:
+        try:
+            return round(float(headers[name]) * 1e6)
+        except (KeyError, ValueError, OverflowError):
+            continue
+    return None

@@ -1,0 +1,110 @@
+"""Cameras that send video: RTSP and HTTP through PyAV (which can give up on a camera that hangs), those plugged in
+through OpenCV (which knows the devices of every system), and a video file played as a camera would."""
+
+from __future__ import annotations
+
+import os
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+
+from pipeline.sources.live.devices.device_reader import SILENCE_S, DeviceLost, Stop
+from pipeline.types.camera_shot import Shot
+
+_OPEN_S = 2.0
+_RTSP = {"rtsp_transport": "tcp", "fflags": "nobuffer", "flags": "low_delay"}
+_SLOWEST_HZ, _FASTEST_HZ, _USUAL_HZ = 1.0, 240.0, 30.0
+
+Receive = Callable[[Shot], None]
+
+
+def read_stream(url: str, receive: Receive, stop: Stop) -> None:
+    """RTSP or video over HTTP. DeviceLost when it cannot be opened, ends or falls silent."""
+    options = _RTSP if url.startswith("rtsp") else {"fflags": "nobuffer"}
+    try:
+        with av.open(url, timeout=(_OPEN_S, SILENCE_S), options=options) as container:
+            for shot, _ in _shots(container):
+                receive(shot)
+                if stop:
+                    return
+    except (av.FFmpegError, OSError, ValueError) as error:
+        raise DeviceLost(f"{url}: {_reason(error)}") from None
+    raise DeviceLost(f"{url}: the camera closed the connection")
+
+
+def play_file(path: Path, receive: Receive, stop: Stop) -> None:
+    """A video at its own rate, again and again. DeviceLost when it is none."""
+    while not stop:
+        begun, shown = time.monotonic(), 0
+        try:
+            with av.open(str(path)) as container:
+                for shot, at_s in _shots(container):
+                    stop.wait(max(0.0, begun + at_s - time.monotonic()))
+                    if stop:
+                        return
+                    receive(shot)
+                    shown += 1
+        except (av.FFmpegError, OSError, ValueError) as error:
+            raise DeviceLost(f"{path}: {_reason(error)}") from None
+        if not shown:
+            raise DeviceLost(f"{path}: no pictures")
+
+
+def read_device(device: int | str, receive: Receive, stop: Stop) -> None:
+    """A camera plugged in, by number or path. DeviceLost when there is none or it was pulled out."""
+    number = device_number(device)
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)  # what is wrong is said once, and by us
+    capture = cv2.VideoCapture(number)
+    try:
+        if not capture.isOpened():
+            raise DeviceLost(f"camera {device}: not plugged in, or used by another program")
+        capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+        while not stop:
+            ok, pixels = capture.read()
+            if not ok or pixels is None:
+                raise DeviceLost(f"camera {device}: gives no pictures")
+            receive(Shot(pixels=np.ascontiguousarray(pixels, dtype=np.uint8)))
+    finally:
+        capture.release()
+
+
+def device_number(device: int | str) -> int:
+    """A camera's number, which OpenCV knows it by. A path, such as /dev/v4l/by-id/…, is a link to where the camera is
+    now: it has another number when it is plugged in anew. DeviceLost when it leads to no camera."""
+    if isinstance(device, int):
+        return device
+    found = re.fullmatch(r"/dev/video(\d+)", os.path.realpath(device))
+    if found is None:
+        raise DeviceLost(f"camera {device}: not plugged in, or no camera")
+    return int(found[1])
+
+
+def _shots(container: av.container.InputContainer) -> Iterator[tuple[Shot, float]]:
+    """Each picture with its time in the video, seconds. JPEGs are handed on as they are."""
+    if not container.streams.video:
+        raise ValueError("no video stream")
+    stream = container.streams.video[0]
+    rate = float(stream.average_rate or stream.base_rate or _USUAL_HZ)
+    rate = rate if _SLOWEST_HZ <= rate <= _FASTEST_HZ else _USUAL_HZ
+    keeps_jpeg = stream.codec_context.name == "mjpeg"
+    for count, packet in enumerate(container.demux(stream)):
+        if keeps_jpeg and packet.size:
+            yield Shot(encoded=bytes(packet)), _time_s(packet, count / rate)
+        elif not keeps_jpeg:
+            for frame in packet.decode():
+                yield Shot(frame=frame), frame.time if frame.time is not None else count / rate
+
+
+def _time_s(packet: av.Packet, otherwise: float) -> float:
+    if packet.pts is None or packet.time_base is None:
+        return otherwise
+    return float(packet.pts * packet.time_base)
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__

@@ -1,0 +1,74 @@
+"""The bench of the whole step: alone, beside a network that really runs meanwhile, and with it."""
+
+from __future__ import annotations
+
+import threading
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from app.bench import whole_pipeline
+from app.commands.bench import _table
+from pipeline.detection import Detectors
+from pipeline.params import Params
+from pipeline.sources import open_source
+from pipeline.types import U8, RawBoxes, RawLanes
+from pipeline.vision.detector import Detector, open_detector
+from tests.pipeline.vision import networks
+
+
+class Paint:
+    """A lane detector that counts the pictures."""
+
+    name = "paint"
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def detect(self, bgr: U8) -> RawLanes:
+        self.asked += 1
+        return RawLanes(self.name, np.zeros((0, 2), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int32))
+
+
+def test_the_step_is_measured_alone_and_beside_the_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = open_source("sim:straight")
+    detector = open_detector(str(networks.yolox(tmp_path / "tiny.onnx")), (128, 128))
+    asked: set[str] = set()
+    look = Detector.detect
+
+    def noting(self: Detector, bgr: U8) -> RawBoxes:
+        asked.add("here" if threading.current_thread() is threading.main_thread() else "beside")
+        return look(self, bgr)
+
+    monkeypatch.setattr(Detector, "detect", noting)
+    lanes = Paint()
+    figures = whole_pipeline.stages(source, 3, Params(), Detectors(detector, lanes, 2), 0.4)
+    assert list(figures) == ["step", "step_beside_network", "line"]
+    assert asked == {"here", "beside"}
+    assert lanes.asked > 0
+    assert (figures["line"]["lanes"], figures["line"]["lanes_every"]) == ("paint", 2)
+    for row in figures.values():
+        assert 0.0 < row["median_ms"] <= row["p99_ms"]
+        assert row["samples"] >= 1
+    beside = figures["step_beside_network"]
+    ratio = beside["p99_ms"] / figures["step"]["median_ms"]
+    assert beside["p99_to_idle_median"] == pytest.approx(ratio, abs=0.01)
+    printed = StringIO()
+    Console(width=160, file=printed).print(_table(figures))
+    assert f"p99 is {beside['p99_to_idle_median']:.1f} × the idle step's median" in printed.getvalue()
+    assert all(f" {row['samples']} " in printed.getvalue() for row in figures.values())
+
+
+def test_each_round_goes_on_where_the_last_one_ended() -> None:
+    source = open_source("sim:straight")
+    laps = whole_pipeline._Laps(iter([source.frame(0), source.frame(1)] * 1000), Params())
+    for _ in range(2):
+        laps.go_on(0.0)
+    assert len(laps.times_s) == 1, "one frame at least, however short the time"
+    laps.go_on(0.05)
+    row = laps.row()
+    assert row["samples"] == len(laps.times_s) > 1
+    assert row["median_ms"] == pytest.approx(float(np.median(laps.times_s)) * 1e3)

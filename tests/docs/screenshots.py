@@ -1,0 +1,128 @@
+"""Renews ``docs/img/*.jpg`` from the real page on the simulated drive: ``make screenshots``. Needs Chromium."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
+
+from app.bench.devtools import CHROMIUM, FLAGS
+from app.engine.engine import Engine
+from app.engine.session_recording import RecordingDesk
+from pipeline.detection import detector_for, lanes_for
+from pipeline.params import Params
+from pipeline.sources import open_source
+from tests.browser.conftest import Site
+
+IMAGES = Path(__file__).resolve().parents[2] / "docs" / "img"
+SOURCE = "sim:straight"
+MOMENT = 60
+"""A frame with traffic around and a lead."""
+QUALITY = 78
+"""Of the JPEGs: a whole page stays below 300 kB, and its text can be read."""
+WAIT_MS = 600_000
+"""On a busy machine the whole drive takes minutes: networks look at every picture."""
+DESK, DISPLAY = (1440, 900), (1024, 600)
+
+
+def main() -> None:
+    """All of them."""
+    expect.set_options(timeout=WAIT_MS)
+    with dashboard() as site, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
+        page = opened(browser, site)
+        save(page, "dashboard")
+        page.locator("#objects tbody tr:not(.is-cipv)").first.click()
+        expect(page.locator("#why .gate").first).to_be_visible()
+        save(page.locator(".why-pane"), "why")
+        page.keyboard.press("Escape")
+        what_if(page)
+        save(page, "whatif")
+        page.close()
+        site.engine.control.set_params(Params(), "default")
+
+        page = opened(browser, site)
+        page.keyboard.press("a")
+        expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %"))
+        save(page, "align")
+        page.close()
+
+        page = browser.new_page(viewport={"width": DISPLAY[0], "height": DISPLAY[1]}, color_scheme="dark")
+        site.engine.control.change(playing=True)
+        page.goto(f"{site.address}/drive/")
+        page.wait_for_function(
+            "() => document.body.innerText.includes('m/s') || document.body.innerText.includes('km/h')"
+        )
+        painted(page)
+        save(page, "drive")
+        page.close()
+        browser.close()
+
+
+@contextmanager
+def dashboard() -> Iterator[Site]:
+    """The dashboard on the simulated drive, paused at ``MOMENT``, with sessions and labels of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        engine = Engine(
+            open_source,
+            detector_for,
+            Params(),
+            uri=SOURCE,
+            whole_drives=True,
+            open_lanes=lanes_for,
+            desk=RecordingDesk(Path(folder)),
+        )
+        engine.start()
+        engine.control.change(target=MOMENT)
+        engine.wait_for(lambda shown: shown.tick is not None and shown.index == MOMENT, WAIT_MS / 1e3)
+        site = Site(engine, 0)
+        site.start()
+        try:
+            yield site
+        finally:
+            site.stop()
+            engine.stop()
+
+
+def opened(browser: Browser, site: Site) -> Page:
+    """The page in the dark theme, with the whole drive computed."""
+    page = browser.new_page(viewport={"width": DESK[0], "height": DESK[1]}, color_scheme="dark")
+    page.set_default_timeout(WAIT_MS)
+    page.goto(site.address)
+    page.wait_for_selector("#objects tbody tr", state="attached")
+    site.engine.wait_for(lambda shown: shown.drive.total > 0 and shown.drive.done == shown.drive.total, WAIT_MS / 1e3)
+    expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
+    painted(page)
+    return page
+
+
+def what_if(page: Page) -> None:
+    """More sightings before one sensor is believed: two runs on the timeline, with the frames in which they differ."""
+    slider = page.locator("[data-param='cipv.confirm_hits'] input[type=range]")
+    slider.evaluate("(range) => { range.closest('details').open = true; range.scrollIntoView() }")
+    slider.fill("10")
+    expect(page.locator("#timeline-facts")).to_contain_text("frames differ")
+    expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
+    page.get_by_role("tab", name="Runs").click()
+    expect(page.locator(".metrics tbody tr")).not_to_have_count(0)
+    painted(page)
+
+
+def painted(page: Page) -> None:
+    """Wait until what was due is drawn."""
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def save(what: Page | Locator, name: str) -> None:
+    """Write a picture of the page, or of a part of it."""
+    path = IMAGES / f"{name}.jpg"
+    what.screenshot(path=path, type="jpeg", quality=QUALITY)
+    print(f"{path.name}: {path.stat().st_size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+"""No link, anchor or image of the documentation leads nowhere."""
+
+from __future__ import annotations
+
+from urllib.parse import urlsplit
+
+import pytest
+
+from app.web import help_pages
+from tests.docs.pages import DOCS, FILES, ROOT, links
+
+MOST_README_LINES = 150
+LARGEST_IMAGE_BYTES = 300_000
+
+
+def anchors(file: str) -> set[str]:
+    page = help_pages.render((ROOT / file).read_text(encoding="utf-8"), file)
+    return {heading.anchor for heading in page.headings}
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_every_link_leads_somewhere(file: str) -> None:
+    broken = []
+    for target, is_image in links(file):
+        parts = urlsplit(target)
+        if parts.scheme:
+            if parts.scheme not in ("http", "https") or not parts.netloc or is_image:
+                broken.append(target)
+            continue
+        path = ((ROOT / file).parent / parts.path).resolve() if parts.path else ROOT / file
+        if (
+            not path.exists()
+            or not path.is_relative_to(ROOT)
+            or (parts.fragment and parts.fragment not in anchors(path.relative_to(ROOT).as_posix()))
+        ):
+            broken.append(target)
+    assert broken == []
+
+
+def test_the_index_lists_every_page_once() -> None:
+    groups = help_pages.navigation((DOCS / help_pages.INDEX).read_text(encoding="utf-8"))
+    listed = [target for group in groups for target, _ in group.links]
+    pages = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")} - {help_pages.INDEX}
+    assert sorted(listed) == sorted(pages)
+
+
+@pytest.mark.parametrize("file", [file for file in FILES if file.startswith("docs/")])
+def test_a_page_has_one_title(file: str) -> None:
+    page = help_pages.render((ROOT / file).read_text(encoding="utf-8"), file)
+    assert [heading.level for heading in page.headings].count(1) == 1
+
+
+def test_every_image_is_small_and_used() -> None:
+    used = {
+        (ROOT / file).parent.joinpath(link.target).resolve() for file in FILES for link in links(file) if link.is_image
+    }
+    images = set((DOCS / "img").iterdir())
+    assert {image.name for image in images if image.stat().st_size > LARGEST_IMAGE_BYTES} == set()
+    assert {image.name for image in images - used} == set()
+
+
+def test_the_readme_is_short() -> None:
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= MOST_README_LINES

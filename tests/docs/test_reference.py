@@ -1,0 +1,25 @@
+"""What is made from the code is up to date, and what is written by hand says the same as the code."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from tests.docs.pages import DOCS, code_spans
+from tests.docs.reference_pages import pages
+from tests.pipeline.types.test_result_json import FIELDS
+
+RESULTS = "docs/reference/results.md"
+
+
+@pytest.mark.parametrize("name", pages())
+def test_a_made_page_is_up_to_date(name: str) -> None:
+    text = (DOCS / name).read_text(encoding="utf-8")
+    assert text == pages()[name], "run `make docs`"
+
+
+@pytest.mark.parametrize("path", FIELDS)
+def test_the_results_page_has_every_field(path: str) -> None:
+    said = {word for span in code_spans(RESULTS) for word in re.split(r"[^\w]+", span)}
+    assert set(FIELDS[path].split()) <= said

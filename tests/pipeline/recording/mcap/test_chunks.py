@@ -1,0 +1,44 @@
+"""What a chunk of a session holds: a seek reads little else than its frame, and what is kept is counted right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.recording import topics
+from pipeline.recording.mcap import output as mcap_output
+from pipeline.recording.mcap.reader import McapFile
+from pipeline.recording.session.writer import SessionWriter
+from tests.pipeline.recording.frames import ABOUT, full, picture, sweep, write
+
+
+def test_a_full_frame_is_one_chunk(tmp_path: Path) -> None:
+    """A seek then reads nothing that is not its frame's."""
+    jpeg = b"\xff\xd8" + bytes(np.random.default_rng(0).integers(0, 255, 400_000, dtype=np.uint8))
+    frames = [
+        replace(full(index), sweep=sweep(index, points=28_000), picture=replace(picture(index), encoded=jpeg[:-index]))
+        for index in range(1, 6)
+    ]
+    with McapFile(write(tmp_path / "a.mcap", frames)) as file:
+        starts = [{stored.log_time_ns for stored in file.chunk(place)} for place in range(len(file.directory.chunks))]
+    assert [len(times) for times in starts] == [1] * 5
+
+
+@pytest.mark.parametrize("chunk_bytes", [500, 2_000, 4_000, 9_000])
+def test_frames_said_to_be_kept_are_in_the_file(
+    chunk_bytes: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wherever a chunk begins, between the messages of a frame too."""
+    monkeypatch.setattr(mcap_output, "CHUNK_BYTES", chunk_bytes)
+    writer = SessionWriter(tmp_path / "a.mcap", ABOUT)
+    for index in range(12):
+        writer.write(full(index), {"frame": index})
+        copy = tmp_path / f"{index}.mcap"
+        copy.write_bytes((tmp_path / "a.mcap").read_bytes())
+        with McapFile(copy, walk=True) as file:
+            assert writer.kept_frames == sum(1 for _ in file.messages((topics.FRAMES,)))
+    writer.close()
+    assert writer.kept_frames == 12

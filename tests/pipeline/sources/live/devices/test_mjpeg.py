@@ -1,0 +1,114 @@
+"""MJPEG over HTTP as cameras really send it: with and without lengths and stamps, and what is no camera at all."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+import pytest
+
+from pipeline.sources.live.devices.device_reader import DeviceLost, Stop
+from pipeline.sources.live.devices.mjpeg import NotMjpeg, read_mjpeg
+from tests.pipeline.sources.live.bench import small_jpeg
+
+MULTIPART = b"HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace;boundary=--x\r\n\r\n"
+
+
+@contextmanager
+def answering(answer: bytes) -> Iterator[str]:
+    """A server that says ``answer`` to whoever asks, and closes."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def serve() -> None:
+            client, _ = listener.accept()
+            with client, suppress(ConnectionError):  # whoever asked may have heard enough
+                client.settimeout(10.0)
+                client.recv(65536)
+                client.sendall(answer)
+
+        thread = threading.Thread(target=serve)
+        thread.start()
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}/video?x=1"
+        thread.join(10.0)
+
+
+class StopAtLook(Stop):
+    """Set when it is looked at for the n-th time."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self._looks_left = number
+
+    def __bool__(self) -> bool:
+        self._looks_left -= 1
+        return self._looks_left <= 0
+
+
+def received(answer: bytes, stop: Stop | None = None) -> tuple[list[tuple[bytes, int | None]], Exception | None]:
+    found: list[tuple[bytes, int | None]] = []
+    with answering(answer) as url:
+        try:
+            read_mjpeg(url, lambda data, stamp: found.append((data, stamp)), Stop() if stop is None else stop)
+        except (DeviceLost, NotMjpeg) as error:
+            return found, error
+    return found, None
+
+
+def part(jpeg: bytes, *headers: str) -> bytes:
+    return "\r\n".join(["--x", "Content-Type: image/jpeg", *headers, "", ""]).encode() + jpeg + b"\r\n"
+
+
+@pytest.mark.parametrize(
+    ("case", "headers", "stamp_us"),
+    [
+        ("length and stamp", lambda j: (f"Content-Length: {len(j)}", "X-Timestamp: 1.123456"), 1_123_456),
+        ("length alone", lambda j: (f"Content-Length: {len(j)}",), None),
+        ("neither", lambda j: (), None),
+        ("stamp that is none", lambda j: (f"content-length: {len(j)}", "X-Timestamp: now"), None),
+        ("length that is none", lambda j: ("Content-Length: -3",), None),
+    ],
+)  # fmt: skip
+def test_pictures_come_as_they_are(
+    case: str, headers: Callable[[bytes], tuple[str, ...]], stamp_us: int | None
+) -> None:
+    pictures = [small_jpeg(shade) for shade in (10, 128, 250)]
+    found, error = received(MULTIPART + b"".join(part(each, *headers(each)) for each in pictures))
+    assert [data for data, _ in found] == pictures
+    assert {stamp for _, stamp in found} == {stamp_us}
+    assert isinstance(error, DeviceLost), "then the camera closed"
+
+
+@pytest.mark.parametrize(
+    ("case", "answer", "complaint"),
+    [
+        ("not found", b"HTTP/1.0 404 Not Found\r\n\r\n", "HTTP 404"),
+        ("no HTTP", b"\x00\x01\x02\r\n\r\n", "not understood"),
+        ("nothing", b"", "not understood"),
+        ("cut in a picture", MULTIPART + part(small_jpeg(), "Content-Length: 99999"), "closed the connection"),
+        ("headers without end", MULTIPART + b"A: b\r\n" * 1000 + part(small_jpeg()), "headers without end"),
+        ("a line without end", MULTIPART + b"A:" + b"b" * 100_000 + b"\n" + part(small_jpeg()), "headers without end"),
+        ("garbage for parts", MULTIPART + bytes(range(256)) * 64, "closed the connection"),
+    ],
+)
+def test_what_is_no_camera_is_said(case: str, answer: bytes, complaint: str) -> None:
+    found, error = received(answer)
+    assert found == []
+    assert complaint in str(error)
+
+
+@pytest.mark.parametrize("look", [2, 3, 6], ids=["before the headers", "among the headers", "in the picture"])
+def test_it_ends_when_asked_in_the_middle_of_a_part(look: int) -> None:
+    assert received(MULTIPART + part(small_jpeg()), StopAtLook(look)) == ([], None)
+
+
+def test_an_address_that_gives_something_else_is_left_to_the_video_reader() -> None:
+    _, error = received(b"HTTP/1.0 200 OK\r\nContent-Type: video/mp4\r\n\r\n....")
+    assert isinstance(error, NotMjpeg)
+
+
+@pytest.mark.parametrize("url", ["http://127.0.0.1:9/", "http://127.0.0.1:99999/", "http://[::1/"])
+def test_an_address_where_nobody_is_is_said(url: str) -> None:
+    with pytest.raises(DeviceLost, match="http"):
+        read_mjpeg(url, lambda data, stamp: None, Stop())

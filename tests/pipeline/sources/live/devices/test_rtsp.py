@@ -1,0 +1,59 @@
+"""A camera that speaks RTSP, from a real server: found, shown, lost and found again."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.sources.live.source import LiveSensors
+from tests.pipeline.sources.live.rig import frames_until, free_port, loopback_config
+
+CAMERA = Path(__file__).parents[1] / "rtsp_camera.py"
+PYTHON = shutil.which("python3", path=os.defpath)
+
+
+@contextmanager
+def camera(codec: str, port: int) -> Iterator[None]:
+    """A camera that is plugged in; pulled out at the end."""
+    assert PYTHON is not None
+    command = [PYTHON, str(CAMERA), codec, str(port)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            if process.stdout.readline().strip() != "ready":
+                pytest.skip(f"GStreamer's RTSP server: {process.communicate()[1].strip().splitlines()[-1:]}")
+            yield
+        finally:
+            process.kill()
+
+
+@pytest.mark.skipif(PYTHON is None, reason="no Python of the system")
+@pytest.mark.parametrize("codec", ["h264", "mjpeg"])
+def test_a_camera_that_speaks_rtsp(codec: str) -> None:
+    """Plugged in late, pulled out, and plugged in again."""
+    port = free_port(socket.SOCK_STREAM)
+    camera_at = {"url": f"rtsp://127.0.0.1:{port}/front"}
+    source = LiveSensors("live:rtsp", loopback_config(lidar=None, gnss=None, ego=None, camera=camera_at))
+    source.start()
+    try:
+        for _ in range(2):
+            with camera(codec, port):
+                for _ in range(20):
+                    picture = frames_until(source, lambda frame: frame.picture is not None).picture
+                    assert picture is not None
+                    assert picture.bgr.shape == (360, 640, 3)
+                    assert np.median(picture.bgr[:, :90]) > 220, "the white bar"
+                    assert np.median(picture.bgr[:, 110:]) == pytest.approx(80, abs=12)
+                    assert (picture.encoded is not None) == (codec == "mjpeg"), "a JPEG stays as it came"
+                (health,) = source.health()
+                assert (health.sensor, health.note != "") == ("camera", True), "its pictures have no times of their own"
+    finally:
+        source.close()
