@@ -19,7 +19,7 @@ from pipeline.types.source import RawPackets
 class Replay:
     """Send a recording as VLP-16 packets, MJPEG, NMEA and CAN in real time, to the addresses of a live config.
 
-    Example: cipv replay sim:straight --config car.yaml, and in another terminal: cipv serve live:car.yaml
+    Example: cipv replay sim:straight --config car.yaml
     """
 
     source: SourceOptions

@@ -41,12 +41,12 @@ def test_a_lane_is_added_by_one_call(open_page: OpenPage, site: Site, before: st
     whole_drive(page, site)
     assert page.evaluate(MAGENTA_ROWS) == 0
     page.evaluate(ADD_LANE, before)
-    page.wait_for_function("window.drawn.length > 0")
+    page.wait_for_function("() => window.drawn.length > 0")
     assert page.evaluate(MAGENTA_ROWS) == pytest.approx(18, abs=2), "drawn over its whole height, and no further"
     row = page.evaluate("window.drawn.at(-1)")
     front = page.locator("#timeline-front")
     front.click(position={"x": box_of(front)["width"] / 2, "y": row["top"] + row["height"] / 2})
-    page.wait_for_function("window.clicked.length === 1")
+    page.wait_for_function("() => window.clicked.length === 1")
 
 
 def test_a_camera_layer_is_added_by_one_call(open_page: OpenPage) -> None:
@@ -59,7 +59,7 @@ def test_a_camera_layer_is_added_by_one_call(open_page: OpenPage) -> None:
           set("layers", { ...get("layers") });
         }"""
     )
-    page.wait_for_function("window.layer !== undefined")
+    page.wait_for_function("() => window.layer !== undefined")
     assert page.evaluate("window.layer.frame") == START
     assert page.evaluate("window.layer.scale") > 0
 

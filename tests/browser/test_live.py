@@ -113,7 +113,7 @@ def test_what_live_sensors_cannot_do_is_off_and_says_why(open_page: OpenPage, ca
     page.get_by_role("tab", name="Runs").click()
     page.get_by_role("tab", name="rerun").click()
     for place in (page.locator("#runs"), page.locator("#rerun-body")):
-        expect(place.get_by_text("Live sensors have no whole drive")).to_be_visible()
+        expect(place.get_by_text("Not available with live sensors")).to_be_visible()
     page.keyboard.press("a")
     expect(page.locator("#align-bar .score")).to_have_text(re.compile(r"\d+ %|nothing stands out|too few borders"))
 

@@ -42,6 +42,7 @@ def test_the_simulator_is_seen_by_the_embedded_detector_unless_another_is_named(
 def test_a_recording_is_seen_by_the_default_one(tmp_path: Path) -> None:
     source = open_source("sim:straight")
     source.uri = "astyx:elsewhere"
+    source.is_simulated = False  # type: ignore[attr-defined]
     assert "simulated cars only" in detector_for(source).notes[0]
     register(networks.yolox(tmp_path / "mine.onnx"), "mine")
     assert detector_for(source).name.startswith("mine")

@@ -44,7 +44,7 @@ export function show() {
         el("h2", { textContent: "Documentation" }),
         el("p", {}, link("help/", "Help: how to use CIPV Studio")),
         el("h2", { textContent: "In-vehicle display" }),
-        el("p", {}, link("drive/", "Touch display for small screens")),
+        el("p", {}, el("a", { href: "drive/", textContent: "Touch display for small screens" })),
       ),
     ),
     el("form", { method: "dialog" }, el("button", { textContent: "Close" })),

@@ -54,7 +54,7 @@ def test_a_command_imports_what_it_needs(module: str, without: set[str]) -> None
     assert without & imported(f"import {module}") == set()
 
 
-USED_EVERY_DAY = ("serve", "run", "evaluate", "record", "sessions", "label_files", "labels", "replay", "live")
+USED_EVERY_DAY = ("serve", "run", "evaluate", "record", "sessions", "labels.files", "labels", "replay", "live")
 
 
 @pytest.mark.parametrize("command", USED_EVERY_DAY)

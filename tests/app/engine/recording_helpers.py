@@ -81,6 +81,7 @@ class Recording:
 
     def __init__(self, uri: str = "test:car", count: int = 30, broken: frozenset[int] = frozenset()) -> None:
         self.uri, self.title, self.notes = uri, "a car", ("made for a test",)
+        self.is_simulated = uri.startswith("sim:")
         self.reads: list[int] = []
         self.reading = threading.Event()
         self.gate = threading.Event()

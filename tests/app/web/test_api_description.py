@@ -22,7 +22,16 @@ from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording, opener
 from tests.app.web.serving import WAIT_S, running, serving
 
-FILES = {"/palette.css", "/viser", "/viser/{path:path}", "/rerun/", "/rerun/re_viewer.js", "/rerun/re_viewer_bg.wasm"}
+FILES = {
+    "/palette.css",
+    "/viser",
+    "/viser/{path:path}",
+    "/rerun/",
+    "/rerun/re_viewer.js",
+    "/rerun/re_viewer_bg.wasm",
+    "/help",
+    "/help/{address:path}",
+}
 """Parts of pages and of foreign viewers, which are no API."""
 BYTES = {"type": "string", "format": "binary"}
 """A file as OpenAPI calls it."""

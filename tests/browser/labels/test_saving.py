@@ -70,7 +70,7 @@ def test_an_act_whose_answer_was_lost_is_done_once(hand: Hand, labels: Labels, l
     is_saved(page)
     line.mute = True
     hand.keys("t")
-    expect(page.locator(".saved")).to_have_text("not saved: the server cannot be reached")
+    expect(page.locator(".saved")).to_have_text("not saved: cannot reach the server")
     done = labels.get(f"/history?kind=track&id={made}")
     line.mute = False
     page.get_by_role("button", name="Retry").click()
