@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 from pipeline.alignment import projection
 from pipeline.common.stopwatch import Stopwatch
-from pipeline.decision import acc, aeb, cipv, object_motion
+from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
 from pipeline.ego_motion import coasting
-from pipeline.fusion import agreement
+from pipeline.fusion import agreement, existence
 from pipeline.fusion import fuse as fusion
 from pipeline.lanes import road_lines as lanes
 from pipeline.lidar import segmentation
@@ -48,6 +48,7 @@ class State:
     lidar: lidar_tracking.LidarTrackerState = lidar_tracking.LidarTrackerState()
     vision: vision_tracking.VisionTrackerState = vision_tracking.VisionTrackerState()
     fusion: fusion.FusionState = fusion.FusionState()
+    existence: existence.ExistenceState = existence.ExistenceState()
     agreement: agreement.AgreementState = agreement.AgreementState()
     own: EgoState | None = None
     lanes: lanes.LaneState = lanes.LaneState()
@@ -82,7 +83,10 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         state.fusion, lidar_tracks, vision_tracks, aligned, frame.picture_size, params.fusion
     )
     clock.lap("fusion")
-    objects = object_motion.describe(fused.objects, now.measured, params.motion)
+    # Existence: what each sensor says for and against every object being where it is said to be
+    existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, now.dt_s, params.existence)
+    clock.lap("existence")
+    objects = object_motion.describe(objects, now.measured, params.motion)
 
     # Path: lane lines, the route and the yaw rate, each weighed by how sure it is
     road_z_m = frame.camera.road_z_m if frame.camera is not None else None
@@ -98,7 +102,8 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     # Decision: the nearest vehicle in the path, a speed that keeps the gap to it, and brakes for an emergency
     cipv_state, chosen = cipv.choose(state.cipv, objects, path, now, params.cipv)
     clock.lap("cipv")
-    situation = Situation(now, path, chosen.objects, chosen.lead)
+    objects = braking_evidence.judge(chosen.objects, params.existence)
+    situation = Situation(now, path, objects, chosen.lead)
     acc_state, command = acc.control(state.acc, situation, params.acc)
     clock.lap("acc")
     aeb_state, command = aeb.guard(state.aeb, command, situation, params.aeb, params.acc)
@@ -120,7 +125,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         t_ns=frame.t_ns,
         sensors=SensorHealth.of(frame),
         ego=frame.ego,
-        objects=chosen.objects,
+        objects=objects,
         path=path,
         cipv=chosen.lead,
         next_cipv=chosen.next_lead,
@@ -136,6 +141,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         lidar=lidar_state,
         vision=vision_state,
         fusion=fusion_state,
+        existence=existence_state,
         agreement=agreement_state,
         own=now.motion,
         lanes=lane_state,

@@ -12,8 +12,10 @@ from pipeline.common import kalman
 from pipeline.common.garbage_collection import collect_rarely
 from pipeline.common.geometry import iou_matrix
 from pipeline.decision import path_position
+from pipeline.fusion import existence
 from pipeline.lanes import road_lines
 from pipeline.path import corridor
+from pipeline.vision import place_filter
 
 _LOCK = threading.Lock()
 
@@ -31,6 +33,8 @@ def _warm_up() -> None:
     one = np.eye(2)
     kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)
     iou_matrix(np.zeros((1, 4)), np.zeros((1, 4)))
+    existence.warm_up()
+    place_filter.warm_up()
     road_lines.warm_up()
     corridor.warm_up()
     path_position.warm_up()

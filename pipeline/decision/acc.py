@@ -13,7 +13,7 @@ from typing import Literal
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import AccParams
-from pipeline.types import AccCommand, Cipv, EgoState, Path, Situation
+from pipeline.types import AccCommand, Braking, Cipv, EgoState, Path, Situation
 
 STANDSTILL_MPS = 0.1
 CREEP_MPS = 3.0
@@ -64,6 +64,8 @@ def control(state: AccState, situation: Situation, params: AccParams) -> tuple[A
     # A PID turns the speed error into an acceleration, and that into pedals
     state, accel = pid(state, demand.speed_mps - ego.speed_mps, situation.now.dt_s, params)
     accel = min(accel, 0.0) if demand.no_faster else accel
+    if demand.object_id is not None and _justified(demand.object_id, situation) is Braking.COMFORT:
+        accel = max(accel, -params.comfort_decel_mps2)
     return state, AccCommand(
         state=demand.state,
         desired_speed_mps=demand.speed_mps,
@@ -73,6 +75,11 @@ def control(state: AccState, situation: Situation, params: AccParams) -> tuple[A
         reason=demand.reason,
         object_id=demand.object_id,
     )
+
+
+def _justified(object_id: int, situation: Situation) -> Braking:
+    """The hardest braking that the object which is slowed down for can justify."""
+    return next((item.justifies for item in situation.objects if item.id == object_id), Braking.FULL)
 
 
 def cruise(params: AccParams) -> Demand:

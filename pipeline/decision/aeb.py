@@ -14,10 +14,11 @@ from typing import Literal, NamedTuple
 
 from pipeline.common.fast_replace import evolve
 from pipeline.decision.acc import STANDSTILL_MPS
+from pipeline.decision.braking_evidence import FRICTION_MPS2
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import AccParams, AebParams
-from pipeline.types import AccCommand, EgoState, Situation
+from pipeline.types import AccCommand, Braking, EgoState, FusedObject, Situation
 
 Stage = Literal["warn", "partial_brake", "full_brake"]
 STAGES: tuple[Stage, ...] = ("warn", "partial_brake", "full_brake")
@@ -50,8 +51,8 @@ class Threat(NamedTuple):
     """Time to collision."""
     required_mps2: float
     """Deceleration required to avoid it; infinite when no distance is left."""
-    ranged: bool
-    """A ranging sensor measures its distance; otherwise it comes from the height of its box."""
+    justified: Braking
+    """The hardest braking that what is known of it can justify."""
 
 
 def guard(
@@ -92,16 +93,23 @@ def find_threats(situation: Situation, params: AebParams) -> tuple[Threat, ...]:
         is_lead = situation.lead is not None and item.id == situation.lead.id
         if (is_lead and not item.carried) or (is_dependable(item) and enters_corridor(item, situation.path)):
             required = required_decel_mps2(item.distance_m, closing, params)
-            found.append(Threat(item.id, item.ttc_s, required, item.ranged))
+            found.append(Threat(item.id, item.ttc_s, required, _justified(item, required)))
     return tuple(found)
 
 
+def _justified(item: FusedObject, required_mps2: float) -> Braking:
+    """As its evidence says; but what no LiDAR has measured and no tyre could avoid is not believed."""
+    if item.ranged:
+        return item.justifies
+    return min(item.justifies, Braking.PARTIAL) if required_mps2 <= FRICTION_MPS2 else Braking.COMFORT
+
+
 def _level(threat: Threat, params: AebParams) -> int:
-    """The stage that a threat calls for. Never full braking without a ranging sensor: a box height errs by a tenth."""
+    """The stage asked for, no harder than the evidence justifies; a warning needs none beyond that of a lead."""
     if threat.ttc_s < params.full_ttc_s or threat.required_mps2 > params.full_when_mps2:
-        return _FULL if threat.ranged else _PARTIAL
+        return min(_FULL, _WARN + threat.justified)
     if threat.ttc_s < params.partial_ttc_s or threat.required_mps2 > params.partial_when_mps2:
-        return _PARTIAL
+        return min(_PARTIAL, _WARN + threat.justified)
     return _WARN if threat.ttc_s < params.warn_ttc_s else _NONE
 
 

@@ -110,9 +110,11 @@ def _judge(
     is_ahead = where is not None and where.ahead_m > 0.0
     probability = 1.0 / (1.0 + exp(-odds)) if is_ahead and odds is not None else 0.0
     is_in = probability > 0.5
-    if where is not None and where.margin_m() >= 0.0 and is_ahead and not is_in:
-        crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
     verdict = judge(Candidate(item, where, odds or 0.0, leads, widening_m, path, params))
+    if where is not None and where.margin_m() >= 0.0 and is_ahead:
+        comes_in = where.middle_m * believed_mps(where.sideways_mps, item) < 0.0
+        if not is_in or (comes_in and not verdict.eligibility.probable):
+            crossing_s = 0.0  # it is over the edge, though not for long enough to be called in the path
     item = evolve(
         item,
         gates=(*item.gates, *verdict.gates),
@@ -174,6 +176,12 @@ def _why_after(item: FusedObject, lead: FusedObject) -> str:
 # ---------------------------------------------------------------- who will be next
 
 
+def _is_outside(item: FusedObject) -> bool:
+    """Out of the path, or over its edge only just now."""
+    surely_in = item.in_path and item.eligibility is not None and item.eligibility.probable
+    return not item.in_path or (not surely_in and item.crossing_s == 0.0)
+
+
 def _next_lead(
     judged: list[FusedObject], able: list[FusedObject], lead: FusedObject | None, params: CipvParams
 ) -> Cipv | None:
@@ -183,7 +191,7 @@ def _next_lead(
     cutting_in = [
         item
         for item in judged
-        if not item.in_path
+        if _is_outside(item)
         and item.crossing_s is not None
         and item.crossing_s <= params.cut_in_s
         and (item.distance_m or 0.0) < lead_m

@@ -6,7 +6,7 @@ decisions read, and gates, which people read; a gate's name means nothing to the
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import copysign, sqrt
+from math import copysign, exp, sqrt
 from typing import NamedTuple
 
 from pipeline.decision.path_position import Place
@@ -186,6 +186,24 @@ def _uncertain(who: Candidate) -> str:
     return f"its position across the path is uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
 
 
+def _probable(who: Candidate) -> Answer:
+    """That it exists and that it is in the path: the less probable of the two decides. A weak box that nothing supports
+    exists by less than a half. (A margin of half a standard deviation for the place in the path, 0.53, was tried: it
+    drops cars at the kerb 40 m away, and two leads of 31 on Astyx with them.)"""
+    limit = who.params.stay_probability if who.leads else who.params.become_probability
+    there = who.item.existence if who.item.existence is not None else 1.0
+    in_path = 1.0 / (1.0 + exp(-who.odds)) if who.odds > 0.0 else 1.0  # what is out of the path has a gate for that
+    probability = min(there, in_path)
+    return probability >= limit, probability, limit
+
+
+def _improbable(who: Candidate) -> str:
+    there = who.item.existence
+    if there is not None and there < 0.5:
+        return f"probably not there: {100 * there:.0f} %"
+    return f"in path with {100 / (1.0 + exp(-who.odds)):.0f} %: not probable enough"
+
+
 CONDITIONS = Conditions(
     vehicle=Condition("vehicle_class", _vehicle, lambda who: f"class {who.item.label}"),
     distance=Condition("distance_known", _distance, lambda _: "distance unknown"),
@@ -197,4 +215,5 @@ CONDITIONS = Conditions(
     confirmed=Condition("hits", _confirmed, lambda who: f"seen {who.item.hits} of {who.params.confirm_hits} times"),
     seen=Condition("seen", _seen, _not_seen),
     placed=Condition("path_sigma", _placed, _uncertain),
+    probable=Condition("lead_probability", _probable, _improbable),
 )

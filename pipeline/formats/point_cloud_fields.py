@@ -37,7 +37,8 @@ class Cloud(NamedTuple):
         if not np.array_equal(T_ego_lidar, np.eye(4)):
             points[:, :3] = self.xyz @ T_ego_lidar[:3, :3].T.astype(np.float32) + T_ego_lidar[:3, 3].astype(np.float32)
         points[:, 3] = self.intensity
-        return Sweep(t_ns, points, self.ring, self.channels, self.time_s)
+        x, y, z = T_ego_lidar[:3, 3].tolist()
+        return Sweep(t_ns, points, self.ring, self.channels, self.time_s, (x, y, z))
 
 
 def cloud_of(raw: npt.NDArray[np.void], t_ns: int, notes: list[str]) -> Cloud:

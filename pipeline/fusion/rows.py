@@ -65,6 +65,7 @@ def hit_row(
         lidar_points=hit.obstacle.points,
         lidar_track=hit.id,
         lidar_hits=hit.hits,
+        rigid_mps=hit.rigid_mps,
         gates=gates,
     )
     if seen is None:
@@ -81,6 +82,7 @@ def hit_row(
         seen_by=row.seen_by if seen.carried else "V" if hit.carried else "VL",
         hits=max(hit.hits, seen.hits),
         vision_track=seen.id,
+        camera_ranges=seen.ranges,
     )
 
 
@@ -102,6 +104,7 @@ def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...]) -> Fused
         measured=seen.measured,
         hits=seen.hits,
         vision_track=seen.id,
+        camera_ranges=seen.ranges,
         gates=gates,
     )
 

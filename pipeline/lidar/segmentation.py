@@ -25,6 +25,8 @@ class SegmentedSweep:
     """One a cluster; None without a sweep."""
     ground: Ground | None
     """The road under the sweep; None without a sweep."""
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Ego x y z of the sensor, where its rays start."""
 
 
 _NO_SWEEP = SegmentedSweep(np.zeros((0, 4), np.float32), np.zeros(0, np.int32), None, None)
@@ -54,4 +56,4 @@ def segment(sweep: Sweep | None, ego: EgoState | None, params: Params, clock: St
     # An upright box around each cluster
     obstacles = boxes.fit_obstacles(sweep.points, labels, plane, params.box)
     clock.lap("boxes")
-    return SegmentedSweep(sweep.points, cluster.kinds(labels, keep, plane.mask), obstacles, plane)
+    return SegmentedSweep(sweep.points, cluster.kinds(labels, keep, plane.mask), obstacles, plane, sweep.origin)

@@ -29,6 +29,12 @@ NEVER = 1e6
 """Cost of a pair that a gate forbids: more than all permitted pairs together."""
 MIN_GATE_POINTS = 10
 """Counts and densities below this many points are noise: one ring more or less doubles them."""
+_SIDES_FRAMES = 10
+"""Sightings over which the sides of a footprint are compared: a second at 10 Hz."""
+_SIDE_NOISE_M = 0.15
+"""Least noise of a side: neighbouring rays of a VLP-16 are 0.1 m apart at 28 m, and a rounded corner
+adds as much."""
+_SURE_SIGMAS = 2.0
 THINNEST_M = 0.5
 """Thinnest footprint for comparing densities. A rear alone is as thin as the LiDAR's noise; with some flank the same
 car has twenty times the area."""
@@ -41,6 +47,8 @@ class Looks(NamedTuple):
     """(M, 2) reference points, ego x, y."""
     shape: F64
     """(M, 5) number of points, density, spread along x, y and z, as the gates compare them."""
+    sides: F64
+    """(M, 2) least and greatest ego y of each footprint."""
 
 
 _NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
@@ -50,14 +58,14 @@ _NO_FILTERS = kalman.CvState(np.zeros((0, 4)), np.zeros((0, 4, 4)))
 class LidarTrackerState:
     """What one frame leaves to the next; arrays have one row per track, in the order of ``tracks``.
 
-    filters: mean (T, 4), cov (T, 4, 4). shape: (T, 5) of the last sighting, as in ``Looks``. history: (T, H, 3)
-    ``t_s x y`` of the last sightings' reference points, newest last, NaN before the first. ``clock_s`` runs from the
-    first frame."""
+    filters: mean (T, 4), cov (T, 4, 4). shape: (T, 5) of the last sighting, as in ``Looks``. history: (T, H, 5)
+    ``t_s x y low high`` of the last sightings' reference points and sides, newest last, NaN before the first.
+    ``clock_s`` runs from the first frame."""
 
     tracks: tuple[LidarTrack, ...] = ()
     filters: kalman.CvState = _NO_FILTERS
     shape: F64 = field(default_factory=lambda: np.zeros((0, 5)))
-    history: F64 = field(default_factory=lambda: np.zeros((0, 1, 3)))
+    history: F64 = field(default_factory=lambda: np.zeros((0, 1, 5)))
     next_id: int = 1
     clock_s: float = 0.0
 
@@ -82,15 +90,21 @@ def track(
     filters = kalman.predict(state.filters, dt_s, params.accel_sigma_mps2)
     partner = associate(state, filters, seen, dt_s, params)
     filters = _correct(filters, seen.place, partner, params)
-    history = _recorded(state.history, partner, seen.place, clock_s, params.trajectory_frames)
-    velocity = filters.mean[:, 2:] if params.filter == "kalman" else slopes(history)
+    where = np.concatenate([seen.place, seen.sides], axis=1)
+    history = _recorded(state.history, partner, where, clock_s, max(params.trajectory_frames, _SIDES_FRAMES))
+    velocity = filters.mean[:, 2:]
+    if params.filter == "trajectory":
+        velocity = slopes(history[:, -params.trajectory_frames :, :3])
+    sideways: list[float | None] = [None] * len(history)
+    if params.rigid_sideways:
+        sideways = rigid_sideways(history[:, -_SIDES_FRAMES:]).tolist()
 
     # A track that found its obstacle is updated; one that did not is carried, or dropped
     tracks, rows = [], []
     for i, (last, j, speed) in enumerate(zip(state.tracks, partner.tolist(), velocity.tolist(), strict=True)):
         if j >= 0:
             known = (speed[0], speed[1]) if speed[0] == speed[0] else None
-            tracks.append(LidarTrack(last.id, sweep[j], known, last.hits + 1, 0, False))
+            tracks.append(LidarTrack(last.id, sweep[j], known, last.hits + 1, 0, False, 0.0, sideways[i]))
         elif _lives_on(last, last.unseen_s + dt_s, has_sweep, params):
             tracks.append(_carried(last, dt_s))
         else:
@@ -112,7 +126,7 @@ def track(
             np.concatenate([filters.mean[rows], begun.mean]), np.concatenate([filters.cov[rows], begun.cov])
         ),
         shape=np.concatenate([shape[rows], seen.shape[fresh]]),
-        history=np.concatenate([history[rows], _first(seen.place[fresh], clock_s, history.shape[1])]),
+        history=np.concatenate([history[rows], _first(where[fresh], clock_s, history.shape[1])]),
         next_id=state.next_id + len(fresh),
         clock_s=clock_s,
     )
@@ -128,8 +142,9 @@ def looks(obstacles: tuple[Obstacle, ...]) -> Looks:
 
 @numba.njit(cache=True, nogil=True)
 def _looks(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """place (M, 2) and shape (M, 5) of (M, 12) center x y z, length, width, height, yaw, points, density, spread."""
-    place, shape = np.empty((len(rows), 2)), np.empty((len(rows), 5))
+    """place (M, 2), shape (M, 5) and sides (M, 2) of (M, 12) center x y z, length, width, height, yaw,
+    points, density, spread."""
+    place, shape, sides = np.empty((len(rows), 2)), np.empty((len(rows), 5)), np.empty((len(rows), 2))
     for i in range(len(rows)):
         length, width, yaw, points = rows[i, 3], rows[i, 4], rows[i, 6], rows[i, 7]
         across = abs(np.cos(yaw)) < np.sqrt(0.5)
@@ -140,7 +155,9 @@ def _looks(rows):  # type: ignore[no-untyped-def]  # pragma: no cover
         shape[i, 0] = max(points, MIN_GATE_POINTS)
         spread_over = length * width / (max(length, THINNEST_M) * max(width, THINNEST_M))
         shape[i, 1] *= spread_over * max(1.0, MIN_GATE_POINTS / max(points, 1.0))
-    return place, shape
+        half = (length * abs(np.sin(yaw)) + width * abs(np.cos(yaw))) / 2
+        sides[i, 0], sides[i, 1] = rows[i, 1] - half, rows[i, 1] + half
+    return place, shape, sides
 
 
 def associate(
@@ -204,7 +221,7 @@ def _extrapolated(state: LidarTrackerState, dt_s: float) -> F64:
     """(T, 2) where the trajectories lead to now."""
     since_s = np.array([[t.unseen_s + dt_s] for t in state.tracks])
     velocity = np.array([t.velocity_mps or (0.0, 0.0) for t in state.tracks])
-    return np.asarray(state.history[:, -1, 1:] + velocity * since_s)
+    return np.asarray(state.history[:, -1, 1:3] + velocity * since_s)
 
 
 def _correct(filters: kalman.CvState, place: F64, partner: I64, params: LidarTrackingParams) -> kalman.CvState:
@@ -223,8 +240,8 @@ def _noise(params: LidarTrackingParams) -> F64:
 
 
 def _recorded(history: F64, partner: I64, place: F64, clock_s: float, frames: int) -> F64:
-    """(T, frames, 3) the history with this tick's sightings at its end."""
-    kept: F64 = np.full((len(history), frames, 3), np.nan)
+    """(T, frames, 5) the history with this tick's sightings at its end."""
+    kept: F64 = np.full((len(history), frames, 5), np.nan)
     common = min(frames, history.shape[1])
     kept[:, frames - common :] = history[:, history.shape[1] - common :]
     rows = np.flatnonzero(partner >= 0)
@@ -235,23 +252,50 @@ def _recorded(history: F64, partner: I64, place: F64, clock_s: float, frames: in
 
 
 def _first(place: F64, clock_s: float, frames: int) -> F64:
-    """(N, frames, 3) the histories of tracks seen once, now."""
-    history: F64 = np.full((len(place), frames, 3), np.nan)
+    """(N, frames, 5) the histories of tracks seen once, now."""
+    history: F64 = np.full((len(place), frames, 5), np.nan)
     history[:, -1, 0], history[:, -1, 1:] = clock_s, place
     return history
 
 
 def slopes(history: F64) -> F64:
-    """(T, 2) velocity in m/s of the least-squares line through each (H, 3) ``t_s x y``; NaN where all are of one
-    time."""
+    """(T, C) speed in m/s of the least-squares line through each column of (T, H, 1 + C) ``t_s …``; NaN where all are
+    of one time."""
     known = ~np.isnan(history[:, :, :1])
     table = np.where(known, history, 0.0)
     mean = table.sum(axis=1, keepdims=True) / np.maximum(known.sum(axis=1, keepdims=True), 1)
     t, xy = (table - mean)[:, :, :1] * known, (table - mean)[:, :, 1:]
     spread = np.sum(t * t, axis=1)
     return np.asarray(
-        np.divide(np.sum(t * xy, axis=1), spread, out=np.full((len(history), 2), np.nan), where=spread > 0.0)
+        np.divide(
+            np.sum(t * xy, axis=1), spread, out=np.full((len(history), table.shape[2] - 1), np.nan), where=spread > 0.0
+        )
     )
+
+
+def rigid_sideways(history: F64) -> F64:
+    """(T,) how fast each track surely moves along ego y as a whole, m/s, of its (H, 5) history: the speed that both of
+    its sides share, less what their scatter explains; 0 where they part.
+
+    A parked car's footprint grows while we pass, as more of its flank comes into view: its reference point moves by
+    metres, one of its sides does not. A car that pulls out takes both sides along."""
+    if not len(history):
+        return np.zeros(0)
+    sides = history[:, :, [0, 3, 4]]
+    speed = slopes(sides)
+    known = ~np.isnan(sides[:, :, :1])
+    count = np.maximum(known.sum(axis=1), 1)
+    t = np.where(known, sides[:, :, :1], 0.0)
+    t = (t - t.sum(axis=1, keepdims=True) / count[:, None]) * known
+    y = np.where(known, sides[:, :, 1:], 0.0)
+    y = (y - y.sum(axis=1, keepdims=True) / count[:, None]) * known
+    residual = np.sum((y - t * np.nan_to_num(speed)[:, None, :]) ** 2, axis=1) / np.maximum(count - 2, 1)
+    noise_m = np.sqrt(np.maximum(residual, _SIDE_NOISE_M**2))
+    span = np.sqrt(np.sum(t * t, axis=1))
+    sure = np.abs(speed) - _SURE_SIGMAS * np.divide(noise_m, span, out=np.full_like(noise_m, np.inf), where=span > 0.0)
+    least = np.clip(np.nan_to_num(sure, nan=0.0, neginf=0.0).min(axis=1), 0.0, None)
+    together = np.sign(speed[:, 0]) == np.sign(speed[:, 1])
+    return np.asarray(np.where(together, np.sign(np.nan_to_num(speed[:, 0])) * least, 0.0))
 
 
 def _lives_on(last: LidarTrack, unseen_s: float, has_sweep: bool, params: LidarTrackingParams) -> bool:
@@ -267,7 +311,8 @@ def _carried(last: LidarTrack, dt_s: float) -> LidarTrack:
     _, cuboid, closest, points, density, spread = last.obstacle
     there = Cuboid(_moved(cuboid.center, vx * dt_s, vy * dt_s), cuboid.size, cuboid.yaw_rad)
     moved = Obstacle(-1, there, _moved(closest, vx * dt_s, vy * dt_s), points, density, spread)
-    return LidarTrack(last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True, last.unseen_s + dt_s)
+    unseen_s = last.unseen_s + dt_s
+    return LidarTrack(last.id, moved, last.velocity_mps, last.hits, last.missed + 1, True, unseen_s, last.rigid_mps)
 
 
 def _moved(point: Point3, dx: float, dy: float) -> Point3:

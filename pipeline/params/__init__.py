@@ -34,7 +34,14 @@ from pipeline.params.lidar import (
     GroundParams,
     LidarTrackingParams,
 )
-from pipeline.params.vision import AlignmentParams, DetectionParams, DistanceParams, FusionParams, VisionTrackingParams
+from pipeline.params.vision import (
+    AlignmentParams,
+    DetectionParams,
+    DistanceParams,
+    ExistenceParams,
+    FusionParams,
+    VisionTrackingParams,
+)
 
 __all__ = [
     "PRESETS",
@@ -48,6 +55,7 @@ __all__ = [
     "DetectionParams",
     "DistanceParams",
     "DownsampleParams",
+    "ExistenceParams",
     "FusionParams",
     "GroundParams",
     "LaneParams",
@@ -85,6 +93,7 @@ class Params(Section):
     vision_tracking: VisionTrackingParams = VisionTrackingParams()
     alignment: AlignmentParams = AlignmentParams()
     fusion: FusionParams = FusionParams()
+    existence: ExistenceParams = ExistenceParams()
     motion: MotionParams = MotionParams()
     lanes: LaneParams = LaneParams()
     path: PathParams = PathParams()
@@ -99,7 +108,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "default": {},
     "paper": {
         "box": {"method": "axis_aligned"},
-        "lidar_tracking": {"filter": "trajectory"},
+        "lidar_tracking": {"filter": "trajectory", "rigid_sideways": False},
         "detection": {"car_prior": 1.0},
         "distance": {
             "coefficient": 1829.1,
@@ -118,7 +127,16 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "range_gate": False,
             "size_gate": False,
         },
-        "cipv": {"confirm_hits": 1, "carried_may_become_lead": True, "hysteresis_m": 0.0, "decide_s": 0.0},
+        "existence": {"enabled": False},
+        "cipv": {
+            "confirm_hits": 1,
+            "carried_may_become_lead": True,
+            "hysteresis_m": 0.0,
+            "decide_s": 0.0,
+            "become_probability": 0.0,
+            "stay_probability": 0.0,
+        },
+        "acc": {"comfort_decel_mps2": 8.0},
         "aeb": {"enabled": False},
     },
 }

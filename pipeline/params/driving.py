@@ -99,6 +99,10 @@ class CipvParams(Section):
     max_size_m: float = slider(
         15.0, 3.0, 40.0, 0.5, "m", "LiDAR-only objects: largest extent; excludes walls and hedges"
     )
+    become_probability: float = slider(
+        0.5, 0.0, 0.95, 0.01, "", "A new lead exists, and is in the path, each with at least this probability"
+    )
+    stay_probability: float = slider(0.4, 0.0, 0.95, 0.05, "", "The lead stays it down to this probability of each")
 
 
 class AccParams(Section):
@@ -113,6 +117,9 @@ class AccParams(Section):
     kd: float = slider(0.0, 0.0, 2.0, 0.01, "", "PID: derivative gain")
     max_accel_mps2: float = slider(2.0, 0.5, 5.0, 0.1, "m/s²", "Acceleration at full accelerator")
     max_decel_mps2: float = slider(8.0, 1.0, 10.0, 0.1, "m/s²", "Deceleration at full brake")
+    comfort_decel_mps2: float = slider(
+        3.5, 0.5, 10.0, 0.1, "m/s²", "ACC brakes no harder for a lead on weak evidence (ISO 15622 permits 3.5 at speed)"
+    )
     brake_limit_mps2: float = slider(
         8.0,
         0.0,

@@ -90,3 +90,6 @@ class LidarTrackingParams(Section):
     trajectory_frames: int = slider(
         5, 2, 20, 1, "frames", "trajectory: number of positions that the velocity is fitted to"
     )
+    rigid_sideways: bool = choice(
+        True, "An object swerves only as far as both of its sides move; off: a footprint that grows counts as motion"
+    )

@@ -70,9 +70,21 @@ class VisionTrackingParams(Section):
     max_missed_s: float = slider(1.0, 0.1, 5.0, 0.1, "s", "A box is dropped after this long without a detection")
     gate_px: float = slider(80.0, 5.0, 400.0, 1.0, "px", "dist_th: largest movement of a box's centre between frames")
     gate_sizes: float = slider(1.0, 0.1, 5.0, 0.1, "", "kalman: largest movement in box widths, where that is more")
+    gate_sigmas: float = slider(
+        4.0, 1.0, 10.0, 0.1, "σ", "kalman: a box farther from the expected place and size is another object"
+    )
     max_size_ratio: float = slider(2.0, 1.1, 5.0, 0.1, "", "kalman: largest change of a box's width between sightings")
+    shift_px: float = slider(
+        4.0, 0.0, 40.0, 0.5, "px", "kalman: how far the whole picture may shift between frames, as the car pitches"
+    )
     bearing_sigma_deg: float = slider(0.3, 0.05, 3.0, 0.05, "°", "kalman: noise of a box's direction")
     accel_sigma_mps2: float = slider(3.0, 0.1, 20.0, 0.1, "m/s²", "kalman: acceleration noise of objects")
+    max_nis: float = slider(
+        13.8, 3.0, 1000.0, 0.1, "", "kalman: a distance more surprising is refused; 13.8 is 99.9 % of χ² (2 degrees)"
+    )
+    restart_after: int = slider(
+        3, 1, 30, 1, "frames", "kalman: distances refused in a row before a track's place is measured anew"
+    )
     ghost_iou: float = slider(
         0.4, 0.1, 1.0, 0.05, "", "kalman: a carried box that overlaps a detected one more is dropped"
     )
@@ -89,6 +101,18 @@ class AlignmentParams(Section):
     yaw_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount to the left")
     pitch_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount downwards")
     roll_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount clockwise")
+
+
+class ExistenceParams(Section):
+    """Whether an object is really there: evidence of both sensors for and against it."""
+
+    enabled: bool = choice(True, "Weigh the evidence for and against each object; off: every object exists")
+    min_braking: float = slider(
+        0.8, 0.0, 0.99, 0.01, "", "An object that exists less probably is slowed down for, but not braked for"
+    )
+    camera_ranges: int = slider(
+        8, 1, 50, 1, "frames", "Distances in a row after which the camera alone knows a closing speed to brake for"
+    )
 
 
 class FusionParams(Section):

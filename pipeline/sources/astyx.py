@@ -148,7 +148,8 @@ def parse_sweep(data: bytes, file: str, t_ns: int, T_ego_lidar: F64, notes: list
     points = np.empty((len(kept), 4), dtype=np.float32)
     points[:, :3] = transform(T_ego_lidar, kept[:, :3])
     points[:, 3] = kept[:, 3]
-    return Sweep(t_ns, points, _RING_OF_LASER[kept[:, 4].astype(np.intp)], _CHANNELS)
+    x, y, z = T_ego_lidar[:3, 3].tolist()
+    return Sweep(t_ns, points, _RING_OF_LASER[kept[:, 4].astype(np.intp)], _CHANNELS, origin=(x, y, z))
 
 
 def parse_calibration(data: bytes, file: str, size: tuple[int, int]) -> tuple[F64, CameraCalibration]:

@@ -36,6 +36,7 @@ from pipeline.types.frame import (
     Sweep,
 )
 from pipeline.types.objects import (
+    Braking,
     Conditions,
     Detection,
     Eligibility,
@@ -75,6 +76,7 @@ __all__ = [
     "VEHICLES",
     "AccCommand",
     "Box",
+    "Braking",
     "CameraCalibration",
     "Cipv",
     "Coasting",

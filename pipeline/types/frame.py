@@ -23,6 +23,8 @@ class Sweep:
     """How many channels the sensor has."""
     time_s: F32 | None = None
     """(N,) float32, when each point was measured, seconds after ``t_ns``; None where the recording does not say."""
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Ego x y z of the sensor, where its rays start."""
 
 
 @dataclass(frozen=True)

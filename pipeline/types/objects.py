@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Generic, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -64,6 +65,9 @@ class VisionMeasurement:
     """Standard deviation of the distance."""
     position: Point2 | None
     """Ego x, y of the nearest face's centre."""
+    noise_share: float | None = None
+    """Share of the distance by which it differs from picture to picture: the noise of the box's height. The rest of
+    ``sigma_m`` is the object's own unknown height, which no number of pictures averages out."""
 
 
 class Obstacle(NamedTuple):
@@ -100,6 +104,8 @@ class LidarTrack(NamedTuple):
     """Not seen in this frame."""
     unseen_s: float = 0.0
     """Time since it was last seen."""
+    rigid_mps: float | None = None
+    """How fast both sides of it surely move together along ego y, relative to ego; None where that is not asked."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +136,8 @@ class VisionTrack:
     """Not seen in this frame."""
     measured: bool = True
     """Whether its distance was measured in this frame: a box cut by the image's edge is seen, but not measured."""
+    ranges: int = 0
+    """Distances in a row that its place took in, since it was last begun."""
 
 
 class Gate(NamedTuple):
@@ -170,6 +178,19 @@ class Conditions(NamedTuple, Generic[Each]):
     """It was seen in this frame, and its distance measured."""
     placed: Each
     """Its place against the path is known well enough."""
+    probable: Each
+    """It exists and is in the path with enough probability."""
+
+
+class Braking(IntEnum):
+    """How hard the car brakes."""
+
+    COMFORT = 0
+    """As adaptive cruise control does for any lead."""
+    PARTIAL = 1
+    """As emergency braking begins."""
+    FULL = 2
+    """As hard as it can."""
 
 
 Eligibility = Conditions[bool]
@@ -242,6 +263,14 @@ class FusedObject:
     neither."""
     lidar_hits: int = 0
     """Sightings of its LiDAR track."""
+    justifies: Braking = Braking.FULL
+    """The hardest braking that what is known of it can justify."""
+    camera_ranges: int = 0
+    """Distances in a row that its vision track took in."""
+    existence: float | None = None
+    """Probability that it is really there, by the evidence of both sensors; None where that is not weighed."""
+    rigid_mps: float | None = None
+    """Of its LiDAR track: how fast both its sides surely move together along ego y, relative to ego. None without."""
     box_sides: tuple[Point2, Point2] | None = None
     """Ego x, y where the lines of sight past its box's left and right edge are as far away as the object; None unless
     the camera sees it now."""

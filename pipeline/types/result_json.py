@@ -103,6 +103,7 @@ def _object(each: FusedObject) -> dict[str, Any]:
         "velocity_mps": _numbers(each.velocity_mps),
         "speed_over_ground_mps": _number(each.speed_over_ground_mps),
         "in_path": each.in_path,
+        "existence_probability": _number(each.existence),
         "in_path_probability": _number(each.in_path_probability),
         "path_offset_m": _number(each.path_offset_m),
         "lateral_mps": _number(each.lateral_mps),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -14,21 +15,31 @@ from pipeline.types import VEHICLES, VisionMeasurement, VisionTrack
 
 _NOMINAL_DT_S = 0.1
 _MAX_GROWTH = 3.0
-"""The pixel gate is meant for pictures 0.1 s apart; it widens with the time since the last sighting, thrice at most."""
+"""The outer gate is meant for pictures 0.1 s apart; it widens with the time since the last sighting, thrice at most."""
+
+
+class Expected(NamedTuple):
+    """A followed object as it should be seen now."""
+
+    track: VisionTrack
+    """With the predicted box."""
+    centre_sigma_px: float
+    """Standard deviation of a sighting's centre from the predicted one, along each axis of the picture."""
+    unseen_s: float
+    """Since its last sighting."""
 
 
 def match(
-    expected: Sequence[VisionTrack],
-    unseen_s: Sequence[float],
+    expected: Sequence[Expected],
     measurements: Sequence[VisionMeasurement],
     params: VisionTrackingParams,
 ) -> dict[int, int]:
     """Index of followed object → index of measurement: the one-to-one choice of least total cost, where leaving a pair
     apart costs as much as a pair at its gate. (Making as many pairs as possible would shift a whole row of cars by one
-    when the first leaves the picture.) unseen_s: since the last sighting of each."""
+    when the first leaves the picture.)"""
     if not expected or not measurements:
         return {}
-    cost = _costs(expected, unseen_s, measurements, params)
+    cost = _costs(expected, measurements, params)
     rows, columns = linear_sum_assignment(np.minimum(cost, 1.0))
     near = cost[rows, columns] < 1.0
     return dict(zip(rows[near].tolist(), columns[near].tolist(), strict=True))
@@ -40,28 +51,32 @@ def same_kind(a: str, b: str) -> bool:
 
 
 def _costs(
-    expected: Sequence[VisionTrack],
-    unseen_s: Sequence[float],
+    expected: Sequence[Expected],
     measurements: Sequence[VisionMeasurement],
     params: VisionTrackingParams,
 ) -> F64:
     """(n, m) how unlike each box is to each expected one: 0 the same, 1 at the gate, infinite for another kind.
 
-    queue: distance of the centres (print: of the half widths). kalman: also how much the width changed."""
-    old = np.array([track.bbox for track in expected])
+    queue: distance of the centres (print: of the half widths). kalman: how surprising the centre is, and how much width
+    and height changed. The gate is as wide as the prediction is uncertain, so a small box far away, which moves by two
+    or three pixels, cannot become its neighbour 20 pixels aside: a new number is better than a wrong one. A detector
+    that draws half of a vehicle for a moment keeps its number; what its height then says is the place filter's to
+    refuse."""
+    old = np.array([each.track.bbox for each in expected])
     new = np.array([seen.detection.bbox for seen in measurements])
     apart = (old[:, None, :2] + old[:, None, 2:] - new[:, :2] - new[:, 2:]) / 2
     moved_px = np.hypot(apart[..., 0], apart[..., 1])
     if params.filter == "queue":
         cost = moved_px / params.gate_px
     else:
-        old_width, new_width = old[:, 2] - old[:, 0], new[:, 2] - new[:, 0]
-        growth = np.clip(np.array(unseen_s) / _NOMINAL_DT_S, 1.0, _MAX_GROWTH)
-        moved = moved_px / (np.maximum(params.gate_px, params.gate_sizes * old_width) * growth)[:, None]
-        ratio = np.maximum(new_width, 1.0) / np.maximum(old_width, 1.0)[:, None]
-        size = np.abs(np.log(ratio)) / math.log(params.max_size_ratio)
-        cost = np.hypot(moved, size)
-        # a gate that has grown lets in more, but what is far is no nearer for it: nobody else's box is taken
-        cost = np.where(cost < 1.0, np.minimum(np.hypot(moved * growth[:, None], size), 0.99), cost)
+        sigma_px = np.array([each.centre_sigma_px for each in expected])[:, None]
+        old_size, new_size = old[:, 2:] - old[:, :2], new[:, 2:] - new[:, :2]
+        change = np.abs(np.log(np.maximum(new_size, 1.0) / np.maximum(old_size, 1.0)[:, None]))
+        cost = np.hypot(
+            moved_px / (params.gate_sigmas * sigma_px), change.max(axis=-1) / math.log(params.max_size_ratio)
+        )
+        growth = np.clip([each.unseen_s / _NOMINAL_DT_S for each in expected], 1.0, _MAX_GROWTH)
+        farthest_px = np.maximum(params.gate_px, params.gate_sizes * old_size[:, 0]) * growth
+        cost = np.where(moved_px < farthest_px[:, None], cost, np.inf)
     named = [seen.detection.label for seen in measurements]
-    return np.where([[same_kind(track.label, name) for name in named] for track in expected], cost, np.inf)
+    return np.where([[same_kind(each.track.label, name) for name in named] for each in expected], cost, np.inf)

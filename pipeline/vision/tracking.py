@@ -22,30 +22,47 @@ from pipeline.common.geometry import F64, iou_matrix
 from pipeline.common.kalman import CvState
 from pipeline.params import VisionTrackingParams
 from pipeline.types import Box, VisionMeasurement, VisionTrack
-from pipeline.vision.association import match, same_kind
+from pipeline.vision import place_filter
+from pipeline.vision.association import Expected, match, same_kind
+from pipeline.vision.place_filter import Sighting
 
 SPEED_SIGMA_MPS = 8.0
 """How fast a new object may be closing in or away, before a second sighting tells."""
-_OUTLIER = 9.21
-"""99 % point of χ² with 2 degrees of freedom: a place farther off weighs less."""
+FASTEST_OVER_GROUND_MPS = 70.0
+"""250 km/h: nothing on a road is faster, and a filter that says so has run away."""
+FASTEST_ONCOMING_MPS = 45.0
+"""160 km/h: the same for what comes towards us."""
 _CAR_WIDTH_M = 1.8
 """Turns box widths into metres, so that a box's motion in the picture is as lively as its object's on the road."""
 _CENTRE_NOISE = 0.04
 """Noise of a box's centre, in box widths."""
+_EDGE_PX = 2.0
+"""Noise of a box's edges, however small it is."""
+_SETTLED = 3
+"""Sightings after which a place is trusted against a single one that contradicts it."""
+_TURN_PXPS2 = 150.0
+"""How hard the picture may begin to turn: 0.2 rad/s² of the car through a lens of 720 px."""
 
 
 @dataclass(frozen=True)
 class Followed:
-    """One object between two pictures. unseen_s, unplaced_s: since its last sighting, and since its last distance.
-    box_filter: its centre in pixels. place_filter: its place, ego x y. votes: summed score of each class name."""
+    """One object between two pictures."""
 
     track: VisionTrack
     unseen_s: float
+    """Since its last sighting."""
     unplaced_s: float
+    """Since the last distance that was taken in."""
     placed: int
+    """Distances taken in since the place was last begun."""
     box_filter: CvState
+    """The centre of its box, pixels."""
     place_filter: CvState | None
+    """Its place and relative velocity, ego x y."""
     votes: tuple[tuple[str, float], ...]
+    """Summed score of each class name."""
+    refused: int = 0
+    """Distances refused in a row."""
 
 
 class SpeedGuess(NamedTuple):
@@ -78,9 +95,11 @@ def track(
     if measurements is None:
         kept = tuple(followed for followed in expected if followed.unseen_s <= params.max_missed_s)
         return evolve(state, followed=kept), tuple(followed.track for followed in kept)
-    partner = match([followed.track for followed in expected], [f.unseen_s for f in expected], measurements, params)
+    partner = match([_expected(followed, params) for followed in expected], measurements, params)
     kept_list = [
-        _seen(followed, measurements[partner[row]], guess, params) if row in partner else _missed(followed)
+        _seen(followed, measurements[partner[row]], guess, ego_speed_mps, params)
+        if row in partner
+        else _missed(followed)
         for row, followed in enumerate(expected)
     ]
     taken = set(partner.values())
@@ -94,6 +113,12 @@ def track(
     if params.filter == "kalman":
         alive = _without_ghosts(alive, params)
     return VisionTrackerState(state.next_id + len(fresh), alive), tuple(followed.track for followed in alive)
+
+
+def _expected(followed: Followed, params: VisionTrackingParams) -> Expected:
+    """What the next box of an object is compared with."""
+    predicted = followed.box_filter.cov[0, 0] + _box_noise(followed.track.bbox, params)[0, 0]
+    return Expected(followed.track, math.sqrt(predicted), followed.unseen_s)
 
 
 def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -> tuple[Followed, ...]:
@@ -113,7 +138,8 @@ def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> F
     if params.filter == "queue":
         return evolve(aged, track=evolve(followed.track, carried=True, measured=False))
     box = followed.track.bbox
-    moved = kalman.predict(followed.box_filter, dt_s, params.accel_sigma_mps2 * _width(box) / _CAR_WIDTH_M)
+    lively = params.accel_sigma_mps2 * _width(box) / _CAR_WIDTH_M + _TURN_PXPS2
+    moved = kalman.predict(followed.box_filter, dt_s, lively)
     place, scale = _predict_place(aged, dt_s, params)
     track = evolve(followed.track, carried=True, measured=False, bbox=_around(moved.mean, box, scale))
     if place is not None:
@@ -161,13 +187,20 @@ def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: Visi
         carried=False,
         measured=seen.distance_m is not None,
     )
-    box_filter = kalman.start(_centre(detection.bbox), _box_noise(detection.bbox), _box_speed_sigma(detection.bbox))
+    noise, speed_sigma = _box_noise(detection.bbox, params), _box_speed_sigma(detection.bbox)
+    box_filter = kalman.start(_centre(detection.bbox), noise, speed_sigma)
     votes = ((detection.label, detection.score),)
     followed = Followed(shown, 0.0, 0.0 if seen.position else math.inf, 0, box_filter, None, votes)
-    return _place(followed, seen, guess, params) if params.filter == "kalman" else followed
+    return _place(followed, seen, guess, None, params) if params.filter == "kalman" else followed
 
 
-def _seen(followed: Followed, seen: VisionMeasurement, guess: SpeedGuess, params: VisionTrackingParams) -> Followed:
+def _seen(
+    followed: Followed,
+    seen: VisionMeasurement,
+    guess: SpeedGuess,
+    ego_speed_mps: float | None,
+    params: VisionTrackingParams,
+) -> Followed:
     """The object with this picture's box and distance taken in."""
     detection = seen.detection
     label, votes, box_filter = detection.label, followed.votes, followed.box_filter
@@ -175,7 +208,7 @@ def _seen(followed: Followed, seen: VisionMeasurement, guess: SpeedGuess, params
         tally = dict(votes)
         tally[label] = tally.get(label, 0.0) + detection.score
         label, votes = max(tally, key=lambda name: tally[name]), tuple(tally.items())
-        box_filter = kalman.update(box_filter, _centre(detection.bbox), _box_noise(detection.bbox))
+        box_filter = kalman.update(box_filter, _centre(detection.bbox), _box_noise(detection.bbox, params))
     track = evolve(
         followed.track,
         bbox=detection.bbox,
@@ -189,29 +222,56 @@ def _seen(followed: Followed, seen: VisionMeasurement, guess: SpeedGuess, params
     if params.filter == "queue":
         track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position)
     current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter)
-    return _place(current, seen, guess, params) if params.filter == "kalman" else current
+    return _place(current, seen, guess, ego_speed_mps, params) if params.filter == "kalman" else current
 
 
 def _missed(followed: Followed) -> Followed:
     return evolve(followed, track=evolve(followed.track, missed=followed.track.missed + 1))
 
 
-def _place(followed: Followed, seen: VisionMeasurement, guess: SpeedGuess, params: VisionTrackingParams) -> Followed:
-    """The measured place taken in; one far from the expected weighs less, by as much as it is too far."""
+def _place(
+    followed: Followed,
+    seen: VisionMeasurement,
+    guess: SpeedGuess,
+    ego_speed_mps: float | None,
+    params: VisionTrackingParams,
+) -> Followed:
+    """The measured place taken in, or refused when it cannot be that object's. When it is refused for long, the
+    distances are right and the filter is wrong: it starts anew from them, and its speed has to be measured again."""
     if seen.position is None or seen.sigma_m is None or seen.distance_m is None:
         if followed.place_filter is not None:
             return evolve(followed, track=_shown(followed.track, followed.place_filter, followed.placed))
         return evolve(followed, track=evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m))
-    noise = place_noise(seen.position, seen.sigma_m, params.bearing_sigma_deg)
-    if followed.place_filter is None:
-        filtered = kalman.start(seen.position, noise, guess.sigma_mps)
-        filtered.mean[2] = guess.along_mps
-    else:
-        surprise = kalman.mahalanobis2(followed.place_filter, seen.position, noise)
-        filtered = kalman.update(followed.place_filter, seen.position, noise * max(1.0, surprise / _OUTLIER))
-    placed = followed.placed + 1
-    track = _shown(followed.track, filtered, placed, seen.sigma_m / seen.distance_m)
-    return evolve(followed, track=track, place_filter=filtered, placed=placed, unplaced_s=0.0)
+    share = seen.sigma_m / seen.distance_m
+    sighting = Sighting(
+        seen.distance_m,
+        math.atan2(seen.position[1], seen.position[0]),
+        seen.noise_share if seen.noise_share is not None else share,
+        math.radians(params.bearing_sigma_deg),
+    )
+    filtered, placed = followed.place_filter, followed.placed + 1
+    if filtered is not None and place_filter.surprise(filtered, sighting) > params.max_nis:
+        # one or two sightings have no standing against a third that contradicts them
+        if followed.placed >= _SETTLED and followed.refused + 1 < params.restart_after:
+            shown = evolve(_shown(followed.track, filtered, followed.placed), measured=False)
+            return evolve(followed, track=shown, refused=followed.refused + 1)
+        filtered = None
+    elif filtered is not None:
+        filtered = place_filter.update(filtered, sighting)
+        if not _is_plausible(filtered, ego_speed_mps):
+            filtered = None
+    if filtered is None:
+        filtered, placed = place_filter.start(sighting, guess.along_mps, guess.sigma_mps), 1
+    track = _shown(followed.track, filtered, placed, share)
+    return evolve(followed, track=track, place_filter=filtered, placed=placed, unplaced_s=0.0, refused=0)
+
+
+def _is_plausible(place: CvState, ego_speed_mps: float | None) -> bool:
+    """Whether something on a road can move so. Without own speed only twice the limits can be told."""
+    along_mps = float(place.mean[2])
+    own = ego_speed_mps if ego_speed_mps is not None else 0.0
+    spare = 0.0 if ego_speed_mps is not None else FASTEST_ONCOMING_MPS
+    return -FASTEST_ONCOMING_MPS - spare <= along_mps + own <= FASTEST_OVER_GROUND_MPS + spare
 
 
 def _shown(track: VisionTrack, place: CvState, placed: int, share: float | None = None) -> VisionTrack:
@@ -221,9 +281,7 @@ def _shown(track: VisionTrack, place: CvState, placed: int, share: float | None 
     that no number of sightings averages out.
     """
     x, y, vx, vy = place.mean.tolist()
-    (xx, xy), (_, yy) = place.cov[:2, :2].tolist()
-    range_m = math.hypot(x, y)
-    filter_sigma = math.sqrt(x * x * xx + 2 * x * y * xy + y * y * yy) / range_m  # along the ray
+    range_m, filter_sigma = math.hypot(x, y), place_filter.range_sigma_m(place)
     if share is None:
         share = track.sigma_m / track.distance_m if track.sigma_m and track.distance_m else 0.0
     return evolve(
@@ -232,21 +290,12 @@ def _shown(track: VisionTrack, place: CvState, placed: int, share: float | None 
         sigma_m=max(filter_sigma, share * range_m),
         position=(x, y),
         velocity_mps=(vx, vy) if placed >= 2 else None,
+        ranges=placed,
     )
 
 
-def place_noise(position: tuple[float, float], range_sigma_m: float, bearing_sigma_deg: float) -> F64:
-    """(2, 2) covariance of a place seen by a camera: long along the ray, narrow across it."""
-    bearing = math.atan2(position[1], position[0])
-    across_m = math.hypot(*position) * math.radians(bearing_sigma_deg)
-    c, s = math.cos(bearing), math.sin(bearing)
-    along, across = range_sigma_m**2, across_m**2
-    off = c * s * (along - across)
-    return np.array([[c * c * along + s * s * across, off], [off, s * s * along + c * c * across]])
-
-
-def _box_noise(box: Box) -> F64:
-    variance = max(_CENTRE_NOISE * _width(box), 1.0) ** 2
+def _box_noise(box: Box, params: VisionTrackingParams) -> F64:
+    variance = max(_CENTRE_NOISE * _width(box), _EDGE_PX) ** 2 + params.shift_px**2
     return np.array([[variance, 0.0], [0.0, variance]])
 
 

@@ -72,6 +72,7 @@ class ObjectJson(_Exact):
     velocity_mps: Point | None
     speed_over_ground_mps: float | None
     in_path: bool
+    existence_probability: float | None
     in_path_probability: float | None
     path_offset_m: float | None
     moving: bool | None

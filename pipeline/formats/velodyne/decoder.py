@@ -26,6 +26,7 @@ class Vlp16Decoder:
         self.clock = clock or SensorClock()
         self._cutter = RotationCutter(T, self.clock, keeps_partial)
         self._R, self._origin = T[:3, :3].astype(np.float32), T[:3, 3].astype(np.float32)
+        self._mount: tuple[float, float, float] = (float(T[0, 3]), float(T[1, 3]), float(T[2, 3]))
         self._is_moved = not np.array_equal(T, np.eye(4))
         _warm_up()
         from velodyne_decoder import Config, Model, ScanDecoder  # 0.1 s to import: only who has packets pays
@@ -64,7 +65,7 @@ class Vlp16Decoder:
         self.counts.sweeps += 1
         if self._is_moved:
             points[:, :3] = points[:, :3] @ self._R.T + self._origin
-        return Sweep(rotation.t_ns, points, ring, CHANNELS, time_s)
+        return Sweep(rotation.t_ns, points, ring, CHANNELS, time_s, self._mount)
 
 
 def _warm_up() -> None:

@@ -34,6 +34,7 @@ class SweepRef:
     at_ns: Nanoseconds
     t_ns: Nanoseconds
     channels: Annotated[int, Field(ge=1, le=255)]
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

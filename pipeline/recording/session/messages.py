@@ -50,7 +50,7 @@ def points_message(sweep: Sweep) -> bytes:
     )
 
 
-def sweep_from(data: bytes, t_ns: int, channels: int) -> Sweep:
+def sweep_from(data: bytes, t_ns: int, channels: int, origin: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Sweep:
     """The sweep of a message of ``points_message``. Damaged when it is none."""
     message = _parse(topics.POINTS, data)
     given = [(field.name, field.offset, field.type) for field in message.fields]
@@ -62,7 +62,7 @@ def sweep_from(data: bytes, t_ns: int, channels: int) -> Sweep:
     time_s = packed["time"].astype(np.float32) if layout is _TIMED_POINT else None
     if not np.isfinite(points).all() or (packed["ring"] >= channels).any():
         raise Damaged("the point cloud holds invalid values")
-    return Sweep(t_ns, points, packed["ring"].astype(np.uint8), channels, time_s)
+    return Sweep(t_ns, points, packed["ring"].astype(np.uint8), channels, time_s, origin)
 
 
 def _first_of(layout: np.dtype[np.void]) -> np.dtype[np.void]:

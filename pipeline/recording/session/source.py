@@ -207,7 +207,7 @@ class SessionSource:
         if tick.sweep is None:
             return None
         ref = tick.sweep
-        return sweep_from(self.file.message(topics.POINTS, ref.at_ns).data, ref.t_ns, ref.channels)
+        return sweep_from(self.file.message(topics.POINTS, ref.at_ns).data, ref.t_ns, ref.channels, ref.origin)
 
     def _read_picture(self, ref: PictureRef | None) -> Picture | None:
         """One picture may serve several ticks, and is the same object then."""

@@ -212,7 +212,7 @@ class SessionWriter:
         came_at_ns = self._sweeps.log_time(sweep.points)
         if came_at_ns is None:
             self._add_sweep(sweep, at_ns)
-        return SweepRef(at_ns if came_at_ns is None else came_at_ns, sweep.t_ns, sweep.channels)
+        return SweepRef(at_ns if came_at_ns is None else came_at_ns, sweep.t_ns, sweep.channels, sweep.origin)
 
     def _add_sweep(self, sweep: Sweep, at_ns: int) -> None:
         self._add(topics.POINTS, at_ns, points_message(sweep), sweep.t_ns)

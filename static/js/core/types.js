@@ -26,6 +26,7 @@
  * @property {Point2|null} velocity_mps
  * @property {number|null} speed_over_ground_mps
  * @property {boolean} in_path
+ * @property {number|null} existence_probability
  * @property {number|null} in_path_probability
  * @property {number|null} path_offset_m
  * @property {boolean|null} moving

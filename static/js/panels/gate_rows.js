@@ -17,6 +17,7 @@ const KINDS = {
   iou: { label: "Box overlap (IoU)", test: "least", param: "fusion.min_iou" },
   range_sigmas: { label: "Range difference", test: "most", unit: "σ", param: "fusion.range_gate_sigmas" },
   class_size: { label: "Length for class", test: "most", unit: "m", param: "fusion.size_gate" },
+  free_road: { label: "LiDAR sees through it", test: "most", param: "existence.enabled" },
   vehicle_class: { label: "Vehicle class", test: "flag" },
   distance_known: { label: "Distance known", test: "flag", unit: "m" },
   hits: { label: "Detections", test: "least", param: "cipv.confirm_hits" },
@@ -25,6 +26,7 @@ const KINDS = {
   ahead: { label: "Ahead of bumper", test: "least", unit: "m" },
   path_offset: { label: "Path offset", test: "most", unit: "m", param: "path.half_width_m" },
   path_sigma: { label: "Position uncertainty", test: "most", unit: "m", param: "cipv.max_sigma_m" },
+  lead_probability: { label: "Lead probability", test: "least", param: "cipv.become_probability" },
 };
 /** Bar range relative to the larger of value and limit. */
 const HEADROOM = 1.2;

@@ -90,7 +90,10 @@ def test_one_frame_is_not_enough() -> None:
         pytest.param(fused(1, 20.0, 0.0, "L", (-20.0, 0.0), hits=3), "full_brake", id="one sensor, confirmed"),
         pytest.param(fused(1, 20.0, 0.0, "L", (-20.0, 0.0), height=0.2), "cruise", id="a kerb"),
         pytest.param(
-            fused(1, 20.0, 0.0, "V", (-20.0, 0.0)), "partial_brake", id="a box height alone never brakes fully"
+            fused(1, 30.0, 0.0, "V", (-20.0, 0.0)), "partial_brake", id="a box height alone never brakes fully"
+        ),
+        pytest.param(
+            fused(1, 20.0, 0.0, "V", (-20.0, 0.0)), "warn", id="a box height that asks for more than tyres can do"
         ),
     ],
 )

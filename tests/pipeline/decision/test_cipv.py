@@ -258,7 +258,8 @@ def test_what_falls_behind_the_bumper_fails_for_that_alone() -> None:
 
 def test_what_crosses_fast_is_judged_where_it_is_now() -> None:
     """A car crosses from the right at 6 m/s: it leads from the first frame on in which 0.9 m of it, its nose included,
-    are inside, and not in the first in which they are not. One that is there at a bound is believed after a while."""
+    are inside, and not in the first in which they are not. One that is there at a
+    bound is believed after a while."""
     crossing = [fused(1, 20.0, -4.1 + 0.6 * k, velocity=(-10.0, 6.0)) for k in range(14)]
     inside = [choice.lead is not None for choice in sightings(*crossing)]
     assert inside == [-2.4 < -4.1 + 0.6 * k < 1.5 for k in range(14)]

@@ -53,7 +53,7 @@ def test_decisions_stay_when_every_shown_gate_has_another_name(
     monkeypatch.setattr(gates, "CONDITIONS", renamed)
     other, situation_then, commands_then = decide(objects)
 
-    assert {gate.name for item in other.objects for gate in item.gates} == {f"renamed {n}" for n in range(8)}
+    assert {gate.name for item in other.objects for gate in item.gates} == {each.shown_as for each in renamed}
     assert (other.lead, other.next_lead, other.rejected) == (choice.lead, choice.next_lead, choice.rejected)
     assert commands_then == commands
     assert find_threats(situation_then, AebParams()) == find_threats(situation, AebParams())

@@ -93,7 +93,7 @@ def test_every_field_is_written() -> None:
     known = {
         Frame: "index name t_ns sweep picture camera ego raw_boxes notes gnss raw_lanes route streams timing_ms "
         "detections_given",
-        Sweep: "t_ns points ring channels time_s",
+        Sweep: "t_ns points ring channels time_s origin",
         Picture: "t_ns bgr encoded",
         CameraCalibration: "K distortion T_camera_ego width height road_z_m",
         Route: "name lat_deg lon_deg sigma_m",

@@ -1,0 +1,34 @@
+"""How hard an object may make the car brake, by what is known of it.
+
+A wrong full braking is a rear-end collision from behind, so what a sensor merely believes must not cause one. Slowing
+down comfortably costs little and may be done for any lead. Braking in an emergency takes either the LiDAR, which
+measures range and closing speed, or a camera that has followed the object for long enough to know its closing speed.
+"""
+
+from __future__ import annotations
+
+from pipeline.common.fast_replace import evolve
+from pipeline.params import ExistenceParams
+from pipeline.types import Braking, FusedObject
+
+RANGED_SIGHTINGS = 3
+"""From two sightings the LiDAR knows no more than the difference of two noisy places."""
+FRICTION_MPS2 = 9.8
+"""Dry asphalt. What the camera alone has followed for a second and what now takes more than tyres can do was not
+overlooked until now: it is a fault of the track."""
+
+
+def judge(objects: tuple[FusedObject, ...], params: ExistenceParams) -> tuple[FusedObject, ...]:
+    """Each object with the hardest braking that it can justify."""
+    return tuple(evolve(item, justifies=_justified(item, params)) for item in objects)
+
+
+def _justified(item: FusedObject, params: ExistenceParams) -> Braking:
+    if not params.enabled:
+        return Braking.FULL if item.ranged else Braking.PARTIAL
+    if item.existence is not None and item.existence < params.min_braking:
+        return Braking.COMFORT
+    is_steady = item.camera_ranges >= params.camera_ranges
+    if item.ranged:
+        return Braking.FULL if is_steady or item.lidar_hits >= RANGED_SIGHTINGS else Braking.PARTIAL
+    return Braking.PARTIAL if is_steady else Braking.COMFORT

@@ -1,0 +1,99 @@
+"""The place of a boxed object on the road, filtered where a box's error is even: in the logarithm of its range.
+
+A box tells range by its height and direction by its centre. A height that is off by some pixels puts the range off by a
+*share* of itself, so the error is even in ln r and lopsided in metres: at 55 m a box of 14 ± 2 px means 48 to 64 m. The
+state stays ``x y vx vy`` in metres, in which objects move evenly; only the measurement is (ln r, bearing), taken in by
+an extended Kalman filter (Bar-Shalom, Li, Kirubarajan 2001, section 10.3). A growing box is a shrinking range, so the
+change of scale gives the closing speed without a measurement of its own.
+
+Every update says how surprising its measurement was (the normalised innovation squared, NIS). The tracker refuses what
+is too surprising and starts anew when that goes on: a filter that weighs surprises down instead is never called back.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from pipeline.common.kalman import CvState
+from pipeline.types import Point2
+
+
+class Sighting(NamedTuple):
+    """One measured place."""
+
+    range_m: float
+    """Horizontal range from the ego origin."""
+    bearing_rad: float
+    """Counter-clockwise from straight ahead."""
+    range_share: float
+    """Standard deviation of ln(range): of what changes from picture to picture, not of the law's lasting error."""
+    bearing_sigma_rad: float
+    """Standard deviation of the bearing."""
+
+
+def start(seen: Sighting, along_mps: float, speed_sigma_mps: float) -> CvState:
+    """A place sighted once, its velocity ``along_mps`` along ego x, uncertain by ``speed_sigma_mps`` on each axis."""
+    c, s = math.cos(seen.bearing_rad), math.sin(seen.bearing_rad)
+    along = (seen.range_share * seen.range_m) ** 2
+    across = (seen.bearing_sigma_rad * seen.range_m) ** 2
+    off = c * s * (along - across)
+    cov = np.zeros((4, 4))
+    cov[:2, :2] = (c * c * along + s * s * across, off), (off, s * s * along + c * c * across)
+    cov[2, 2] = cov[3, 3] = speed_sigma_mps**2
+    return CvState(np.array([seen.range_m * c, seen.range_m * s, along_mps, 0.0]), cov)
+
+
+def surprise(state: CvState, seen: Sighting) -> float:
+    """The NIS of a sighting: χ² with 2 degrees of freedom while the model holds."""
+    return float(_innovate(state.mean, state.cov, *seen)[2])
+
+
+def update(state: CvState, seen: Sighting) -> CvState:
+    """The state with a sighting taken in."""
+    mean, cov, _ = _innovate(state.mean, state.cov, *seen)
+    return CvState(mean, cov)
+
+
+def range_sigma_m(state: CvState) -> float:
+    """Standard deviation along the ray."""
+    x, y = state.mean[:2].tolist()
+    (xx, xy), (_, yy) = state.cov[:2, :2].tolist()
+    return math.sqrt(max(x * x * xx + 2 * x * y * xy + y * y * yy, 0.0)) / math.hypot(x, y)
+
+
+def position(state: CvState) -> Point2:
+    """Ego x and y."""
+    x, y = state.mean[:2].tolist()
+    return x, y
+
+
+def warm_up() -> None:
+    """Compile the kernel."""
+    update(start(Sighting(10.0, 0.0, 0.1, 0.01), 0.0, 1.0), Sighting(10.0, 0.0, 0.1, 0.01))
+
+
+@numba.njit(cache=True, nogil=True)
+def _innovate(mean, cov, range_m, bearing, share, bearing_sigma):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Mean, covariance (Joseph form) and NIS after z = (ln r, bearing) of ``mean`` (4,) and ``cov`` (4, 4)."""
+    x, y = mean[0], mean[1]
+    r2 = x * x + y * y
+    H = np.zeros((2, 4))
+    H[0, 0], H[0, 1] = x / r2, y / r2
+    H[1, 0], H[1, 1] = -y / r2, x / r2
+    R = np.zeros((2, 2))
+    R[0, 0], R[1, 1] = share * share, bearing_sigma * bearing_sigma
+    innovation = np.empty(2)
+    innovation[0] = np.log(range_m) - 0.5 * np.log(r2)
+    turn = bearing - np.arctan2(y, x)
+    innovation[1] = np.arctan2(np.sin(turn), np.cos(turn))
+    S = H @ cov @ H.T + R
+    inverse = np.linalg.inv(S)
+    gain = cov @ H.T @ inverse
+    keep = np.eye(4) - gain @ H
+    joseph = keep @ cov @ keep.T + gain @ R @ gain.T
+    nis = innovation @ inverse @ innovation
+    return mean + gain @ innovation, (joseph + joseph.T) / 2, nis

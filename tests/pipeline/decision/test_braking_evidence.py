@@ -1,0 +1,41 @@
+"""How hard an object may make the car brake, by what is known of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pipeline.decision.braking_evidence import judge
+from pipeline.params import ExistenceParams
+from pipeline.types import Braking, FusedObject
+from tests.pipeline.build import fused
+
+PARAMS = ExistenceParams()
+CAMERA = replace(fused(1, 30.0, source="V"), existence=0.95)
+BOTH = replace(fused(1, 30.0), existence=0.95, lidar_hits=5)
+
+
+@pytest.mark.parametrize(
+    ("item", "hardest"),
+    [
+        pytest.param(replace(CAMERA, camera_ranges=3), Braking.COMFORT, id="the camera alone, for a moment"),
+        pytest.param(replace(CAMERA, camera_ranges=8), Braking.PARTIAL, id="the camera alone, for long"),
+        pytest.param(replace(CAMERA, camera_ranges=99, existence=0.6), Braking.COMFORT, id="for long, but doubtful"),
+        pytest.param(replace(BOTH, lidar_hits=1), Braking.PARTIAL, id="the LiDAR, once"),
+        pytest.param(replace(BOTH, lidar_hits=3), Braking.FULL, id="the LiDAR, three times"),
+        pytest.param(replace(BOTH, lidar_hits=1, camera_ranges=8), Braking.FULL, id="long followed, and now measured"),
+        pytest.param(replace(BOTH, existence=0.5), Braking.COMFORT, id="measured, but doubtful"),
+    ],
+)
+def test_what_it_justifies(item: FusedObject, hardest: Braking) -> None:
+    (found,) = judge((item,), PARAMS)
+    assert found.justifies is hardest
+
+
+def test_switched_off_only_a_box_height_is_not_enough_for_full_braking() -> None:
+    off = ExistenceParams(enabled=False)
+    assert [each.justifies for each in judge((CAMERA, replace(BOTH, lidar_hits=1)), off)] == [
+        Braking.PARTIAL,
+        Braking.FULL,
+    ]

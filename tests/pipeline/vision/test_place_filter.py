@@ -1,0 +1,105 @@
+"""A boxed object's range, which errs by shares of itself, and a filter that must neither run away nor be muted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.common import kalman
+from pipeline.params import VisionTrackingParams
+from pipeline.types import Detection, VisionMeasurement, VisionTrack
+from pipeline.vision import place_filter
+from pipeline.vision.place_filter import Sighting
+from pipeline.vision.tracking import VisionTrackerState, track
+
+PARAMS = VisionTrackingParams()
+
+
+def sighting(range_m: float, bearing_rad: float = 0.0, share: float = 0.05) -> Sighting:
+    return Sighting(range_m, bearing_rad, share, 0.005)
+
+
+def seen(range_m: float, u: float = 600.0, height_px: float | None = None) -> VisionMeasurement:
+    """A car straight ahead through a lens of 721 px: 1.5 m tall, so many pixels tall as its range makes it."""
+    tall = height_px if height_px is not None else 721.0 * 1.5 / range_m
+    box = (u - 0.6 * tall, 180.0 - tall / 2, u + 0.6 * tall, 180.0 + tall / 2)
+    side_m = (600.0 - u) / 721.0 * range_m
+    return VisionMeasurement(Detection(box, "car", 0.8), range_m, 0.1 * range_m, (range_m, side_m), 2.0 / tall)
+
+
+def follow(pictures: list[list[VisionMeasurement]], ego_mps: float | None = 10.0) -> list[tuple[VisionTrack, ...]]:
+    """Every picture's tracks, ten pictures a second."""
+    state, shown = VisionTrackerState(), []
+    for k, boxes in enumerate(pictures):
+        state, tracks = track(state, tuple(boxes), 0.1 if k else None, PARAMS, ego_mps)
+        shown.append(tracks)
+    return shown
+
+
+@given(st.floats(5.0, 100.0), st.floats(-0.6, 0.6), st.floats(0.02, 0.3))
+def test_a_sighting_where_it_is_expected_is_no_surprise(range_m: float, bearing: float, share: float) -> None:
+    begun = place_filter.start(sighting(range_m, bearing, share), 0.0, 8.0)
+    assert place_filter.surprise(begun, sighting(range_m, bearing, share)) == pytest.approx(0.0, abs=1e-9)
+    assert place_filter.range_sigma_m(begun) == pytest.approx(share * range_m, rel=1e-6)
+
+
+@given(st.floats(5.0, 100.0), st.floats(0.05, 0.4))
+def test_half_as_far_and_twice_as_far_are_equally_surprising(range_m: float, share: float) -> None:
+    begun = place_filter.start(sighting(range_m, share=share), 0.0, 8.0)
+    nearer, farther = (place_filter.surprise(begun, sighting(range_m * by, share=share)) for by in (0.5, 2.0))
+    assert nearer == pytest.approx(farther, rel=1e-6)
+
+
+def test_a_growing_box_is_a_closing_speed() -> None:
+    state = place_filter.start(sighting(60.0), 0.0, 8.0)
+    for k in range(1, 31):
+        state = place_filter.update(kalman.predict(state, 0.1, 3.0), sighting(60.0 - 1.0 * k))
+    assert state.mean[2] == pytest.approx(-10.0, abs=0.5)
+    assert math.hypot(*place_filter.position(state)) == pytest.approx(30.0, rel=0.02)
+
+
+def test_a_small_box_does_not_become_its_neighbour() -> None:
+    """Parked cars 55 m away, 30 px apart: when one is missed for three pictures, its number does not go to the next."""
+    left, right = (lambda k: seen(55.0 - k, 560.0)), (lambda k: seen(55.0 - k, 590.0))
+    shown = follow([[left(k)] for k in range(5)] + [[right(k)] for k in range(5, 8)])
+    (first,) = shown[4]
+    last = {each.id: each for each in shown[-1]}
+    assert first.id not in last or last[first.id].carried
+    assert any(each.id != first.id and not each.carried for each in shown[-1])
+
+
+def test_one_wrong_height_is_refused_and_the_place_kept() -> None:
+    """For one picture the network draws the upper half of the car: twice as far, by its height."""
+    shown = follow([[seen(24.0)]] * 8 + [[seen(42.0, height_px=29.0)]] + [[seen(24.0)]], 0.0)
+    assert [each.id for each in shown[8]] == [shown[0][0].id], "it keeps its number"
+    assert not shown[8][0].measured
+    assert shown[8][0].distance_m == pytest.approx(24.0, rel=0.05)
+    assert shown[9][0].distance_m == pytest.approx(24.0, rel=0.05)
+
+
+def test_a_place_that_is_contradicted_for_long_begins_anew() -> None:
+    """The filter was wrong, not the pictures: it must be called back, with its speed to be measured again."""
+    shown = follow([[seen(12.0, height_px=60.0)]] * 8 + [[seen(45.0, height_px=45.0)]] * 4, 0.0)
+    assert shown[-1][0].distance_m == pytest.approx(45.0, rel=0.05)
+    assert shown[-1][0].ranges < 4
+    velocity = shown[-1][0].velocity_mps
+    assert velocity is None or abs(velocity[0]) < 15.0
+
+
+def test_nothing_is_faster_than_cars_are() -> None:
+    """Boxes that shrink as if the object left at 120 m/s: the place is measured anew rather than believed."""
+    shown = follow([[seen(20.0 + 12.0 * k, height_px=50.0)] for k in range(10)])
+    speeds = [each.velocity_mps[0] for tracks in shown for each in tracks if each.velocity_mps is not None]
+    assert all(speed + 10.0 <= 70.0 for speed in speeds)
+
+
+def test_the_covariance_stays_positive() -> None:
+    state = place_filter.start(sighting(50.0), -5.0, 8.0)
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        state = place_filter.update(kalman.predict(state, 0.1, 3.0), sighting(40.0 + rng.normal(), rng.normal() * 0.01))
+        assert np.linalg.eigvalsh(state.cov).min() > 0.0
