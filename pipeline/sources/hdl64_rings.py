@@ -1,8 +1,9 @@
 """Making a 16-ring sweep of KITTI's 64-ring one.
 
 KITTI's files hold no ring numbers, but they list ring after ring, the highest first, each counter-clockwise from
-straight ahead: the azimuth wraps from 2π to 0 where a new ring begins. The HDL-64 reaches only about +3°, so of the 16
-elevations of a VLP-16 those within 1° of a recorded ring remain, about ten.
+straight ahead: the azimuth wraps from 2π to 0 where a new ring begins. Where a file is not in that order (shuffled,
+cropped, or begun in mid-turn), each point belongs to the laser nearest to its elevation. The HDL-64 reaches only about
++3°, so of the 16 elevations of a VLP-16 those within 1° of a recorded ring remain, about ten.
 """
 
 from __future__ import annotations
@@ -16,6 +17,12 @@ from pipeline.types import F32, F64, U8
 _MATCH_DEG = 1.0
 _FAR_M = 10.0
 _ENOUGH_POINTS = 50
+RINGS = 64
+NOMINAL_ELEVATIONS_DEG: F64 = np.concatenate([2.0 - np.arange(32) / 3.0, -8.83 - 0.5 * np.arange(32)])
+"""(64,) highest first: 32 lasers from +2° in steps of 1/3°, 32 from −8.83° in steps of 1/2° (HDL-64E user's manual)."""
+_ORDER_SLACK_DEG = 0.5
+"""How far a ring may lie above the one before it and the file still count as in order: the median of a ring that is
+mostly hidden is that uncertain."""
 
 Turns = npt.NDArray[np.int64]
 
@@ -52,6 +59,19 @@ def ring_elevations_deg(points: F32, turn: Turns, count: int) -> F64:
     return medians
 
 
+def is_in_order(elevations_deg: F64) -> bool:
+    """Whether counted rings are rings: as many as the HDL-64 has lasers, or fewer, and each below the one before it."""
+    seen = elevations_deg[np.isfinite(elevations_deg)]
+    return len(elevations_deg) <= RINGS and bool(np.all(np.diff(seen) <= _ORDER_SLACK_DEG))
+
+
+def rings_by_elevation(points: F32, elevations_deg: F64) -> Turns:
+    """(N,) int64: for each of (N, 4) points the ring of (R,) elevations, highest first, that is nearest to its own."""
+    elevation = np.degrees(np.arctan2(points[:, 2], np.hypot(points[:, 0], points[:, 1])))
+    between = (elevations_deg[1:] + elevations_deg[:-1]) / 2
+    return np.searchsorted(-between, -elevation).astype(np.int64, copy=False)
+
+
 def match_vlp16(elevations_deg: F64) -> dict[int, int]:
     """Recorded ring → VLP-16 channel (0 = −15°): for each channel the nearest recorded ring within 1°, each once."""
     matched: dict[int, int] = {}
@@ -69,7 +89,7 @@ def match_vlp16(elevations_deg: F64) -> dict[int, int]:
 def keep_rings(points: F32, turn: Turns, channels: dict[int, int]) -> tuple[F32, U8]:
     """The points whose ring is a key of ``channels``, and each one's channel: (K, 4) float32 and (K,) uint8."""
     none = 255
-    channel_of_ring = np.full(int(turn.max(initial=0)) + 1, none, dtype=np.uint8)
+    channel_of_ring = np.full(max(int(turn.max(initial=0)), *channels, 0) + 1, none, dtype=np.uint8)
     for ring, channel in channels.items():
         channel_of_ring[ring] = channel
     channel_of_point = channel_of_ring[turn]

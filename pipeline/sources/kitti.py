@@ -25,12 +25,21 @@ from pipeline.formats.file_reading import (
 )
 from pipeline.formats.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
 from pipeline.formats.kitti_records import parse_labels, parse_oxts, parse_timestamps
-from pipeline.sources.hdl64_rings import keep_rings, match_vlp16, ring_elevations_deg, turns
+from pipeline.sources.hdl64_rings import (
+    NOMINAL_ELEVATIONS_DEG,
+    RINGS,
+    Turns,
+    is_in_order,
+    keep_rings,
+    match_vlp16,
+    ring_elevations_deg,
+    rings_by_elevation,
+    turns,
+)
 from pipeline.types import F32, F64, EgoState, Frame, GnssFix, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
 _STEP_NS = 100_000_000
-_RINGS = 64
 _NOMINAL_SIZE = (1242, 375)
 _PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
@@ -58,7 +67,7 @@ class KittiSource:
     """A KITTI drive. rings: 16 keeps the rings that a VLP-16 would have, 64 keeps all."""
 
     def __init__(self, uri: str, path: str, rings: int = 16) -> None:
-        if rings not in (16, _RINGS):
+        if rings not in (16, RINGS):
             raise SourceError(f"{uri}: {rings} rings asked for; KITTI gives 16 (as a VLP-16) or 64")
         folder = recording_folder(path)
         self.uri, self.title, self.rate_hz = uri, folder.resolve().name, 10.0
@@ -69,7 +78,8 @@ class KittiSource:
         self._size = self._picture_size()
         self._calibration = self._first_calibration(path)
         self._ticks = _ticks(self._names, self._files)
-        self._channels = self._match_rings() if rings == 16 else None
+        self._elevations_deg = self._ring_elevations()
+        self._channels = match_vlp16(self._elevations_deg) if rings == 16 else None
         self.notes = self._about()
 
     def __len__(self) -> int:
@@ -131,22 +141,28 @@ class KittiSource:
         except SourceError as error:
             notes.append(str(error))
             return None
-        turn = turns(points)
-        count = int(turn.max()) + 1
-        if count > _RINGS:
-            notes.append(f"{path.name}: {count} rings instead of {_RINGS}; not in KITTI's order, left out")
-            return None
+        turn, own_channels = self._rings(points, path.name, notes)
         if self._channels is None:
-            return Sweep(tick, points, (_RINGS - 1 - turn).astype(np.uint8), _RINGS)
-        channels = self._channels
-        if count < _RINGS:
-            notes.append(f"{path.name}: {count} rings instead of {_RINGS}; matched by this sweep's own elevations")
-            channels = match_vlp16(ring_elevations_deg(points, turn, count))
-        kept, ring = keep_rings(points, turn, channels)
+            return Sweep(tick, points, (RINGS - 1 - turn).astype(np.uint8), RINGS)
+        kept, ring = keep_rings(points, turn, own_channels if own_channels is not None else self._channels)
         if not len(kept):
             notes.append(f"{path.name}: none of its rings lies where a VLP-16 has one")
             return None
         return Sweep(tick, kept, ring, 16)
+
+    def _rings(self, points: F32, file: str, notes: list[str]) -> tuple[Turns, dict[int, int] | None]:
+        """The ring of each point, 0 the highest, and which rings stand for a VLP-16's channels when those of the drive
+        do not fit this sweep."""
+        turn = turns(points)
+        count = int(turn.max()) + 1
+        elevations_deg = ring_elevations_deg(points, turn, min(count, RINGS))
+        if count > RINGS or not is_in_order(elevations_deg):
+            notes.append(f"{file}: points are not in KITTI's order; their rings are told by elevation")
+            return rings_by_elevation(points, self._elevations_deg), None
+        if count < RINGS:
+            notes.append(f"{file}: {count} rings instead of {RINGS}; matched by this sweep's own elevations")
+            return turn, match_vlp16(elevations_deg)
+        return turn, None
 
     def _own_motion(self, name: str, tick: int, notes: list[str]) -> tuple[EgoState | None, GnssFix | None]:
         """Own speed and place, of the inertial unit, whose record belongs to the frame of its number."""
@@ -194,17 +210,20 @@ class KittiSource:
             return bgr.shape[1], bgr.shape[0]
         return _NOMINAL_SIZE
 
-    def _match_rings(self) -> dict[int, int]:
-        """Recorded ring → VLP-16 channel, from the first whole sweep; the laser mounts do not move within a drive."""
+    def _ring_elevations(self) -> F64:
+        """(64,) elevations of the rings in degrees, highest first, from the first whole sweep, because the laser mounts
+        do not move within a drive; without one those of the manual."""
         for path in self._files.sweeps.values():
             try:
                 points = parse_velodyne(read_bytes(path), path.name, [])
             except SourceError:
                 continue
             turn = turns(points)
-            if int(turn.max()) == _RINGS - 1:
-                return match_vlp16(ring_elevations_deg(points, turn, _RINGS))
-        return {}
+            if int(turn.max()) == RINGS - 1:
+                elevations_deg = ring_elevations_deg(points, turn, RINGS)
+                if is_in_order(elevations_deg) and np.isfinite(elevations_deg).all():
+                    return elevations_deg
+        return NOMINAL_ELEVATIONS_DEG
 
     def _about(self) -> tuple[str, ...]:
         notes = []
@@ -219,18 +238,19 @@ class KittiSource:
 
 def parse_velodyne(data: bytes, file: str, notes: list[str]) -> F32:
     """(N, 4) float32 ``x y z intensity`` (0–255) of a Velodyne file. Points that are not finite or farther than a
-    kilometre are left out and counted in ``notes``, as is a cut last point. SourceError when none is left."""
+    kilometre are left out and counted in ``notes``, as is a cut last point; a point at the sensor itself is no return
+    and says nothing. SourceError when none is left."""
     whole = len(data) // 16
     if len(data) % 16:
         notes.append(f"{file}: truncated in the middle of a point")
     raw = np.frombuffer(data, dtype="<f4", count=whole * 4).reshape(-1, 4)
     with np.errstate(invalid="ignore"):  # comparing a signalling NaN of a damaged file
         good = np.all(np.abs(raw[:, :3]) < 1000.0, axis=1) & (raw[:, 3] >= 0.0) & (raw[:, 3] <= 1.0)
-    kept = raw[good]
+    kept = raw[good & np.any(raw[:, :3] != 0.0, axis=1)]
     if not len(kept):
         raise SourceError(f"{file}: no LiDAR points")
-    if len(kept) < len(raw):
-        notes.append(f"{file}: {len(raw) - len(kept)} unreadable points skipped")
+    if not np.all(good):
+        notes.append(f"{file}: {len(raw) - np.count_nonzero(good)} unreadable points skipped")
     return np.ascontiguousarray(kept * np.array([1.0, 1.0, 1.0, 255.0]), dtype=np.float32)
 
 
