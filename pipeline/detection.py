@@ -11,6 +11,7 @@ from pipeline.lanes.open_detector import LaneDetector, open_lanes
 from pipeline.types import U8, Frame, RawBoxes, RawLanes
 from pipeline.types.source import AnySource, Source, is_live_source, is_simulated
 from pipeline.vision.detector import Detector, open_detector
+from pipeline.vision.far_view import WINDOW_PX, FarView, open_far_view
 
 Seen = TypeVar("Seen", RawBoxes, RawLanes)
 Seen_co = TypeVar("Seen_co", bound=RawBoxes | RawLanes, covariant=True)
@@ -45,25 +46,56 @@ class Detectors:
     lanes_every: int = 1
     """Lane lines are looked for in every n-th frame, by its index, so in whatever order frames are asked for the
     answers are the same. In between the lane tracker predicts."""
+    far: FarView | None = None
+    """Looks a second time at the far part of the picture; None: nobody does."""
+    far_every: int = 1
+    """In every n-th frame, by its index."""
 
     def looks_for_lanes(self, index: int) -> bool:
         """Whether lane lines are looked for in the frame of this index."""
         return self.lanes is not None and index % self.lanes_every == 0
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all that look: equal names give equal answers."""
+        asked = (self.boxes, self.lanes, self.far)
+        return tuple(each.name for each in asked if each is not None)
+
+    def looks_far(self, index: int) -> bool:
+        """Whether the far view is looked at in the frame of this index."""
+        return self.far is not None and index % self.far_every == 0
+
+
+CALM_TICKS = 50
+"""Ticks without a dropped one after which the far view is looked at in every tick again: 5 s at 10 Hz."""
+
 
 class LiveDetectors:
     """The detectors for each tick of live sensors that is run. Lane lines are looked for again once ``lanes_every``
-    ticks were run; the frame index cannot say so, because it also counts the ticks that were dropped."""
+    ticks were run; the frame index cannot say so, because it also counts the ticks that were dropped. Where ticks are
+    dropped, the machine is too slow for all of it, and the far view sits out every other tick."""
 
     def __init__(self, detectors: Detectors) -> None:
         self._detectors = detectors
         self._since_lanes = detectors.lanes_every
+        self._last_index: int | None = None
+        self._calm = CALM_TICKS
+        self._looked_far = False
 
     def of(self, frame: Frame) -> Detectors:
         """The detectors for a tick; call it once for each. A tick without a picture passes its turn to the next."""
         is_due = self._since_lanes >= self._detectors.lanes_every and frame.picture is not None
         self._since_lanes = 1 if is_due else self._since_lanes + 1
-        return replace(self._detectors, lanes=self._detectors.lanes if is_due else None, lanes_every=1)
+        lanes = self._detectors.lanes if is_due else None
+        far = self._detectors.far if self._has_time_to_look_far(frame) else None
+        return replace(self._detectors, lanes=lanes, lanes_every=1, far=far, far_every=1)
+
+    def _has_time_to_look_far(self, frame: Frame) -> bool:
+        dropped = self._last_index is not None and frame.index > self._last_index + 1
+        self._calm = 0 if dropped else self._calm + 1
+        self._last_index = frame.index
+        self._looked_far = self._calm >= CALM_TICKS or not self._looked_far
+        return self._looked_far
 
 
 class Look(Protocol):
@@ -85,6 +117,9 @@ def detect(frame: Frame, detectors: Detectors, ask: Look = look) -> Frame:
     bgr = frame.picture.bgr
     if detectors.boxes is not None:
         frame = replace(frame, raw_boxes=ask(detectors.boxes, frame, bgr))
+    if detectors.far is not None and detectors.looks_far(frame.index):
+        far = ask(detectors.far.of(frame), frame, bgr)
+        frame = replace(frame, raw_boxes=frame.raw_boxes.with_far(far) if frame.raw_boxes is not None else far)
     if detectors.lanes is not None and detectors.looks_for_lanes(frame.index):
         frame = replace(frame, raw_lanes=ask(detectors.lanes, frame, bgr))
     return frame
@@ -99,6 +134,13 @@ def detector_for(source: AnySource, spec: str | None = None) -> Detector:
     if spec is None and is_simulated(source):
         spec = EMBEDDED
     return open_detector(spec, picture_size(source))
+
+
+def far_view_for(source: AnySource, detector: Detects[RawBoxes] | None, size_px: int = WINDOW_PX) -> FarView | None:
+    """The far view of the same network for the source's pictures. None without a network, and where the pictures are
+    no larger than what it sees anyway. DetectorError when the network cannot be run at that size."""
+    size = picture_size(source)
+    return open_far_view(detector, size, size_px) if isinstance(detector, Detector) and size is not None else None
 
 
 def lanes_for(source: AnySource, spec: str | None = None) -> LaneDetector | None:

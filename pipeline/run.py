@@ -87,7 +87,10 @@ def _through(
     warm_up()
     state = State()
     for frame in frames:
-        seen, state, result = advance(state, frame, params, detectors_of(frame), sensors)
+        asked = detectors_of(frame)
+        if not params.detection.far_view:
+            asked = replace(asked, far=None)
+        seen, state, result = advance(state, frame, params, asked, sensors)
         yield seen, result
 
 

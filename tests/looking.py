@@ -10,6 +10,7 @@ from pipeline.detection import Detects, Seen_co, lanes_for
 from pipeline.sources import open_source
 from pipeline.types import U8, RawBoxes, RawLanes
 from pipeline.vision.detector import open_detector
+from pipeline.vision.far_view import FarView, open_far_view
 
 
 class LooksOnce(Generic[Seen_co]):
@@ -38,6 +39,14 @@ class LooksOnce(Generic[Seen_co]):
 def yolox_nano(data_dir: Path, width: int, height: int) -> LooksOnce[RawBoxes]:
     """The network of the data folder for pictures of a size, in px."""
     return LooksOnce(open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (width, height)))
+
+
+@cache
+def far_view(data_dir: Path, width: int, height: int) -> FarView | None:
+    """Its second look, as on the command line."""
+    network = open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (width, height))
+    far = open_far_view(network, (width, height))
+    return FarView(LooksOnce(far.detector), far.size_px) if far is not None else None
 
 
 @cache

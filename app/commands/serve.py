@@ -135,6 +135,7 @@ class Serve:
             whole_drives=True,
             open_lanes=lambda source: lanes_for(source, self.pipeline.lanes),
             lanes_every=self.pipeline.every(),
+            far_view_px=self.pipeline.far_px(),
             labels=self.server.label_desk(),
         )
 

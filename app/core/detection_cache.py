@@ -4,14 +4,23 @@ from __future__ import annotations
 
 import threading
 from time import perf_counter
-from typing import cast
+from typing import Protocol, cast
 
 from app.core.lru import BoundedCache
 from pipeline.detection import Detects, Seen
 from pipeline.sources.fingerprint import fingerprint
 from pipeline.types import U8, Frame, RawBoxes, RawLanes
 
-_CACHED_ANSWERS = 8192
+_CACHED_ANSWERS = 12288
+
+
+class Named(Protocol):
+    """What answers are kept for."""
+
+    @property
+    def name(self) -> str:
+        """Equal names give equal answers."""
+        ...
 
 
 class DetectionCache:
@@ -47,7 +56,7 @@ class CachedLook:
         """The same for a second thread."""
         return CachedLook(self._cache, self._source)
 
-    def knows(self, detector: Detects[Seen], index: int) -> bool:
+    def knows(self, detector: Named, index: int) -> bool:
         """Whether the detections of a frame are in the cache."""
         return self._cache.get((self._source, index, detector.name)) is not None
 

@@ -144,9 +144,7 @@ class OpenRecording:
 
     def digest(self, params: Params) -> str:
         """What a run is made from, as twelve characters."""
-        detectors = self.setup.detectors
-        names = [each.name for each in (detectors.boxes, detectors.lanes) if each is not None]
-        return digest(self.setup.uri, names, self.setup.sensors, params)
+        return digest(self.setup.uri, self.setup.detectors.names, self.setup.sensors, params)
 
     def calibration_digest(self, params: Params) -> str:
         """With which calibration pictures and points are laid on each other, as twelve characters."""

@@ -7,20 +7,24 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from app.engine.snapshot import Notice
-from pipeline.detection import Detectors, Detects, brings_detections, picture_size
+from pipeline.detection import Detectors, Detects, brings_detections, far_view_for, picture_size
 from pipeline.inference.runtime import DetectorError, DetectorMissing
 from pipeline.lanes.open_detector import usual_every
 from pipeline.run import Sensors
 from pipeline.types import RawBoxes, RawLanes
 from pipeline.types.source import AnySource, is_simulated
+from pipeline.vision.far_view import FarView
 
 OpenDetector = Callable[[AnySource], Detects[RawBoxes]]
 OpenLanes = Callable[[AnySource], Detects[RawLanes] | None]
 
+_Kind = tuple[bool, tuple[int, int] | None]
+
 
 class DetectorPool:
     """``open_detector`` and ``open_lanes`` give those for a source's pictures; None: none, and nothing is said about
-    it. lanes_every: lanes are looked for in every n-th frame; None: as the lane detector is quick."""
+    it. lanes_every: lanes are looked for in every n-th frame; None: as the lane detector is quick. far_view_px: side of
+    the far view's window; None: no far view."""
 
     def __init__(
         self,
@@ -28,12 +32,15 @@ class DetectorPool:
         sensors: Sensors,
         open_lanes: OpenLanes | None = None,
         lanes_every: int | None = None,
+        far_view_px: int | None = None,
     ) -> None:
         self._open_lanes = open_lanes if sensors != "lidar" else None
         self._lanes_every = lanes_every
+        self._far_view_px = far_view_px
         self._open = open_detector if sensors != "lidar" else None
         self._without = "Running on LiDAR alone." if sensors == "both" else "Without it, no object can be detected."
-        self._opened: dict[tuple[bool, tuple[int, int] | None], Detects[RawBoxes]] = {}
+        self._opened: dict[_Kind, Detects[RawBoxes]] = {}
+        self._opened_far: dict[_Kind, FarView | None] = {}
 
     def both_for(self, source: AnySource, notices: list[Notice]) -> Detectors:
         """What looks at the source's pictures; what is missing is None, and a notice says so. Nothing where detections
@@ -41,9 +48,18 @@ class DetectorPool:
         if brings_detections(source):
             return Detectors()
         lanes = self.lanes_for(source, notices)
-        return Detectors(
-            self.boxes_for(source, notices), lanes, self._lanes_every or usual_every(lanes, source.rate_hz)
-        )
+        boxes = self.boxes_for(source, notices)
+        every = self._lanes_every or usual_every(lanes, source.rate_hz)
+        return Detectors(boxes, lanes, every, self.far_view_for(source, boxes))
+
+    def far_view_for(self, source: AnySource, boxes: Detects[RawBoxes] | None) -> FarView | None:
+        """The detector's second look at the source's pictures; None where it is off or adds nothing."""
+        if self._far_view_px is None or boxes is None:
+            return None
+        kind = _kind_of(source)
+        if kind not in self._opened_far:
+            self._opened_far[kind] = far_view_for(source, boxes, self._far_view_px)
+        return self._opened_far[kind]
 
     def lanes_for(self, source: AnySource, notices: list[Notice]) -> Detects[RawLanes] | None:
         """The lane detector, which a notice names."""
@@ -61,7 +77,7 @@ class DetectorPool:
         """The detector of vehicles; where there is none, LiDAR goes on alone and a notice says so."""
         if self._open is None:
             return None
-        kind = (is_simulated(source), picture_size(source))
+        kind = _kind_of(source)
         try:
             if kind not in self._opened:
                 self._opened[kind] = self._open(source)
@@ -71,3 +87,8 @@ class DetectorPool:
         detector = self._opened[kind]
         notices += [Notice("warning", note) for note in detector.notes]
         return detector
+
+
+def _kind_of(source: AnySource) -> _Kind:
+    """What a detector is opened for: equal kinds share it."""
+    return is_simulated(source), picture_size(source)

@@ -55,7 +55,8 @@ class OpenSource(Protocol):
 class Engine:
     """``start`` it, send wishes through ``control``, read ``snapshot`` or listen. ``open_detector`` gives the
     one for a source's pictures; None runs without a camera's detector and says nothing about it; ``open_lanes`` gives
-    the lane detector, which looks at every ``lanes_every``-th frame. ``whole_drives``: a recording's whole drive is
+    the lane detector, which looks at every ``lanes_every``-th frame. ``far_view_px``: side of the window of the second
+    look, None for none. ``whole_drives``: a recording's whole drive is
     computed in the background (``drives``), so that any frame is shown as it is in it. ``desk``: where what is shown
     can be recorded; by default into the folder of this machine's sessions. ``labels``: what people say of it, and the
     steps they can take back; by default gone at the end."""
@@ -73,6 +74,7 @@ class Engine:
         whole_drives: bool = False,
         open_lanes: OpenLanes | None = None,
         lanes_every: int | None = None,
+        far_view_px: int | None = None,
         desk: SessionRecorder | None = None,
         labels: LabelDesk | None = None,
     ) -> None:
@@ -87,7 +89,7 @@ class Engine:
         self.desk = desk or SessionRecorder()
         self.labels = labels or LabelDesk()
         self._whole_drives = whole_drives
-        self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every)
+        self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every, far_view_px)
         self._player: Player | None = None
         self._thread = threading.Thread(target=self._work, name="cipv-engine", daemon=True)
 

@@ -140,6 +140,8 @@ class SeekablePipeline:
         asked = self._detectors
         if asked.boxes is not None and not is_wanted and not self._ask.knows(asked.boxes, index):
             asked = replace(asked, boxes=None)
+        if asked.far is not None and asked.looks_far(index) and not is_wanted and not self._ask.knows(asked.far, index):
+            asked = replace(asked, far=None)
         if asked.lanes is not None and asked.looks_for_lanes(index) and not self._ask.knows(asked.lanes, index):
             asked = replace(asked, lanes=None)
         return asked

@@ -78,15 +78,17 @@ def pack(header: dict[str, Any], jpeg: bytes, arrays: bytes) -> bytes:
 
 def display_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, Any]:
     """What is drawn over the picture. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom first;
-    ``path`` is the corridor laid on the ground that the sweep shows, None where there is none. ``lanes`` are the ego
-    lane's lines where the camera saw them, None without a lane detector; ``plan_lanes`` the same in the plan, x y in
-    metres; ``ground`` the planes under the sweep, n·p + d = 0, and the segments of x that they hold in; ``ranking``
-    every object in the order in which it could have led."""
+    ``far_view`` is the window of the detector's second look, None without one. ``path`` is the corridor laid on the
+    ground that the sweep shows, None where there is none. ``lanes`` are the ego lane's lines where the camera saw
+    them, None without a lane detector; ``plan_lanes`` the same in the plan, x y in metres; ``ground`` the planes under
+    the sweep, n·p + d = 0, and the segments of x that they hold in; ``ranking`` every object in the order in which it
+    could have led."""
     layers = result.layers
     path = {"center": result.path.center, "left": result.path.left, "right": result.path.right}
     return {
         "lidar_boxes": _boxes_json(layers.lidar_boxes, scale),
         "vision_boxes": _boxes_json(layers.vision_boxes, scale),
+        "far_view": [side * scale for side in result.sensors.far_view] if result.sensors.far_view else None,
         "cuboids": _cuboids_json(result, aligned, scale),
         "path": _on_ground(path, layers.ground, aligned, scale),
         **_lanes_json(layers.lanes, aligned, scale),

@@ -188,20 +188,27 @@ def _uncertain(who: Candidate) -> str:
 
 def _probable(who: Candidate) -> Answer:
     """That it exists and that it is in the path: the less probable of the two decides. A weak box that nothing supports
-    exists by less than a half. (A margin of half a standard deviation for the place in the path, 0.53, was tried: it
-    drops cars at the kerb 40 m away, and two leads of 31 on Astyx with them.)"""
+    exists by less than a half; a car 60 m away on a road that may bend either way is in the path by less than a half,
+    though it be straight ahead. The lead was seen in the path when that was known well enough: it is asked only on
+    which side of the edge it is now."""
     limit = who.params.stay_probability if who.leads else who.params.become_probability
     there = who.item.existence if who.item.existence is not None else 1.0
-    in_path = 1.0 / (1.0 + exp(-who.odds)) if who.odds > 0.0 else 1.0  # what is out of the path has a gate for that
+    in_path = _in_path_probability(who) if who.odds > 0.0 else 1.0  # what is out of the path has a gate for that
     probability = min(there, in_path)
     return probability >= limit, probability, limit
+
+
+def _in_path_probability(who: Candidate) -> float:
+    if who.leads or who.place is None:
+        return 1.0 / (1.0 + exp(-who.odds))
+    return who.place.probability(who.widening_m)
 
 
 def _improbable(who: Candidate) -> str:
     there = who.item.existence
     if there is not None and there < 0.5:
         return f"probably not there: {100 * there:.0f} %"
-    return f"in path with {100 / (1.0 + exp(-who.odds)):.0f} %: not probable enough"
+    return f"in path with {100 * _in_path_probability(who):.0f} %: not probable enough"
 
 
 CONDITIONS = Conditions(

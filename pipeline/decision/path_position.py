@@ -8,7 +8,7 @@ is outside but which leaves no room is in the path too.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, copysign, nan
+from math import atan2, copysign, erf, nan, sqrt
 from typing import NamedTuple
 
 import numba
@@ -37,6 +37,7 @@ _CAR_LENGTH_M, _SLOWEST_MPS, _MOST_TURNED = 4.5, 5.0, 0.2
 """A car that changes lanes faster than the second is turned by its sideways over its forward speed, at most the third;
 its nose is this car length further on."""
 _NO_SIDES = ((nan, nan), (nan, nan))
+_SUREST_M = 0.01
 SURE = 4.0
 """Log-odds beyond which nothing gets surer: the sigmas themselves are not known that well."""
 
@@ -71,6 +72,14 @@ class Place(NamedTuple):
     def margin_m(self, extra_m: float = 0.0) -> float:
         """How far inside the path it is; negative: outside. extra_m widens the path."""
         return min(self.left_m + extra_m - self.middle_m, self.right_m + extra_m + self.middle_m)
+
+    def probability(self, extra_m: float = 0.0) -> float:
+        """That it is in the path, its position being normal around where it was measured. Unlike ``log_odds``, which
+        asks on which side of an edge it lies, this falls below a half when the path is known less well than it is wide.
+        """
+        left_m, right_m = self.left_m + extra_m - self.middle_m, self.right_m + extra_m + self.middle_m
+        scale = 1.0 / (max(self.sigma_m, _SUREST_M) * sqrt(2.0))
+        return max(0.0, 0.5 * (erf(left_m * scale) + erf(right_m * scale)))
 
     def log_odds(self, extra_m: float, moves_m: float) -> float:
         """Log-odds of this sighting that the object is in the path: the log-likelihood ratio of its position against

@@ -109,7 +109,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "paper": {
         "box": {"method": "axis_aligned"},
         "lidar_tracking": {"filter": "trajectory", "rigid_sideways": False},
-        "detection": {"car_prior": 1.0},
+        "detection": {"far_view": False, "car_prior": 1.0},
         "distance": {
             "coefficient": 1829.1,
             "exponent": -1.093,

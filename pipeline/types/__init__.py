@@ -17,6 +17,7 @@ from pipeline.types.arrays import (
     Point2,
     Point3,
     SourceKind,
+    Window,
     sensors_in_words,
 )
 from pipeline.types.frame import (
@@ -113,5 +114,6 @@ __all__ = [
     "Sweep",
     "VisionMeasurement",
     "VisionTrack",
+    "Window",
     "sensors_in_words",
 ]

@@ -17,6 +17,8 @@ Point2 = tuple[float, float]
 Point3 = tuple[float, float, float]
 Box = tuple[float, float, float, float]
 """Axis-aligned image box ``x1 y1 x2 y2`` in pixels."""
+Window = tuple[int, int, int, int]
+"""A part of a picture, ``x1 y1 x2 y2`` in whole pixels, the last ones not in it."""
 SourceKind = Literal["V", "L", "VL"]
 """Which sensors have an object: vision only, LiDAR only, or both (paper, Table 3 "Name"). One letter a sensor."""
 

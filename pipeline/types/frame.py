@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from pipeline.types.arrays import F32, F64, I32, U8
+import numpy as np
+
+from pipeline.types.arrays import F32, F64, I32, U8, Window
 
 
 @dataclass(frozen=True)
@@ -160,6 +162,33 @@ class RawBoxes:
     """M class names in COCO's spelling."""
     law: DistanceLaw = REAL_VEHICLES
     """Distance from box heights, where no parameter says otherwise."""
+    far: Window | None = None
+    """The part of the picture that was looked at a second time, at native resolution; None: none."""
+    far_count: int = 0
+    """How many of the candidates, the last ones, come from that look."""
+
+    def with_far(self, far: RawBoxes) -> RawBoxes:
+        """The candidates of both looks. Doubles go with the other doubles in non-maximum suppression."""
+        return replace(
+            self,
+            boxes=np.concatenate([self.boxes, far.boxes]),
+            scores=np.concatenate([self.scores, far.scores]),
+            labels=self.labels + far.labels,
+            far=far.far,
+            far_count=far.far_count,
+        )
+
+    def without_far(self) -> RawBoxes:
+        """The candidates of the whole picture alone."""
+        count = len(self.boxes) - self.far_count
+        return replace(
+            self,
+            boxes=self.boxes[:count],
+            scores=self.scores[:count],
+            labels=self.labels[:count],
+            far=None,
+            far_count=0,
+        )
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.types.arrays import F32, F64, I32, Box
+from pipeline.types.arrays import F32, F64, I32, Box, Window
 from pipeline.types.frame import EgoState, Frame, StreamHealth
 from pipeline.types.lane import EgoLane
 from pipeline.types.objects import FusedObject, Ground, LidarTrack, Obstacle, VisionTrack
@@ -109,6 +109,8 @@ class SensorHealth:
     """How much later than the sweep the image was taken."""
     ego_age_ms: float | None
     """Age of own motion."""
+    far_view: Window | None = None
+    """The part of the image that the detector saw a second time, in native pixels; None when it did not."""
 
     @staticmethod
     def of(frame: Frame) -> SensorHealth:
@@ -125,6 +127,7 @@ class SensorHealth:
             camera_age_ms=age_ms(picture_ns),
             camera_skew_ms=(picture_ns - sweep.t_ns) / 1e6 if picture_ns is not None and sweep is not None else None,
             ego_age_ms=age_ms(frame.ego.t_ns if frame.ego is not None else None),
+            far_view=frame.raw_boxes.far if frame.raw_boxes is not None else None,
         )
 
 

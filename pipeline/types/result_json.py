@@ -59,7 +59,11 @@ def _sensors(health: SensorHealth, streams: tuple[StreamHealth, ...]) -> dict[st
     """What the frame held of each sensor; of live ones also how their streams do."""
     sensors: dict[str, dict[str, Any]] = {
         "lidar": {"age_ms": _number(health.lidar_age_ms), "points": health.lidar_points},
-        "camera": {"age_ms": _number(health.camera_age_ms), "skew_ms": _number(health.camera_skew_ms)},
+        "camera": {
+            "age_ms": _number(health.camera_age_ms),
+            "skew_ms": _number(health.camera_skew_ms),
+            "far_view": list(health.far_view) if health.far_view is not None else None,
+        },
         "ego": {"age_ms": _number(health.ego_age_ms)},
     }
     for name, stream in streams_json(streams).items():

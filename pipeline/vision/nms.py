@@ -18,6 +18,7 @@ def select(raw: RawBoxes, params: DetectionParams) -> tuple[Detection, ...]:
     Boxes of one class suppress each other, and so do all vehicle classes: what the network calls car in one candidate
     and truck in the next is one object. Its box and score are the best candidate's, its name as ``_name`` decides.
     """
+    raw = raw if params.far_view else raw.without_far()
     candidates = np.flatnonzero(raw.scores >= params.min_score)
     order = candidates[np.argsort(-raw.scores[candidates], kind="stable")]
     boxes, scores = raw.boxes[order], raw.scores[order].tolist()

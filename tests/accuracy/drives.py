@@ -68,7 +68,12 @@ def drive(
     results, judged = {}, {}
     found = looking.lanes(uri, lanes)
     every = lanes_every or usual_every(found and found.detector, source.rate_hz)
-    for frame, result in through(frames, params, Detectors(detector, found, every), sensors):
+    for frame, result in through(
+        frames,
+        params,
+        Detectors(detector, found, every, looking.far_view(folder, picture.bgr.shape[1], picture.bgr.shape[0])),
+        sensors,
+    ):
         results[frame.name] = result
         truth = source.truth(frame.index)
         if truth is not None:

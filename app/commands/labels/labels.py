@@ -56,8 +56,7 @@ class ProposeLabels:
                 names.append(frame.name)
                 calibration = calibration or calibration_digest(frame.camera, params)
                 bar.update(task, completed=len(names))
-        looked = [each.name for each in (detectors.boxes, detectors.lanes) if each is not None]
-        made_from = digest(source.uri, looked, "both", params)
+        made_from = digest(source.uri, detectors.names, "both", params)
         origin = Origin("pipeline", "cipv labels propose", int(time.time() * 1000), made_from, calibration)
         found = propose(frames, leads, origin)
         database = open_database(self.database)

@@ -88,6 +88,9 @@ class PipelineOptions:
     lanes_every: Annotated[int | None, tyro.conf.arg(metavar="N")] = None
     """Run the lane detector on every N-th frame only and predict lanes in between. Default: every third frame
     for a network, more often below 10 Hz, and every frame for the classical detector"""
+    far_view_px: Annotated[int, tyro.conf.arg(metavar="PX")] = 416
+    """Look a second time at the far part of the road, in a window of so many native pixels; 0: never. Where live
+    sensors outrun the machine, the second look sits out every other frame"""
 
     def parameters(self) -> Params:
         """The preset, changed by --params, then by each --set. ParamsError names the first invalid one."""
@@ -112,10 +115,16 @@ class PipelineOptions:
             raise BadInput(f"--lanes-every {self.lanes_every}: expected at least 1")
         return self.lanes_every
 
+    def far_px(self) -> int | None:
+        """``far_view_px``, validated; None where it is off."""
+        if self.far_view_px and not 64 <= self.far_view_px <= 2048:
+            raise BadInput(f"--far-view-px {self.far_view_px}: expected 0, or 64 to 2048")
+        return self.far_view_px or None
+
     def open_detectors(self, source: AnySource, sensors: Sensors = "both") -> Detectors:
         """All detectors for the source's pictures; their notes are printed. None of them for LiDAR alone, and for
         recordings that contain detections."""
-        from pipeline.detection import Detectors, brings_detections, lanes_for
+        from pipeline.detection import Detectors, brings_detections, far_view_for, lanes_for
         from pipeline.lanes.open_detector import usual_every
 
         every = self.every()
@@ -124,7 +133,10 @@ class PipelineOptions:
         lanes = lanes_for(source, self.lanes)
         for note in lanes.notes if lanes is not None else ():
             print(f"cipv: {note}", file=sys.stderr)
-        return Detectors(self.open_detector(source, sensors), lanes, every or usual_every(lanes, source.rate_hz))
+        boxes = self.open_detector(source, sensors)
+        px = self.far_px()
+        far = far_view_for(source, boxes, px) if px is not None else None
+        return Detectors(boxes, lanes, every or usual_every(lanes, source.rate_hz), far)
 
     def open_detector(self, source: AnySource, sensors: Sensors = "both") -> Detector | None:
         """The detector for the source's pictures; its notes are printed. DetectorMissing when a named one is missing,

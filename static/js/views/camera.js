@@ -6,7 +6,7 @@ import { drawInPicture } from "./drawing/gates.js";
 import { num } from "../core/format.js";
 import { followHover } from "./hover.js";
 import { Labels } from "./drawing/text_labels.js";
-import { drawBox, drawObjects, drawPath } from "./drawing/picture.js";
+import { drawBox, drawObjects, drawPath, drawWindow } from "./drawing/picture.js";
 import { nearestPoint, ownerOf } from "./drawing/hit_test.js";
 import { GROUND, tints } from "./drawing/point_colors.js";
 import { DotRaster } from "./drawing/dot_raster.js";
@@ -102,6 +102,7 @@ function drawBelief(ctx, frame) {
   const layers = get("layers") ?? {},
     { display, result } = frame;
   if (layers.path && display.path) drawPath(ctx, display.path, X, Y);
+  if (layers.farView && display.far_view) drawWindow(ctx, display.far_view, X, Y);
   if (layers.points) drawPoints(ctx, frame);
   if (layers.lanes && display.lanes) for (const lane of [display.lanes.left, display.lanes.right]) drawLane(ctx, lane);
   const labels = new Labels(ctx, surface.width, laid.y, laid.y + (frame.picture?.height ?? 0) * laid.scale);

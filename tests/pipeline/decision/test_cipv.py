@@ -174,9 +174,9 @@ def over_time(frames: list[tuple[FusedObject, ...]], path: Path = PATH, ego: Ego
 
 def test_a_decoy_whose_place_sways_does_not_take_over() -> None:
     """A box in the next lane, twice in ten frames measured inside the path."""
-    lead = fused(1, 50.0, source="V")
+    lead = fused(1, 40.0, source="V")
     offsets = [3.2, 2.9, 3.3, 1.0, 3.1, 2.8, 1.2, 3.4, 3.0, 3.2]
-    choices = over_time([(lead, dataclasses.replace(fused(2, 40.0, y, source="V"))) for y in offsets])
+    choices = over_time([(lead, dataclasses.replace(fused(2, 32.0, y, source="V"))) for y in offsets])
     assert {choice.lead.id for choice in choices if choice.lead} == {1}
 
 
@@ -185,7 +185,7 @@ def test_one_that_moves_over_is_told_before_and_leads_when_it_is_in() -> None:
     frames = []
     for k in range(40):
         y = max(3.5 - 0.12 * k, 0.0)
-        frames.append((fused(1, 50.0), fused(2, 25.0, y, velocity=(-1.0, -1.2 if y else 0.0))))
+        frames.append((fused(1, 40.0), fused(2, 25.0, y, velocity=(-1.0, -1.2 if y else 0.0))))
     choices = over_time(frames, ego=EgoState(0, 20.0, 0.0))
     on_the_edge = next(k for k in range(40) if 3.5 - 0.12 * k <= 2.4)
     told = next(k for k, choice in enumerate(choices) if choice.next_lead and choice.next_lead.id == 2)
@@ -199,7 +199,7 @@ def test_one_that_moves_over_is_told_before_and_leads_when_it_is_in() -> None:
 
 def test_a_lead_that_leaves_names_the_one_behind_it() -> None:
     leaving = fused(1, 20.0, 0.8, velocity=(0.0, 1.5))
-    (choice,) = over_time([(leaving, fused(2, 50.0))], ego=EgoState(0, 20.0, 0.0))
+    (choice,) = over_time([(leaving, fused(2, 40.0))], ego=EgoState(0, 20.0, 0.0))
     assert choice.lead is not None
     assert choice.next_lead is not None
     assert (choice.lead.id, choice.next_lead.id) == (1, 2)
@@ -274,3 +274,19 @@ def test_the_lidar_has_just_lost_what_the_camera_sees() -> None:
     lead, why_not = decide(dataclasses.replace(lost, distance_sigma_m=0.8))
     assert lead is None
     assert why_not == {1: "distance not measured in this frame"}
+
+
+@pytest.mark.parametrize(
+    ("case", "sigma_m", "at_m", "leads"),
+    [
+        ("the path is known", 0.5, 60.0, True),
+        ("as likely beside it", 3.5, 60.0, False),
+        ("near, though beside the middle", 0.5, 20.0, True),
+    ],
+)
+def test_a_new_lead_is_rather_in_the_path_than_not(case: str, sigma_m: float, at_m: float, leads: bool) -> None:
+    vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), sigma_m))
+    objects = (fused(1, at_m, 0.3),)
+    assert (choose(CipvState(), objects, vague, moment(), PARAMS)[1].lead is not None) == leads, case
+    led = choose(CipvState(1), objects, vague, moment(), PARAMS)[1].lead
+    assert led is not None, "it was in the path when that was known"

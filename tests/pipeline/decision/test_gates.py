@@ -20,7 +20,7 @@ EGO = EgoState(0, 15.0, 0.0)
 PATH = corridor(EGO, PathParams(half_width_m=1.5))
 SCENES = {
     "a lead, one cuts in, one stands aside": (
-        fused(1, 40.0, velocity=(-5.0, 0.0)),
+        fused(1, 30.0, velocity=(-5.0, 0.0)),
         fused(2, 20.0, 2.6, velocity=(-1.0, -2.0)),
         fused(3, 25.0, -4.0),
         fused(4, 12.0, 0.2, source="L", height=0.2),

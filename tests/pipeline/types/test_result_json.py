@@ -33,7 +33,7 @@ FIELDS = {
     "": "version frame t_ns sensors ego objects path cipv next_cipv rejected acc notes timing_ms",
     "sensors": "lidar camera ego",
     "sensors.lidar": "age_ms points",
-    "sensors.camera": "age_ms skew_ms",
+    "sensors.camera": "age_ms skew_ms far_view",
     "sensors.ego": "age_ms",
     "ego": "speed_mps yaw_rate_radps",
     "objects.0": "id source type type_score bbox bev cuboid closest_point distance_m distance_sigma_m velocity_mps "

@@ -113,6 +113,18 @@ export function drawBox(ctx, [x1, y1, x2, y2], tint, width, X, Y) {
   ctx.strokeRect(X(x1), Y(y1), X(x2) - X(x1), Y(y2) - Y(y1));
 }
 
+/**
+ * The window of the far view, faint, because it is no object.
+ * @param {CanvasRenderingContext2D} ctx @param {number[]} window @param {Axis} X @param {Axis} Y
+ */
+export function drawWindow(ctx, window, X, Y) {
+  ctx.globalAlpha = 0.45;
+  ctx.setLineDash([2, 4]);
+  drawBox(ctx, window, onPicture("vision"), 1, X, Y);
+  ctx.setLineDash([]);
+  ctx.globalAlpha = 1;
+}
+
 /** @param {CanvasRenderingContext2D} ctx @param {number[]} box @param {Axis} X @param {Axis} Y */
 function drawHalo(ctx, [x1, y1, x2, y2], X, Y) {
   ctx.strokeStyle = "#fff";

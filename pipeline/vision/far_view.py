@@ -1,0 +1,150 @@
+"""A second look at what is far: the part of the picture around the road's vanishing point at the picture's own
+resolution.
+
+A detector sees a wide picture scaled down: a car at 80 m, 40 px wide in a picture of 2048 px, is 16 px wide in its
+input. In a window of native pixels the same network finds it. The window is the smallest that holds the road ahead: a
+square around where the car is heading, moved sideways with the bend that own motion tells of. It depends on the frame
+alone, never on tracks, so boxes can be cached and computed ahead, and a wrong track cannot turn the view away.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from pipeline.inference.graph import MULTIPLE
+from pipeline.inference.runtime import DetectorError
+from pipeline.types import F32, U8, Frame, Mask, RawBoxes, Window
+from pipeline.vision.detector import Detector, open_detector
+
+WINDOW_PX = 416
+"""Side of the window: YOLOX-nano's own input. At 1800 px of focal length ±6.6°, at 720 px ±16°."""
+LOOK_AHEAD_M = 60.0
+"""Where on the bend the window is centred: about where a whole picture stops showing vehicles."""
+_GRID_PX = 16
+"""The window moves in steps of this, so that the noise of a yaw rate does not move it."""
+_SLOWEST_MPS = 3.0
+"""Below this the yaw rate over the speed says nothing of the road."""
+_WORTH_IT = 0.8
+"""Where the whole picture already has this share of the native resolution, a second look adds nothing."""
+_CUT_PX = 3.0
+"""A box that ends this near to an inner edge of the window goes on beyond it."""
+
+
+class Network(Protocol):
+    """What looks at the window."""
+
+    @property
+    def name(self) -> str:
+        """Equal names give equal boxes."""
+        ...
+
+    def detect(self, bgr: U8) -> RawBoxes:
+        """What is in a picture (H, W, 3) uint8."""
+        ...
+
+
+@dataclass(frozen=True)
+class FarView:
+    """A detector and the size of its window."""
+
+    detector: Network
+    """At the window's input size."""
+    size_px: int = WINDOW_PX
+    """Side of the window, in pixels of the picture."""
+
+    @property
+    def name(self) -> str:
+        """Equal names give equal boxes for equal frames."""
+        return f"{self.detector.name}-far{self.size_px}"
+
+    def of(self, frame: Frame | None) -> FarLook:
+        """The look at one frame's picture; at the middle of a picture of which nothing else is known for None."""
+        return FarLook(self, frame)
+
+
+@dataclass(frozen=True)
+class FarLook:
+    """The far view of one frame. Its name is the far view's: which window it is follows from the frame."""
+
+    view: FarView
+    frame: Frame | None
+
+    @property
+    def name(self) -> str:
+        """The far view's."""
+        return self.view.name
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Nothing that the detector does not say of the whole picture."""
+        return ()
+
+    def detect(self, bgr: U8) -> RawBoxes:
+        """Candidates in the window of a picture (H, W, 3) uint8, in the picture's pixels. Those that the window cuts
+        off are left out: the whole picture shows them whole."""
+        window = window_of(self.frame, (bgr.shape[1], bgr.shape[0]), self.view.size_px)
+        x1, y1, x2, y2 = window
+        seen = self.view.detector.detect(np.ascontiguousarray(bgr[y1:y2, x1:x2]))
+        boxes = seen.boxes + np.array([x1, y1, x1, y1], np.float32)
+        whole = _is_whole(boxes, window, (bgr.shape[1], bgr.shape[0]))
+        labels = tuple(label for label, kept in zip(seen.labels, whole, strict=True) if kept)
+        return replace(
+            seen,
+            model=self.name,
+            boxes=boxes[whole],
+            scores=seen.scores[whole],
+            labels=labels,
+            far=window,
+            far_count=len(labels),
+        )
+
+
+def open_far_view(detector: Detector, picture_size: tuple[int, int], size_px: int = WINDOW_PX) -> FarView | None:
+    """The far view by the same network as ``detector`` in pictures of (width, height). None where the whole picture
+    already reaches the network at nearly its own resolution."""
+    width, height = picture_size
+    if min(detector.input_size[0] / height, detector.input_size[1] / width) >= _WORTH_IT:
+        return None
+    sides = tuple(-(-min(size_px, side) // MULTIPLE) * MULTIPLE for side in (height, width))
+    try:
+        native = open_detector(str(detector.path), None, detector.threads, (sides[0], sides[1]))
+    except DetectorError:  # the graph has a size of its own; the window is scaled to it
+        native = open_detector(str(detector.path), None, detector.threads)
+    return FarView(native, size_px)
+
+
+def window_of(frame: Frame | None, picture_size: tuple[int, int], size_px: int = WINDOW_PX) -> Window:
+    """The window in a picture of (width, height): around the vanishing point of the way ahead, inside the picture. The
+    picture's middle where the camera is not known."""
+    width, height = picture_size
+    u, v = width / 2, height / 2
+    camera = frame.camera if frame is not None else None
+    if camera is not None:
+        bearing = _bend_bearing(frame)
+        ray = camera.K @ camera.T_camera_ego[:3, :3] @ np.array([np.cos(bearing), np.sin(bearing), 0.0])
+        if ray[2] > 0.0:
+            u, v = float(ray[0] / ray[2]), float(ray[1] / ray[2])
+    across, down = min(size_px, width), min(size_px, height)
+    x1 = int(np.clip(round((u - across / 2) / _GRID_PX) * _GRID_PX, 0, width - across))
+    y1 = int(np.clip(round((v - down / 2) / _GRID_PX) * _GRID_PX, 0, height - down))
+    return x1, y1, x1 + across, y1 + down
+
+
+def _bend_bearing(frame: Frame | None) -> float:
+    """Where a constant turn leads in ``LOOK_AHEAD_M``, radians to the left."""
+    ego = frame.ego if frame is not None else None
+    if ego is None or ego.speed_mps is None or ego.yaw_rate_radps is None or ego.speed_mps < _SLOWEST_MPS:
+        return 0.0
+    return float(np.clip(ego.yaw_rate_radps / ego.speed_mps * LOOK_AHEAD_M / 2, -0.5, 0.5))
+
+
+def _is_whole(boxes: F32, window: Window, picture_size: tuple[int, int]) -> Mask:
+    """(M,) whether the window shows all of each box that the picture shows."""
+    x1, y1, x2, y2 = window
+    width, height = picture_size
+    low = (np.array([x1, y1]) > 0) & (boxes[:, :2] < np.array([x1, y1]) + _CUT_PX)
+    high = (np.array([x2, y2]) < np.array([width, height])) & (boxes[:, 2:] > np.array([x2, y2]) - _CUT_PX)
+    return np.logical_not((low | high).any(axis=1))
