@@ -82,6 +82,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     fusion_state, fused = fusion.fuse(
         state.fusion, lidar_tracks, vision_tracks, aligned, frame.picture_size, params.fusion
     )
+    vision_state = vision_tracking.learn_heights(vision_state, fused.ranged_boxes(), params.vision_tracking)
     clock.lap("fusion")
     # Existence: what each sensor says for and against every object being where it is said to be
     existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, now.dt_s, params.existence)

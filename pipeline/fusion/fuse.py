@@ -39,6 +39,17 @@ class Fusion:
     lidar_boxes: dict[int, Box]
     vision_boxes: dict[int, Box]
 
+    def ranged_boxes(self) -> dict[int, tuple[float, float]]:
+        """Distance and its standard deviation by the LiDAR, by id of the vision track, of what both see now."""
+        return {
+            item.vision_track: (item.distance_m, item.distance_sigma_m)
+            for item in self.objects
+            if item.vision_track is not None
+            and item.seen_by_two_sensors
+            and item.distance_m is not None
+            and item.distance_sigma_m is not None
+        }
+
 
 def fuse(
     state: FusionState,

@@ -58,7 +58,15 @@ class DistanceParams(Section):
     binning: bool = choice(False, "Round estimates to bins of 10 m between 5 and 60 m, as in the paper")
     max_m: float = slider(120.0, 20.0, 200.0, 1.0, "m", "Estimates beyond this are discarded (paper: 60)")
     height_sigma_px: float = slider(2.0, 0.2, 20.0, 0.1, "px", "Noise of a box's height; sets the distance's sigma")
-    size_spread: float = slider(0.1, 0.0, 0.5, 0.01, "", "Spread of real heights within a class, as a fraction")
+    size_spread: float = slider(
+        0.2,
+        0.0,
+        0.5,
+        0.01,
+        "",
+        "Spread of heights within a class and of how a network boxes them, as a fraction. Measured: 0.10 to 0.18 about "
+        "a median off by up to 0.11, in four labelled drives",
+    )
 
 
 class VisionTrackingParams(Section):
@@ -80,6 +88,9 @@ class VisionTrackingParams(Section):
     )
     bearing_sigma_deg: float = slider(0.3, 0.05, 3.0, 0.05, "°", "kalman: noise of a box's direction")
     accel_sigma_mps2: float = slider(3.0, 0.1, 20.0, 0.1, "m/s²", "kalman: acceleration noise of objects")
+    learn_height: bool = choice(
+        True, "kalman: learn how tall a vehicle is while the LiDAR ranges it; off: as tall as its class"
+    )
     max_nis: float = slider(
         13.8, 3.0, 1000.0, 0.1, "", "kalman: a distance more surprising is refused; 13.8 is 99.9 % of χ² (2 degrees)"
     )
@@ -135,7 +146,9 @@ class FusionParams(Section):
         "",
         "Boxes that overlap more skip the range gate: those of cars 1.8 times as far away cannot overlap so",
     )
-    range_gate_sigmas: float = slider(3.0, 0.5, 10.0, 0.1, "σ", "Largest difference of the two distances")
+    range_gate_sigmas: float = slider(
+        1.5, 0.5, 10.0, 0.1, "σ", "Largest difference of the two distances: 1.5 σ of a box's distance is 30 % of it"
+    )
     size_gate: bool = choice(
         True, "Do not join a box with a cluster longer than any vehicle of its class: hedges, walls, rails"
     )

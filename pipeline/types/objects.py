@@ -68,6 +68,8 @@ class VisionMeasurement:
     noise_share: float | None = None
     """Share of the distance by which it differs from picture to picture: the noise of the box's height. The rest of
     ``sigma_m`` is the object's own unknown height, which no number of pictures averages out."""
+    size_share: float | None = None
+    """The share of the distance by which vehicles of the class differ in height."""
 
 
 class Obstacle(NamedTuple):

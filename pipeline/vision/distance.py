@@ -126,6 +126,7 @@ def measure(
             sigma if is_known else None,
             (x, y) if is_placed else None,
             noise if is_known else None,
+            params.size_spread if is_known else None,
         )
         for detection, at_m, sigma, (x, y), is_known, is_placed, noise in rows
     )

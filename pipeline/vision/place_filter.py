@@ -58,6 +58,12 @@ def update(state: CvState, seen: Sighting) -> CvState:
     return CvState(mean, cov)
 
 
+def scaled(state: CvState, factor: float) -> CvState:
+    """The state with its place ``factor`` times as far away along the same ray; its velocity grows with it, because it
+    was read off the same distances."""
+    return CvState(state.mean * factor, state.cov * factor**2)
+
+
 def range_sigma_m(state: CvState) -> float:
     """Standard deviation along the ray."""
     x, y = state.mean[:2].tolist()

@@ -11,6 +11,7 @@ measured, and it has no velocity. ``kalman`` predicts both the box and the place
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -25,6 +26,7 @@ from pipeline.types import Box, VisionMeasurement, VisionTrack
 from pipeline.vision import place_filter
 from pipeline.vision.association import Expected, match, same_kind
 from pipeline.vision.place_filter import Sighting
+from pipeline.vision.vehicle_height import Height, learn
 
 SPEED_SIGMA_MPS = 8.0
 """How fast a new object may be closing in or away, before a second sighting tells."""
@@ -63,6 +65,10 @@ class Followed:
     """Summed score of each class name."""
     refused: int = 0
     """Distances refused in a row."""
+    height: Height = Height()
+    """How tall it is for its class."""
+    seen: VisionMeasurement | None = None
+    """This picture's sighting with a distance; None without one."""
 
 
 class SpeedGuess(NamedTuple):
@@ -115,6 +121,30 @@ def track(
     return VisionTrackerState(state.next_id + len(fresh), alive), tuple(followed.track for followed in alive)
 
 
+def learn_heights(
+    state: VisionTrackerState, ranges: Mapping[int, tuple[float, float]], params: VisionTrackingParams
+) -> VisionTrackerState:
+    """Take in what the LiDAR measured of the objects that it shares with the camera. What an object's height is learned
+    to be holds from the next picture on; its place moves with it, so that it does not seem to approach.
+
+    ranges: distance and its standard deviation in metres, by id of the vision track.
+    """
+    if not params.learn_height or params.filter == "queue" or not ranges:
+        return state
+    return evolve(state, followed=tuple(_learned(followed, ranges) for followed in state.followed))
+
+
+def _learned(followed: Followed, ranges: Mapping[int, tuple[float, float]]) -> Followed:
+    measured, seen = ranges.get(followed.track.id), followed.seen
+    if measured is None or seen is None or seen.distance_m is None or not seen.noise_share or not seen.size_share:
+        return followed
+    height = learn(followed.height, seen.distance_m, seen.noise_share, seen.size_share, *measured)
+    place = followed.place_filter
+    if place is not None and height != followed.height:
+        place = place_filter.scaled(place, height.factor / followed.height.factor)
+    return evolve(followed, height=height, place_filter=place)
+
+
 def _expected(followed: Followed, params: VisionTrackingParams) -> Expected:
     """What the next box of an object is compared with."""
     predicted = followed.box_filter.cov[0, 0] + _box_noise(followed.track.bbox, params)[0, 0]
@@ -134,7 +164,7 @@ def _without_ghosts(alive: tuple[Followed, ...], params: VisionTrackingParams) -
 
 def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> Followed:
     """Where the object should be now; carried until a box says that it is there."""
-    aged = evolve(followed, unseen_s=followed.unseen_s + dt_s, unplaced_s=followed.unplaced_s + dt_s)
+    aged = evolve(followed, unseen_s=followed.unseen_s + dt_s, unplaced_s=followed.unplaced_s + dt_s, seen=None)
     if params.filter == "queue":
         return evolve(aged, track=evolve(followed.track, carried=True, measured=False))
     box = followed.track.bbox
@@ -242,9 +272,13 @@ def _place(
         if followed.place_filter is not None:
             return evolve(followed, track=_shown(followed.track, followed.place_filter, followed.placed))
         return evolve(followed, track=evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m))
-    share = seen.sigma_m / seen.distance_m
+    share, own_m = seen.sigma_m / seen.distance_m, seen.distance_m * followed.height.factor
+    if seen.size_share is not None:
+        pixel_share = math.sqrt(max(share**2 - seen.size_share**2, 0.0))
+        share = math.hypot(pixel_share, followed.height.share(seen.size_share))
+    followed = evolve(followed, seen=seen)
     sighting = Sighting(
-        seen.distance_m,
+        own_m,
         math.atan2(seen.position[1], seen.position[0]),
         seen.noise_share if seen.noise_share is not None else share,
         math.radians(params.bearing_sigma_deg),

@@ -30,9 +30,9 @@ def test_no_lead_is_made_up_on_an_empty_road(data_dir: Path) -> None:
 def test_camera_alone_estimates_distance_with_a_law_fitted_elsewhere(data_dir: Path) -> None:
     total = score(camera_alone_without_own_clip(data_dir))
     assert total.frames == 31
-    # 188–189: the network boxes the upper half of the lead. 060: the end of the lane change is seen late
-    assert total.wrong <= 3
-    assert total.missed <= 4  # an object that one sensor sees counts from its third sighting
+    assert total.correct >= 26
+    assert total.wrong <= 1
+    assert total.missed <= 5  # an object that one sensor sees counts from its third sighting
     assert total.mean_relative_error is not None
     assert total.mean_relative_error <= 0.12
 

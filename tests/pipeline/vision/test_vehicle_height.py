@@ -1,0 +1,68 @@
+"""Learning how tall one vehicle is, alone, in the tracker, and over the whole pipeline with the LiDAR cut off."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from pipeline.params import VisionTrackingParams
+from pipeline.types import Detection, VisionMeasurement
+from pipeline.vision.tracking import VisionTrackerState, learn_heights, track
+from pipeline.vision.vehicle_height import FLOOR_SHARE, NEAREST_M, Height, learn
+
+SPREAD, NOISE = 0.2, 0.03
+PARAMS = VisionTrackingParams()
+
+
+def test_a_tall_van_is_learned_and_its_sigma_shrinks_to_the_floor() -> None:
+    height = Height()
+    for _ in range(10):
+        height = learn(height, 25.0, NOISE, SPREAD, 30.0, 0.2)
+    assert height.factor == pytest.approx(1.2, rel=0.02)
+    assert height.sigma == FLOOR_SHARE
+    assert height.share(SPREAD) == FLOOR_SHARE
+    assert Height().share(SPREAD) == SPREAD
+
+
+@pytest.mark.parametrize(
+    ("case", "law_m", "range_m"),
+    [("another vehicle's range", 20.0, 45.0), ("too near to tell", 9.0, NEAREST_M - 0.1)],
+)
+def test_what_teaches_nothing(case: str, law_m: float, range_m: float) -> None:
+    assert learn(Height(), law_m, NOISE, SPREAD, range_m, 0.2) == Height(), case
+
+
+def seen(law_m: float) -> VisionMeasurement:
+    tall = 1400.0 / law_m
+    box = (600.0 - tall / 2, 300.0 - tall / 2, 600.0 + tall / 2, 300.0 + tall / 2)
+    noise = math.hypot(2.0 / tall, NOISE)
+    sigma = law_m * math.hypot(2.0 / tall, SPREAD)
+    return VisionMeasurement(Detection(box, "car", 0.8), law_m, sigma, (law_m, 0.0), noise, SPREAD)
+
+
+@pytest.mark.parametrize("learns", [True, False])
+def test_a_lead_that_leaves_the_lidars_reach_keeps_its_distance(learns: bool) -> None:
+    """It is 20 % taller than a car, so the law says 20 % less; the LiDAR has it for a second, then it draws away."""
+    params = PARAMS.model_copy(update={"learn_height": learns})
+    state = VisionTrackerState()
+    closing = []
+    for k in range(40):
+        true_m = 25.0 + 0.8 * k
+        state, (one,) = track(state, (seen(true_m / 1.2),), 0.1 if k else None, params, 20.0)
+        if k < 10:
+            state = learn_heights(state, {one.id: (true_m, 0.2)}, params)
+            assert one.velocity_mps is None or k < 3 or abs(one.velocity_mps[0] - 8.0) < 6.0, "learning is no motion"
+        closing.append(one.velocity_mps[0] if one.velocity_mps else np.nan)
+    assert one.distance_m is not None
+    assert one.sigma_m is not None
+    off = abs(one.distance_m - true_m) / true_m
+    assert (off < 0.03) == learns
+    assert (one.sigma_m / one.distance_m < 0.08) == learns
+    assert off < 2 * one.sigma_m / one.distance_m
+
+
+def test_a_range_of_no_track_changes_nothing() -> None:
+    state, _ = track(VisionTrackerState(), (seen(20.0),), None, PARAMS)
+    assert learn_heights(state, {99: (25.0, 0.2)}, PARAMS) == state
