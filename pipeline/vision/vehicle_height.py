@@ -15,8 +15,8 @@ FLOOR_SHARE = 0.03
 """What is never learned: a box's bottom and top move by this share of its height as the vehicle turns and the road
 slopes. Measured on labelled KITTI cars within 20 m: 2.9 % (``pipeline.vision.distance``)."""
 NEAREST_M = 10.0
-"""Nearer than this nothing is learned: the bumper, which the LiDAR ranges, and the roof, which ends the box, lie up to a
-metre apart, and the box's lower edge is a shadow as often as a tyre. On KITTI 0052, at 7 m, the ratio wanders by ±9 %
+"""Nearer than this nothing is learned: the bumper, which the LiDAR ranges, and the roof, which ends the box, lie up to
+a metre apart, and the box's lower edge is a shadow as often as a tyre. On KITTI 0052, at 7 m, the ratio wanders by ±9 %
 within two seconds; on Astyx, at 20 to 32 m, by ±3 %."""
 _SETBACK_M = 0.5
 """Standard deviation of how far the roof's edge lies behind the bumper."""

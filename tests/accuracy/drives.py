@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -18,8 +18,14 @@ from pipeline.types import Frame, Result
 from tests import looking
 from tests.looking import yolox_nano
 
-FOLDERS = {"astyx": "astyx", "kitti": "kitti_0052"}
-"""Where a kind of recording lies in the data folder."""
+FOLDERS = {
+    "astyx": "astyx",
+    "kitti": "kitti_0052",
+    "street": "kitti_0009/2011_09_26/2011_09_26_drive_0009_sync",
+}
+"""Where a recording lies in the data folder."""
+SCHEMES = {"astyx": "astyx", "kitti": "kitti", "street": "kitti"}
+"""As what it is opened."""
 SCORED_CLIPS = {
     "lead near 20 m": range(60, 69),
     "following at 22–24 m": range(183, 193),
@@ -55,12 +61,15 @@ def drive(
     changes: tuple[tuple[str, object], ...] = (),
     lanes: str = "twinlitenet",
     lanes_every: int | None = None,
+    own_motion: bool = True,
 ) -> Drive:
     """Run a recording of the data folder with YOLOX-nano and, as the command line does where it is, TwinLiteNet.
     ``changes``: dotted parameters on top of the preset. lanes: another lane detector, as on the command line; it looks
-    at every ``lanes_every``-th picture, null: as often as usual."""
-    uri = f"{kind}:{folder / FOLDERS[kind]}"
+    at every ``lanes_every``-th picture, None: as often as usual. own_motion off: as if the car told nothing of it."""
+    uri = f"{SCHEMES[kind]}:{folder / FOLDERS[kind]}"
     source, frames = open_source(uri), _frames(uri)
+    if not own_motion:
+        frames = tuple(replace(frame, ego=None, gnss=None) for frame in frames)
     params = with_changes(preset(preset_name), dict(changes))
     picture = frames[0].picture
     assert picture is not None
