@@ -17,7 +17,7 @@ from pipeline.alignment import projection
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
 from pipeline.ego_motion import coasting
-from pipeline.fusion import agreement, existence
+from pipeline.fusion import agreement, existence, returns
 from pipeline.fusion import fuse as fusion
 from pipeline.lanes import road_lines as lanes
 from pipeline.lidar import segmentation
@@ -72,6 +72,7 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
 
     # Camera: the detector's boxes, each with a distance from its height, followed from picture to picture
     boxes = _measure_boxes(frame, aligned, params)
+    boxes = returns.range_boxes(boxes, sweep, aligned, params.fusion)
     clock.lap("distance")
     vision_state, vision_tracks = vision_tracking.track(
         state.vision, boxes, now.dt_s, params.vision_tracking, now.speed_mps

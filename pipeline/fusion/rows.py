@@ -106,6 +106,7 @@ def box_row(object_id: int, seen: VisionTrack, gates: tuple[Gate, ...]) -> Fused
         hits=seen.hits,
         vision_track=seen.id,
         camera_ranges=seen.ranges,
+        returns=seen.returns,
         gates=gates,
     )
 

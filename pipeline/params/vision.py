@@ -149,6 +149,9 @@ class FusionParams(Section):
     range_gate_sigmas: float = slider(
         1.5, 0.5, 10.0, 0.1, "σ", "Largest difference of the two distances: 1.5 σ of a box's distance is 30 % of it"
     )
+    single_returns: bool = choice(
+        True, "Range far vehicles by the few LiDAR returns inside their boxes that are no cluster"
+    )
     size_gate: bool = choice(
         True, "Do not join a box with a cluster longer than any vehicle of its class: hedges, walls, rails"
     )

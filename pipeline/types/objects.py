@@ -70,6 +70,12 @@ class VisionMeasurement:
     ``sigma_m`` is the object's own unknown height, which no number of pictures averages out."""
     size_share: float | None = None
     """The share of the distance by which vehicles of the class differ in height."""
+    ranged_m: float | None = None
+    """The same distance by LiDAR returns inside the box; None without any."""
+    ranged_sigma_m: float = 0.0
+    """Standard deviation of ``ranged_m``."""
+    returns: int = 0
+    """How many returns that is."""
 
 
 class Obstacle(NamedTuple):
@@ -140,6 +146,8 @@ class VisionTrack:
     """Whether its distance was measured in this frame: a box cut by the image's edge is seen, but not measured."""
     ranges: int = 0
     """Distances in a row that its place took in, since it was last begun."""
+    returns: int = 0
+    """LiDAR returns inside its box that its distance was measured by in this frame."""
 
 
 class Gate(NamedTuple):
@@ -194,6 +202,9 @@ class Braking(IntEnum):
     FULL = 2
     """As hard as it can."""
 
+
+DistanceFrom = Literal["cluster", "returns", "box"] | None
+"""A LiDAR cluster; single LiDAR returns inside its image box; the height of that box; None: nothing in this frame."""
 
 Eligibility = Conditions[bool]
 """Which conditions of a lead an object meets (``pipeline.decision.gates`` decides)."""
@@ -269,6 +280,8 @@ class FusedObject:
     """The hardest braking that what is known of it can justify."""
     camera_ranges: int = 0
     """Distances in a row that its vision track took in."""
+    returns: int = 0
+    """LiDAR returns inside its image box that ranged it in this frame, where it has no cluster."""
     existence: float | None = None
     """Probability that it is really there, by the evidence of both sensors; None where that is not weighed."""
     rigid_mps: float | None = None
@@ -278,6 +291,15 @@ class FusedObject:
     the camera sees it now."""
     eligibility: Eligibility | None = None
     """Which conditions of a lead it meets; None before it was judged."""
+
+    @property
+    def distance_from(self) -> DistanceFrom:
+        """What its distance was measured by in this frame."""
+        if self.carried or not self.measured or self.distance_m is None:
+            return None
+        if self.seen_by_lidar:
+            return "cluster"
+        return "returns" if self.returns else "box"
 
     @property
     def carried(self) -> bool:

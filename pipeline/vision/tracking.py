@@ -129,14 +129,21 @@ def learn_heights(
 
     ranges: distance and its standard deviation in metres, by id of the vision track.
     """
-    if not params.learn_height or params.filter == "queue" or not ranges:
+    if params.filter == "queue" or not ranges:
         return state
-    return evolve(state, followed=tuple(_learned(followed, ranges) for followed in state.followed))
+    return evolve(state, followed=tuple(_learned(followed, ranges, params) for followed in state.followed))
 
 
-def _learned(followed: Followed, ranges: Mapping[int, tuple[float, float]]) -> Followed:
+def _learned(followed: Followed, ranges: Mapping[int, tuple[float, float]], params: VisionTrackingParams) -> Followed:
     measured, seen = ranges.get(followed.track.id), followed.seen
-    if measured is None or seen is None or seen.distance_m is None or not seen.noise_share or not seen.size_share:
+    if (
+        not params.learn_height
+        or measured is None
+        or seen is None
+        or seen.distance_m is None
+        or not seen.noise_share
+        or not seen.size_share
+    ):
         return followed
     height = learn(followed.height, seen.distance_m, seen.noise_share, seen.size_share, *measured)
     place = followed.place_filter
@@ -166,12 +173,12 @@ def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> F
     """Where the object should be now; carried until a box says that it is there."""
     aged = evolve(followed, unseen_s=followed.unseen_s + dt_s, unplaced_s=followed.unplaced_s + dt_s, seen=None)
     if params.filter == "queue":
-        return evolve(aged, track=evolve(followed.track, carried=True, measured=False))
+        return evolve(aged, track=evolve(followed.track, carried=True, measured=False, returns=0))
     box = followed.track.bbox
     lively = params.accel_sigma_mps2 * _width(box) / _CAR_WIDTH_M + _TURN_PXPS2
     moved = kalman.predict(followed.box_filter, dt_s, lively)
     place, scale = _predict_place(aged, dt_s, params)
-    track = evolve(followed.track, carried=True, measured=False, bbox=_around(moved.mean, box, scale))
+    track = evolve(followed.track, carried=True, measured=False, returns=0, bbox=_around(moved.mean, box, scale))
     if place is not None:
         track = _shown(track, place, followed.placed)
     elif followed.place_filter is not None:
@@ -277,10 +284,16 @@ def _place(
         pixel_share = math.sqrt(max(share**2 - seen.size_share**2, 0.0))
         share = math.hypot(pixel_share, followed.height.share(seen.size_share))
     followed = evolve(followed, seen=seen)
+    noise_share = seen.noise_share if seen.noise_share is not None else share
+    if seen.ranged_m is not None:
+        # what the height is learned to be moves the place there first, so that it is no motion
+        followed = _learned(followed, {followed.track.id: (seen.ranged_m, seen.ranged_sigma_m)}, params)
+        own_m, share = seen.ranged_m, seen.ranged_sigma_m / seen.ranged_m
+        noise_share = share
     sighting = Sighting(
         own_m,
         math.atan2(seen.position[1], seen.position[0]),
-        seen.noise_share if seen.noise_share is not None else share,
+        noise_share,
         math.radians(params.bearing_sigma_deg),
     )
     filtered, placed = followed.place_filter, followed.placed + 1
@@ -296,7 +309,7 @@ def _place(
             filtered = None
     if filtered is None:
         filtered, placed = place_filter.start(sighting, guess.along_mps, guess.sigma_mps), 1
-    track = _shown(followed.track, filtered, placed, share)
+    track = evolve(_shown(followed.track, filtered, placed, share), returns=seen.returns)
     return evolve(followed, track=track, place_filter=filtered, placed=placed, unplaced_s=0.0, refused=0)
 
 

@@ -36,7 +36,8 @@ FIELDS = {
     "sensors.camera": "age_ms skew_ms far_view",
     "sensors.ego": "age_ms",
     "ego": "speed_mps yaw_rate_radps",
-    "objects.0": "id source type type_score bbox bev cuboid closest_point distance_m distance_sigma_m velocity_mps "
+    "objects.0": "id source type type_score bbox bev cuboid closest_point distance_m distance_sigma_m distance_from "
+    "velocity_mps "
     "speed_over_ground_mps in_path existence_probability in_path_probability path_offset_m lateral_mps crossing_s "
     "moving ttc_s carried "
     "seen_by hits lidar_points gates",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -66,3 +67,18 @@ def test_a_lead_that_leaves_the_lidars_reach_keeps_its_distance(learns: bool) ->
 def test_a_range_of_no_track_changes_nothing() -> None:
     state, _ = track(VisionTrackerState(), (seen(20.0),), None, PARAMS)
     assert learn_heights(state, {99: (25.0, 0.2)}, PARAMS) == state
+
+
+def test_returns_of_a_far_vehicle_place_it_without_seeming_motion() -> None:
+    """Seen for a second by its box, 15 % too near; then one return says how far it is, every other frame."""
+    state = VisionTrackerState()
+    for k in range(20):
+        measured = seen(60.0 / 1.15)
+        if k >= 10 and k % 2 == 0:
+            measured = replace(measured, ranged_m=60.0, ranged_sigma_m=0.5, returns=1)
+        state, (one,) = track(state, (measured,), 0.1 if k else None, PARAMS, 20.0)
+        assert (one.returns == 1) == (measured.ranged_m is not None)
+    assert one.distance_m == pytest.approx(60.0, abs=1.0)
+    assert one.velocity_mps is not None
+    assert abs(one.velocity_mps[0]) < 3.0
+    assert one.ranges == 20, "its place was not begun anew"

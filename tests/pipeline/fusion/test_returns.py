@@ -1,0 +1,97 @@
+"""Single LiDAR returns as the range of a far vehicle: what is taken for one, and what is not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from pipeline.alignment.projection import Alignment, resolve
+from pipeline.fusion.returns import SIGMA_M, range_boxes
+from pipeline.params import AlignmentParams, FusionParams
+from pipeline.types import F32, I32, CameraCalibration, Detection, Ground, Point3, VisionMeasurement
+
+AT_M = 50.0
+BOX = (980.0, 270.0, 1044.0, 330.0)
+"""What a car 50 m ahead looks like: 1.8 m across, 1.7 m high, its wheels 0.8 m below the camera."""
+
+
+def aligned() -> Alignment:
+    K = np.array([[1800.0, 0.0, 1012.0], [0.0, 1800.0, 300.0], [0.0, 0.0, 1.0]])
+    T_camera_ego = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
+    found = resolve(AlignmentParams(), CameraCalibration(K, np.zeros(5), T_camera_ego, 2048, 618))
+    assert found is not None
+    return found
+
+
+class FlatRoad:
+    """0.8 m under the sensor."""
+
+    def height(self, xy: np.ndarray) -> np.ndarray:
+        return np.full(len(xy), -0.8)
+
+
+@dataclass
+class Sweep:
+    points: F32
+    kind: I32
+    ground: Ground | None = FlatRoad()  # type: ignore[assignment]
+    origin: Point3 = (0.0, 0.0, 0.0)
+
+
+@dataclass
+class Scene:
+    """Points, each (x, y, z, kind)."""
+
+    rows: list[tuple[float, float, float, int]] = field(default_factory=list)
+
+    def sweep(self) -> Sweep:
+        table = np.array(self.rows, dtype=np.float64).reshape(-1, 4)
+        points = np.column_stack([table[:, :3], np.full(len(table), 50.0)]).astype(np.float32)
+        return Sweep(points, table[:, 3].astype(np.int32))
+
+
+def box(label: str = "car", distance_m: float = AT_M) -> VisionMeasurement:
+    return VisionMeasurement(Detection(BOX, label, 0.8), distance_m, 0.2 * distance_m, (distance_m, 0.0), 0.05, 0.2)
+
+
+LOOSE, GROUND, CLUSTER = -2, -1, 3
+ON_IT = (46.0, 0.2, 0.0, LOOSE)
+
+
+@pytest.mark.parametrize(
+    ("case", "rows", "expected_m"),
+    [
+        ("one return", [ON_IT], 46.0),
+        ("two of one range, and the road under it", [ON_IT, (46.2, -0.3, 0.0, LOOSE), (46.0, 0.0, -0.8, GROUND)], 46.0),
+        ("nothing", [], None),
+        ("the road", [(46.0, 0.0, -0.7, LOOSE)], None),
+        ("a bridge", [(46.0, 0.0, 3.0, LOOSE)], None),
+        ("beside the box", [(46.0, 1.5, 0.0, LOOSE)], None),
+        ("far nearer than any vehicle of that height", [(25.0, 0.1, 0.0, LOOSE)], None),
+        ("far beyond it", [(95.0, 0.1, 0.0, LOOSE)], None),
+        ("a cluster's point", [(46.0, 0.2, 0.0, CLUSTER)], None),
+        ("a wall that goes on to both sides", [ON_IT, (46.0, 1.2, 0.0, LOOSE), (46.0, -1.2, 0.0, LOOSE)], None),
+        ("a rail that ends behind it", [ON_IT, (46.0, 1.2, 0.0, LOOSE)], 46.0),
+        ("another car at another range beside it", [ON_IT, (70.0, 1.7, 0.0, LOOSE), (30.0, -0.8, 0.0, LOOSE)], 46.0),
+        ("two things fit as well", [(46.0, 0.2, 0.0, LOOSE), (54.0, -0.2, 0.0, LOOSE)], None),
+    ],
+)
+def test_which_returns_are_a_vehicles(
+    case: str, rows: list[tuple[float, float, float, int]], expected_m: float | None
+) -> None:
+    (found,) = range_boxes((box(),), Scene(rows).sweep(), aligned(), FusionParams()) or ()
+    assert (found.ranged_m and round(found.ranged_m, 1)) == expected_m, case
+    assert found.distance_m == AT_M, "the law's own distance stays what it was"
+    assert (found.returns > 0) == (expected_m is not None)
+    assert expected_m is None or found.ranged_sigma_m == SIGMA_M
+
+
+def test_who_is_not_asked() -> None:
+    seen = (box("person"), box(distance_m=15.0))
+    sweep = Scene([ON_IT, (15.0, 0.1, 0.0, LOOSE)]).sweep()
+    assert range_boxes(seen, sweep, aligned(), FusionParams()) == seen
+    assert range_boxes((box(),), sweep, aligned(), FusionParams(single_returns=False)) == (box(),)
+    assert range_boxes((box(),), sweep, None, FusionParams()) == (box(),)
+    assert range_boxes(None, sweep, aligned(), FusionParams()) is None
