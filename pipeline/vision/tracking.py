@@ -13,69 +13,27 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.common import kalman
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64, iou_matrix
-from pipeline.common.kalman import CvState
 from pipeline.params import VisionTrackingParams
 from pipeline.types import Box, VisionMeasurement, VisionTrack
-from pipeline.vision import place_filter
 from pipeline.vision.association import Expected, match, same_kind
-from pipeline.vision.place_filter import Sighting
-from pipeline.vision.vehicle_height import Height, learn
+from pipeline.vision.followed import Followed, SpeedGuess, learned, predict_place, take_place, with_place
 
 SPEED_SIGMA_MPS = 8.0
 """How fast a new object may be closing in or away, before a second sighting tells."""
-FASTEST_OVER_GROUND_MPS = 70.0
-"""250 km/h: nothing on a road is faster, and a filter that says so has run away."""
-FASTEST_ONCOMING_MPS = 45.0
-"""160 km/h: the same for what comes towards us."""
 _CAR_WIDTH_M = 1.8
 """Turns box widths into metres, so that a box's motion in the picture is as lively as its object's on the road."""
 _CENTRE_NOISE = 0.04
 """Noise of a box's centre, in box widths."""
 _EDGE_PX = 2.0
 """Noise of a box's edges, however small it is."""
-_SETTLED = 3
-"""Sightings after which a place is trusted against a single one that contradicts it."""
 _TURN_PXPS2 = 150.0
 """How hard the picture may begin to turn: 0.2 rad/s² of the car through a lens of 720 px."""
-
-
-@dataclass(frozen=True)
-class Followed:
-    """One object between two pictures."""
-
-    track: VisionTrack
-    unseen_s: float
-    """Since its last sighting."""
-    unplaced_s: float
-    """Since the last distance that was taken in."""
-    placed: int
-    """Distances taken in since the place was last begun."""
-    box_filter: CvState
-    """The centre of its box, pixels."""
-    place_filter: CvState | None
-    """Its place and relative velocity, ego x y."""
-    votes: tuple[tuple[str, float], ...]
-    """Summed score of each class name."""
-    refused: int = 0
-    """Distances refused in a row."""
-    height: Height = Height()
-    """How tall it is for its class."""
-    seen: VisionMeasurement | None = None
-    """This picture's sighting with a distance; None without one."""
-
-
-class SpeedGuess(NamedTuple):
-    """What a new object's relative speed along ego x is taken for, and its standard deviation along each axis."""
-
-    along_mps: float
-    sigma_mps: float
 
 
 @dataclass(frozen=True)
@@ -131,25 +89,13 @@ def learn_heights(
     """
     if params.filter == "queue" or not ranges:
         return state
-    return evolve(state, followed=tuple(_learned(followed, ranges, params) for followed in state.followed))
-
-
-def _learned(followed: Followed, ranges: Mapping[int, tuple[float, float]], params: VisionTrackingParams) -> Followed:
-    measured, seen = ranges.get(followed.track.id), followed.seen
-    if (
-        not params.learn_height
-        or measured is None
-        or seen is None
-        or seen.distance_m is None
-        or not seen.noise_share
-        or not seen.size_share
-    ):
-        return followed
-    height = learn(followed.height, seen.distance_m, seen.noise_share, seen.size_share, *measured)
-    place = followed.place_filter
-    if place is not None and height != followed.height:
-        place = place_filter.scaled(place, height.factor / followed.height.factor)
-    return evolve(followed, height=height, place_filter=place)
+    return evolve(
+        state,
+        followed=tuple(
+            learned(each, *ranges[each.track.id], params) if each.track.id in ranges else each
+            for each in state.followed
+        ),
+    )
 
 
 def _expected(followed: Followed, params: VisionTrackingParams) -> Expected:
@@ -177,27 +123,14 @@ def _predict(followed: Followed, dt_s: float, params: VisionTrackingParams) -> F
     box = followed.track.bbox
     lively = params.accel_sigma_mps2 * _width(box) / _CAR_WIDTH_M + _TURN_PXPS2
     moved = kalman.predict(followed.box_filter, dt_s, lively)
-    place, scale = _predict_place(aged, dt_s, params)
+    place, scale = predict_place(aged, dt_s, params)
     track = evolve(followed.track, carried=True, measured=False, returns=0, bbox=_around(moved.mean, box, scale))
     if place is not None:
-        track = _shown(track, place, followed.placed)
+        track = with_place(track, place, followed.placed)
     elif followed.place_filter is not None:
         track = evolve(track, distance_m=None, sigma_m=None, position=None, velocity_mps=None)
     placed = followed.placed if place is not None or followed.place_filter is None else 0
     return evolve(aged, box_filter=moved, place_filter=place, placed=placed, track=track)
-
-
-def _predict_place(followed: Followed, dt_s: float, params: VisionTrackingParams) -> tuple[CvState | None, float]:
-    """The place a moment later, and how much the box has grown as the range changed. A place not measured for
-    ``max_missed_s`` is forgotten, though its box be seen (it may be too near to be measured)."""
-    if followed.place_filter is None:
-        return None, 1.0
-    moved = kalman.predict(followed.place_filter, dt_s, params.accel_sigma_mps2)
-    (before_x, before_y), (x, y) = followed.place_filter.mean[:2].tolist(), moved.mean[:2].tolist()
-    before_m, now_m = math.hypot(before_x, before_y), math.hypot(x, y)
-    if followed.unplaced_s > params.max_missed_s or now_m <= 0.0 or x <= 0.0:
-        return None, 1.0
-    return moved, before_m / now_m
 
 
 def _first_guess(ego_speed_mps: float | None) -> SpeedGuess:
@@ -228,7 +161,7 @@ def _new(track_id: int, seen: VisionMeasurement, guess: SpeedGuess, params: Visi
     box_filter = kalman.start(_centre(detection.bbox), noise, speed_sigma)
     votes = ((detection.label, detection.score),)
     followed = Followed(shown, 0.0, 0.0 if seen.position else math.inf, 0, box_filter, None, votes)
-    return _place(followed, seen, guess, None, params) if params.filter == "kalman" else followed
+    return take_place(followed, seen, guess, None, params) if params.filter == "kalman" else followed
 
 
 def _seen(
@@ -259,86 +192,11 @@ def _seen(
     if params.filter == "queue":
         track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position)
     current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter)
-    return _place(current, seen, guess, ego_speed_mps, params) if params.filter == "kalman" else current
+    return take_place(current, seen, guess, ego_speed_mps, params) if params.filter == "kalman" else current
 
 
 def _missed(followed: Followed) -> Followed:
     return evolve(followed, track=evolve(followed.track, missed=followed.track.missed + 1))
-
-
-def _place(
-    followed: Followed,
-    seen: VisionMeasurement,
-    guess: SpeedGuess,
-    ego_speed_mps: float | None,
-    params: VisionTrackingParams,
-) -> Followed:
-    """The measured place taken in, or refused when it cannot be that object's. When it is refused for long, the
-    distances are right and the filter is wrong: it starts anew from them, and its speed has to be measured again."""
-    if seen.position is None or seen.sigma_m is None or seen.distance_m is None:
-        if followed.place_filter is not None:
-            return evolve(followed, track=_shown(followed.track, followed.place_filter, followed.placed))
-        return evolve(followed, track=evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m))
-    share, own_m = seen.sigma_m / seen.distance_m, seen.distance_m * followed.height.factor
-    if seen.size_share is not None:
-        pixel_share = math.sqrt(max(share**2 - seen.size_share**2, 0.0))
-        share = math.hypot(pixel_share, followed.height.share(seen.size_share))
-    followed = evolve(followed, seen=seen)
-    noise_share = seen.noise_share if seen.noise_share is not None else share
-    if seen.ranged_m is not None:
-        # what the height is learned to be moves the place there first, so that it is no motion
-        followed = _learned(followed, {followed.track.id: (seen.ranged_m, seen.ranged_sigma_m)}, params)
-        own_m, share = seen.ranged_m, seen.ranged_sigma_m / seen.ranged_m
-        noise_share = share
-    sighting = Sighting(
-        own_m,
-        math.atan2(seen.position[1], seen.position[0]),
-        noise_share,
-        math.radians(params.bearing_sigma_deg),
-    )
-    filtered, placed = followed.place_filter, followed.placed + 1
-    if filtered is not None and place_filter.surprise(filtered, sighting) > params.max_nis:
-        # one or two sightings have no standing against a third that contradicts them
-        if followed.placed >= _SETTLED and followed.refused + 1 < params.restart_after:
-            shown = evolve(_shown(followed.track, filtered, followed.placed), measured=False)
-            return evolve(followed, track=shown, refused=followed.refused + 1)
-        filtered = None
-    elif filtered is not None:
-        filtered = place_filter.update(filtered, sighting)
-        if not _is_plausible(filtered, ego_speed_mps):
-            filtered = None
-    if filtered is None:
-        filtered, placed = place_filter.start(sighting, guess.along_mps, guess.sigma_mps), 1
-    track = evolve(_shown(followed.track, filtered, placed, share), returns=seen.returns)
-    return evolve(followed, track=track, place_filter=filtered, placed=placed, unplaced_s=0.0, refused=0)
-
-
-def _is_plausible(place: CvState, ego_speed_mps: float | None) -> bool:
-    """Whether something on a road can move so. Without own speed only twice the limits can be told."""
-    along_mps = float(place.mean[2])
-    own = ego_speed_mps if ego_speed_mps is not None else 0.0
-    spare = 0.0 if ego_speed_mps is not None else FASTEST_ONCOMING_MPS
-    return -FASTEST_ONCOMING_MPS - spare <= along_mps + own <= FASTEST_OVER_GROUND_MPS + spare
-
-
-def _shown(track: VisionTrack, place: CvState, placed: int, share: float | None = None) -> VisionTrack:
-    """The track with its public numbers, from its filter. ``share``: sigma over distance of the measurement taken in.
-
-    The sigma shown never falls below that of one sighting: most of it is the object's own unknown height, an error
-    that no number of sightings averages out.
-    """
-    x, y, vx, vy = place.mean.tolist()
-    range_m, filter_sigma = math.hypot(x, y), place_filter.range_sigma_m(place)
-    if share is None:
-        share = track.sigma_m / track.distance_m if track.sigma_m and track.distance_m else 0.0
-    return evolve(
-        track,
-        distance_m=range_m,
-        sigma_m=max(filter_sigma, share * range_m),
-        position=(x, y),
-        velocity_mps=(vx, vy) if placed >= 2 else None,
-        ranges=placed,
-    )
 
 
 def _box_noise(box: Box, params: VisionTrackingParams) -> F64:
