@@ -49,6 +49,26 @@ def input_size(model: onnx.ModelProto) -> Size | None:
     return (height, width) if height and width else None
 
 
+def with_unit_picture(model: onnx.ModelProto) -> onnx.ModelProto:
+    """A graph whose second input is the size of the original picture (N, 2), as DETR exports have it, with that bound
+    to 1 × 1: its boxes become shares of the input's sides. Any other graph as it is."""
+    weights = {tensor.name for tensor in model.graph.initializer}
+    inputs = [value for value in model.graph.input if value.name not in weights]
+    sizes = inputs[1:]
+    if len(sizes) != 1 or sizes[0].type.tensor_type.elem_type != onnx.TensorProto.INT64:
+        return model
+    dims = sizes[0].type.tensor_type.shape.dim
+    if len(dims) != 2 or dims[1].dim_value != 2:
+        return model
+    bound = onnx.ModelProto()
+    bound.CopyFrom(model)
+    bound.graph.initializer.append(onnx.helper.make_tensor(sizes[0].name, onnx.TensorProto.INT64, (1, 2), (1, 1)))
+    kept = [value for value in bound.graph.input if value.name != sizes[0].name]
+    del bound.graph.input[:]
+    bound.graph.input.extend(kept)
+    return bound
+
+
 def with_input_size(model: onnx.ModelProto, size: Size) -> onnx.ModelProto:
     """A copy that takes 1×3×size. Every declared shape after the input is dropped and inferred anew; where the graph
     holds its old size in constants that leaves contradictions, which the runtime then reports."""

@@ -18,7 +18,7 @@ import onnxruntime as ort
 from pipeline.common.data_dir import file_sha256
 from pipeline.inference import model_registry
 from pipeline.inference.distance_laws import find_law
-from pipeline.inference.graph import MULTIPLE, Size, fitting_size, input_size, with_input_size
+from pipeline.inference.graph import MULTIPLE, Size, fitting_size, input_size, with_input_size, with_unit_picture
 from pipeline.inference.runtime import DetectorError, DetectorMissing, find_graph, open_session, read_graph, run_session
 from pipeline.types import F32, REAL_VEHICLES, U8, DistanceLaw, RawBoxes
 from pipeline.vision.classes import class_names
@@ -107,7 +107,7 @@ def open_detector(
     """
     path = _locate(spec)
     notes = (_SIMULATED_ONLY,) if spec is None and path == model_registry.find(model_registry.EMBEDDED) else ()
-    model = read_graph(path)
+    model = with_unit_picture(read_graph(path))
     own = _own_size(model, path)
     if input_size is not None:
         if min(input_size) < MULTIPLE or any(side % MULTIPLE for side in input_size):

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from pipeline.inference.graph import Size
 from pipeline.types import F32
-from pipeline.vision.heads import end_to_end, yolov3, yolov5, yolov6, yolov8, yolox
+from pipeline.vision.heads import detr, end_to_end, yolov3, yolov5, yolov6, yolov8, yolox
 from pipeline.vision.heads.decoder import Answer, Decoder, Head, UnknownHead
 
 __all__ = ["HEADS", "Decoder", "Head", "UnknownHead", "pick_decoder"]
@@ -18,6 +18,7 @@ HEADS: tuple[Head, ...] = (
     yolov3.MAPS,
     yolov5.MAPS,
     end_to_end.MARKED,
+    detr.LABELS_BOXES_SCORES,
     yolox.RAW,
     yolov6.ROWS,
     yolox.DECODED,

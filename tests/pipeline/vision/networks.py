@@ -91,6 +91,45 @@ def yolov8(path: Path, size: tuple[int, int] = (64, 64)) -> Path:
     return _save(path, nodes, weights, ["output"], size, names="{0: 'Pedestrian', 1: 'lorry'}")
 
 
+def detr(path: Path) -> Path:
+    """A DETR-shaped network of 64×64 with a second input for the size of the picture, in whose pixels its boxes are: a
+    car in the left upper quarter and a person on the right. Both score the picture's mean red."""
+    weights = [
+        _constant("shares", np.array([[[0.0, 0.0, 0.5, 0.5], [0.75, 0.0, 1.0, 1.0]]], np.float32)),
+        _constant("numbers", np.array([[2, 0]], np.int64)),
+        _constant("only", np.array([1.0, 0.0, 0.0], np.float32).reshape(1, 3, 1, 1)),
+        _constant("flat", np.array([1, 1], np.int64)),
+        _constant("both", np.array([[1.0, 1.0]], np.float32)),
+    ]
+    nodes = [
+        helper.make_node("Cast", ["orig_target_sizes"], ["sides"], to=TensorProto.FLOAT),
+        helper.make_node("Concat", ["sides", "sides"], ["corners"], axis=1),
+        helper.make_node("Mul", ["shares", "corners"], ["boxes"]),
+        helper.make_node("Identity", ["numbers"], ["labels"]),
+        helper.make_node("GlobalAveragePool", ["images"], ["mean"]),
+        helper.make_node("Mul", ["mean", "only"], ["red"]),
+        helper.make_node("ReduceSum", ["red"], ["sum"], keepdims=1),
+        helper.make_node("Reshape", ["sum", "flat"], ["one"]),
+        helper.make_node("Mul", ["one", "both"], ["scores"]),
+    ]
+    graph = helper.make_graph(
+        nodes,
+        "tiny",
+        [
+            helper.make_tensor_value_info("images", TensorProto.FLOAT, ["N", 3, 64, 64]),
+            helper.make_tensor_value_info("orig_target_sizes", TensorProto.INT64, ["N", 2]),
+        ],
+        [
+            helper.make_tensor_value_info("labels", TensorProto.INT64, None),
+            helper.make_tensor_value_info("boxes", TensorProto.FLOAT, None),
+            helper.make_tensor_value_info("scores", TensorProto.FLOAT, None),
+        ],
+        weights,
+    )
+    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=IR_VERSION), path)
+    return path
+
+
 def classifier(path: Path) -> Path:
     """A network that is no detector."""
     return _save(path, [helper.make_node("GlobalAveragePool", ["images"], ["output"])], [], ["output"], (64, 64))

@@ -98,6 +98,17 @@ def test_v8_gets_rgb_between_0_and_1_and_names_its_classes(tmp_path: Path) -> No
     assert len(detector.detect(red[..., ::-1].copy()).scores) == 0
 
 
+def test_a_detr_gives_boxes_in_the_pictures_pixels(tmp_path: Path) -> None:
+    detector = open_detector(str(networks.detr(tmp_path / "detr.onnx")), None)
+    assert (detector.head, detector.input_size) == ("DETR", (64, 64))
+    red = np.zeros((256, 256, 3), np.uint8)
+    red[..., 2] = 204
+    raw = detector.detect(red)
+    assert raw.labels == ("car", "person")
+    assert raw.scores.tolist() == pytest.approx([0.8, 0.8], abs=1e-5)
+    np.testing.assert_allclose(raw.boxes, [[0, 0, 128, 128], [192, 0, 256, 256]])
+
+
 def test_the_rest_of_the_input_is_grey(tmp_path: Path) -> None:
     """A black picture that fills a quarter of the input leaves a mean of three quarters of 114."""
     detector = open_detector(str(networks.yolov8(tmp_path / "v8.onnx")), None)
