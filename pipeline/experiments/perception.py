@@ -12,6 +12,7 @@ from pipeline.simulation.closed_loop import Eyes, NetworkEyes, TruthEyes
 from pipeline.simulation.sensors.camera import HEIGHT, WIDTH
 from pipeline.simulation.sensors.detection_model import BoxNoise, Detections
 from pipeline.vision.detector import Detector, open_detector
+from pipeline.vision.far_view import FarView, open_far_view
 
 Boxes = Literal["truth", "network"]
 """Whose the camera's boxes are: projected truth with a detector's errors, or the embedded network's on drawn
@@ -33,8 +34,14 @@ def embedded() -> Detector:
     return open_detector(EMBEDDED, (WIDTH, HEIGHT))
 
 
+@cache
+def embedded_far_view() -> FarView | None:
+    """Its second look at the same pictures."""
+    return open_far_view(embedded(), (WIDTH, HEIGHT))
+
+
 def eyes_for(boxes: Boxes) -> Eyes:
-    return TruthEyes() if boxes == "truth" else NetworkEyes(embedded())
+    return TruthEyes() if boxes == "truth" else NetworkEyes(embedded(), embedded_far_view())
 
 
 def detections_for(boxes: Boxes) -> Detections | None:

@@ -28,6 +28,7 @@ from pipeline.simulation.world.world_state import World
 from pipeline.step import State, step
 from pipeline.types import AccCommand, Frame, Result
 from pipeline.vision.detector import Detector
+from pipeline.vision.far_view import FarView
 from pipeline.warm_up import warm_up
 
 STEP_S = 0.005
@@ -61,10 +62,11 @@ class NetworkEyes:
     """The real network on the drawn picture."""
 
     detector: Detector
+    far: FarView | None = None
     needs_picture: bool = True
 
     def look(self, frame: Frame, now: World, seed: int) -> Frame:
-        return detect(frame, Detectors(self.detector))
+        return detect(frame, Detectors(self.detector, far=self.far))
 
 
 @dataclass(frozen=True)
