@@ -7,6 +7,7 @@ Where the path is not known well enough to tell the lead, ACC does not accelerat
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -100,11 +101,24 @@ def follow(ego: EgoState, cipv: Cipv | None, params: AccParams) -> Demand:
         return cruise(params)
     wanted = desired_gap_m(ego.speed_mps, params)
     if cipv.distance_m > wanted:
+        safe = _approach_speed_mps(ego, cipv, params)
+        if safe < min(ego.speed_mps, set_speed):
+            return Demand(safe, "follow", f"closing in on lead #{cipv.id} too fast", cipv.id)
         return Demand(set_speed, "cruise", f"lead #{cipv.id} beyond the desired gap of {wanted:.1f} m")
     if cipv.distance_m <= params.min_gap_m:
         return Demand(0.0, "stop", f"lead #{cipv.id} within the minimum gap of {params.min_gap_m:.1f} m", cipv.id)
     speed = ego.speed_mps * (cipv.distance_m - params.min_gap_m) / (wanted - params.min_gap_m)
     return Demand(min(speed, set_speed), "follow", f"lead #{cipv.id} within the desired gap of {wanted:.1f} m", cipv.id)
+
+
+def _approach_speed_mps(ego: EgoState, cipv: Cipv, params: AccParams) -> float:
+    """The speed from which braking by ``approach_decel_mps2`` still ends at the lead's speed and the gap desired there.
+    The paper's law begins at the desired gap, which is too late for a slow lead: from 100 km/h it would take 9 m/s²."""
+    if params.approach_decel_mps2 <= 0.0 or cipv.closing_speed_mps is None:
+        return math.inf
+    lead_mps = max(ego.speed_mps - cipv.closing_speed_mps, 0.0)
+    spare_m = max(cipv.distance_m - desired_gap_m(lead_mps, params), 0.0)
+    return lead_mps + math.sqrt(2.0 * params.approach_decel_mps2 * spare_m)
 
 
 def avoid(ego: EgoState, situation: Situation, params: AccParams) -> list[Demand]:

@@ -137,7 +137,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "become_probability": 0.0,
             "stay_probability": 0.0,
         },
-        "acc": {"comfort_decel_mps2": 8.0},
+        "acc": {"comfort_decel_mps2": 8.0, "approach_decel_mps2": 0.0},
         "aeb": {"enabled": False},
     },
 }

@@ -120,6 +120,14 @@ class AccParams(Section):
     comfort_decel_mps2: float = slider(
         3.5, 0.5, 10.0, 0.1, "m/s²", "ACC brakes no harder for a lead on weak evidence (ISO 15622 permits 3.5 at speed)"
     )
+    approach_decel_mps2: float = slider(
+        2.5,
+        0.0,
+        10.0,
+        0.1,
+        "m/s²",
+        "A lead beyond the desired gap is slowed down for when it takes this; 0: not before the gap, as in the paper",
+    )
     brake_limit_mps2: float = slider(
         8.0,
         0.0,

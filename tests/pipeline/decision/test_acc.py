@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.decision.acc import AccState, control, desired_gap_m, pid
+from pipeline.decision.acc import AccState, control, desired_gap_m, follow, pid
 from pipeline.decision.cipv import CipvState, choose
 from pipeline.decision.object_motion import describe
 from pipeline.params import AccParams, CipvParams, MotionParams, PathParams
@@ -155,3 +155,25 @@ def test_on_an_unknown_path_acc_does_not_accelerate() -> None:
     assert follows is not None
     assert follows.state == "follow"
     assert follows.desired_speed_mps == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(
+    ("case", "distance_m", "closing_mps", "allowed_mps"),
+    [
+        ("standing, far enough away", 200.0, 27.0, None),
+        ("standing, 100 m ahead", 100.0, 27.0, 21.8),
+        ("as fast as we are", 70.0, 0.0, None),
+        ("slower by 10 m/s, near the gap", 55.0, 10.0, 26.85),
+        ("closing speed not known", 60.0, None, None),
+    ],
+)
+def test_a_slow_lead_is_slowed_down_for_before_the_gap(
+    case: str, distance_m: float, closing_mps: float | None, allowed_mps: float | None
+) -> None:
+    ego = EgoState(0, 27.0)
+    demand = follow(ego, Cipv(1, distance_m, closing_mps, None, ""), AccParams())
+    assert demand.object_id == (1 if allowed_mps else None), case
+    if allowed_mps is not None:
+        assert demand.speed_mps == pytest.approx(allowed_mps, abs=0.1), case
+    off = follow(ego, Cipv(1, distance_m, closing_mps, None, ""), AccParams(approach_decel_mps2=0.0))
+    assert off.state == "cruise", "as in the paper"
