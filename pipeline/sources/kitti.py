@@ -174,7 +174,7 @@ class KittiSource:
         except SourceError as error:
             notes.append(str(error))
             return None, None
-        ego = EgoState(tick, oxts.speed_mps, oxts.yaw_rate_radps)
+        ego = EgoState(tick, oxts.speed_mps, oxts.yaw_rate_radps, source="ins")
         if oxts.quality is None:
             return ego, None
         place = (oxts.lat_deg, oxts.lon_deg, oxts.alt_m, oxts.course_rad)

@@ -10,11 +10,11 @@ from pipeline.common.fast_replace import evolve
 from pipeline.common.nearest_in_time import Timeline, nearest
 from pipeline.common.progress import Progress, silent
 from pipeline.common.user_file_errors import given_path, reason_of
+from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.formats import video_file as video_files
 from pipeline.formats.file_reading import files_by_name
 from pipeline.formats.nmea import NmeaReader
 from pipeline.sources import rig as rig_files
-from pipeline.sources.live.gnss_motion import MotionFromGnss
 from pipeline.sources.uri_options import number_option
 from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Sweep
 from pipeline.types.source import SourceError
