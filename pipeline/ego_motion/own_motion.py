@@ -100,6 +100,8 @@ def measure(
     sources = [_usual(each) for each in given] + ([_of_lidar(placed)] if placed is not None else [])
     state, notes = OwnMotionState(odometry, courses), (note,) if note else ()
     trusted = [each for each in sources if _may(each.source, params)]
+    if recorded is not None and received is not None and params.source == "auto":
+        trusted = [each for each in trusted if each.source != "gnss"]  # as good as the car's own, but later
     if not trusted:
         return Measured(state, None, None, notes)
     speed = min(trusted, key=lambda each: each.speed_sigma_mps)
