@@ -30,8 +30,8 @@ _FEWEST_POINTS = 40
 _LEAST_FIT = 0.4
 """Share of structure that must lie on the sweeps before: 0.73 and more in a street, 0.5 along a bare motorway."""
 _ACCEL_MPS2, _JERK_MPS3 = 3.0, 2.0
-_TURN_RADPS2, _TURN_JERK_RADPS3 = 0.3, 0.3
-"""What cars do: braking to 3 m/s² without an emergency; a bend entered in two seconds."""
+_TURN_RADPS2, _TURN_JERK_RADPS3 = 0.2, 0.1
+"""What cars do: braking to 3 m/s² without an emergency; at 10 m/s, bends entered with a lateral jerk of 1 m/s³."""
 _GATE_SIGMAS = 5.0
 _FASTEST_MPS, _START_STEP_M = 45.0, 2.0
 """Without any motion known it is looked for up to this speed, in steps that registration bridges."""

@@ -80,7 +80,7 @@ def test_speed_and_yaw_rate_are_those_of_the_inertial_unit(data_dir: Path) -> No
     speed = np.array([ego.speed_mps - own.speed_mps for ego, own in measured])
     turning = np.array([degrees((ego.yaw_rate_radps or 0.0) - (own.yaw_rate_radps or 0.0)) for ego, own in measured])
     assert np.abs(speed).mean() <= 0.15
-    assert np.abs(turning).mean() <= 0.2
+    assert np.abs(turning).mean() <= 0.15
     sigmas = [result.own_motion.speed.speed_sigma_mps for result in results(data_dir, "auto") if result.own_motion]
     assert 0.3 < np.sqrt(np.mean((speed / sigmas) ** 2)) < 1.5, "errors are as large as it says"
 

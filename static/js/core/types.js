@@ -70,7 +70,7 @@
  * @property {number|null} object_id  object it slows down for
  *
  * @typedef {object} OwnMotion  where own speed and yaw rate are from
- * @property {string} speed_from
+ * @property {"can"|"ins"|"gnss"|"lidar"} speed_from
  * @property {number|null} speed_sigma_mps
  * @property {string|null} yaw_rate_from
  * @property {number|null} yaw_rate_sigma_radps
