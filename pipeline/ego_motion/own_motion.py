@@ -1,8 +1,8 @@
 """Own motion from whatever measures it: the surest source of the speed, and of the yaw rate.
 
 The car's bus and an inertial unit are surest, and cost nothing. A GNSS receiver has a good speed, and a yaw rate that
-lags. The LiDAR has both, and a rough moment behind it costs a frame's tenth of a second some ten milliseconds; it is
-asked where speed or yaw rate are missing, or come from GNSS. Sources that contradict each other are named."""
+lags. The LiDAR has both at some ten milliseconds a sweep; it is asked where speed or yaw rate are missing, or come from
+GNSS. Sources that contradict each other are named."""
 
 from __future__ import annotations
 
@@ -98,7 +98,8 @@ def measure(
             before.odometry, frame.sweep, seen.ground, seen.tracks, dt_s, prior if params.source == "auto" else None
         )
     sources = [_usual(each) for each in given] + ([_of_lidar(placed)] if placed is not None else [])
-    state, notes = OwnMotionState(odometry, courses), (note,) if note else ()
+    state = OwnMotionState(odometry, courses)
+    notes = (note,) if note and (params.source == "lidar" or not given) else ()
     trusted = [each for each in sources if _may(each.source, params)]
     if recorded is not None and received is not None and params.source == "auto":
         trusted = [each for each in trusted if each.source != "gnss"]  # as good as the car's own, but later

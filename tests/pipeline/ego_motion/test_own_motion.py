@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from pipeline.ego_motion import own_motion
@@ -60,6 +62,14 @@ def test_what_is_recorded_is_passed_on_as_it_is_and_the_lidar_not_asked() -> Non
     last = driven("auto", CAN)
     assert last.ego is CAN
     assert last.state.odometry.clouds == ()
+
+
+def test_a_lidar_that_sees_too_little_is_said_only_where_it_is_missed() -> None:
+    bare = Frame(1, "1", 0, seen(STREET[:3], 0.0, 0.0, 0.0, 1), gnss=fix(0, 12.0))
+    params, around = MotionParams(), Seen(ROAD, (), None)
+    assert own_motion.measure(OwnMotionState(), bare, None, around, 0.1, params).notes == ()
+    alone = own_motion.measure(OwnMotionState(), replace(bare, gnss=None), None, around, 0.1, params)
+    assert alone.notes == ("own motion from the LiDAR: too little stands around that is no vehicle",)
 
 
 def test_a_bus_that_counts_in_miles_is_contradicted() -> None:
