@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Literal
 
 from pipeline.detection import Detectors, LiveDetectors, Look, detect, look
 from pipeline.params import Params
-from pipeline.step import State, step
+from pipeline.step import State, measure_own_motion, step
 from pipeline.types import Frame, Result
 from pipeline.types.source import LiveSource, Source
 from pipeline.warm_up import warm_up
 
 _SILENCE_S = 0.5
+_BESIDE = ThreadPoolExecutor(thread_name_prefix="own-motion")
+"""Own motion is measured while detectors look at the picture."""
 
 Sensors = Literal["lidar", "camera", "both"]
 
@@ -50,8 +53,9 @@ def advance(
     Returns:
         The frame that ``step`` was given, the state after it, and the result.
     """
+    beside = _BESIDE.submit(measure_own_motion, state, only(frame, sensors), params)
     frame = sensed(frame, detectors, sensors, ask)
-    state, result = step(state, frame, params)
+    state, result = step(state, frame, params, beside.result())
     return frame, state, result
 
 

@@ -28,7 +28,7 @@ class SourceKind:
     files: tuple[str, ...] = ()
     """A folder with a file that matches one of these patterns is of this kind."""
     suffixes: tuple[str, ...] = ()
-    """A path that ends so is of this kind."""
+    """A file whose name ends so is of this kind."""
     bare_suffixes: tuple[str, ...] = ()
     """A path that ends so is opened without a scheme."""
     is_live: bool = False
@@ -62,7 +62,23 @@ KINDS: tuple[SourceKind, ...] = (
         "astyx", "astyx:<dir>", "pipeline.sources.astyx:open_recording", folders=("lidar_vlp16", "camera_front")
     ),
     SourceKind(
-        "kitti", "kitti:<dir>", "pipeline.sources.kitti:open_recording", folders=("velodyne", "velodyne_points")
+        "kitti",
+        "kitti:<dir>",
+        "pipeline.sources.kitti:open_recording",
+        folders=("velodyne", "velodyne_points"),
+        files=("*_drive_*",),
+    ),
+    SourceKind(
+        "video",
+        "video:<file>",
+        "pipeline.sources.camera_alone:open_video",
+        suffixes=(".mp4", ".avi", ".mkv", ".mov", ".mjpeg"),
+    ),
+    SourceKind(
+        "pictures",
+        "pictures:<dir>",
+        "pipeline.sources.camera_alone:open_pictures",
+        files=("*.jpg", "*.jpeg", "*.png"),
     ),
     SourceKind(
         "sim",

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pipeline.alignment import projection
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
-from pipeline.ego_motion import coasting
+from pipeline.ego_motion import coasting, own_motion
 from pipeline.fusion import agreement, existence, returns
 from pipeline.fusion import fuse as fusion
 from pipeline.lanes import road_lines as lanes
@@ -29,6 +29,7 @@ from pipeline.types import (
     Box,
     EgoState,
     Frame,
+    Ground,
     Layers,
     Moment,
     Result,
@@ -38,6 +39,9 @@ from pipeline.types import (
 )
 from pipeline.vision import distance, nms
 from pipeline.vision import tracking as vision_tracking
+
+_LATE_MS = 50.0
+"""Half of the time between two sweeps."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,8 @@ class State:
     existence: existence.ExistenceState = existence.ExistenceState()
     agreement: agreement.AgreementState = agreement.AgreementState()
     own: EgoState | None = None
+    measured: own_motion.OwnMotionState = own_motion.OwnMotionState()
+    ground: Ground | None = None
     lanes: lanes.LaneState = lanes.LaneState()
     path: corridor.PathState = corridor.PathState()
     cipv: cipv.CipvState = cipv.CipvState()
@@ -58,11 +64,14 @@ class State:
     aeb: aeb.AebState = aeb.AebState()
 
 
-def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
+def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured | None = None) -> tuple[State, Result]:
     """Run every stage on one frame. The networks have run before: their answers are ``frame.raw_boxes`` and
-    ``frame.raw_lanes`` (``pipeline.detection.detect``)."""
+    ``frame.raw_lanes`` (``pipeline.detection.detect``). motion: what ``measure_own_motion`` returned, where it ran
+    beside them."""
     clock = Stopwatch()
-    state, now = _begin(state, frame, params)
+    motion = motion if motion is not None else measure_own_motion(state, frame, params)
+    clock.lap("own_motion")
+    state, now = _begin(state, frame, motion.ego, params)
     aligned = projection.resolve(params.alignment, frame.camera)
 
     # LiDAR: what stands on the ground in this sweep, followed from sweep to sweep
@@ -126,14 +135,15 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         frame=frame.name,
         t_ns=frame.t_ns,
         sensors=SensorHealth.of(frame),
-        ego=frame.ego,
+        ego=motion.ego,
+        own_motion=motion.own,
         objects=objects,
         path=path,
         cipv=chosen.lead,
         next_cipv=chosen.next_lead,
         rejected=chosen.rejected,
         acc=command,
-        notes=(*frame.notes, *yaw_rate.doubts(frame.ego), *path.notes),
+        notes=(*frame.notes, *yaw_rate.doubts(frame.ego), *motion.notes, *path.notes),
         streams=frame.streams,
         timing_ms={**frame.timing_ms, **clock.timing_ms()},
         layers=layers,
@@ -146,6 +156,8 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
         existence=existence_state,
         agreement=agreement_state,
         own=now.motion,
+        measured=motion.state,
+        ground=sweep.ground,
         lanes=lane_state,
         path=path_state,
         cipv=cipv_state,
@@ -155,13 +167,32 @@ def step(state: State, frame: Frame, params: Params) -> tuple[State, Result]:
     return following, result
 
 
-def _begin(state: State, frame: Frame, params: Params) -> tuple[State, Moment]:
+def measure_own_motion(state: State, frame: Frame, params: Params) -> own_motion.Measured:
+    """Own motion in a frame, from whatever measures it. It needs nothing of the networks, so it may run beside them."""
+    dt_s = _since(state, frame, params)
+    seen = own_motion.Seen(state.ground, state.lidar.tracks, coasting.recent(state.own, params.motion))
+    before = state.measured if dt_s is not None else own_motion.OwnMotionState()
+    clock = Stopwatch()
+    found = own_motion.measure(before, frame, yaw_rate.believable(frame.ego), seen, dt_s, params.motion)
+    late_ms = clock.timing_ms()["total"]
+    if frame.streams and late_ms > _LATE_MS:  # of live sensors only: a recording's results do not depend on the clock
+        return found._replace(notes=(*found.notes, f"own motion from the LiDAR took {late_ms:.0f} ms"))
+    return found
+
+
+def _since(state: State, frame: Frame, params: Params) -> float | None:
+    """Seconds since the frame before; None at the start, after a gap and after a jump back in time."""
+    dt_s = (frame.t_ns - state.t_ns) / 1e9 if state.t_ns is not None else None
+    return dt_s if dt_s is not None and 0.0 < dt_s <= params.time.reset_gap_s else None
+
+
+def _begin(state: State, frame: Frame, measured: EgoState | None, params: Params) -> tuple[State, Moment]:
     """The state to go on from, and the moment. After a gap or a jump back in time the state is a fresh one, because a
     track carried over either would be a guess; only object ids go on, so that none is given twice."""
-    dt_s = (frame.t_ns - state.t_ns) / 1e9 if state.t_ns is not None else None
-    if dt_s is not None and not 0.0 < dt_s <= params.time.reset_gap_s:
-        state, dt_s = State(fusion=fusion.FusionState(next_id=state.fusion.next_id)), None
-    motion = coasting.follow(state.own, yaw_rate.believable(frame.ego), dt_s, params.motion)
+    dt_s = _since(state, frame, params)
+    if dt_s is None:
+        state = State(fusion=fusion.FusionState(next_id=state.fusion.next_id))
+    motion = coasting.follow(state.own, measured, dt_s, params.motion)
     return state, Moment(frame.t_ns, dt_s, motion, coasting.recent(motion, params.motion))
 
 

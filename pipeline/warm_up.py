@@ -12,6 +12,7 @@ from pipeline.common import kalman
 from pipeline.common.garbage_collection import collect_rarely
 from pipeline.common.geometry import iou_matrix
 from pipeline.decision import path_position
+from pipeline.ego_motion import registration, structure
 from pipeline.fusion import existence
 from pipeline.lanes import road_lines
 from pipeline.path import corridor
@@ -33,6 +34,8 @@ def _warm_up() -> None:
     one = np.eye(2)
     kalman.update(kalman.predict(kalman.start((0.0, 0.0), one, 1.0), 0.1, 1.0), (0.0, 0.0), one)
     iou_matrix(np.zeros((1, 4)), np.zeros((1, 4)))
+    structure.warm_up()
+    registration.warm_up()
     existence.warm_up()
     place_filter.warm_up()
     road_lines.warm_up()

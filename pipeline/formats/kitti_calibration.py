@@ -35,6 +35,14 @@ def parse_object_calibration(data: bytes, file: str, size: tuple[int, int]) -> K
     return _calibration(projection, rectify, _values(table, "Tr_velo_to_cam", (3, 4), file), file, size)
 
 
+def parse_odometry_calibration(data: bytes, file: str, size: tuple[int, int]) -> KittiCalibration:
+    """A sequence's ``calib.txt`` with P2 and Tr, which goes from the Velodyne to the rectified camera 0. SourceError
+    names the file and what is wrong."""
+    table = parse_key_values(data)
+    projection, to_camera = _values(table, "P2", (3, 4), file), _values(table, "Tr", (3, 4), file)
+    return _calibration(projection, np.eye(3), to_camera, file, size)
+
+
 def parse_raw_calibration(
     cam_to_cam: bytes, velo_to_cam: bytes, files: tuple[str, str], size: tuple[int, int]
 ) -> KittiCalibration:

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import onnx
+import onnx.numpy_helper
 
 Size = tuple[int, int]
 """Height and width of a network's input, pixels."""
@@ -67,6 +69,24 @@ def with_unit_picture(model: onnx.ModelProto) -> onnx.ModelProto:
     del bound.graph.input[:]
     bound.graph.input.extend(kept)
     return bound
+
+
+def with_empty_masks(model: onnx.ModelProto) -> onnx.ModelProto:
+    """A copy whose inputs beside the picture, of 1×1×height×width, are zeros of its own: masks that say which part of
+    the picture is padding, and here none is. The model itself where it has none."""
+    weights = {tensor.name for tensor in model.graph.initializer}
+    inputs = [value for value in model.graph.input if value.name not in weights]
+    shapes = {value.name: [dim.dim_value for dim in value.type.tensor_type.shape.dim] for value in inputs}
+    masks = [value for value in inputs[1:] if len(shapes[value.name]) == 4 and shapes[value.name][:2] == [1, 1]]
+    if not masks or not all(all(shapes[value.name]) for value in masks):
+        return model
+    filled = onnx.ModelProto()
+    filled.CopyFrom(model)
+    for value in masks:
+        zeros = np.zeros(shapes[value.name], np.float32)
+        filled.graph.initializer.append(onnx.numpy_helper.from_array(zeros, value.name))
+        filled.graph.input.remove(value)
+    return filled
 
 
 def with_input_size(model: onnx.ModelProto, size: Size) -> onnx.ModelProto:

@@ -92,6 +92,14 @@ KNOWN: tuple[KnownModel, ...] = (
         "MIT", "BDD100K, lane lines and drivable area",
     ),
     KnownModel(
+        "twinlitenetplus_small", "lanes", "https://github.com/chequanghuy/TwinLiteNetPlus", None, None,
+        "MIT", "BDD100K, lane lines and drivable area in half of TwinLiteNet's time; export it to ONNX",
+    ),
+    KnownModel(
+        "lstr_360x640", "lanes", "https://github.com/liuruijin17/LSTR", None, None,
+        "BSD-3-Clause", "TuSimple, motorways: lines as curves in a fourteenth of TwinLiteNet's time; export it to ONNX",
+    ),
+    KnownModel(
         "yolop", "lanes", "https://github.com/hustvl/YOLOP", None, None,
         "MIT", "BDD100K, lane lines, drivable area and cars; its weights/ folder has ONNX files",
     ),

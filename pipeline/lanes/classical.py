@@ -12,13 +12,11 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from pipeline.common.geometry import F64
+from pipeline.lanes.horizon import horizon_share
 from pipeline.types import U8, CameraCalibration, RawLanes
 
 NAME = "classical"
 _NOTE = "lane lines by colour and gradient (classical), without a network"
-_UNCALIBRATED_HORIZON = 0.57
-"""Share of the picture's height at which a dashboard camera sees the horizon, where no calibration says it."""
 _CAMERA_HEIGHT_M = 1.4
 """Of a camera behind a windshield; a tenth more or less changes the expected width of paint by as much."""
 _PAINT_WIDTH_M = 0.15
@@ -53,16 +51,8 @@ class ClassicalLanes:
 
 def open_classical(camera: CameraCalibration | None) -> ClassicalLanes:
     """For the pictures of a calibrated camera, or of an unknown one on a dashboard."""
-    if camera is None:
-        return ClassicalLanes(NAME, _UNCALIBRATED_HORIZON)
-    horizon = horizon_row(camera) / camera.height
-    return ClassicalLanes(f"{NAME}-{horizon:.3f}", horizon)
-
-
-def horizon_row(camera: CameraCalibration) -> float:
-    """The row in which ego +x vanishes, pixels; lens distortion is small there and left out."""
-    forward: F64 = camera.T_camera_ego[:3, :3] @ np.array([1.0, 0.0, 0.0])
-    return float(camera.K[1, 1] * forward[1] / forward[2] + camera.K[1, 2])
+    horizon = horizon_share(camera)
+    return ClassicalLanes(NAME if camera is None else f"{NAME}-{horizon:.3f}", horizon)
 
 
 @numba.njit(cache=True, nogil=True)

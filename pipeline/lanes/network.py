@@ -13,15 +13,18 @@ import numpy as np
 import onnxruntime as ort
 
 from pipeline.common.data_dir import file_sha256
-from pipeline.inference.graph import Size, input_size, with_input_size
+from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size
 from pipeline.inference.runtime import DetectorError, DetectorMissing, find_graph, open_session, read_graph, run_session
 from pipeline.lanes.heads import Head, UnknownLaneHead, pick_head
-from pipeline.types import F32, U8, RawLanes
+from pipeline.lanes.horizon import horizon_share
+from pipeline.types import F32, U8, CameraCalibration, RawLanes
 
 _FREE_SIZE: Size = (360, 640)
 """Input (height, width) of a graph of free size: that of the BDD100K networks."""
 _PADDING = 114
 _MIN_SCORE = 0.3
+_MOST_SKY = 0.6
+"""More of a picture than this is never cut off, whatever its calibration says."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,8 @@ class LaneNetwork:
     head: Head
     notes: tuple[str, ...]
     threads: int
+    horizon: float
+    """Where the camera sees the horizon, as a share of its picture's height."""
     _session: ort.InferenceSession = field(repr=False, compare=False)
 
     def detect(self, bgr: U8) -> RawLanes:
@@ -46,7 +51,7 @@ class LaneNetwork:
         """
         if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
             raise DetectorError(f"expected a picture of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
-        placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head)
+        placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head, self.horizon)
         found = self.head.points(run_session(self._session, self._blob(bgr, placed)))
         keep = found.score >= _MIN_SCORE
         uv = found.uv[keep] * (self.input_size[1], self.input_size[0])
@@ -78,8 +83,9 @@ class _Placed:
     shift: tuple[float, float]
 
 
-def open_lane_network(spec: str | None, threads: int = 2) -> LaneNetwork:
-    """Load a lane network by name or path; None: the default one (``pipeline.inference.model_registry``).
+def open_lane_network(spec: str | None, threads: int = 2, camera: CameraCalibration | None = None) -> LaneNetwork:
+    """Load a lane network by name or path; None: the default one (``pipeline.inference.model_registry``). camera: of
+    the pictures; None where it is not known.
 
     DetectorMissing when there is no file, DetectorError when the file is not a lane network that can be run.
     """
@@ -90,12 +96,12 @@ def open_lane_network(spec: str | None, threads: int = 2) -> LaneNetwork:
             f"{what}: run `cipv models pull twinlitenet`, or give an ONNX file with `--lanes PATH`, "
             "or use `--lanes classical`, which needs none."
         )
-    return _loaded(path, threads)
+    return _loaded(path, threads, horizon_share(camera))
 
 
-def _loaded(path: Path, threads: int) -> LaneNetwork:
+def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
     """The network, proven by a run on a grey picture."""
-    model = read_graph(path)
+    model = with_empty_masks(read_graph(path))
     try:
         own = input_size(model)
     except ValueError as error:
@@ -109,11 +115,13 @@ def _loaded(path: Path, threads: int) -> LaneNetwork:
     except UnknownLaneHead as error:
         raise DetectorError(f"{path.name}: {error}") from None
     name = f"{path.stem}-{file_sha256(path)[:12]}"
+    if head.horizon is not None:
+        name += f"-{horizon:.3f}"
     notes = (f"lane lines by the network {path.stem}",)
-    return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, threads, session)
+    return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, threads, horizon, session)
 
 
-def _placed(picture: Size, size: Size, head: Head) -> _Placed:
+def _placed(picture: Size, size: Size, head: Head, horizon: float) -> _Placed:
     (height, width), (rows, columns) = picture, size
     if head.fit == "letterbox":
         scale = min(rows / height, columns / width)
@@ -121,4 +129,7 @@ def _placed(picture: Size, size: Size, head: Head) -> _Placed:
         shift = (float((columns - fitted[1]) // 2), float((rows - fitted[0]) // 2))
         return _Placed(0, fitted, (fitted[1] / width, fitted[0] / height), shift)
     top = max(0, height - round(width * rows / columns)) if head.fit == "lower" else 0
+    if head.horizon is not None:
+        share = min(max((horizon - head.horizon) / (1.0 - head.horizon), 0.0), _MOST_SKY)
+        top = round(share * height)
     return _Placed(top, size, (columns / width, rows / (height - top)), (0.0, 0.0))

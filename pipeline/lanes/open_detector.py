@@ -36,9 +36,9 @@ def open_lanes(spec: str | None, camera: CameraCalibration | None, drawn: bool =
     if spec == OFF:
         return None
     if spec is not None and spec != CLASSICAL:
-        return open_lane_network(spec)
+        return open_lane_network(spec, camera=camera)
     if spec is None and not drawn and find_graph(None, "lanes") is not None:
-        return open_lane_network(None)
+        return open_lane_network(None, camera=camera)
     classical = open_classical(camera)
     if spec is None and not drawn:
         return replace(classical, notes=tuple(note + _REMEDY for note in classical.notes))

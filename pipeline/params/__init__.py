@@ -107,6 +107,7 @@ class Params(Section):
 PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "default": {},
     "paper": {
+        "motion": {"source": "can"},
         "box": {"method": "axis_aligned"},
         "lidar_tracking": {"filter": "trajectory", "rigid_sideways": False},
         "detection": {"far_view": False, "car_prior": 1.0},

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pipeline.params.declare import Section, choice, slider
 
 
 class MotionParams(Section):
     """When an object counts as moving, and how long own motion is trusted after it was last measured."""
 
+    source: Literal["auto", "can", "gnss", "lidar", "off"] = choice(
+        "auto",
+        "Own motion: auto: the best of what is recorded, and the LiDAR where speed or yaw rate are missing; can: the "
+        "car's bus, its odometry or inertial unit only; gnss: a GNSS receiver only; lidar: the LiDAR, compared with "
+        "what is recorded; off: none",
+    )
     moving_mps: float = slider(1.5, 0.1, 10.0, 0.1, "m/s", "Speed over ground above which an object is moving")
     coast_s: float = slider(
         2.0, 0.0, 5.0, 0.1, "s", "How long ACC and AEB go on with the last own speed when none is measured"

@@ -54,7 +54,7 @@ def follow(before: YawRate | None, ego: EgoState | None, dt_s: float | None, par
     measured = usable_rate(ego) if ego.coasting is None else None
     if measured is None:
         return before
-    noise = params.yaw_rate_sigma_radps**2
+    noise = params.yaw_rate_sigma_radps**2 + (ego.yaw_rate_sigma_radps or 0.0) ** 2
     if before is None:
         return YawRate(measured, noise)
     gain = before.variance / (before.variance + noise)

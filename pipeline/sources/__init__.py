@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import cast
 
@@ -27,7 +28,7 @@ __all__ = [
 
 
 def open_source(uri: str, *, rings: int = 16, progress: Progress = silent) -> Source:
-    """Open a recording: ``scheme:rest``, or the path of a session.
+    """Open a recording: ``scheme:rest``, or a path that is recognised by what is in it.
 
     Args:
         uri: what a person typed.
@@ -68,7 +69,7 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
     scheme, colon, rest = uri.partition(":")
     is_drive_letter = len(scheme) == 1
     if not colon or is_drive_letter or not scheme.isalnum():
-        bare = kind_of_bare(uri)
+        bare = kind_of_bare(uri) or _recognised(uri)
         if bare is None:
             raise SourceError(_about_bare_path(uri, live))
         return bare, uri
@@ -78,12 +79,36 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
     return kind, rest
 
 
-def _about_bare_path(path: str, live: bool) -> str:
-    """What to type instead of a path without a scheme."""
+def _recognised(uri: str) -> SourceKind | None:
+    """The kind of a path without a scheme, by what is in it; options may follow a question mark."""
     try:
-        scheme = looks_like(Path(path).expanduser()) if path else None
+        scheme = looks_like(Path(uri.partition("?")[0]).expanduser()) if uri else None
     except (OSError, RuntimeError, ValueError):
         scheme = None
-    if scheme is not None:
-        return f"{path}: the kind of recording is missing; it looks like {scheme}:{path}"
-    return f"{path}: not a source; type one of {usages(live=live)}"
+    return kind_named(scheme) if scheme is not None else None
+
+
+def _about_bare_path(uri: str, live: bool) -> str:
+    """What a path without a scheme that is of no known kind holds, and what to type instead."""
+    return f"{uri}: not a source{_holding(uri.partition('?')[0])}; type one of {usages(live=live)}"
+
+
+def _holding(path: str) -> str:
+    """What lies there, in words; empty where nothing does."""
+    try:
+        place = Path(path).expanduser()
+        if not path or not place.exists():
+            return ""
+        if place.is_file():
+            return f": a {place.suffix} file" if place.suffix else ": a file of no known kind"
+        inside = sorted(place.iterdir())
+        recordings = [each for each in inside if looks_like(each) is not None]
+    except (OSError, RuntimeError, ValueError):
+        return ""
+    if recordings:
+        return f": it holds recordings, for example {recordings[0]}"
+    folders = [each.name for each in inside if each.is_dir()]
+    kinds = Counter(each.suffix or "unnamed" for each in inside if each.is_file())
+    parts = [f"{count} {suffix} files" for suffix, count in kinds.most_common(3)]
+    parts += [f"folders {', '.join(folders[:4])}"] if folders else []
+    return f": it holds {' and '.join(parts) or 'nothing'}"

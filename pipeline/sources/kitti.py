@@ -1,8 +1,7 @@
-"""KITTI: HDL-64 and colour camera 2 (Geiger et al. 2013), as raw drives and as folders in the object benchmark's form.
+"""KITTI: HDL-64 and colour camera 2 (Geiger et al. 2013), as raw drives, folders in the object benchmark's form and
+odometry sequences.
 
-Raw: ``<date>_drive_NNNN_sync/{image_02,velodyne_points,oxts}/data`` with ``timestamps.txt`` beside each ``data`` and
-``calib_cam_to_cam.txt``, ``calib_velo_to_cam.txt`` one folder up. Object form: ``image_02`` (or ``image_2``),
-``velodyne``, ``calib``, ``label_2``, one file a frame.
+``pipeline.sources.kitti_layouts`` knows where each layout keeps what.
 
 The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 here, as a VLP-16's reflectivity.
 """
@@ -10,21 +9,13 @@ The ego frame is the Velodyne's axes. Intensity, 0–1 in the files, is 0–255 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.formats.file_reading import (
-    decode_picture,
-    files_by_name,
-    in_order,
-    picture_of,
-    read_bytes,
-    recording_folder,
-)
+from pipeline.formats.file_reading import decode_picture, picture_of, read_bytes, recording_folder
 from pipeline.formats.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
-from pipeline.formats.kitti_records import parse_labels, parse_oxts, parse_timestamps
+from pipeline.formats.kitti_records import parse_labels, parse_oxts
 from pipeline.sources.hdl64_rings import (
     NOMINAL_ELEVATIONS_DEG,
     RINGS,
@@ -36,26 +27,12 @@ from pipeline.sources.hdl64_rings import (
     rings_by_elevation,
     turns,
 )
+from pipeline.sources.kitti_layouts import Files, files_of, motion_of, sequence_calibration
 from pipeline.types import F32, F64, EgoState, Frame, GnssFix, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
 
 _STEP_NS = 100_000_000
 _NOMINAL_SIZE = (1242, 375)
-_PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
-
-
-@dataclass(frozen=True)
-class _Files:
-    """Where a recording keeps what; files by frame name, stamps by frame number."""
-
-    pictures: dict[str, Path]
-    sweeps: dict[str, Path]
-    oxts: dict[str, Path]
-    labels: dict[str, Path]
-    calibrations: dict[str, Path]
-    raw_calibration: tuple[Path, Path] | None
-    lidar_stamps: tuple[int, ...]
-    camera_stamps: tuple[int, ...]
 
 
 def open_recording(uri: str, rest: str, how: Opening) -> KittiSource:
@@ -71,13 +48,14 @@ class KittiSource:
             raise SourceError(f"{uri}: {rings} rings asked for; KITTI gives 16 (as a VLP-16) or 64")
         folder = recording_folder(path)
         self.uri, self.title, self.rate_hz = uri, folder.resolve().name, 10.0
-        self._files = _raw_files(folder) if _is_raw(folder) else _object_files(folder)
-        self._names = in_order(self._files.sweeps.keys() | self._files.pictures.keys())
+        self._files = files_of(folder)
+        self._names = self._files.names
         if not self._names:
             raise SourceError(f"{path}: not a KITTI recording: {_what_it_holds(folder)}")
         self._size = self._picture_size()
         self._calibration = self._first_calibration(path)
         self._ticks = _ticks(self._names, self._files)
+        self._moved = motion_of(self._files, self._calibration)
         self._elevations_deg = self._ring_elevations()
         self._channels = match_vlp16(self._elevations_deg) if rings == 16 else None
         self.notes = self._about()
@@ -168,13 +146,14 @@ class KittiSource:
         """Own speed and place, of the inertial unit, whose record belongs to the frame of its number."""
         path = self._files.oxts.get(name)
         if path is None:
-            return None, None
+            number = int(name) if name.isdecimal() else -1
+            return (self._moved[number] if 0 <= number < len(self._moved) else None), None
         try:
             oxts = parse_oxts(read_bytes(path), path.name)
         except SourceError as error:
             notes.append(str(error))
             return None, None
-        ego = EgoState(tick, oxts.speed_mps, oxts.yaw_rate_radps)
+        ego = EgoState(tick, oxts.speed_mps, oxts.yaw_rate_radps, source="ins")
         if oxts.quality is None:
             return ego, None
         place = (oxts.lat_deg, oxts.lon_deg, oxts.alt_m, oxts.course_rad)
@@ -195,8 +174,12 @@ class KittiSource:
             cameras, velodyne = self._files.raw_calibration
             names = (cameras.name, velodyne.name)
             return parse_raw_calibration(read_bytes(cameras), read_bytes(velodyne), names, self._size)
+        if self._files.sequence_calibration is not None:
+            return sequence_calibration(self._files.sequence_calibration, self._size)
         if not self._files.calibrations:
-            raise SourceError(f"{path}: no calibration: neither calib/*.txt nor calib_cam_to_cam.txt one folder up")
+            raise SourceError(
+                f"{path}: no calibration: neither calib.txt nor calib/*.txt nor calib_cam_to_cam.txt one folder up"
+            )
         first = next(iter(self._files.calibrations.values()))
         return parse_object_calibration(read_bytes(first), first.name, self._size)
 
@@ -231,7 +214,7 @@ class KittiSource:
             notes.append(f"{len(self._channels)} of a VLP-16's 16 rings remain: the HDL-64 reaches only about +3°")
         if not self._files.lidar_stamps and not self._files.camera_stamps:
             notes.append("no time stamps: 10 Hz assumed")
-        if not self._files.oxts:
+        if not self._files.oxts and not self._moved:
             notes.append("no ego speed recorded")
         return tuple(notes)
 
@@ -254,47 +237,7 @@ def parse_velodyne(data: bytes, file: str, notes: list[str]) -> F32:
     return np.ascontiguousarray(kept * np.array([1.0, 1.0, 1.0, 255.0]), dtype=np.float32)
 
 
-def _is_raw(folder: Path) -> bool:
-    return any((folder / sensor / "data").is_dir() for sensor in ("velodyne_points", "image_02"))
-
-
-def _raw_files(folder: Path) -> _Files:
-    names = ("calib_cam_to_cam.txt", "calib_velo_to_cam.txt")
-    home = folder.resolve().parent if not (folder / names[0]).exists() else folder
-    return _Files(
-        pictures=files_by_name(folder / "image_02" / "data", _PICTURE_SUFFIXES),
-        sweeps=files_by_name(folder / "velodyne_points" / "data", (".bin",)),
-        oxts=files_by_name(folder / "oxts" / "data", (".txt",)),
-        labels={},
-        calibrations={},
-        raw_calibration=(home / names[0], home / names[1]),
-        lidar_stamps=_read_stamps(folder / "velodyne_points" / "timestamps.txt"),
-        camera_stamps=_read_stamps(folder / "image_02" / "timestamps.txt"),
-    )
-
-
-def _object_files(folder: Path) -> _Files:
-    pictures = files_by_name(folder / "image_02", _PICTURE_SUFFIXES)
-    return _Files(
-        pictures=pictures or files_by_name(folder / "image_2", _PICTURE_SUFFIXES),
-        sweeps=files_by_name(folder / "velodyne", (".bin",)),
-        oxts={},
-        labels=files_by_name(folder / "label_2", (".txt",)),
-        calibrations=files_by_name(folder / "calib", (".txt",)),
-        raw_calibration=None,
-        lidar_stamps=(),
-        camera_stamps=(),
-    )
-
-
-def _read_stamps(path: Path) -> tuple[int, ...]:
-    try:
-        return parse_timestamps(path.read_bytes())
-    except OSError:
-        return ()
-
-
-def _ticks(names: list[str], files: _Files) -> list[int]:
+def _ticks(names: list[str], files: Files) -> list[int]:
     """The tick of every frame; one without a stamp follows the frame before it by 0.1 s."""
     ticks: list[int] = []
     for name in names:

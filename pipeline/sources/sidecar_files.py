@@ -10,19 +10,19 @@ from pipeline.common.fast_replace import evolve
 from pipeline.common.nearest_in_time import Timeline, nearest
 from pipeline.common.progress import Progress, silent
 from pipeline.common.user_file_errors import given_path, reason_of
+from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.formats import video_file as video_files
 from pipeline.formats.file_reading import files_by_name
 from pipeline.formats.nmea import NmeaReader
 from pipeline.sources import rig as rig_files
-from pipeline.sources.live.gnss_motion import MotionFromGnss
 from pipeline.sources.uri_options import number_option
 from pipeline.types import CameraCalibration, EgoState, Frame, GnssFix, Picture, Sweep
 from pipeline.types.source import SourceError
 
 OPTIONS = ("video", "video_offset_s", "nmea", "rig")
-_NMEA_SUFFIXES = (".nmea", ".nma", ".ubx.txt")
+NMEA_SUFFIXES = (".nmea", ".nma", ".ubx.txt")
 _PICTURE_WITHIN_NS = 100_000_000
-_FIX_WITHIN_NS = 1_500_000_000
+FIX_WITHIN_NS = 1_500_000_000
 _LONGEST_LINE = 1024
 
 
@@ -45,15 +45,15 @@ class Beside:
     ) -> None:
         self.notes: list[str] = []
         self._camera = rig.camera_calibration()
-        self._video = self._open_video(_named(recording, options, "video", video_files.SUFFIXES), progress)
+        self._video = self._open_video(named(recording, options, "video", video_files.SUFFIXES), progress)
         offset_s = number_option(options, "video_offset_s", 0.0) + rig.camera.time_offset_ms / 1e3
         self._video_begins_ns = begin_ns + round(offset_s * 1e9)
         if self._video is not None and not offset_s:
             self.notes.append("the video is assumed to start with the recording; ?video_offset_s= shifts it")
         if self._video is not None and self._camera is None:
             self.notes.append("the camera has no calibration: LiDAR and camera are not fused")
-        sentences = _named(recording, options, "nmea", _NMEA_SUFFIXES)
-        found = _fixes_of(sentences, begin_ns, self.notes) if sentences is not None else list(fixes)
+        sentences = named(recording, options, "nmea", NMEA_SUFFIXES)
+        found = fixes_of(sentences, begin_ns, self.notes) if sentences is not None else list(fixes)
         found = [evolve(fix, t_ns=fix.t_ns + round(rig.gnss.time_offset_ms * 1e6)) for fix in found]
         self._fixes = Timeline([fix.t_ns for fix in found], found)
         follow = MotionFromGnss()
@@ -77,11 +77,11 @@ class Beside:
         return (self._outline(index, t_ns, camera) for index, t_ns in enumerate(times_ns))
 
     def _outline(self, index: int, t_ns: int, camera: CameraCalibration | None) -> Frame:
-        ego, gnss = self._ego(t_ns), self._fixes.latest(t_ns, _FIX_WITHIN_NS)
+        ego, gnss = self._ego(t_ns), self._fixes.latest(t_ns, FIX_WITHIN_NS)
         return Frame(index, f"{index:06d}", t_ns, camera=camera, ego=ego, gnss=gnss)
 
     def _ego(self, t_ns: int) -> EgoState | None:
-        return self._own.latest(t_ns, _FIX_WITHIN_NS)
+        return self._own.latest(t_ns, FIX_WITHIN_NS)
 
     def _picture(self, t_ns: int, notes: list[str]) -> Picture | None:
         if self._video is None:
@@ -106,11 +106,11 @@ class Beside:
 
 def rig_of(recording: Path, options: dict[str, str]) -> rig_files.Rig:
     """The file that says where sensors sit; without one every sensor is at the ego origin."""
-    path = _named(recording, options, "rig", rig_files.SUFFIXES)
+    path = named(recording, options, "rig", rig_files.SUFFIXES)
     return rig_files.load_rig(path) if path is not None else rig_files.Rig()
 
 
-def _named(recording: Path, options: dict[str, str], option: str, suffixes: tuple[str, ...]) -> Path | None:
+def named(recording: Path, options: dict[str, str], option: str, suffixes: tuple[str, ...]) -> Path | None:
     """The file that an option names, from the recording's folder; else the one with the recording's own name."""
     if option in options:
         path = recording.parent / given_path(options[option], SourceError)
@@ -120,7 +120,7 @@ def _named(recording: Path, options: dict[str, str], option: str, suffixes: tupl
     return files_by_name(recording.parent, suffixes).get(recording.stem)
 
 
-def _fixes_of(path: Path, near_ns: int, notes: list[str]) -> list[GnssFix]:
+def fixes_of(path: Path, near_ns: int, notes: list[str]) -> list[GnssFix]:
     """Every fix of a file of sentences. Damaged lines are counted in ``notes``."""
     reader, fixes = NmeaReader(), []
     try:

@@ -73,6 +73,10 @@ class Coasting:
     """What this tick adds to the variance of the yaw rate."""
 
 
+MotionSource = Literal["can", "ins", "gnss", "lidar"]
+"""What measures own motion: the car's bus or its odometry, an inertial unit, a GNSS receiver, the LiDAR."""
+
+
 @dataclass(frozen=True)
 class EgoState:
     """Own motion."""
@@ -85,6 +89,41 @@ class EgoState:
     """Positive to the left; None when no sensor gives it."""
     coasting: Coasting | None = None
     """Set while it is carried on without a measurement; None while it is measured."""
+    source: MotionSource = "can"
+    """What measured it."""
+    yaw_rate_sigma_radps: float | None = None
+    """Standard deviation of the yaw rate; None where it is that of usual sensors."""
+
+
+@dataclass(frozen=True)
+class MotionEstimate:
+    """Own motion as one source has it."""
+
+    source: MotionSource
+    """Which one."""
+    speed_mps: float
+    """Positive forwards."""
+    speed_sigma_mps: float
+    """Standard deviation of the speed."""
+    yaw_rate_radps: float | None
+    """Positive to the left; None where the source has none."""
+    yaw_rate_sigma_radps: float | None
+    """Standard deviation of the yaw rate."""
+
+
+@dataclass(frozen=True)
+class OwnMotion:
+    """Where own motion is from: the surest source of the speed, and of the yaw rate."""
+
+    speed: MotionEstimate
+    """The source that gives the speed."""
+    turning: MotionEstimate | None
+    """The source that gives the yaw rate; None where none does."""
+    sources: tuple[MotionEstimate, ...]
+    """Every source that has a say in this frame."""
+    pose: tuple[float, float, float] | None = None
+    """x, y in metres and heading in radians since the LiDAR's odometry began, in the ego frame of then; None without
+    it."""
 
 
 GnssQuality = Literal["single", "dgnss", "rtk_float", "rtk_fixed"]

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pipeline.types.arrays import F32, F64, I32, Box, Window
-from pipeline.types.frame import EgoState, Frame, StreamHealth
+from pipeline.types.frame import EgoState, Frame, OwnMotion, StreamHealth
 from pipeline.types.lane import EgoLane
 from pipeline.types.objects import FusedObject, Ground, LidarTrack, Obstacle, VisionTrack
 
@@ -170,7 +170,7 @@ class Result:
     sensors: SensorHealth
     """How fresh each sensor's data is."""
     ego: EgoState | None
-    """Own motion as measured."""
+    """Own motion as measured by its surest source."""
     objects: tuple[FusedObject, ...]
     """Every object, nearest first."""
     path: Path
@@ -191,6 +191,8 @@ class Result:
     """The vehicle that will be the CIPV next."""
     streams: tuple[StreamHealth, ...] = ()
     """Health of each sensor of a live source."""
+    own_motion: OwnMotion | None = None
+    """Where own motion is from; None where it is not measured."""
 
     def chosen(self) -> FusedObject | None:
         """The object that is the CIPV; None without one."""

@@ -16,7 +16,18 @@ from dataclasses import fields
 from typing import Any, TextIO
 
 from pipeline.common.geometry import F64, Cuboid
-from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Gate, Path, Result, SensorHealth, StreamHealth
+from pipeline.types import (
+    AccCommand,
+    Cipv,
+    EgoState,
+    FusedObject,
+    Gate,
+    OwnMotion,
+    Path,
+    Result,
+    SensorHealth,
+    StreamHealth,
+)
 
 VERSION = 1
 _DECIMALS = 4
@@ -34,6 +45,7 @@ def to_json(result: Result) -> dict[str, Any]:
         "t_ns": result.t_ns,
         "sensors": _sensors(result.sensors, result.streams),
         "ego": _ego(result.ego),
+        "own_motion": _own_motion(result.own_motion),
         "objects": [_object(each) for each in result.objects],
         "path": _path(result.path),
         "cipv": _cipv(result.cipv),
@@ -90,6 +102,26 @@ def _ego(ego: EgoState | None) -> dict[str, Any] | None:
     if ego is None:
         return None
     return {"speed_mps": _number(ego.speed_mps), "yaw_rate_radps": _number(ego.yaw_rate_radps)}
+
+
+def _own_motion(own: OwnMotion | None) -> dict[str, Any] | None:
+    if own is None:
+        return None
+    return {
+        "speed_from": own.speed.source,
+        "speed_sigma_mps": _number(own.speed.speed_sigma_mps),
+        "yaw_rate_from": own.turning.source if own.turning is not None else None,
+        "yaw_rate_sigma_radps": _number(own.turning.yaw_rate_sigma_radps) if own.turning is not None else None,
+        "pose": _numbers(own.pose),
+        "sources": [
+            {
+                "source": each.source,
+                "speed_mps": _number(each.speed_mps),
+                "yaw_rate_radps": _number(each.yaw_rate_radps),
+            }
+            for each in own.sources
+        ],
+    }
 
 
 def _object(each: FusedObject) -> dict[str, Any]:

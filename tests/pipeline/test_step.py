@@ -105,9 +105,21 @@ def test_a_sensor_lost_midway_is_carried_and_says_so(frames: list[Frame]) -> Non
 
 
 def test_no_ego_state_no_speed_over_ground_and_no_pedals(frames: list[Frame]) -> None:
-    last = drive([dataclasses.replace(frame, ego=None) for frame in frames], Params())[-1]
+    unmeasured = with_changes(Params(), {"motion.source": "can"})
+    last = drive([dataclasses.replace(frame, ego=None) for frame in frames], unmeasured)[-1]
     assert last.acc is None
     assert all(item.speed_over_ground_mps is None and item.moving is None for item in last.objects)
+
+
+def test_the_lidar_gives_own_motion_where_nothing_else_does(frames: list[Frame]) -> None:
+    """At 20 m/s behind a car as fast: without own speed nothing says that it drives."""
+    last = drive([dataclasses.replace(frame, ego=None, gnss=None) for frame in frames], Params())[-1]
+    assert last.own_motion is not None
+    assert last.own_motion.speed.source == "lidar"
+    assert last.acc is not None
+    assert last.ego is not None
+    assert last.ego.speed_mps == pytest.approx(20.0, abs=4 * last.own_motion.speed.speed_sigma_mps)
+    assert any(item.moving for item in last.objects)
 
 
 def test_after_a_gap_every_tracker_starts_anew_and_no_number_is_used_twice(frames: list[Frame]) -> None:

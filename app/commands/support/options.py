@@ -78,6 +78,9 @@ class PipelineOptions:
     """A preset file (YAML), e.g. one saved from the dashboard"""
     set: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME=VALUE")] = ()
     """Change one parameter, e.g. cluster.z_weight=0.4 (repeatable; `cipv params` lists them)"""
+    own_motion: Literal["auto", "can", "gnss", "lidar", "off"] | None = None
+    """Where own speed and yaw rate come from (motion.source). auto: what is recorded, and the LiDAR where that is
+    missing; can: the car's bus, its odometry or inertial unit; gnss: a receiver; lidar: the LiDAR alone; off: none"""
     detector: str | None = None
     """Name or path of an ONNX detector. Default: the registered one, then $CIPV_DATA/models, then the embedded
     one, trained on simulated cars only, which is the default for sim:"""
@@ -97,17 +100,19 @@ class PipelineOptions:
         params = preset(self.preset)
         if self.params is not None:
             params = from_yaml(self.params, params)
-        changes = {}
+        changes: dict[str, object] = {}
         for change in self.set:
             name, separator, value = change.partition("=")
             if not separator:
                 raise ParamsError(f"--set {change}: expected NAME=VALUE")
             changes[name] = parse_yaml(value, f"--set {change}", ParamsError)
+        if self.own_motion is not None:
+            changes["motion.source"] = self.own_motion
         return with_changes(params, changes)
 
     def changes_parameters(self) -> bool:
         """Whether the options ask for other parameters than the defaults."""
-        return self.preset != "default" or self.params is not None or bool(self.set)
+        return self.preset != "default" or self.params is not None or bool(self.set) or self.own_motion is not None
 
     def every(self) -> int | None:
         """``lanes_every``, validated."""

@@ -9,13 +9,18 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pipeline.lanes.heads import classes, row_grid, two_masks
+from pipeline.lanes.heads import classes, curves, row_grid, two_masks
 from pipeline.lanes.heads.head import Answer, Head, UnknownLaneHead
 from pipeline.types import F32
 
 __all__ = ["HEADS", "Head", "UnknownLaneHead", "pick_head"]
 
-HEADS: tuple[Callable[[Answer], Head | None], ...] = (two_masks.recognise, row_grid.recognise, classes.recognise)
+HEADS: tuple[Callable[[Answer], Head | None], ...] = (
+    two_masks.recognise,
+    curves.recognise,
+    row_grid.recognise,
+    classes.recognise,
+)
 """Each gives the head, if an answer is of its form. The first that does is taken."""
 
 

@@ -64,6 +64,9 @@ class Head:
     """Taken from the picture's 0–1."""
     spread: Colour = (1.0, 1.0, 1.0)
     """What the difference is divided by."""
+    horizon: float | None = None
+    """Where its training pictures had the horizon, as a share of their height: so much sky is cut off that the input
+    has it there too. None: it does not care."""
 
     def points(self, outputs: Sequence[F32]) -> Points:
         """The points on lines in the network's answer."""

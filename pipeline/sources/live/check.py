@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
+from pipeline.ego_motion.from_gnss import yaw_rate_lag_s
 from pipeline.sources.live.devices.lidar import LidarInput
-from pipeline.sources.live.gnss_motion import yaw_rate_lag_s
 from pipeline.sources.live.source import LiveSensors
 from pipeline.types import StreamHealth
 

@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from typing import TypeVar
 
+from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.params import SyncParams
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LiveConfig, load
@@ -19,7 +20,6 @@ from pipeline.sources.live.devices.can import CanInput
 from pipeline.sources.live.devices.gnss import GnssInput
 from pipeline.sources.live.devices.lidar import LidarInput
 from pipeline.sources.live.devices.sensor_input import Input
-from pipeline.sources.live.gnss_motion import MotionFromGnss
 from pipeline.sources.live.health import StreamStats, not_delivering
 from pipeline.sources.live.sync import Stream, Synchroniser, Together
 from pipeline.sources.rig import calibration_for

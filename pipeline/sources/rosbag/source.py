@@ -13,9 +13,9 @@ import numpy as np
 from pipeline.common.fast_replace import evolve
 from pipeline.common.nearest_in_time import Timeline, nearest
 from pipeline.common.progress import Progress, silent
+from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.formats.velodyne import Vlp16Decoder
 from pipeline.sources import rig as rig_files
-from pipeline.sources.live.gnss_motion import MotionFromGnss
 from pipeline.sources.rosbag import messages
 from pipeline.sources.rosbag.bag import Bag, BagError, bag_path
 from pipeline.sources.rosbag.index import BagIndex, Stream

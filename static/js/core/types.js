@@ -69,12 +69,21 @@
  * @property {string} reason
  * @property {number|null} object_id  object it slows down for
  *
+ * @typedef {object} OwnMotion  where own speed and yaw rate are from
+ * @property {"can"|"ins"|"gnss"|"lidar"} speed_from
+ * @property {number|null} speed_sigma_mps
+ * @property {string|null} yaw_rate_from
+ * @property {number|null} yaw_rate_sigma_radps
+ * @property {number[]|null} pose
+ * @property {{source: string, speed_mps: number, yaw_rate_radps: number|null}[]} sources
+ *
  * @typedef {object} Result
  * @property {number} version
  * @property {string} frame
  * @property {number} t_ns
  * @property {Record<string, Record<string, any>>} sensors
  * @property {{speed_mps: number, yaw_rate_radps: number|null}|null} ego
+ * @property {OwnMotion|null} own_motion
  * @property {FusedObject[]} objects
  * @property {Path} path
  * @property {Cipv|null} cipv

@@ -78,6 +78,7 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Cipv": result["cipv"],
         "Path": result["path"],
         "Acc": result["acc"],
+        "OwnMotion": result["own_motion"],
         "Result": result,
         "Notice": state["notices"][0],
         "State": state,

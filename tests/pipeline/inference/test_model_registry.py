@@ -199,6 +199,8 @@ def test_the_list_names_every_known_network_and_what_is_here(tmp_path: Path) -> 
         "yolox_tiny",
         "yolox_s",
         "twinlitenet",
+        "twinlitenetplus_small",
+        "lstr_360x640",
         "yolop",
         "ufld",
         "enet_sad",

@@ -51,6 +51,31 @@ def yolop(path: Path, size: Size = (128, 128)) -> Path:
     return _saved(path, [none, road, line], weights, ["det_out", "drive_area_seg", "lane_line_seg"], size)
 
 
+def lstr(path: Path, size: Size = (72, 128)) -> Path:
+    """Two curves and a mask that must be empty: the first is the upright line at x = 0.5 from the middle of the input
+    to its lower edge, the second is said not to be there. Training leaves outputs of the same shapes behind."""
+    upright, elsewhere = (0.5, 1.0, 0.0, 0.4, 0.0, 0.5, 0.0, 0.0), (0.5, 1.0, 0.0, 0.4, 0.0, 0.1, 0.0, 0.0)
+    weights = {
+        "scores": np.array([[(-4.0, 4.0), (4.0, -4.0)]]),
+        "lines": np.array([[upright, elsewhere]]),
+        "axes": np.array([0.0]),
+    }
+    nodes = [
+        helper.make_node("ReduceMax", ["input_mask"], ["filled"], keepdims=0),
+        helper.make_node("ReduceMean", ["images"], ["seen"], keepdims=0),
+        helper.make_node("Mul", ["seen", "axes"], ["nothing"]),
+        helper.make_node("Add", ["filled", "nothing"], ["moved"]),
+        helper.make_node("Identity", ["scores"], ["pred_logits"]),
+        helper.make_node("Add", ["lines", "moved"], ["pred_curves"]),
+        helper.make_node("Identity", ["scores"], ["foo_out_1"]),
+    ]
+    _saved(path, nodes, weights, ["pred_logits", "pred_curves", "foo_out_1"], size)
+    model = onnx.load(path)
+    model.graph.input.append(helper.make_tensor_value_info("input_mask", TensorProto.FLOAT, [1, 1, *size]))
+    onnx.save(model, path)
+    return path
+
+
 def classes(path: Path, size: Size = (72, 128), there: tuple[float, ...] = (0.0, 1.0, 1.0, 0.0)) -> Path:
     """Five classes: red is the second line, green the third; and which lines are there."""
     rows = [(0.0, 0.0, 0.0, 20.0), _NOTHING, (40.0, -20.0, -20.0, 0.0), (-20.0, 40.0, -20.0, 0.0), _NOTHING]

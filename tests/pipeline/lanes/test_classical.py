@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from pipeline.lanes.classical import horizon_row, open_classical
+from pipeline.lanes.classical import open_classical
+from pipeline.lanes.horizon import horizon_row
 from pipeline.lanes.road_lines import LaneState, RoadView, follow
 from pipeline.params import LaneParams
 from pipeline.types import U8

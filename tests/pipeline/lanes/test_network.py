@@ -15,7 +15,7 @@ from pipeline.lanes.heads import UnknownLaneHead, pick_head
 from pipeline.lanes.heads.head import Answer, Head, Points
 from pipeline.lanes.network import LaneNetwork, open_lane_network
 from pipeline.lanes.open_detector import OFF, open_lanes
-from pipeline.types import U8
+from pipeline.types import U8, CameraCalibration
 from tests.pipeline.lanes import lane_networks
 from tests.pipeline.vision import networks
 
@@ -45,6 +45,21 @@ MASKS = {
     "classes": (lane_networks.classes, (72, 128), "classes"),
     "classes of the lower part": (lane_networks.classes, (52, 244), "classes"),
 }
+
+
+def test_curves_lie_in_the_picture_whose_sky_was_cut_off_at_the_cameras_horizon(tmp_path: Path) -> None:
+    """The curve begins in the middle of the input: 0.33 of it lie above the horizon, and 17 % down to that."""
+    K = np.array([[1000.0, 0.0, 640.0], [0.0, 1000.0, 0.57 * HEIGHT], [0.0, 0.0, 1.0]])
+    level = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    camera = CameraCalibration(K, np.zeros(0), level, WIDTH, HEIGHT)
+    network = open_lane_network(str(lane_networks.lstr(tmp_path / "lstr.onnx")), camera=camera)
+    assert network.head.name == "LSTR"
+    raw = network.detect(picture())
+    assert set(raw.line.tolist()) == {0}
+    assert raw.points[:, 0] == pytest.approx(639.5, abs=1.0)
+    sky = (0.57 - 0.33) / (1.0 - 0.33)
+    assert raw.points[:, 1].min() == pytest.approx((sky + 0.5 * (1.0 - sky)) * HEIGHT, abs=2.0)
+    assert raw.points[:, 1].max() == pytest.approx(HEIGHT, abs=5.0)
 
 
 @pytest.mark.parametrize("kind", MASKS)

@@ -132,7 +132,7 @@ def test_less_is_known_and_nobody_else_leads(broken: Break, from_start: bool, fa
 def test_an_own_motion_that_is_lost_goes_on_for_a_while_and_is_said() -> None:
     """Half a second after the fix, and the own speed that came from it, are gone: the path has hardly moved, the car
     gets no faster though 130 km/h are set, and later nobody drives any more."""
-    params = with_changes(PARAMS, {"acc.set_speed_kmh": 130.0, "acc.time_gap_s": 0.8})
+    params = with_changes(PARAMS, {"acc.set_speed_kmh": 130.0, "acc.time_gap_s": 0.8, "motion.source": "can"})
     state, commands, path_sources = State(), [], []
     for moment in drive():
         after_s = moment.now.t_s - BREAKS_S

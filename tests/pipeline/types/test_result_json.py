@@ -22,6 +22,8 @@ from pipeline.types import (
     FusedObject,
     Gate,
     Layers,
+    MotionEstimate,
+    OwnMotion,
     Path,
     Rejection,
     Result,
@@ -30,12 +32,14 @@ from pipeline.types import (
 from pipeline.types.result_json import to_json, to_line, write_line
 
 FIELDS = {
-    "": "version frame t_ns sensors ego objects path cipv next_cipv rejected acc notes timing_ms",
+    "": "version frame t_ns sensors ego own_motion objects path cipv next_cipv rejected acc notes timing_ms",
     "sensors": "lidar camera ego",
     "sensors.lidar": "age_ms points",
     "sensors.camera": "age_ms skew_ms far_view",
     "sensors.ego": "age_ms",
     "ego": "speed_mps yaw_rate_radps",
+    "own_motion": "speed_from speed_sigma_mps yaw_rate_from yaw_rate_sigma_radps pose sources",
+    "own_motion.sources.0": "source speed_mps yaw_rate_radps",
     "objects.0": "id source type type_score bbox bev cuboid closest_point distance_m distance_sigma_m distance_from "
     "velocity_mps "
     "speed_over_ground_mps in_path existence_probability in_path_probability path_offset_m lateral_mps crossing_s "
@@ -49,6 +53,9 @@ FIELDS = {
     "acc": "state desired_speed_mps accel_mps2 accelerator brake reason object_id",
 }
 SHAPES = {"bbox": (4,), "bev": (4, 2), "closest_point": (3,), "velocity_mps": (2,)}
+
+
+LIDAR = MotionEstimate("lidar", 15.0, 0.2, 0.01, 0.005)
 
 
 def whole_result() -> Result:
@@ -101,6 +108,7 @@ def whole_result() -> Result:
         t_ns=1_700_000_000_123_456_789,
         sensors=SensorHealth(1.0, 9000, 2.0, 3.0, None),
         ego=EgoState(0, 15.0, 0.01),
+        own_motion=OwnMotion(LIDAR, LIDAR, (LIDAR,), (1.0, 2.0, 0.1)),
         objects=(lead, unknown),
         path=Path("straight", line, line + side, line - side, 1.5, {"10": 0.1}, {"straight": 1.0}),
         cipv=Cipv(7, 16.0, 2.0, 8.0, "nearest in path: 16.0 m"),

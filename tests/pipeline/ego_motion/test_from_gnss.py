@@ -7,7 +7,7 @@ from math import ceil
 import numpy as np
 import pytest
 
-from pipeline.sources.live.gnss_motion import MotionFromGnss, yaw_rate_lag_s
+from pipeline.ego_motion.from_gnss import MotionFromGnss, yaw_rate_lag_s
 from pipeline.types import EgoState, GnssFix
 
 SECOND = 1_000_000_000

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from math import ceil
 
 import numpy as np
@@ -17,24 +16,31 @@ _SLOWEST_MPS = 3.0
 """Slower, the course says little about where the car points."""
 
 
+Courses = tuple[tuple[int, float], ...]
+"""(t_ns, course clockwise from north) of the last fixes, oldest first."""
+
+
+def follow(courses: Courses, fix: GnssFix) -> tuple[Courses, EgoState]:
+    """The courses to go on with, and own motion: speed as measured; the yaw rate (left positive) once there is course
+    for it, else None."""
+    if courses and not 0 < fix.t_ns - courses[-1][0] <= _LONGEST_NS:
+        courses = ()
+    courses = () if fix.course_rad is None or fix.speed_mps < _SLOWEST_MPS else (*courses, (fix.t_ns, fix.course_rad))
+    while len(courses) > 1 and fix.t_ns - courses[1][0] >= _SPAN_NS:
+        courses = courses[1:]
+    return courses, EgoState(fix.t_ns, fix.speed_mps, _turning_left_radps(courses), source="gnss")
+
+
 class MotionFromGnss:
     """Follows one receiver."""
 
     def __init__(self) -> None:
-        self._courses: deque[tuple[int, float]] = deque()
+        self._courses: Courses = ()
 
     def push(self, fix: GnssFix) -> EgoState:
-        """Speed as measured; the yaw rate (left positive) once there is course for it, else None."""
-        courses = self._courses
-        if courses and not 0 < fix.t_ns - courses[-1][0] <= _LONGEST_NS:
-            courses.clear()
-        if fix.course_rad is None or fix.speed_mps < _SLOWEST_MPS:
-            courses.clear()
-        else:
-            courses.append((fix.t_ns, fix.course_rad))
-        while len(courses) > 1 and fix.t_ns - courses[1][0] >= _SPAN_NS:
-            courses.popleft()
-        return EgoState(fix.t_ns, fix.speed_mps, _turning_left_radps(list(courses)))
+        """Own motion at the fix (``follow``)."""
+        self._courses, ego = follow(self._courses, fix)
+        return ego
 
 
 def yaw_rate_lag_s(rate_hz: float) -> float | None:
@@ -43,7 +49,7 @@ def yaw_rate_lag_s(rate_hz: float) -> float | None:
     return span_s / 2.0 if span_s <= _LONGEST_NS / 1e9 else None
 
 
-def _turning_left_radps(courses: list[tuple[int, float]]) -> float | None:
+def _turning_left_radps(courses: Courses) -> float | None:
     """Slope of the line through (t_ns, course clockwise from north), its sign turned; None where it is too short."""
     if not courses or courses[-1][0] - courses[0][0] < _SPAN_NS:
         return None

@@ -1,0 +1,211 @@
+"""Own motion from the LiDAR: each sweep is placed among the last ones, and two filters make rates of the displacements.
+
+    structure of the sweep → placed on the last sweeps' → displacement, turn → filters → speed, yaw rate, pose
+
+It is believed once the sweeps agree with each other, and while enough structure fixes it: few points, a tunnel, or
+nothing but vehicles around end it, and it says so. Measured on KITTI at 16 rings: ``docs/reference/accuracy.md``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, ceil, cos, hypot, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.common.fast_replace import evolve
+from pipeline.ego_motion import rate_filter, registration, structure
+from pipeline.ego_motion.rate_filter import RateFilter
+from pipeline.lidar import deskew
+from pipeline.params import DeskewParams
+from pipeline.types import F32, F64, EgoState, Ground, LidarTrack, Sweep
+
+_KEPT = 5
+"""Sweeps that make the map. Three pull own speed towards zero by 0.17 m/s, five by 0.03; ten gain nothing more."""
+_CELL_SIGMA_M = 0.25
+"""How well one cell of structure fixes the place: points of a 16-channel LiDAR lie so far from each other on it."""
+_FEWEST_CELLS = 15.0
+"""With fewer cells along either axis the place is not fixed, but guessed."""
+_FEWEST_POINTS = 40
+_LEAST_FIT = 0.4
+"""Share of structure that must lie on the sweeps before: 0.73 and more in a street, 0.5 along a bare motorway."""
+_ACCEL_MPS2, _JERK_MPS3 = 3.0, 2.0
+_TURN_RADPS2, _TURN_JERK_RADPS3 = 0.2, 0.1
+"""What cars do: braking to 3 m/s² without an emergency; at 10 m/s, bends entered with a lateral jerk of 1 m/s³."""
+_GATE_SIGMAS = 5.0
+_FASTEST_MPS, _START_STEP_M = 45.0, 2.0
+"""Without any motion known it is looked for up to this speed, in steps that registration bridges."""
+_AGREEING = 2
+"""Displacements that must agree before motion is believed."""
+_MOST_REFUSED = 2
+_LONGEST_GAP_S = 1.5
+"""After so long without a sweep odometry starts anew."""
+_DESKEW = DeskewParams(enabled=True)
+
+
+@dataclass(frozen=True, eq=False)
+class OdometryState:
+    """What one sweep leaves to the next."""
+
+    clouds: tuple[F32, ...] = ()
+    """Structure of the last sweeps, (N, 3) each, ego frame of its time."""
+    poses: tuple[F64, ...] = ()
+    """(4, 4) of each: T_start_ego."""
+    speed: RateFilter | None = None
+    """m/s along x; None before the first displacement."""
+    turning: RateFilter | None = None
+    """Yaw rate, rad/s."""
+    agreeing: int = 0
+    """Displacements in a row that agreed."""
+    refused: int = 0
+    """Displacements in a row that did not."""
+    unplaced_s: float = 0.0
+    """Time since a sweep was last placed."""
+
+
+class LidarMotion(NamedTuple):
+    """Own motion at a sweep's tick."""
+
+    speed_mps: float
+    """Positive forwards."""
+    speed_sigma_mps: float
+    """Standard deviation of the speed."""
+    yaw_rate_radps: float
+    """Positive to the left."""
+    yaw_rate_sigma_radps: float
+    """Standard deviation of the yaw rate."""
+    pose: tuple[float, float, float]
+    """x, y in metres and heading in radians since odometry began, in the ego frame of then."""
+
+
+class Followed(NamedTuple):
+    """Odometry after a sweep."""
+
+    state: OdometryState
+    """For the next sweep."""
+    motion: LidarMotion | None
+    """None while it is not believed."""
+    note: str = ""
+    """Why it is not, in words; empty while nothing is wrong."""
+
+
+def follow(
+    before: OdometryState,
+    sweep: Sweep | None,
+    ground: Ground | None,
+    tracks: tuple[LidarTrack, ...],
+    dt_s: float | None,
+    prior: EgoState | None,
+) -> Followed:
+    """Own motion after one more sweep.
+
+    Args:
+        before: what the sweep before left.
+        sweep: this one; None when it is missing.
+        ground: road of the sweep before; without it only the next sweep can be used.
+        tracks: what the sweep before left of LiDAR tracks: vehicles are kept out.
+        dt_s: seconds since the frame before; None at the start and after a gap, where odometry starts anew.
+        prior: own motion as another sensor has it, to begin with.
+    """
+    if dt_s is None:
+        return Followed(OdometryState(), None)
+    if before.unplaced_s + dt_s > _LONGEST_GAP_S:
+        before = OdometryState()
+    since_s = before.unplaced_s + dt_s
+    if sweep is None or ground is None:
+        return Followed(evolve(before, unplaced_s=since_s, agreeing=0), None)
+    speed, turning = _foreseen(before, since_s, prior)
+    expected = EgoState(sweep.t_ns, speed.rate, turning.rate) if speed is not None and turning is not None else None
+    points = structure.standing(deskew.deskew(sweep, expected, _DESKEW) or sweep, ground, tracks, dt_s)
+    fixed = structure.support(points)
+    if len(points) < _FEWEST_POINTS or min(fixed.along_x, fixed.along_y) < _FEWEST_CELLS:
+        return Followed(OdometryState(), None, _too_little(len(points), fixed))
+    cloud = registration.thinned(points)
+    if not before.clouds:
+        return Followed(OdometryState((cloud,), (np.eye(4),)), None)
+
+    last = before.poses[-1]
+    starts = [speed.rate] if speed is not None else _starts(since_s)
+    rate = turning.rate if turning is not None else 0.0
+    guesses = [last @ _moved_by(start * since_s, rate * since_s) for start in starts]
+    pose, fit = registration.align(cloud, before.clouds, before.poses, guesses)
+    step = np.linalg.inv(last) @ pose
+    turned = atan2(step[1, 0], step[0, 0])
+    moved = float(step[0, 3]) * cos(0.5 * turned) + float(step[1, 3]) * sin(0.5 * turned)
+    moved_sigma, turned_sigma = _CELL_SIGMA_M / fixed.along_x**0.5, _CELL_SIGMA_M / fixed.turning_m2**0.5
+
+    agreeing, refused = before.agreeing, before.refused
+    if before.speed is None or before.turning is None:
+        new_speed = rate_filter.start(moved, since_s, moved_sigma, _ACCEL_MPS2)
+        new_turning = rate_filter.start(turned, since_s, turned_sigma, _TURN_RADPS2)
+        agreeing = 1
+    else:
+        foreseen = rate_filter.predict(before.speed, since_s, _JERK_MPS3)
+        foreseen_turn = rate_filter.predict(before.turning, since_s, _TURN_JERK_RADPS3)
+        surprise = max(
+            _surprise(foreseen, moved, since_s, moved_sigma), _surprise(foreseen_turn, turned, since_s, turned_sigma)
+        )
+        if surprise > _GATE_SIGMAS or fit < _LEAST_FIT:
+            if refused + 1 > _MOST_REFUSED or agreeing < _AGREEING:
+                return Followed(OdometryState((cloud,), (np.eye(4),)), None, _CONTRADICTS)
+            kept = evolve(before, refused=refused + 1, unplaced_s=since_s)
+            return Followed(kept, _motion(foreseen, foreseen_turn, last @ _moved_by(moved, turned)), _CONTRADICTS)
+        new_speed = rate_filter.update(foreseen, moved, since_s, moved_sigma)
+        new_turning = rate_filter.update(foreseen_turn, turned, since_s, turned_sigma)
+        agreeing, refused = agreeing + 1, 0
+    after = OdometryState(
+        (*before.clouds, cloud)[-_KEPT:], (*before.poses, pose)[-_KEPT:], new_speed, new_turning, agreeing, refused
+    )
+    return Followed(after, _motion(new_speed, new_turning, pose) if agreeing >= _AGREEING else None)
+
+
+_CONTRADICTS = "own motion from the LiDAR: sweeps contradict each other"
+
+
+def _too_little(points: int, fixed: structure.Support) -> str:
+    if points >= _FEWEST_POINTS and fixed.along_y >= _FEWEST_CELLS:
+        return "own motion from the LiDAR: nothing fixes it along the road, as in a tunnel"
+    return "own motion from the LiDAR: too little stands around that is no vehicle"
+
+
+def _foreseen(
+    before: OdometryState, dt_s: float, prior: EgoState | None
+) -> tuple[RateFilter | None, RateFilter | None]:
+    """Speed and yaw rate expected now: of the filters, else of another sensor."""
+    if before.speed is not None and before.turning is not None:
+        return (
+            rate_filter.predict(before.speed, dt_s, _JERK_MPS3),
+            rate_filter.predict(before.turning, dt_s, _TURN_JERK_RADPS3),
+        )
+    if prior is None:
+        return None, None
+    return (
+        rate_filter.start(prior.speed_mps, 1.0, 0.0, _ACCEL_MPS2),
+        rate_filter.start(prior.yaw_rate_radps or 0.0, 1.0, 0.0, _TURN_RADPS2),
+    )
+
+
+def _starts(dt_s: float) -> list[float]:
+    """Speeds to begin at where none is known."""
+    count = ceil(_FASTEST_MPS * dt_s / _START_STEP_M)
+    return [k * _START_STEP_M / dt_s for k in range(count + 1)]
+
+
+def _surprise(foreseen: RateFilter, moved: float, dt_s: float, sigma: float) -> float:
+    """How many standard deviations a displacement lies from the expected one."""
+    expected, spread = rate_filter.expected(foreseen, dt_s)
+    return abs(moved - expected) / hypot(spread**0.5, sigma)
+
+
+def _moved_by(moved: float, turned: float) -> F64:
+    """(4, 4) of a short arc along the ground."""
+    pose = np.eye(4)
+    c, s = cos(turned), sin(turned)
+    pose[:2, :2] = [[c, -s], [s, c]]
+    pose[:2, 3] = moved * cos(0.5 * turned), moved * sin(0.5 * turned)
+    return pose
+
+
+def _motion(speed: RateFilter, turning: RateFilter, pose: F64) -> LidarMotion:
+    place = (float(pose[0, 3]), float(pose[1, 3]), atan2(pose[1, 0], pose[0, 0]))
+    return LidarMotion(speed.rate, speed.sigma, turning.rate, turning.sigma, place)

@@ -1,0 +1,178 @@
+"""Own motion from whatever measures it: the surest source of the speed, and of the yaw rate.
+
+The car's bus and an inertial unit are surest, and cost nothing. A GNSS receiver has a good speed, and a yaw rate that
+lags. The LiDAR has both at some ten milliseconds a sweep; it is asked where speed or yaw rate are missing, or come from
+GNSS. Sources that contradict each other are named."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, pi
+from typing import NamedTuple
+
+from pipeline.common.fast_replace import evolve
+from pipeline.ego_motion import from_gnss, lidar_odometry
+from pipeline.ego_motion.from_gnss import Courses
+from pipeline.ego_motion.lidar_odometry import LidarMotion, OdometryState
+from pipeline.params import MotionParams
+from pipeline.types import (
+    EgoState,
+    Frame,
+    Ground,
+    LidarTrack,
+    MotionEstimate,
+    MotionSource,
+    OwnMotion,
+)
+
+_CONTRADICT_SIGMAS, _CONTRADICT_MPS = 5.0, 1.0
+"""Speeds that differ by more than both contradict each other."""
+_SPEED_SIGMA_MPS: dict[MotionSource, tuple[float, float]] = {"can": (0.1, 0.01), "ins": (0.05, 0.0), "gnss": (0.2, 0.0)}
+"""Of each source: a constant part, and a share of the speed (a tyre's radius wears by a hundredth)."""
+_YAW_RATE_SIGMA_RADPS: dict[MotionSource, float] = {"can": 0.005, "ins": 0.002, "gnss": 1.0 * pi / 180.0}
+"""A car's own sensor as measured in comma2k19; a receiver's is a slope of courses that are good to 0.2°."""
+
+
+@dataclass(frozen=True)
+class OwnMotionState:
+    """What one frame leaves to the next."""
+
+    odometry: OdometryState = OdometryState()
+    """Of the LiDAR; empty while it is not asked."""
+    courses: Courses = ()
+    """Of the last GNSS fixes."""
+
+
+class Seen(NamedTuple):
+    """What the frame before left that odometry needs."""
+
+    ground: Ground | None
+    """Its road."""
+    tracks: tuple[LidarTrack, ...]
+    """Its LiDAR tracks."""
+    motion: EgoState | None
+    """Its own motion, measured or carried on."""
+
+
+class Measured(NamedTuple):
+    """Own motion of one frame."""
+
+    state: OwnMotionState
+    """For the next frame."""
+    ego: EgoState | None
+    """Speed and yaw rate; None where nothing measures them."""
+    own: OwnMotion | None
+    """Where they are from."""
+    notes: tuple[str, ...]
+    """What is wrong, in sentences."""
+
+
+def measure(
+    before: OwnMotionState,
+    frame: Frame,
+    recorded: EgoState | None,
+    seen: Seen,
+    dt_s: float | None,
+    params: MotionParams,
+) -> Measured:
+    """Own motion in a frame.
+
+    Args:
+        before: what the frame before left.
+        frame: its sweep and GNSS fix count.
+        recorded: the frame's own motion, where it is believable.
+        seen: what the frame before left of its surroundings.
+        dt_s: seconds since the frame before; None at the start and after a gap.
+        params: ``source`` says who may be asked.
+    """
+    if params.source == "off":
+        return Measured(OwnMotionState(), None, None, ())
+    courses, received = before.courses, None
+    if frame.gnss is not None and (recorded is None or recorded.source != "gnss"):
+        courses, received = from_gnss.follow(courses, frame.gnss)
+    given = [each for each in (recorded, received) if each is not None]
+    odometry, placed, note = OdometryState(), None, ""
+    if _asks_the_lidar(params, given):
+        prior = seen.motion if seen.motion is not None else recorded
+        odometry, placed, note = lidar_odometry.follow(
+            before.odometry, frame.sweep, seen.ground, seen.tracks, dt_s, prior if params.source == "auto" else None
+        )
+    sources = [_usual(each) for each in given] + ([_of_lidar(placed)] if placed is not None else [])
+    state = OwnMotionState(odometry, courses)
+    notes = (note,) if note and (params.source == "lidar" or not given) else ()
+    trusted = [each for each in sources if _may(each.source, params)]
+    if recorded is not None and received is not None and params.source == "auto":
+        trusted = [each for each in trusted if each.source != "gnss"]  # as good as the car's own, but later
+    if not trusted:
+        return Measured(state, None, None, notes)
+    speed = min(trusted, key=lambda each: each.speed_sigma_mps)
+    turns = [each for each in trusted if each.yaw_rate_sigma_radps is not None]
+    turning = min(turns, key=lambda each: each.yaw_rate_sigma_radps or 0.0) if turns else None
+    own = OwnMotion(speed, turning, tuple(sources), placed.pose if placed is not None else None)
+    return Measured(state, _as_ego(own, frame, recorded), own, (*notes, *_contradictions(speed, sources)))
+
+
+def _asks_the_lidar(params: MotionParams, given: list[EgoState]) -> bool:
+    if params.source == "lidar":
+        return True
+    return params.source == "auto" and all(each.source == "gnss" or each.yaw_rate_radps is None for each in given)
+
+
+def _may(source: MotionSource, params: MotionParams) -> bool:
+    """Whether own motion may be taken from there."""
+    if params.source == "can":
+        return source in ("can", "ins")
+    return params.source in ("auto", source)
+
+
+def _usual(ego: EgoState) -> MotionEstimate:
+    """What is recorded, as sure as such sensors are."""
+    constant, share = _SPEED_SIGMA_MPS[ego.source]
+    turning = None if ego.yaw_rate_radps is None else _YAW_RATE_SIGMA_RADPS[ego.source]
+    return MotionEstimate(
+        ego.source, ego.speed_mps, hypot(constant, share * ego.speed_mps), ego.yaw_rate_radps, turning
+    )
+
+
+def _of_lidar(placed: LidarMotion) -> MotionEstimate:
+    return MotionEstimate(
+        "lidar", placed.speed_mps, placed.speed_sigma_mps, placed.yaw_rate_radps, placed.yaw_rate_sigma_radps
+    )
+
+
+def _as_ego(own: OwnMotion, frame: Frame, recorded: EgoState | None) -> EgoState:
+    """Own motion for the stages. What is recorded stays as it is where nothing else adds to it."""
+    turning = own.turning
+    if recorded is not None and own.speed.source == recorded.source:
+        if turning is None or turning.source == recorded.source:
+            return recorded
+        return evolve(recorded, yaw_rate_radps=turning.yaw_rate_radps, yaw_rate_sigma_radps=_beyond_usual(turning))
+    return EgoState(
+        frame.t_ns,
+        own.speed.speed_mps,
+        turning.yaw_rate_radps if turning is not None else None,
+        source=own.speed.source,
+        yaw_rate_sigma_radps=_beyond_usual(turning) if turning is not None else None,
+    )
+
+
+def _beyond_usual(turning: MotionEstimate) -> float | None:
+    """The sigma of the LiDAR's yaw rate; that of sensors is part of ``path.yaw_rate_sigma_radps``."""
+    return turning.yaw_rate_sigma_radps if turning.source == "lidar" else None
+
+
+def _contradictions(chosen: MotionEstimate, sources: list[MotionEstimate]) -> tuple[str, ...]:
+    """A sentence for each source whose speed the chosen one contradicts."""
+    found = []
+    for each in sources:
+        apart = abs(each.speed_mps - chosen.speed_mps)
+        allowed = max(_CONTRADICT_SIGMAS * hypot(each.speed_sigma_mps, chosen.speed_sigma_mps), _CONTRADICT_MPS)
+        if each is not chosen and apart > allowed:
+            found.append(
+                f"own speed: {_NAMES[chosen.source]} {chosen.speed_mps * 3.6:.0f} km/h, "
+                f"{_NAMES[each.source]} {each.speed_mps * 3.6:.0f} km/h"
+            )
+    return tuple(found)
+
+
+_NAMES: dict[MotionSource, str] = {"can": "CAN", "ins": "inertial unit", "gnss": "GNSS", "lidar": "LiDAR"}

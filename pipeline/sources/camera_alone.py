@@ -1,0 +1,202 @@
+"""Pictures without a LiDAR: a video file, or a folder of pictures, with a GNSS track beside it if there is one.
+
+Without a calibration the camera is taken for a dash cam: looking straight ahead, with a diagonal field of view of 78°,
+1.3 m above the road. The notes say so; ``NAME.yaml`` beside the recording, or ``hfov_deg``, gives the real one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from math import hypot, radians, tan
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.common.fast_replace import evolve
+from pipeline.common.nearest_in_time import Timeline
+from pipeline.common.user_file_errors import reason_of
+from pipeline.ego_motion.from_gnss import MotionFromGnss
+from pipeline.formats.file_reading import decode_picture, files_by_name, recording_file, recording_folder
+from pipeline.formats.gpx_file import parse_gpx
+from pipeline.formats.video_file import VideoFile
+from pipeline.sources import rig as rig_files
+from pipeline.sources.live.config import CalibrationConfig
+from pipeline.sources.sidecar_files import FIX_WITHIN_NS, NMEA_SUFFIXES, fixes_of, named
+from pipeline.sources.uri_options import number_option, split_options
+from pipeline.types import U8, CameraCalibration, Frame, GnssFix, Picture, Sweep
+from pipeline.types.source import Opening, SourceError, TruthObject
+
+PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png")
+_OPTIONS = ("rate_hz", "hfov_deg", "height_m", "nmea", "gpx", "rig", "gnss_offset_s")
+_RATE_HZ = 10.0
+"""Frames a second that are taken of a video: more add nothing to tracking, and cost a network's time each."""
+_DIAGONAL_DEG, _HEIGHT_M = 78.0, 1.3
+_EPOCH_NS = 631_152_000 * 1_000_000_000
+"""1990: smaller names count pictures."""
+_STAMP = re.compile(r"^\d{16}(\d{3})?$")
+
+
+def open_video(uri: str, rest: str, how: Opening) -> CameraAlone:
+    """``video:FILE?rate_hz=10&hfov_deg=70&…``. Called by name, from ``pipeline.source_kinds``. SourceError when it
+    cannot be opened."""
+    path, options = split_options(rest, _OPTIONS)
+    file = recording_file(path)
+    video = VideoFile(file, how.progress)
+    wanted_hz = _positive(options, "rate_hz", _RATE_HZ)
+    steps = np.diff(video.times_ns)
+    recorded_hz = 1e9 / float(np.median(steps)) if len(steps) else wanted_hz
+    every = max(1, round(recorded_hz / wanted_hz))
+    taken = range(0, len(video.times_ns), every)
+    notes = [f"{recorded_hz:.0f} pictures a second; every {_ordinal(every)} is used"] if every > 1 else []
+    return CameraAlone(
+        uri, file, options, video.times_ns[::every].tolist(), lambda index: (video.picture(taken[index]), None), notes
+    )
+
+
+def open_pictures(uri: str, rest: str, how: Opening) -> CameraAlone:
+    """``pictures:DIR?rate_hz=10&…``, in order of name. Names of 16 or 19 digits are µs or ns since 1970. Called by
+    name, from ``pipeline.source_kinds``. SourceError when it cannot be opened."""
+    path, options = split_options(rest, _OPTIONS)
+    folder = recording_folder(path)
+    files = files_by_name(folder, PICTURE_SUFFIXES)
+    if not files:
+        raise SourceError(f"{path}: no pictures in it; they are .jpg, .jpeg or .png")
+    names, paths = list(files), list(files.values())
+    times = [_stamp_ns(name) for name in names]
+    stamped = all(times) and bool(np.all(np.diff(times) > 0))
+    step_ns = round(1e9 / _positive(options, "rate_hz", _RATE_HZ))
+    ticks = times if stamped else [index * step_ns for index in range(len(names))]
+    notes = [] if stamped else [f"no time stamps in the names: {1e9 / step_ns:g} Hz assumed; ?rate_hz= gives another"]
+    return CameraAlone(uri, folder, options, ticks, lambda index: decode_picture(paths[index]), notes, names)
+
+
+class CameraAlone:
+    """A recording of pictures. ticks: ns of each, ascending. read: (picture, JPEG file or None) of each."""
+
+    def __init__(
+        self,
+        uri: str,
+        path: Path,
+        options: dict[str, str],
+        ticks: Sequence[int],
+        read: Callable[[int], tuple[U8, bytes | None]],
+        notes: list[str],
+        names: Sequence[str] | None = None,
+    ) -> None:
+        self.uri, self.title = uri, path.resolve().stem
+        self._read, self._names = read, names
+        notes = [*notes]
+        rig_file = named(path, options, "rig", rig_files.SUFFIXES)
+        rig = rig_files.load_rig(rig_file) if rig_file is not None else rig_files.Rig()
+        fixes = _track(path, options, ticks[0], notes)
+        if fixes and not fixes[0].t_ns <= ticks[0] <= fixes[-1].t_ns:
+            # a video's clock starts at zero: the track is taken to begin with it
+            begin = fixes[0].t_ns + round(number_option(options, "gnss_offset_s", 0.0) * 1e9)
+            ticks = [begin + tick - ticks[0] for tick in ticks]
+            notes.append("the GNSS track is assumed to start with the pictures; ?gnss_offset_s= shifts it")
+        self._ticks = ticks
+        steps = np.diff(ticks)
+        self.rate_hz = round(1e9 / float(np.median(steps)), 2) if len(steps) else _RATE_HZ
+        self._fixes = Timeline([fix.t_ns for fix in fixes], fixes)
+        follow = MotionFromGnss()
+        own = [follow.push(fix) for fix in fixes]
+        self._own = Timeline([each.t_ns for each in own], own)
+        self._camera = rig.camera_calibration() or self._assumed(options, notes)
+        self.notes = (*notes, "no LiDAR: distances come from the camera alone", *([] if fixes else [_NO_SPEED]))
+
+    def __len__(self) -> int:
+        return len(self._ticks)
+
+    def t_ns(self, index: int) -> int:
+        if not 0 <= index < len(self):
+            raise IndexError(f"frame {index} of {len(self)}")
+        return self._ticks[index]
+
+    def frame(self, index: int) -> Frame:
+        t_ns, notes = self.t_ns(index), list[str]()
+        picture = self._picture(index, t_ns, notes)
+        camera = rig_files.calibration_for(self._camera, picture, notes)
+        return evolve(self._outline(index), picture=picture, camera=camera, notes=tuple(notes))
+
+    def outlines(self) -> Iterator[Frame]:
+        return (self._outline(index) for index in range(len(self)))
+
+    def sweep(self, index: int) -> Sweep | None:
+        self.t_ns(index)
+        return None
+
+    def truth(self, index: int) -> tuple[TruthObject, ...] | None:
+        self.t_ns(index)
+        return None
+
+    def _outline(self, index: int) -> Frame:
+        t_ns = self.t_ns(index)
+        name = self._names[index] if self._names is not None else f"{index:06d}"
+        ego, gnss = self._own.latest(t_ns, FIX_WITHIN_NS), self._fixes.latest(t_ns, FIX_WITHIN_NS)
+        return Frame(index, name, t_ns, camera=self._camera, ego=ego, gnss=gnss)
+
+    def _picture(self, index: int, t_ns: int, notes: list[str]) -> Picture | None:
+        try:
+            bgr, encoded = self._read(index)
+        except SourceError as error:
+            notes.append(str(error))
+            return None
+        return Picture(t_ns, bgr, encoded)
+
+    def _assumed(self, options: dict[str, str], notes: list[str]) -> CameraCalibration | None:
+        """A dash cam's calibration for the first readable picture."""
+        for index in range(len(self)):
+            picture = self._picture(index, 0, [])
+            if picture is not None:
+                break
+        else:
+            return None
+        height, width = picture.bgr.shape[:2]
+        if "hfov_deg" in options:
+            focal = 0.5 * width / tan(radians(_positive(options, "hfov_deg", 70.0)) / 2.0)
+        else:
+            focal = 0.5 * hypot(width, height) / tan(radians(_DIAGONAL_DEG) / 2.0)
+            notes.append(
+                f"no calibration: a dash cam with a diagonal field of view of {_DIAGONAL_DEG:.0f}°, looking straight "
+                "ahead, is assumed; ?hfov_deg=, or a .yaml file beside it, gives the real one"
+            )
+        pinhole = CalibrationConfig(
+            fx_px=focal, fy_px=focal, cx_px=width / 2, cy_px=height / 2, width_px=width, height_px=height
+        )
+        return evolve(pinhole.calibration(), road_z_m=-_positive(options, "height_m", _HEIGHT_M))
+
+
+_NO_SPEED = "no ego speed recorded"
+
+
+def _track(path: Path, options: dict[str, str], near_ns: int, notes: list[str]) -> list[GnssFix]:
+    """The fixes of a file beside the recording, in order of time; none without one."""
+    gpx = named(path, options, "gpx", (".gpx",))
+    if gpx is not None:
+        try:
+            fixes = parse_gpx(gpx.read_text(encoding="utf-8", errors="replace"), gpx.name)
+        except OSError as error:
+            raise SourceError(f"{gpx.name}: cannot be read: {reason_of(error)}") from None
+        notes.append(f"{len(fixes)} GNSS fixes from {gpx.name}")
+        return fixes
+    nmea = named(path, options, "nmea", NMEA_SUFFIXES)
+    return sorted(fixes_of(nmea, near_ns, notes), key=lambda fix: fix.t_ns) if nmea is not None else []
+
+
+def _positive(options: dict[str, str], name: str, otherwise: float) -> float:
+    value = number_option(options, name, otherwise)
+    if value <= 0.0 or (name == "hfov_deg" and value >= 170.0):
+        raise SourceError(f"{name}={options[name]}: out of range")
+    return value
+
+
+def _stamp_ns(name: str) -> int:
+    """The time that a picture's name is; 0 when it is none."""
+    if not _STAMP.match(name):
+        return 0
+    t_ns = int(name) * (1000 if len(name) == 16 else 1)
+    return t_ns if t_ns > _EPOCH_NS else 0
+
+
+def _ordinal(number: int) -> str:
+    return {2: "second", 3: "third"}.get(number, f"{number}th")

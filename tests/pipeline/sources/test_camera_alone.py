@@ -1,0 +1,105 @@
+"""Pictures without a LiDAR."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from pipeline.params import Params
+from pipeline.sources import SourceError, open_source
+from pipeline.step import State, step
+
+GPX = """<?xml version="1.0"?><gpx xmlns="http://www.topografix.com/GPX/1/1" version="1.1" creator="test"><trk><trkseg>
+{}</trkseg></trk></gpx>"""
+
+
+@pytest.fixture
+def video(tmp_path: Path) -> Path:
+    """Two seconds at 30 Hz, in which the picture's brightness counts."""
+    file = tmp_path / "drive.mp4"
+    with av.open(str(file), "w") as container:
+        stream = container.add_stream("mpeg4", rate=30)
+        stream.width, stream.height = 320, 180
+        for k in range(60):
+            picture = np.full((180, 320, 3), 4 * k, np.uint8)
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="bgr24")))
+        container.mux(stream.encode())
+    return file
+
+
+def track(seconds: int, speed_mps: float = 10.0) -> str:
+    """Northwards from 48° N, a point a second."""
+    points = (
+        f'<trkpt lat="{48.0 + k * speed_mps / 111_200:.7f}" lon="11.0"><time>2024-05-01T12:00:{k:02d}Z</time></trkpt>'
+        for k in range(seconds)
+    )
+    return GPX.format("\n".join(points))
+
+
+def test_a_bare_video_is_a_recording_of_ten_frames_a_second(video: Path) -> None:
+    source = open_source(str(video))
+    assert (len(source), source.rate_hz) == (20, pytest.approx(10.0, abs=0.1))
+    frame = source.frame(7)
+    assert frame.picture is not None
+    assert frame.picture.bgr.mean() == pytest.approx(4 * 21, abs=6), "the picture of its time"
+    assert frame.t_ns - source.t_ns(0) == pytest.approx(0.7e9, abs=2e6)
+    assert frame.camera is not None
+    assert frame.camera.K[0, 0] == pytest.approx(226.7, abs=0.1), "78° over the diagonal of 367 px"
+    assert frame.sweep is None
+    assert any("is assumed" in note for note in source.notes)
+    _, result = step(State(), frame, Params())
+    assert (result.ego, result.acc) == (None, None)
+
+
+def test_a_track_beside_a_video_gives_own_motion(video: Path) -> None:
+    video.with_suffix(".gpx").write_text(track(5))
+    source = open_source(f"video:{video}")
+    frame = source.frame(15)
+    assert frame.ego is not None
+    assert frame.ego.speed_mps == pytest.approx(10.0, abs=0.1)
+    assert frame.gnss is not None
+    assert frame.gnss.course_rad == pytest.approx(0.0, abs=0.01)
+    _, result = step(State(), frame, Params())
+    assert result.own_motion is not None
+    assert result.own_motion.speed.source == "gnss"
+    assert result.acc is not None
+
+
+def test_options_give_the_rate_and_the_camera(video: Path) -> None:
+    source = open_source(f"{video}?rate_hz=30&hfov_deg=90")
+    assert len(source) == 60
+    camera = source.frame(0).camera
+    assert camera is not None
+    assert camera.K[0, 0] == pytest.approx(160.0)
+    with pytest.raises(SourceError, match="hfov_deg=200: out of range"):
+        open_source(f"{video}?hfov_deg=200")
+
+
+def test_a_folder_of_pictures(tmp_path: Path) -> None:
+    for k in range(3):
+        cv2.imwrite(
+            str(tmp_path / f"{1_700_000_000_000_000_000 + k * 200_000_000}.png"), np.full((40, 60, 3), k, np.uint8)
+        )
+    source = open_source(str(tmp_path))
+    assert (len(source), source.rate_hz) == (3, 5.0)
+    picture = source.frame(2).picture
+    assert picture is not None
+    assert picture.bgr[0, 0, 0] == 2
+    (tmp_path / "1700000000900000000.png").write_bytes(b"\x89PNG cut")
+    assert open_source(str(tmp_path)).frame(3).notes == ("1700000000900000000.png: the picture is truncated",)
+
+
+def test_what_is_no_video_and_no_track_is_said_in_one_line(video: Path, tmp_path: Path) -> None:
+    (tmp_path / "cut.mp4").write_bytes(video.read_bytes()[:200])
+    with pytest.raises(SourceError, match=r"cut\.mp4: not a readable video"):
+        open_source(str(tmp_path / "cut.mp4"))
+    video.with_suffix(".gpx").write_text("<gpx>")
+    with pytest.raises(SourceError, match=r"drive\.gpx: not XML"):
+        open_source(str(video))
+    video.with_suffix(".gpx").write_text(GPX.format(""))
+    with pytest.raises(SourceError, match=r"drive\.gpx: no track points with times"):
+        open_source(str(video))
