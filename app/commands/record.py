@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
@@ -17,6 +16,7 @@ from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.commands.support.sensor_wait import Waiting
 from app.core.session_folder import SESSIONS
+from app.core.stop_signals import asked_to_stop
 from app.engine.session_recording import new_session
 from pipeline.common.errors import BadInput
 from pipeline.params import Params
@@ -56,7 +56,7 @@ class Record:
         params = self.pipeline.parameters()
         if self.packets and not is_live(self.source.source):
             raise BadInput("--packets works with live sensors only; recordings contain no packets to record")
-        with _asked_to_stop() as asked:
+        with asked_to_stop() as asked:
             source = self.source.open_any()
             if is_live_source(source):
                 return self._live(source, params, asked)
@@ -148,26 +148,6 @@ class _Ended(Exception):
 def _end_if(asked: Event) -> None:
     if asked.is_set():
         raise _Ended
-
-
-@contextmanager
-def _asked_to_stop() -> Iterator[Event]:
-    """Set by SIGINT (Ctrl-C) and SIGTERM; the current frame is finished first. A second signal ends at once."""
-    asked = Event()
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-
-    def ask(*_: object) -> None:
-        if asked.is_set():
-            raise KeyboardInterrupt
-        asked.set()
-
-    for number in before:
-        signal.signal(number, ask)
-    try:
-        yield asked
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _say_where(file: Path) -> None:

@@ -97,14 +97,15 @@ class BackgroundRuns:
     def start(self) -> None:
         self._thread.start()
 
-    def stop(self) -> None:
-        """End the thread. A running network is stopped; a read in progress is finished first."""
+    def stop(self, patience_s: float = _PATIENCE_S) -> None:
+        """End the thread. A running network is stopped; a read in progress is finished first, or left to itself after
+        ``patience_s``."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()
         self.turn.end()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(_PATIENCE_S)
+            self._thread.join(patience_s)
 
     def open(self, setup: RunSetup | None) -> None:
         """Another recording, or none."""

@@ -1,4 +1,4 @@
-"""The server and the engine as one program, until Ctrl-C.
+"""The server and the engine as one program, until it is asked to end.
 
 The engine starts before FastAPI is imported, which takes half a second: it opens the recording and makes the first
 picture meanwhile.
@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterable
 from app.core.server_address import DEFAULT_PORT, is_loopback, listen_socket, reachable
 from app.core.session_folder import SESSIONS
 from app.core.shared_view_state import SharedViewState
+from app.core.stop_signals import asked_to_stop
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.web.tokens import Tokens
@@ -30,7 +31,7 @@ def serve(
     looks: SharedViewState | None = None,
     on_ready: Callable[[str], None] | None = None,
 ) -> None:
-    """Serve until Ctrl-C. Starts and stops the engine; prints the page's address on a line of its own when it answers,
+    """Serve until Ctrl-C, SIGTERM or SIGHUP. Starts and stops the engine; prints the page's address on a line of its own when it answers,
     and links with tokens where other machines can come.
 
     PortTaken and BadInput (a weak token) before anything is started.
@@ -42,15 +43,14 @@ def serve(
         print(f"cipv: port {port} is in use; using {number}", file=sys.stderr)
     address = f"http://{reachable(host)}:{number}"
     engine.labels.kept.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
-    engine.start()
-    try:
-        from app.web.server import Server, create_app
+    with asked_to_stop() as asked:
+        engine.start()
+        try:
+            from app.web.server import Server, create_app
 
-        app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks, tokens)
-        freeze_loaded_objects()
-        Server(app, address, on_ready, tokens).run(sockets=[bound])
-    except KeyboardInterrupt:
-        pass  # uvicorn raises the signal again once it has shut down
-    finally:
-        engine.stop()
-        bound.close()
+            app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks, tokens)
+            freeze_loaded_objects()
+            Server(app, address, on_ready, tokens, asked).run(sockets=[bound])
+        finally:
+            engine.stop()
+            bound.close()

@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import os
 import socket
-from collections.abc import AsyncIterator, Callable, Iterable
-from contextlib import asynccontextmanager
+import threading
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -78,10 +79,16 @@ def create_app(
 
 
 class Server(uvicorn.Server):
-    """Says where it is as soon as it answers. Compressing the stream would cost more than sending it."""
+    """Says where it is as soon as it answers, and ends once it is ``asked`` to, a moment later. Compressing the stream
+    would cost more than sending it."""
 
     def __init__(
-        self, app: FastAPI, address: str, on_ready: Callable[[str], None] | None, tokens: Tokens | None = None
+        self,
+        app: FastAPI,
+        address: str,
+        on_ready: Callable[[str], None] | None,
+        tokens: Tokens | None = None,
+        asked: threading.Event | None = None,
     ) -> None:
         super().__init__(
             uvicorn.Config(
@@ -96,6 +103,16 @@ class Server(uvicorn.Server):
         self._address = address
         self._tokens = tokens
         self._on_ready = on_ready
+        self._asked = asked or threading.Event()
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Signals are the program's: uvicorn would raise SIGTERM again at the end, which then kills the program before
+        its recording is closed."""
+        yield
+
+    async def on_tick(self, counter: int) -> bool:
+        return self._asked.is_set() or await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)

@@ -105,3 +105,35 @@ def test_for_other_machines_it_shows_links_with_tokens_and_lets_nobody_else_in()
         assert "token" not in errors, "it is shown once"
     finally:
         program.kill()
+
+
+RECORDING = PROGRAM.replace("playing=True", "playing=True, desk=SessionRecorder(Path(sys.argv[3]))").replace(
+    "import sys", "import sys\nfrom pathlib import Path\nfrom app.engine.session_recording import SessionRecorder"
+)
+
+
+@pytest.mark.parametrize("numbers", [[signal.SIGTERM], [signal.SIGHUP, signal.SIGTERM]])
+def test_whoever_ends_it_its_recording_is_closed_first(tmp_path: Path, numbers: list[signal.Signals]):
+    program = subprocess.Popen(
+        [sys.executable, "-c", RECORDING, "0", "127.0.0.1", str(tmp_path)],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert program.stdout is not None
+        with httpx.Client(base_url=program.stdout.readline().strip(), timeout=60) as client:
+            client.post("/api/recording", json={"on": True}).raise_for_status()
+            with connect(f"{client.base_url}/api/stream".replace("http", "ws"), max_size=None) as stream:
+                while client.get("/api/state").json()["recording"]["frames"] < 2:
+                    stream.recv(60)  # a frame or a state: something has happened
+                for number in numbers:
+                    program.send_signal(number)
+                program.communicate(timeout=5)
+        assert program.returncode == 0
+        (session,) = tmp_path.iterdir()
+        assert session.read_bytes().endswith(b"\x89MCAP0\r\n"), "its index and its end are there"
+    finally:
+        program.kill()
+        program.communicate()
