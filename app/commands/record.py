@@ -19,6 +19,7 @@ from app.core.session_folder import SESSIONS
 from app.core.stop_signals import asked_to_stop
 from app.engine.session_recording import new_session
 from pipeline.common.errors import BadInput
+from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.save import about
@@ -65,7 +66,7 @@ class Record:
     def _offline(self, source: Source, params: Params, asked: Event) -> int:
         """A recording waits for the disk, so nothing is dropped."""
         detectors = self.pipeline.open_detectors(source)
-        segments = Segments(new_session(self.out, source.title), about(source), self._rotation)
+        segments = Segments(new_session(self.out, source.title), about(source, detectors), self._rotation)
         _say_where(segments.files[0])
         with closing(segments), frames_progress() as bar:
             task = bar.add_task(source.title, total=len(source))
@@ -78,7 +79,7 @@ class Record:
     def _live(self, source: LiveSource, params: Params, asked: Event) -> int:
         """Sensors do not wait: frames that the disk is too slow for are dropped and counted."""
         detectors, waiting = self.pipeline.open_detectors(source), Waiting(source)
-        recorder = self._recorder(source)
+        recorder = self._recorder(source, detectors)
 
         def on_silence() -> None:
             _end_if(asked)
@@ -114,14 +115,14 @@ class Record:
             print(f"cipv: {state.error}", file=sys.stderr)
         return 0 if state.error is None else 1
 
-    def _recorder(self, source: LiveSource) -> Recorder:
+    def _recorder(self, source: LiveSource, detectors: Detectors) -> Recorder:
         """Records point clouds, or the packets that they are made of."""
         path, mount = new_session(self.out, source.title), source.lidar_mount
         if not self.packets:
-            return Recorder(path, about(source), self._rotation)
+            return Recorder(path, about(source, detectors), self._rotation)
         if mount is None:
             raise BadInput(f"--packets: {source.uri} has no LiDAR")
-        return Recorder(path, about(source), self._rotation, raw_lidar=RawLidar(*mount))
+        return Recorder(path, about(source, detectors), self._rotation, raw_lidar=RawLidar(*mount))
 
     @property
     def _rotation(self) -> Rotation:

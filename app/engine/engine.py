@@ -91,6 +91,8 @@ class Engine:
         self._whole_drives = whole_drives
         self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every, far_view_px)
         self._player: Player | None = None
+        self.detectors = Detectors()
+        """Of what is open."""
         self._thread = threading.Thread(target=self._work, name="cipv-engine", daemon=True)
 
     def start(self) -> None:
@@ -182,7 +184,7 @@ class Engine:
         self._close()
         player = self._player_of(source, detectors)
         player.open()
-        self._player = player
+        self._player, self.detectors = player, detectors
         self.labels.open(uri, self.drives.recording)
         self._publisher.publish(
             replace(

@@ -31,8 +31,8 @@ def serve(
     looks: SharedViewState | None = None,
     on_ready: Callable[[str], None] | None = None,
 ) -> None:
-    """Serve until Ctrl-C, SIGTERM or SIGHUP. Starts and stops the engine; prints the page's address on a line of its own when it answers,
-    and links with tokens where other machines can come.
+    """Serve until Ctrl-C, SIGTERM or SIGHUP. Starts and stops the engine; prints the page's address on a line of its
+    own when it answers, and links with tokens where other machines can come.
 
     PortTaken and BadInput (a weak token) before anything is started.
     """

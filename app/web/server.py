@@ -28,11 +28,13 @@ from app.views.rerun.web import ViewerFiles
 from app.views.viser.proxy import viser_router
 from app.web.access import Access, Guard
 from app.web.api_description import REFUSALS, titled
+from app.web.connections import LimitedProtocol
 from app.web.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
 from app.web.metrics import Metrics
 from app.web.routers import ROUTERS, Services
 from app.web.routes.labels.files import IMPORT
 from app.web.tokens import Tokens
+from pipeline.common.user_files import Overloaded
 
 STATIC = Path(__file__).resolve().parents[2] / "static"
 
@@ -70,6 +72,7 @@ def create_app(
     app.add_middleware(BodyLimit, files={IMPORT: LARGEST_FILE})
     app.add_middleware(Guard, access=access, tokens=tokens)  # the last one added is the first to be asked
     app.add_exception_handler(RequestValidationError, _one_sentence)
+    app.add_exception_handler(Overloaded, _overloaded)
     for make_router in ROUTERS:
         app.include_router(make_router(services))
     app.include_router(viser_router(viser_port, access.allowed))
@@ -93,6 +96,7 @@ class Server(uvicorn.Server):
         super().__init__(
             uvicorn.Config(
                 app,
+                http=LimitedProtocol,
                 log_level="warning",
                 access_log=False,
                 ws_per_message_deflate=False,
@@ -149,6 +153,10 @@ class _Pages(StaticFiles):
         response = super().file_response(*args, **kwargs)
         response.headers["cache-control"] = "no-cache"
         return response
+
+
+def _overloaded(_: Request, error: Exception) -> Response:
+    return JSONResponse({"detail": str(error)}, 503, {"retry-after": "1"})
 
 
 def _palette() -> Response:

@@ -22,6 +22,7 @@ from pyproj import Transformer
 
 from pipeline.common.errors import BadInput
 from pipeline.common.user_file_errors import given_path
+from pipeline.common.user_files import read_regular
 from pipeline.formats.nmea import parse_sentence
 from pipeline.types import GnssFix, Route
 
@@ -52,9 +53,7 @@ def load_route(path: str) -> Route:
     try:
         if file.suffix.lower() == ".mcap":
             return _from_session(path, file.stem)
-        if file.stat().st_size > _LARGEST_FILE_BYTES:
-            raise RouteError(f"{path}: too large for a route")
-        text = file.read_text(encoding="utf-8", errors="replace")
+        text = read_regular(file, _LARGEST_FILE_BYTES).decode("utf-8", "replace")
     except OSError as error:
         raise RouteError(f"{path}: {error.strerror}") from None
     reader = _reader(file.suffix.lower(), text)
