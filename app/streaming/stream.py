@@ -21,6 +21,7 @@ import asyncio
 import json
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -133,6 +134,7 @@ class Stream:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._slots: list[Slot] = []
         self._encoder = Encoder()
+        self._threads = ThreadPoolExecutor(1, "cipv-stream")  # its own: whatever requests do, frames go on
         self._lock = threading.Lock()
         self._frame = _Encoded()
         self._width_px = MAX_WIDTH_PX
@@ -195,7 +197,7 @@ class Stream:
                 slot.painted()
             if "selected" in said and _is_id_or_null(said["selected"]) and not is_display(socket):
                 self._looks.select(said["selected"])
-            if isinstance(said.get("hides_3d"), bool):
+            if isinstance(said.get("hides_3d"), bool) and not is_display(socket):
                 self._looks.hide(slot, said["hides_3d"])
             if "held" in said and not is_display(socket):
                 self._hold(slot, said["held"])
@@ -219,7 +221,7 @@ class Stream:
 
     async def _put_newest(self, slot: Slot, snapshot: Snapshot) -> None:
         """The frame, and the state as it is now: the one in the frame may be older than what was told meanwhile."""
-        frame = await asyncio.to_thread(self._encoded, snapshot)
+        frame = await asyncio.get_running_loop().run_in_executor(self._threads, self._encoded, snapshot)
         if frame.message is not None:
             slot.put("frame", frame.message, frame.sequence)
         slot.put("state", state_message(self._snapshot or snapshot))

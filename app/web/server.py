@@ -31,6 +31,7 @@ from app.web.api_description import REFUSALS, titled
 from app.web.connections import LimitedProtocol
 from app.web.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
 from app.web.metrics import Metrics
+from app.web.quotas import RoleQuota
 from app.web.routers import ROUTERS, Services
 from app.web.routes.labels.files import IMPORT
 from app.web.tokens import Tokens
@@ -70,6 +71,7 @@ def create_app(
     )
     app.openapi = titled(app)  # type: ignore[method-assign]
     app.add_middleware(BodyLimit, files={IMPORT: LARGEST_FILE})
+    app.add_middleware(RoleQuota)
     app.add_middleware(Guard, access=access, tokens=tokens)  # the last one added is the first to be asked
     app.add_exception_handler(RequestValidationError, _one_sentence)
     app.add_exception_handler(Overloaded, _overloaded)
