@@ -39,6 +39,8 @@ from app.streaming.picture import MAX_WIDTH_PX, width_for
 FRAMES_UNDER_WAY = 2
 """One being painted while the next is on its way."""
 
+DISPLAY_MAY_SAY = frozenset({"ping", "picture_px", "painted"})
+"""What changes nothing for others; of a display everything else is ignored, whatever is added."""
 _LARGEST_PING = 1e15
 """Milliseconds; a page sends its own clock."""
 _WIDEST_PX = 4096
@@ -187,6 +189,8 @@ class Stream:
             if message["type"] == "websocket.disconnect":
                 return
             said = _object(message.get("text"))
+            if is_display(socket):
+                said = {name: value for name, value in said.items() if name in DISPLAY_MAY_SAY}
             if (ping := _number(said.get("ping"), _LARGEST_PING)) is not None:
                 slot.put("pong", _dump({"type": "pong", "ping": ping, "server_unix_ms": time.time() * 1e3}))
             if (wanted := _width(said.get("picture_px"))) is not None:
@@ -195,11 +199,11 @@ class Stream:
                     await self._put_newest(slot, self._snapshot)
             if said.get("painted") is True:
                 slot.painted()
-            if "selected" in said and _is_id_or_null(said["selected"]) and not is_display(socket):
+            if "selected" in said and _is_id_or_null(said["selected"]):
                 self._looks.select(said["selected"])
-            if isinstance(said.get("hides_3d"), bool) and not is_display(socket):
+            if isinstance(said.get("hides_3d"), bool):
                 self._looks.hide(slot, said["hides_3d"])
-            if "held" in said and not is_display(socket):
+            if "held" in said:
                 self._hold(slot, said["held"])
 
     def _hold(self, slot: Slot, said: Any) -> None:
