@@ -56,6 +56,8 @@ def about(source: AnySource, detectors: Detectors | None = None) -> About:
     """Where a session made of this source came from: in the end from what was recorded first; and, of results, which
     networks they are of."""
     origin = source.origin if isinstance(source, Recorded) else source.uri
-    asked = (detectors.boxes, detectors.lanes) if detectors is not None else ()
-    networks = {each.name: each.sha256 for each in asked if each is not None and hasattr(each, "sha256")}
+    asked: tuple[object, ...] = ()
+    if detectors is not None:
+        asked = (detectors.boxes, detectors.lanes, detectors.far.detector if detectors.far is not None else None)
+    networks = {each.name: each.sha256 for each in asked if hasattr(each, "name") and hasattr(each, "sha256")}
     return About(origin, source.title, source.rate_hz, source.notes, networks)
