@@ -3,7 +3,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: install demo test check fix bench docs screenshots suite soak lock clean
+.PHONY: install demo test check fix bench docs screenshots suite soak fuzz sbom lock clean
 
 install: .venv/.installed
 
@@ -57,9 +57,21 @@ soak: install
 	@mkdir -p build
 	@$(BIN)/python -m pytest -q -m soak tests/soak tests/browser/display/test_all_day.py -s
 
+# Damaged inputs for every parser, `make fuzz SECONDS=3600`. Writes build/fuzz: what was found, and the corpus.
+SECONDS ?= 300
+fuzz: install
+	@$(BIN)/python -m tests.fuzz.run --seconds $(SECONDS)
+
+# What the product is made of, with licences and what the wheels bundle: build/sbom.json (CycloneDX), build/licences.md.
+sbom: install
+	@mkdir -p build
+	@$(BIN)/python -m tests.supply.sbom build
+
 lock: install
 	@$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --extra dev --no-header --no-annotate --no-emit-index-url \
 	  --output-file requirements.lock pyproject.toml
+	@$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-header --no-annotate \
+	  --no-emit-index-url --constraint requirements.lock --output-file requirements-runtime.lock pyproject.toml
 
 clean:
 	@rm -rf .venv build dist *.egg-info

@@ -13,6 +13,7 @@ from typing import Any
 
 import tyro
 
+from app.core.stop_signals import as_interrupts
 from pipeline.common.errors import BadInput
 
 COMMANDS = {
@@ -48,7 +49,8 @@ def main(arguments: list[str] | None = None) -> None:
     """Entry point of the console script."""
     typed = sys.argv[1:] if arguments is None else arguments
     try:
-        raise SystemExit(_parse(typed)())
+        with as_interrupts():
+            raise SystemExit(_parse(typed)())
     except BadInput as error:
         print(f"cipv: {error}", file=sys.stderr)
         raise SystemExit(2) from None

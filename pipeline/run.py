@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Literal
 
+from pipeline.common.user_files import Overloaded
 from pipeline.detection import Detectors, LiveDetectors, Look, detect, look
 from pipeline.params import Params
 from pipeline.step import State, measure_own_motion, step
@@ -17,6 +19,7 @@ from pipeline.warm_up import warm_up
 _SILENCE_S = 0.5
 _BESIDE = ThreadPoolExecutor(thread_name_prefix="own-motion")
 """Own motion is measured while detectors look at the picture."""
+_TRIES = 10
 
 Sensors = Literal["lidar", "camera", "both"]
 
@@ -63,7 +66,7 @@ def run(
     source: Source, params: Params, detectors: Detectors, sensors: Sensors = "both"
 ) -> Iterator[tuple[Frame, Result]]:
     """Each frame of a recording with its result. Without detectors the LiDAR works alone."""
-    return through((source.frame(index) for index in range(len(source))), params, detectors, sensors)
+    return through((_patiently(source, index) for index in range(len(source))), params, detectors, sensors)
 
 
 def run_live(
@@ -76,6 +79,16 @@ def run_live(
     """The newest tick of live sensors with its result, again and again until the iterator is closed, which releases the
     sensors. on_silence: called every half second while no sensor delivers."""
     return _through(_ticks(source, params, on_silence), params, LiveDetectors(detectors).of, sensors)
+
+
+def _patiently(source: Source, index: int) -> Frame:
+    """A frame, read again for a while where the system cannot read at this moment. Overloaded after that."""
+    for _ in range(_TRIES):
+        try:
+            return source.frame(index)
+        except Overloaded:
+            time.sleep(_SILENCE_S)
+    return source.frame(index)
 
 
 def through(

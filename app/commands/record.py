@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
@@ -17,8 +16,10 @@ from app.commands.support.options import PipelineOptions, SourceOptions
 from app.commands.support.progress_bars import frames_progress
 from app.commands.support.sensor_wait import Waiting
 from app.core.session_folder import SESSIONS
+from app.core.stop_signals import asked_to_stop
 from app.engine.session_recording import new_session
 from pipeline.common.errors import BadInput
+from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.recording.recorder import Recorder
 from pipeline.recording.save import about
@@ -56,7 +57,7 @@ class Record:
         params = self.pipeline.parameters()
         if self.packets and not is_live(self.source.source):
             raise BadInput("--packets works with live sensors only; recordings contain no packets to record")
-        with _asked_to_stop() as asked:
+        with asked_to_stop() as asked:
             source = self.source.open_any()
             if is_live_source(source):
                 return self._live(source, params, asked)
@@ -65,7 +66,7 @@ class Record:
     def _offline(self, source: Source, params: Params, asked: Event) -> int:
         """A recording waits for the disk, so nothing is dropped."""
         detectors = self.pipeline.open_detectors(source)
-        segments = Segments(new_session(self.out, source.title), about(source), self._rotation)
+        segments = Segments(new_session(self.out, source.title), about(source, detectors), self._rotation)
         _say_where(segments.files[0])
         with closing(segments), frames_progress() as bar:
             task = bar.add_task(source.title, total=len(source))
@@ -78,7 +79,7 @@ class Record:
     def _live(self, source: LiveSource, params: Params, asked: Event) -> int:
         """Sensors do not wait: frames that the disk is too slow for are dropped and counted."""
         detectors, waiting = self.pipeline.open_detectors(source), Waiting(source)
-        recorder = self._recorder(source)
+        recorder = self._recorder(source, detectors)
 
         def on_silence() -> None:
             _end_if(asked)
@@ -114,14 +115,14 @@ class Record:
             print(f"cipv: {state.error}", file=sys.stderr)
         return 0 if state.error is None else 1
 
-    def _recorder(self, source: LiveSource) -> Recorder:
+    def _recorder(self, source: LiveSource, detectors: Detectors) -> Recorder:
         """Records point clouds, or the packets that they are made of."""
         path, mount = new_session(self.out, source.title), source.lidar_mount
         if not self.packets:
-            return Recorder(path, about(source), self._rotation)
+            return Recorder(path, about(source, detectors), self._rotation)
         if mount is None:
             raise BadInput(f"--packets: {source.uri} has no LiDAR")
-        return Recorder(path, about(source), self._rotation, raw_lidar=RawLidar(*mount))
+        return Recorder(path, about(source, detectors), self._rotation, raw_lidar=RawLidar(*mount))
 
     @property
     def _rotation(self) -> Rotation:
@@ -148,26 +149,6 @@ class _Ended(Exception):
 def _end_if(asked: Event) -> None:
     if asked.is_set():
         raise _Ended
-
-
-@contextmanager
-def _asked_to_stop() -> Iterator[Event]:
-    """Set by SIGINT (Ctrl-C) and SIGTERM; the current frame is finished first. A second signal ends at once."""
-    asked = Event()
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-
-    def ask(*_: object) -> None:
-        if asked.is_set():
-            raise KeyboardInterrupt
-        asked.set()
-
-    for number in before:
-        signal.signal(number, ask)
-    try:
-        yield asked
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _say_where(file: Path) -> None:

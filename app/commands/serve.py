@@ -21,6 +21,7 @@ from app.labels import URL_VARIABLE
 from app.labels.service.desk import LabelDesk
 from app.views.lazy_scene import LateScene
 from app.web.serve import serve
+from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress
 from pipeline.detection import detector_for, lanes_for
 from pipeline.sources import open_any
@@ -42,6 +43,12 @@ class ServerOptions:
     """Port to listen on; by default the first free one from 8420"""
     allow_host: Annotated[tuple[str, ...], tyro.conf.UseAppendAction] = ()
     """Another host name that this server may be reached by, as behind a proxy (repeatable); requires the token"""
+    token: bool = False
+    """Require a token on this machine too, where every other user could do everything otherwise"""
+    tls_cert: Annotated[Path | None, tyro.conf.arg(metavar="PEM")] = None
+    """Certificate to serve HTTPS with; needs --tls-key"""
+    tls_key: Annotated[Path | None, tyro.conf.arg(metavar="PEM")] = None
+    """Private key of the certificate"""
     browser: bool = False
     """Open a browser once the dashboard is ready"""
     rerun: Annotated[str | None, tyro.conf.arg(metavar="URL")] = None
@@ -58,6 +65,9 @@ class ServerOptions:
 
     def serve(self, engine: Engine) -> int:
         """Until Ctrl-C."""
+        if (self.tls_cert is None) != (self.tls_key is None):
+            raise BadInput("--tls-cert and --tls-key belong together")
+        tls = (self.tls_cert, self.tls_key) if self.tls_cert is not None and self.tls_key is not None else None
         on_ready: Callable[[str], None] | None = webbrowser.open if self.browser else None  # type: ignore[assignment]
         looks = SharedViewState()
         with ExitStack() as stack:
@@ -73,6 +83,8 @@ class ServerOptions:
                 viser_port=scene.port,
                 looks=looks,
                 on_ready=on_ready,
+                always_token=self.token,
+                tls=tls,
             )
         return 0
 

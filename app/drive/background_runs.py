@@ -15,6 +15,7 @@ from app.drive.compute_scheduler import ComputeScheduler
 from app.drive.full_run import DriveRun
 from app.drive.open_recording import OpenRecording, RunSetup
 from pipeline.common.errors import BadInput
+from pipeline.common.user_files import Overloaded
 from pipeline.inference.cancellation import Stopped
 from pipeline.params import Params
 from pipeline.step import State
@@ -25,6 +26,8 @@ logger = logging.getLogger("cipv.drive")
 
 _TELL_EVERY_S = 0.25
 _PATIENCE_S = 10.0
+_TRY_AGAIN_S = 0.5
+"""After the system could not read."""
 Phase = Literal["detect", "run", "done", "failed"]
 
 
@@ -97,14 +100,15 @@ class BackgroundRuns:
     def start(self) -> None:
         self._thread.start()
 
-    def stop(self) -> None:
-        """End the thread. A running network is stopped; a read in progress is finished first."""
+    def stop(self, patience_s: float = _PATIENCE_S) -> None:
+        """End the thread. A running network is stopped; a read in progress is finished first, or left to itself after
+        ``patience_s``."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()
         self.turn.end()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(_PATIENCE_S)
+            self._thread.join(patience_s)
 
     def open(self, setup: RunSetup | None) -> None:
         """Another recording, or none."""
@@ -165,6 +169,10 @@ class BackgroundRuns:
             recording.advance(run)
         except Stopped:
             raise
+        except Overloaded as error:  # says nothing of the frame: it is read again, and meanwhile nothing is final
+            logger.warning("frame %s of %s: %s", run.done, recording.setup.uri, error)
+            with self._condition:
+                self._condition.wait_for(lambda: self._ended, _TRY_AGAIN_S)
         except BadInput as error:
             run.note = str(error)
         except Exception as error:  # whatever a recording or a network does, other runs go on

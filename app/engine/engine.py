@@ -36,7 +36,7 @@ from pipeline.warm_up import warm_up
 
 logger = logging.getLogger("cipv.engine")
 
-_PATIENCE_S = 10.0
+_PATIENCE_S = 2.0
 _TELL_EVERY_S = 0.25
 _ABLATION: dict[Sensors, tuple[str, ...]] = {
     "both": (),
@@ -91,6 +91,8 @@ class Engine:
         self._whole_drives = whole_drives
         self._detectors = DetectorPool(open_detector, sensors, open_lanes, lanes_every, far_view_px)
         self._player: Player | None = None
+        self.detectors = Detectors()
+        """Of what is open."""
         self._thread = threading.Thread(target=self._work, name="cipv-engine", daemon=True)
 
     def start(self) -> None:
@@ -100,12 +102,14 @@ class Engine:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the worker. A network run or a read in progress is finished first."""
+        """Close the recording, if there is one, then end the worker. A network run or a read in progress is finished
+        first, but not waited for longer than a system waits for a program that it has asked to end."""
         self.control.change(stop=True)
-        self.drives.stop()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(_PATIENCE_S)
         self.desk.stop()
+        ends_s = time.monotonic() + _PATIENCE_S
+        self.drives.stop(_PATIENCE_S)
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join(max(0.0, ends_s - time.monotonic()))
         self.labels.stop()
 
     @property
@@ -180,7 +184,7 @@ class Engine:
         self._close()
         player = self._player_of(source, detectors)
         player.open()
-        self._player = player
+        self._player, self.detectors = player, detectors
         self.labels.open(uri, self.drives.recording)
         self._publisher.publish(
             replace(

@@ -14,6 +14,7 @@ from pipeline.common.errors import BadInput
 from pipeline.types.source import AnySource, LiveSource, is_live_source
 
 if TYPE_CHECKING:
+    from pipeline.detection import Detectors
     from pipeline.recording.recorder import Recorder, RecordingState
 
 
@@ -44,8 +45,8 @@ class SessionRecorder:
         recorder = self._recorder
         return recorder.state if recorder is not None else None
 
-    def start(self, source: AnySource | None) -> RecordingState:
-        """Record from the next frame on; a recording that goes on already just goes on.
+    def start(self, source: AnySource | None, detectors: Detectors | None = None) -> RecordingState:
+        """Record from the next frame on; a recording that goes on already just goes on. detectors: whose results.
 
         BadInput when nothing is open, or no file can be made.
         """
@@ -60,7 +61,7 @@ class SessionRecorder:
             from pipeline.recording.save import about
 
             try:
-                recorder = Recorder(new_session(self._folder, source.title), about(source))
+                recorder = Recorder(new_session(self._folder, source.title), about(source, detectors))
             except OSError as error:
                 raise BadInput(f"{self._folder}: cannot record here: {error.strerror}") from None
             with self._feeding:

@@ -21,6 +21,7 @@ import asyncio
 import json
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -38,6 +39,8 @@ from app.streaming.picture import MAX_WIDTH_PX, width_for
 FRAMES_UNDER_WAY = 2
 """One being painted while the next is on its way."""
 
+DISPLAY_MAY_SAY = frozenset({"ping", "picture_px", "painted"})
+"""What changes nothing for others; of a display everything else is ignored, whatever is added."""
 _LARGEST_PING = 1e15
 """Milliseconds; a page sends its own clock."""
 _WIDEST_PX = 4096
@@ -133,6 +136,7 @@ class Stream:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._slots: list[Slot] = []
         self._encoder = Encoder()
+        self._threads = ThreadPoolExecutor(1, "cipv-stream")  # its own: whatever requests do, frames go on
         self._lock = threading.Lock()
         self._frame = _Encoded()
         self._width_px = MAX_WIDTH_PX
@@ -185,6 +189,8 @@ class Stream:
             if message["type"] == "websocket.disconnect":
                 return
             said = _object(message.get("text"))
+            if is_display(socket):
+                said = {name: value for name, value in said.items() if name in DISPLAY_MAY_SAY}
             if (ping := _number(said.get("ping"), _LARGEST_PING)) is not None:
                 slot.put("pong", _dump({"type": "pong", "ping": ping, "server_unix_ms": time.time() * 1e3}))
             if (wanted := _width(said.get("picture_px"))) is not None:
@@ -193,11 +199,11 @@ class Stream:
                     await self._put_newest(slot, self._snapshot)
             if said.get("painted") is True:
                 slot.painted()
-            if "selected" in said and _is_id_or_null(said["selected"]) and not is_display(socket):
+            if "selected" in said and _is_id_or_null(said["selected"]):
                 self._looks.select(said["selected"])
             if isinstance(said.get("hides_3d"), bool):
                 self._looks.hide(slot, said["hides_3d"])
-            if "held" in said and not is_display(socket):
+            if "held" in said:
                 self._hold(slot, said["held"])
 
     def _hold(self, slot: Slot, said: Any) -> None:
@@ -219,7 +225,7 @@ class Stream:
 
     async def _put_newest(self, slot: Slot, snapshot: Snapshot) -> None:
         """The frame, and the state as it is now: the one in the frame may be older than what was told meanwhile."""
-        frame = await asyncio.to_thread(self._encoded, snapshot)
+        frame = await asyncio.get_running_loop().run_in_executor(self._threads, self._encoded, snapshot)
         if frame.message is not None:
             slot.put("frame", frame.message, frame.sequence)
         slot.put("state", state_message(self._snapshot or snapshot))

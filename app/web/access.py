@@ -10,6 +10,7 @@ Where other machines can reach the server, all that does not help: there everybo
 
 from __future__ import annotations
 
+import asyncio
 import socket
 from collections.abc import Iterable
 from html import escape
@@ -23,7 +24,7 @@ from starlette.websockets import WebSocket
 
 from app.core.client_role import set_role
 from app.core.server_address import LOOPBACK_HOSTS, WILDCARDS, is_address
-from app.web.tokens import Tokens
+from app.web.tokens import Guesses, Tokens
 
 _READING = frozenset({"GET", "HEAD", "OPTIONS"})
 _OWN_SITES = (None, "same-origin", "none")
@@ -50,6 +51,10 @@ _SECURITY_HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "permissions-policy": "camera=(), microphone=(), geolocation=()",
 }
+
+
+_GUESSER_WAITS_S = 1.0
+_TOO_MANY_GUESSES = JSONResponse({"detail": "too many wrong tokens; wait a minute"}, 429, {"retry-after": "60"})
 
 
 class Access:
@@ -95,6 +100,7 @@ class Guard:
         self._app = app
         self._access = access
         self._tokens = tokens
+        self._guesses = Guesses()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -103,6 +109,8 @@ class Guard:
         answer = self._refused(HTTPConnection(scope), is_socket or scope["method"] not in _READING)
         if answer is None:
             return await self._app(scope, receive, send if is_socket else _with_headers(send))
+        if answer is _TOO_MANY_GUESSES:
+            await asyncio.sleep(_GUESSER_WAITS_S)
         if is_socket:
             return await WebSocket(scope, receive, send).close(code=1008)
         await answer(scope, receive, _with_headers(send))
@@ -117,9 +125,12 @@ class Guard:
         by_link = connection.query_params.get("token") if not changes else None
         if by_link is not None and self._tokens.role_of(by_link) is not None:
             return _signed_in(connection, by_link)
-        role = self._tokens.role_of(_bearer(connection.headers) or connection.cookies.get(cookie_name(connection)))
+        given = _bearer(connection.headers) or connection.cookies.get(cookie_name(connection))
+        role = self._tokens.role_of(given)
         if role is None:
-            return _who_are_you(connection)
+            wrong, address = by_link or given, connection.client.host if connection.client else ""
+            is_guessing = wrong is not None and self._guesses.wrong(address, wrong)
+            return _who_are_you(connection) if not is_guessing else _TOO_MANY_GUESSES
         if role == "display" and not _display_may(connection.scope):
             return JSONResponse({"detail": "not allowed for the in-vehicle display"}, 403)
         set_role(connection, role)
@@ -163,7 +174,13 @@ def _signed_in(connection: HTTPConnection, token: str) -> Response:
     )
     answer = HTMLResponse(page, headers={"cache-control": "no-store"})
     answer.set_cookie(
-        cookie_name(connection), token, max_age=_COOKIE_DAYS * 86400, path="/", httponly=True, samesite="strict"
+        cookie_name(connection),
+        token,
+        max_age=_COOKIE_DAYS * 86400,
+        path="/",
+        httponly=True,
+        samesite="strict",
+        secure=connection.url.scheme == "https",
     )
     return answer
 

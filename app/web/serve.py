@@ -1,4 +1,4 @@
-"""The server and the engine as one program, until Ctrl-C.
+"""The server and the engine as one program, until it is asked to end.
 
 The engine starts before FastAPI is imported, which takes half a second: it opens the recording and makes the first
 picture meanwhile.
@@ -9,10 +9,12 @@ from __future__ import annotations
 import socket
 import sys
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 from app.core.server_address import DEFAULT_PORT, is_loopback, listen_socket, reachable
 from app.core.session_folder import SESSIONS
 from app.core.shared_view_state import SharedViewState
+from app.core.stop_signals import asked_to_stop
 from app.drive.marks import Marks
 from app.engine.engine import Engine
 from app.web.tokens import Tokens
@@ -29,28 +31,37 @@ def serve(
     viser_port: Callable[[], int | None] = lambda: None,
     looks: SharedViewState | None = None,
     on_ready: Callable[[str], None] | None = None,
+    always_token: bool = False,
+    tls: tuple[Path, Path] | None = None,
 ) -> None:
-    """Serve until Ctrl-C. Starts and stops the engine; prints the page's address on a line of its own when it answers,
-    and links with tokens where other machines can come.
+    """Serve until Ctrl-C, SIGTERM or SIGHUP. Starts and stops the engine; prints the page's address on a line of its
+    own when it answers, and links with tokens where other machines can come.
 
-    PortTaken and BadInput (a weak token) before anything is started.
+    always_token: also where only this machine can come, whose other users could do everything otherwise. tls: files of
+    a certificate and its key.
+
+    PortTaken and BadInput (a weak token, no certificate) before anything is started.
     """
-    tokens = None if is_loopback(host) and not tuple(hosts) else Tokens.from_environment()
+    is_private = is_loopback(host) and not tuple(hosts) and not always_token
+    tokens = None if is_private else Tokens.from_environment()
     bound = listen_socket(host, port, strict=strict_port)
     number = bound.getsockname()[1]
     if port not in (0, number):
         print(f"cipv: port {port} is in use; using {number}", file=sys.stderr)
-    address = f"http://{reachable(host)}:{number}"
+    address = f"{'http' if tls is None else 'https'}://{reachable(host)}:{number}"
     engine.labels.kept.station = f"{socket.gethostname()}:{number}"  # two on one machine have parameters of their own
-    engine.start()
-    try:
-        from app.web.server import Server, create_app
+    with asked_to_stop() as asked:
+        engine.start()
+        try:
+            from app.web.server import Server, TlsFiles, create_app
 
-        app = create_app(engine, viser_port, (*hosts, host), Marks(SESSIONS / "marks"), looks, tokens)
-        freeze_loaded_objects()
-        Server(app, address, on_ready, tokens).run(sockets=[bound])
-    except KeyboardInterrupt:
-        pass  # uvicorn raises the signal again once it has shut down
-    finally:
-        engine.stop()
-        bound.close()
+            files = TlsFiles(*tls) if tls is not None else None
+            if files is not None:
+                files.check()
+            marks, audit = Marks(SESSIONS / "marks"), SESSIONS / "audit.jsonl"
+            app = create_app(engine, viser_port, (*hosts, host), marks, looks, tokens, audit)
+            freeze_loaded_objects()
+            Server(app, address, on_ready, tokens, asked, files).run(sockets=[bound])
+        finally:
+            engine.stop()
+            bound.close()

@@ -5,8 +5,11 @@ from __future__ import annotations
 import asyncio
 import os
 import socket
-from collections.abc import AsyncIterator, Callable, Iterable
-from contextlib import asynccontextmanager
+import ssl
+import threading
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +30,16 @@ from app.views.rerun.web import ViewerFiles
 from app.views.viser.proxy import viser_router
 from app.web.access import Access, Guard
 from app.web.api_description import REFUSALS, titled
+from app.web.audit import Audit
+from app.web.connections import LimitedProtocol
 from app.web.limits import LARGEST_FILE, LARGEST_MESSAGE, BodyLimit
 from app.web.metrics import Metrics
+from app.web.quotas import RoleQuota
 from app.web.routers import ROUTERS, Services
 from app.web.routes.labels.files import IMPORT
 from app.web.tokens import Tokens
+from pipeline.common.errors import BadInput
+from pipeline.common.user_files import Overloaded
 
 STATIC = Path(__file__).resolve().parents[2] / "static"
 
@@ -43,10 +51,11 @@ def create_app(
     marks: Marks | None = None,
     looks: SharedViewState | None = None,
     tokens: Tokens | None = None,
+    audit: Path | None = None,
 ) -> FastAPI:
     """The application over a running engine. ``hosts``: names other than loopback it may be called by. ``marks``: where
     marked moments are kept; None forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
-    comes must have; None where only this machine can come."""
+    comes must have; None where only this machine can come. ``audit``: the file of who did what; None keeps none."""
     access = Access(hosts)
     stream = Stream(looks)
     exports, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
@@ -67,8 +76,12 @@ def create_app(
     )
     app.openapi = titled(app)  # type: ignore[method-assign]
     app.add_middleware(BodyLimit, files={IMPORT: LARGEST_FILE})
+    if audit is not None:
+        app.add_middleware(Audit, file=audit)
+    app.add_middleware(RoleQuota)
     app.add_middleware(Guard, access=access, tokens=tokens)  # the last one added is the first to be asked
     app.add_exception_handler(RequestValidationError, _one_sentence)
+    app.add_exception_handler(Overloaded, _overloaded)
     for make_router in ROUTERS:
         app.include_router(make_router(services))
     app.include_router(viser_router(viser_port, access.allowed))
@@ -77,25 +90,66 @@ def create_app(
     return app
 
 
+@dataclass(frozen=True)
+class TlsFiles:
+    """What HTTPS is served with, PEM."""
+
+    certificate: Path
+    """With those that lead to its root, if any."""
+    key: Path
+
+    def check(self) -> None:
+        """BadInput when they cannot be used."""
+        try:
+            ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(self.certificate, self.key, password=_no_password)
+        except (OSError, ValueError) as error:  # an SSLError is an OSError
+            reason = getattr(error, "reason", None) or getattr(error, "strerror", None) or str(error)
+            raise BadInput(f"{self.certificate}, {self.key}: cannot be used for TLS: {reason}") from None
+
+
+def _no_password() -> str:
+    raise ValueError("the key needs a password")
+
+
 class Server(uvicorn.Server):
-    """Says where it is as soon as it answers. Compressing the stream would cost more than sending it."""
+    """Says where it is as soon as it answers, and ends once it is ``asked`` to, a moment later. Compressing the stream
+    would cost more than sending it."""
 
     def __init__(
-        self, app: FastAPI, address: str, on_ready: Callable[[str], None] | None, tokens: Tokens | None = None
+        self,
+        app: FastAPI,
+        address: str,
+        on_ready: Callable[[str], None] | None,
+        tokens: Tokens | None = None,
+        asked: threading.Event | None = None,
+        tls: TlsFiles | None = None,
     ) -> None:
         super().__init__(
             uvicorn.Config(
                 app,
+                http=LimitedProtocol,
                 log_level="warning",
                 access_log=False,
                 ws_per_message_deflate=False,
                 ws_max_size=LARGEST_MESSAGE,
                 timeout_graceful_shutdown=1,
+                ssl_certfile=tls.certificate if tls is not None else None,
+                ssl_keyfile=tls.key if tls is not None else None,
             )
         )
         self._address = address
         self._tokens = tokens
         self._on_ready = on_ready
+        self._asked = asked or threading.Event()
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Signals are the program's: uvicorn would raise SIGTERM again at the end, which then kills the program before
+        its recording is closed."""
+        yield
+
+    async def on_tick(self, counter: int) -> bool:
+        return self._asked.is_set() or await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
@@ -104,8 +158,8 @@ class Server(uvicorn.Server):
             link = self._address
             if self._tokens is not None:
                 link = f"{self._address}/?token={self._tokens.person}"
-                print(f"everything:         {link}", flush=True)
-                print(f"display in the car: {self._address}/drive/?token={self._tokens.display}", flush=True)
+                print(f"everything:         {self._address}/?token={self._tokens.shown('person')}", flush=True)
+                print(f"display in the car: {self._address}/drive/?token={self._tokens.shown('display')}", flush=True)
             if self._on_ready is not None:
                 await asyncio.to_thread(self._on_ready, link)
 
@@ -132,6 +186,10 @@ class _Pages(StaticFiles):
         response = super().file_response(*args, **kwargs)
         response.headers["cache-control"] = "no-cache"
         return response
+
+
+def _overloaded(_: Request, error: Exception) -> Response:
+    return JSONResponse({"detail": str(error)}, 503, {"retry-after": "1"})
 
 
 def _palette() -> Response:

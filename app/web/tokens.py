@@ -10,15 +10,19 @@ import hashlib
 import hmac
 import os
 import secrets
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from app.core.client_role import Role
 from pipeline.common.errors import BadInput
 
 _BYTES = 24
+_MOST_ADDRESSES = 10_000
 SHORTEST = 16
 """Characters of a token that somebody chose; 16 of them from a random source cannot be guessed over a network."""
+FEWEST_DIFFERENT = 8
+"""Different ones among them: sixteen random letters have fewer once in ten million times."""
 _VARIABLES: dict[Role, str] = {"person": "CIPV_TOKEN", "display": "CIPV_DISPLAY_TOKEN"}
 
 
@@ -28,6 +32,8 @@ class Tokens:
 
     person: str
     display: str
+    chosen: frozenset[Role] = frozenset()
+    """Whose come from the environment, where other programs' logs do not show them: they are never printed."""
 
     @classmethod
     def from_environment(cls, environment: Mapping[str, str] = os.environ) -> Tokens:
@@ -37,10 +43,16 @@ class Tokens:
             token = environment.get(variable) or secrets.token_urlsafe(_BYTES)
             if len(token) < SHORTEST or not (token.isascii() and token.replace("-", "").replace("_", "").isalnum()):
                 raise BadInput(f"{variable}: must have at least {SHORTEST} letters, digits, - or _")
+            if len(set(token)) < FEWEST_DIFFERENT or _repeats(token):
+                raise BadInput(f"{variable}: too easy to guess; `openssl rand -hex 24` makes a good one")
             chosen[role] = token
         if chosen["person"] == chosen["display"]:
             raise BadInput("CIPV_TOKEN and CIPV_DISPLAY_TOKEN must differ")
-        return cls(**chosen)
+        return cls(**chosen, chosen=frozenset(role for role, name in _VARIABLES.items() if environment.get(name)))
+
+    def shown(self, role: Role) -> str:
+        """The token as it is printed: by the variable's name where it has one."""
+        return f"${_VARIABLES[role]}" if role in self.chosen else getattr(self, role)
 
     def role_of(self, given: str | None) -> Role | None:
         """Whose token it is; None for nobody's. Takes as long for every answer."""
@@ -48,6 +60,31 @@ class Tokens:
         is_person = hmac.compare_digest(digest, _digest(self.person))
         is_display = hmac.compare_digest(digest, _digest(self.display))
         return "person" if is_person else "display" if is_display else None
+
+
+def _repeats(token: str) -> bool:
+    """Whether it is one piece again and again: then it is in itself doubled, elsewhere than at its ends."""
+    return token in (token + token)[1:-1]
+
+
+class Guesses:
+    """Wrong tokens by address. Whoever tries more than ``allowed`` different ones in ``per_s`` waits for each answer;
+    who is right never waits, so that nobody can lock others out."""
+
+    def __init__(self, allowed: int = 10, per_s: float = 60.0, clock: Callable[[], float] = time.monotonic) -> None:
+        self._allowed, self._per_s, self._clock = allowed, per_s, clock
+        self._wrong: dict[str, dict[bytes, float]] = {}
+
+    def wrong(self, address: str, token: str) -> bool:
+        """Count a try; whether it was one too many. The same again, as by a page with an old cookie, is none."""
+        if len(self._wrong) >= _MOST_ADDRESSES:
+            self._wrong.clear()  # so many at once are one attacker's, who has them all
+        now_s = self._clock()
+        recent = {each: at_s for each, at_s in self._wrong.get(address, {}).items() if at_s > now_s - self._per_s}
+        if len(recent) <= self._allowed:
+            recent.setdefault(_digest(token), now_s)
+        self._wrong[address] = recent
+        return len(recent) > self._allowed
 
 
 def _digest(token: str) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from pathlib import Path
@@ -11,7 +12,12 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from pipeline.common.errors import BadInput
+from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
 
+_MOST_NODES = 200_000
+"""Values of a YAML document; a few dozen bytes of aliases can stand for billions."""
+_QUOTED = re.compile("['\"].*['\"]", re.DOTALL)
+_PLAIN_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,39}")
 _IN_OUR_WORDS = {
     "extra_forbidden": "no such setting",
     "missing": "is missing",
@@ -24,7 +30,7 @@ def read_yaml(path: Path, what: str, refuse: Callable[[str], BadInput] = BadInpu
     """The plain values of a YAML file, None of an empty one. Else what ``refuse`` makes of a sentence that begins with
     ``what`` is raised."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_regular(path, LARGEST_TEXT_BYTES).decode("utf-8")
     except UnicodeDecodeError:
         raise refuse(f"{what}: not YAML: not a text file") from None
     except (OSError, ValueError) as error:
@@ -33,13 +39,42 @@ def read_yaml(path: Path, what: str, refuse: Callable[[str], BadInput] = BadInpu
 
 
 def parse_yaml(text: str, what: str, refuse: Callable[[str], BadInput] = BadInput) -> Any:
-    """As ``read_yaml``, of a text."""
+    """As ``read_yaml``, of a text. The sentence says where the text is wrong and not what stands there: who asks for a
+    file by a wrong name shall not be shown it."""
     try:
+        if _nodes_of(yaml.compose(text, yaml.SafeLoader), {}) > _MOST_NODES:
+            raise refuse(f"{what}: not YAML: its aliases expand to more than {_MOST_NODES} values")
         return yaml.safe_load(text)
+    except BadInput:
+        raise
     except RecursionError:
         raise refuse(f"{what}: not YAML: nested too deeply") from None
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: a day that is in no calendar, a number without end
-        raise refuse(f"{what}: not YAML: {str(error).splitlines()[0]}") from None
+    except yaml.MarkedYAMLError as error:
+        mark, said = error.problem_mark or error.context_mark, (error.context, error.problem)
+        where = f"line {mark.line + 1}, column {mark.column + 1}" if mark is not None else None
+        raise refuse(f"{what}: not YAML: {_without_content(', '.join(filter(None, (*said, where))))}") from None
+    except ValueError as error:  # a day that is in no calendar, a number without end
+        raise refuse(f"{what}: not YAML: {_without_content(str(error))}") from None
+    except Exception:  # a value that is none of its tag's (``!!int ""``) makes PyYAML raise whatever it stumbles over
+        raise refuse(f"{what}: not YAML: a value that is not of its type") from None
+
+
+def _without_content(text: str) -> str:
+    """One line of what a parser says, without what it quotes."""
+    return _QUOTED.sub("…", (text.splitlines() or ["damaged"])[0])
+
+
+def _nodes_of(node: yaml.Node | None, known: dict[int, int]) -> int:
+    """How many values a document has once each alias is put in; too many for one that contains itself."""
+    if node is None:
+        return 0
+    if id(node) not in known:
+        known[id(node)] = _MOST_NODES + 1
+        inside: list[yaml.Node] = node.value if isinstance(node, yaml.SequenceNode) else []
+        if isinstance(node, yaml.MappingNode):
+            inside = [each for pair in node.value for each in pair]
+        known[id(node)] = 1 + sum(_nodes_of(each, known) for each in inside)
+    return known[id(node)]
 
 
 def given_path(text: str | Path, refuse: Callable[[str], BadInput] = BadInput) -> Path:
@@ -67,8 +102,13 @@ def first_complaint(error: ValidationError, model: type[BaseModel]) -> str:
     text = _IN_OUR_WORDS.get(first["type"], first["msg"].removeprefix("Value error, "))
     if first["type"] == "extra_forbidden":
         text += did_you_mean(str(place[-1]), _names_at(model, place[:-1]))
-    where = ".".join(str(part) for part in place)
+    where = ".".join(_shown(part) for part in place)
     return f"{where}: {text}" if where else text
+
+
+def _shown(part: int | str) -> str:
+    """A name as it may be shown; what is no name may be any line of any file."""
+    return str(part) if isinstance(part, int) or _PLAIN_NAME.fullmatch(part) else "…"
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -7,16 +7,19 @@ from collections.abc import Iterable
 from decimal import Decimal
 from pathlib import Path
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 
+from pipeline.common.picture_decoding import TooMuch, decode_within_budget
 from pipeline.common.user_file_errors import reason_of
+from pipeline.common.user_files import check_allowed, read_regular
 from pipeline.types import F64, U8, CameraCalibration, Picture
 from pipeline.types.source import SourceError
 
 _JPEG_START = b"\xff\xd8"
 _MARKERS = ((_JPEG_START, b"\xff\xd9"), (b"\x89PNG", b"IEND"))
+_LARGEST_FILE_BYTES = 512 << 20
+"""Of one frame: the largest sweeps have some dozen MB."""
 _END_BYTES = 64
 _NUMBER = re.compile(r"\d+(\.\d+)?")
 
@@ -27,6 +30,7 @@ def recording_folder(path: str) -> Path:
         raise SourceError("no folder given after the colon")
     try:
         folder = Path(path).expanduser()
+        check_allowed(folder)
         if not folder.exists():
             raise SourceError(f"{path}: no such folder")
         if not folder.is_dir():
@@ -44,6 +48,7 @@ def recording_file(path: str) -> Path:
         raise SourceError("no file given after the colon")
     try:
         file = Path(path).expanduser()
+        check_allowed(file)
         if not file.exists():
             raise SourceError(f"{path}: no such file")
         if not file.is_file():
@@ -71,7 +76,7 @@ def in_order(names: Iterable[str]) -> list[str]:
 def read_bytes(path: Path) -> bytes:
     """The whole file. SourceError names it when it cannot be read."""
     try:
-        return path.read_bytes()
+        return read_regular(path, _LARGEST_FILE_BYTES)
     except OSError as error:
         raise SourceError(f"{path.name}: cannot be read: {reason_of(error)}") from None
 
@@ -102,12 +107,12 @@ def decode_image(data: bytes, name: str) -> tuple[U8, bytes | None]:
         if data.startswith(start) and end not in data[-_END_BYTES:]:
             raise SourceError(f"{name}: the picture is truncated")
     try:
-        picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR) if data else None
-    except cv2.error:
-        picture = None
+        picture = decode_within_budget(data)
+    except TooMuch as error:
+        raise SourceError(f"{name}: not a readable picture: {error}") from None
     if picture is None:
         raise SourceError(f"{name}: not a readable picture")
-    return np.ascontiguousarray(picture, dtype=np.uint8), data if is_jpeg else None
+    return picture, data if is_jpeg else None
 
 
 def picture_of(path: Path | None, t_ns: int | None, size: tuple[int, int], notes: list[str]) -> Picture | None:

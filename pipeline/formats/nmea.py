@@ -46,9 +46,11 @@ class NmeaReader:
         height is not a number where the receiver sends no GGA.
         """
         try:
-            sentence = _parse(line)
+            sentence = parse_sentence(line)
         except BadSentence:
             self.bad += 1
+            return None
+        if sentence is None:
             return None
         kind, moment = sentence.sentence_type, getattr(sentence, "timestamp", None)
         if kind not in ("GGA", "RMC", "GST") or not isinstance(moment, time):
@@ -100,26 +102,31 @@ class NmeaReader:
         lat_deg, lon_deg = float(place.latitude), float(place.longitude)
         if not (abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0):
             raise ValueError("a position that is not on the Earth")
+        course_rad, sigma_m = math.radians(float(course)) if is_moving else None, _sigma_m(gga, gst, quality)
+        if not all(map(math.isfinite, (speed_mps, course_rad or 0.0, sigma_m))):
+            raise ValueError("a number without end")
         return GnssFix(
             _unix_ns(self._date, self._moment, near_ns),
             lat_deg,
             lon_deg,
             alt_m=_height_m(gga),
-            course_rad=math.radians(float(course)) if is_moving else None,
+            course_rad=course_rad,
             speed_mps=speed_mps,
             quality=quality,
-            sigma_m=_sigma_m(gga, gst, quality),
+            sigma_m=sigma_m,
         )
 
 
-def _parse(line: str) -> Any:
-    """pynmea2's sentence. BadSentence when the line is damaged or has no checksum: garbage often looks like text."""
+def parse_sentence(line: str) -> pynmea2.TalkerSentence | None:
+    """A sentence of the standard; None for a maker's own (``$P…``) and for a query, which a receiver sends among the
+    others. BadSentence when the line is damaged or has no checksum: garbage often looks like text."""
     if len(line) > _LONGEST_SENTENCE or "*" not in line:
         raise BadSentence("not a complete sentence")
     try:
-        return pynmea2.parse(line.strip(), check=True)
-    except (pynmea2.ParseError, ValueError, TypeError, IndexError, AttributeError) as error:
+        sentence = pynmea2.parse(line.strip(), check=True)
+    except Exception as error:  # its parsers for each maker's sentences raise what they happen to stumble over
         raise BadSentence(str(error)) from None
+    return sentence if isinstance(sentence, pynmea2.TalkerSentence) else None
 
 
 def _quality(gga: Any, rmc: Any) -> GnssQuality | None:

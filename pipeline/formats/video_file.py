@@ -10,12 +10,15 @@ import av
 import numpy as np
 
 from pipeline.common.nearest_in_time import Times
+from pipeline.common.picture_decoding import MOST_PIXELS, check_pixels
 from pipeline.common.progress import Progress, silent
 from pipeline.common.user_file_errors import reason_of
+from pipeline.common.user_files import check_regular, overload_told_apart
 from pipeline.types import U8
 from pipeline.types.source import SourceError
 
 SUFFIXES = (".mp4", ".avi", ".mkv", ".mov", ".mjpeg", ".ts")
+_FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,avi,matroska,webm,mjpeg,mjpeg_2000,mpegts,mpeg,mpegvideo,h264,hevc,ogg,flv,asf"
 _NS = 1_000_000_000
 _DECODE_ON_NS = 2 * _NS
 """A picture this little later is reached sooner by decoding on than by seeking."""
@@ -23,6 +26,21 @@ _TELL_EVERY = 256
 """Pictures between two words of progress."""
 _PLACES = 2
 """What is shown, and what is computed beside it."""
+
+
+def open_video(path: Path) -> av.container.InputContainer:
+    """A video file, ready to be decoded within the budget of a picture. OSError for what is no regular file. What a
+    playlist in it names is not opened: FFmpeg would fetch it from any server."""
+    check_regular(path)
+    container = av.open(str(path.resolve()), options={"protocol_whitelist": "file", "format_whitelist": _FORMATS})
+    within_budget(container)
+    return container
+
+
+def within_budget(container: av.container.InputContainer) -> None:
+    """Have FFmpeg refuse pictures that are larger than any camera's, also where their size changes on the way."""
+    for stream in container.streams.video:
+        stream.codec_context.options = {"max_pixels": str(MOST_PIXELS)}
 
 
 class VideoFile:
@@ -33,7 +51,7 @@ class VideoFile:
     def __init__(self, path: Path, progress: Progress = silent) -> None:
         self.path = path
         try:
-            with av.open(str(path)) as container:
+            with open_video(path) as container:
                 stamps, tick_ns = _stamps(container, progress)
         except (av.FFmpegError, OSError, ValueError) as error:
             raise SourceError(f"{path.name}: not a readable video: {reason_of(error)}") from None
@@ -52,7 +70,8 @@ class VideoFile:
             self._places.remove(place)
             self._places.append(place)
         try:
-            return place.picture(wanted_ns)
+            with overload_told_apart():
+                return place.picture(wanted_ns)
         except (av.FFmpegError, OSError, ValueError, StopIteration) as error:
             raise SourceError(f"{self.path.name}: picture {index} cannot be decoded: {reason_of(error)}") from None
 
@@ -91,13 +110,14 @@ class _Place:
                 continue
             self._at_ns = round((frame.pts - self._first_stamp) * self._tick_ns)
             if self._at_ns >= wanted_ns - half_tick_ns:
+                check_pixels(frame.width, frame.height)
                 return np.ascontiguousarray(frame.to_ndarray(format="bgr24"), dtype=np.uint8)
         raise ValueError("the video ends before it")
 
     def _seek(self, wanted_ns: int) -> None:
         self.seeks += 1
         if self._container is None:
-            self._container = av.open(str(self._path))
+            self._container = open_video(self._path)
         stream = self._container.streams.video[0]
         self._container.seek(self._first_stamp + int(wanted_ns / self._tick_ns), stream=stream)
         self._frames = self._container.decode(stream)

@@ -91,7 +91,8 @@ def with_empty_masks(model: onnx.ModelProto) -> onnx.ModelProto:
 
 def with_input_size(model: onnx.ModelProto, size: Size) -> onnx.ModelProto:
     """A copy that takes 1×3×size. Every declared shape after the input is dropped and inferred anew; where the graph
-    holds its old size in constants that leaves contradictions, which the runtime then reports."""
+    holds its old size in constants that leaves contradictions, which the runtime then reports, or, as ValueError, the
+    inference itself."""
     changed = onnx.ModelProto()
     changed.CopyFrom(model)
     weights = {tensor.name for tensor in changed.graph.initializer}
@@ -102,7 +103,11 @@ def with_input_size(model: onnx.ModelProto, size: Size) -> onnx.ModelProto:
     del changed.graph.value_info[:]
     for value in changed.graph.output:
         value.type.tensor_type.ClearField("shape")
-    return onnx.shape_inference.infer_shapes(changed)
+    try:
+        return onnx.shape_inference.infer_shapes(changed)
+    except Exception as error:  # the class that it raises is none of Python's own errors
+        reason = (str(error).splitlines() or ["no reason given"])[0]
+        raise ValueError(f"its shapes contradict each other: {reason}") from None
 
 
 def _up(length: float) -> int:

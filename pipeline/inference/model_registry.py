@@ -15,12 +15,15 @@ import urllib.error
 import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
+
+from pydantic import BaseModel
 
 from pipeline.common.data_dir import data_dir, file_sha256
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.common.user_file_errors import given_path
+from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.inference.distance_laws import find_law, law_file
 from pipeline.types import DistanceLaw
 
@@ -28,6 +31,8 @@ Task = Literal["detector", "lanes"]
 EMBEDDED = "embedded"
 """Name of the built-in detector."""
 _EMBEDDED_FILE = Path(__file__).parents[1] / "vision" / "embedded" / "simulated_vehicles.onnx"
+_LARGEST_BYTES = 2 << 30
+"""What protobuf can hold."""
 _CHUNK = 1 << 16
 _TIMEOUT_S = 30.0
 
@@ -148,6 +153,9 @@ def list_models() -> tuple[ModelEntry, ...]:
 
     def entry(name: str, task: Task, licence: str | None, url: str | None, note: str) -> ModelEntry:
         path = _located(name)
+        official = next((known.sha256 for known in KNOWN if known.name == name), None)
+        if path is not None and official is not None and file_sha256(path) != official:
+            licence, url, note = None, None, f"not the official file of this name: {note}"
         law = find_law(path).law if path is not None and task == "detector" else None
         return ModelEntry(name, task, path, _same(path, defaults[task]), licence, url, note, law)
 
@@ -155,8 +163,8 @@ def list_models() -> tuple[ModelEntry, ...]:
     own = "built in: simulated vehicles only, 0.5 M parameters"
     names = {each.name for each in KNOWN}
     registered = [
-        entry(name, row["task"], None, None, "registered")
-        for name, row in sorted(_read_registry()["models"].items())
+        entry(name, row.task, None, None, "registered")
+        for name, row in sorted(_read_registry().models.items())
         if name not in names
     ]
     return (*known, entry(EMBEDDED, "detector", None, None, own), *registered)
@@ -172,7 +180,7 @@ def find(spec: str) -> Path | None:
 
 def default_model(task: Task) -> Path | None:
     """The network used when none is named; None when none is installed."""
-    chosen = _read_registry()["defaults"].get(task)
+    chosen = _read_registry().defaults.get(task)
     names = [chosen] if chosen else []
     names += [known.name for known in KNOWN if known.task == task]
     names += [EMBEDDED] if task == "detector" else []
@@ -209,11 +217,36 @@ def register(path: Path, name: str, task: Task = "detector", default: bool = Tru
     except OSError as error:
         raise ModelError(f"{target} cannot be written: {error.strerror or error}") from None
     registry = _read_registry()
-    registry["models"][name] = {"task": task, "sha256": file_sha256(target)}
+    registry.models[name] = _Registered(task=task, sha256=file_sha256(target))
     if default:
-        registry["defaults"][task] = name
+        registry.defaults[task] = name
     _write_registry(registry)
     return target
+
+
+def read_verified(path: Path) -> bytes:
+    """A network's file. ModelError when it is not what was installed here: a registered one as it was registered, an
+    official one as its project published it, the embedded one as it came with the program. Of any other file nothing is
+    known. OSError when it cannot be read."""
+    data, expected = read_regular(path, _LARGEST_BYTES), _expected_sha256(path)
+    found = hashlib.sha256(data).hexdigest()
+    if expected is not None and found != expected:
+        raise ModelError(
+            f"{path.name} is damaged or was changed: its SHA-256 is {found[:12]}…, not {expected[:12]}…; "
+            "pull or register it again"
+        )
+    return data
+
+
+def _expected_sha256(path: Path) -> str | None:
+    if _same(path, _EMBEDDED_FILE):
+        return str(json.loads(law_file(_EMBEDDED_FILE).read_text(encoding="utf-8"))["network_sha256"])
+    if not _same(path.parent, store()):
+        return None
+    registered = _read_registry().models.get(path.stem)
+    if registered is not None and registered.sha256:
+        return registered.sha256
+    return next((known.sha256 for known in KNOWN if known.name == path.stem), None)
 
 
 def known_model(name: str) -> KnownModel:
@@ -290,19 +323,33 @@ def _same(a: Path | None, b: Path | None) -> bool:
     return a is not None and b is not None and a.resolve() == b.resolve()
 
 
-def _read_registry() -> dict[str, dict[str, Any]]:
+class _Registered(BaseModel):
+    task: Task
+    sha256: str = ""
+
+
+class _Registry(BaseModel):
+    """What ``registry.json`` holds."""
+
+    defaults: dict[Task, str] = {}
+    models: dict[str, _Registered] = {}
+
+
+def _read_registry() -> _Registry:
     path = store() / "registry.json"
     try:
-        loaded = json.loads(path.read_text(encoding="utf-8"))
-        return {"defaults": dict(loaded["defaults"]), "models": dict(loaded["models"])}
+        registry = _Registry.model_validate_json(read_regular(path, LARGEST_TEXT_BYTES))
     except FileNotFoundError:
-        return {"defaults": {}, "models": {}}
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        raise ModelError(f"{path} is damaged; delete it and register your networks again") from None
+        return _Registry()
+    except (OSError, ValueError, RecursionError):
+        registry = None
+    if registry is None or not all(map(_is_name, (*registry.models, *registry.defaults.values()))):
+        raise ModelError(f"{path} is damaged; delete it and register your networks again")
+    return registry
 
 
-def _write_registry(registry: dict[str, dict[str, Any]]) -> None:
+def _write_registry(registry: _Registry) -> None:
     path = store() / "registry.json"
     part = path.with_suffix(".part")
-    part.write_text(json.dumps(registry, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+    part.write_text(json.dumps(registry.model_dump(), indent=1, sort_keys=True) + "\n", encoding="utf-8")
     part.replace(path)

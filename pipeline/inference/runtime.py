@@ -46,11 +46,13 @@ def find_graph(spec: str | None, task: model_registry.Task) -> Path | None:
 
 
 def read_graph(path: Path) -> onnx.ModelProto:
-    """The graph in a file. DetectorError when it holds none."""
+    """The graph in a file. DetectorError when it holds none, or is not the file that was installed here."""
     try:
-        return onnx.load(path)
+        return onnx.load_from_string(model_registry.read_verified(path))
+    except model_registry.ModelError as error:
+        raise DetectorError(str(error)) from None
     except Exception as error:  # protobuf's own errors have no common base class
-        raise DetectorError(f"{path} is not an ONNX file: {str(error).splitlines()[0]}") from None
+        raise DetectorError(f"{path} is not an ONNX file: {_first_line(error)}") from None
 
 
 def open_session(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:

@@ -42,6 +42,7 @@ class LaneNetwork:
     threads: int
     horizon: float
     """Where the camera sees the horizon, as a share of its picture's height."""
+    sha256: str
     _session: ort.InferenceSession = field(repr=False, compare=False)
 
     def detect(self, bgr: U8) -> RawLanes:
@@ -107,18 +108,22 @@ def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
     except ValueError as error:
         raise DetectorError(f"{path.name} is not a lane network: {error}") from None
     size = own or _FREE_SIZE
-    graph = (model if own else with_input_size(model, size)).SerializeToString()
+    try:
+        graph = (model if own else with_input_size(model, size)).SerializeToString()
+    except ValueError as error:
+        raise DetectorError(f"{path.name} cannot be run: {error}") from None
     session = open_session(graph, path, threads)
     probe = run_session(session, np.full((1, 3, *size), 0.45, np.float32))
     try:
         head = pick_head(probe, [output.name for output in session.get_outputs()])
     except UnknownLaneHead as error:
         raise DetectorError(f"{path.name}: {error}") from None
-    name = f"{path.stem}-{file_sha256(path)[:12]}"
+    sha256 = file_sha256(path)
+    name = f"{path.stem}-{sha256[:12]}"
     if head.horizon is not None:
         name += f"-{horizon:.3f}"
     notes = (f"lane lines by the network {path.stem}",)
-    return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, threads, horizon, session)
+    return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, threads, horizon, sha256, session)
 
 
 def _placed(picture: Size, size: Size, head: Head, horizon: float) -> _Placed:

@@ -40,7 +40,8 @@ _BATCH = 76
 """A VLP-16 sends about so many packets a rotation."""
 
 _PATIENCE_S = 15.0
-"""A disk that takes nothing for so long at the end is not waited for."""
+"""A disk that takes nothing for so long at the end is not waited for; one that takes something, however little, is: a
+loaded machine is slow, and that is not the disk's fault."""
 
 _Do = Callable[[Segments], None]
 _Kind = Literal["frames", "packets", "sweeps", "pictures", "samples"]
@@ -177,19 +178,26 @@ class Recorder:
 
     def stop(self) -> RecordingState:
         """Write what is queued, close the file, and say how it went. Safe to call twice. A disk that hangs is waited
-        for ``_PATIENCE_S``, and the error says so."""
+        for ``_PATIENCE_S`` after the last that it took, and the error says so."""
         if self._thread.is_alive() and not self.hangs:
             if self._batch:
                 batch, self._batch = self._batch, []
                 self.put_packets(batch)
             self._jobs.put(None)
-            self._thread.join(_PATIENCE_S)
-            if self._thread.is_alive():
+            if not self._ends():
                 self.hangs = True
                 kept = self._segments.kept_frames
                 self._error = f"recording stopped: the disk does not answer; {kept} frames until then are kept"
                 logger.error("%s: %s", self._segments.files[-1], self._error)
         return self.state
+
+    def _ends(self) -> bool:
+        """Wait until all is written, or nothing more has been for ``_PATIENCE_S``."""
+        written = None
+        while self._thread.is_alive() and written != (now := (self._done, self._segments.bytes_written)):
+            written = now
+            self._thread.join(_PATIENCE_S)
+        return not self._thread.is_alive()
 
     def _put(self, do: _Do, kind: _Kind, size: int = 0) -> bool:
         """Queue it, if there is room for one more of its kind, or for so many bytes of what comes between frames."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pipeline.common.progress import Progress, silent
 from pipeline.recording.relabel import relabel
@@ -11,6 +12,9 @@ from pipeline.recording.session.provenance import About
 from pipeline.recording.session.source import SessionSource
 from pipeline.recording.session.writer import SessionWriter
 from pipeline.types.source import AnySource, Recorded, Source
+
+if TYPE_CHECKING:
+    from pipeline.detection import Detectors
 
 
 def save(
@@ -48,7 +52,12 @@ def save(
         raise
 
 
-def about(source: AnySource) -> About:
-    """Where a session made of this source came from: in the end from what was recorded first."""
+def about(source: AnySource, detectors: Detectors | None = None) -> About:
+    """Where a session made of this source came from: in the end from what was recorded first; and, of results, which
+    networks they are of."""
     origin = source.origin if isinstance(source, Recorded) else source.uri
-    return About(origin, source.title, source.rate_hz, source.notes)
+    asked: tuple[object, ...] = ()
+    if detectors is not None:
+        asked = (detectors.boxes, detectors.lanes, detectors.far.detector if detectors.far is not None else None)
+    networks = {each.name: each.sha256 for each in asked if hasattr(each, "name") and hasattr(each, "sha256")}
+    return About(origin, source.title, source.rate_hz, source.notes, networks)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.common.geometry import Cuboid, inverse, transform
+from pipeline.common.user_files import open_regular
 from pipeline.formats.file_reading import (
     camera_matrix,
     check_looks_ahead,
@@ -197,7 +198,7 @@ def _first_stamp_ns(path: Path | None) -> int | None:
     if path is None:
         return None
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             head = file.read(_HEAD_BYTES)
     except OSError:
         return None

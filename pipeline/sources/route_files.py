@@ -18,11 +18,12 @@ from statistics import median
 from xml.etree import ElementTree
 
 import numpy as np
-import pynmea2
 from pyproj import Transformer
 
 from pipeline.common.errors import BadInput
 from pipeline.common.user_file_errors import given_path
+from pipeline.common.user_files import read_regular
+from pipeline.formats.nmea import parse_sentence
 from pipeline.types import GnssFix, Route
 
 _LAT_NAMES = ("lat", "lat_deg", "latitude", "latitude_deg")
@@ -52,9 +53,7 @@ def load_route(path: str) -> Route:
     try:
         if file.suffix.lower() == ".mcap":
             return _from_session(path, file.stem)
-        if file.stat().st_size > _LARGEST_FILE_BYTES:
-            raise RouteError(f"{path}: too large for a route")
-        text = file.read_text(encoding="utf-8", errors="replace")
+        text = read_regular(file, _LARGEST_FILE_BYTES).decode("utf-8", "replace")
     except OSError as error:
         raise RouteError(f"{path}: {error.strerror}") from None
     reader = _reader(file.suffix.lower(), text)
@@ -149,8 +148,8 @@ def _gpx(text: str, path: str) -> tuple[Rows, float]:
     if "<!DOCTYPE" in text[:10_000] or "<!ENTITY" in text:
         raise RouteError(f"{path}: GPX needs no document type or entities, and none are read")
     try:
-        root = ElementTree.fromstring(text.lstrip("\ufeff \r\n\t").encode())
-    except ElementTree.ParseError as error:
+        root = ElementTree.fromstring(text.lstrip("\ufeff \r\n\t"))  # a text: the encoding it names is not tried
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise RouteError(f"{path}: not XML: {error}") from None
     for kind, point in (("trk", "trkpt"), ("rte", "rtept")):
         line = root.find(f"{{*}}{kind}")
@@ -177,13 +176,13 @@ def _nmea_place(line: str) -> tuple[str, tuple[float, float], float] | None:
     """Kind, latitude and longitude in degrees, and sigma in metres; None for a sentence of another kind, without a fix,
     with a wrong checksum, or with something else where its numbers should be."""
     try:
-        sentence = pynmea2.parse(line[line.index("$") :].strip(), check=True)
-        kind = getattr(sentence, "sentence_type", "")
-        if kind not in ("GGA", "RMC") or not sentence.lat:
+        sentence = parse_sentence(line[line.index("$") :])
+        kind = sentence.sentence_type if sentence is not None else ""
+        if sentence is None or kind not in ("GGA", "RMC") or not sentence.lat:
             return None
         quality = int(sentence.gps_qual or 0) if kind == "GGA" else int(sentence.status == "A")
         place = float(sentence.latitude), float(sentence.longitude)
-    except (pynmea2.ParseError, ValueError, TypeError, IndexError, AttributeError):
+    except (ValueError, TypeError, AttributeError):
         return None
     return (kind, place, SIGMA_BY_NMEA_QUALITY_M.get(quality, SIGMA_BY_NMEA_QUALITY_M[1])) if quality else None
 

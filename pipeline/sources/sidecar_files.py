@@ -10,6 +10,7 @@ from pipeline.common.fast_replace import evolve
 from pipeline.common.nearest_in_time import Timeline, nearest
 from pipeline.common.progress import Progress, silent
 from pipeline.common.user_file_errors import given_path, reason_of
+from pipeline.common.user_files import open_regular
 from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.formats import video_file as video_files
 from pipeline.formats.file_reading import files_by_name
@@ -124,7 +125,7 @@ def fixes_of(path: Path, near_ns: int, notes: list[str]) -> list[GnssFix]:
     """Every fix of a file of sentences. Damaged lines are counted in ``notes``."""
     reader, fixes = NmeaReader(), []
     try:
-        with path.open("rb") as file:
+        with open_regular(path) as file:
             while line := file.readline(_LONGEST_LINE):
                 fix = reader.push(line.decode("ascii", "replace"), near_ns) if line.strip() else None
                 if fix is not None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 
+from pipeline.common.picture_decoding import TooMuch, check_pixels, decode_within_budget
 from pipeline.types import U8
 
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
@@ -29,13 +29,13 @@ class Shot:
         """(H, W, 3) uint8; None when the picture is damaged."""
         if self.pixels is not None:
             return self.pixels
-        if self.frame is not None:
-            return np.ascontiguousarray(self.frame.to_ndarray(format="bgr24"), dtype=np.uint8)
         try:
-            decoded = cv2.imdecode(np.frombuffer(self.encoded or b"", np.uint8), cv2.IMREAD_COLOR)
-        except cv2.error:
+            if self.frame is not None:
+                check_pixels(self.frame.width, self.frame.height)
+                return np.ascontiguousarray(self.frame.to_ndarray(format="bgr24"), dtype=np.uint8)
+            return decode_within_budget(self.encoded or b"")
+        except TooMuch:
             return None
-        return None if decoded is None else np.ascontiguousarray(decoded, dtype=np.uint8)
 
 
 def is_whole_jpeg(data: bytes) -> bool:

@@ -57,6 +57,8 @@ class Detector:
     """What a user should know about how it was loaded."""
     threads: int
     """How many threads it runs on."""
+    sha256: str
+    """Of the file, hexadecimal."""
     graph: bytes = field(repr=False, compare=False)
     """The ONNX graph as it runs, at this input size."""
     _session: ort.InferenceSession = field(repr=False, compare=False)
@@ -145,7 +147,10 @@ def _at_size(
     model: onnx.ModelProto, path: Path, own: Size | None, size: Size, threads: int, notes: tuple[str, ...] = ()
 ) -> Detector:
     """The detector at one input size, proven by a run on a grey picture."""
-    graph = (model if own == size else with_input_size(model, size)).SerializeToString()
+    try:
+        graph = (model if own == size else with_input_size(model, size)).SerializeToString()
+    except ValueError as error:
+        raise DetectorError(f"{path.name} cannot be run: {error}") from None
     session = open_session(graph, path, threads)
     metadata = {entry.key: entry.value for entry in model.metadata_props}
     probe = run_session(session, np.full((1, 3, *size), PADDING, np.float32))
@@ -158,7 +163,8 @@ def _at_size(
         raise DetectorError("the graph may hold a grid for its own size")
     labels = class_names(decoder.classes, metadata)
     found = find_law(path)
-    name = f"{path.stem}-{file_sha256(path)[:12]}-{size[1]}x{size[0]}{_name_of(found.law)}"
+    sha256 = file_sha256(path)
+    name = f"{path.stem}-{sha256[:12]}-{size[1]}x{size[0]}{_name_of(found.law)}"
     return Detector(
         path,
         name,
@@ -169,6 +175,7 @@ def _at_size(
         decoder.name,
         (*notes, *((found.note,) if found.note else ())),
         threads,
+        sha256,
         graph,
         session,
         decoder,

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import lzma
 import shutil
 import tempfile
 import time
 import zipfile
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,15 +27,8 @@ _LARGEST_UNPACKED = 512 << 20
 _MOST_PARTS = 100_000
 _ENCRYPTED = 1
 """Of a file's flags in a .zip (PKWARE's APPNOTE, 4.4.4)."""
-_BROKEN_ZIP = (
-    zipfile.BadZipFile,  # none at all, or a file in it is not what its checksum says
-    zlib.error,  # a damaged file in it, packed in the usual way
-    lzma.LZMAError,  # the same, in another; of bzip2 it is an OSError
-    NotImplementedError,  # what zipfile raises for one that is packed in a way that it does not know
-    EOFError,  # ends early
-    ValueError,  # says something of a file that cannot be
-    OSError,  # a file and a folder in it have the same name
-)
+_PACKED = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""How every tool packs a .zip. The dictionary of an LZMA stream may be as large as the stream says: gigabytes."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +94,8 @@ def _unzipped(file: Path, folder: Path) -> Path:
     """The folder that was packed. BadAct for what is no .zip, or one that leads out of its folder or swells up."""
     try:
         with zipfile.ZipFile(file) as packed:
+            if any(not each.filename or each.compress_type not in _PACKED for each in packed.infolist()):
+                raise BadAct("the .zip has a file without a name, or one that is not packed with deflate")
             parts = [each for each in packed.infolist() if not each.is_dir()]
             if len(parts) > _MOST_PARTS or sum(each.file_size for each in parts) > _LARGEST_UNPACKED:
                 raise BadAct(f"the .zip unpacks to more than {_LARGEST_UNPACKED >> 20} MiB")
@@ -116,7 +109,9 @@ def _unzipped(file: Path, folder: Path) -> Path:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 with packed.open(each) as source, target.open("xb") as out:
                     _copied(source, out, each.file_size)
-    except _BROKEN_ZIP as error:
+    except BadInput:
+        raise
+    except Exception as error:  # of a damaged one zipfile and its decompressors raise whatever they stumble over
         raise ActRefused(f"not a valid .zip: {error}") from None
     inside = list(folder.iterdir())
     return inside[0] if len(inside) == 1 and inside[0].is_dir() and inside[0].name.startswith("labels") else folder

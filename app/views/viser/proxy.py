@@ -1,6 +1,7 @@
 """The 3D view under ``/viser/`` of the one web port: its page over HTTP and its scene over a WebSocket.
 
-viser's own server has no idea of origins or tokens, so it listens on loopback only and people reach it through here.
+viser's own server has no idea of origins or tokens, so it listens on loopback only, answers nobody but this proxy
+(``internal_port``), and people reach it through here.
 Its client opens ``ws://host/viser`` from a page at ``http://host/viser/`` (it drops the trailing slash) and asks for
 the subprotocol ``viser-v<version>``, which its server refuses to do without: both go through as they are.
 """
@@ -22,6 +23,8 @@ from websockets.exceptions import ConnectionClosed, InvalidHandshake
 from websockets.frames import CloseCode
 from websockets.typing import Data, Subprotocol
 
+from app.views.viser.internal_port import HEADERS
+
 PREFIX = "/viser"
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'wasm-unsafe-eval'; style-src 'unsafe-inline'; "
@@ -31,7 +34,7 @@ POLICY = (
 """What viser's page needs, each part tried: it is one file that unpacks its own script and style with WebAssembly,
 reads its scene in a worker made from a blob, and fetches a light map and a decoder from inside itself (data:). Without
 'unsafe-eval' its sorter of Gaussian splats fails, with one message in the console; nothing here draws any."""
-_HEADERS = {"content-security-policy": POLICY, "x-content-type-options": "nosniff", "cache-control": "no-cache"}
+_OWN_HEADERS = {"content-security-policy": POLICY, "x-content-type-options": "nosniff", "cache-control": "no-cache"}
 _PASSED_ON = ("content-type", "content-encoding")
 _TIMEOUT_S = 5.0
 _GONE = "The 3D view is not running."
@@ -55,10 +58,10 @@ def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConn
     @router.get(PREFIX + "/{path:path}", include_in_schema=False)
     async def page(path: str, request: Request) -> Response:
         if not allowed(request):
-            return PlainTextResponse("not allowed", 403, headers=_HEADERS)
+            return PlainTextResponse("not allowed", 403, headers=_OWN_HEADERS)
         port = await run_in_threadpool(get_port)
         if port is None:
-            return PlainTextResponse(_GONE, 502, headers=_HEADERS)
+            return PlainTextResponse(_GONE, 502, headers=_OWN_HEADERS)
         return await run_in_threadpool(_fetch, port, path, request.headers.get("accept-encoding", ""))
 
     @router.websocket(PREFIX)
@@ -81,12 +84,12 @@ def _same_origin(browser: WebSocket) -> bool:
 def _fetch(port: int, path: str, accept_encoding: str) -> Response:
     connection = http.client.HTTPConnection("127.0.0.1", port, timeout=_TIMEOUT_S)
     try:
-        connection.request("GET", "/" + path, headers={"Accept-Encoding": accept_encoding})
+        connection.request("GET", "/" + path, headers=HEADERS | {"Accept-Encoding": accept_encoding})
         answer = connection.getresponse()
         headers = {name: value for name in _PASSED_ON if (value := answer.getheader(name)) is not None}
-        return Response(answer.read(), answer.status, headers={**headers, **_HEADERS})
+        return Response(answer.read(), answer.status, headers={**headers, **_OWN_HEADERS})
     except (OSError, ValueError, http.client.HTTPException):
-        return PlainTextResponse(_GONE, 502, headers=_HEADERS)
+        return PlainTextResponse(_GONE, 502, headers=_OWN_HEADERS)
     finally:
         connection.close()
 
@@ -100,6 +103,7 @@ async def _bridge(browser: WebSocket, port: int | None) -> None:
         viser = await connect(
             f"ws://127.0.0.1:{port}",
             subprotocols=offered or None,
+            additional_headers=HEADERS,
             compression=None,  # the scene is compressed already; deflating it again costs 4 ms a frame
             max_size=None,
             proxy=None,

@@ -23,6 +23,7 @@ from app.views.ray_picking import object_on_ray
 from app.views.viser import nodes as viser_nodes
 from app.views.viser.gizmo import CuboidGizmo
 from app.views.viser.gui import OnChange, ParamsGui
+from app.views.viser.internal_port import demanding_the_secret
 from app.views.viser.nodes import Strokes
 from pipeline.params import Params
 from pipeline.types import Frame, FusedObject, Point3, Result
@@ -81,7 +82,7 @@ class ViserView:
         self._display = _Display()
         self._labels = 0
         self._selected: int | None = None
-        with _silent():
+        with _silent(), demanding_the_secret():
             self._server = viser.ViserServer(HOST, port, label="CIPV Studio", verbose=False)
         self._server.gui.configure_theme(
             dark_mode=True, show_logo=False, show_share_button=False, control_width="small"

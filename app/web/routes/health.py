@@ -23,9 +23,10 @@ def health_router(engine: Engine, metrics: Metrics) -> APIRouter:
     """Routes for process supervisors and Prometheus."""
     router = APIRouter(tags=["health"])
 
+    @router.head("/healthz", include_in_schema=False)
     @router.get("/healthz", responses={503: {"model": Health, "description": "The worker has ended"}})
     @router.get("/api/healthz", responses={503: {"model": Health, "description": "The worker has ended"}})
-    def healthz(response: Response) -> Health:
+    async def healthz(response: Response) -> Health:
         """Check whether the server and its worker are alive: 200, otherwise 503. Needs no token."""
         if engine.alive:
             return Health(status="ok", engine=True)

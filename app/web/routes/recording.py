@@ -38,7 +38,7 @@ def recording_router(engine: Engine) -> APIRouter:
         POST /api/source {"uri": file}. Marks made meanwhile (POST /api/marks) are in it. 409 with a sentence when
         nothing is open or no file can be made. Opening another source ends the recording."""
         with refusing():
-            state = engine.desk.start(engine.source) if body.on else engine.desk.stop()
+            state = engine.desk.start(engine.source, engine.detectors) if body.on else engine.desk.stop()
         engine.control.change()
         return _json(state)
 

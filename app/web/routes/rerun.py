@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from urllib.parse import urlencode
 
-from fastapi import APIRouter, HTTPException, Query
+from fastapi import APIRouter, HTTPException, Query, Request
 from fastapi.responses import FileResponse
 from pydantic import BaseModel
 from starlette.background import BackgroundTask
@@ -17,14 +18,17 @@ from app.clips.exports import write_clip
 from app.engine.engine import Engine
 from app.views.rerun.start_options import RerunStartOptions
 from app.views.rerun.web import FILES, ViewerFiles
+from app.web.quotas import while_waited_for
 from app.web.routes.clips import clip_of
 from app.web.routes.refusals import open_recording, refusing
 from app.web.routes.shapes import file_of
-from pipeline.common.progress import silent
+from pipeline.common.progress import Progress
 
 AROUND = 50
 """Frames before and behind the shown one that are opened by default."""
 MOST_FRAMES = 600
+_AT_ONCE = 2
+"""Replays that are written; more wait, and go when who asked for them does."""
 
 _POLICY = (
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self' 'unsafe-inline'; img-src 'self' blob: "
@@ -47,6 +51,7 @@ class Address(BaseModel):
 def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
     """Routes to the viewer and what it shows."""
     router = APIRouter(tags=["rerun"])
+    threads = ThreadPoolExecutor(_AT_ONCE, "cipv-rerun")
 
     @router.get("/api/rerun/open")
     def address(
@@ -64,7 +69,8 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
         return Address(url=f"/rerun/?{query}", first=begin, last=end)
 
     @router.get("/api/rerun.rrd", response_class=FileResponse, responses=file_of("application/octet-stream"))
-    def replay(
+    async def replay(
+        request: Request,
         first: int | None = Query(None, ge=0),
         last: int | None = Query(None, ge=0),
         paused: bool = Query(False, description="Start paused"),
@@ -73,16 +79,9 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
         """Download a clip as a rerun recording, with the present parameters. By default the frames around the shown
         one, at most 600."""
         span = _span(engine, first, last)
-        clip = replace(clip_of(engine, *span), start=RerunStartOptions(paused, compact))
-        file = tempfile.NamedTemporaryFile(prefix="cipv-", suffix=".rrd", delete=False)  # noqa: SIM115
-        path = Path(file.name)
-        file.close()
-        try:
-            with refusing():
-                write_clip(clip, "rrd", path, silent)
-        except BaseException:
-            path.unlink(missing_ok=True)
-            raise
+        path = await while_waited_for(
+            request, threads, lambda progress: _written(engine, span, RerunStartOptions(paused, compact), progress)
+        )
         name = f"drive-{span[0]:06d}-{span[1]:06d}.rrd"
         gone = BackgroundTask(path.unlink, missing_ok=True)
         return FileResponse(path, filename=name, media_type="application/octet-stream", background=gone)
@@ -105,6 +104,19 @@ def rerun_router(engine: Engine, viewer: ViewerFiles) -> APIRouter:
         return FileResponse(_PAGE, headers=headers)
 
     return router
+
+
+def _written(engine: Engine, span: tuple[int, int], start: RerunStartOptions, progress: Progress) -> Path:
+    """A new file; none is left when it cannot be written, or nobody waits for it."""
+    progress(0, 1)
+    with refusing(), tempfile.NamedTemporaryFile(prefix="cipv-", suffix=".rrd", delete=False) as file:
+        path = Path(file.name)
+        try:
+            write_clip(replace(clip_of(engine, *span), start=start), "rrd", path, progress)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
+    return path
 
 
 def _span(engine: Engine, first: int | None, last: int | None) -> tuple[int, int]:

@@ -69,6 +69,7 @@ class ObjectJson(_Exact):
     closest_point: tuple[float, float, float] | None
     distance_m: float | None
     distance_sigma_m: float | None
+    distance_from: Literal["cluster", "returns", "box"] | None
     velocity_mps: Point | None
     speed_over_ground_mps: float | None
     in_path: bool
@@ -137,6 +138,25 @@ class EgoJson(_Exact):
     yaw_rate_radps: float | None
 
 
+class MotionSourceJson(_Exact):
+    """What one source says of our own motion."""
+
+    source: str
+    speed_mps: float | None
+    yaw_rate_radps: float | None
+
+
+class OwnMotionJson(_Exact):
+    """Where own motion is from. pose: x, y, heading since the LiDAR began to tell, null without it."""
+
+    speed_from: str
+    speed_sigma_mps: float | None
+    yaw_rate_from: str | None
+    yaw_rate_sigma_radps: float | None
+    pose: list[float] | None
+    sources: list[MotionSourceJson]
+
+
 class ResultJson(_Exact):
     """One frame's result, version 1. What is unknown is null, never 0."""
 
@@ -145,6 +165,7 @@ class ResultJson(_Exact):
     t_ns: int
     sensors: dict[str, dict[str, Any]]
     ego: EgoJson | None
+    own_motion: OwnMotionJson | None
     objects: list[ObjectJson]
     path: PathJson
     cipv: CipvJson | None

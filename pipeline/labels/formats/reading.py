@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from pipeline.common.errors import BadInput
+from pipeline.common.user_files import read_regular
 
 _LARGEST_BYTES = 1 << 30
 T = TypeVar("T")
@@ -17,9 +18,7 @@ T = TypeVar("T")
 def read_bytes(path: Path) -> bytes:
     """The whole file. BadInput when it cannot be read, or is larger than any labels are."""
     try:
-        if path.stat().st_size > _LARGEST_BYTES:
-            raise BadInput(f"{path}: larger than 1 GiB; this is not a label file")
-        return path.read_bytes()
+        return read_regular(path, _LARGEST_BYTES)
     except (OSError, ValueError) as error:
         raise BadInput(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
 

@@ -5,18 +5,21 @@ from __future__ import annotations
 
 import io
 import struct
+import zlib
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import zstandard
+from lz4.frame import LZ4FrameDecompressor
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Schema
-from mcap.stream_reader import get_chunk_data_stream
 
 from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap.index import RECORD_HEAD
 
-_LARGEST_CHUNK_BYTES = 1 << 30
+_LARGEST_CHUNK_BYTES = 256 << 20
+"""Unpacked. Recorders begin a new chunk after one to some dozen MB."""
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
@@ -50,8 +53,8 @@ def unpack(content: bytes) -> UnpackedChunk:
     chunk = Chunk.read(ReadDataStream(io.BytesIO(content)))
     if chunk.uncompressed_size > _LARGEST_CHUNK_BYTES:
         raise Damaged("a chunk of an invalid size")
-    stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-    data = stream.read(length)
+    data = _decompressed(chunk)
+    length = len(data)
     messages: list[Place] = []
     named: list[Schema | Channel] = []
     offset = 0
@@ -67,3 +70,22 @@ def unpack(content: bytes) -> UnpackedChunk:
             kind = Schema if opcode == Opcode.SCHEMA else Channel
             named.append(kind.read(ReadDataStream(io.BytesIO(data[start:offset]))))
     return UnpackedChunk(data, tuple(messages), tuple(named))
+
+
+def _decompressed(chunk: Chunk) -> bytes:
+    """The chunk's bytes, never more than it says: some kilobytes can unpack to terabytes, and both formats have a size
+    of their own that the decompressors would make room for."""
+    size = chunk.uncompressed_size
+    if chunk.compression == "zstd":
+        if zstandard.frame_content_size(chunk.data) > size:
+            raise Damaged("a chunk that unpacks to more than it says")
+        data = zstandard.ZstdDecompressor().decompress(chunk.data, max_output_size=size)
+    elif chunk.compression == "lz4":
+        data = LZ4FrameDecompressor().decompress(chunk.data, max_length=size)
+    elif chunk.compression:
+        raise Damaged(f"a chunk packed with {chunk.compression!r}")
+    else:
+        data = chunk.data
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise Damaged("a chunk with a wrong checksum")
+    return data

@@ -19,6 +19,7 @@ from mcap.records import Attachment, Metadata
 
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
+from pipeline.common.user_files import open_regular
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap.chunk import NOTHING, UnpackedChunk, unpack
@@ -54,7 +55,7 @@ class McapFile:
         self._held: OrderedDict[int, Future[UnpackedChunk]] = OrderedDict()
         self._lock = threading.Lock()
         try:
-            self._file = path.open("rb")
+            self._file = open_regular(path)
         except OSError as error:
             raise NotMcap(f"{path}: {error.strerror}") from None
         try:

@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 
 from pipeline.common.geometry import inverse
+from pipeline.common.picture_decoding import TooMuch, decode_within_budget
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
-from pipeline.types import U8, CameraCalibration, GnssFix, Picture, Sweep
+from pipeline.types import CameraCalibration, GnssFix, Picture, Sweep
 from pipeline.types.camera_shot import Shot
 
 _XYZI = ("x", "y", "z", "intensity")
@@ -99,12 +100,11 @@ def picture_from(data: bytes, t_ns: int | None) -> Picture:
     """The picture of a message of ``image_message``. Damaged when it cannot be decoded."""
     message = _parse(topics.IMAGE, data)
     try:
-        bgr = cv2.imdecode(np.frombuffer(message.data, dtype=np.uint8), cv2.IMREAD_COLOR) if message.data else None
-    except cv2.error:
-        bgr = None
-    if bgr is None:
+        pixels = decode_within_budget(message.data)
+    except TooMuch as error:
+        raise Damaged(f"the picture cannot be decoded: {error}") from None
+    if pixels is None:
         raise Damaged("the picture cannot be decoded")
-    pixels: U8 = np.ascontiguousarray(bgr, dtype=np.uint8)
     return Picture(t_ns, pixels, message.data if message.format == "jpeg" else None)
 
 

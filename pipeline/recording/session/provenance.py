@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -23,6 +23,8 @@ class About:
     """Nominal frames per second."""
     notes: tuple[str, ...] = ()
     """What a person should know about the whole recording."""
+    networks: dict[str, str] = field(default_factory=dict)
+    """SHA-256 of the file of each network that looked at the pictures, by its name."""
     version: int = VERSION
     """Of the session's form."""
 

@@ -11,6 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from pipeline.common.geometry import inverse, rotation
 from pipeline.common.user_file_errors import first_complaint, given_path, parse_yaml
+from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.formats.file_reading import check_looks_ahead
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
@@ -29,6 +30,7 @@ def _is_device(given: object) -> object:
     raise ValueError(f"0 to {_DEVICES - 1}, or a path such as /dev/v4l/by-id/…")
 
 
+_SUFFIXES = (".yaml", ".yml")
 _DEVICES, _DEVICE_PATH = 64, re.compile(r"/dev/[^\s\0]+")
 Device = Annotated[int | str, BeforeValidator(_is_device)]
 
@@ -181,9 +183,11 @@ def load(path: str) -> LiveConfig:
     """The file's content; paths in it are relative to it. SourceError in one sentence when it cannot be used."""
     try:
         file = Path(path).expanduser()
-        text = file.read_text(encoding="utf-8")
+        if file.suffix.lower() not in _SUFFIXES:
+            raise ValueError
+        text = read_regular(file, LARGEST_TEXT_BYTES).decode("utf-8")
     except (OSError, UnicodeDecodeError, RuntimeError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or "not a text file"
+        reason = getattr(error, "strerror", None) or "not a text file that ends in .yaml"
         raise SourceError(f"{path or 'live:'}: {reason}; `cipv live init` writes such a file") from None
     data = parse_yaml(text, path, SourceError)
     if not isinstance(data, dict):

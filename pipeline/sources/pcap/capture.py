@@ -16,10 +16,13 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from pipeline.common.user_file_errors import reason_of
+from pipeline.common.user_files import open_regular
 from pipeline.types.source import SourceError
 
 _MAX_RECORD = 1 << 18
 """libpcap's own limit; a longer record is damage."""
+_END_OF_TIME_NS = 1 << 63
+"""In the year 2262 nanoseconds since 1970 leave 64 bits; a later packet is damage."""
 _CLASSIC = {
     b"\xd4\xc3\xb2\xa1": ("<", 1000),
     b"\xa1\xb2\xc3\xd4": (">", 1000),
@@ -91,7 +94,7 @@ class Capture:
     @contextmanager
     def _open(self) -> Iterator[BinaryIO]:
         try:
-            with self.path.open("rb", buffering=1 << 20) as file:
+            with open_regular(self.path) as file:
                 yield file
         except OSError as error:
             raise SourceError(f"{self.path.name}: cannot be read: {reason_of(error)}") from None
@@ -150,7 +153,9 @@ class Capture:
                 number, high, low, captured = struct.unpack_from(section.order + "IIII", body)
                 if number < len(section.interfaces) and section.interfaces[number].origin < origin:
                     _, link, tick_ns = section.interfaces[number]
-                    yield origin, round((high << 32 | low) * tick_ns), link, body[20 : 20 + captured]
+                    t_ns = round((high << 32 | low) * tick_ns)
+                    if t_ns < _END_OF_TIME_NS:
+                        yield origin, t_ns, link, body[20 : 20 + captured]
             origin += length
             self._described_to = max(self._described_to, origin)
 

@@ -10,6 +10,7 @@ from weakref import finalize
 
 from rosbags.highlevel import AnyReader
 
+from pipeline.common.user_files import check_regular
 from pipeline.formats.velodyne.ros import typestore
 from pipeline.types.source import SourceError
 
@@ -72,6 +73,9 @@ def bag_path(path: str) -> Path:
             raise SourceError(f"{path}: no such file or folder")
         if bag.is_dir() and not (bag / "metadata.yaml").is_file():
             raise SourceError(f"{path}: not a ROS 2 bag: it has no metadata.yaml")
+        for each in bag.iterdir() if bag.is_dir() else [bag]:
+            if each.suffix in (*_SUFFIXES, ".yaml", ".yml") or each == bag:
+                check_regular(each)
     except (OSError, RuntimeError, ValueError) as error:
         raise SourceError(f"{path}: cannot be opened: {_in_words(error)}") from None
     if bag.is_file() and bag.suffix not in _SUFFIXES:
@@ -84,6 +88,8 @@ def _topics(reader: AnyReader) -> dict[str, Topic]:
     for connection in reader.connections:
         count = found[connection.topic].held if connection.topic in found else 0
         kind = connection.msgtype.rpartition("/")[2]
+        if not isinstance(connection.topic, str):
+            raise ValueError("a topic whose name is no text")
         found[connection.topic] = Topic(connection.topic, kind, count + connection.msgcount)
     return found
 

@@ -14,6 +14,9 @@ import pytest
 from rerun.chunk import RrdReader
 
 from app.cli import main
+from pipeline.common.data_dir import file_sha256
+from pipeline.inference.model_registry import EMBEDDED, find
+from pipeline.recording.info import info
 from pipeline.recording.session.source import SessionSource
 from pipeline.sources import open_source
 from tests.conftest import ROOT
@@ -46,6 +49,13 @@ def test_record_keeps_inputs_results_parameters_and_labels(recorded: Path) -> No
     assert result is not None
     assert result["objects"]
     assert session.params(10) is not None
+
+
+def test_a_session_says_which_weights_its_results_are_of(recorded: Path) -> None:
+    about, embedded = info(recorded).about, find(EMBEDDED)
+    assert about is not None
+    assert embedded is not None
+    assert set(about.networks.values()) == {file_sha256(embedded)}
 
 
 def test_record_names_a_file_in_a_folder_and_goes_on_in_another(tmp_path: Path) -> None:

@@ -14,10 +14,12 @@ from app.drive.frame_inputs import InputStore, without_pixels
 from app.drive.full_run import DriveRun, digest
 from app.drive.open_recording import OpenRecording, RunSetup
 from app.drive.run_registry import MOST_KEPT, MOST_UNKEPT, NoSuchRun, RunRefused, RunRegistry
+from pipeline.common.user_files import Overloaded
 from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
 from pipeline.run import Sensors, run
 from pipeline.step import State, step
+from pipeline.types import Frame
 from tests.app.engine.recording_helpers import CountingDetector, Recording, SlowDetector
 
 WAIT_S = 60.0
@@ -287,3 +289,28 @@ def test_no_more_than_a_dozen_runs_are_kept():
     with pytest.raises(RunRefused, match="saved already"):
         runs.keep(begun(runs, 19).number, "")
     runs.keep(1, "renamed")
+
+
+class Starved(Recording):
+    """Too many files are open when frame 3 is read for the first two times."""
+
+    def frame(self, index: int) -> Frame:
+        if index == 3 and self.reads.count(3) < 2:
+            self.reads.append(3)
+            raise Overloaded("too many open files")
+        return super().frame(index)
+
+
+def test_what_could_not_be_read_for_a_moment_is_no_frames_final_result(
+    drives: BackgroundRuns, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.drive.background_runs._TRY_AGAIN_S", 0.0)
+    monkeypatch.setattr("pipeline.run._SILENCE_S", 0.0)
+    drives.start()
+    drives.open(setup(Starved(count=6)))
+    drives.want(Params(), "default")
+    run_ = wait_done(drives)
+    assert (run_.note, run_.done) == ("", 6)
+    undisturbed = [result.objects for _, result in run(Recording(count=6), Params(), Detectors(CountingDetector()))]
+    starved = [result.objects for _, result in run(Starved(count=6), Params(), Detectors(CountingDetector()))]
+    assert starved == undisturbed

@@ -16,6 +16,7 @@ import zstandard
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from app.views.viser.internal_port import HEADERS
 from pipeline.common.geometry import Cuboid
 from pipeline.types import (
     GROUND,
@@ -231,6 +232,8 @@ def open_scene() -> Iterator[OpenScene]:
     with ExitStack() as stack:
 
         def opening(port: int, path: str = "", version: str = viser.__version__, **options: Any) -> SceneClient:
+            if not path:  # viser's own port, as the proxy reaches it
+                options["additional_headers"] = HEADERS
             connection = connect(
                 f"ws://127.0.0.1:{port}{path}",
                 subprotocols=[Subprotocol(f"viser-v{version}")],

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
+import ssl
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -19,6 +23,7 @@ from app.core.server_address import listen_socket
 from app.engine.engine import Engine
 from app.web.serve import serve
 from app.web.server import Server
+from pipeline.common.errors import BadInput
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import Recording, opener
 
@@ -27,6 +32,7 @@ PROGRAM = """
 import sys
 from app.engine.engine import Engine
 from app.web.serve import serve
+from pipeline.common.errors import BadInput
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 engine = Engine(opener(Recording()), lambda _: CountingDetector(), Params(), uri="test:car", playing=True)
@@ -42,10 +48,13 @@ def taken_port() -> Iterator[int]:
         yield held.getsockname()[1]
 
 
-def test_two_servers_of_one_machine_keep_their_parameters_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_servers_of_one_machine_keep_their_parameters_apart(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     ports: list[int] = []
     monkeypatch.setattr(Server, "run", lambda _, sockets: ports.append(sockets[0].getsockname()[1]))
     engine = Engine(opener(Recording()), None, Params())
+    monkeypatch.setattr("app.web.serve.SESSIONS", tmp_path)
     serve(engine, port=0)
     assert engine.labels.kept.station == f"{socket.gethostname()}:{ports[0]}"
 
@@ -92,7 +101,7 @@ def test_for_other_machines_it_shows_links_with_tokens_and_lets_nobody_else_in()
         port = urlsplit(address).port
         assert "0.0.0.0" not in address
         assert person.startswith(f"everything:         {address}/?token=")
-        assert display == f"display in the car: {address}/drive/?token={token}"
+        assert display == f"display in the car: {address}/drive/?token=$CIPV_DISPLAY_TOKEN"
         here = f"http://127.0.0.1:{port}"
         assert httpx.get(f"{here}/api/state", timeout=60).status_code == 401
         assert httpx.get(f"{here}/healthz", timeout=60).status_code == 200
@@ -105,3 +114,65 @@ def test_for_other_machines_it_shows_links_with_tokens_and_lets_nobody_else_in()
         assert "token" not in errors, "it is shown once"
     finally:
         program.kill()
+
+
+RECORDING = PROGRAM.replace("playing=True", "playing=True, desk=SessionRecorder(Path(sys.argv[3]))").replace(
+    "import sys", "import sys\nfrom pathlib import Path\nfrom app.engine.session_recording import SessionRecorder"
+)
+
+
+@pytest.mark.parametrize("numbers", [[signal.SIGTERM], [signal.SIGHUP, signal.SIGTERM]])
+def test_whoever_ends_it_its_recording_is_closed_first(tmp_path: Path, numbers: list[signal.Signals]):
+    program = subprocess.Popen(
+        [sys.executable, "-c", RECORDING, "0", "127.0.0.1", str(tmp_path)],
+        cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert program.stdout is not None
+        with httpx.Client(base_url=program.stdout.readline().strip(), timeout=60) as client:
+            client.post("/api/recording", json={"on": True}).raise_for_status()
+            with connect(f"{client.base_url}/api/stream".replace("http", "ws"), max_size=None) as stream:
+                while client.get("/api/state").json()["recording"]["frames"] < 2:
+                    stream.recv(60)  # a frame or a state: something has happened
+                for number in numbers:
+                    program.send_signal(number)
+                program.communicate(timeout=5)
+        assert program.returncode == 0
+        (session,) = tmp_path.iterdir()
+        assert session.read_bytes().endswith(b"\x89MCAP0\r\n"), "its index and its end are there"
+    finally:
+        program.kill()
+        program.communicate()
+
+
+def test_https_with_a_token_on_this_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    cert, key = tmp_path / "cert.pem", tmp_path / "key.pem"
+    make = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "1"]
+    named = ["-subj", "/CN=localhost", "-addext", "subjectAltName=IP:127.0.0.1"]
+    subprocess.run([*make, *named, "-keyout", str(key), "-out", str(cert)], check=True, capture_output=True)
+    monkeypatch.setattr("app.web.serve.SESSIONS", tmp_path)
+    answers: list[httpx.Response] = []
+    asked = threading.Event()
+    monkeypatch.setattr("app.web.serve.asked_to_stop", lambda: nullcontext(asked))
+
+    def ask(link: str) -> None:
+        with httpx.Client(verify=ssl.create_default_context(cafile=str(cert)), timeout=60) as client:
+            answers.append(client.get(f"{link.partition('?')[0]}api/state"))
+            answers.append(client.get(link))
+            answers.append(client.post(f"{link.partition('?')[0]}api/playback", json={"playing": False}))
+        asked.set()
+
+    engine = Engine(opener(Recording()), None, Params(), uri="test:car")
+    serve(engine, port=0, always_token=True, tls=(cert, key), on_ready=ask)
+    assert [answer.status_code for answer in answers] == [401, 200, 202]
+    assert answers[1].url.scheme == "https"
+    assert "secure" in answers[1].headers["set-cookie"].lower()
+    (entry,) = map(json.loads, (tmp_path / "audit.jsonl").read_text().splitlines())
+    assert (entry["role"], entry["method"], entry["path"], entry["status"]) == ("person", "POST", "/api/playback", 202)
+    assert json.loads(entry["body"]) == {"playing": False}
+    assert (tmp_path / "audit.jsonl").stat().st_mode & 0o077 == 0
+    with pytest.raises(BadInput, match="cannot be used for TLS"):
+        serve(Engine(opener(Recording()), None, Params()), port=0, tls=(key, cert))

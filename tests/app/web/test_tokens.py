@@ -6,7 +6,7 @@ import hmac
 
 import pytest
 
-from app.web.tokens import Tokens
+from app.web.tokens import Guesses, Tokens
 from pipeline.common.errors import BadInput
 
 PERSON, DISPLAY = "person-0123456789abcdef", "display-0123456789abcde"
@@ -54,6 +54,9 @@ def test_a_display_keeps_a_token_that_was_chosen():
 
 WEAK = {
     "short": {"CIPV_TOKEN": "secret"},
+    "one letter": {"CIPV_TOKEN": "a" * 16},
+    "few letters": {"CIPV_TOKEN": "abcabcabdabcabca"},
+    "a word again and again": {"CIPV_DISPLAY_TOKEN": "password" * 4},
     "with a space": {"CIPV_TOKEN": "a b" * 10},
     "with what a link would change": {"CIPV_DISPLAY_TOKEN": "abc&def=" * 4},
     "the same for both": {"CIPV_TOKEN": PERSON, "CIPV_DISPLAY_TOKEN": PERSON},
@@ -64,3 +67,19 @@ WEAK = {
 def test_a_weak_token_is_refused(name: str):
     with pytest.raises(BadInput):
         Tokens.from_environment(WEAK[name])
+
+
+def test_what_was_chosen_is_never_shown():
+    tokens = Tokens.from_environment({"CIPV_DISPLAY_TOKEN": DISPLAY})
+    assert tokens.shown("display") == "$CIPV_DISPLAY_TOKEN"
+    assert tokens.shown("person") == tokens.person
+
+
+def test_a_guesser_is_told_and_a_page_with_an_old_cookie_is_none():
+    now_s = 0.0
+    guesses = Guesses(clock=lambda: now_s)
+    assert not any(guesses.wrong("a", "old") for _ in range(100))
+    assert [guesses.wrong("a", f"guess {n}") for n in range(12)] == [False] * 9 + [True] * 3
+    assert not guesses.wrong("b", "guess 0")
+    now_s = 61.0
+    assert not guesses.wrong("a", "guess 99")

@@ -71,12 +71,23 @@ def test_what_is_near_is_proposed() -> None:
     assert did_you_mean("xyz", ["cluster.z_weight"]) == ""
 
 
+ALIASES = b"a0: &a0 [1, 2]\n" + b"".join(
+    b"a%d: &a%d [%s]\n" % (n, n, b", ".join([b"*a%d" % (n - 1)] * 9)) for n in range(1, 12)
+)
+"""A few hundred bytes that stand for thirty thousand million numbers."""
+
+
 @pytest.mark.parametrize(
     ("content", "says"),
     [
         pytest.param(b"a: 2026-13-45", "not YAML: month must be in 1..12", id="a day in no calendar"),
         pytest.param(b"a: " + b"9" * 5000, "not YAML: Exceeds the limit", id="a number without end"),
         pytest.param(b"[" * 100_000, "not YAML: nested too deeply", id="nested without end"),
+        pytest.param(b"a: !!timestamp x", "not YAML: a value that is not of its type", id="no time"),
+        pytest.param(b"a: !!bool z", "not YAML: a value that is not of its type", id="no truth"),
+        pytest.param(b'a: !!int ""', "not YAML: ", id="no number"),
+        pytest.param(ALIASES, "not YAML: its aliases expand to more than 200000 values", id="aliases of aliases"),
+        pytest.param(b"&a [*a]", "not YAML: its aliases expand", id="in itself"),
         pytest.param(b"a: {", "not YAML: while parsing", id="cut off"),
         pytest.param(b"\xff\xfe", "not YAML: not a text file", id="no text"),
         pytest.param(None, "cannot be read: No such file", id="no file"),

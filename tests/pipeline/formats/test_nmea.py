@@ -87,6 +87,23 @@ def test_what_is_no_fix_gives_none(case: str, lines: tuple[str, ...], bad: int) 
     assert reader.bad == bad
 
 
+@pytest.mark.parametrize(
+    "body",
+    ["PUBX,00,123519.00,4807.038,N", "PMTK001,314,3", "PASHR,123519,84.4,T", "PQTMVER,1", "PGRME,15.0,M", "CCGPQ,GGA"],
+)
+def test_a_makers_own_sentence_or_a_query_among_the_others_changes_nothing(body: str) -> None:
+    (fix,), reader = fixes(GGA, whole(body), RMC)
+    assert fix.t_ns == RMC_NS
+    assert reader.bad == 0
+
+
+def test_a_number_without_end_is_no_fix() -> None:
+    gst = whole("GPGST,123519,0.5,,,,inf,1.0,1.0")
+    found, reader = fixes(gst, GGA, RMC)
+    assert found == []
+    assert reader.bad == 1
+
+
 def test_garbage_between_costs_nothing() -> None:
     found, reader = fixes("��", GGA, "$GPGGA,half", RMC, "*")
     assert len(found) == 1

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.inference import model_registry
+from pipeline.inference.runtime import DetectorError, read_graph
 
 CONTENT = bytes(range(256)) * 1000
 
@@ -223,3 +224,48 @@ def test_a_damaged_registry_is_named(tmp_path: Path) -> None:
     (model_registry.store() / "registry.json").write_text("{", encoding="utf-8")
     with pytest.raises(model_registry.ModelError, match=r"registry\.json is damaged"):
         model_registry.default_model("detector")
+
+
+def test_damaged_lists_of_networks_are_said(tmp_path: Path):
+    (tmp_path / "home" / "models").mkdir(parents=True)
+    for text in (
+        '{"models": {"a": 1}}',
+        '{"defaults": {"detector": 7}}',
+        "[]",
+        '{"defaults": {"detector": "../x"}}',
+        "\\udc80",
+    ):
+        (tmp_path / "home" / "models" / "registry.json").write_text(text)
+        with pytest.raises(model_registry.ModelError, match="is damaged"):
+            model_registry.list_models()
+
+
+def test_weights_that_changed_since_they_were_installed_are_not_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    (tmp_path / "mine.onnx").write_bytes(CONTENT)
+    installed = model_registry.register(tmp_path / "mine.onnx", "mine")
+    assert model_registry.read_verified(installed) == CONTENT
+    _known(monkeypatch, "")
+    pulled = installed.with_name("yolox_nano.onnx")
+    for path in (installed, pulled):
+        path.write_bytes(CONTENT[:5000] + bytes(4000) + CONTENT[9000:])
+        with pytest.raises(model_registry.ModelError, match="damaged or was changed"):
+            model_registry.read_verified(path)
+    with pytest.raises(DetectorError, match="damaged or was changed"):
+        read_graph(installed)
+    pulled.write_bytes(CONTENT)
+    assert model_registry.read_verified(pulled) == CONTENT
+
+
+def test_the_embedded_network_is_the_one_that_its_law_was_fitted_to():
+    embedded = model_registry.find(model_registry.EMBEDDED)
+    assert embedded is not None
+    assert model_registry.read_verified(embedded)
+
+
+def test_another_file_of_an_official_name_has_not_its_licence(tmp_path: Path):
+    (tmp_path / "data" / "models").mkdir(parents=True)
+    (tmp_path / "data" / "models" / "yolox_nano.onnx").write_bytes(CONTENT)
+    listed = next(each for each in model_registry.list_models() if each.name == "yolox_nano")
+    assert listed.path is not None
+    assert (listed.licence, listed.url) == (None, None)
+    assert listed.note.startswith("not the official file")

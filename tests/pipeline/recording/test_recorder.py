@@ -351,3 +351,20 @@ def test_a_full_disk_stops_the_recording_says_so_and_keeps_what_is_there(tmp_pat
     assert not session.file.directory.is_cut
     for index in range(len(session)):
         assert same(session.frame(index).sweep, sweep(0, points=3000))
+
+
+def test_a_writer_that_is_slow_and_goes_on_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a machine whose processors have other work: longer than the patience in all, and never at once."""
+    monkeypatch.setattr(recorder_module, "_PATIENCE_S", 0.3)
+    write = Segments.write
+
+    def slowly(self: Segments, *arguments: Any, **named: Any) -> None:
+        threading.Event().wait(0.1)
+        write(self, *arguments, **named)
+
+    monkeypatch.setattr(Segments, "write", slowly)
+    recorder = Recorder(tmp_path / "a.mcap", ABOUT)
+    for index in range(6):
+        assert recorder.put(full(index))
+    state = recorder.stop()
+    assert (state.error, state.frames) == (None, 6)

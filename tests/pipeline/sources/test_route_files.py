@@ -84,6 +84,12 @@ def test_a_utm_zone_that_is_missing_or_wrong_is_said(tmp_path: Path, text: str, 
         pytest.param("a.txt", "48.1 11.2\n48.2 11.3\n", 0.5, id="two columns"),
         pytest.param("a.csv", "\ufefflat,lon\n48.1,11.2\nnan,11\nx,y\n48.2,11.3\n", 0.5, id="CSV with rubbish in it"),
         pytest.param("a.gpx", GPX.format(1, 1, f"<trk><trkseg>{POINTS.format('trkpt')}</trkseg></trk>"), 0.5, id="GPX"),
+        pytest.param(
+            "a.gpx",
+            GPX.replace('"1.0"?', '"1.0" encoding="utf-7"?').format(1, 1, f"<rte>{POINTS.format('rtept')}</rte>"),
+            0.5,
+            id="GPX in an encoding that expat has not",
+        ),
         pytest.param("a.gpx", GPX.format(0, 0, f"<rte>{POINTS.format('rtept')}</rte>"), 0.5, id="GPX 1.0 route"),
     ],
 )

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 from pathlib import Path
 from typing import Any
 
 import can
 import cantools
 
+from pipeline.common.user_files import LARGEST_TEXT_BYTES, read_regular
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import CanConfig, SignalConfig
 from pipeline.sources.live.devices.device_reader import POLL_S, DeviceLost, Reader, Stop
@@ -19,6 +21,13 @@ from pipeline.types import EgoState
 from pipeline.types.source import SourceError
 
 _YAW_RATE_KEPT_NS = 500_000_000
+_LIMITS = (
+    (re.compile(r"^\s*BO_\s+\d+\s+\w+\s*:\s*(\d+)", re.MULTILINE), 64),
+    (re.compile(r"^\s*SG_[^:\n]*:\s*(\d+)\s*\|", re.MULTILINE), 511),
+    (re.compile(r"^\s*SG_[^:\n]*:\s*\d+\s*\|\s*(\d+)\s*@", re.MULTILINE), 512),
+)
+"""Of a message's bytes, a signal's first bit and its bits: cantools lays out every bit up to there. CAN FD has 64
+bytes; a J1939 message in packets has more, and is not read here."""
 _FASTEST_MPS, _FASTEST_RADPS = 120.0, 5.0
 
 
@@ -84,11 +93,17 @@ class CanInput:
 def load_dbc(path: Path) -> Any:
     """cantools' database. SourceError when the file is none."""
     try:
-        return cantools.database.load_file(path)
+        text = read_regular(path, LARGEST_TEXT_BYTES).decode("cp1252", "replace")
     except OSError as error:
         raise SourceError(f"{path}: {error.strerror}") from None
-    except Exception as error:  # cantools has an error class for each of its parsers
-        raise SourceError(f"{path}: not a DBC file: {(str(error).splitlines() or ['empty'])[0]}") from None
+    if any(int(number) > limit for pattern, limit in _LIMITS for number in pattern.findall(text)):
+        raise SourceError(f"{path}: not a DBC file: a message or a signal beyond the 64 bytes of CAN FD")
+    try:
+        return cantools.database.load_string(text, "dbc")
+    except Exception as error:  # cantools has an error class for each of its parsers, whose text shows the file's
+        line = re.search(r"\bline (\d+)", str(error))
+        where = f" in line {line[1]}" if line else ""
+        raise SourceError(f"{path}: not a DBC file{where}") from None
 
 
 def _messages(config: CanConfig) -> dict[int, Any]:

@@ -16,6 +16,9 @@ _MOST_LINES = 100
 _STAMPS = ("x-timestamp", "x-sendtimestamp")
 """Seconds since 1970, as mjpg-streamer, µStreamer and others send it."""
 
+_END_OF_TIME_US = (1 << 63) // 1000
+"""Later than that, in the year 2262, nanoseconds leave 64 bits."""
+
 Receive = Callable[[bytes, int | None], None]
 """Takes a JPEG and its own stamp, µs since 1970, if it has one."""
 
@@ -116,7 +119,9 @@ def _line(response: http.client.HTTPResponse, url: str, stop: Stop) -> bytes:
 def _stamp_us(headers: Mapping[str, str]) -> int | None:
     for name in _STAMPS:
         try:
-            return round(float(headers[name]) * 1e6)
+            stamp_us = round(float(headers[name]) * 1e6)
         except (KeyError, ValueError, OverflowError):
             continue
+        if 0 < stamp_us < _END_OF_TIME_US:
+            return stamp_us
     return None

@@ -13,6 +13,7 @@ import av
 import cv2
 import numpy as np
 
+from pipeline.formats.video_file import open_video, within_budget
 from pipeline.sources.live.devices.device_reader import SILENCE_S, DeviceLost, Stop
 from pipeline.types.camera_shot import Shot
 
@@ -28,6 +29,7 @@ def read_stream(url: str, receive: Receive, stop: Stop) -> None:
     options = _RTSP if url.startswith("rtsp") else {"fflags": "nobuffer"}
     try:
         with av.open(url, timeout=(_OPEN_S, SILENCE_S), options=options) as container:
+            within_budget(container)
             for shot, _ in _shots(container):
                 receive(shot)
                 if stop:
@@ -42,7 +44,7 @@ def play_file(path: Path, receive: Receive, stop: Stop) -> None:
     while not stop:
         begun, shown = time.monotonic(), 0
         try:
-            with av.open(str(path)) as container:
+            with open_video(path) as container:
                 for shot, at_s in _shots(container):
                     stop.wait(max(0.0, begun + at_s - time.monotonic()))
                     if stop:

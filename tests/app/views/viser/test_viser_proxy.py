@@ -16,6 +16,7 @@ from fastapi import FastAPI
 from starlette.requests import HTTPConnection
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
+from app.views.viser.internal_port import HEADERS
 from app.views.viser.proxy import POLICY, viser_router
 from app.views.viser.view import ViserView
 from pipeline.params import Params
@@ -67,7 +68,7 @@ def web(view: ViserView) -> Iterator[Web]:
 
 def test_the_page_comes_through_with_a_policy_of_its_own(web: Web, view: ViserView) -> None:
     answer = web.get("/viser/")
-    direct = httpx.get(f"http://127.0.0.1:{view.port}/", trust_env=False)
+    direct = httpx.get(f"http://127.0.0.1:{view.port}/", headers=HEADERS, trust_env=False)
     assert (answer.status_code, answer.content) == (200, direct.content)
     assert answer.headers["content-type"].startswith("text/html")
     assert answer.headers["content-security-policy"] == POLICY

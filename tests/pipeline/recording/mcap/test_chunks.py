@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import resource
+import struct
 from dataclasses import replace
 from pathlib import Path
 
+import lz4.frame
 import numpy as np
 import pytest
+import zstandard
 
 from pipeline.recording import topics
 from pipeline.recording.mcap import output as mcap_output
+from pipeline.recording.mcap.chunk import unpack
 from pipeline.recording.mcap.reader import McapFile
 from pipeline.recording.session.writer import SessionWriter
 from tests.pipeline.recording.frames import ABOUT, full, picture, sweep, write
@@ -42,3 +47,17 @@ def test_frames_said_to_be_kept_are_in_the_file(
             assert writer.kept_frames == sum(1 for _ in file.messages((topics.FRAMES,)))
     writer.close()
     assert writer.kept_frames == 12
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_chunk_never_unpacks_to_more_than_it_says(compression: str) -> None:
+    """80 MB of nothing, of which the chunk says that they are a kilobyte."""
+    zeros = bytes(80_000_000)
+    packed = zstandard.compress(zeros) if compression == "zstd" else lz4.frame.compress(zeros)
+    head = (
+        struct.pack("<QQQII", 0, 0, 1000, 0, len(compression)) + compression.encode() + struct.pack("<Q", len(packed))
+    )
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    with pytest.raises(Exception, match=r"more than it says|ends within|requires a buffer"):
+        unpack(head + packed)
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < 40_000_000

@@ -90,3 +90,10 @@ def test_a_fragment_is_no_datagram(tmp_path: Path) -> None:
 def test_something_else_is_refused(data: bytes, tmp_path: Path) -> None:
     with pytest.raises(SourceError, match="neither a pcap nor a pcapng file"):
         opened(tmp_path, data)
+
+
+def test_a_packet_beyond_the_end_of_time_is_left_out(tmp_path: Path) -> None:
+    beyond = pcapng([*SENT[:2], ((1 << 63) + 5, 2368, b"late")])
+    assert [it.payload for it in opened(tmp_path, beyond).datagrams()] == [payload for _, _, payload in SENT[:2]]
+    a_tick_a_second = beyond.replace(struct.pack("<HHB3x", 9, 1, 9), struct.pack("<HHB3x", 9, 1, 0))
+    assert list(opened(tmp_path, a_tick_a_second).datagrams()) == []

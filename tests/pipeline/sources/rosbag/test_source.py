@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -220,6 +221,14 @@ def test_what_is_wrong_in_one_sentence(name: str, tmp_path: Path) -> None:
         open_source(uri.format(tmp_path))
     assert says in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_topic_whose_name_is_a_number_is_said(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "drive", sweeps=1)
+    metadata = (bag / "metadata.yaml").read_text()
+    (bag / "metadata.yaml").write_text(re.sub(r"name: ['\"]?/\S+", "name: 7", metadata))
+    with pytest.raises(SourceError, match="cannot be read as a bag"):
+        open_source(f"rosbag:{bag}")
 
 
 def test_another_velodyne_is_named(tmp_path: Path) -> None:

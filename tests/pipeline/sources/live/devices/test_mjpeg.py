@@ -112,3 +112,10 @@ def test_an_address_that_gives_something_else_is_left_to_the_video_reader() -> N
 def test_an_address_where_nobody_is_is_said(url: str) -> None:
     with pytest.raises(DeviceLost, match="http"):
         read_mjpeg(url, lambda data, stamp: None, Stop())
+
+
+@pytest.mark.parametrize("stamp", ["1e300", "-5", "nan", "inf", "1e13"])
+def test_a_stamp_that_is_no_time_is_left_out(stamp: str) -> None:
+    jpeg = small_jpeg()
+    found, _ = received(MULTIPART + part(jpeg, f"Content-Length: {len(jpeg)}", f"X-Timestamp: {stamp}"))
+    assert found == [(jpeg, None)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import socket
 import time
 import tty
@@ -97,6 +98,9 @@ def _yaw_rate(frame: Frame) -> float | None:
     [
         ("not there", None, "No such file"),
         ("no DBC", "hello", "not a DBC"),
+        ("a bit far away", DBC.replace("0|16@", "1000000|16@"), "beyond the 64 bytes of CAN FD"),
+        ("a signal of a million bits", DBC.replace("0|16@", "0|1000000@"), "beyond the 64 bytes of CAN FD"),
+        ("a message of a million bytes", re.sub(r": (\d+) ", ": 1000000 ", DBC, count=1), "beyond the 64 bytes"),
         ("no such signal", DBC, "no signal V"),
     ],
 )

@@ -1,0 +1,58 @@
+"""viser's port on loopback answers nobody but our own proxy.
+
+viser knows neither tokens nor origins, and every program and every web page of this machine can reach loopback. So each
+request and each WebSocket must bring a secret of this process in a header, which the proxy adds and a page cannot set.
+viser offers no place for that check: the ``serve`` of the websockets library that it calls gets one while it starts.
+"""
+
+from __future__ import annotations
+
+import hmac
+import http
+import secrets
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import websockets.asyncio.server
+from websockets.asyncio.server import ServerConnection
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+_NAME = "x-cipv-internal"
+HEADERS = {_NAME: secrets.token_urlsafe(32)}
+"""What the proxy sends with every request."""
+_starting = threading.Lock()
+Answer = Callable[[ServerConnection, Request], Response | None]
+
+
+@contextmanager
+def demanding_the_secret() -> Iterator[None]:
+    """viser's server that is started in the block demands it, from its first connection on. RuntimeError when none was
+    started the way we know."""
+    with _starting:
+        usual, guarded = websockets.asyncio.server.serve, False
+
+        def serve(handler: Any, *arguments: Any, process_request: Answer, **options: Any) -> Any:
+            nonlocal guarded
+            guarded = True
+            return usual(handler, *arguments, process_request=_checked(process_request), **options)
+
+        websockets.asyncio.server.serve = serve  # type: ignore[assignment, misc]
+        try:
+            yield
+        finally:
+            websockets.asyncio.server.serve = usual  # type: ignore[misc]
+    if not guarded:
+        raise RuntimeError("viser's server was started without the check of its internal secret")
+
+
+def _checked(answer: Answer) -> Answer:
+    def process_request(connection: ServerConnection, request: Request) -> Response | None:
+        given = request.headers.get_all(_NAME)
+        if len(given) != 1 or not hmac.compare_digest(given[0].encode(), HEADERS[_NAME].encode()):
+            return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", Headers({"Content-Length": "0"}), b"")
+        return answer(connection, request)
+
+    return process_request

@@ -1,0 +1,76 @@
+"""How much of the server one role may have at a time, and work that ends when nobody waits for it any more.
+
+Requests are answered on forty threads that all share. Whoever may only look could hold every one of them with long
+requests; so displays together may have a few, and people the rest. What says that the server lives, and the stream of
+frames, take none of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections import Counter
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
+from typing import TypeVar
+
+from starlette.requests import HTTPConnection, Request
+from starlette.responses import JSONResponse
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from app.core.client_role import Role, is_display
+from app.core.jobs import Cancelled
+from pipeline.common.progress import Progress
+
+AT_ONCE: Mapping[Role, int] = {"person": 30, "display": 6}
+"""Requests of a role under way, over all its clients. Browsers send six at a time; together they leave some threads."""
+STREAMS: Mapping[Role, int] = {"person": 48, "display": 16}
+"""Open WebSockets of a role."""
+_LOOK_S = 0.25
+T = TypeVar("T")
+
+
+class RoleQuota:
+    """ASGI middleware: 429 for a request, 403 for a WebSocket, that is one too many of its role."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+        self._under_way: Counter[tuple[str, Role]] = Counter()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] not in ("http", "websocket"):
+            return await self._app(scope, receive, send)
+        role: Role = "display" if is_display(HTTPConnection(scope)) else "person"
+        kind, limits = (scope["type"], AT_ONCE if scope["type"] == "http" else STREAMS)
+        if self._under_way[kind, role] >= limits[role]:
+            if kind == "websocket":
+                await receive()
+                return await send({"type": "websocket.close", "code": 1013})
+            return await _TOO_MANY(scope, receive, send)
+        self._under_way[kind, role] += 1
+        try:
+            await self._app(scope, receive, send)
+        finally:
+            self._under_way[kind, role] -= 1
+
+
+_TOO_MANY = JSONResponse({"detail": "too many requests at once"}, 429, {"retry-after": "1"})
+
+
+async def while_waited_for(request: Request, threads: Executor, work: Callable[[Progress], T]) -> T:
+    """What ``work`` returns, done on a thread of these. Cancelled when the client leaves before; the work ends when it
+    next reports progress."""
+    gone = threading.Event()
+
+    def progress(done: int, total: int) -> None:
+        if gone.is_set():
+            raise Cancelled
+
+    working = asyncio.get_running_loop().run_in_executor(threads, work, progress)
+    try:
+        while not (await asyncio.wait({working}, timeout=_LOOK_S))[0]:
+            if await request.is_disconnected():
+                gone.set()
+        return working.result()
+    finally:
+        gone.set()

@@ -1,0 +1,79 @@
+"""The one place where a compressed picture becomes pixels: of a file, a bag, a session or a stream.
+
+A decoder takes a header at its word: a PNG of 130 kB may ask for 6 GB, a JPEG for a thousand passes over its pixels. So
+the header is read first, and what would take more than a camera's picture may is never given to the decoder.
+"""
+
+from __future__ import annotations
+
+import struct
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+MOST_PIXELS = 50_000_000
+"""About four times the 12 megapixels of the largest automotive cameras; 150 MB as blue, green and red."""
+LARGEST_BYTES = 64 << 20
+"""More than such a picture takes as a PNG that hardly shrinks."""
+_MOST_PASSES = 1_000_000_000
+"""Pixels times scans of a progressive JPEG, which each scan goes over: seconds. Encoders make about ten scans."""
+_PNG, _PNG_HEADER = b"\x89PNG\r\n\x1a\n", struct.Struct(">I4sII")
+_JPEG, _SCAN = b"\xff\xd8", b"\xff\xda"
+_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+"""JPEG's markers that a picture's size stands behind (ITU-T T.81, table B.1)."""
+_BARE = frozenset({0x01, *range(0xD0, 0xD9)})
+"""Those without a length."""
+
+
+class TooMuch(ValueError):
+    """A picture beyond the budget, or of no kind whose size is known before it is decoded; the text is why."""
+
+
+def decode_within_budget(data: bytes) -> npt.NDArray[np.uint8] | None:
+    """(H, W, 3) uint8, blue green red, of a JPEG or PNG; None when it is damaged. TooMuch before it is decoded."""
+    check_budget(data)
+    try:
+        picture = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), cv2.IMREAD_COLOR)
+    except (cv2.error, MemoryError):
+        return None
+    return None if picture is None else np.ascontiguousarray(picture, dtype=np.uint8)
+
+
+def check_budget(data: bytes) -> None:
+    """TooMuch when a compressed picture would take more bytes, pixels or time than any camera's."""
+    if len(data) > LARGEST_BYTES:
+        raise TooMuch(f"a picture larger than {LARGEST_BYTES >> 20} MiB")
+    size = _size_of(data)
+    if size is None:
+        raise TooMuch("neither a JPEG nor a PNG")
+    check_pixels(*size)
+    if data.startswith(_JPEG) and data.count(_SCAN) * size[0] * size[1] > _MOST_PASSES:
+        raise TooMuch("a JPEG of too many scans")
+
+
+def check_pixels(width: int, height: int) -> None:
+    """TooMuch when a picture, or a video's, is larger than any camera's."""
+    if width * height > MOST_PIXELS:
+        raise TooMuch(f"a picture of {width}×{height} pixels")
+
+
+def _size_of(data: bytes) -> tuple[int, int] | None:
+    """Width and height by the header; None for neither a JPEG nor a PNG."""
+    if data.startswith(_PNG) and len(data) >= len(_PNG) + _PNG_HEADER.size:
+        _, kind, width, height = _PNG_HEADER.unpack_from(data, len(_PNG))
+        return (width, height) if kind == b"IHDR" else None
+    return _jpeg_size(data) if data.startswith(_JPEG) else None
+
+
+def _jpeg_size(data: bytes) -> tuple[int, int] | None:
+    at = len(_JPEG)
+    while at + 9 <= len(data):
+        if data[at] != 0xFF or data[at + 1] == 0xFF or data[at + 1] in _BARE:
+            at += 1 if data[at] != 0xFF or data[at + 1] == 0xFF else 2
+            continue
+        if data[at + 1] in _FRAMES:
+            height, width = struct.unpack_from(">HH", data, at + 5)
+            return width, height
+        at += 2 + int.from_bytes(data[at + 2 : at + 4], "big")
+    return None

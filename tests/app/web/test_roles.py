@@ -1,0 +1,126 @@
+"""Every address of the server and every word of the stream, with who may use it. Made from the routes themselves: one
+that is added without a rule here fails."""
+
+from __future__ import annotations
+
+import asyncio
+import inspect
+import re
+from collections.abc import Iterator
+from typing import Any, Literal
+
+import pytest
+from starlette.routing import Mount
+from starlette.types import Message, Receive, Scope, Send
+
+from app.engine.engine import Engine
+from app.streaming.stream import DISPLAY_MAY_SAY, Stream
+from app.web.access import Access, Guard
+from app.web.server import create_app
+from app.web.tokens import Tokens
+from pipeline.params import Params
+from tests.app.engine.recording_helpers import Recording, opener
+
+Rule = Literal["everybody", "whoever looks", "people"]
+TOKENS = Tokens("person-0123456789abcdef", "display-0123456789abcde")
+
+EVERYBODY = "GET /healthz · HEAD /healthz"
+WHOEVER_LOOKS = """
+GET /api/healthz · GET /metrics · GET /api/state · GET /api/result · GET /api/sources · GET /api/params ·
+GET /api/params.yaml · GET /api/recording · POST /api/recording · GET /api/drive · GET /api/drive/object/{object_id} ·
+GET /api/drive/events · POST /api/marks · GET /api/runs · GET /api/runs/{number}/columns ·
+GET /api/runs/{number}/params.yaml · GET /api/compare · GET /api/labels · GET /api/labels/frames ·
+GET /api/labels/tracks/{number} · GET /api/labels/next · GET /api/labels/score · GET /api/labels/history ·
+GET /api/labels/formats · GET /api/labels/export · GET /api/labels/export/notes · GET /api/labels/versions ·
+GET /api/labels/versions/{name} · GET /api/jobs · GET /api/jobs/{number} · GET /api/jobs/{number}/file ·
+GET /api/alignment/score · GET /api/rerun/open · GET /api/rerun.rrd · GET /openapi.json · HEAD /openapi.json ·
+WEBSOCKET /api/stream · GET /rerun/re_viewer.js · GET /rerun/re_viewer_bg.wasm · GET /rerun/ · GET /help ·
+GET /help/{address:path} · GET /palette.css · GET / · HEAD /
+"""
+PEOPLE = """
+POST /api/playback · POST /api/source · PATCH /api/params · POST /api/params · POST /api/params/undo ·
+POST /api/params/redo · POST /api/params/preset · DELETE /api/marks/{number} · POST /api/runs/{number}/keep ·
+POST /api/runs/{number}/base · POST /api/runs/{number}/use · DELETE /api/runs/{number} · POST /api/labels/act ·
+POST /api/labels/undo · POST /api/labels/redo · POST /api/labels/import · POST /api/labels/versions · POST /api/clip ·
+DELETE /api/jobs/{number} · POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ ·
+GET /viser · GET /viser/{path:path}
+"""
+RULES: dict[str, Rule] = {
+    door.strip(): rule
+    for rule, doors in (("everybody", EVERYBODY), ("whoever looks", WHOEVER_LOOKS), ("people", PEOPLE))
+    for door in doors.split("·")
+}  # type: ignore[assignment]
+WELCOME: dict[Rule, set[str]] = {
+    "everybody": {"nobody", "display", "person"},
+    "whoever looks": {"display", "person"},
+    "people": {"person"},
+}
+
+
+def doors_of(routes: Any) -> Iterator[str]:
+    for route in routes:
+        inside = getattr(route, "original_router", None)
+        if inside is not None:
+            yield from doors_of(inside.routes)
+        elif isinstance(route, Mount):
+            yield from (f"{method} {route.path or '/'}" for method in ("GET", "HEAD"))
+        else:
+            yield from (f"{method} {route.path}" for method in getattr(route, "methods", None) or ("WEBSOCKET",))
+
+
+def test_every_address_has_a_rule():
+    app = create_app(Engine(opener(Recording()), None, Params()))
+    described = {f"{method.upper()} {path}" for path, methods in app.openapi()["paths"].items() for method in methods}
+    assert set(doors_of(app.routes)) | described == set(RULES)
+
+
+async def _inside(_: Scope, receive: Receive, send: Send) -> None:
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+
+
+def lets_in(door: str, role: str) -> bool:
+    """Whether the request comes through to what is behind the guard."""
+    method, _, path = door.partition(" ")
+    path = re.sub(r"\{[^}]*\}", "1", path)
+    token = getattr(TOKENS, role, None)
+    headers = [(b"host", b"127.0.0.1:8420")] + ([(b"authorization", f"Bearer {token}".encode())] if token else [])
+    kind = "websocket" if method == "WEBSOCKET" else "http"
+    scope = {
+        "type": kind, "method": method, "path": path, "query_string": b"", "headers": headers, "client": ("::1", 1),
+        "server": ("127.0.0.1", 8420), "scheme": "http",
+    }  # fmt: skip
+    sent: list[Message] = []
+
+    async def ask() -> None:
+        async def send(message: Message) -> None:
+            sent.append(message)
+
+        async def receive() -> Message:
+            return {"type": "websocket.connect"}
+
+        await Guard(_inside, Access(["0.0.0.0"]), TOKENS)(scope, receive, send)
+
+    asyncio.run(ask())
+    return sent[0].get("status") == 200
+
+
+@pytest.mark.parametrize("role", ["nobody", "display", "person"])
+def test_the_guard_lets_in_whom_the_rules_do_and_nobody_else(role: str):
+    wrong = [door for door, rule in RULES.items() if lets_in(door, role) != (role in WELCOME[rule])]
+    assert wrong == []
+
+
+WORDS: dict[str, Rule] = {
+    "ping": "whoever looks",
+    "picture_px": "whoever looks",
+    "painted": "whoever looks",
+    "selected": "people",
+    "hides_3d": "people",
+    "held": "people",
+}
+
+
+def test_every_word_of_the_stream_has_a_rule():
+    heard = set(re.findall(r"""said(?:\.get\(|\[)"(\w+)\"""", inspect.getsource(Stream._receive)))
+    assert heard == set(WORDS)
+    assert {word for word, rule in WORDS.items() if rule == "whoever looks"} == DISPLAY_MAY_SAY

@@ -1,0 +1,130 @@
+"""Every parser of what comes from outside, each with inputs that it reads well.
+
+A target takes any bytes. It may return, or raise ``Refused``; everything else is a finding.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from pipeline.common.errors import BadInput
+from pipeline.common.picture_decoding import TooMuch, decode_within_budget
+from pipeline.common.user_file_errors import parse_yaml
+from pipeline.formats.kitti_records import parse_timestamps
+from pipeline.formats.nmea import NmeaReader
+from pipeline.formats.velodyne.decoder import Vlp16Decoder
+from pipeline.labels.formats.native import from_json, to_json
+from pipeline.labels.model import LabelSet
+from pipeline.recording.errors import Damaged
+from pipeline.recording.session.frame_record import frame_record_from
+from pipeline.simulation import scenario
+from pipeline.sources import open_source
+from pipeline.sources.live import config
+from pipeline.sources.live.devices.can import load_dbc
+from pipeline.sources.route_files import load_route
+from tests.pipeline.formats.velodyne.streams import drive
+from tests.pipeline.recording.frames import full, write
+from tests.pipeline.sources.live.devices.test_wires import DBC
+from tests.pipeline.sources.test_fuzz import FILES
+from tests.pipeline.sources.test_route_files import GGA, GPX, POINTS, RMC
+
+Refused = (BadInput, Damaged, TooMuch, ValueError)
+"""ValueError: of the parsers inside, whose callers turn it into a sentence."""
+_MOST_FRAMES = 4
+
+
+@dataclass(frozen=True)
+class Target:
+    """One parser."""
+
+    seeds: tuple[bytes, ...]
+    """Inputs that it reads well."""
+    read: Callable[[bytes], object]
+    """What it does with any."""
+
+
+def _sentences(data: bytes) -> None:
+    reader = NmeaReader()
+    for line in data.splitlines():
+        reader.push(line.decode("ascii", "replace"), 1_700_000_000_000_000_000)
+    reader.flush(1_700_000_000_000_000_000)
+
+
+def _packets(data: bytes) -> None:
+    decoder = Vlp16Decoder()
+    for at in range(0, len(data), 1206):
+        decoder.push(data[at : at + 1206], None)
+
+
+def _by_file(folder: Path, name: str, read: Callable[[str], object]) -> Callable[[bytes], None]:
+    path = folder / name
+
+    def reading(data: bytes) -> None:
+        path.write_bytes(data)
+        read(str(path))
+
+    return reading
+
+
+def _frames_of(uri: str) -> None:
+    source = open_source(uri)
+    for index in range(min(len(source), _MOST_FRAMES)):
+        source.frame(index)
+        source.truth(index)
+
+
+def _whole_recording(uri: str, _: str) -> None:
+    """A recording one of whose files was written anew."""
+    _frames_of(uri)
+
+
+def _text(read: Callable[[str, str], object]) -> Callable[[bytes], object]:
+    return lambda data: read(data.decode("utf-8", "replace"), "x")
+
+
+def _route(place: str) -> bytes:
+    return GPX.format(1, 1, f"<trk><trkseg>{POINTS.format(place)}</trkseg></trk>").encode()
+
+
+def targets(folder: Path) -> dict[str, Target]:
+    """All of them; those that read files write them below ``folder``."""
+    grey = np.full((24, 40, 3), 90, np.uint8)
+    pictures = tuple(cv2.imencode(suffix, grey)[1].tobytes() for suffix in (".png", ".jpg"))
+    built_in = tuple(path.read_bytes() for path in sorted(scenario.FOLDER.glob("*.yaml"))[:3])
+    session = write(folder / "whole.mcap", [full(index) for index in range(3)])
+    found = {
+        "picture": Target(pictures, decode_within_budget),
+        "nmea": Target(((GGA + RMC).encode(),), _sentences),
+        "velodyne": Target((b"".join(packet for packet, _ in drive(1)[:8]),), _packets),
+        "yaml": Target((b"a: &a [1, 2]\nb: {c: *a, d: 2026-01-01}\n", *built_in), _text(parse_yaml)),
+        "scenario": Target(built_in, _text(scenario.parse)),
+        "labels": Target((to_json(LabelSet("a", ("1", "2"), (0, 1))),), lambda data: from_json(data, "x")),
+        "frame record": Target((b'{"index": 1, "name": "a", "t_ns": 5}',), frame_record_from),
+        "kitti stamps": Target((b"2011-09-26 13:02:25.964389445\n" * 3,), parse_timestamps),
+        "gpx": Target((_route("trkpt"),), _by_file(folder, "a.gpx", load_route)),
+        "route csv": Target((b"lat,lon\n48.1,11.2\n48.2,11.3\n",), _by_file(folder, "a.csv", load_route)),
+        "dbc": Target((DBC.encode(),), _by_file(folder, "a.dbc", lambda path: load_dbc(Path(path)))),
+        "live config": Target((b"title: a\nlidar: {data_port: 2368}\n",), _by_file(folder, "a.yaml", config.load)),
+        "session": Target((session.read_bytes(),), _by_file(folder, "a.mcap", _frames_of)),
+    }
+    for name, (make, uri, inside) in FILES.items():
+        (folder / name).mkdir()
+        recording = make(folder / name / "recording")
+        path = recording / inside
+        reading = _by_file(path.parent, path.name, partial(_whole_recording, uri.format(folder=recording)))
+        found[f"file of {name}"] = Target((path.read_bytes(),), reading)
+    return found
+
+
+def all_targets() -> Iterator[dict[str, Target]]:
+    """For a ``with`` of contextlib: the folder goes at the end."""
+    with tempfile.TemporaryDirectory(prefix="cipv-fuzz-") as folder, suppress(KeyboardInterrupt):
+        yield targets(Path(folder))

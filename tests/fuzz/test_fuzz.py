@@ -1,0 +1,81 @@
+"""That the fuzzer finds what is wrong, and that nothing that it has found comes back."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.fuzz import run as fuzzing
+from tests.fuzz.run import outcome, run
+from tests.fuzz.targets import Target, targets
+
+FINDINGS = Path(__file__).parent / "findings"
+
+
+def _stumbles(data: bytes) -> None:
+    {}["x"]
+
+
+def _hangs(data: bytes) -> None:
+    while True:
+        time.sleep(0.01)
+
+
+def _swells(data: bytes) -> None:
+    bytearray(64 << 30)
+
+
+def _dies(data: bytes) -> None:
+    os._exit(3)  # as a library's crash: nothing of Python's runs any more
+
+
+@pytest.mark.parametrize(
+    ("read", "says"),
+    [
+        (_stumbles, "KeyError in test_fuzz.py"),
+        (_hangs, "more than 0.1 s"),
+        (_swells, "MemoryError"),
+        (_dies, "the process"),
+    ],
+)
+def test_each_kind_of_failure_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, read: object, says: str):
+    monkeypatch.setattr(fuzzing, "BUDGET_S", 0.1)
+    monkeypatch.setattr(fuzzing, "_PATIENCE_S", 2.0)
+
+    def known() -> Iterator[dict[str, Target]]:
+        yield {"x": Target((b"abc",), read)}  # type: ignore[arg-type]
+
+    monkeypatch.setattr(fuzzing, "all_targets", known)
+    (done,) = run(0.2, build=tmp_path)
+    assert says in done["findings"][0]
+    (finding,) = (tmp_path / "findings" / "x").iterdir()
+    assert finding.stat().st_size
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Target]:
+    return targets(tmp_path_factory.mktemp("fuzz"))
+
+
+def test_every_parser_reads_what_it_is_made_for(known: dict[str, Target]):
+    wrong = {
+        name: outcome(target, seed)
+        for name, target in known.items()
+        for seed in target.seeds
+        if outcome(target, seed) != ("read", False)
+    }
+    assert wrong == {}
+
+
+def test_nothing_that_was_found_comes_back(known: dict[str, Target]):
+    names = {name.replace(" ", "_").replace(",", ""): name for name in known}
+    again = {
+        str(path): outcome(known[names[path.parent.name]], path.read_bytes())
+        for path in FINDINGS.glob("*/*")
+        if outcome(known[names[path.parent.name]], path.read_bytes())[1]
+    }
+    assert again == {}
