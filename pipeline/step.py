@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pipeline.alignment import projection
+from pipeline.common.clips import begins_clip
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
 from pipeline.ego_motion import coasting
@@ -159,7 +160,7 @@ def _begin(state: State, frame: Frame, params: Params) -> tuple[State, Moment]:
     """The state to go on from, and the moment. After a gap or a jump back in time the state is a fresh one, because a
     track carried over either would be a guess; only object ids go on, so that none is given twice."""
     dt_s = (frame.t_ns - state.t_ns) / 1e9 if state.t_ns is not None else None
-    if dt_s is not None and not 0.0 < dt_s <= params.time.reset_gap_s:
+    if state.t_ns is not None and begins_clip(state.t_ns, frame.t_ns, params.time.reset_gap_s):
         state, dt_s = State(fusion=fusion.FusionState(next_id=state.fusion.next_id)), None
     motion = coasting.follow(state.own, yaw_rate.believable(frame.ego), dt_s, params.motion)
     return state, Moment(frame.t_ns, dt_s, motion, coasting.recent(motion, params.motion))
