@@ -52,6 +52,7 @@ def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, .
         *_posts(start_m, end_m, right, left),
         *_gantries(start_m, end_m, right),
         *_trees(np.random.default_rng([seed, 1]), start_m, end_m, right, left),
+        *(Thing("post", b.s_m, b.d_m, b.length_m, b.width_m, 0.0, b.high_m, 0.0) for b in road.beacons),
         *_buildings(np.random.default_rng([seed, 1, 1]), start_m, end_m, right, left),
     ]
     return tuple(sorted(_off_the_road(things, road, start_m, end_m), key=lambda thing: thing.s_m))
