@@ -43,7 +43,7 @@ ALLOWED: Mapping[Kind, float] = {
     "lead missed": 2.0,
     "lead late": 2.0,
 }
-"""In 1,000 km. Fewer than this cannot be told from none in a short run: a demand fails when the lower bound is above."""
+"""In 1,000 km. A demand fails when the lower bound is above it: a short run cannot tell a few from none."""
 _SHORT_KM = 2
 _CONFIDENCE = 0.95
 _WORST = 40
@@ -59,7 +59,7 @@ class Kilometre:
 
 
 @dataclass(frozen=True)
-class Driven1:
+class DriveOutcome:
     """What one drive came to: how far, for how long, and each variant's failures."""
 
     km: float
@@ -67,7 +67,7 @@ class Driven1:
     failures: Mapping[str, tuple[Failure, ...]]
 
 
-def run(case: Kilometre) -> Driven1:
+def run(case: Kilometre) -> DriveOutcome:
     """One drive with each variant, on the same frames."""
     warm_up()
     scene = traffic.scenario(case.seed, case.number)
@@ -81,12 +81,14 @@ def run(case: Kilometre) -> Driven1:
             states[n], result = step(states[n], frame, each)
             judges[n].take(now, frame.camera, result)
     failures = {name: tuple(judge.failures) for name, judge in zip(case.variants, judges, strict=True)}
-    return Driven1((last_m - first_m) / 1000.0, scene.duration_s, failures)
+    return DriveOutcome((last_m - first_m) / 1000.0, scene.duration_s, failures)
 
 
-def suite(km: int, seed: int = 0, ablation: bool = False) -> Experiment[Kilometre, Driven1]:
+def suite(km: int, seed: int = 0, ablation: bool = False) -> Experiment[Kilometre, DriveOutcome]:
     """So many kilometres; with ``ablation`` each rule is switched off in turn as well."""
-    return Experiment("robustness", "robustness", "Robustness", partial(_cases, km, seed, ablation), run, report, as_drive)
+    return Experiment(
+        "robustness", "robustness", "Robustness", partial(_cases, km, seed, ablation), run, report, as_drive
+    )
 
 
 def _cases(km: int, seed: int, ablation: bool, short: bool) -> list[Kilometre]:
@@ -94,7 +96,7 @@ def _cases(km: int, seed: int, ablation: bool, short: bool) -> list[Kilometre]:
     return [Kilometre(seed, number, variants) for number in range(min(km, _SHORT_KM) if short else km)]
 
 
-def as_drive(case: Kilometre, outcome: Driven1) -> ExperimentDrive | None:
+def as_drive(case: Kilometre, outcome: DriveOutcome) -> ExperimentDrive | None:
     """A drive in which something failed."""
     failures = outcome.failures[AS_IS]
     if not failures:
@@ -124,7 +126,7 @@ def _told(failure: Failure) -> str:
     return f"{failure.kind}{cause}: {failure.text}"
 
 
-def report(cases: Sequence[Kilometre], outcomes: Sequence[Driven1]) -> Section:
+def report(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> Section:
     km, hours = sum(each.km for each in outcomes), sum(each.seconds for each in outcomes) / 3600.0
     counts = _counts(outcomes, AS_IS)
     tables = [
@@ -140,7 +142,9 @@ def report(cases: Sequence[Kilometre], outcomes: Sequence[Driven1]) -> Section:
     ]
     variants = list(outcomes[0].failures) if outcomes else []
     if len(variants) > 1:
-        rows = tuple((name, *(_counts(outcomes, name)[kind] for kind in KINDS)) for name in variants)
+        rows: tuple[tuple[AnyCell, ...], ...] = tuple(
+            (name, *(_counts(outcomes, name)[kind] for kind in KINDS)) for name in variants
+        )
         tables.insert(1, Table("Each rule switched off", ("variant", *KINDS), rows, f"Counts in {km:.0f} km."))
     return Section(
         "robustness",
@@ -156,7 +160,7 @@ def report(cases: Sequence[Kilometre], outcomes: Sequence[Driven1]) -> Section:
     )
 
 
-def _counts(outcomes: Sequence[Driven1], variant: str) -> Counter[str]:
+def _counts(outcomes: Sequence[DriveOutcome], variant: str) -> Counter[str]:
     return Counter(each.kind for outcome in outcomes for each in outcome.failures[variant])
 
 
@@ -181,14 +185,14 @@ def _unmet(counts: Counter[str], km: float) -> Iterator[str]:
             yield f"{kind}: {counts[kind]} in {km:.0f} km, surely more than {allowed:g} in 1,000 km."
 
 
-def _causes(outcomes: Sequence[Driven1]) -> Iterator[tuple[AnyCell, ...]]:
+def _causes(outcomes: Sequence[DriveOutcome]) -> Iterator[tuple[AnyCell, ...]]:
     by_cause = Counter((each.kind, each.cause) for outcome in outcomes for each in outcome.failures[AS_IS])
     for kind in KINDS:
         found = [(cause, count) for (of, cause), count in by_cause.items() if of == kind]
         yield from ((kind, cause, count) for cause, count in sorted(found, key=lambda each: (-each[1], each[0])))
 
 
-def _by_layout(cases: Sequence[Kilometre], outcomes: Sequence[Driven1]) -> Iterator[tuple[AnyCell, ...]]:
+def _by_layout(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> Iterator[tuple[AnyCell, ...]]:
     pairs = [(traffic.layout_of(case.seed, case.number)[1], got) for case, got in zip(cases, outcomes, strict=True)]
     parts = {place.name: [got for layout, got in pairs if layout.place == place.name] for place in traffic.PLACES}
     for flag in ("lead", "cut_in", "crossing", "bends", "crests", "roadworks"):
@@ -198,7 +202,7 @@ def _by_layout(cases: Sequence[Kilometre], outcomes: Sequence[Driven1]) -> Itera
         yield name, sum(each.km for each in got), *(counts[kind] for kind in KINDS)
 
 
-def _where(cases: Sequence[Kilometre], outcomes: Sequence[Driven1]) -> Iterator[tuple[AnyCell, ...]]:
+def _where(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> Iterator[tuple[AnyCell, ...]]:
     """The worst failures first; switches are not listed."""
     found = [
         (KINDS.index(each.kind), -each.lasts_s, case.number, case, each)

@@ -49,7 +49,9 @@ def steady(steps: int, speed_mps: float, rear_m: float) -> Drive:
     return _driven(np.full(steps, speed_mps), rear_m)
 
 
-def following(ahead: list[tuple[int, int, Drive]], steps: int, usual_mps: float, start_mps: float, front_m: float) -> F64:
+def following(
+    ahead: list[tuple[int, int, Drive]], steps: int, usual_mps: float, start_mps: float, front_m: float
+) -> F64:
     """Speeds of a car whose bumper starts at ``front_m``. ahead: those in its lane, each from one step to another."""
     speeds = np.empty(steps)
     speed, place = start_mps, front_m

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, dist, hypot, sin
+from math import ceil, cos, dist, hypot, sin
 from typing import Literal
 
 from pipeline.common.geometry import closest_on_polygon
@@ -267,6 +267,6 @@ def _seen_by(item: FusedObject | None) -> str:
 
 
 def _why_missed(lead: ActorState, chosen: FusedObject | None) -> str:
-    away_m = -(-int(((lead.cuboid.center[0] ** 2 + lead.cuboid.center[1] ** 2) ** 0.5 - lead.cuboid.size[0] / 2)) // 20) * 20
+    away_m = hypot(*lead.cuboid.center[:2]) - lead.cuboid.size[0] / 2
     what = "no lead" if chosen is None else "another object leads"
-    return f"{what}, true one within {away_m} m"
+    return f"{what}, true one within {20 * ceil(away_m / 20)} m"

@@ -264,7 +264,12 @@ def _false(counted: Counted) -> FalseBoxes:
         per_frame=round(len(false) / counted.frames, 3),
         lasts=round(again / max(could, 1), 3),
         seen=tuple(
-            (round(box[3] - box[1], 1), round((box[2] - box[0]) / (box[3] - box[1]), 2), round(bearing, 1), round(score, 2))
+            (
+                round(box[3] - box[1], 1),
+                round((box[2] - box[0]) / (box[3] - box[1]), 2),
+                round(bearing, 1),
+                round(score, 2),
+            )
             for _, _, box, bearing, score in sorted(false, key=lambda each: each[2][3] - each[2][1])
         ),
         height_share=round(float(_spread(np.array(grown))), 3) if len(grown) > 5 else 0.1,

@@ -149,7 +149,9 @@ def _faults(rng: np.random.Generator) -> dict[str, Any]:
         "camera_roll_deg": angle(),
         "nods_deg": round(float(rng.uniform(0.05, 0.35)), 3),
         "camera_skew_ms": round(float(rng.uniform(-50.0, 50.0)), 1),
-        "lost_rings": sorted(map(int, rng.choice(16, 1 + rng.integers(2), replace=False))) if rng.random() < 0.1 else [],
+        "lost_rings": sorted(map(int, rng.choice(16, 1 + rng.integers(2), replace=False)))
+        if rng.random() < 0.1
+        else [],
         "spurious_clusters": round(float(rng.choice((0.0, 0.02, 0.2), p=(0.5, 0.4, 0.1))), 3),
         "sweeps_lost": round(float(rng.choice((0.0, 0.02), p=(0.8, 0.2))), 3),
         "pictures_lost": round(float(rng.choice((0.0, 0.05), p=(0.8, 0.2))), 3),
@@ -237,7 +239,7 @@ def _roadworks(
     place: Place,
     way: np.ndarray,
 ) -> None:
-    """The outermost lane is closed by beacons: a taper, then a row along the line. Whoever drives there changes first."""
+    """Beacons close the outermost lane: a taper, then a row along the line. Whoever drives there changes first."""
     begins_m = float(rng.uniform(350.0, 600.0))
     lanes = road["lanes_forward"]
     line_m = -(place.median_m / 2 + (lanes - 1) * lane_m)

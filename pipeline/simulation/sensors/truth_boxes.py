@@ -68,11 +68,13 @@ def in_picture(now: World, camera: CameraCalibration) -> tuple[Seen, ...]:
     """Every vehicle ahead whose cuboid falls into the picture, nearest first."""
     alignment = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
     corners = corners_of([state.cuboid for state in reversed(now.actors)])
-    ahead = np.flatnonzero(corners[:, :4, 0].max(axis=1) > 0.0) if len(corners) else []
-    boxes = project_cuboids(alignment, corners[ahead], camera.width, camera.height) if len(ahead) else []
+    if not len(corners):
+        return ()
+    ahead = np.flatnonzero(corners[:, :4, 0].max(axis=1) > 0.0)
+    boxes = project_cuboids(alignment, corners[ahead], camera.width, camera.height)
     nearer: list[Box] = []
     seen = []
-    for n, bbox in zip(ahead, boxes, strict=True):
+    for n, bbox in zip(ahead.tolist(), boxes, strict=True):
         state = now.actors[-1 - n]
         if bbox is not None:
             seen.append(Seen(state, bbox, visible_share(bbox, nearer)))
