@@ -54,10 +54,10 @@ def test_what_is_right_ahead_of_a_standing_car_is_in_its_path_whatever_a_vague_r
     route = Route("street", np.linspace(-0.001, 0.002, 200), np.zeros(200), 0.1)
     standing = EgoState(0, 0.0, 0.0)
     state = PathState()
-    for n, speed_mps in enumerate((10.0, 10.0, 10.0, 0.0, 0.0)):
+    for n, speed_mps in enumerate((10.0,) * 5 + (0.0,) * 30):
         t_ns = n * 100_000_000
         moving = speed_mps > 0.0
-        fix = GnssFix(t_ns, n * 9e-6, 3e-5, 0.0, 0.0 if moving else None, speed_mps, "single", 5.0)
+        fix = GnssFix(t_ns, min(n, 5) * 9e-6, 3e-5, 0.0, 0.0 if moving else None, speed_mps, "single", 5.0)
         own = EgoState(t_ns, speed_mps, 0.0) if moving else standing
         now = Moment(t_ns, 0.1 if n else None, own, own)
         state, path = predict(state, Evidence(None, fix, route), now, PARAMS)
