@@ -128,7 +128,9 @@ class Judge:
         met = _there(now, where) if where is not None else []
         due = [state for state in met if _in_path(state, path)] or self._comes_in(now, met)
         if due:
-            if level == 0 or any(self._needs_braking(now, state) for state in due):
+            # ACC's gap law brakes hard for a true lead that the script follows closer than the law would: no phantom
+            is_emergency = acc.state in ("partial_brake", "full_brake")
+            if not is_emergency or any(self._needs_braking(now, state) for state in due):
                 return
             cause = f"wrong speed of a true vehicle, by {_seen_by(item)}"
         else:
