@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pipeline.alignment import projection
+from pipeline.common.clips import begins_clip
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
 from pipeline.ego_motion import coasting, own_motion
@@ -182,8 +183,9 @@ def measure_own_motion(state: State, frame: Frame, params: Params) -> own_motion
 
 def _since(state: State, frame: Frame, params: Params) -> float | None:
     """Seconds since the frame before; None at the start, after a gap and after a jump back in time."""
-    dt_s = (frame.t_ns - state.t_ns) / 1e9 if state.t_ns is not None else None
-    return dt_s if dt_s is not None and 0.0 < dt_s <= params.time.reset_gap_s else None
+    if state.t_ns is None or begins_clip(state.t_ns, frame.t_ns, params.time.reset_gap_s):
+        return None
+    return (frame.t_ns - state.t_ns) / 1e9
 
 
 def _begin(state: State, frame: Frame, measured: EgoState | None, params: Params) -> tuple[State, Moment]:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from app.bench.ground_reference import fit_ground_numpy
 from app.bench.timing import figures, interleaved
+from pipeline.common.clips import begins_clip
 from pipeline.lidar import warm_up
 from pipeline.lidar.boxes import fit_obstacles
 from pipeline.lidar.cluster import candidates, cluster
@@ -95,8 +96,8 @@ def _chain(prepared: list[Prepared], params: Params) -> Callable[[], object]:
     def run() -> object:
         nonlocal state, last_ns
         sweep = next(turn).sweep
-        dt_s, last_ns = (sweep.t_ns - last_ns) / 1e9, sweep.t_ns
-        continues = 0.0 < dt_s <= params.time.reset_gap_s
+        dt_s, continues = (sweep.t_ns - last_ns) / 1e9, not begins_clip(last_ns, sweep.t_ns, params.time.reset_gap_s)
+        last_ns = sweep.t_ns
         state, tracks = track(state, obstacles_of(sweep, params), dt_s if continues else None, params.lidar_tracking)
         return tracks
 

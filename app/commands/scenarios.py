@@ -6,7 +6,7 @@ import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -16,7 +16,14 @@ from app.reports.html import html
 from app.reports.terminal_tables import show
 from pipeline.common.errors import BadInput
 from pipeline.evaluation.report_sections import as_json
+from pipeline.experiments.experiment import Experiment
+from pipeline.experiments.robustness.experiment import suite as robustness
 from pipeline.experiments.runner import count_cases, of_suite, run_all
+
+ROBUSTNESS = "robustness"
+_FAILED_DRIVES = Path("robustness-failures")
+"""Where the drives with a failure go unless a folder is named."""
+_MOST_KM = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -30,26 +37,34 @@ class Scenarios:
     what: tyro.conf.Positional[Literal["run"]]
     """What to do"""
     suite: str = "paper"
-    """paper, curves, euroncap, iso, all, or the name of one experiment"""
+    """paper, curves, euroncap, iso, all, robustness, or the name of one experiment"""
     short: bool = False
     """Run a few cases of each only: seconds instead of minutes"""
     jobs: Annotated[int, tyro.conf.arg(metavar="N")] = 0
     """Number of processes; 0 for one per core"""
+    km: int | None = None
+    """Robustness: kilometres of random traffic; 100 without"""
+    seed: int | None = None
+    """Robustness: another seed is other traffic; 0 without"""
+    ablation: bool = False
+    """Robustness: also with each rule against phantoms switched off in turn"""
     report: Path | None = None
     """Write an HTML file with tables and charts"""
     drives: Path | None = None
-    """Save every drive in this folder, listed in index.html and linked from the report; open one as sim:<file>"""
+    """Save every drive in this folder (robustness: those with a failure, in robustness-failures without a name), listed
+    in index.html and linked from the report; open one as sim:<file>"""
     json: bool = False
     """Print the figures as JSON"""
 
     def __call__(self) -> int:
-        experiments = of_suite(self.suite)
+        experiments = self._experiments()
         if self.jobs < 0:
             raise BadInput(f"--jobs {self.jobs}: expected a number of processes, or 0 for one per core")
         if self.report is not None:
             self.report.parent.mkdir(parents=True, exist_ok=True)
             self.report.open("a").close()  # report an unwritable file before the work, not after it
-        folder = ReplayFolder(self.drives) if self.drives is not None else None
+        drives = self.drives or (_FAILED_DRIVES if self.suite == ROBUSTNESS else None)
+        folder = ReplayFolder(drives) if drives is not None else None
         with frames_progress() as progress:
             bar = progress.add_task("driving", total=count_cases(experiments, self.short))
             sections = run_all(
@@ -58,8 +73,8 @@ class Scenarios:
         if folder is not None:
             folder.list_all()
         if self.report is not None:
-            drives = folder.link_from(self.report) if folder else ""
-            self.report.write_text(html(sections, f"Experiments: {self.suite}", drives), encoding="utf-8")
+            link = folder.link_from(self.report) if folder else ""
+            self.report.write_text(html(sections, f"Experiments: {self.suite}", link), encoding="utf-8")
         if self.json:
             print(json.dumps([as_json(section) for section in sections], indent=1, ensure_ascii=False))
         else:
@@ -68,3 +83,13 @@ class Scenarios:
         for failure in failures:
             print(f"FAILED: {failure}", file=sys.stderr)
         return 1 if failures else 0
+
+    def _experiments(self) -> tuple[Experiment[Any, Any], ...]:
+        if self.suite != ROBUSTNESS:
+            if self.km is not None or self.seed is not None or self.ablation:
+                raise BadInput(f"--km, --seed and --ablation are for --suite {ROBUSTNESS}")
+            return of_suite(self.suite)
+        km, seed = 100 if self.km is None else self.km, self.seed or 0
+        if not 0 < km <= _MOST_KM or seed < 0:
+            raise BadInput(f"--km {km} --seed {seed}: expected 1 to {_MOST_KM} km and a seed of 0 or more")
+        return (robustness(km, seed, self.ablation),)

@@ -7,20 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.common.clips import first_frames
+from pipeline.params import TimeParams
 from pipeline.types import F64
 
-LONGEST_GAP_S = 1.0
-"""A recording made of several runs has gaps of minutes; nobody wants to watch those."""
+LONGEST_GAP_S = TimeParams().reset_gap_s
+"""A recording of several clips has gaps of minutes; nobody wants to watch those."""
 
 
 def timeline_s(t_ns: Sequence[int], rate_hz: float) -> F64:
     """(N,) seconds from the first frame at which each frame is shown.
 
-    The frames' own stamps, except that a gap over ``LONGEST_GAP_S`` and a step back in time take one nominal period.
+    The frames' own stamps, except that the step to another clip (a gap over ``LONGEST_GAP_S``, or back in time) takes
+    one nominal period.
     """
     steps: F64 = np.diff(np.asarray(t_ns, dtype=np.int64)).astype(np.float64) / 1e9
     period = 1.0 / rate_hz if rate_hz > 0 else 0.1
-    steps[(steps <= 0) | (steps > LONGEST_GAP_S)] = period
+    steps[[first - 1 for first in first_frames(t_ns, LONGEST_GAP_S)[1:]]] = period
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 

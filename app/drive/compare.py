@@ -11,7 +11,9 @@ from itertools import pairwise
 from typing import Literal
 
 from app.drive.frame_rows import Row
+from pipeline.common.clips import begins_clip
 from pipeline.evaluation.lead_verdict import score
+from pipeline.params import TimeParams
 
 SAME_PLACE_M = 0.5
 """Distances, or offsets from the path, that differ by less are one place."""
@@ -127,7 +129,9 @@ def _count(rows: Sequence[Row], holds: Callable[[Row], bool]) -> int:
 
 
 def _changes(rows: Sequence[Row]) -> int:
-    return sum(a.cipv_id != b.cipv_id for a, b in pairwise(rows))
+    longest_gap_s = TimeParams().reset_gap_s
+    joined = ((a, b) for a, b in pairwise(rows) if not begins_clip(a.t_ns, b.t_ns, longest_gap_s))
+    return sum(a.cipv_id != b.cipv_id for a, b in joined)
 
 
 def _least(values: Iterable[float | None]) -> float | None:

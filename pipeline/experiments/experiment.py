@@ -13,7 +13,7 @@ from pipeline.run import Sensors
 from pipeline.simulation.scenario import Scenario
 from pipeline.simulation.sensors.detection_model import Detections
 
-Suite = Literal["paper", "curves", "euroncap", "iso"]
+Suite = Literal["paper", "curves", "euroncap", "iso", "robustness"]
 
 
 @dataclass(frozen=True)
@@ -55,5 +55,5 @@ class Experiment(Generic[Case, Outcome]):
     """One case to its outcome: a pure function at a module's top level."""
     report: Callable[[Sequence[Case], Sequence[Outcome]], Section]
     """All cases and outcomes, in order, to a section of the report."""
-    as_drive: Callable[[Case, Outcome], ExperimentDrive]
-    """The drive behind an outcome."""
+    as_drive: Callable[[Case, Outcome], ExperimentDrive | None]
+    """The drive behind an outcome; None for one that is not worth keeping."""

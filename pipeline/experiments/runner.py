@@ -23,7 +23,7 @@ from pipeline.experiments.paper.lidar_range import RANGING
 
 EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, CURVES, BRAKING, NCAP, ISO)
 Keep = Callable[[Experiment[Any, Any], ExperimentDrive], None]
-SUITES = ("paper", "curves", "euroncap", "iso", "all")
+SUITES = ("paper", "curves", "euroncap", "iso", "all", "robustness")
 
 
 class NoSuchSuite(BadInput):
@@ -31,7 +31,8 @@ class NoSuchSuite(BadInput):
 
 
 def of_suite(suite: str) -> tuple[Experiment[Any, Any], ...]:
-    """The experiments of a suite, or the one of that name. NoSuchSuite when there is neither."""
+    """The experiments of a suite, or the one of that name. NoSuchSuite when there is neither. The suite ``robustness``
+    is made of as many kilometres as are wanted: ``robustness.experiment.suite``."""
     found = tuple(each for each in EXPERIMENTS if suite in ("all", each.suite, each.name))
     if not found:
         names = ", ".join(dict.fromkeys((*SUITES, *(each.name for each in EXPERIMENTS))))
@@ -75,6 +76,8 @@ def _reported(
     for case, outcome in zip(cases, outcomes, strict=True):
         got.append(outcome)
         if keep is not None:
-            keep(experiment, experiment.as_drive(case, outcome))
+            kept = experiment.as_drive(case, outcome)
+            if kept is not None:
+                keep(experiment, kept)
         done()
     return experiment.report(cases, got)

@@ -21,7 +21,7 @@ OVERLAP_M = 0.9
 """In the path: as much of the vehicle as this reaches into the corridor, or half of what is narrower."""
 VISIBLE_SHARE = 0.35
 """A vehicle of which nearer ones leave less than this in sight is hidden."""
-_EDGE_M = 0.3
+EDGE_M = 0.3
 """So near to the overlap that decides, either answer is right."""
 _AHEAD_M, _STEP_S, _LONGEST_S, _SMALLEST_MOVE_M = 90.0, 0.25, 15.0, 0.2
 _SAME_PLACE_M, _SAME_SHARE = 2.5, 0.2
@@ -57,20 +57,25 @@ def true_lead(now: World, path: Path | None, max_m: float = MAX_M) -> tuple[Acto
     found: list[tuple[float, ActorState]] = []
     doubtful_m = np.inf
     for state in now.actors:
-        if path is None or range_m(state) > max_m:
+        if path is None or _is_beyond(state, max_m) or range_m(state) > max_m:
             continue
-        offsets, along = nearest_on_path(path, state.cuboid.footprint())
-        low, high, nearest = float(offsets.min()), float(offsets.max()), float(along.min())
+        too_little, nearest = overlap(state, path)
         if nearest <= 0.0:
             continue
-        half = path.half_width_m
-        too_little = min(high, half) - max(low, -half) - min(OVERLAP_M, 0.5 * (high - low))
-        if abs(too_little) < _EDGE_M:
+        if abs(too_little) < EDGE_M:
             doubtful_m = min(doubtful_m, nearest)
         elif too_little > 0.0:
             found.append((nearest, state))
     nearest_m, lead = min(found, key=lambda pair: pair[0], default=(np.inf, None))
     return lead, bool(doubtful_m < nearest_m)
+
+
+def overlap(state: ActorState, path: Path) -> tuple[float, float]:
+    """By how many metres more of a vehicle reaches into the corridor than makes it in the path, negative: fewer; and
+    how far along the path it begins."""
+    offsets, along = nearest_on_path(path, state.cuboid.footprint())
+    low, high, half = float(offsets.min()), float(offsets.max()), path.half_width_m
+    return min(high, half) - max(low, -half) - min(OVERLAP_M, 0.5 * (high - low)), float(along.min())
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,11 @@ def near_face(state: ActorState) -> Point2:
 
 def range_m(state: ActorState) -> float:
     return float(np.hypot(*near_face(state)))
+
+
+def _is_beyond(state: ActorState, max_m: float) -> bool:
+    """Whether no part of it can be that near: quicker than its nearest face."""
+    return float(np.hypot(*state.cuboid.center[:2])) - sum(state.cuboid.size[:2]) > max_m
 
 
 def same_place(point: Point2, lead: ActorState) -> bool:

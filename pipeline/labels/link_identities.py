@@ -13,12 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipeline.common.clips import begins_clip
 from pipeline.params import TimeParams
 from pipeline.types import F64
 from pipeline.types.source import TruthObject
 
 MAX_GAP_S = TimeParams().reset_gap_s
-"""After a longer gap the pipeline's trackers start anew, so nothing is compared across it."""
+"""A longer gap begins another clip (``pipeline.common.clips``), so nothing is compared across it."""
 _LINK_M, _LINK_MPS = 2.0, 10.0
 _FIRST_MPS, _FIRST_ASIDE_M = 50.0, 1.0
 _NEVER = 1e6
@@ -26,15 +27,17 @@ _STILL = np.zeros(2)
 
 
 def linked(labelled: Mapping[int, tuple[TruthObject, ...]]) -> dict[int, tuple[TruthObject, ...]]:
-    """Labels with an identity over time, by tick, counted from 1."""
+    """Labels with an identity over time, by tick, counted from 1. labelled: in recorded order, also where times run
+    back."""
     given = 0
     before: tuple[TruthObject, ...] = ()
     speeds: dict[int, F64] = {}
     last_ns: int | None = None
     out = {}
-    for tick in sorted(labelled):
+    for tick in labelled:
         gap_s = (tick - last_ns) / 1e9 if last_ns is not None else np.inf
-        ids = _links(before, labelled[tick], speeds, gap_s) if gap_s <= MAX_GAP_S else {}
+        goes_on = last_ns is not None and not begins_clip(last_ns, tick, MAX_GAP_S)
+        ids = _links(before, labelled[tick], speeds, gap_s) if goes_on else {}
         now = []
         for n, item in enumerate(labelled[tick]):
             if n not in ids:

@@ -76,8 +76,9 @@ def predict(state: PathState, evidence: Evidence, now: Moment, params: PathParam
         yaw_rate.ahead(yaw, ego, params),
     )
     estimates = [each for each in seen if each is not None]
-    if not estimates or _fades(ego, estimates):
-        estimates.append(straight(ego, params))
+    guess = straight(ego, params)
+    if all(each.sigma_m[0] > guess.sigma_m[0] for each in estimates) or _fades(ego, estimates):
+        estimates.append(guess)  # of the next metres a vague route tells less than that the car goes where it points
 
     # They are compared with each other and with the last path, moved on; what disagrees is left out, the rest weighed
     expected = _expected(state.last, yaw, ego, dt_s, len(estimates[0].center))

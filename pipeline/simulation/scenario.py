@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from functools import cached_property
-from math import ceil
+from math import ceil, pi
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from pipeline.common.errors import BadInput
@@ -13,11 +14,13 @@ from pipeline.common.user_file_errors import first_complaint, given_path, parse_
 from pipeline.simulation.built_in import FOLDER, names
 from pipeline.simulation.drawing.lens import ORDINARY, CameraModel
 from pipeline.simulation.sensors.detection_model import Detections
+from pipeline.simulation.sensors.faults import NONE, Faults
 from pipeline.simulation.sensors.gnss_model import MEASURED, RTK, GnssModel, OdometryModel
 from pipeline.simulation.sensors.lidar_model import VLP16, LidarModel
 from pipeline.simulation.world.actors import Actor, Motion, Script, motion
 from pipeline.simulation.world.intersection_ways import CrossingActor, Route, route
 from pipeline.simulation.world.roads import Road, Strict
+from pipeline.types import F64
 
 _GAP_STEP_S, _GAP_HALVINGS = 0.25, 10
 
@@ -39,7 +42,7 @@ Moment = tuple[float, float, float, float, float, float]
 class Scenario(Strict):
     """driven: the ego vehicle's motion as a closed loop drove it, a moment a tick; where it is given, the ego
     vehicle moves so and not by its script. sensors: those that the pipeline is given. detections: what is found in the
-    pictures; None: what detectors find that look at them."""
+    pictures; None: what detectors find that look at them. faults: what is wrong with the sensors."""
 
     title: str
     seed: int = Field(default=0, ge=0)
@@ -55,6 +58,7 @@ class Scenario(Strict):
     crossing_actors: tuple[CrossingActor, ...] = ()
     sensors: Literal["lidar", "camera", "both"] = "both"
     detections: Detections | None = None
+    faults: Faults = NONE
     driven: tuple[Moment, ...] = ()
 
     @model_validator(mode="after")
@@ -90,6 +94,22 @@ class Scenario(Strict):
     def cast(self) -> tuple[Actor, ...]:
         """The actors on the road, every gap at which one brakes turned into the time when the drive reaches it."""
         return tuple(_timed(self, actor) for actor in self.actors)
+
+    @cached_property
+    def parked(self) -> tuple[tuple[Actor, ...], F64, F64]:
+        """The actors that never move, (N,) where on the road they are, and (N, 3) their poses in the world."""
+        still = tuple(each for each in self.cast if not any(each.speed_mps.values()) and not each.lane_changes)
+        s_m = np.array([each.place_m(self.road, self.ego.start_m, 0.0) for each in still])
+        d_m = np.array([self.road.lane_offset_m(each.lane) + each.offset_m for each in still])
+        poses = self.road.to_world(s_m, d_m) if still else np.zeros((0, 3))
+        poses[:, 2] += [pi if each.direction() < 0.0 else 0.0 for each in still]
+        return still, s_m, poses
+
+    @cached_property
+    def driving(self) -> tuple[Actor, ...]:
+        """The other actors on the road."""
+        still = {each.id for each in self.parked[0]}
+        return tuple(each for each in self.cast if each.id not in still)
 
     @cached_property
     def routes(self) -> tuple[Route, ...]:

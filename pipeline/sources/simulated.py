@@ -10,11 +10,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.common.fast_replace import evolve
 from pipeline.simulation import scenario
-from pipeline.simulation.sensors import truth_boxes
+from pipeline.simulation.sensors.faults import NONE
 from pipeline.simulation.sensors.rig import Sensors
-from pipeline.simulation.sensors.truth_lanes import lane_points
+from pipeline.simulation.sensors.senses import Senses
 from pipeline.simulation.world import world_state
 from pipeline.types import Frame, Sweep
 from pipeline.types.source import Opening, SourceError, TruthObject
@@ -42,6 +41,7 @@ class SimulatedSource:
         self._step_ns = round(1e9 / self.rate_hz)
         last = world_state.at(self._scenario, self._scenario.duration_s)
         self._sensors = Sensors(self._scenario, last.s_m)
+        self._senses = Senses(self._scenario)
 
     def __len__(self) -> int:
         return self._scenario.frame_count()
@@ -53,17 +53,17 @@ class SimulatedSource:
 
     def frame(self, index: int) -> Frame:
         now = self._world(index)
-        return sensed(self._sensors.frame(now, index, self.t_ns(index)), now, self._scenario)
+        return self._senses.sensed(self._sensors.frame(now, index, self.t_ns(index)), now)
 
     def outlines(self) -> Iterator[Frame]:
         for index in range(len(self)):
             now = self._world(index)
-            yield sensed(self._sensors.outline(now, index, self.t_ns(index)), now, self._scenario)
+            yield self._senses.sensed(self._sensors.outline(now, index, self.t_ns(index)), now)
 
     def sweep(self, index: int) -> Sweep | None:
         if self._scenario.sensors == "camera":
             return None
-        return self._sensors.sweep(self._world(index), index, self.t_ns(index))
+        return self._senses.disturbed(self._sensors.sweep(self._world(index), index, self.t_ns(index)), index)
 
     def truth(self, index: int) -> tuple[TruthObject, ...]:
         self.t_ns(index)
@@ -71,23 +71,6 @@ class SimulatedSource:
 
     def _world(self, index: int) -> world_state.World:
         return world_state.at(self._scenario, self.t_ns(index) / 1e9)
-
-
-def sensed(frame: Frame, now: world_state.World, scene: scenario.Scenario) -> Frame:
-    """The frame as far as the scenario's car senses it, with the detections that the scenario gives. The picture stays
-    where nobody looks at it: people still want to see it."""
-    if scene.sensors == "lidar":
-        return evolve(frame, detections_given=True)
-    frame = evolve(frame, sweep=None) if scene.sensors == "camera" else frame
-    if scene.detections is None or frame.camera is None:
-        return frame
-    noise, seed, index = scene.detections, scene.seed, frame.index
-    return evolve(
-        frame,
-        raw_boxes=truth_boxes.boxes(now, frame.camera, noise.boxes, seed, index) if noise.boxes else None,
-        raw_lanes=lane_points(now, scene.road, frame.camera, noise.lines, seed, index) if noise.lines else None,
-        detections_given=True,
-    )
 
 
 def _notes(scene: scenario.Scenario) -> Iterator[str]:
@@ -98,6 +81,8 @@ def _notes(scene: scenario.Scenario) -> Iterator[str]:
         yield "This drive uses the camera alone; it has no LiDAR."
     if scene.detections is not None:
         yield "Detections come with this drive: the truth, with a detector's errors. No network runs."
+    if scene.faults != NONE:
+        yield "The sensors of this drive have faults: see `faults` in its file."
 
 
 def truth_of(now: world_state.World) -> tuple[TruthObject, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 from app.drive.frame_rows import Objects, Row
+from pipeline.common.clips import begins_clip
 from pipeline.params import Params
 
 Severity = Literal["info", "notice", "warning", "alarm"]
@@ -50,8 +51,8 @@ class RunRows(NamedTuple):
 
     def starts_anew(self, index: int) -> bool:
         """Whether all trackers were reset at a frame, as after a gap in the recording."""
-        step_s = (self.rows[index].t_ns - self.rows[index - 1].t_ns) / 1e9 if index else 0.0
-        return not 0.0 < step_s <= self.params.time.reset_gap_s
+        gap_s = self.params.time.reset_gap_s
+        return index == 0 or begins_clip(self.rows[index - 1].t_ns, self.rows[index].t_ns, gap_s)
 
 
 class EventFinder(NamedTuple):

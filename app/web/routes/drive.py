@@ -20,10 +20,12 @@ from app.engine.snapshot import Snapshot
 from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
 from app.web.routes.shapes import StatusJson
+from pipeline.common.clips import first_frames
 
 
 class Columns(BaseModel):
-    """Each column is a list for frames ``from`` … done−1; t_s has every frame of the drive, when ``from`` is 0."""
+    """Each column is a list for frames ``from`` … done−1; t_s has every frame of the recording, and
+    clips the index at which each clip of it begins, when ``from`` is 0."""
 
     run: int
     uri: str
@@ -31,6 +33,7 @@ class Columns(BaseModel):
     first: int = Field(serialization_alias="from")
     done: int
     t_s: list[float]
+    clips: list[int]
     columns: dict[str, list[Any]]
 
 
@@ -204,6 +207,7 @@ def columns_of(recording: OpenRecording, run: DriveRun, first: int) -> Columns:
         first=min(first, run.done),
         done=first + len(rows) if rows else min(first, run.done),
         t_s=[round(float(t), 4) for t in recording.setup.timeline_s] if first == 0 else [],
+        clips=first_frames(recording.stamps_ns.tolist(), run.params.time.reset_gap_s) if first == 0 else [],
         columns=columns_json(rows),
     )
 

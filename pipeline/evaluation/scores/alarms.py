@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import hypot, inf
 from typing import Literal
 
+from pipeline.common.clips import first_frames
 from pipeline.common.geometry import closest_on_polygon
 from pipeline.decision.aeb import required_decel_mps2
 from pipeline.decision.object_motion import SMALLEST_CLOSING_MPS
@@ -111,7 +111,7 @@ def _alarm(kind: AlarmKind, due_ns: int | None, acted: _Moment | None) -> Alarm:
 
 def _runs(moments: Sequence[_Moment], holds: Callable[[_Moment], bool]) -> list[tuple[int, int]]:
     """First and last of each run of moments that hold, none across a gap."""
-    broken = {n + 1 for n, (a, b) in enumerate(pairwise(moments)) if (b.t_ns - a.t_ns) / 1e9 > MAX_GAP_S}
+    broken = set(first_frames([moment.t_ns for moment in moments], MAX_GAP_S))
     runs: list[tuple[int, int]] = []
     for n, moment in enumerate(moments):
         if not holds(moment):

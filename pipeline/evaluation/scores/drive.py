@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from pipeline.common.clips import first_frames
 from pipeline.common.errors import BadInput
 from pipeline.evaluation.lead_verdict import Judged, LeadRule, judge_lead, judge_lead_box
 from pipeline.evaluation.scores import tracking
@@ -20,6 +21,7 @@ from pipeline.evaluation.scores.episodes import (
 )
 from pipeline.evaluation.scores.matching import Error, errors
 from pipeline.evaluation.scores.truth import DriveTruth, FrameTruth
+from pipeline.labels.link_identities import MAX_GAP_S
 from pipeline.params import AebParams
 from pipeline.types import Result
 
@@ -45,12 +47,14 @@ class FrameScore:
 
 @dataclass(frozen=True)
 class DriveScore:
-    """One drive. judged_s: how long the lead was judged; guarded_s: for how much of it ego speed was known, and with it
-    warning and braking. tracking: None without trackeval."""
+    """One recording. clips: how many it is made of, each judged as a drive of its own. judged_s: how long the lead was
+    judged; guarded_s: for how much of it ego speed was known, and with it warning and braking. tracking: None without
+    trackeval."""
 
     uri: str
     frames: tuple[FrameScore, ...]
     judged_s: float
+    clips: int
     guarded_s: float
     switches: int
     acquisitions: tuple[Acquisition, ...]
@@ -71,6 +75,7 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
     if not pairs:
         raise BadInput(f"{truth.uri}: no labelled frame has a result; these results are of another recording")
     index = {tick: n for n, tick in enumerate(truth.ticks)}
+    pairs.sort(key=lambda pair: index[pair[0].t_ns])  # times may run back from one clip to the next
     frames, moments, guarded = [], [], []
     for result, known in pairs:
         verdict = judged(result, known, rules)
@@ -85,6 +90,7 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
         truth.uri,
         tuple(frames),
         judged_s(moments),
+        len(first_frames(truth.ticks, MAX_GAP_S)),
         judged_s(guarded),
         count_switches(moments),
         tuple(acquisitions(moments)),

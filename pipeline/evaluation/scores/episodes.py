@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from pipeline.common.clips import begins_clip
 from pipeline.evaluation.lead_verdict import Judged, nearest_face_m, switches
 from pipeline.evaluation.scores.truth import FrameTruth
 from pipeline.labels.link_identities import MAX_GAP_S
@@ -45,10 +46,10 @@ class CutIn:
 
 
 def stretches(moments: Sequence[Moment]) -> list[list[Moment]]:
-    """Parts without a gap."""
+    """Each clip's own part."""
     parts: list[list[Moment]] = []
     for moment in moments:
-        if parts and (moment.t_ns - parts[-1][-1].t_ns) / 1e9 <= MAX_GAP_S:
+        if parts and not begins_clip(parts[-1][-1].t_ns, moment.t_ns, MAX_GAP_S):
             parts[-1].append(moment)
         else:
             parts.append([moment])

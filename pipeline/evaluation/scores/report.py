@@ -37,6 +37,7 @@ def as_json(run: Drives, base: Drives | None = None) -> dict[str, Any]:
                 "frames": len(drive.frames),
                 "judged": sum(frame.judged is not None for frame in drive.frames),
                 "judged_s": drive.judged_s,
+                "clips": drive.clips,
                 "notes": list(drive.notes),
                 "worst": [_bad_json(bad) for bad in worst([drive], MOST)],
             }
@@ -88,6 +89,11 @@ def _scores(run: Drives) -> Section:
         f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class does not claim to be a vehicle: it counts where "
         "there is one, so the LiDAR alone has no false detections. Detection and tracking are scored in frames whose "
         "vehicles are all labelled; an object there without a label counts as a false detection.",
+    ]
+    text += [
+        f"{drive.uri}: {drive.clips} clips, each judged as a drive of its own: nothing is carried or counted across."
+        for drive in run
+        if drive.clips > 1
     ]
     if len(run) < FEW:
         text.append(

@@ -22,8 +22,8 @@ NO_PATH = Path("straight", _NO_LINE, _NO_LINE, _NO_LINE, 0.0, {}, {})
 
 
 def read_results(path: FilePath) -> list[Result]:
-    """The results of ``cipv run --out``, in order of time. What is not judged (path, gates, health, pedals) is
-    not read and stays empty. BadInput names the line that is no result, or the
+    """The results of ``cipv run --out``, in order of time; ``score_drive`` puts them in the recording's. What is not
+    judged (path, gates, health, pedals) is not read and stays empty. BadInput names the line that is no result, or the
     frame that has two."""
     try:
         text = path.read_text(encoding="utf-8")

@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
+from pipeline.common.clips import begins_clip
 from pipeline.labels.link_identities import MAX_GAP_S
 from pipeline.types import F64, I64, Mask, Point2
 
@@ -62,7 +64,8 @@ def velocities(sightings: Sightings) -> Velocities:
 
 def _runs(keys: I64, frames: I64, ticks: I64) -> I64:
     """(N,) a number for each stretch of one vehicle in labelled frames that follow each other."""
-    is_new = (np.diff(keys) != 0) | (np.diff(frames) != 1) | (np.diff(ticks) > MAX_GAP_S * 1e9)
+    is_new = (np.diff(keys) != 0) | (np.diff(frames) != 1)
+    is_new |= np.array([begins_clip(a, b, MAX_GAP_S) for a, b in pairwise(ticks.tolist())], dtype=bool)
     return np.concatenate(([0], np.cumsum(is_new)))
 
 

@@ -37,7 +37,9 @@ class LineNoise(Strict):
 
 
 class Detections(Strict):
-    """Vehicles and lane lines, with their errors; None: none are looked for."""
+    """Vehicles and lane lines, with their errors; None: none are looked for. measured: instead of ``boxes``, those with
+    the errors measured of a detector of real pictures (``real_detector``), false ones among them."""
 
+    measured: bool = False
     boxes: BoxNoise | None = None
     lines: LineNoise | None = None

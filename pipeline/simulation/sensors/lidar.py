@@ -25,7 +25,8 @@ from pipeline.simulation.world.roadside import Roadside
 from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
 from pipeline.types import F32, F64, Sweep
 
-_LEVEL_ROAD = np.array([-LIDAR_HEIGHT_M, 0.0, 0.0])
+_SECANT_M = 20.0
+"""Over a crest the road is cast as a plane, which is right here: as far as the road returns rays."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,8 @@ class Lidar:
 
     def sweep(self, world: World, roadside: Roadside, seed: int, index: int, t_ns: int) -> Sweep:
         """The sweep of one moment, ego frame. The same seed and index give the same points."""
-        return self.sweep_of(scene_boxes(world, roadside), _LEVEL_ROAD, np.random.default_rng([seed, 2, index]), t_ns)
+        road = np.array([-LIDAR_HEIGHT_M, world.lift_m(_SECANT_M) / _SECANT_M, 0.0])
+        return self.sweep_of(scene_boxes(world, roadside), road, np.random.default_rng([seed, 2, index]), t_ns)
 
     def sweep_of(self, boxes: F64, ground: F64, rng: np.random.Generator, t_ns: int) -> Sweep:
         """The sweep of (B, 13) boxes of the ego frame on a plane z = ground[0] + ground[1]·x + ground[2]·y."""

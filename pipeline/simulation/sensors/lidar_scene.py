@@ -59,9 +59,12 @@ def scene_boxes(world: World, roadside: Roadside) -> F64:
     for state in world.actors:
         if np.hypot(*state.cuboid.center[:2]) < MAX_RANGE_M + 20.0:
             rows.extend(vehicle_boxes(state))
+    vehicles = len(rows)
     for thing, x, y, yaw in roadside.near(world, 20.0, MAX_RANGE_M + 10.0):
         rows.extend(_thing_boxes(thing, x, y, yaw))
     boxes = np.array(rows, dtype=np.float64).reshape(-1, BOX_FIELDS)
+    if world.hump_per_m:
+        boxes[vehicles:, 2] += world.lift_m(boxes[vehicles:, 0])
     boxes[:, 9] += boxes[:, 1] * world.yaw_rate_radps - world.speed_mps
     boxes[:, 10] -= boxes[:, 0] * world.yaw_rate_radps
     boxes[:, 11] -= world.yaw_rate_radps

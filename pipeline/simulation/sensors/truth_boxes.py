@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.alignment.projection import Pinhole, project_cuboid
+from pipeline.alignment.projection import Pinhole, project_cuboids
+from pipeline.common.geometry import corners_of
 from pipeline.simulation.sensors.detection_model import BoxNoise
 from pipeline.simulation.world.actors import SIZES_M
 from pipeline.simulation.world.world_state import ActorState, World
@@ -66,19 +67,22 @@ def boxes(now: World, camera: CameraCalibration, noise: BoxNoise, seed: int, ind
 def in_picture(now: World, camera: CameraCalibration) -> tuple[Seen, ...]:
     """Every vehicle ahead whose cuboid falls into the picture, nearest first."""
     alignment = Pinhole(camera.K, camera.distortion, camera.T_camera_ego)
+    corners = corners_of([state.cuboid for state in reversed(now.actors)])
+    if not len(corners):
+        return ()
+    ahead = np.flatnonzero(corners[:, :4, 0].max(axis=1) > 0.0)
+    boxes = project_cuboids(alignment, corners[ahead], camera.width, camera.height)
     nearer: list[Box] = []
     seen = []
-    for state in reversed(now.actors):
-        if state.cuboid.footprint()[:, 0].max() <= 0.0:
-            continue
-        bbox = project_cuboid(alignment, state.cuboid.corners(), camera.width, camera.height)
+    for n, bbox in zip(ahead.tolist(), boxes, strict=True):
+        state = now.actors[-1 - n]
         if bbox is not None:
-            seen.append(Seen(state, bbox, _visible_share(bbox, nearer)))
+            seen.append(Seen(state, bbox, visible_share(bbox, nearer)))
             nearer.append(bbox)
     return tuple(seen)
 
 
-def _visible_share(bbox: Box, nearer: list[Box]) -> float:
+def visible_share(bbox: Box, nearer: list[Box]) -> float:
     """The share of a box that none of the nearer boxes covers, by sampling."""
     if not nearer:
         return 1.0

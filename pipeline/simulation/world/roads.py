@@ -86,6 +86,16 @@ class Crossing(Strict):
         return self.lanes_each_way * self.lane_width_m
 
 
+class Beacon(Strict):
+    """Something that stands on the road, as at roadworks: its middle, size and how high it is."""
+
+    s_m: float
+    d_m: float
+    length_m: float = Field(default=0.1, ge=0.05, le=50.0)
+    width_m: float = Field(default=0.25, ge=0.05, le=5.0)
+    high_m: float = Field(default=1.05, ge=0.1, le=5.0)
+
+
 class Road(Strict):
     segments: tuple[Segment, ...] = Field(min_length=1)
     crossings: tuple[Crossing, ...] = ()
@@ -94,6 +104,10 @@ class Road(Strict):
     lanes_oncoming: int = Field(default=2, ge=0, le=6)
     median_m: float = Field(default=4.0, ge=0.0, le=30.0)
     shoulder_m: float = Field(default=2.5, ge=0.0, le=10.0)
+    crest_radius_m: float | None = Field(default=None, ge=300.0)
+    """Least vertical radius of its crests and sags; None: it is level."""
+    crests_every_m: float = Field(default=400.0, ge=50.0)
+    beacons: tuple[Beacon, ...] = ()
 
     @model_validator(mode="after")
     def _wide_enough_bends(self) -> Road:
@@ -113,6 +127,12 @@ class Road(Strict):
             raise ValueError(f"no lane {lane}: there are −{self.lanes_forward}…−1 and 1…{self.lanes_oncoming}")
         side = 1.0 if lane > 0 else -1.0
         return side * (self.median_m / 2 + (abs(lane) - 0.5) * self.lane_width_m)
+
+    def hump_per_m(self, s_m: float) -> float:
+        """Vertical curvature at s, positive on a crest. Crests and sags take turns."""
+        if self.crest_radius_m is None:
+            return 0.0
+        return float(np.sin(2.0 * np.pi * s_m / self.crests_every_m)) / self.crest_radius_m
 
     def edges_m(self) -> tuple[tuple[float, float], ...]:
         """d of the (right, left) edges of each carriageway, without shoulders: forward first."""

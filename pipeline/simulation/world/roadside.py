@@ -25,6 +25,8 @@ _BY_THE_ROAD = frozenset({"rail", "post", "gantry_leg", "gantry_sign"})
 """These stand where they do because the road is there; they only make way for crossings."""
 _COURSE_STEP_M = 4.0
 _CORNER_M = 5.0
+_LEAST_MEDIAN_M = 1.0
+"""A narrower one has no room for rails, nor for a gantry's leg."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +52,9 @@ def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, .
     things = [
         *_rails(road, start_m, end_m),
         *_posts(start_m, end_m, right, left),
-        *_gantries(start_m, end_m, right),
+        *(_gantries(start_m, end_m, right) if road.median_m >= _LEAST_MEDIAN_M or not road.lanes_oncoming else ()),
         *_trees(np.random.default_rng([seed, 1]), start_m, end_m, right, left),
+        *(Thing("post", b.s_m, b.d_m, b.length_m, b.width_m, 0.0, b.high_m, 0.0) for b in road.beacons),
         *_buildings(np.random.default_rng([seed, 1, 1]), start_m, end_m, right, left),
     ]
     return tuple(sorted(_off_the_road(things, road, start_m, end_m), key=lambda thing: thing.s_m))
@@ -106,7 +109,7 @@ class Roadside:
 
 def _rails(road: Road, start_m: float, end_m: float) -> list[Thing]:
     """Guard rails along the median, when it is wide enough to hold them."""
-    if road.median_m < 1.0:
+    if road.median_m < _LEAST_MEDIAN_M:
         return []
     middles = np.arange(start_m, end_m, RAIL_LENGTH_M) + RAIL_LENGTH_M / 2
     sides = (-road.median_m / 2 + 0.6, road.median_m / 2 - 0.6)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import atan2, hypot, pi, remainder
+from typing import TypeVar
 
 import numpy as np
 
@@ -16,8 +17,12 @@ from pipeline.simulation.world.actors import Motion, Vehicle, motion
 from pipeline.simulation.world.roads import Road
 from pipeline.types import F64
 
+FloatOrArray = TypeVar("FloatOrArray", float, F64)
+
 LIDAR_HEIGHT_M = 0.5
 _BRAKING_MPS2 = -0.4
+_PARKED_BEHIND_M, _PARKED_AHEAD_M = 60.0, 250.0
+"""Parked vehicles beyond are left out: rows of them would take most of the time, and no sensor finds them there."""
 _SLOWEST_STEER_MPS = 2.0  # slower than this a lane change is a creep to the side, not a turn on the spot
 
 
@@ -44,6 +49,12 @@ class World:
     speed_mps: float
     yaw_rate_radps: float
     actors: tuple[ActorState, ...]
+    hump_per_m: float = 0.0
+    """Vertical curvature of the road here, positive on a crest."""
+
+    def lift_m(self, x_m: FloatOrArray) -> FloatOrArray:
+        """How much higher the road is, that far ahead, than the plane on which the car stands."""
+        return -self.hump_per_m * x_m * x_m / 2.0
 
     def to_ego(self, world: F64) -> F64:
         """(N, 2) world points as ego x, y."""
@@ -56,32 +67,69 @@ class World:
 def at(scenario: Scenario, t_s: float, ego: Motion | None = None) -> World:
     """The world at time t; nothing is carried from one moment to the next. ``ego`` given: the ego vehicle moves as
     that says (closed loop), else as the scenario says. The others follow their scripts either way."""
-    road = scenario.road
     own = ego if ego is not None else scenario.own_motion(t_s)
-    lane_d_m = road.lane_offset_m(scenario.ego.lane) + scenario.ego.offset_m
-    s_m = road.line.advance(scenario.ego.start_m, own.travelled_m, lane_d_m)
-    x, y, road_heading = road.to_world(s_m, own.d_m)[0].tolist()
-    pose = (x, y, road_heading + _drift_rad(own))
-    world = World(t_s, pose, s_m, own.d_m, own.speed_mps, _yaw_rate(own, road, s_m, 1.0), ())
+    s_m, pose = _ego_place(scenario, own)
+    world = World(
+        t_s,
+        pose,
+        s_m,
+        own.d_m,
+        own.speed_mps,
+        _yaw_rate(own, scenario.road, s_m, 1.0),
+        (),
+        scenario.road.hump_per_m(s_m),
+    )
     states = [*_on_the_road(scenario, world), *_crossing(scenario, world)]
     return replace(world, actors=tuple(sorted(states, key=lambda s: (-hypot(*s.cuboid.center[:2]), s.actor.id))))
 
 
+def ego_pose(scenario: Scenario, t_s: float) -> tuple[float, float, float]:
+    """World x, y and heading of the ego vehicle at time t, as the scenario says."""
+    return _ego_place(scenario, scenario.own_motion(t_s))[1]
+
+
+def _ego_place(scenario: Scenario, own: Motion) -> tuple[float, tuple[float, float, float]]:
+    """s on the road, and the pose in the world."""
+    road = scenario.road
+    lane_d_m = road.lane_offset_m(scenario.ego.lane) + scenario.ego.offset_m
+    s_m = road.line.advance(scenario.ego.start_m, own.travelled_m, lane_d_m)
+    x, y, road_heading = road.to_world(s_m, own.d_m)[0].tolist()
+    return s_m, (x, y, road_heading + _drift_rad(own))
+
+
 def _on_the_road(scenario: Scenario, world: World) -> list[ActorState]:
-    """Those that keep to lanes. A vehicle that drives against the road is turned by half a circle, and its drift to the
-    road's left is one to its driver's right."""
-    road, actors = scenario.road, scenario.cast
+    """Those that keep to lanes."""
+    return [*_parked(scenario, world), *_driving(scenario, world)]
+
+
+def _parked(scenario: Scenario, world: World) -> list[ActorState]:
+    actors, s_m, poses = scenario.parked
+    near = np.flatnonzero((s_m > world.s_m - _PARKED_BEHIND_M) & (s_m < world.s_m + _PARKED_AHEAD_M))
+    places = world.to_ego(poses[near]).tolist()
+    headings = poses[near, 2].tolist()
+    return [
+        _placed(world, actors[n], x, y, heading, 0.0, 0.0, 0.0)
+        for n, (x, y), heading in zip(near.tolist(), places, headings, strict=True)
+    ]
+
+
+def _driving(scenario: Scenario, world: World) -> list[ActorState]:
+    """A vehicle that drives against the road is turned by half a circle, and its drift to the road's left is one to its
+    driver's right."""
+    road, actors = scenario.road, scenario.driving
     if not actors:
         return []
     motions = [motion(actor, road, world.t_s) for actor in actors]
     start_m = scenario.ego.start_m
     s_m = [actor.place_m(road, start_m, now.travelled_m) for actor, now in zip(actors, motions, strict=True)]
     poses = road.to_world(np.array(s_m), np.array([now.d_m for now in motions]))
+    places = world.to_ego(poses).tolist()
     states = []
-    for actor, now, s, pose in zip(actors, motions, s_m, poses, strict=True):
+    for actor, now, s, (x, y), road_heading in zip(actors, motions, s_m, places, poses[:, 2].tolist(), strict=True):
         way = actor.direction()
-        pose[2] += way * _drift_rad(now) + (pi if way < 0.0 else 0.0)
-        states.append(_state(world, actor, pose, now.speed_mps, now.accel_mps2, _yaw_rate(now, road, s, way)))
+        heading = road_heading + way * _drift_rad(now) + (pi if way < 0.0 else 0.0)
+        yaw_rate = _yaw_rate(now, road, s, way)
+        states.append(_placed(world, actor, x, y, heading, now.speed_mps, now.accel_mps2, yaw_rate))
     return states
 
 
@@ -97,10 +145,24 @@ def _crossing(scenario: Scenario, world: World) -> list[ActorState]:
 
 def _state(world: World, actor: Vehicle, pose: F64, speed_mps: float, accel_mps2: float, yaw_rate: float) -> ActorState:
     """An actor that stands at a pose in the world, as the ego vehicle sees it."""
-    length, width, height = actor.size()
     x, y = world.to_ego(pose[None])[0].tolist()
-    yaw = remainder(float(pose[2]) - world.pose[2], 2 * pi)
-    cuboid = Cuboid((x, y, height / 2 - LIDAR_HEIGHT_M), (length, width, height), yaw)
+    return _placed(world, actor, x, y, float(pose[2]), speed_mps, accel_mps2, yaw_rate)
+
+
+def _placed(
+    world: World,
+    actor: Vehicle,
+    x: float,
+    y: float,
+    heading: float,
+    speed_mps: float,
+    accel_mps2: float,
+    yaw_rate: float,
+) -> ActorState:
+    """An actor at ego x, y that points along ``heading`` in the world."""
+    length, width, height = actor.size()
+    yaw = remainder(heading - world.pose[2], 2 * pi)
+    cuboid = Cuboid((x, y, height / 2 - LIDAR_HEIGHT_M + world.lift_m(x)), (length, width, height), yaw)
     return ActorState(actor, cuboid, speed_mps, accel_mps2 < _BRAKING_MPS2, yaw_rate)
 
 

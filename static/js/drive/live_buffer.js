@@ -97,6 +97,7 @@ function remember() {
     uri,
     count: times.length,
     t_s: times,
+    clips: [],
     now: { run: -1, done: times.length, columns },
     base: null,
     events: marks,

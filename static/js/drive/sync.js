@@ -40,7 +40,7 @@ async function fetchAll() {
   const { run, base } = state.drive;
   const before = get("drive")?.uri === state.uri ? get("drive") : null;
   if (!before) held = {};
-  const [now, t_s] = await fetchSeries(run, "api/drive");
+  const [now, { t_s, clips }] = await fetchSeries(run, "api/drive");
   const [old] = base === null || base === run ? [null] : await fetchSeries(base, `api/runs/${base}/columns`);
   held = Object.fromEntries([now, old].filter((series) => series !== null).map((series) => [series.run, series]));
   const found = await findings(before, now, old);
@@ -49,6 +49,7 @@ async function fetchAll() {
     uri: state.uri,
     count: state.count,
     t_s: t_s.length ? t_s : (before?.t_s ?? []),
+    clips: t_s.length ? clips : (before?.clips ?? []),
     now,
     base: old,
     ...found,
@@ -59,7 +60,8 @@ async function fetchAll() {
  * Extend a run's known columns by what the server has since computed.
  * @param {number} run
  * @param {string} path
- * @returns {Promise<[Series, number[]]>} the series, and the times of its frames if they were sent
+ * @returns {Promise<[Series, {t_s: number[], clips: number[]}]>} the series, and the times and clips of the recording
+ *   if they were sent
  */
 async function fetchSeries(run, path) {
   const from = held[run]?.done ?? 0;
@@ -67,7 +69,7 @@ async function fetchSeries(run, path) {
   const isMore = answer.run === run && from > 0;
   return [
     isMore ? extended(held[run], answer) : { run: answer.run, done: answer.done, columns: answer.columns },
-    answer.t_s,
+    answer,
   ];
 }
 

@@ -29,6 +29,7 @@
  * @property {number} from
  * @property {number} done
  * @property {number[]} t_s
+ * @property {number[]} clips
  * @property {Columns} columns
  * @typedef {object} DriveEvent
  * @property {string} kind
@@ -97,6 +98,7 @@
  * @property {string|null} uri
  * @property {number} count
  * @property {number[]} t_s
+ * @property {number[]} clips frame at which each clip of the recording begins
  * @property {Series|null} now
  * @property {Series|null} base null without a comparison
  * @property {DriveEvent[]} events

@@ -27,6 +27,7 @@ export function drawBack(ctx, size, span, rows, isLight) {
   const drive = get("drive"),
     place = placer(span, rows, isLight);
   drawAxis(ctx, size, span, rows);
+  drawSeams(ctx, span, rows, drive?.clips ?? []);
   if (!drive?.now) return;
   ctx.save();
   ctx.beginPath();
@@ -62,6 +63,23 @@ function drawLine(ctx, span, index, top, bottom) {
   if (!span.holds(x)) return;
   ctx.fillStyle = ui("dim");
   ctx.fillRect(x - 0.5, top, 1.5, bottom - top);
+}
+
+/**
+ * Where a clip of the recording ends and the next begins: nothing is carried across, and the time between is left out.
+ * @param {CanvasRenderingContext2D} ctx
+ * @param {Span} span
+ * @param {Rows} rows
+ * @param {number[]} clips first frame of each
+ */
+function drawSeams(ctx, span, rows, clips) {
+  ctx.fillStyle = ui("dim");
+  const bottom = rows.bar.top;
+  for (const first of clips.slice(1)) {
+    const x = Math.round(span.x(first));
+    if (!span.holds(x)) continue;
+    for (let y = rows.axis.top; y < bottom; y += 6) ctx.fillRect(x - 0.5, y, 1, 3);
+  }
 }
 
 /**

@@ -112,3 +112,13 @@ def test_a_demand_that_does_not_hold_fails_the_command(
     out, err = capsys.readouterr()
     assert json.loads(out)[0]["failures"] == list(failures)
     assert ("FAILED: Left turn" in err) is bool(failures)
+
+
+def test_kilometres_are_for_the_robustness_suite_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    for arguments in (["--suite", "iso", "--km", "5"], ["--suite", "robustness", "--km", "0"]):
+        with pytest.raises(SystemExit) as ended:
+            main(["scenarios", "run", *arguments])
+        assert ended.value.code not in (0, None)
+    told = capsys.readouterr().err
+    assert "--suite robustness" in told
+    assert "expected 1 to" in told

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.params import PathParams
-from pipeline.path.corridor import corridor, nearest_on_path, offset
+from pipeline.path.corridor import Evidence, PathState, corridor, nearest_on_path, offset, predict
 from pipeline.path.estimates import arc, samples
-from pipeline.types import EgoState, Path
+from pipeline.types import EgoState, GnssFix, Moment, Path, Route
 
 PARAMS = PathParams()
 
@@ -47,6 +47,22 @@ def test_a_guess_is_less_sure_than_a_measurement() -> None:
     """As far ahead as a yaw rate is good for, two seconds of driving."""
     guessed, measured = corridor(None, PARAMS), corridor(ego(20.0, 0.0), PARAMS)
     assert guessed.sigma_m["30"] > 1.5 * measured.sigma_m["30"] > measured.sigma_m["10"] > 0.0
+
+
+def test_what_is_right_ahead_of_a_standing_car_is_in_its_path_whatever_a_vague_route_says() -> None:
+    """A single receiver is off by metres: a truck three metres ahead in a queue was no lead by it."""
+    route = Route("street", np.linspace(-0.001, 0.002, 200), np.zeros(200), 0.1)
+    standing = EgoState(0, 0.0, 0.0)
+    state = PathState()
+    for n, speed_mps in enumerate((10.0,) * 5 + (0.0,) * 30):
+        t_ns = n * 100_000_000
+        moving = speed_mps > 0.0
+        fix = GnssFix(t_ns, min(n, 5) * 9e-6, 3e-5, 0.0, 0.0 if moving else None, speed_mps, "single", 5.0)
+        own = EgoState(t_ns, speed_mps, 0.0) if moving else standing
+        now = Moment(t_ns, 0.1 if n else None, own, own)
+        state, path = predict(state, Evidence(None, fix, route), now, PARAMS)
+    assert path.profile_m[3] < 1.0
+    assert abs(path.center[3, 1]) < 1.0
 
 
 def test_left_is_left() -> None:

@@ -13,11 +13,12 @@ from pipeline.simulation import scenario
 from pipeline.simulation.drawing.lens import CameraModel
 from pipeline.simulation.scenario import Ego, Scenario
 from pipeline.simulation.sensors.detection_model import BoxNoise, Detections, LineNoise
+from pipeline.simulation.sensors.faults import Faults
 from pipeline.simulation.sensors.gnss_model import GnssModel, OdometryModel
 from pipeline.simulation.sensors.lidar_model import LidarModel
 from pipeline.simulation.world.actors import Actor, Brake
 from pipeline.simulation.world.intersection_ways import CrossingActor
-from pipeline.simulation.world.roads import Crossing, Road, Segment
+from pipeline.simulation.world.roads import Beacon, Crossing, Road, Segment
 
 TEXT = (Path(scenario.__file__).parent / "scenarios" / "README.md").read_text(encoding="utf-8")
 PARTS: dict[str, type[BaseModel]] = {
@@ -25,6 +26,7 @@ PARTS: dict[str, type[BaseModel]] = {
     "road": Road,
     "segment": Segment,
     "crossing": Crossing,
+    "beacon": Beacon,
     "ego": Ego,
     "actor": Actor,
     "crossing_actor": CrossingActor,
@@ -36,6 +38,7 @@ PARTS: dict[str, type[BaseModel]] = {
     "detections": Detections,
     "boxes": BoxNoise,
     "lines": LineNoise,
+    "faults": Faults,
 }
 
 

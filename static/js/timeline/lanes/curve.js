@@ -69,7 +69,7 @@ function drawCurve(ctx, span, row, curve, now, base) {
  */
 
 /**
- * A column as samples; CIPV values are not joined across object changes.
+ * A column as samples, not joined across clips of the recording; CIPV values nor across object changes.
  * @param {Series} series
  * @param {keyof Columns} key
  * @param {number} factor
@@ -78,11 +78,12 @@ function drawCurve(ctx, span, row, curve, now, base) {
 function ofSeries({ done, columns }, key, factor) {
   const values = /** @type {(number|null)[]} */ (columns[key]),
     ids = columns.cipv_id;
+  const starts = new Set(get("drive")?.clips);
   const isLeads = !["speed_mps", "desired_speed_mps", "brake"].includes(key);
   return {
     count: done,
     index: (i) => i,
-    joined: (i) => !isLeads || ids[i] === ids[i - 1],
+    joined: (i) => !starts.has(i) && (!isLeads || ids[i] === ids[i - 1]),
     value: (i) => (values[i] === null ? null : /** @type {number} */ (values[i]) * factor),
   };
 }

@@ -81,6 +81,7 @@ def test_columns_are_the_command_lines(client: httpx.Client, engine: Engine):
     results = [result for _, result in run(Recording(), Params(), Detectors(CountingDetector()))]
     assert (answer["count"], answer["from"], answer["done"]) == (30, 0, 30)
     assert answer["t_s"] == pytest.approx([0.1 * n for n in range(30)])
+    assert answer["clips"] == [0]
     assert tuple(answer["columns"]) == column_names()
     assert answer["columns"]["cipv_id"] == [r.cipv.id if r.cipv else None for r in results]
     assert answer["columns"]["distance_m"] == [round(r.cipv.distance_m, 4) if r.cipv else None for r in results]
@@ -90,7 +91,7 @@ def test_columns_are_the_command_lines(client: httpx.Client, engine: Engine):
 def test_columns_are_asked_for_piece_by_piece(client: httpx.Client):
     whole = client.get("/api/drive").json()
     piece = client.get("/api/drive?from=20").json()
-    assert (piece["from"], piece["done"], piece["t_s"]) == (20, 30, [])
+    assert (piece["from"], piece["done"], piece["t_s"], piece["clips"]) == (20, 30, [], [])
     assert piece["columns"]["distance_m"] == whole["columns"]["distance_m"][20:]
     nothing = client.get("/api/drive?from=99").json()
     assert (nothing["from"], nothing["done"]) == (30, 30)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import pytest
 
 from pipeline.evaluation.scores.drive import DriveScore, Rules, score_drive
-from pipeline.evaluation.scores.truth import DriveTruth
+from pipeline.evaluation.scores.truth import DriveTruth, FrameTruth, with_velocities
 from pipeline.types import Result
 from tests.pipeline.build import fused
-from tests.pipeline.evaluation.scores.drives import TICK_NS, believed, truth
+from tests.pipeline.evaluation.scores.drives import TICK_NS, believed, labelled, truth
 
 
 def judged(chosen: list[int | None], known: DriveTruth) -> DriveScore:
@@ -98,3 +98,27 @@ def test_frames_in_which_nobody_knows_who_leads_do_not_count() -> None:
     unknown = replace(known.frames[TICK_NS], lead=None, lead_known=False)
     score = judged([7, 7], replace(known, frames={**known.frames, TICK_NS: unknown}))
     assert [frame.judged is None for frame in score.frames] == [False, True]
+
+
+def test_clips_that_overlap_in_time_are_drives_of_their_own() -> None:
+    """The second clip's times run back into the first's; its lead and its speeds are its own."""
+    first = {n * TICK_NS: 30.0 + n for n in range(4)}
+    second = {n * TICK_NS + TICK_NS // 2: 60.0 - n for n in range(4)}
+    ticks = (*first, *second)
+    alone = truth({1: (30.0, 0.0)})
+    frames = {}
+    for tick, x in {**first, **second}.items():
+        objects = (labelled(1, x),)
+        frames[tick] = FrameTruth(tick, objects, objects[0])
+    known = DriveTruth(alone.uri, ticks, with_velocities(frames)[0])
+    results = []
+    for tick, x in sorted({**first, **second}.items()):  # as a results file has them
+        number = 7 if tick in first else 8
+        results.append(replace(believed(0, [fused(number, x - 2.0)], number), t_ns=tick, frame=str(tick)))
+    score = score_drive(results, known, Rules())
+    assert score.clips == 2
+    assert score.judged_s == pytest.approx(0.6)
+    assert score.switches == 0
+    assert len(score.acquisitions) == 2
+    speeds = [known.frames[tick].velocity_mps[1][0] for tick in (*first, *second)]  # type: ignore[index]
+    assert speeds == pytest.approx([10.0] * 4 + [-10.0] * 4)

@@ -1,0 +1,19 @@
+"""Where one drive ends and the next begins in a recording of several clips: the one place that says so.
+
+The next clip begins after a gap longer than ``longest_gap_s``, and where time stands still or runs back. Nothing that
+was followed before can be known after it, so nothing is carried, compared or counted across it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def begins_clip(before_ns: int, now_ns: int, longest_gap_s: float) -> bool:
+    """Whether a frame belongs to another clip than the frame before it."""
+    return not 0 < now_ns - before_ns <= longest_gap_s * 1e9
+
+
+def first_frames(t_ns: Sequence[int], longest_gap_s: float) -> list[int]:
+    """Index of each clip's first frame, in order; empty without frames. t_ns: of each frame, in recorded order."""
+    return [n for n, now in enumerate(t_ns) if n == 0 or begins_clip(t_ns[n - 1], now, longest_gap_s)]

@@ -1,0 +1,274 @@
+"""One drive's results against the truth: phantom leads, phantom braking, leads missed, switches of the lead.
+
+A phantom is believed where no vehicle is that the car could meet. What is in the driven path, or so near to its edge
+that either answer is right, is none, and neither is what comes into it within three seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from math import ceil, cos, dist, hypot, sin
+from typing import Literal
+
+from pipeline.common.geometry import closest_on_polygon
+from pipeline.decision.aeb import required_decel_mps2
+from pipeline.decision.path_position import near_face_middle
+from pipeline.experiments.true_lead import EDGE_M, MAX_M, VISIBLE_SHARE, Way, overlap, same_place, true_lead
+from pipeline.params import AebParams, CipvParams
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.sensors.truth_boxes import in_picture
+from pipeline.simulation.world import world_state
+from pipeline.simulation.world.world_state import ActorState, World
+from pipeline.types import CameraCalibration, FusedObject, Path, Point2, Result
+
+Kind = Literal[
+    "phantom full braking",
+    "phantom partial braking",
+    "phantom comfort braking",
+    "phantom lead",
+    "lead missed",
+    "lead late",
+    "switch",
+]
+KINDS: tuple[Kind, ...] = (
+    "phantom full braking",
+    "phantom partial braking",
+    "phantom comfort braking",
+    "phantom lead",
+    "lead missed",
+    "lead late",
+    "switch",
+)
+MISSED_S = 0.5
+"""A lead may be missed for so long, and may take so long to be found beyond its confirmation."""
+_SOON_S = (0.75, 1.5, 2.25, 3.0)
+_BRAKES_MPS2, _PARTIAL_MPS2, _FULL_MPS2 = 0.5, 3.6, 5.5
+_NO_NEED_MPS2, _NO_NEED_TTC_S = 2.0, 4.0
+"""A true vehicle that needs less braking, and is farther in time, is no reason for an emergency stage."""
+_JOINS_S = 0.5
+"""Two moments of one failure lie this near to each other."""
+_SEVERITY: tuple[Kind, ...] = ("phantom comfort braking", "phantom partial braking", "phantom full braking")
+_PARKED, _ONCOMING, _BESIDE, _CROSSING = 100, 1000, 2000, 3000
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Something that went wrong, from when to when."""
+
+    kind: Kind
+    cause: str
+    """In words that count alike."""
+    from_s: float
+    to_s: float
+    text: str
+    """What was believed, for a person."""
+
+    @property
+    def lasts_s(self) -> float:
+        return self.to_s - self.from_s
+
+
+@dataclass
+class _Reign:
+    """A true lead from when it leads."""
+
+    lead: int | None = None
+    could_s: float = 0.0
+    wrong_s: float = 0.0
+    told: bool = False
+    was_right: bool = False
+    chosen: int | None = None
+
+
+@dataclass
+class Judge:
+    """Takes a drive's results one by one. step_s: between two."""
+
+    scenario: Scenario
+    step_s: float
+    failures: list[Failure] = field(default_factory=list)
+    reign: _Reign = field(default_factory=_Reign)
+
+    def __post_init__(self) -> None:
+        self._way = Way.of(self.scenario)
+        self._aeb, self._confirm_s = AebParams(), CipvParams().confirm_hits * self.step_s
+
+    def take(self, now: World, camera: CameraCalibration | None, result: Result) -> None:
+        """Judge one tick."""
+        path = self._way.ahead(now)
+        if path is None:
+            return
+        lead, doubtful = true_lead(now, path)
+        chosen = result.chosen()
+        self._judge_choice(now, path, chosen)
+        self._judge_braking(now, path, result)
+        self._judge_lead(now, camera, lead, doubtful, chosen)
+
+    def _judge_choice(self, now: World, path: Path, chosen: FusedObject | None) -> None:
+        where = _place(chosen)
+        if chosen is None or where is None or (chosen.distance_m or 0.0) >= MAX_M:
+            return
+        met = _there(now, where)
+        if any(_in_path(state, path) for state in met) or self._comes_in(now, met):
+            return
+        cause = f"{_what(met)}, by {_seen_by(chosen)}"
+        self._fail("phantom lead", cause, now.t_s, f"#{chosen.id} at {chosen.distance_m:.1f} m")
+
+    def _judge_braking(self, now: World, path: Path, result: Result) -> None:
+        acc = result.acc
+        if acc is None or acc.object_id is None or acc.accel_mps2 > -_BRAKES_MPS2:
+            return
+        item = next((each for each in result.objects if each.id == acc.object_id), None)
+        where = _place(item)
+        if acc.state == "full_brake" or acc.accel_mps2 < -_FULL_MPS2:
+            level = 2
+        else:
+            level = 1 if acc.state == "partial_brake" or acc.accel_mps2 < -_PARTIAL_MPS2 else 0
+        met = _there(now, where) if where is not None else []
+        due = [state for state in met if _in_path(state, path)] or self._comes_in(now, met)
+        if due:
+            # ACC's gap law brakes hard for a true lead that the script follows closer than the law would: no phantom
+            is_emergency = acc.state in ("partial_brake", "full_brake")
+            if not is_emergency or any(self._needs_braking(now, state) for state in due):
+                return
+            cause = f"wrong speed of a true vehicle, by {_seen_by(item)}"
+        else:
+            cause = f"{_what(met)}, by {_seen_by(item)}"
+        self._fail(_SEVERITY[level], cause, now.t_s, acc.reason)
+
+    def _judge_lead(
+        self,
+        now: World,
+        camera: CameraCalibration | None,
+        lead: ActorState | None,
+        doubtful: bool,
+        chosen: FusedObject | None,
+    ) -> None:
+        number = lead.actor.id if lead is not None else None
+        if number != self.reign.lead:
+            self.reign = _Reign(number)
+        if lead is None or doubtful:
+            self.reign.wrong_s, self.reign.chosen = 0.0, None
+            return
+        where = _place(chosen)
+        if where is not None and same_place(where, lead):
+            assert chosen is not None
+            before = self.reign.chosen
+            if before is not None and before != chosen.id:
+                self._fail("switch", "", now.t_s, f"#{before} → #{chosen.id}")
+            self.reign.chosen, self.reign.was_right = chosen.id, True
+            self.reign.wrong_s, self.reign.told = 0.0, False
+            return
+        if camera is not None and _is_hidden(now, camera, lead):
+            self.reign.could_s = self.reign.wrong_s = 0.0
+            return
+        self.reign.could_s += self.step_s
+        self.reign.wrong_s += self.step_s
+        allowed = MISSED_S if self.reign.was_right else MISSED_S + self._confirm_s
+        if self.reign.wrong_s > allowed + 1e-6:
+            kind: Kind = "lead missed" if self.reign.was_right else "lead late"
+            self._fail(kind, _why_missed(lead, chosen), now.t_s, f"true lead {lead.actor.kind} {number}")
+
+    def _comes_in(self, now: World, met: Sequence[ActorState]) -> list[ActorState]:
+        """Those of these vehicles that will be in the path, or have just been."""
+        if not met:
+            return []
+        wanted = {state.actor.id for state in met}
+        for later_s in (*_SOON_S, -0.75):
+            then = world_state.at(self.scenario, max(now.t_s + later_s, 0.0))
+            path = self._way.ahead(then)
+            if path is None:
+                continue
+            for state in then.actors:
+                if state.actor.id in wanted and _in_path(state, path, behind_m=3.0):
+                    return [state for state in met]
+        return []
+
+    def _needs_braking(self, now: World, state: ActorState) -> bool:
+        """Whether a true vehicle could call for an emergency stage, give or take."""
+        x, y = closest_on_polygon(state.cuboid.footprint())
+        gap_m = max((x * x + y * y) ** 0.5, 0.1)
+        later = world_state.at(self.scenario, now.t_s + 0.1)
+        then = next((each for each in later.actors if each.actor.id == state.actor.id), None)
+        if then is None:
+            return True
+        x, y = closest_on_polygon(then.cuboid.footprint())
+        closing = (gap_m - (x * x + y * y) ** 0.5) / 0.1
+        if closing <= 0.1:
+            return gap_m < 3.0
+        needed = required_decel_mps2(gap_m, closing, self._aeb)
+        return needed > _NO_NEED_MPS2 or gap_m / closing < _NO_NEED_TTC_S
+
+    def _fail(self, kind: Kind, cause: str, t_s: float, text: str) -> None:
+        """Add a failure, or make the one that goes on longer. A harder braking takes over a softer one's place."""
+        for n in range(len(self.failures) - 1, -1, -1):
+            last = self.failures[n]
+            if t_s - last.to_s > _JOINS_S or kind == "switch":
+                break
+            if last.kind in _SEVERITY and kind in _SEVERITY:
+                harder = max(last.kind, kind, key=_SEVERITY.index)
+                told = (cause, text) if harder != last.kind else (last.cause, last.text)
+                self.failures[n] = Failure(harder, told[0], last.from_s, t_s, told[1])
+                return
+            if last.kind == kind:
+                self.failures[n] = replace(last, to_s=t_s)
+                return
+        self.failures.append(Failure(kind, cause, t_s, t_s, text))
+
+
+def _place(item: FusedObject | None) -> Point2 | None:
+    if item is None:
+        return None
+    if item.bev is not None:
+        return near_face_middle(item.bev)
+    return item.closest_point[:2] if item.closest_point is not None else None
+
+
+def _there(now: World, where: Point2) -> list[ActorState]:
+    """The true vehicles that may be what is believed at a place."""
+    reach_m = 20.0 + 0.25 * hypot(*where)
+    near = [state for state in now.actors if dist(where, state.cuboid.center[:2]) < reach_m]
+    return [state for state in near if same_place(where, state) or _inside(where, state)]
+
+
+def _inside(where: Point2, state: ActorState) -> bool:
+    """Whether a place is on a vehicle, or within a metre of it: of a long one the nearest face is far from its side."""
+    x, y = where[0] - state.cuboid.center[0], where[1] - state.cuboid.center[1]
+    c, s = cos(state.cuboid.yaw_rad), sin(state.cuboid.yaw_rad)
+    length, width, _ = state.cuboid.size
+    return abs(x * c + y * s) < length / 2 + 1.0 and abs(y * c - x * s) < width / 2 + 1.0
+
+
+def _in_path(state: ActorState, path: Path, behind_m: float = 0.0) -> bool:
+    """Whether a vehicle is in the path, or so near to its edge that either answer is right."""
+    too_little, nearest = overlap(state, path)
+    return too_little > -EDGE_M and nearest > -behind_m
+
+
+def _is_hidden(now: World, camera: CameraCalibration, lead: ActorState) -> bool:
+    seen = next((each for each in in_picture(now, camera) if each.actor.actor.id == lead.actor.id), None)
+    return seen is not None and seen.visible < VISIBLE_SHARE
+
+
+def _what(met: Sequence[ActorState]) -> str:
+    if not met:
+        return "nothing there"
+    number = min(state.actor.id for state in met)
+    if number >= _CROSSING:
+        return "crossing vehicle"
+    if number >= _BESIDE:
+        return "vehicle in the next lane"
+    if number >= _ONCOMING:
+        return "oncoming vehicle"
+    return "parked vehicle" if number >= _PARKED else "vehicle of another lane"
+
+
+def _seen_by(item: FusedObject | None) -> str:
+    return {"V": "camera", "L": "LiDAR", "VL": "both", None: "nobody"}[item.source if item is not None else None]
+
+
+def _why_missed(lead: ActorState, chosen: FusedObject | None) -> str:
+    away_m = hypot(*lead.cuboid.center[:2]) - lead.cuboid.size[0] / 2
+    what = "no lead" if chosen is None else "another object leads"
+    return f"{what}, true one within {20 * ceil(away_m / 20)} m"

@@ -1,0 +1,90 @@
+"""What is wrong with a car's sensors in one drive: the ``faults`` part of a scenario file. None is measured: they are
+what cars of a fleet have, by an order of magnitude, so a pipeline must bear them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from pipeline.common.geometry import inverse, rotation
+from pipeline.simulation.sensors.series import lasting
+from pipeline.simulation.world.roads import Strict
+from pipeline.types import F32, CameraCalibration, Sweep
+
+Ring = Annotated[int, Field(ge=0, le=15)]
+_BLOB_M, _BLOB_POINTS = 0.25, 12
+_BLOBS_TO_M, _BLOBS_ASIDE_M = 30.0, 6.0
+_NODS_FOR_S = 0.4
+
+
+class Faults(Strict):
+    """Of the camera, the LiDAR and the time between them; the LiDAR's own ``dropout`` is in its model."""
+
+    camera_yaw_deg: float = Field(default=0.0, ge=-5.0, le=5.0)
+    """By how much the camera really looks to the left of what its calibration says."""
+    camera_pitch_deg: float = Field(default=0.0, ge=-5.0, le=5.0)
+    """The same downwards."""
+    camera_roll_deg: float = Field(default=0.0, ge=-5.0, le=5.0)
+    """The same clockwise."""
+    nods_deg: float = Field(default=0.0, ge=0.0, le=5.0)
+    """Standard deviation by which the car, and both sensors with it, nods on bumps and when it brakes."""
+    camera_skew_ms: float = Field(default=0.0, ge=-200.0, le=200.0)
+    """Pictures show the world this much after the tick that they are said to be of."""
+    lost_rings: tuple[Ring, ...] = ()
+    """Rings of the LiDAR that give nothing, 0 the lowest."""
+    spurious_clusters: float = Field(default=0.0, ge=0.0, le=10.0)
+    """Clouds of exhaust, spray or snow that a sweep has on average, within 30 m ahead."""
+    sweeps_lost: float = Field(default=0.0, ge=0.0, le=0.9)
+    """Share of sweeps that do not come."""
+    pictures_lost: float = Field(default=0.0, ge=0.0, le=0.9)
+    """Share of pictures that do not come."""
+
+
+NONE = Faults()
+
+
+def nods_rad(faults: Faults, seed: int, frames: int, rate_hz: float) -> F32:
+    """(frames,) how far the car's nose is down in each frame."""
+    kept = np.array([np.exp(-1.0 / (_NODS_FOR_S * rate_hz))])
+    return np.radians(faults.nods_deg * lasting([seed, 20], frames, kept)[:, 0]).astype(np.float32)
+
+
+def true_camera(camera: CameraCalibration, faults: Faults, nod_rad: float = 0.0) -> CameraCalibration:
+    """The camera as it really looks, where ``camera`` is what its calibration says."""
+    turned = (faults.camera_roll_deg, faults.camera_pitch_deg, faults.camera_yaw_deg)
+    if not any(turned) and not nod_rad:
+        return camera
+    angles = [float(np.radians(each)) for each in turned]
+    place = inverse(camera.T_camera_ego)[:3, 3]
+    turn = np.eye(4)
+    turn[:3, :3] = rotation(angles[0], angles[1] + nod_rad, angles[2])
+    turn[:3, 3] = place - turn[:3, :3] @ place
+    T_camera_ego = camera.T_camera_ego @ inverse(turn)
+    return CameraCalibration(camera.K, camera.distortion, T_camera_ego, camera.width, camera.height, camera.road_z_m)
+
+
+def disturb_sweep(sweep: Sweep, faults: Faults, seed: int, index: int, nod_rad: float = 0.0) -> Sweep | None:
+    """The sweep with what the faults take from it, add to it and tilt of it; None where it is lost."""
+    rng = np.random.default_rng([seed, 21, index])
+    if rng.random() < faults.sweeps_lost:
+        return None
+    points, ring, time_s = sweep.points, sweep.ring, sweep.time_s
+    if faults.lost_rings:
+        kept = ~np.isin(ring, faults.lost_rings)
+        points, ring, time_s = points[kept], ring[kept], time_s[kept] if time_s is not None else None
+    if nod_rad:
+        points = points.copy()
+        points[:, 2] += np.float32(np.tan(nod_rad)) * points[:, 0]
+    for _ in range(rng.poisson(faults.spurious_clusters)):
+        middle = np.array([rng.uniform(2.0, _BLOBS_TO_M), rng.normal(0.0, _BLOBS_ASIDE_M), rng.uniform(-0.3, 0.5)])
+        count = int(rng.integers(3, _BLOB_POINTS))
+        cloud = np.empty((count, 4), dtype=np.float32)
+        cloud[:, :3] = middle + rng.normal(0.0, _BLOB_M, (count, 3))
+        cloud[:, 3] = 3.0
+        elevation = np.degrees(np.arctan2(cloud[:, 2], np.hypot(cloud[:, 0], cloud[:, 1])))
+        rings = np.clip(np.round((elevation + 15.0) / 2.0), 0, 15).astype(np.uint8)
+        points, ring = np.vstack([points, cloud]), np.concatenate([ring, rings])
+        time_s = np.concatenate([time_s, np.zeros(count, np.float32)]) if time_s is not None else None
+    return Sweep(sweep.t_ns, np.ascontiguousarray(points), ring, sweep.channels, time_s, sweep.origin)

@@ -1,0 +1,190 @@
+"""The boxes that a detector of real pictures would draw, without pictures: true vehicles with the errors that
+``measured_noise.json`` holds, and boxes where no vehicle is.
+
+Misses come in bursts, edges are off by a part that lasts and one new in each frame, scores fall with range, cars are
+called trucks, and now and then one has two boxes. A false box stands somewhere in the world, so it grows as the car
+comes nearer, as a shop front does. Everything is drawn per vehicle for the whole drive, so any frame can be asked for.
+
+Assumed, not measured: what lasts is forgotten over 3 s; what decides a miss is a normal variable whose correlation
+gives the measured one of misses at an even chance; beyond the last measured range recall halves every 15 m.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import cos, exp, pi, radians, sin
+
+import numpy as np
+
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.sensors.measured_noise import SHARES, MeasuredNoise, measured
+from pipeline.simulation.sensors.series import lasting
+from pipeline.simulation.sensors.truth_boxes import LABELS, LAW, Seen, in_picture
+from pipeline.simulation.world import world_state
+from pipeline.simulation.world.world_state import LIDAR_HEIGHT_M, World
+from pipeline.types import F64, CameraCalibration, RawBoxes
+
+_FORGETS_S = 3.0
+_HALVES_M = 15.0
+_MISS, _SCORE, _CALLED, _DOUBLED, _EDGES = 0, 1, 2, 3, slice(4, 8)
+_COLUMNS = 8
+_LARGE = ("truck", "bus")
+_CAR_HEIGHT_M = 1.48
+_LONGEST_FALSE = 60
+"""Frames after which a false box ends in any case."""
+
+
+@dataclass(frozen=True)
+class FalseThing:
+    """Something that is taken for a vehicle. first, last: frames; x, y: in the world; width: share of its height."""
+
+    number: int
+    first: int
+    last: int
+    x: float
+    y: float
+    height_m: float
+    width: float
+    score: float
+    label: str
+
+
+class RealDetector:
+    """The boxes of one scenario."""
+
+    def __init__(self, scenario: Scenario, noise: MeasuredNoise | None = None) -> None:
+        self._scenario, self._noise = scenario, noise or measured()
+        self._frames = scenario.frame_count()
+        self._series = lru_cache(maxsize=None)(self._draw)
+        self._things = _false_things(scenario, self._noise)
+        middles = np.array(self._noise.ranges_m)
+        self._middles_m = (middles[:-1] + middles[1:]) / 2
+
+    def boxes(self, now: World, camera: CameraCalibration, index: int) -> RawBoxes:
+        """What is found in the picture that ``camera`` takes of the world ``now``. index: of the frame."""
+        found, scores, labels = [], [], []
+        rng = np.random.default_rng([self._scenario.seed, 13, index])
+        for seen in in_picture(now, camera):
+            series = self._series(seen.actor.actor.id)[min(index, self._frames - 1)]
+            fresh = np.random.default_rng([self._scenario.seed, 14, index, seen.actor.actor.id]).standard_normal(8)
+            if _share_below(series[_MISS]) > self._found(seen):
+                continue
+            box = self._drawn(seen, series, fresh[:4], camera)
+            found.append(box)
+            scores.append(self._score(seen, series[_SCORE]))
+            labels.append(self._label(seen, series[_CALLED]))
+            if _share_below(series[_DOUBLED]) < self._noise.doubled:
+                width = box[2] - box[0]
+                shift = np.array([0.35, 0.1, 0.35, 0.1]) * width * np.sign(fresh[4])
+                found.append(box + shift + fresh[4:8] * 0.1 * width)
+                scores.append(0.6 * scores[-1])
+                labels.append(labels[-1])
+        for thing in self._things:
+            if thing.first <= index <= thing.last:
+                drawn = self._false_box(thing, now, camera, rng)
+                if drawn is not None:
+                    found.append(drawn)
+                    scores.append(thing.score)
+                    labels.append(thing.label)
+        edges = np.clip(np.array(found).reshape(-1, 4), 0.0, np.tile([camera.width, camera.height], 2))
+        whole = (edges[:, 2] > edges[:, 0] + 1.0) & (edges[:, 3] > edges[:, 1] + 1.0)
+        return RawBoxes(
+            "measured",
+            edges[whole].astype(np.float32),
+            np.array(scores, dtype=np.float32)[whole],
+            tuple(label for label, keep in zip(labels, whole.tolist(), strict=True) if keep),
+            LAW,
+        )
+
+    def _draw(self, actor: int) -> F64:
+        """(frames, ``_COLUMNS``) of one vehicle."""
+        slow = exp(-1.0 / (_FORGETS_S * self._scenario.rate_hz))
+        step = 10.0 / self._scenario.rate_hz  # correlations were measured at 10 frames a second
+        missed = sin(pi / 2 * self._noise.missed_again) ** step
+        kept = [missed, missed, slow, missed, *[slow] * 4]
+        return lasting([self._scenario.seed, 12, actor], self._frames, np.array(kept))
+
+    def _found(self, seen: Seen) -> float:
+        """The chance that a frame has a box of it."""
+        away_m = _range_m(seen)
+        bin_of = next((n for n, low in enumerate(self._noise.visible[1:]) if seen.visible > low), None)
+        if bin_of is None:
+            return 0.0
+        last_m = self._noise.ranges_m[-1]
+        share = float(np.interp(away_m, self._middles_m, self._noise.found[bin_of]))
+        return share * 0.5 ** (max(away_m - last_m, 0.0) / _HALVES_M)
+
+    def _drawn(self, seen: Seen, series: F64, fresh: F64, camera: CameraCalibration) -> F64:
+        noise = self._noise
+        box = np.array(seen.bbox)
+        height = box[3] - box[1]
+        scale = float(camera.K[0, 0]) / LAW.focal_px
+        new = np.hypot(noise.frame_share * height, noise.frame_px * scale) * fresh
+        lasts = np.array([noise.across_share, noise.up_share, noise.across_share, noise.up_share]) * height
+        drawn: F64 = box + lasts * series[_EDGES] + new
+        return drawn
+
+    def _score(self, seen: Seen, z: float) -> float:
+        bin_of = min(
+            int(np.searchsorted(self._noise.ranges_m, _range_m(seen), side="right")) - 1, len(self._middles_m) - 1
+        )
+        return float(np.interp(_share_below(z), SHARES, self._noise.score[max(bin_of, 0)]))
+
+    def _label(self, seen: Seen, z: float) -> str:
+        own = LABELS[seen.actor.actor.kind]
+        others = self._noise.large_called if own in _LARGE else self._noise.car_called if own == "car" else {}
+        share = _share_below(z)
+        for name, chance in others.items():
+            if share < chance:
+                return name
+            share -= chance
+        return own
+
+    def _false_box(
+        self, thing: FalseThing, now: World, camera: CameraCalibration, rng: np.random.Generator
+    ) -> F64 | None:
+        """The box of a thing where it is now; None where it is out of the picture."""
+        jitter = rng.standard_normal(4)
+        x, y = now.to_ego(np.array([[thing.x, thing.y]]))[0].tolist()
+        middle = camera.T_camera_ego @ np.array([x, y, thing.height_m / 2 - LIDAR_HEIGHT_M, 1.0])
+        if middle[2] < 2.0:
+            return None
+        height = camera.K[1, 1] * thing.height_m / middle[2] * exp(self._noise.false_boxes.height_share * jitter[0])
+        u = camera.K[0, 0] * middle[0] / middle[2] + camera.K[0, 2] + 0.05 * height * jitter[1]
+        v = camera.K[1, 1] * middle[1] / middle[2] + camera.K[1, 2] + 0.05 * height * jitter[2]
+        half = thing.width * height / 2
+        return np.array([u - half, v - height / 2, u + half, v + height / 2])
+
+
+def _false_things(scenario: Scenario, noise: MeasuredNoise) -> tuple[FalseThing, ...]:
+    """Those of the whole drive: so many begin in each frame that as many as measured are there on average."""
+    rng = np.random.default_rng([scenario.seed, 15])
+    of = noise.false_boxes
+    step = 10.0 / scenario.rate_hz
+    ends = 1.0 - of.lasts**step
+    things: list[FalseThing] = []
+    for index in range(scenario.frame_count()):
+        births = rng.poisson(of.per_frame * ends)
+        if not births:
+            continue
+        x, y, heading = world_state.ego_pose(scenario, index / scenario.rate_hz)
+        for _ in range(births if of.seen else 0):
+            height_px, width, bearing, score = of.seen[int(rng.integers(len(of.seen)))]
+            height_m = _CAR_HEIGHT_M * exp(0.15 * rng.standard_normal())
+            away_m = LAW.focal_px * height_m / height_px
+            turned = heading + radians(bearing) * (1.0 if rng.random() < 0.5 else -1.0)
+            lives = min(int(rng.geometric(ends)), _LONGEST_FALSE)
+            place = (x + away_m * cos(turned), y + away_m * sin(turned))
+            label = "car" if rng.random() < 0.9 else "truck"
+            things.append(FalseThing(len(things), index, index + lives - 1, *place, height_m, width, score, label))
+    return tuple(things)
+
+
+def _range_m(seen: Seen) -> float:
+    return float(np.hypot(*seen.actor.cuboid.center[:2])) - seen.actor.cuboid.size[0] / 2
+
+
+def _share_below(z: float) -> float:
+    """Of a standard normal variable, to 2·10⁻³: the logistic curve of Bowling et al. 2009."""
+    return 1.0 / (1.0 + exp(-(0.07056 * z**3 + 1.5976 * z)))

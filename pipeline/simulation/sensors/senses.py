@@ -1,0 +1,77 @@
+"""What the pipeline is given of what the sensors see: a scenario's faults, its detections, the sensors in use.
+
+Recorded scenarios and suites without pictures go through this one place, so a drive of a suite that is opened again
+gives the same frames.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from pipeline.common.fast_replace import evolve
+from pipeline.simulation.scenario import Scenario
+from pipeline.simulation.sensors import truth_boxes
+from pipeline.simulation.sensors.detection_model import Detections
+from pipeline.simulation.sensors.faults import NONE, disturb_sweep, nods_rad, true_camera
+from pipeline.simulation.sensors.real_detector import RealDetector
+from pipeline.simulation.sensors.truth_lanes import lane_points
+from pipeline.simulation.world import world_state
+from pipeline.simulation.world.world_state import World
+from pipeline.types import Frame, Sweep
+
+
+class Senses:
+    """Of one scenario. The same frame and world give the same answer, in any order."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._faults = scenario.faults
+
+    def sensed(self, frame: Frame, now: World) -> Frame:
+        """The frame as far as the scenario's car senses it, with the detections that the scenario gives. The picture
+        stays where nobody looks at it: people still want to see it."""
+        scene = self._scenario
+        if self._faults != NONE and frame.sweep is not None:
+            frame = evolve(frame, sweep=self.disturbed(frame.sweep, frame.index))
+        if scene.sensors == "lidar":
+            return evolve(frame, detections_given=True)
+        frame = evolve(frame, sweep=None) if scene.sensors == "camera" else frame
+        if scene.detections is None or frame.camera is None:
+            return frame
+        return self._detected(evolve(frame, detections_given=True), now, scene.detections)
+
+    def disturbed(self, sweep: Sweep, index: int) -> Sweep | None:
+        """A sweep with the scenario's faults; None where it is lost."""
+        if self._faults == NONE:
+            return sweep
+        return disturb_sweep(sweep, self._faults, self._scenario.seed, index, self._nod_rad(index))
+
+    def _detected(self, frame: Frame, now: World, noise: Detections) -> Frame:
+        scene, faults, seed, index = self._scenario, self._faults, self._scenario.seed, frame.index
+        assert frame.camera is not None
+        if np.random.default_rng([seed, 22, index]).random() < faults.pictures_lost:
+            return frame
+        camera = true_camera(frame.camera, faults, self._nod_rad(index))
+        if faults.camera_skew_ms:
+            now = world_state.at(scene, max(now.t_s + faults.camera_skew_ms / 1e3, 0.0))
+        boxes = None
+        if noise.measured:
+            boxes = self._detector.boxes(now, camera, index)
+        elif noise.boxes is not None:
+            boxes = truth_boxes.boxes(now, camera, noise.boxes, seed, index)
+        lanes = lane_points(now, scene.road, camera, noise.lines, seed, index) if noise.lines else None
+        return evolve(frame, raw_boxes=boxes, raw_lanes=lanes)
+
+    def _nod_rad(self, index: int) -> float:
+        return float(self._nods[min(index, len(self._nods) - 1)]) if self._faults.nods_deg else 0.0
+
+    @cached_property
+    def _nods(self) -> np.ndarray:
+        scene = self._scenario
+        return nods_rad(self._faults, scene.seed, scene.frame_count(), scene.rate_hz)
+
+    @cached_property
+    def _detector(self) -> RealDetector:
+        return RealDetector(self._scenario)
