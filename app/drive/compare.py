@@ -12,6 +12,7 @@ from typing import Literal
 
 from app.drive.frame_rows import Row
 from pipeline.evaluation.lead_verdict import score
+from pipeline.types import are_several
 
 SAME_PLACE_M = 0.5
 """Distances, or offsets from the path, that differ by less are one place."""
@@ -119,7 +120,7 @@ def _is_carried(row: Row) -> bool:
 
 
 def _is_seen_by_both(row: Row) -> bool:
-    return row.source == "VL"
+    return are_several(row.source or "")
 
 
 def _count(rows: Sequence[Row], holds: Callable[[Row], bool]) -> int:

@@ -48,7 +48,7 @@ def stands_out(each: FusedObject, result: Result) -> bool:
     """The CIPV, what is in path and what the camera sees now: not every pole, and nothing that is only carried.
 
     These get a name and an arrow of their velocity; arrows of all that stands still would fill the view."""
-    return each.id == cipv_id(result) or (not each.carried and (each.source != "L" or each.in_path))
+    return each.id == cipv_id(result) or (not each.carried and (each.pictured or each.in_path))
 
 
 def top_of(each: FusedObject, floor_m: float) -> Point3:

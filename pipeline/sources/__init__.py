@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import cast
 
 from pipeline.common.progress import Progress, silent
-from pipeline.source_kinds import SourceKind, kind_named, kind_of_bare, looks_like, usages
+from pipeline.source_kinds import SourceKind, is_live, kind_named, kind_of_bare, looks_like, usages
 from pipeline.types.source import AnySource, LiveSource, Opening, Source, SourceError, TruthObject
 
 __all__ = [
@@ -55,12 +55,6 @@ def open_any(uri: str, *, rings: int = 16, progress: Progress = silent) -> AnySo
     """Open devices or a recording, whichever the URI names. Errors as of ``open_source``."""
     kind, rest = _kind_and_rest(uri, live=True)
     return cast("AnySource", kind.load()(uri, rest, Opening(rings, progress)))
-
-
-def is_live(uri: str) -> bool:
-    """Whether a URI names devices that are read as they deliver."""
-    kind = kind_named(uri.partition(":")[0])
-    return kind is not None and ":" in uri and kind.is_live
 
 
 def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:

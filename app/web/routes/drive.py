@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, HTTPException, Query
 from pydantic import BaseModel, Field
@@ -20,6 +20,7 @@ from app.engine.snapshot import Snapshot
 from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
 from app.web.routes.shapes import StatusJson
+from pipeline.types import ObjectSource
 
 
 class Columns(BaseModel):
@@ -40,7 +41,7 @@ class Curve(BaseModel):
     id: int
     run: int
     index: list[int]
-    source: list[Literal["V", "L", "VL"]]
+    source: list[ObjectSource]
     carried: list[bool]
     in_path: list[bool]
     distance_m: list[float | None]

@@ -13,16 +13,17 @@ from pipeline.decision.path_position import near_face_middle
 from pipeline.evaluation.lead_verdict import LABELLED_VEHICLES, SAME_BOX_IOU, nearest_face_m
 from pipeline.evaluation.scores.truth import FrameTruth
 from pipeline.params import CipvParams
-from pipeline.types import VEHICLES, Box, FusedObject, Point2, Result, SourceKind
+from pipeline.types import VEHICLES, Box, FusedObject, ObjectSource, Point2, Result
 from pipeline.types.source import TruthObject
 
 MAX_RANGE_M = 60.0
 HALF_ANGLE_RAD = np.radians(35.0)
 """Vehicles are looked for ahead to this range and this far to either side: about what a front camera sees."""
 SIDE_M, LEAST_M = 2.5, 2.0
-SHARE: dict[SourceKind, float] = {"V": 0.35, "VL": 0.15, "L": 0.15}
-"""What may stand for a vehicle: no farther to its side, and no farther off lengthwise than this share of its range. A
-LiDAR's range is right or that of another thing; a box height's may be off by a third."""
+RANGED_SHARE, UNRANGED_SHARE = 0.15, 0.35
+"""What may stand for a vehicle: no farther to its side, and no farther off lengthwise than this share of its range,
+where a sensor measured it and where its box's height gave it. A measured range is right or that of another thing; a box
+height's may be off by a third."""
 CONFIRM_HITS = CipvParams().confirm_hits
 _NEVER = 1e6
 
@@ -31,7 +32,7 @@ class Error(NamedTuple):
     """One matched vehicle in one frame: who saw it, its true range, and believed minus true of its distance, of its
     nearest face's middle (lateral, longitudinal), and of its velocity along the car's axis; metres, m/s."""
 
-    source: SourceKind
+    source: ObjectSource
     range_m: float
     distance_m: float
     lateral_m: float
@@ -73,7 +74,7 @@ def _pairs(wanted: Sequence[TruthObject], seen: Sequence[FusedObject]) -> list[t
     believed = _faces(seen)
     off = np.abs(believed[None] - true[:, None])
     ranges = np.array([nearest_face_m(item) for item in wanted])
-    shares = np.array([SHARE[item.source] for item in seen])
+    shares = np.array([RANGED_SHARE if item.ranged else UNRANGED_SHARE for item in seen])
     reach = np.maximum(LEAST_M, ranges[:, None] * shares[None])
     away = np.abs(np.array([item.distance_m for item in seen])[None] - ranges[:, None])
     cost = np.where((off[..., 1] <= SIDE_M) & (away <= reach), np.hypot(off[..., 0], off[..., 1]), _NEVER)
@@ -108,8 +109,7 @@ def claims(
     near and the picture shows where one of ``unplaced`` is: a vehicle is there, and nobody knows how far off.
     """
     placed = [item for item in result.objects if item.bev is not None and item.distance_m is not None]
-    placed = [item for item in placed if not item.carried and (item.source == "VL" or item.hits >= CONFIRM_HITS)]
-    field = [item for item in placed if _in_field(item)]
+    field = [item for item in placed if not item.carried and _is_confirmed(item) and _in_field(item)]
     faces = np.array([face_of(true) for true in wanted]).reshape(-1, 2)
     named = [item for item in field if item.label in VEHICLES]
     named = [item for item in named if _is_near(item, faces, within_m) or not _is_in_one_of(item, unplaced)]
@@ -134,6 +134,10 @@ def _is_in_one_of(item: FusedObject, boxes: Sequence[Box]) -> bool:
     if item.bbox is None or not boxes:
         return False
     return bool(iou_matrix(np.array([item.bbox]), np.array(boxes)).max() >= SAME_BOX_IOU)
+
+
+def _is_confirmed(item: FusedObject) -> bool:
+    return item.tracked_by_two_sensors or item.hits >= CONFIRM_HITS
 
 
 def _in_field(item: FusedObject) -> bool:

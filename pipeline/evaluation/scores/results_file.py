@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
-from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth
+from pipeline.types import OBJECT_SOURCES, AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth
 from pipeline.types.result_json import VERSION
 
 EMPTY = Layers(np.zeros((0, 4), np.float32), np.zeros(0, np.int32))
@@ -94,7 +94,7 @@ def _object(row: dict[str, Any]) -> FusedObject:
     if bev is not None and len(bev) != 4:
         raise ValueError("four corners")
     box = row["cuboid"]
-    if row["source"] not in ("V", "L", "VL"):
+    if row["source"] not in OBJECT_SOURCES:
         raise ValueError(row["source"])
     if row["type"] is not None and not isinstance(row["type"], str):
         raise ValueError(row["type"])
