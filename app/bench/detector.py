@@ -15,8 +15,8 @@ from pipeline.vision.detector import Detector
 
 
 def stages(pictures: Sequence[U8], detector: Detector, budget_s: float) -> dict[str, dict[str, Any]]:
-    """``{"detector": …}`` in the contract's form, or nothing without a picture. pictures: (H, W, 3) uint8, taken in
-    turn. The peer runs the same graph at the same size on as many threads; where it cannot, it is left out."""
+    """``{"detector": …}`` as ``cipv bench --json`` prints it, or nothing without a picture. pictures: (H, W, 3) uint8,
+    taken in turn. The peer runs the same graph at the same size on as many threads; where it cannot, it is left out."""
     if not pictures:
         return {}
     ours = _in_turn(detector.detect, pictures)

@@ -38,7 +38,8 @@ class Prepared:
 
 
 def stages(sweeps: list[Sweep], budget_s: float, params: Params) -> dict[str, dict[str, Any]]:
-    """``ground``, ``cluster`` and ``lidar_chain`` in the contract's form; every contestant sees every sweep in turn.
+    """``ground``, ``cluster`` and ``lidar_chain`` as ``cipv bench --json`` prints them. Every contestant gets every
+    sweep in turn.
 
     A peer that cannot be measured has ``absent`` with the reason in place of its figures' numbers.
     """

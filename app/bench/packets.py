@@ -29,8 +29,8 @@ Rotations = list[list[bytes]]
 
 
 def stages(budget_s: float) -> dict[str, dict[str, Any]]:
-    """``decode`` and ``decode dual`` in the contract's form: one rotation, packet by packet, to a sweep in the ego
-    frame; of a sensor that sends one return of each laser, and of one that sends two."""
+    """``decode`` and ``decode dual`` as ``cipv bench --json`` prints them: one rotation, packet by packet, to a sweep
+    in the ego frame. The first is of a sensor that sends one return of each laser, the second of one that sends two."""
     packets = _recorded() or _simulated()
     return {
         "decode": _stage(_rotations(packets), budget_s / 2),

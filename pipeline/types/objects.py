@@ -213,7 +213,8 @@ Eligibility = Conditions[bool]
 
 @dataclass(frozen=True)
 class FusedObject:
-    """One physical object: the paper's Table 3 row, widened by what the contract asks for, whose frames and units hold.
+    """One physical object: the paper's Table 3 row, with what docs/reference/results.md adds; its frames and units
+    apply.
 
     A V object whose distance is not known (no law for its class, a box cut by the picture's edge, beyond the law's
     reach) keeps its row; its place and distance are None, and it cannot be the CIPV.
