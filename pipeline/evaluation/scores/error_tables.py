@@ -1,4 +1,4 @@
-"""Errors of place and speed by range and by sensor, in the form of the paper's Table 4: smallest, largest, mean."""
+"""Position and speed errors by range and by sensor, in the form of the paper's Table 4: smallest, largest, mean."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ _CHARTS = {
 
 
 def _scatter(title: str, unit: str, name: str, errors: Sequence[Error]) -> Chart:
-    """One error of every vehicle in every frame, by who saw it."""
+    """One error of every vehicle in every frame, by sensor."""
     lines = []
     for source in MOST_SENSORS_FIRST:
         pairs = [(e.range_m, value) for e in errors if e.source == source and (value := getattr(e, name)) is not None]
@@ -59,7 +59,7 @@ def _scatter(title: str, unit: str, name: str, errors: Sequence[Error]) -> Chart
 
 
 def error_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
-    """By who saw it over all ranges, then by range bin, all together and by who saw it. Empty groups are left out."""
+    """By sensor over all ranges, then for each range bin in total and by sensor. Empty groups are left out."""
     every = _all_errors(run)
     groups: list[tuple[str, str, list[Error]]] = [("all", "any", every)]
     groups += [("all", source, [e for e in every if e.source == source]) for source in MOST_SENSORS_FIRST]

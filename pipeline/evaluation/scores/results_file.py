@@ -1,4 +1,4 @@
-"""A ``results.jsonl`` file read back, as far as scores need it."""
+"""Reading a ``results.jsonl`` file back, as far as scores need it."""
 
 from __future__ import annotations
 
@@ -22,16 +22,15 @@ NO_PATH = Path("straight", _NO_LINE, _NO_LINE, _NO_LINE, 0.0, {}, {})
 
 
 def read_results(path: FilePath) -> list[Result]:
-    """The results of ``cipv run --out``, in order of time. What is not judged (path, gates, health, pedals) is
-    not read and stays empty. BadInput names the line that is no result, or the
-    frame that has two."""
+    """The results of ``cipv run --out``, in order of time. What is not scored (path, gates, health, pedals) is not read
+    and stays empty. BadInput names the line that is not a result, or the frame that has two."""
     try:
         text = path.read_text(encoding="utf-8")
     except (UnicodeDecodeError, ValueError):
         raise BadInput(f"{path}: not a text file; expected the JSON lines of `cipv run --out`") from None
     results = [_result(line, f"{path}, line {n}") for n, line in enumerate(text.split("\n"), 1) if line.strip()]
     if not results:
-        raise BadInput(f"{path}: no results in it")
+        raise BadInput(f"{path}: contains no results")
     results.sort(key=lambda result: result.t_ns)
     twice = next((a.frame for a, b in pairwise(results) if a.t_ns == b.t_ns), None)
     if twice is not None:
@@ -80,7 +79,7 @@ def _cipv(row: dict[str, Any] | None) -> Cipv | None:
 
 
 def _acc(row: dict[str, Any] | None) -> AccCommand | None:
-    """Its state, which is all that is judged of it."""
+    """Its state, the only part that is scored."""
     if row is None:
         return None
     state = row["state"]

@@ -1,4 +1,4 @@
-"""The world at one moment, seen from the ego vehicle: who is where, and how the ego vehicle moves.
+"""The world at one moment, seen from the ego vehicle: where the actors are, and how the ego vehicle moves.
 
 Ego frame: x forward, y left, z up, origin at the LiDAR, which sits level in the middle of the front bumper.
 """
@@ -54,8 +54,8 @@ class World:
 
 
 def at(scenario: Scenario, t_s: float, ego: Motion | None = None) -> World:
-    """The world at time t; nothing is carried from one moment to the next. ``ego`` given: the ego vehicle moves as
-    that says (closed loop), else as the scenario says. The others follow their scripts either way."""
+    """The world at time t; nothing is carried from one moment to the next. ``ego``: the ego vehicle's motion (closed
+    loop); without it the scenario's. The others always follow their scripts."""
     road = scenario.road
     own = ego if ego is not None else scenario.own_motion(t_s)
     lane_d_m = road.lane_offset_m(scenario.ego.lane) + scenario.ego.offset_m
@@ -68,8 +68,8 @@ def at(scenario: Scenario, t_s: float, ego: Motion | None = None) -> World:
 
 
 def _on_the_road(scenario: Scenario, world: World) -> list[ActorState]:
-    """Those that keep to lanes. A vehicle that drives against the road is turned by half a circle, and its drift to the
-    road's left is one to its driver's right."""
+    """The actors that drive in lanes. A vehicle that drives against the road is turned by half a circle, and its drift
+    to the road's left is one to its driver's right."""
     road, actors = scenario.road, scenario.cast
     if not actors:
         return []
@@ -86,7 +86,7 @@ def _on_the_road(scenario: Scenario, world: World) -> list[ActorState]:
 
 
 def _crossing(scenario: Scenario, world: World) -> list[ActorState]:
-    """Those that come over a crossing."""
+    """The actors that cross an intersection."""
     states = []
     for actor, way in zip(scenario.crossing_actors, scenario.routes, strict=True):
         s_m = way.arrival_m + actor.travelled_m(world.t_s) - actor.travelled_m(actor.arrive_s)
