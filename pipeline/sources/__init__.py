@@ -68,7 +68,7 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
         return bare, uri
     kind = kind_named(scheme)
     if kind is None:
-        raise SourceError(f"{uri}: no kind of source is called {scheme!r}; type one of {usages(live=live)}")
+        raise SourceError(f"{uri}: unknown kind of source {scheme!r}; use one of {usages(live=live)}")
     return kind, rest
 
 
@@ -80,4 +80,4 @@ def _about_bare_path(path: str, live: bool) -> str:
         scheme = None
     if scheme is not None:
         return f"{path}: the kind of recording is missing; it looks like {scheme}:{path}"
-    return f"{path}: not a source; type one of {usages(live=live)}"
+    return f"{path}: not a source; use one of {usages(live=live)}"
