@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from urllib.parse import urlsplit
 
@@ -77,6 +78,14 @@ def test_every_image_is_small_and_used() -> None:
     images = set((DOCS / "img").iterdir())
     assert {image.name for image in images if image.stat().st_size > LARGEST_IMAGE_BYTES} == set()
     assert {image.name for image in images - used} == set()
+
+
+def test_every_screenshot_is_made_by_the_script() -> None:
+    pytest.importorskip("playwright")
+    importlib.import_module("tests.docs.screenshots")
+    script = (ROOT / "tests" / "docs" / "screenshots.py").read_text(encoding="utf-8")
+    made = set(re.findall(r'save\(.*, "(\w+)"\)', script))
+    assert made == {image.stem for image in (DOCS / "img").glob("*.jpg")}
 
 
 def test_the_readme_is_short() -> None:
