@@ -1,4 +1,4 @@
-"""Recording never holds up the line, never loses a frame without saying so, and leaves whole files behind."""
+"""Recording never blocks the pipeline, never loses a frame silently, and leaves complete files."""
 
 from __future__ import annotations
 
