@@ -106,6 +106,13 @@ def kind_named(scheme: str) -> SourceKind | None:
     return next((kind for kind in KINDS if kind.scheme == scheme), None)
 
 
+def is_live(uri: str) -> bool:
+    """Whether a URI names devices that are read as they deliver."""
+    scheme, colon, _ = uri.partition(":")
+    kind = kind_named(scheme)
+    return kind is not None and bool(colon) and kind.is_live
+
+
 def kind_of_bare(path: str) -> SourceKind | None:
     """The kind that opens a path without a scheme."""
     return next((kind for kind in KINDS if path.lower().endswith(kind.bare_suffixes or ("\0",))), None)

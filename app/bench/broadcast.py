@@ -1,9 +1,9 @@
-"""The server side of the clients' bench, in a process of its own so that its processor time can be told apart.
+"""The server side of the client benchmark, in its own process so that its CPU time can be measured separately.
 
     python -m app.bench.broadcast [--deflate]
 
-sends frames of ``sim:straight`` at 10 Hz through the stream that the product uses, compressed or not. It prints its
-port on a line, and for each line that it reads, its processor time in seconds. It ends with its input.
+streams frames of ``sim:straight`` at 10 Hz through the product's own stream, compressed or not. It prints its port, and
+then its CPU time in seconds for each line that it reads. It exits when its input ends.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def main() -> None:
 
 
 def _publish(stream: Stream, frames: list[ProcessedFrame]) -> None:
-    """One frame each tenth of a second, by the clock: a late one does not put off the next."""
+    """One frame every 0.1 s by the clock; a late frame does not delay the next one."""
     start = time.monotonic()
     for sequence in count(1):
         shown = Snapshot(Params(), uri="sim:straight", index=sequence, sequence=sequence, made_unix_s=time.time())

@@ -1,5 +1,5 @@
-"""What a client of the stream costs the server, against the same frames through uvicorn's default, compressed
-WebSocket; and whether any client's lag grows, while one of them does not read at all."""
+"""What each client of the stream costs the server, compared with uvicorn's default compressed WebSocket; and whether
+any client's lag grows while another client does not read at all."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _OPEN_TIMEOUT_S = 30.0
 
 @dataclass
 class Client:
-    """Seconds from a frame made to its arrival here, one a frame."""
+    """Seconds from the creation of each frame to its arrival here."""
 
     lags_s: list[float] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
 class Run:
-    """What a number of clients got, and the server's processor time for it."""
+    """What the clients received, and the server's CPU time for it."""
 
     clients: list[Client]
     cpu_s: float
@@ -45,9 +45,9 @@ class Run:
 
 
 def figures(clients: int, each_s: float) -> dict[str, Any]:
-    """Milliseconds of processor time a client and frame, with and without compression, each as the difference between
-    one client and ``clients``; lags and rates without compression, beside a client that never reads. Each of the four
-    runs takes ``each_s``."""
+    """CPU time in ms per client and frame, with and without compression, each from the difference between one client
+    and ``clients``; lags and rates without compression, next to a client that never reads. Each of the four runs takes
+    ``each_s``."""
     with _server(deflate=False) as plain, _server(deflate=True) as compressed:
         runs = {
             (name, number): asyncio.run(_measure(server, number, each_s, compression))
@@ -67,21 +67,21 @@ def figures(clients: int, each_s: float) -> dict[str, Any]:
 
 
 def _per_frame_ms(one: Run, many: Run) -> float:
-    """What one more client costs: a frame is made once whatever their number."""
+    """Cost of one more client. A frame is encoded once, however many clients there are."""
     made = one.cpu_s / one.spent_s
     sent_s = many.cpu_s - made * many.spent_s
     return 1e3 * max(sent_s, 1e-9) / max(1, many.frames - round(one.frames * many.spent_s / one.spent_s))
 
 
 def _rate_hz(run: Run) -> dict[str, float]:
-    """Frames a second, of the client that got most and of the one that got fewest."""
+    """Frames per second of the fastest and of the slowest client."""
     rates = [len(client.lags_s) / run.spent_s for client in run.clients]
     return {"least": round(min(rates), 1), "most": round(max(rates), 1), "of": RATE_HZ}
 
 
 def _lags(run: Run) -> dict[str, float]:
-    """Over all clients; ``growth`` is the median's change from the first third of the run to the last, of the client
-    where it changed most."""
+    """Over all clients; ``growth`` is the change of the median from the first to the last third of the run, for the
+    client whose median changed most."""
     every = np.concatenate([client.lags_s for client in run.clients]) * 1e3
     growth = []
     for client in run.clients:
@@ -97,7 +97,7 @@ class _Server:
     process: subprocess.Popen[str]
 
     def cpu_s(self) -> float:
-        """Its processor time so far."""
+        """Its CPU time so far."""
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         self.process.stdin.write("\n")
@@ -118,7 +118,7 @@ def _server(*, deflate: bool) -> Iterator[_Server]:
 
 
 async def _measure(server: _Server, number: int, for_s: float, compression: str | None) -> Run:
-    """``number`` clients that read, and beside many of them one that does not."""
+    """``number`` clients that read, plus, if there are several, one that does not."""
     url, lazy = f"ws://127.0.0.1:{server.port}/", int(number > 1)
     sockets = await asyncio.gather(*(_open(url, compression) for _ in range(number + lazy)))
     clients = [Client() for _ in range(number)]

@@ -44,7 +44,7 @@ class Demand:
 
 
 def _faster(stage: str, peer: str, times: float) -> tuple[Demand, Demand]:
-    """For both recordings on which LiDAR stages are measured."""
+    """For both recordings that the LiDAR stages are measured on."""
     return (
         Demand(stage, "ratio", at_least=times, peer=peer),
         Demand(f"{stage}@kitti", "ratio", at_least=times, peer=peer, is_optional=True),

@@ -1,4 +1,4 @@
-"""The network's part of the bench: a picture in, candidate boxes out, and the same file read by OpenCV's own engine."""
+"""Benchmark of the network: image in, candidate boxes out, compared with OpenCV's engine on the same file."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from pipeline.vision.detector import Detector
 
 
 def stages(pictures: Sequence[U8], detector: Detector, budget_s: float) -> dict[str, dict[str, Any]]:
-    """``{"detector": …}`` in the contract's form, or nothing without a picture. pictures: (H, W, 3) uint8, taken in
-    turn. The peer runs the same graph at the same size on as many threads; where it cannot, it is left out."""
+    """``{"detector": …}`` as ``cipv bench --json`` prints it, or nothing without a picture. pictures: (H, W, 3) uint8,
+    taken in turn. The peer runs the same graph at the same size with the same number of threads; it is left out where
+    it cannot."""
     if not pictures:
         return {}
     ours = _in_turn(detector.detect, pictures)

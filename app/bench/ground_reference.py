@@ -1,6 +1,5 @@
-"""Ground fitting in plain numpy: the same method as ``pipeline.lidar.ground``, written as one would write it first.
-
-It is what ``cipv bench`` measures the compiled version against, and what a test compares its masks with.
+"""Ground fitting in plain numpy: the same method as ``pipeline.lidar.ground``, written in the obvious way. ``cipv
+bench`` compares the speed of the compiled version with it, and a test compares the masks.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ def fit_ground_numpy(points: F32, keep: Mask, params: GroundParams) -> Ground:
 
 
 def _edges(x: F32, params: GroundParams) -> F64:
-    """Bounds of equal counts along x, on multiples of the bin."""
+    """Segment bounds along x with equal point counts, on multiples of the bin."""
     bins = int(np.ceil(2.0 * params.fit_range_m / ground_kernels.X_BIN_M))
     sample = ((x[:: ground_kernels.EDGE_SAMPLE] + params.fit_range_m) / ground_kernels.X_BIN_M).astype(int)
     before = np.concatenate([[0], np.cumsum(np.bincount(sample, minlength=bins + 1))])[:-1]
@@ -42,7 +41,7 @@ def _edges(x: F32, params: GroundParams) -> F64:
 
 
 def _fit(parts: list[F32], edges: F64, params: GroundParams) -> tuple[F64, Mask]:
-    """The planes from the least ragged one outwards."""
+    """The planes, fitted from the least ragged segment outwards."""
     alone = [_refine(part, np.array([0.0, 0.0, 1.0, 0.0]), params) for part in parts]
     planes = np.array([plane for plane, _ in alone])
     raggedness = np.array([ragged for _, ragged in alone])
@@ -93,6 +92,6 @@ def _refine(part: F32, prior: F64, params: GroundParams) -> tuple[F64, float]:
 
 
 def _heights(xyz: F32, planes: F64) -> F32:
-    """Heights in single precision over one plane (4,) or one a point (N, 4)."""
+    """Heights in single precision over one plane (4,) or over one plane per point (N, 4)."""
     a, b, c, d = planes.astype(np.float32).T
     return np.asarray(a * xyz[:, 0] + b * xyz[:, 1] + c * xyz[:, 2] + d)

@@ -1,5 +1,5 @@
-"""A drive with a great many labels in the page, timed in a real browser: from a seek to the frame painted, to its
-labels painted in the plan, and to their edges painted in the picture.
+"""The page with very many labels, timed in a real browser: from a seek until the frame, its labels in the bird's-eye
+view and their edges in the camera image are painted.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pipeline.labels.model import LabelSet, LabelTrack, LeadRange, Origin, Sight
 
 MOST = 100_000
 _LIFE = 100
-"""Frames in which a made-up vehicle is there: ten seconds at ten hertz."""
+"""Number of frames in which a made-up vehicle is present: 10 s at 10 Hz."""
 _SEEKS, _FAR, _PAUSE_MS, _PATIENCE_MS = 24, 37, 120, 30_000
 _ALL_THERE_WITHIN_S, _ASK_EVERY_S = 300.0, 0.5
 _PERSON = "Bench"
@@ -30,7 +30,7 @@ _BEGIN = """(person) => {
 _ARE_THERE = """async ([count, patience]) => {
   const { get, on } = await import("/js/core/store.js");
   await new Promise((done, fail) => {
-    setTimeout(() => fail(new Error("the labels did not come")), patience);
+    setTimeout(() => fail(new Error("the labels did not arrive")), patience);
     const look = () => (get("labels")?.tracks.size ?? 0) >= count && get("projected") && done();
     on(["labels", "projected"], look);
     look();
@@ -67,8 +67,8 @@ _SEEK = """async ([frames, pause, patience]) => {
 
 
 def labelled(running: Browser, address: str, count: int) -> dict[str, list[float]]:
-    """On a paused recording of ``count`` frames that is filled with labels: milliseconds of each seek, to the frame,
-    its labels in the plan, and their edges in the picture."""
+    """Milliseconds from each seek to the frame, to its labels in the bird's-eye view and to their edges in the camera
+    image, on a paused recording of ``count`` frames that is filled with labels."""
     tracks = _fill(address)
     page = opened(running, address)
     page.call(_BEGIN, _PERSON)
@@ -80,7 +80,7 @@ def labelled(running: Browser, address: str, count: int) -> dict[str, list[float
 
 
 def many(drive: LabelSet, labels: int = MOST) -> LabelSet:
-    """Made-up vehicles all over a drive, so many sightings in all; every tenth is a keyframe. Who leads
+    """Made-up vehicles over a whole drive, with this many sightings in total; every tenth is a keyframe. The lead
     changes every ten frames."""
     count = len(drive.frames)
     life, by = min(_LIFE, count), Origin("import", "made up", 1)
@@ -104,7 +104,7 @@ def many(drive: LabelSet, labels: int = MOST) -> LabelSet:
 
 
 def _fill(address: str) -> int:
-    """Import them as a person's file; how many tracks there are. BadInput when they are not taken."""
+    """Import them as a file of one person. Returns the number of tracks; BadInput when the import fails."""
     with urlopen(f"{address}/api/labels/export?format=native") as answer:
         labels = many(from_json(answer.read(), address))
     with urlopen(f"{address}/api/labels") as answer:
@@ -118,7 +118,7 @@ def _fill(address: str) -> int:
             now = json.load(answer)["labels"]["task"]
         if now is not None and now["id"] == task and not now["running"]:
             if now["error"]:
-                raise BadInput(f"the labels were not taken: {now['error']}")
+                raise BadInput(f"the labels were not imported: {now['error']}")
             return len(labels.tracks)
         time.sleep(_ASK_EVERY_S)
-    raise BadInput(f"the labels were not taken within {_ALL_THERE_WITHIN_S:.0f} s")
+    raise BadInput(f"the labels were not imported within {_ALL_THERE_WITHIN_S:.0f} s")

@@ -1,4 +1,4 @@
-"""The LiDAR branch against what one would take instead: plain numpy for the ground, Open3D for the rest."""
+"""The LiDAR branch compared with the usual alternatives: plain numpy for the ground, Open3D for the rest."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SYSTEM_LIBRARIES = "on slim systems Open3D needs libegl1 libgl1 libx11-6 libusb-
 
 @dataclass(frozen=True)
 class Prepared:
-    """One sweep and what the stages before clustering make of it. chosen: (N,) bool, the points to cluster."""
+    """One sweep with the results of the stages before clustering. chosen: (N,) bool, the points to cluster."""
 
     sweep: Sweep
     keep: npt.NDArray[np.bool_]
@@ -39,9 +39,10 @@ class Prepared:
 
 
 def stages(sweeps: list[Sweep], budget_s: float, params: Params) -> dict[str, dict[str, Any]]:
-    """``ground``, ``cluster`` and ``lidar_chain`` in the contract's form; every contestant sees every sweep in turn.
+    """``ground``, ``cluster`` and ``lidar_chain`` as ``cipv bench --json`` prints them. Every contestant gets every
+    sweep in turn.
 
-    A peer that cannot be measured has ``absent`` with the reason in place of its figures' numbers.
+    For a peer that cannot be measured, ``absent`` gives the reason instead of figures.
     """
     if not sweeps:
         return {}
@@ -87,7 +88,7 @@ def _each(prepared: list[Prepared], run: Callable[[Prepared], object]) -> Callab
 
 
 def _chain(prepared: list[Prepared], params: Params) -> Callable[[], object]:
-    """Our line from points to tracks, the tracker's state carried from sweep to sweep by their own stamps."""
+    """Our stages from points to tracks; the tracker's state is carried from sweep to sweep by their timestamps."""
     turn = cycle(prepared)
     state = LidarTrackerState()
 
@@ -113,7 +114,7 @@ def obstacles_of(sweep: Sweep, params: Params) -> tuple[Obstacle, ...]:
 
 
 class Open3dPeer:
-    """The same work with Open3D's own functions."""
+    """The same work with Open3D's functions."""
 
     def __init__(self, open3d: Any, params: Params) -> None:
         self._open3d = open3d
@@ -122,12 +123,13 @@ class Open3dPeer:
         open3d.utility.random.seed(0)
 
     def cluster(self, prepared: Prepared) -> npt.NDArray[np.int32]:
-        """(M,) labels of the chosen points. With z scaled and one point enough, DBSCAN gives our partition."""
+        """(M,) labels of the chosen points. With z scaled and a minimum of one point, DBSCAN gives our partition."""
         return self._dbscan(prepared.sweep.points[prepared.chosen, :3], min_points=1)
 
     def chain(self, prepared: Prepared, voxel_m: float | None) -> list[Any]:
-        """Points to boxes: voxels, RANSAC plane, DBSCAN of what is in reach, a box a cluster. Less than our line does:
-        it does not turn the boxes (its oriented box warns on the console about every flat cluster) nor track."""
+        """Points to boxes: voxels, RANSAC plane, DBSCAN of the points in range, one box per cluster. This is less than
+        our stages do: boxes are not oriented (Open3D's oriented box prints a warning for every flat cluster) and not
+        tracked."""
         cloud = self._cloud(prepared.sweep.points[:, :3])
         if voxel_m is not None:
             cloud = cloud.voxel_down_sample(voxel_m)
@@ -150,7 +152,7 @@ class Open3dPeer:
 
 
 def _open3d() -> tuple[Any, str]:
-    """The module, or None and why it cannot be had."""
+    """The module, or None and the reason why it is not available."""
     try:
         import open3d
     except (ImportError, OSError) as error:

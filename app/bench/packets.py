@@ -1,4 +1,5 @@
-"""Packets of one rotation to a sweep, with every guard, against the library alone and against plain Python."""
+"""Decoding the packets of one rotation into a sweep, with all checks, compared with the bare library and with plain
+Python."""
 
 from __future__ import annotations
 
@@ -29,8 +30,8 @@ Rotations = list[list[bytes]]
 
 
 def stages(budget_s: float) -> dict[str, dict[str, Any]]:
-    """``decode`` and ``decode dual`` in the contract's form: one rotation, packet by packet, to a sweep in the ego
-    frame; of a sensor that sends one return of each laser, and of one that sends two."""
+    """``decode`` and ``decode dual`` as ``cipv bench --json`` prints them: one rotation, packet by packet, to a sweep
+    in the ego frame. The first is of a sensor that sends one return of each laser, the second of one that sends two."""
     packets = _recorded() or _simulated()
     return {
         "decode": _stage(_rotations(packets), budget_s / 2),
@@ -55,7 +56,7 @@ def _stage(rotations: Rotations, budget_s: float) -> dict[str, Any]:
 
 
 def _recorded() -> list[bytes]:
-    """Payloads of a real sensor, kept one after another in a file; empty without one."""
+    """Payloads of a real sensor, stored one after another in a file; empty without that file."""
     folder = data_dir() / "vlp16_packets"
     for path in sorted(folder.glob(f"*x{PACKET_BYTES}.bin")) if folder.is_dir() else ():
         raw = path.read_bytes()
@@ -64,15 +65,15 @@ def _recorded() -> list[bytes]:
 
 
 def _simulated() -> list[bytes]:
-    """The simulator's sweeps as a sensor would have sent them: the front half turn only, so half the points."""
+    """The simulator's sweeps as a sensor would have sent them: the front half turn only, so half as many points."""
     source = open_source("sim:straight")
     sweeps = (source.frame(index).sweep for index in range(_SIMULATED))
     return [packet for sweep in sweeps if sweep is not None for packet in packets_of(sweep)]
 
 
 def _with_two_returns(packets: list[bytes]) -> list[bytes]:
-    """The same rotations as of a sensor in dual return mode, so twice as many packets: each block once more, its
-    returns a metre behind."""
+    """The same rotations as a sensor in dual-return mode sends them, with twice as many packets: each block is repeated
+    with its returns one metre farther away."""
     doubled = []
     for packet in packets:
         for half in (0, 6):
@@ -96,7 +97,7 @@ def _rotations(packets: list[bytes]) -> Rotations:
 
 
 def _ours(rotations: Rotations) -> Callable[[], object]:
-    """A rotation's packets are pushed; the first of them completes the sweep before."""
+    """Push the packets of one rotation; the first one completes the previous sweep."""
     turn, decoder = cycle(enumerate(rotations)), Vlp16Decoder()
 
     def run() -> object:
@@ -134,7 +135,7 @@ def _plain(rotations: Rotations) -> Callable[[], object]:
 
 
 def _points(packet: bytes) -> list[tuple[float, float, float, int]]:
-    """x, y, z, intensity of a single-return packet, with no thought of time or damage."""
+    """x, y, z, intensity of a single-return packet, ignoring time and damage."""
     points = []
     azimuths = struct.unpack("<" + "2xH96x" * 12, packet[:1200])
     for block, azimuth in enumerate(azimuths):

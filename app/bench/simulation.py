@@ -1,4 +1,4 @@
-"""The simulator in the closed loop against the time it simulates: LiDAR and true boxes, and camera and network."""
+"""The closed-loop simulator compared with real time: with LiDAR and true boxes, and with camera and network."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _SCENARIO = "straight"
 
 
 def stages(budget_s: float) -> dict[str, dict[str, Any]]:
-    """Figures of one tick for ``simulate_lidar`` and ``simulate_camera``: sensors, line and vehicle. Their peer is real
-    time: by the clock, and by the processor's time, which other work on the machine hardly changes. budget_s: wall time
-    for both, seconds."""
+    """Time per tick of ``simulate_lidar`` and ``simulate_camera``: sensors, pipeline and vehicle. The peer is real
+    time, by wall clock and by CPU time, which other load on the machine hardly changes. budget_s: wall time for both,
+    seconds."""
     return {
         "simulate_lidar": _stage(TruthEyes(), budget_s / 2),
         "simulate_camera": _stage(NetworkEyes(embedded()), budget_s / 2),

@@ -1,4 +1,4 @@
-"""Everything that `cipv bench` measures, on real sweeps where they are and on simulated ones where not."""
+"""Everything that `cipv bench` measures, on real sweeps where available and otherwise on simulated ones."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ BUDGET_S = {"decode": 1.5, "lidar": 8.0, "lidar@kitti": 6.5, "line": 10.0, "dete
 """Wall time of each part; together with loading and compiling they stay below 45 s."""
 FRAMES = 40
 SWEEPS_HZ = 10.0
-"""Of a VLP-16. A recording may have fewer (Astyx 3.3), but the pipeline must keep up with the sensor: the lane network
-looks as often as it does then."""
+"""Frame rate of a VLP-16. A recording may have fewer frames per second (Astyx 3.3), but the pipeline must keep up with
+the sensor, so the lane network runs as often as it would then."""
 
 
 def run_all(params: Params, detector_spec: str | None) -> dict[str, dict[str, Any]]:
     """The object of docs/reference/results.md: stage → median_ms, p99_ms and peers with their ratios.
 
-    The LiDAR stages come once more as ``stage@kitti`` where a KITTI drive is at hand: its sweeps, cut to a VLP-16's
-    rings, are twice as dense."""
+    Where a KITTI drive is available, the LiDAR stages are repeated as ``stage@kitti``: its sweeps, reduced to the rings
+    of a VLP-16, are twice as dense."""
     source = _source()
     print(f"cipv: measuring on {source.title}", file=sys.stderr)
     frames = [source.frame(i) for i in range(min(FRAMES, len(source)))]

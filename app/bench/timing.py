@@ -1,4 +1,4 @@
-"""Timing contestants fairly: in one process, in turns, so that whatever slows the machine slows all of them."""
+"""Fair timing of contestants: in one process and in turns, so that any load on the machine slows all of them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,10 @@ _MIN_ROUNDS = 3
 
 
 def interleaved(contestants: Mapping[str, Callable[[], object]], budget_s: float) -> dict[str, list[float]]:
-    """Seconds of every run of every contestant, by name.
-
-    The first run of each is not counted (compiling, caches). Then come rounds in which each has its turn, until
-    ``budget_s`` of wall time is over, three rounds at least. In a turn a fast contestant runs as often as fits into one
-    run of the slowest, 20 times at most, so that a slow peer does not leave the fast one with a handful of samples.
+    """Seconds of every run of every contestant, by name. The first run of each is not counted (compilation, caches).
+    Then they take turns in rounds until ``budget_s`` of wall time is over, for three rounds at least. In its turn, a
+    fast contestant runs as often as fits into one run of the slowest, 20 times at most, so that a slow peer does not
+    leave the fast one with only a few samples.
     """
     end = perf_counter() + budget_s
     first = {name: min(_time(run), _time(run)) for name, run in contestants.items()}
@@ -33,7 +32,7 @@ def interleaved(contestants: Mapping[str, Callable[[], object]], budget_s: float
 
 
 def figures(spent_s: Sequence[float]) -> dict[str, Any]:
-    """``median_ms``, ``p99_ms`` and of how many samples."""
+    """``median_ms``, ``p99_ms`` and the number of samples."""
     median, p99 = (np.percentile(spent_s, [50, 99]) * 1e3).tolist()
     return {"median_ms": median, "p99_ms": p99, "samples": len(spent_s)}
 

@@ -1,5 +1,5 @@
-"""The whole step without the networks, the step beside a busy network, and the whole line as the command line runs it:
-read and decoded, looked at by both networks, stepped."""
+"""The step without networks, the step next to a busy network, and the whole pipeline as the command line runs it:
+reading, decoding, both networks, step."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ from pipeline.types.source import Source
 from pipeline.warm_up import warm_up
 
 _ROUNDS = 3
-"""The step alone and the step beside the network take turns, so that what slows the machine slows both."""
+"""The step alone and the step next to the network take turns, so that any load on the machine slows both."""
 _IDLE, _BESIDE = 0.3, 0.45
-"""Shares of the time: beside the network, where the step is slower, it takes longer to have as many samples."""
+"""Shares of the time: next to the network, where the step is slower, the same number of samples takes longer."""
 _SETTLE_S = 0.2
-"""A network that has just begun is no busy one yet: for 0.1 s its threads share the step's core. Players keep one."""
+"""A network that has just started is not busy yet: for 0.1 s its threads share the core of the step. A player keeps its
+network running."""
 
 
 _NOBODY = Detectors()
@@ -36,9 +37,8 @@ def stages(
     """Figures for ``step``, and with a detector of vehicles for ``step_beside_network`` and ``line`` (from the
     recording to the result).
 
-    Beside the network: it looks at one picture after the other, on as many threads as the product gives it.
-
-    The first ``count`` frames, round and round. budget_s: wall time for all of it, seconds.
+    The network next to it processes one image after another, with as many threads as in the product. The first
+    ``count`` frames are repeated. budget_s: total wall time, seconds.
     """
     warm_up()
     detector = detectors.boxes
@@ -64,18 +64,18 @@ def stages(
 
 
 def _read(source: Source, count: int) -> Iterator[Frame]:
-    """Each frame anew from the recording, as when it is played."""
+    """Reads each frame from the recording, as playback does."""
     return (source.frame(index) for index in cycle(range(count)))
 
 
 def _name(network: object) -> str | None:
-    """None: nothing looks."""
+    """None: no network runs."""
     return getattr(network, "name", None)
 
 
 class _Laps:
-    """Goes through the frames and times each, from asking for it to the result. Without detectors: the step alone,
-    where the frames are held. times_s: of every frame so far."""
+    """Runs through the frames and times each, from the request to the result. Without detectors only the step is timed,
+    on frames held in memory. times_s: of every frame so far."""
 
     def __init__(self, frames: Iterator[Frame], params: Params, detectors: Detectors = _NOBODY) -> None:
         self.times_s: list[float] = []
@@ -83,7 +83,7 @@ class _Laps:
         self._params, self._detectors = params, detectors
 
     def go_on(self, budget_s: float) -> None:
-        """From the frame after the last one, until the time is over; one frame at least."""
+        """Continue after the last frame until the time is over, for at least one frame."""
         start = perf_counter()
         end = start + budget_s
         while start < end or not self.times_s:
@@ -97,7 +97,7 @@ class _Laps:
 
 
 class _Busy:
-    """Keeps the network running in a thread of its own, as the player does that looks ahead."""
+    """Keeps the network running on its own thread, like a player that reads ahead."""
 
     def __init__(self, detector: Detects[RawBoxes], frames: list[Frame]) -> None:
         self._ended = threading.Event()

@@ -37,7 +37,7 @@ def write_csv(results: Iterable[dict[str, Any] | None], out: Path) -> None:
 
 
 def rows(result: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """A row for each object of a result in the contract's form; one without an object where it holds none."""
+    """A row for each object of a result (docs/reference/results.md), or one row without an object where it has none."""
     ego, acc, cipv = result.get("ego") or {}, result.get("acc") or {}, result.get("cipv") or {}
     about = {
         "frame": result.get("frame"),

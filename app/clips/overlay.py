@@ -87,7 +87,8 @@ def _draw_object(canvas: U8, item: FusedObject, result: Result, display: dict[st
         return
     x1, y1, x2, y2 = (round(value) for value in box)
     cv2.rectangle(canvas, (x1, y1), (x2, y2), _bgr(color), thick, cv2.LINE_AA)
-    if leads or item.in_path or item.source == "VL":  # names of all that only the camera sees would hide the picture
+    # The names of everything that only the camera sees would hide the picture.
+    if leads or item.in_path or item.tracked_by_two_sensors:
         _text(canvas, object_text(item), (x1, max(y1 - 6, _BANNER_PX + 14)), color, 0.5)
 
 

@@ -71,7 +71,7 @@ class RegisterModel:
     task: Literal["detector", "lanes"] = "detector"
     """What the network does"""
     default: bool = True
-    """Use it whenever no network is named"""
+    """Whether it becomes the default, used when no network is named"""
 
     def __call__(self) -> int:
         file = own_file(self.path)

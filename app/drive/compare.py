@@ -14,6 +14,7 @@ from app.drive.frame_rows import Row
 from pipeline.common.clips import begins_clip
 from pipeline.evaluation.lead_verdict import score
 from pipeline.params import TimeParams
+from pipeline.types import are_several
 
 SAME_PLACE_M = 0.5
 """Distances, or offsets from the path, that differ by less are one place."""
@@ -121,7 +122,7 @@ def _is_carried(row: Row) -> bool:
 
 
 def _is_seen_by_both(row: Row) -> bool:
-    return row.source == "VL"
+    return are_several(row.source or "")
 
 
 def _count(rows: Sequence[Row], holds: Callable[[Row], bool]) -> int:

@@ -17,10 +17,10 @@ from app.drive.timeline_columns import EXTRA_COLUMNS, ColumnValue
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.evaluation.lead_verdict import Judged
 from pipeline.fusion.rows import LIDAR_RANGE_SIGMA_M
-from pipeline.types import VEHICLES, Frame, FusedObject, Result, VisionTrack
+from pipeline.types import OBJECT_SOURCES, VEHICLES, Frame, FusedObject, Result, VisionTrack
 from pipeline.vision.classes import COCO_80
 
-SOURCES = ("", "V", "L", "VL")
+SOURCES = ("", *OBJECT_SOURCES)
 LABELS = ("", *COCO_80)
 """A class that is none of these is kept as nameless."""
 _DECIMALS = 4
@@ -177,7 +177,7 @@ def _by_id(result: Result) -> dict[int, VisionTrack]:
 def _vl_gap(item: FusedObject, tracks: dict[int, VisionTrack]) -> tuple[float, float] | None:
     """Camera's minus LiDAR's distance of an object that both see now, in metres and in standard deviations of both."""
     track = tracks.get(item.vision_track) if item.vision_track is not None else None
-    if item.seen_by != "VL" or track is None or not track.measured or item.distance_m is None:
+    if not item.seen_by_two_sensors or track is None or not track.measured or item.distance_m is None:
         return None
     if track.distance_m is None or track.sigma_m is None:
         return None

@@ -70,7 +70,7 @@ class ReplayFolder:
 
 def _listed(name: str, title: str, drives: list[ExperimentDrive]) -> Section:
     rows = tuple((Linked(each.title, url_quote(f"{each.name}.html")), " ".join(each.text)) for each in drives)
-    return Section(name, title, tables=(Table(f"{len(drives)} drives", ("drive", "what came of it"), rows),))
+    return Section(name, title, tables=(Table(f"{len(drives)} drives", ("drive", "outcome"), rows),))
 
 
 def _command(drive: ExperimentDrive) -> str:

@@ -36,7 +36,7 @@ from pipeline.types.result_json import to_json
 
 
 class Encoder:
-    """Keeps the JPEG of the last picture: while a slider moves on a paused frame, the picture is not encoded again."""
+    """Keeps the last JPEG, so that moving a slider on a paused frame does not encode the image again."""
 
     def __init__(self) -> None:
         self._last: tuple[Picture, int, SentPicture] | None = None
@@ -70,19 +70,19 @@ class Encoder:
 
 
 def pack(header: dict[str, Any], jpeg: bytes, arrays: bytes) -> bytes:
-    """The message as this module's first lines lay it out."""
+    """The message, in the layout that the module's docstring describes."""
     text = msgspec.json.encode(header)
     text += b" " * (-len(text) % 4)
     return b"".join([struct.pack("<I", len(text)), text, jpeg, b"\0" * (-len(jpeg) % 4), arrays])
 
 
 def display_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, Any]:
-    """What is drawn over the picture. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom first;
-    ``far_view`` is the window of the detector's second look, None without one. ``path`` is the corridor laid on the
-    ground that the sweep shows, None where there is none. ``lanes`` are the ego lane's lines where the camera saw
-    them, None without a lane detector; ``plan_lanes`` the same in the plan, x y in metres; ``ground`` the planes under
-    the sweep, n·p + d = 0, and the segments of x that they hold in; ``ranking`` every object in the order in which it
-    could have led."""
+    """What is drawn over the camera image. Boxes are those that fusion compared; ``cuboids`` are 8 corners, bottom
+    first; ``far_view`` is the window of the detector's second look, None without one; ``path`` is the corridor on the
+    ground of the sweep, None without a ground. ``lanes`` are the ego lane's lines where the camera saw them, None
+    without a lane detector; ``plan_lanes`` the same seen from above, x y in metres; ``ground`` the planes under the
+    sweep, n·p + d = 0, and the segments of x in which they apply; ``ranking`` every object, best candidate for the CIPV
+    first."""
     layers = result.layers
     path = {"center": result.path.center, "left": result.path.left, "right": result.path.right}
     return {
@@ -99,7 +99,7 @@ def display_json(result: Result, aligned: Alignment | None, scale: float) -> dic
 
 
 def _cuboids_json(result: Result, aligned: Alignment | None, scale: float) -> dict[str, list[list[float] | None]]:
-    """By object, the pixels of its cuboid's corners; all are projected at once, a sweep has dozens."""
+    """For each object, the pixels of its cuboid's corners. All are projected at once, since a sweep has dozens."""
     boxed = [(item.id, item.cuboid) for item in result.objects if item.cuboid is not None]
     if aligned is None or not boxed:
         return {}
@@ -111,7 +111,7 @@ def _cuboids_json(result: Result, aligned: Alignment | None, scale: float) -> di
 def _on_ground(
     lines: dict[str, F64], ground: Ground | None, aligned: Alignment | None, scale: float
 ) -> dict[str, list[list[float] | None]] | None:
-    """Each (K, 2) ego line as pixels, one a point; None as a whole where no ground or no camera is known."""
+    """Each (K, 2) ego line as pixels, one per point; None where the ground or the camera is not known."""
     if ground is None or aligned is None or not ground.fitted.any():
         return None
     return {
@@ -121,7 +121,7 @@ def _on_ground(
 
 
 def _lanes_json(lane: EgoLane | None, aligned: Alignment | None, scale: float) -> dict[str, Any]:
-    """The ego lane's lines where the camera saw them, and in the plan."""
+    """The ego lane's lines where the camera saw them, and seen from above."""
     if lane is None:
         return {"lanes": None, "plan_lanes": None}
     seen = in_picture(lane, aligned) if aligned is not None else None

@@ -1,4 +1,4 @@
-"""The camera's picture as pages get it: a JPEG, no larger than they show it, encoded once for all of them."""
+"""The camera image that pages receive: a JPEG, no larger than they show it, encoded once for all of them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.types import U8, Picture
 
 MAX_WIDTH_PX = 1280
-"""For who does not say how wide it shows the picture."""
+"""For pages that do not say how wide they show the image."""
 MIN_WIDTH_PX, WIDTH_STEP_PX = 320, 160
 JPEG_QUALITY = 80
 _JPEG = b"\xff\xd8"
@@ -27,13 +27,14 @@ class SentPicture:
 
 
 def width_for(shown_px: float) -> int:
-    """The width to send for one shown so wide: in steps, so that dragging a pane's edge does not make a new one for
-    each of its pixels."""
+    """The width to send for an image shown this wide. It changes in steps, so that dragging a pane's edge does not
+    encode a new image for every pixel."""
     return max(MIN_WIDTH_PX, int(np.ceil(shown_px / WIDTH_STEP_PX)) * WIDTH_STEP_PX)
 
 
 def encode_picture(picture: Picture, width_px: int = MAX_WIDTH_PX) -> SentPicture:
-    """The camera's own JPEG where it is one and small enough; else encoded, at most ``width_px`` wide."""
+    """The camera's own JPEG if there is one and it is small enough; otherwise the image encoded at most ``width_px``
+    wide."""
     height, width = picture.bgr.shape[:2]
     if picture.encoded is not None and picture.encoded[:2] == _JPEG and width <= width_px:
         return SentPicture(picture.encoded, width, height, 1.0)
@@ -43,7 +44,8 @@ def encode_picture(picture: Picture, width_px: int = MAX_WIDTH_PX) -> SentPictur
 
 
 def _shrunk(bgr: U8, width_px: int) -> U8:
-    """At most ``width_px`` wide. Halving by areas and a last linear step cost a fifth of one step by areas."""
+    """The image at most ``width_px`` wide. Halving by area averaging and a final linear step takes a fifth of the time
+    of a single area-averaging step."""
     while bgr.shape[1] >= 2 * width_px:
         bgr = _resized(bgr, bgr.shape[1] // 2, cv2.INTER_AREA)
     return _resized(bgr, width_px, cv2.INTER_LINEAR) if bgr.shape[1] > width_px else bgr

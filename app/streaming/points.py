@@ -1,4 +1,4 @@
-"""Every point of the sweep as pages get it: small whole numbers, one array a property."""
+"""Every point of the sweep as pages receive it: small integers, one array per property."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pipeline.alignment.projection import Alignment
 from pipeline.types import DROPPED, F32, F64, GROUND, I32, UNCLUSTERED, Frame, Result
 
 UNSEEN = -32768
-"""A pixel of a point that the camera cannot see."""
+"""The pixel of a point outside the camera's view."""
 UNKNOWN_AGE = 255
 _LIMIT = 32767
 _CODES = ((GROUND, 0), (UNCLUSTERED, 1), (DROPPED, 3))

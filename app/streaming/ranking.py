@@ -1,4 +1,4 @@
-"""Every object of a frame in the order in which it could have been the CIPV, and the one test that stopped it."""
+"""Every object of a frame, best candidate for the CIPV first, with the test that excluded it."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from typing import Any
 from pipeline.types import FusedObject, Gate, Result
 
 _OF_FUSION = frozenset({"iou", "range_sigmas", "class_size"})
-"""Gates between two sensors' objects: failing one makes two rows of a pair, and stops neither from leading."""
+"""Gates between the objects of two sensors: failing one splits a pair into two rows, and excludes neither from being
+the CIPV."""
 BEHIND = "behind"
-"""What stops an object that passed every test: another one is nearer, or surer in the same place."""
+"""What excludes an object that passed every test: another one is nearer, or better known in the same place."""
 
 
 @dataclass(frozen=True)
 class Ranked:
-    """order counts from 1, the CIPV first. stopped_by: the first gate that failed, with its number and limit, or
-    ``BEHIND``; None for the CIPV."""
+    """order starts at 1, the CIPV. stopped_by: the first gate that failed, with its value and limit, or ``BEHIND``;
+    None for the CIPV."""
 
     id: int
     order: int
@@ -29,7 +30,7 @@ class Ranked:
 
 
 def ranking(result: Result) -> list[Ranked]:
-    """The CIPV, then the other candidates by distance, then what a gate stopped, by distance."""
+    """The CIPV, then the other candidates by distance, then the objects that a gate excluded, by distance."""
     reasons = {each.id: each.reason for each in result.rejected}
     lead = result.cipv
     if lead is not None:
@@ -53,7 +54,7 @@ def ranking(result: Result) -> list[Ranked]:
 
 
 def stopping_gate(item: FusedObject) -> Gate | None:
-    """The first test that kept an object from being a candidate; None when it passed all."""
+    """The first test that an object failed as a candidate; None when it passed all."""
     return next((gate for gate in item.gates if not gate.passed and gate.name not in _OF_FUSION), None)
 
 

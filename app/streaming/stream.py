@@ -1,9 +1,8 @@
-"""Every browser gets the newest message and never an old one.
+"""Every browser gets the newest message, never an outdated one.
 
-Each client has one place for a frame and one for a state. A newer message replaces an older one that was not sent yet,
-so a slow client skips frames and hurts nobody; one that joins late gets the current frame at once.
-
-A frame carries the state too, so the state goes out on its own only when it is newer than the newest frame.
+Each client has one slot for a frame and one for a state. A newer message replaces an unsent older one, so a slow client
+skips frames without affecting others, and a client that joins late gets the current frame at once. A frame includes the
+state, so the state is sent separately only when it is newer than the newest frame.
 
 Buffers of the system between here and a page hold many frames, which would be a queue after all. A page therefore asks
 for ``?paced=1`` and says ``{"painted": true}`` once for each frame it got; no more than ``FRAMES_UNDER_WAY`` are sent
@@ -56,17 +55,17 @@ class _Held(BaseModel):
 
 @dataclass
 class Traffic:
-    """Frames over all clients since the start: sent, and dropped unsent for a newer one."""
+    """Frames of all clients since the start: sent, and dropped because a newer one replaced them."""
 
     sent: int = 0
     dropped: int = 0
 
 
 class Slot:
-    """The newest unsent messages of one client, by kind. Lives on the server's event loop.
+    """The newest unsent messages of one client, by kind. Used on the server's event loop only.
 
-    ``paced``: frames wait for ``painted``. ``traffic``: where frames are counted. picture_px: how wide it shows the
-    picture, None until it says so."""
+    ``paced``: frames wait for ``painted``. ``traffic`` counts frames. picture_px: how wide it shows the image, None
+    until it says so."""
 
     def __init__(self, paced: bool = False, traffic: Traffic | None = None) -> None:
         self.picture_px: int | None = None
@@ -79,7 +78,7 @@ class Slot:
         self._filled = asyncio.Event()
 
     def put(self, kind: str, message: str | bytes, order: int = 0) -> None:
-        """Replace what is unsent of this kind; a message older than one already put is ignored."""
+        """Replace the unsent message of this kind; a message older than the last one put is ignored."""
         if order < self._newest.get(kind, order):
             return
         self._newest[kind] = order
@@ -93,12 +92,12 @@ class Slot:
         self._filled.set()
 
     def painted(self) -> None:
-        """The client is done with one of the frames it got."""
+        """The client has painted one of its frames."""
         self._under_way = max(0, self._under_way - 1)
         self._filled.set()
 
     async def take(self) -> list[str | bytes]:
-        """Everything that may be sent, as soon as there is anything."""
+        """Wait for messages that may be sent, and take them all."""
         while True:
             await self._filled.wait()
             self._filled.clear()
@@ -108,7 +107,7 @@ class Slot:
             self._traffic.sent += "frame" in ready
             self._unsent = {kind: message for kind, message in self._unsent.items() if kind not in ready}
             if "frame" in ready:
-                ready.pop("state", None)  # what came before the frame the frame says too
+                ready.pop("state", None)  # the frame includes the state as it was
                 if self._state_after_frame is not None:  # also when it has been sent: the frame, late, says what was
                     ready["state"] = self._state_after_frame
                     self._state_after_frame = None
@@ -144,11 +143,11 @@ class Stream:
 
     @property
     def clients(self) -> int:
-        """How many watch now."""
+        """Number of clients now."""
         return len(self._slots)
 
     def publish(self, snapshot: Snapshot) -> None:
-        """Called by the engine. Encodes only when somebody watches, and a result only once."""
+        """Called by the engine. Encodes only while a client is connected, and each result only once."""
         self._snapshot = snapshot
         loop = self._loop
         if loop is None or loop.is_closed() or not self._slots:
@@ -160,7 +159,7 @@ class Stream:
             return
 
     async def serve(self, socket: WebSocket) -> None:
-        """Feed one client until it leaves. It may send ``{"ping": t}`` and gets ``t`` back with the server's clock."""
+        """Serve one client until it leaves. It may send ``{"ping": t}`` and gets ``t`` back with the server's clock."""
         await socket.accept()
         self._loop = asyncio.get_running_loop()
         slot = Slot(socket.query_params.get("paced") == "1", self.traffic)
@@ -183,7 +182,7 @@ class Stream:
             self._fit_width()
 
     async def _receive(self, socket: WebSocket, slot: Slot) -> None:
-        """Hear the client until it leaves; what is nothing we know is ignored."""
+        """Read the client's messages until it leaves; unknown ones are ignored."""
         while True:
             message = await socket.receive()
             if message["type"] == "websocket.disconnect":
@@ -207,7 +206,7 @@ class Stream:
                 self._hold(slot, said["held"])
 
     def _hold(self, slot: Slot, said: Any) -> None:
-        """What is no label is none."""
+        """None for anything that is not a valid label."""
         try:
             held = _Held.model_validate(said)
         except ValidationError:
@@ -216,7 +215,7 @@ class Stream:
             self._looks.hold(HeldCuboid(slot, held.track, held.frame, held.cuboid.value()))
 
     def _tell_dragged(self, held: HeldCuboid, ended: bool) -> None:
-        """Tell the page that holds it; on a thread of the 3D view's."""
+        """Tell the page that edits the label. Called on a thread of the 3D view."""
         said = {"track": held.track, "frame": held.frame, "cuboid": held.cuboid._asdict(), "ended": ended}
         message = _dump({"type": "held", **said})
         if self._loop is not None and isinstance(held.page, Slot):
@@ -231,7 +230,8 @@ class Stream:
         slot.put("state", state_message(self._snapshot or snapshot))
 
     def _fit_width(self) -> bool:
-        """Take the width that the widest client needs. True when it has grown: the newest frame is then too narrow."""
+        """Use the width of the widest client. True when it has grown, so that the newest frame's image is too
+        narrow."""
         wanted = max((slot.picture_px or MAX_WIDTH_PX for slot in self._slots), default=MAX_WIDTH_PX)
         with self._lock:
             has_grown = wanted > self._width_px
@@ -259,7 +259,7 @@ class Stream:
             slot.put(kind, message)
 
     def _distribute(self, state: str, frame: _Encoded, is_said: bool) -> None:
-        """is_said: the frame carries this state. One that was encoded anew for a wider page may carry an older one."""
+        """is_said: the frame includes this state. A frame encoded again for a wider page may include an older one."""
         for slot in self._slots:
             slot.put("state", state)
             if frame.message is not None:
@@ -290,7 +290,7 @@ def _object(text: str | None) -> dict[str, Any]:
 
 
 def _number(value: Any, limit: float) -> float | None:
-    """A number within ±limit; else None. What a client says is not to be trusted."""
+    """A number within ±limit, otherwise None; input from clients is not trusted."""
     return value if isinstance(value, int | float) and -limit < value < limit else None
 
 
@@ -299,7 +299,7 @@ def _is_id_or_null(value: Any) -> bool:
 
 
 def _width(shown_px: Any) -> int | None:
-    """The width to send to who shows it so wide; None for what is no width."""
+    """The width to send to a client that shows it this wide; None for an invalid width."""
     shown = _number(float(shown_px) if isinstance(shown_px, str) and shown_px.isdecimal() else shown_px, _WIDEST_PX)
     return None if shown is None or shown <= 0 else width_for(shown)
 

@@ -53,8 +53,6 @@ PALETTE: dict[Role, Shades] = {
 }
 """``cluster`` is a LiDAR cluster that belongs to no object (yet); ``dropped`` a point that down-sampling left out."""
 
-_ROLE_OF_SOURCE: dict[str, Role] = {"L": "lidar", "V": "vision", "VL": "fused"}
-
 
 def rgb(role: Role, theme: Literal["dark", "light"] = "dark") -> Rgb:
     """A role's colour as three numbers 0–255."""
@@ -64,7 +62,11 @@ def rgb(role: Role, theme: Literal["dark", "light"] = "dark") -> Rgb:
 
 def role_of(each: FusedObject, cipv_id: int | None) -> Role:
     """What an object's colour says: that it is the CIPV, else which sensors see it."""
-    return "cipv" if each.id == cipv_id else _ROLE_OF_SOURCE[each.source]
+    if each.id == cipv_id:
+        return "cipv"
+    if each.tracked_by_two_sensors:
+        return "fused"
+    return "vision" if each.pictured else "lidar"
 
 
 def shade_of(color: Rgb, identity: int) -> Rgb:

@@ -8,21 +8,21 @@ from pipeline.common.geometry import F64
 from pipeline.types import FusedObject, Point3
 
 MARGIN_M = 0.3
-"""A finger and a far car are both small: boxes are met this much around themselves."""
+"""Pointers are imprecise and far cars small: a ray this close to a box hits it."""
 _UNKNOWN_HEIGHT_M = 1.5
-"""How high a footprint without a cuboid stands, as high as most cars."""
+"""Height assumed for a footprint without a cuboid, that of most cars."""
 
 
 def object_on_ray(objects: tuple[FusedObject, ...], origin: Point3, direction: Point3, floor_m: float) -> int | None:
-    """The id of the object that the ray meets first, None when it meets none. Ego frame, metres; ``floor_m`` is the
-    ground's height, on which footprints stand that no LiDAR has measured."""
+    """The id of the first object on the ray; None without one. Ego frame, metres; ``floor_m`` is the ground's height,
+    used for footprints that no LiDAR has measured."""
     start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
     met = [(distance, each.id) for each in objects if (distance := _distance(each, start, along, floor_m)) is not None]
     return min(met)[1] if met else None
 
 
 def _distance(each: FusedObject, start: F64, along: F64, floor_m: float) -> float | None:
-    """How far along the ray the object's box is entered, in lengths of ``along``; None where it is missed."""
+    """Where the ray enters the object's box, in lengths of ``along``; None when it misses."""
     if each.cuboid is not None:
         center, size, yaw_rad = np.asarray(each.cuboid.center), np.asarray(each.cuboid.size), each.cuboid.yaw_rad
     elif each.bev is not None:

@@ -1,4 +1,4 @@
-"""What the three-dimensional views share: the colours, words and outlines of one ``Result``. Nothing here perceives.
+"""What the 3D views share: colours, texts and outlines of one ``Result``. Nothing here computes perception.
 
 Ego frame, metres. Colours are 0–255. Each function reads a result and returns arrays that a view hands to its library.
 """
@@ -39,16 +39,15 @@ def object_color(each: FusedObject, result: Result) -> Rgb:
 
 
 def object_text(each: FusedObject) -> str:
-    """``#7 car 23.4 m``; ``?`` where the distance is unknown, and said so when the object is only carried."""
+    """``#7 car 23.4 m``; ``?`` where the distance is unknown, with ``carried`` when the object was not seen."""
     distance = "? m" if each.distance_m is None else f"{each.distance_m:.1f} m"
     return f"#{each.id} {each.label or 'obstacle'} {distance}{' carried' if each.carried else ''}"
 
 
 def stands_out(each: FusedObject, result: Result) -> bool:
-    """The CIPV, what is in path and what the camera sees now: not every pole, and nothing that is only carried.
-
-    These get a name and an arrow of their velocity; arrows of all that stands still would fill the view."""
-    return each.id == cipv_id(result) or (not each.carried and (each.source != "L" or each.in_path))
+    """The CIPV, and objects in the path or seen by the camera now: not every pole, and no carried objects. These get a
+    name and a velocity arrow; arrows for all objects would fill the view."""
+    return each.id == cipv_id(result) or (not each.carried and (each.pictured or each.in_path))
 
 
 def top_of(each: FusedObject, floor_m: float) -> Point3:
@@ -70,7 +69,7 @@ def owners(result: Result) -> dict[int, FusedObject]:
 
 
 def point_colors(result: Result, by: ColorBy = "kind") -> U8:
-    """(N, 3) RGB, one a point of ``result.layers.points``.
+    """(N, 3) RGB, one per point of ``result.layers.points``.
 
     kind: grey ground, dim unclustered, clusters in their object's colour. The others run over one scale of colours:
     height above the ground, intensity up to its 98th percentile, horizontal range up to 80 m.
@@ -132,7 +131,7 @@ def _heights_m(result: Result) -> npt.NDArray[np.floating]:
 
 
 def lane_lines(result: Result) -> list[F64]:
-    """(K, 2) ego x y of each line of the ego lane that is believed."""
+    """(K, 2) ego x y of each detected line of the ego lane."""
     return list(polylines(result.layers.lanes).values()) if result.layers.lanes is not None else []
 
 
@@ -151,7 +150,7 @@ def ego_cuboid(ground_m: float) -> Cuboid:
 
 
 def flat_outline(each: FusedObject, height_m: float) -> F64 | None:
-    """(5, 3) closed outline of an object's footprint at a height; None when nobody knows where it is."""
+    """(5, 3) closed outline of an object's footprint at a height; None when its place is unknown."""
     if each.bev is None:
         return None
     ring = np.asarray([*each.bev, each.bev[0]], dtype=np.float64)

@@ -1,4 +1,4 @@
-"""Keeps the 3D view up to date with the engine, on a thread of its own, newest frame only."""
+"""Keeps the 3D view in step with the engine, on its own thread, newest frame only."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from pipeline.params import ParamsError
 
 
 class SceneFeed:
-    """Draws the engine's newest snapshot in viser, while a browser looks: one that hides its 3D view does not. While
-    one is drawn, older ones that wait are dropped: the 3D view may be slower than the pipeline, but never behind it.
-    Use it in a ``with`` block.
+    """Draws the engine's newest snapshot in viser while a browser shows the 3D view. Older snapshots that wait while
+    one is drawn are dropped: the 3D view may be slower than the pipeline, but never lags behind it. Use it in a
+    ``with`` block.
 
     drawn: frames drawn so far."""
 
@@ -47,7 +47,7 @@ class SceneFeed:
         self._view.close()
 
     def _moved(self, name: str, value: Any) -> None:
-        """A slider in the 3D view was moved. viser's own bounds are the schema's, so only a race can be refused."""
+        """A slider in the 3D view was moved. Its bounds are the schema's, so only a race can be refused."""
         control = self._engine.control
         try:
             control.change_params({name: value}, merge=True)

@@ -1,4 +1,5 @@
-"""Is the CIPV the right vehicle, and how far off is its distance? Judged frame by frame against labelled cuboids."""
+"""Whether the CIPV is the right vehicle, and the error of its distance, judged frame by frame against labelled
+cuboids."""
 
 from __future__ import annotations
 
@@ -15,8 +16,9 @@ from pipeline.types import VEHICLES, Box, Point2, Result
 from pipeline.types.source import TruthObject
 
 Verdict = Literal["correct", "none", "missed", "false", "wrong"]
-"""correct: the right vehicle · none: rightly nothing · missed: a lead, not found · false: a CIPV, no lead · wrong:
-a CIPV that is not where the lead is: another vehicle, or the lead at a distance too far off (`LeadRule`)."""
+"""correct: the right vehicle · none: correctly no CIPV · missed: there is a lead, but no CIPV · false: a CIPV without a
+lead · wrong: a CIPV that is not where the lead is: another vehicle, or the lead with too large a distance error
+(`LeadRule`)."""
 
 LABELLED_VEHICLES = VEHICLES | {"van", "tram", "trailer", "other vehicle", "motorcyclist"}
 """Label names of the recordings that may be a lead, lower case."""
@@ -28,9 +30,9 @@ SAME_BOX_IOU = 0.5
 class LeadRule:
     """Which labelled vehicle is the lead, and when a CIPV is on it.
 
-    half_lane_m: a vehicle whose centre is nearer to the car's axis is in the lane. max_range_m: farther leads are not
-    asked for. lateral_slack_m: how far beside the label a CIPV may lie. range_slack: how far before or behind it, as a
-    share of its range, and never under ``range_slack_m``.
+    half_lane_m: a vehicle whose centre is nearer to the car's axis is in the lane. max_range_m: leads beyond this are
+    ignored. lateral_slack_m: how far to the side of the label a CIPV may lie. range_slack: how far in front of it or
+    behind it, as a share of its range, but at least ``range_slack_m``.
     """
 
     half_lane_m: float = 1.5
@@ -53,8 +55,8 @@ class Judged:
 
     @property
     def error_m(self) -> float | None:
-        """Estimated minus true distance, of every CIPV that lies where the lead is from side to side: also of one whose
-        distance is too far off to be called correct. None otherwise."""
+        """Estimated minus true distance of every CIPV that matches the lead sideways, including those whose distance
+        error is too large to count as correct. None otherwise."""
         beside = self.lateral_error_m is None or self.lateral_error_m > 0.0
         if beside or self.truth_m is None or self.distance_m is None:
             return None
@@ -62,7 +64,7 @@ class Judged:
 
 
 def true_lead(truth: Iterable[TruthObject], rule: LeadRule) -> TruthObject | None:
-    """The labelled vehicle nearest in the lane, the lane taken as straight."""
+    """The nearest labelled vehicle in the lane, which is assumed to be straight."""
     ahead = [
         item
         for item in truth
@@ -80,13 +82,12 @@ def nearest_face_m(item: TruthObject) -> float:
 
 
 def judge(result: Result, truth: Iterable[TruthObject], rule: LeadRule) -> Judged:
-    """One frame's CIPV against its labels, the lead being the nearest in the lane."""
+    """One frame's CIPV against its labels, where the lead is the nearest vehicle in the lane."""
     return judge_lead(result, true_lead(truth, rule), rule)
 
 
 def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judged:
-    """One frame's CIPV against the vehicle that is known to lead; None: none does. A lead beyond the range asked for
-    counts as none."""
+    """One frame's CIPV against the known lead; None: there is none. A lead beyond the scored range counts as none."""
     if lead is not None and nearest_face_m(lead) > rule.max_range_m:
         lead = None
     chosen = result.chosen()
@@ -104,8 +105,8 @@ def judge_lead(result: Result, lead: TruthObject | None, rule: LeadRule) -> Judg
 
 
 def judge_lead_box(result: Result, bbox: Box) -> Judged:
-    """One frame's CIPV against a lead that only the picture shows: correct when half of their boxes' union is common.
-    Nobody knows how far off it is."""
+    """One frame's CIPV against a lead that is labelled in the picture only: correct when the IoU of their boxes is at
+    least one half. Its distance is unknown."""
     chosen = result.chosen()
     if chosen is None:
         return Judged(result.frame, "missed", None, None, None)
@@ -121,15 +122,15 @@ def _lateral_error(bev: tuple[Point2, Point2, Point2, Point2], lead: TruthObject
 
 
 def switches(pairs: Iterable[tuple[int | None, int | None]]) -> int:
-    """How often the chosen object's number changed while the true lead stayed the same. pairs: of each frame the true
-    lead and the chosen object; frames without either are passed over."""
+    """How often the id of the chosen object changed while the true lead stayed the same. pairs: for each frame the true
+    lead and the chosen object; frames that lack one of them are skipped."""
     both = [(lead, chosen) for lead, chosen in pairs if lead is not None and chosen is not None]
     return sum(before[0] == after[0] and before[1] != after[1] for before, after in pairwise(both))
 
 
 @dataclass(frozen=True)
 class LeadScore:
-    """A drive's figures. Errors: metres, and share of the true distance; over the frames that have one."""
+    """A drive's figures. Errors are in metres, and as a share of the true distance, over the frames that have one."""
 
     frames: int
     correct: int

@@ -14,8 +14,8 @@ Cell = str | float | int | None
 
 @dataclass(frozen=True)
 class Coloured:
-    """A cell with a colour that means something; the table's caption says what. drive: name of the drive behind it,
-    where one is kept."""
+    """A cell whose colour has the meaning that the table's caption gives. drive: name of the drive it comes from, where
+    one is kept."""
 
     value: Cell
     tone: Tone
@@ -24,7 +24,7 @@ class Coloured:
 
 @dataclass(frozen=True)
 class Driven:
-    """A cell with the drive behind it, by its name."""
+    """A cell with the name of the drive it comes from."""
 
     value: Cell
     drive: str
@@ -32,7 +32,7 @@ class Driven:
 
 @dataclass(frozen=True)
 class Linked:
-    """A cell that leads somewhere: href is a whole address."""
+    """A cell with a link; href is an absolute address."""
 
     value: Cell
     href: str
@@ -63,7 +63,7 @@ class Series:
 
     @staticmethod
     def of_points(name: str, points: Iterable[tuple[float, float]]) -> Series:
-        """Points that no line joins, each x and y."""
+        """Points without a connecting line, each x and y."""
         found = list(points)
         return Series(name, tuple(x for x, _ in found), tuple(y for _, y in found), points_only=True)
 
@@ -87,8 +87,8 @@ class Scene:
 
 @dataclass(frozen=True)
 class Section:
-    """One experiment's report. text: paragraphs, what was done and what it shows. failures: a sentence for each demand
-    that does not hold. scenes: what was driven through."""
+    """One experiment's report. text: paragraphs on what was done and what it shows. failures: a sentence for each
+    requirement that is not met. scenes: the scenes that were driven."""
 
     name: str
     title: str

@@ -1,1 +1,2 @@
-"""The paper's experiments, repeated on the simulator's test track, and those that road testers use."""
+"""The paper's experiments repeated on the simulator's test track, and standard tests such as Euro NCAP's and ISO
+15622."""

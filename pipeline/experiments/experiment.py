@@ -21,20 +21,20 @@ class ExperimentDrive:
     """The drive behind an outcome, which can be opened again as a scenario."""
 
     name: str
-    """Fit for a file name."""
+    """As a file name."""
     title: str
     text: tuple[str, ...]
-    """What happened in it, a paragraph each."""
+    """What happened in it, as paragraphs."""
     scenario: Scenario
     """With the ego vehicle as it drove, or with its script."""
     params: Params
     sensors: Sensors
     charts: tuple[Chart, ...]
     detections: Detections | None = GIVEN
-    """What was detected in its pictures; None: what the embedded network detected."""
+    """Its detections; None: those of the embedded network."""
 
     def as_seen(self) -> Scenario:
-        """The scenario with the detections of that drive, so that a run gives the same results."""
+        """The scenario with the detections of that drive, so that a run reproduces its results."""
         return self.scenario.model_copy(update={"sensors": self.sensors, "detections": self.detections})
 
 
@@ -50,9 +50,9 @@ class Experiment(Generic[Case, Outcome]):
     suite: Suite
     title: str
     cases: Callable[[bool], Sequence[Case]]
-    """The cases, fewer of them when called with True; each can be sent to another process."""
+    """The cases, or fewer when called with True. They can be pickled."""
     run: Callable[[Case], Outcome]
-    """One case to its outcome: a pure function at a module's top level."""
+    """Case to outcome: a pure function at module level."""
     report: Callable[[Sequence[Case], Sequence[Outcome]], Section]
     """All cases and outcomes, in order, to a section of the report."""
     as_drive: Callable[[Case, Outcome], ExperimentDrive | None]

@@ -1,4 +1,4 @@
-"""What the pipeline perceives with in an experiment: which sensors, and where the camera's boxes come from."""
+"""The inputs of the pipeline in an experiment: which sensors, and where the camera's boxes come from."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from pipeline.vision.detector import Detector, open_detector
 from pipeline.vision.far_view import FarView, open_far_view
 
 Boxes = Literal["truth", "network"]
-"""Whose the camera's boxes are: projected truth with a detector's errors, or the embedded network's on drawn
+"""Source of the camera's boxes: projected truth with a detector's errors, or the embedded network on rendered
 pictures."""
 SENSORS: Mapping[Sensors, str] = {"lidar": "LiDAR", "camera": "camera", "both": "fused"}
 """Their names in reports."""
 COMPARED: tuple[Sensors, ...] = ("lidar", "both")
-"""What most experiments drive with: the LiDAR alone, and both sensors."""
+"""The sensors of most experiments: the LiDAR alone, and both sensors."""
 GIVEN = Detections(boxes=BoxNoise())
 GIVEN_SAID = (
     "The camera's boxes are given: projected truth with assumed errors, near those measured of the embedded detector. "
-    "No network looked at pictures."
+    "No network was used."
 )
 
 
 @cache
 def embedded() -> Detector:
-    """The embedded network for drawn pictures. One a process; it is ready only after a while."""
+    """The embedded network for rendered pictures. One per process, since loading takes a while."""
     return open_detector(EMBEDDED, (WIDTH, HEIGHT))
 
 
@@ -50,5 +50,5 @@ def detections_for(boxes: Boxes) -> Detections | None:
 
 
 def boxes_said(boxes: Boxes) -> str:
-    """What a title adds to what was driven."""
+    """The suffix of a drive's title."""
     return "" if boxes == "truth" else ", network"

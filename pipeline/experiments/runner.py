@@ -1,5 +1,5 @@
-"""Runs experiments case by case over the cores. Outcomes come back in the order of the cases, so the report does not
-depend on which process was faster."""
+"""Runs experiments case by case on all cores. Outcomes are returned in the order of the cases, so the report does not
+depend on timing."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def run_all(
     done: Callable[[], None] = lambda: None,
     keep: Keep | None = None,
 ) -> list[Section]:
-    """Each experiment's report. jobs: processes; 0 is one a core, 1 none but this one. ``done`` is called after every
+    """Each experiment's report. jobs: processes; 0 means one per core, 1 only this one. ``done`` is called after every
     case, ``keep`` with every drive."""
     jobs = jobs or os.cpu_count() or 1
     if jobs == 1:
@@ -61,7 +61,7 @@ def run_all(
     try:
         return [_reported(each, short, pool.map(each.run, each.cases(short)), done, keep) for each in experiments]
     finally:
-        pool.shutdown(cancel_futures=True)  # a person who interrupts does not want the rest driven first
+        pool.shutdown(cancel_futures=True)  # after an interrupt, do not drive the remaining cases first
 
 
 def _reported(
@@ -71,7 +71,7 @@ def _reported(
     done: Callable[[], None],
     keep: Keep | None,
 ) -> Section:
-    """The report of outcomes that come one by one, in the order of the cases."""
+    """The report of outcomes that arrive one by one, in the order of the cases."""
     cases, got = experiment.cases(short), []
     for case, outcome in zip(cases, outcomes, strict=True):
         got.append(outcome)

@@ -1,4 +1,4 @@
-"""The test track: a straight road, one target on it, and what a drive towards it came to."""
+"""The test track: a straight road with one target, and the outcome of a drive towards it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CONTROLLERS: Mapping[str, Mapping[str, Any]] = {
     "ACC + AEB": {},
     "AEB": {"acc.brake_limit_mps2": 0.0},
 }
-"""What brakes. AEB alone: ACC holds the speed, as the driving robot of a test does, and never brakes."""
+"""The controller that brakes. AEB alone: ACC holds the speed, like the driving robot of a test, and never brakes."""
 _NEAR_ENOUGH = 0.25
 _STANDING_MPS = 0.05
 _BRAKING_MPS2 = 0.5
@@ -32,7 +32,7 @@ _PEDAL_TOUCHED = 0.02
 
 def scene(ego_speed: Mapping[float, float], target: Mapping[str, Any], duration_s: float, seed: int) -> Scenario:
     """A straight road of three lanes with one target. ego_speed, and ``speed_mps`` of the target: seconds → m/s.
-    target: more of it, as in a scenario file; it is a car in the ego lane unless it says otherwise."""
+    target: more of its fields, as in a scenario file; by default it is a car in the ego lane."""
     return Scenario.model_validate(
         {
             "title": "test track",
@@ -58,7 +58,7 @@ def parameters(controller: str, set_speed_mps: float, changes: Mapping[str, Any]
 
 @dataclass(frozen=True)
 class DriveRecord:
-    """A drive towards the target, one value a tick. gap_m: from the bumper to the target's rear. acquired_m: the gap
+    """A drive towards the target, one value per tick. gap_m: from the bumper to the target's rear. acquired_m: the gap
     when the target first was the CIPV; brakes_m: when any braking was first asked for. impact_mps: relative speed at
     contact, None without. motions: the ego vehicle's. All None or empty where it did not happen."""
 
@@ -82,7 +82,7 @@ class DriveRecord:
         return max(0.0, -min(self.accel_mps2))
 
     def mean_decel_mps2(self) -> float | None:
-        """Speed lost over the time of the hardest braking: all ticks around its peak with more than 0.5 m/s²."""
+        """Mean deceleration during the hardest braking: all ticks around its peak with more than 0.5 m/s²."""
         if self.peak_decel_mps2() < _BRAKING_MPS2:
             return None
         first = last = min(range(len(self.accel_mps2)), key=lambda k: self.accel_mps2[k])
@@ -100,7 +100,7 @@ class DriveRecord:
 
 
 def approach(scenario: Scenario, setup: Setup, stop_when_over: bool = True) -> DriveRecord:
-    """DriveRecord until contact, until the danger is over (if so wished), or to the scenario's end."""
+    """Drive until contact, until the danger is over (optional), or to the end of the scenario."""
     return record(drive(scenario, setup), stop_when_over)
 
 
@@ -128,7 +128,7 @@ def record(ticks: Iterable[LoopStep], stop_when_over: bool = True) -> DriveRecor
 
 
 def drive_charts(drive: DriveRecord) -> tuple[Chart, ...]:
-    """Speeds, gap and acceleration over time, as one looks at a drive."""
+    """Charts of speeds, gap and acceleration over time."""
     t_s = drive.t_s
     seen = [(t, range_m) for t, range_m in zip(t_s, drive.measured_m, strict=True) if range_m is not None]
     seen_s, seen_m = zip(*seen, strict=True) if seen else ((), ())
@@ -165,7 +165,7 @@ def true_range_m(target: ActorState) -> float:
 
 
 def measured_m(tick: LoopStep, target: ActorState) -> float | None:
-    """The CIPV's distance where the CIPV is the target; None where there is none or it is something else."""
+    """The CIPV's distance if the CIPV is the target; None otherwise."""
     lead = tick.result.cipv
     if lead is None:
         return None

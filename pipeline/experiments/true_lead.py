@@ -1,4 +1,4 @@
-"""The vehicle that the car will really meet first, by the simulator's truth: what a chosen CIPV is judged against."""
+"""The vehicle that the car will really meet first, by the simulator's truth: the reference for the CIPV."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from pipeline.types import F64, CameraCalibration, Path, Point2
 
 MAX_M = 60.0
 OVERLAP_M = 0.9
-"""In the path: as much of the vehicle as this reaches into the corridor, or half of what is narrower."""
+"""In the path: this much of the vehicle reaches into the corridor, or half of a narrower one."""
 VISIBLE_SHARE = 0.35
 """A vehicle of which nearer ones leave less than this in sight is hidden."""
 EDGE_M = 0.3
@@ -42,7 +42,7 @@ class Way:
         return Way(t_s, np.array([world_state.at(alone, float(t)).pose[:2] for t in t_s]))
 
     def ahead(self, now: World, at_most_m: float = _AHEAD_M) -> Path | None:
-        """What is left of it, 90 m at most, in the ego frame of now; None while the car stands."""
+        """The rest of it, 90 m at most, in the current ego frame; None while the car stands."""
         coming = np.vstack([now.pose[:2], self.places[self.t_s > now.t_s]])
         moved = np.hypot(*np.diff(coming, axis=0).T)
         keep = np.concatenate([[True], (moved > _SMALLEST_MOVE_M) & (np.cumsum(moved) < at_most_m)])
@@ -80,7 +80,7 @@ def overlap(state: ActorState, path: Path) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class InSight:
-    """For how many frames in a row each vehicle has been in sight, by number. A hidden one is not among them."""
+    """For how many consecutive frames each vehicle has been visible, by id. Hidden ones are left out."""
 
     frames: Mapping[int, int] = field(default_factory=dict)
 
@@ -91,11 +91,11 @@ class InSight:
         return InSight({each: self.frames.get(each, 0) + 1 for each in ids})
 
     def is_hidden(self, actor: int) -> bool:
-        """Whether nearer vehicles cover so much of it that neither sensor can see it."""
+        """Whether nearer vehicles hide it from both sensors."""
         return actor not in self.frames
 
     def is_confirmable(self, actor: int) -> bool:
-        """Whether it could have been seen as often as an object must be that one sensor sees."""
+        """Whether it could have been seen often enough for an object of one sensor."""
         return self.frames.get(actor, 0) >= CipvParams().confirm_hits
 
 

@@ -187,7 +187,7 @@ class Recorder:
             if not self._ends():
                 self.hangs = True
                 kept = self._segments.kept_frames
-                self._error = f"recording stopped: the disk does not answer; {kept} frames until then are kept"
+                self._error = f"recording stopped: the disk does not respond; the {kept} frames before are saved"
                 logger.error("%s: %s", self._segments.files[-1], self._error)
         return self.state
 
@@ -276,7 +276,7 @@ class Recorder:
         """Recording ends here; the pipeline goes on."""
         reason = (error.strerror if isinstance(error, OSError) else None) or f"{type(error).__name__}: {error}"
         with self._lock:
-            self._error = f"recording stopped: {reason}; {self._segments.kept_frames} frames until then are kept"
+            self._error = f"recording stopped: {reason}; the {self._segments.kept_frames} frames before are saved"
         logger.error("%s: %s", self._segments.files[-1], self._error)
         while not self._jobs.empty():  # the frames that wait hold memory
             self._jobs.get_nowait()

@@ -35,7 +35,7 @@ STEP_S = 0.005
 
 
 class Eyes(Protocol):
-    """What finds vehicles in the picture."""
+    """Finds vehicles in the picture."""
 
     @property
     def needs_picture(self) -> bool: ...
@@ -59,7 +59,7 @@ class TruthEyes:
 
 @dataclass(frozen=True)
 class NetworkEyes:
-    """The real network on the drawn picture."""
+    """A real network on the rendered picture."""
 
     detector: Detector
     far: FarView | None = None
@@ -71,8 +71,8 @@ class NetworkEyes:
 
 @dataclass(frozen=True)
 class Setup:
-    """What drives: parameters, sensors in use, eyes, and the car. closed: its pedals move the car; otherwise the car
-    follows its script, and what the pipeline would do is only recorded."""
+    """The setup of a drive: parameters, sensors, detector and car. closed: the pipeline's pedals move the car;
+    otherwise the car follows its script, and the pipeline's commands are only recorded."""
 
     params: Params = field(default_factory=Params)
     sensors: Sensed = "both"
@@ -83,7 +83,7 @@ class Setup:
 
 @dataclass(frozen=True)
 class LoopStep:
-    """One moment of a drive. vehicle: as it was when the sensors looked; ``result`` is what came of it."""
+    """One tick of a drive. vehicle: its state when the sensors measured; ``result`` is the pipeline's."""
 
     index: int
     world: World
@@ -97,7 +97,7 @@ class LoopStep:
 
 
 def drive(scenario: Scenario, setup: Setup) -> Iterator[LoopStep]:
-    """Every tick of the scenario, until its end or for as long as the caller wants more."""
+    """Every tick of the scenario, until its end or until the caller stops."""
     warm_up()
     period_s = 1.0 / scenario.rate_hz
     sensors = Sensors(scenario, _furthest_m(scenario))
@@ -147,5 +147,5 @@ def _scripted(scenario: Scenario, t_s: float) -> VehicleState:
 
 
 def _furthest_m(scenario: Scenario) -> float:
-    """A place on the road that the car cannot pass: its fastest scripted speed and a little, all the way."""
+    """A place on the road that the car cannot reach: 1.2 times its fastest scripted speed, for the whole duration."""
     return scenario.ego.start_m + 1.2 * max(scenario.ego.speed_mps.values()) * scenario.duration_s

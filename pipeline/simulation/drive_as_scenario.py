@@ -1,8 +1,8 @@
-"""A closed-loop drive kept as a scenario file: the same road and actors, and the ego vehicle as it was driven.
+"""A closed-loop drive saved as a scenario file: the same road and actors, with the ego vehicle's actual motion.
 
-What the sensors saw is not stored; it follows from the scenario, the motion and the seed, bit for bit. So a drive is a
-few kilobytes, opens as ``sim:<file>`` wherever a scenario does, with truth, and gives pictures even where the loop drew
-none.
+What the sensors saw is not stored; it follows from the scenario, the motion and the seed, bit for bit. So a drive takes
+a few kilobytes, opens as ``sim:<file>`` wherever a scenario does, with truth, and has pictures even if the loop
+rendered none.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pipeline.simulation.world.actors import Motion
 
 
 def as_driven(scenario: Scenario, motions: Sequence[Motion], title: str | None = None) -> Scenario:
-    """The scenario, as long as the drive, with the ego vehicle moving as ``motions`` say, one a tick."""
+    """The scenario with the drive's duration, and the ego vehicle moving as in ``motions``, one per tick."""
     moments = tuple((m.travelled_m, m.d_m, m.speed_mps, m.accel_mps2, m.d_rate_mps, m.d_accel_mps2) for m in motions)
     return scenario.model_copy(
         update={
@@ -29,8 +29,8 @@ def as_driven(scenario: Scenario, motions: Sequence[Motion], title: str | None =
 
 
 def to_yaml(scenario: Scenario, heading: str = "") -> str:
-    """The scenario as a file that ``pipeline.simulation.scenario.load`` takes back, without what is default.
-    heading: lines for a person, put before it."""
+    """The scenario as a file for ``pipeline.simulation.scenario.load``, without default values. heading: comment lines
+    at the top."""
     comment = "".join(f"# {line}\n" for line in heading.splitlines())
     return comment + yaml.safe_dump(
         scenario.model_dump(mode="json", exclude_defaults=True),

@@ -1,4 +1,5 @@
-"""Scenarios: YAML files that say what road there is, who drives on it and how; a wrong file is told in one sentence."""
+"""Scenarios: YAML files that describe the road, the actors and their scripts. Errors in a file are reported in one
+sentence."""
 
 from __future__ import annotations
 
@@ -26,7 +27,7 @@ _GAP_STEP_S, _GAP_HALVINGS = 0.25, 10
 
 
 class ScenarioError(BadInput):
-    """A scenario that does not exist or cannot be understood; the text names what is wrong."""
+    """A scenario that does not exist or is not valid; the message says what is wrong."""
 
 
 class Ego(Script):
@@ -81,7 +82,7 @@ class Scenario(Strict):
         return max(1, round(self.duration_s * self.rate_hz))
 
     def own_motion(self, t_s: float) -> Motion:
-        """Of the ego vehicle at time t: as driven, between two ticks in proportion, else by its script."""
+        """Motion of the ego vehicle at time t: as driven, interpolated between two ticks, else by its script."""
         if not self.driven:
             return motion(self.ego, self.road, t_s)
         at = min(max(t_s * self.rate_hz, 0.0), len(self.driven) - 1.0)
@@ -92,7 +93,7 @@ class Scenario(Strict):
 
     @cached_property
     def cast(self) -> tuple[Actor, ...]:
-        """The actors on the road, every gap at which one brakes turned into the time when the drive reaches it."""
+        """The actors on the road, with every ``at_gap_m`` of a brake converted into the time at which it is reached."""
         return tuple(_timed(self, actor) for actor in self.actors)
 
     @cached_property

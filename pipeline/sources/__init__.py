@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import cast
 
 from pipeline.common.progress import Progress, silent
-from pipeline.source_kinds import SourceKind, kind_named, kind_of_bare, looks_like, usages
+from pipeline.source_kinds import SourceKind, is_live, kind_named, kind_of_bare, looks_like, usages
 from pipeline.types.source import AnySource, LiveSource, Opening, Source, SourceError, TruthObject
 
 __all__ = [
@@ -58,12 +58,6 @@ def open_any(uri: str, *, rings: int = 16, progress: Progress = silent) -> AnySo
     return cast("AnySource", kind.load()(uri, rest, Opening(rings, progress)))
 
 
-def is_live(uri: str) -> bool:
-    """Whether a URI names devices that are read as they deliver."""
-    kind = kind_named(uri.partition(":")[0])
-    return kind is not None and ":" in uri and kind.is_live
-
-
 def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
     """What opens a URI, and the part after its scheme. live: whether error texts offer live sensors, too."""
     scheme, colon, rest = uri.partition(":")
@@ -75,7 +69,7 @@ def _kind_and_rest(uri: str, *, live: bool) -> tuple[SourceKind, str]:
         return bare, uri
     kind = kind_named(scheme)
     if kind is None:
-        raise SourceError(f"{uri}: no kind of source is called {scheme!r}; type one of {usages(live=live)}")
+        raise SourceError(f"{uri}: unknown kind of source {scheme!r}; use one of {usages(live=live)}")
     return kind, rest
 
 
@@ -90,7 +84,7 @@ def _recognised(uri: str) -> SourceKind | None:
 
 def _about_bare_path(uri: str, live: bool) -> str:
     """What a path without a scheme that is of no known kind holds, and what to type instead."""
-    return f"{uri}: not a source{_holding(uri.partition('?')[0])}; type one of {usages(live=live)}"
+    return f"{uri}: not a source{_holding(uri.partition('?')[0])}; use one of {usages(live=live)}"
 
 
 def _holding(path: str) -> str:

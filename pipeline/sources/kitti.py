@@ -45,7 +45,7 @@ class KittiSource:
 
     def __init__(self, uri: str, path: str, rings: int = 16) -> None:
         if rings not in (16, RINGS):
-            raise SourceError(f"{uri}: {rings} rings asked for; KITTI gives 16 (as a VLP-16) or 64")
+            raise SourceError(f"{uri}: {rings} rings requested; KITTI supports 16 (like a VLP-16) or 64")
         folder = recording_folder(path)
         self.uri, self.title, self.rate_hz = uri, folder.resolve().name, 10.0
         self._files = files_of(folder)

@@ -1,4 +1,4 @@
-"""Random views of a training picture: a window at some scale, mirrored, in other light, blurred and noisy."""
+"""Random views of a training picture: a window at a random scale, mirrored, with other exposure, blur and noise."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _AIMED = 0.75
 
 def view(rng: np.random.Generator, picture: U8, rows: F32, size: Size) -> tuple[U8, F32]:
     """A window of (height, width) of a picture and its label rows (``dataset.COLUMNS``), boxes and visible shares cut
-    to the window. A shift up or down is what a pitching car would see, a scale what another distance would show."""
+    to the window. A vertical shift simulates a pitching car, a scale another distance."""
     scale = float(rng.uniform(_FARTHEST_SCALE, _NEAREST_SCALE))
     left, top = _corner(rng, picture, rows, size, scale)
     to_window = np.array([[scale, 0.0, -left], [0.0, scale, -top]])
@@ -36,7 +36,7 @@ def view(rng: np.random.Generator, picture: U8, rows: F32, size: Size) -> tuple[
 
 
 def _corner(rng: np.random.Generator, picture: U8, rows: F32, size: Size, scale: float) -> tuple[float, float]:
-    """Upper left of the window in the scaled picture: mostly so that some vehicle is in it."""
+    """Upper left corner of the window in the scaled picture, mostly such that it contains a vehicle."""
     free = np.array([picture.shape[1] * scale - size[1], picture.shape[0] * scale - size[0]])
     if len(rows) and rng.random() < _AIMED:
         box = rows[int(rng.integers(len(rows))), 2:6] * scale
@@ -48,7 +48,7 @@ def _corner(rng: np.random.Generator, picture: U8, rows: F32, size: Size, scale:
 
 
 def other_light(rng: np.random.Generator, picture: U8) -> U8:
-    """Another exposure, white balance and contrast, now and then blur and noise."""
+    """Random exposure, white balance and contrast, sometimes blur and noise."""
     gamma, gain = np.exp(rng.normal(0.0, 0.25)), np.exp(rng.normal(0.0, 0.2, 3) * 0.4 + rng.normal(0.0, 0.25))
     levels = (np.arange(256)[:, None] / 255.0) ** gamma * gain * 255.0 + rng.normal(0.0, 8.0)
     table = np.clip(levels, 0, 255).astype(np.uint8).reshape(1, 256, 3)

@@ -28,17 +28,18 @@ from pipeline.vision.nms import select
 EDGES_M = (0.0, 10.0, 20.0, 30.0, 45.0, 60.0, 80.0, 100.0)
 MATCH_IOU = 0.5
 JUDGE_SEEDS = (101, 202, 303, 404, 505, 606, 707)
-"""Random traffic that neither training nor the distance law knows."""
+"""Random traffic not used for training or the distance law."""
 FREE_SHARE = 0.5
-"""Vehicles less visible than this are neither asked for nor counted as wrong when found."""
+"""Vehicles less visible than this count neither as missed nor as false positives."""
 LEAD_M = 60.0
-"""A lead is asked for up to here."""
+"""Leads are scored up to here."""
 _HEIGHT_M = 1.6
 
 
 @dataclass
 class Bin:
-    """Counts of one range of distances. height_errors: found height over true height − 1, of boxes whole and clear."""
+    """Counts of one range of distances. height_errors: found height over true height − 1, for whole, unoccluded
+    boxes."""
 
     vehicles: int = 0
     found: int = 0
@@ -55,7 +56,7 @@ class Bin:
         return self.leads_found / max(self.leads, 1)
 
     def lead_interval(self) -> tuple[float, float]:
-        """Of the lead's recall, at 95 % (Wilson 1927): what as many other pictures may show."""
+        """95 % confidence interval of the lead's recall (Wilson 1927)."""
         interval = binomtest(self.leads_found, self.leads).proportion_ci(method="wilson")
         return float(interval.low), float(interval.high)
 
@@ -71,8 +72,8 @@ class Bin:
 
 
 def evaluate(detector: Detector, pictures: Iterable[Moment], params: DetectionParams | None = None) -> list[Bin]:
-    """One bin for each pair of ``EDGES_M``. A lead is the nearest vehicle straight ahead. A wrong detection has no
-    distance; it counts where a car of its box's height would be."""
+    """One bin for each pair of ``EDGES_M``. A lead is the nearest vehicle straight ahead. A false positive has no
+    distance; it counts at the distance of a car with its box height."""
     camera = calibration()
     bins = [Bin() for _ in EDGES_M[1:]]
     for moment in pictures:
@@ -82,7 +83,7 @@ def evaluate(detector: Detector, pictures: Iterable[Moment], params: DetectionPa
 
 
 def within(bins: list[Bin], far_m: float) -> Bin:
-    """What is nearer, as one bin."""
+    """All nearer bins as one."""
     return _sum(part for part, end_m in zip(bins, EDGES_M[1:], strict=True) if end_m <= far_m)
 
 

@@ -1,4 +1,4 @@
-"""What a detector should find in a drawn picture: every vehicle's outline as a box, and how much of it can be seen."""
+"""The labels of a rendered picture: every vehicle's box, and how much of it is visible."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _WIDEST_TAN = 1.1
 class Label:
     """One vehicle in a picture.
 
-    box: of its whole outline, hidden parts too, clipped to the picture: its height tells the distance. visible: share
-    of the outline inside the picture that nearer vehicles leave free. distance_m: range from the ego origin to the
-    nearest corner of its footprint. ahead: its centre is straight ahead, no more than 1.5 m to either side. cut: the
-    outline leaves the picture.
+    box: around its whole outline including hidden parts, clipped to the picture, since the height gives the distance.
+    visible: share of the outline inside the picture that nearer vehicles do not cover. distance_m: range from the ego
+    origin to the nearest corner of its footprint. ahead: its centre is straight ahead, no more than 1.5 m to either
+    side. cut: the outline leaves the picture.
     """
 
     actor_id: int
@@ -86,7 +86,7 @@ def _outline(state: ActorState, camera: CameraCalibration) -> F64:
 
 def through_lens(flat: F64, camera: CameraCalibration) -> F64:
     """(K, 2) points of the image plane at distance 1 as the lens bends them (k1, k2). Beyond the picture, where the
-    polynomial may turn back, the bend stays what it is at its rim."""
+    polynomial may turn back, the distortion stays that of the edge."""
     if not camera.distortion.size:
         return flat
     k1, k2 = camera.distortion[:2]
@@ -108,7 +108,7 @@ def _inside(outline: F64, camera: CameraCalibration) -> F64:
 
 
 def _fill(owners: Ints32, outline: F64, number: int) -> int:
-    """Give an outline's pixels to a vehicle; how many they are."""
+    """Assign an outline's pixels to a vehicle, and count them."""
     pixels = np.round(outline).astype(np.int32)
     left, top, width, height = cv2.boundingRect(pixels)
     part = owners[top : top + height, left : left + width]

@@ -1,6 +1,6 @@
 """The distance law of a detector of simulated vehicles, fitted to pictures it was not trained on, and its errors.
 
-``python -m pipeline.training.law [MODEL]`` prints both and keeps the law beside the network.
+``python -m pipeline.training.law [MODEL]`` prints both and saves the law next to the network.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from pipeline.vision.distance import height_at_reference, is_cut
 from pipeline.vision.nms import select
 
 FIT_SEEDS = (7, 8, 9)
-"""Each has roads, traffic and sizes of its own; neither training nor judging knows them."""
+"""Each has its own roads, traffic and sizes, not used for training or evaluation."""
 _JUDGE_COUNT = 100
 MAX_DEPTH_M = 60.0
-"""Farther off a network finds the taller ones of equal cars, and a law fitted to those reads long."""
+"""Beyond this a network mainly finds the taller ones of similar cars, and a law fitted to those overestimates."""
 CLEAR_SHARE = 0.9
-"""A box of a vehicle less visible than this tells the height of the part that can be seen."""
+"""The box of a vehicle less visible than this has the height of the visible part."""
 
 
 @dataclass(frozen=True)
 class SeenPair(Pair):
-    """kind: what the vehicle is, which its label need not say: a van is a "car"."""
+    """kind: the kind of vehicle, which may differ from the label: a van is a "car"."""
 
     kind: str
 
 
 def pairs(detector: Detector, pictures: Iterable[Moment]) -> Iterator[SeenPair]:
-    """Every box of a vehicle that is clear and whole, with the true depth of that vehicle's nearest point."""
+    """Every box of a whole, unoccluded vehicle, with the true depth of its nearest point."""
     camera = calibration()
     for number, moment in enumerate(pictures):
         detections = select(detector.detect(moment.picture), DetectionParams())
@@ -96,7 +96,7 @@ def _scenario_pictures() -> Iterator[Moment]:
 
 
 def _rows(found: Iterable[SeenPair], law: DistanceLaw) -> list[str]:
-    """``errors`` as a person reads them."""
+    """``errors`` as text."""
     return [
         f"{low:.0f}–{high:.0f} m: {count} cars, mean error {100 * mean:+.1f} %, mean absolute {100 * absolute:.1f} %"
         for (low, high), (count, mean, absolute) in zip(itertools.pairwise(EDGES_M), errors(found, law), strict=True)

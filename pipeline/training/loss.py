@@ -1,4 +1,4 @@
-"""What the network is trained to make small."""
+"""The training loss."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MOST_LOG_SIZE = 6.0
 
 @dataclass(frozen=True)
 class Losses:
-    """Means over the cells that answer for a vehicle; iou: how well their boxes fit."""
+    """Means over the cells assigned to a vehicle; iou: of their boxes."""
 
     total: Tensor
     objectness: float
@@ -29,9 +29,9 @@ class Losses:
 def losses(logits: Tensor, labels: Tensor, boxes: Tensor, size: Size) -> Losses:
     """logits (B, N, 5 + C), labels (B, N), boxes (B, N, 4) of ``targets``.
 
-    Objectness aims at the box's IoU, weighted by its error (quality focal loss, Li 2020), so that of several
-    candidates the one with the best box wins. Boxes: generalised IoU (Rezatofighi 2019) and L1 of the raw numbers,
-    which for far vehicles of ten pixels says more about the height.
+    Objectness aims at the box's IoU, weighted by its error (quality focal loss, Li 2020), so that the candidate with
+    the best box wins. Boxes: generalised IoU (Rezatofighi 2019) and L1 of the raw numbers, which is more sensitive to
+    the height of far vehicles of ten pixels.
     """
     cells, strides = (torch.from_numpy(part) for part in grid_centres(size))
     positive = labels >= 0

@@ -1,4 +1,4 @@
-"""Random moments of random traffic on random roads, all from one seed."""
+"""Random moments of random traffic on random roads, from one seed."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class Moment:
 
 
 def moments(seed: int, count: int, wanted: Callable[[world_state.World], bool] = lambda _: True) -> Iterator[Moment]:
-    """Those of ``count`` pictures whose world is wanted, the others are not drawn. Equal seeds give equal pictures,
-    different seeds share no road, traffic or backdrop."""
+    """The pictures out of ``count`` whose world is ``wanted``; the others are not rendered. Equal seeds give equal
+    pictures; different seeds share no road, traffic or backdrop."""
     rng = np.random.default_rng([seed, 11])
     models = size_models(rng)
     for number in range(count):
@@ -60,8 +60,8 @@ def moments(seed: int, count: int, wanted: Callable[[world_state.World], bool] =
 
 
 def without_collisions(now: world_state.World) -> world_state.World:
-    """The same world without those whom random braking and turning put into the ego vehicle: no camera can see from
-    inside of a truck."""
+    """The same world without actors that random braking and turning moved into the ego vehicle: no camera sees from
+    inside a truck."""
     length, width, _ = SIZES_M["car"]
     own = np.array([[-length, -width / 2], [0.0, -width / 2], [0.0, width / 2], [-length, width / 2]], np.float32)
     clear = (cv2.intersectConvexConvex(own, s.cuboid.footprint().astype(np.float32))[0] <= 0.0 for s in now.actors)
@@ -69,7 +69,7 @@ def without_collisions(now: world_state.World) -> world_state.World:
 
 
 def _turned(rng: np.random.Generator, now: world_state.World) -> world_state.World:
-    """The same world with some of its cars turned any way, as crossings and turns show them."""
+    """The same world with some cars at random headings, as at crossings and turns."""
     actors = tuple(
         replace(state, cuboid=state.cuboid._replace(yaw_rad=float(rng.uniform(-np.pi, np.pi))))
         if state.cuboid.size[0] < _SHORT_M and rng.random() < _TURNED
@@ -136,7 +136,7 @@ def random_traffic(rng: np.random.Generator, road: Road, models: Models) -> Scen
 
 
 def size_models(rng: np.random.Generator) -> Models:
-    """A dozen sizes of each kind. Any size in every picture would be more varied, but meshes are kept, not remade."""
+    """A dozen sizes of each kind. More sizes would give more variety, but meshes are cached."""
     return {kind: [_grown(rng, SIZES_M[kind]) for _ in range(_MODELS_A_KIND)] for kind in _KINDS}
 
 
@@ -170,7 +170,7 @@ def _colour(rng: np.random.Generator) -> str:
 
 
 def _lane_change(rng: np.random.Generator, road: Road, lane: int) -> list[dict[str, Any]]:
-    """Now and then a change to a neighbouring lane of the same carriageway."""
+    """Sometimes a change to a neighbouring lane of the same carriageway."""
     lanes = road.lanes_forward if lane < 0 else road.lanes_oncoming
     beside = [n for n in (lane - 1, lane + 1) if 1 <= abs(n) <= lanes and n * lane > 0]
     if not beside or rng.random() > 0.2:

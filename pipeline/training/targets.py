@@ -1,4 +1,4 @@
-"""Which cells of the grid answer for which vehicle, and what they should say."""
+"""Assignment of vehicles to the cells of the grid, and the targets of these cells."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from pipeline.types import F32
 from pipeline.vision.heads.decoder import grid_centres
 
 RANGES_PX = {8: (0.0, 56.0), 16: (40.0, 128.0), 32: (96.0, np.inf)}
-"""Geometric mean of a box's sides that each stride answers for; neighbours overlap, so that no size falls between."""
+"""Range of the geometric mean of a box's sides for each stride; ranges overlap, so that no size is left out."""
 RADIUS_CELLS = 1.0
 MIN_VISIBLE, MIN_HEIGHT_PX = 0.25, 5.0
-"""Less than this is neither wanted nor punished; less than ``_HIDDEN`` of a vehicle visible is background."""
+"""A vehicle less visible than this is ignored; less than ``_HIDDEN`` of a vehicle visible is background."""
 _HIDDEN = 0.05
 
 BACKGROUND, IGNORED = -1, -2

@@ -16,9 +16,7 @@ from pipeline.types.arrays import (
     Mask,
     Point2,
     Point3,
-    SourceKind,
     Window,
-    sensors_in_words,
 )
 from pipeline.types.frame import (
     REAL_VEHICLES,
@@ -65,6 +63,14 @@ from pipeline.types.result import (
     Result,
     SensorHealth,
 )
+from pipeline.types.sensors import (
+    MOST_SENSORS_FIRST,
+    OBJECT_SOURCES,
+    ObjectSource,
+    are_several,
+    seeing_sensors_in_words,
+    sensors_in_words,
+)
 from pipeline.types.situation import Moment, Situation
 
 __all__ = [
@@ -74,6 +80,8 @@ __all__ = [
     "GROUND",
     "I32",
     "I64",
+    "MOST_SENSORS_FIRST",
+    "OBJECT_SOURCES",
     "REAL_VEHICLES",
     "U8",
     "UNCLUSTERED",
@@ -101,6 +109,7 @@ __all__ = [
     "Moment",
     "MotionEstimate",
     "MotionSource",
+    "ObjectSource",
     "Obstacle",
     "OwnMotion",
     "Path",
@@ -115,11 +124,12 @@ __all__ = [
     "Route",
     "SensorHealth",
     "Situation",
-    "SourceKind",
     "StreamHealth",
     "Sweep",
     "VisionMeasurement",
     "VisionTrack",
     "Window",
+    "are_several",
+    "seeing_sensors_in_words",
     "sensors_in_words",
 ]

@@ -1,8 +1,6 @@
-"""Names for arrays, points and boxes, and for the sensors that have an object."""
+"""Names for arrays, points and boxes."""
 
 from __future__ import annotations
-
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -19,20 +17,5 @@ Box = tuple[float, float, float, float]
 """Axis-aligned image box ``x1 y1 x2 y2`` in pixels."""
 Window = tuple[int, int, int, int]
 """A part of a picture, ``x1 y1 x2 y2`` in whole pixels, the last ones not in it."""
-SourceKind = Literal["V", "L", "VL"]
-"""Which sensors have an object: vision only, LiDAR only, or both (paper, Table 3 "Name"). One letter a sensor."""
-
-SENSOR_NAMES = {"V": "camera", "L": "LiDAR"}
-"""What people call the sensor of each letter."""
-
-
-def sensors_in_words(source: str) -> str:
-    """``camera only``, ``LiDAR only``, ``both sensors``."""
-    if len(source) == 2:
-        return "both sensors"
-    names = [SENSOR_NAMES[letter] for letter in source]
-    return f"{names[0]} only" if len(names) == 1 else ", ".join(names)
-
-
 VEHICLES = frozenset({"car", "truck", "bus", "motorcycle"})
 """Class names that may be a lead vehicle. Detector labels are mapped to the COCO names by the detector."""

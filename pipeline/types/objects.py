@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.common.geometry import Cuboid
-from pipeline.types.arrays import F64, Box, Mask, Point2, Point3, SourceKind
+from pipeline.types.arrays import F64, Box, Mask, Point2, Point3
+from pipeline.types.sensors import ObjectSource, are_several, is_camera_in, is_lidar_in, is_ranging_in
 
 
 @dataclass(frozen=True)
@@ -212,7 +213,8 @@ Eligibility = Conditions[bool]
 
 @dataclass(frozen=True)
 class FusedObject:
-    """One physical object: the paper's Table 3 row, widened by what the contract asks for, whose frames and units hold.
+    """One physical object: the paper's Table 3 row, with what docs/reference/results.md adds; its frames and units
+    apply.
 
     A V object whose distance is not known (no law for its class, a box cut by the picture's edge, beyond the law's
     reach) keeps its row; its place and distance are None, and it cannot be the CIPV.
@@ -223,7 +225,7 @@ class FusedObject:
 
     id: int
     """The same from frame to frame, whichever sensors see the object."""
-    source: SourceKind
+    source: ObjectSource
     """Which sensors' tracks it is made of."""
     label: str | None
     """Its class, by the camera; None for what only the LiDAR has."""
@@ -243,7 +245,7 @@ class FusedObject:
     """Standard deviation of the distance."""
     velocity_mps: Point2 | None
     """Relative to ego, x and y; None until it can be told."""
-    seen_by: Literal["", "V", "L", "VL"]
+    seen_by: ObjectSource | Literal[""]
     """Which of its sensors saw it in this frame; none: it is carried."""
     hits: int
     """Sightings so far, by the sensor that has more of them."""
@@ -310,24 +312,29 @@ class FusedObject:
     def ranged(self) -> bool:
         """A sensor that measures range follows it, today the LiDAR. Otherwise its distance and speed come from the
         height of its image box, and are much less sure."""
-        return "L" in self.source
+        return is_ranging_in(self.source)
 
     @property
     def pictured(self) -> bool:
         """The camera follows it, so that its class is known."""
-        return "V" in self.source
+        return is_camera_in(self.source)
+
+    @property
+    def tracked_by_two_sensors(self) -> bool:
+        """More than one sensor follows it, whether or not each saw it in this frame."""
+        return are_several(self.source)
 
     @property
     def seen_by_camera(self) -> bool:
         """The camera saw it in this frame."""
-        return "V" in self.seen_by
+        return is_camera_in(self.seen_by)
 
     @property
     def seen_by_lidar(self) -> bool:
         """The LiDAR saw it in this frame."""
-        return "L" in self.seen_by
+        return is_lidar_in(self.seen_by)
 
     @property
     def seen_by_two_sensors(self) -> bool:
         """More than one sensor saw it in this frame, so no second look is needed to believe in it."""
-        return len(self.seen_by) > 1
+        return are_several(self.seen_by)

@@ -161,7 +161,8 @@ class Layers:
 
 @dataclass(frozen=True)
 class Result:
-    """What the pipeline concludes at one tick. ``pipeline.types.result_json`` writes it in the contract's form."""
+    """What the pipeline concludes at one tick. ``pipeline.types.result_json`` writes it as
+    docs/reference/results.md says."""
 
     frame: str
     """The recording's own name of the frame."""

@@ -1,6 +1,6 @@
 """A ``Result`` as one JSON object per frame that scripts, labels and scores read: the results contract, version 1.
 
-``docs/reference/results.md`` defines every field. "The contract" anywhere in the code is that page.
+``docs/reference/results.md`` defines every field.
 
 Metres, metres per second, radians and pixels rounded to four decimals; nanoseconds are whole. What is unknown is
 null: a number that is not finite is unknown too, so NaN and infinity never reach a file. Keys come in a fixed order,
@@ -196,7 +196,7 @@ def _acc(acc: AccCommand | None) -> dict[str, Any] | None:
 
 
 def _plain(record: Cipv | AccCommand) -> dict[str, Any]:
-    """A flat record whose names are the contract's own."""
+    """A flat record whose field names are those of docs/reference/results.md."""
     values = {field.name: getattr(record, field.name) for field in fields(record)}
     return {name: _number(value) if isinstance(value, float) else value for name, value in values.items()}
 

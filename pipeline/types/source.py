@@ -10,11 +10,9 @@ from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
 from pipeline.common.progress import Progress, silent
 from pipeline.params import SyncParams
+from pipeline.source_kinds import is_live
 from pipeline.types import F64, Box, CameraCalibration, EgoState, Frame, GnssFix, StreamHealth, Sweep
 from pipeline.types.camera_shot import Shot
-
-LIVE = "live:"
-"""Scheme of what is read from devices."""
 
 
 class SourceError(BadInput):
@@ -211,7 +209,7 @@ class Opening:
 
 def is_live_source(source: AnySource) -> TypeGuard[LiveSource]:
     """Whether it is live sensors, which have no frames to choose from."""
-    return source.uri.startswith(LIVE)
+    return is_live(source.uri)
 
 
 def is_simulated(source: AnySource) -> bool:

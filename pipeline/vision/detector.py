@@ -160,7 +160,7 @@ def _at_size(
         raise DetectorError(f"{path.name}: {error}") from None
     if own is not None and own != size and not decoder.own_grid and own[0] * own[1] == size[0] * size[1]:
         # The grid inside such a graph may be of the old width: the run cannot fail, and every box would be elsewhere.
-        raise DetectorError("the graph may hold a grid for its own size")
+        raise DetectorError("the graph may contain a grid for a fixed size")
     labels = class_names(decoder.classes, metadata)
     found = find_law(path)
     sha256 = file_sha256(path)

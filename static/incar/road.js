@@ -3,6 +3,7 @@ import { showPictureAt } from "../js/core/connection.js";
 import { onPicture, ui } from "../js/core/colors.js";
 import { $, text } from "../js/core/dom.js";
 import { num } from "../js/core/format.js";
+import { isPictured } from "../js/core/object_sources.js";
 import { drawBox, drawPath } from "../js/views/drawing/picture.js";
 import { get, on, paint } from "../js/core/store.js";
 import { Surface } from "../js/views/drawing/surface.js";
@@ -82,7 +83,7 @@ function drawObjects(ctx, { result, display }, X, Y) {
   const farFirst = [...result.objects].sort((a, b) => (b.distance_m ?? 1e9) - (a.distance_m ?? 1e9));
   for (const item of farFirst) {
     const box = boxOf(item.id);
-    if (!box || important(item.id) || item.carried || item.source === "L") continue;
+    if (!box || important(item.id) || item.carried || !isPictured(item)) continue;
     ctx.globalAlpha = 0.55;
     drawBox(ctx, box, onPicture("fused"), 1.5, X, Y);
     ctx.globalAlpha = 1;

@@ -92,7 +92,7 @@ def drive(
 
 @cache
 def _frames(uri: str) -> tuple[Frame, ...]:
-    """Read once: a picture takes longer to read than to go through the line."""
+    """Read once: reading a picture takes longer than running the pipeline on it."""
     source = open_source(uri)
     return tuple(source.frame(index) for index in range(len(source)))
 

@@ -1,7 +1,7 @@
 """Lane lines on pictures whose camera nobody calibrated: drawn for people, and compared with marks made by hand.
 
 Such a picture is given a camera that a dashboard usually has. Metres are then a guess, but the way from the picture to
-the road and back is the line's own, so where a line falls in the picture is what the line believes.
+the road and back is the pipeline's own, so the place of a line in the picture is the pipeline's estimate.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def alone(raw: RawLanes, width: int, height: int) -> tuple[EgoLane | None, Align
 
 
 def misses(name: str, lane: EgoLane | None, aligned: Alignment, marks: Marks) -> list[Miss]:
-    """Every mark of one picture against the line believed there."""
+    """Every mark of one picture compared with the line detected there."""
     lines = in_picture(lane, aligned) if lane is not None else {}
     found = []
     for row, sides in marks[name].items():

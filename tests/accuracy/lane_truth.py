@@ -33,7 +33,7 @@ _NEAR_M = 0.4
 @dataclass(frozen=True)
 class LaneError:
     """One line at one distance in one frame. error_m: believed minus true, to the left; null where no line was
-    believed. sigma_m: what the line itself says about that error."""
+    believed. sigma_m: the pipeline's own estimate of that error."""
 
     frame: int
     side: str

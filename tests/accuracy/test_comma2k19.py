@@ -30,8 +30,8 @@ PARAMS = PathParams()
 
 @dataclass(frozen=True)
 class Drive:
-    """One row per fix. t_s, speed_mps, yaw_rate_radps (mean of the 0.1 s before), course_rad: (N,). places: (N, 2)
-    UTM. fixes: as the line takes them."""
+    """One row per fix. t_s, speed_mps, yaw_rate_radps (mean of the 0.1 s before), course_rad: (N,). places: (N, 2) UTM.
+    fixes: as the pipeline takes them."""
 
     t_s: F64
     speed_mps: F64

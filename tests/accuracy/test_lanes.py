@@ -213,7 +213,7 @@ def test_the_lead_is_still_right_on_astyx(data_dir: Path, kind: str, every: int 
 
 @pytest.mark.parametrize("light", [0.1, 0.03])
 def test_a_dark_picture_ends_in_less_confidence_and_no_wrong_lead(data_dir: Path, light: float) -> None:
-    """A real drive at night, all of the line: the box network and the classical lanes see next to nothing."""
+    """A real drive at night through the whole pipeline: the box network and the classical lanes see next to nothing."""
     source = open_source(f"astyx:{data_dir / 'astyx'}")
     eyes = Detectors(open_detector(str(data_dir / "models" / "yolox_nano.onnx"), (2048, 618)), open_classical(None))
     part = _Part(source, SCORED_CLIPS["following at 22–24 m"])

@@ -10,13 +10,16 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 
-from app.bench.devtools import CHROMIUM, FLAGS
+from app.bench.page.devtools import CHROMIUM, FLAGS
 from app.engine.engine import Engine
-from app.engine.session_recording import RecordingDesk
+from app.engine.session_recording import SessionRecorder
+from app.labels.service.desk import LabelDesk
+from app.labels.store.database import Database
 from pipeline.detection import detector_for, lanes_for
 from pipeline.params import Params
 from pipeline.sources import open_source
 from tests.browser.conftest import Site
+from tests.browser.labels.hands import begin
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "img"
 SOURCE = "sim:straight"
@@ -51,6 +54,11 @@ def main() -> None:
         save(page, "align")
         page.close()
 
+        page = opened(browser, site)
+        labeled(page)
+        save(page, "label")
+        page.close()
+
         page = browser.new_page(viewport={"width": DISPLAY[0], "height": DISPLAY[1]}, color_scheme="dark")
         site.engine.control.change(playing=True)
         page.goto(f"{site.address}/drive/")
@@ -74,11 +82,12 @@ def dashboard() -> Iterator[Site]:
             uri=SOURCE,
             whole_drives=True,
             open_lanes=lanes_for,
-            desk=RecordingDesk(Path(folder)),
+            desk=SessionRecorder(Path(folder)),
+            labels=LabelDesk(Database.in_file(Path(folder) / "labels.db")),
         )
         engine.start()
         engine.control.change(target=MOMENT)
-        engine.wait_for(lambda shown: shown.tick is not None and shown.index == MOMENT, WAIT_MS / 1e3)
+        engine.wait_for(lambda shown: shown.processed is not None and shown.index == MOMENT, WAIT_MS / 1e3)
         site = Site(engine, 0)
         site.start()
         try:
@@ -109,6 +118,18 @@ def what_if(page: Page) -> None:
     expect(page.locator(".timeline-pane")).to_have_attribute("aria-busy", "false")
     page.get_by_role("tab", name="Runs").click()
     expect(page.locator(".metrics tbody tr")).not_to_have_count(0)
+    painted(page)
+
+
+def labeled(page: Page) -> None:
+    """Labeling mode with proposals for the whole drive, one track selected and accepted."""
+    begin(page)
+    page.keyboard.press("p")
+    expect(page.locator(".leads button[aria-pressed=true]")).to_have_count(1)
+    page.keyboard.press(".")
+    expect(page.locator(".track-detail")).to_be_visible()
+    page.keyboard.press("a")
+    expect(page.locator(".said")).to_contain_text("accepted")
     painted(page)
 
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import importlib
+import re
 from urllib.parse import urlsplit
 
 import pytest
 
 from app.web import help_pages
-from tests.docs.pages import DOCS, FILES, ROOT, links
+from tests.docs.pages import DOCS, FILES, ROOT, code_spans, links
 
 MOST_README_LINES = 150
 LARGEST_IMAGE_BYTES = 300_000
+PACKAGES = ("app", "pipeline", "static", "tests")
+IN_THIS_REPOSITORY = re.compile(r"(app|pipeline|static|tests|docs|\.ci)/[\w./-]*|(app|pipeline)(\.[a-z_0-9]+)+")
+TO_BE_WRITTEN = {"pipeline/radar"}
+"""What a guide tells its reader to make."""
+CITED_PAGE = re.compile(r"(?<![\w/])docs/[\w/-]+\.md\b")
 
 
 def anchors(file: str) -> set[str]:
@@ -37,6 +44,20 @@ def test_every_link_leads_somewhere(file: str) -> None:
     assert broken == []
 
 
+@pytest.mark.parametrize("file", FILES)
+def test_every_file_and_module_it_names_exists(file: str) -> None:
+    named = {span.rstrip("/") for span in code_spans(file) if IN_THIS_REPOSITORY.fullmatch(span)}
+    paths = {name.replace(".", "/") if "/" not in name else name for name in named} - TO_BE_WRITTEN
+    assert sorted(path for path in paths if not ((ROOT / path).exists() or (ROOT / f"{path}.py").exists())) == []
+
+
+def test_every_page_that_code_cites_exists() -> None:
+    sources = [path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".js")]
+    cited = {page for path in sources for page in CITED_PAGE.findall(path.read_text(encoding="utf-8"))}
+    assert "docs/reference/results.md" in cited
+    assert sorted(page for page in cited if not (ROOT / page).exists()) == []
+
+
 def test_the_index_lists_every_page_once() -> None:
     groups = help_pages.navigation((DOCS / help_pages.INDEX).read_text(encoding="utf-8"))
     listed = [target for group in groups for target, _ in group.links]
@@ -57,6 +78,14 @@ def test_every_image_is_small_and_used() -> None:
     images = set((DOCS / "img").iterdir())
     assert {image.name for image in images if image.stat().st_size > LARGEST_IMAGE_BYTES} == set()
     assert {image.name for image in images - used} == set()
+
+
+def test_every_screenshot_is_made_by_the_script() -> None:
+    pytest.importorskip("playwright")
+    importlib.import_module("tests.docs.screenshots")
+    script = (ROOT / "tests" / "docs" / "screenshots.py").read_text(encoding="utf-8")
+    made = set(re.findall(r'save\(.*, "(\w+)"\)', script))
+    assert made == {image.stem for image in (DOCS / "img").glob("*.jpg")}
 
 
 def test_the_readme_is_short() -> None:

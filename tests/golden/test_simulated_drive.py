@@ -1,4 +1,4 @@
-"""What the line believed of the embedded drive when somebody last looked at it and found it right.
+"""The results of the pipeline on the embedded drive, as last reviewed and found right.
 
 A change that moves these numbers must be looked at; then `CIPV_UPDATE_GOLDEN=1 pytest tests/golden` writes them anew.
 Numbers are compared within what another processor's rounding may do, decisions exactly.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.common.geometry import Cuboid
-from pipeline.types import Box, EgoState, FusedObject, LidarTrack, Moment, Obstacle, SourceKind, VisionTrack
+from pipeline.types import Box, EgoState, FusedObject, LidarTrack, Moment, ObjectSource, Obstacle, VisionTrack
 
 
 def moment(ego: EgoState | None = None, dt_s: float | None = None) -> Moment:
@@ -42,7 +42,7 @@ def fused(
     object_id: int,
     x: float | None,
     y: float = 0.0,
-    source: SourceKind = "VL",
+    source: ObjectSource = "VL",
     velocity: tuple[float, float] | None = (0.0, 0.0),
     label: str | None = "car",
     hits: int = 5,

@@ -1,7 +1,7 @@
 """Live sensors for half a minute, or ten minutes (`make soak`), with every fault there is: nothing crashes, memory
 stays, every sensor that returns is used again, the recording is complete, and the page's frames are young.
 
-The car is a process of its own on loopback. Here run the readers, the line with its network and lane detector, the
+The car is a process of its own on loopback. Here run the readers, the pipeline with its network and lane detector, the
 encoder of the page's frames, and the recorder. The short form runs what comes with the program and judges what does not
 depend on how busy the machine is. The long form runs the network for real roads where it is here, on two cores; the
 report says which.

@@ -1,7 +1,6 @@
-"""The dashboard in a real browser, timed there: what is painted, how soon, and what it costs.
-
-All times are the page's own: from a navigation, a frame made, or a hand's act, until the message that follows the
-painting of the frame that shows it.
+"""The dashboard timed in a real browser: what is painted, how soon, and at what cost. All times are measured by the
+page: from a navigation, the creation of a frame or a user action to the message that follows the paint of the frame
+that shows it.
 """
 
 from __future__ import annotations
@@ -16,7 +15,8 @@ _FIRST_VIEWS = 5
 _SEEKS = 24
 _SLIDES = 24
 _FAR = 37
-"""Frames from one seek to the next, around the recording: coprime with most lengths, so nearly all are visited."""
+"""Frames between one seek and the next, modulo the recording: coprime with most lengths, so that nearly all frames are
+visited."""
 _PARAMETER = "cluster.tolerance_m"
 _ACT_PAUSE_MS, _PATIENCE_MS = 120, 30_000
 
@@ -80,15 +80,15 @@ _ACT = """async ([acts, pause, patience]) => {
 
 
 class Waits(NamedTuple):
-    """Milliseconds from a hand's act: until camera, plan, the lead's figures and the timeline's cursor are painted with
-    what comes of it; and until the table, the reasons and the parameters are too, one turn of the screen later."""
+    """Milliseconds from a user action until the camera image, the bird's-eye view, the lead's figures and the timeline
+    cursor show the outcome; and until the table, the reasons and the parameters do, one screen refresh later."""
 
     painted_ms: float
     whole_ms: float
 
 
 def first_views_ms(running: Browser, address: str) -> list[float]:
-    """From opening the address to the first frame painted, each with nothing kept from before."""
+    """Milliseconds from opening the address to the first painted frame, each time with an empty cache."""
     found = []
     for _ in range(_FIRST_VIEWS):
         page = opened(running, address)
@@ -98,15 +98,15 @@ def first_views_ms(running: Browser, address: str) -> list[float]:
 
 
 def opened(running: Browser, address: str) -> Page:
-    """The dashboard in a fresh profile, once it has painted a frame."""
+    """The dashboard in a fresh profile, after its first painted frame."""
     page = running.open(address, f"(async () => {{ {_WATCH} }})()")
     page.call(_ONE_PAINTED, _PATIENCE_MS)
     return page
 
 
 def playing(running: Browser, address: str, for_s: float) -> tuple[list[float], float, dict[str, float]]:
-    """Of each frame painted while it plays: milliseconds from the result made. Frames a second; and the browser's
-    processor time in milliseconds a frame, by kind of process."""
+    """During playback: milliseconds from the creation of the result to each painted frame, frames per second, and the
+    browser's CPU time in ms per frame by kind of process."""
     page = opened(running, address)
     time.sleep(_SETTLE_S)
     page.call("() => { window.painted = []; }")
@@ -121,8 +121,8 @@ def playing(running: Browser, address: str, for_s: float) -> tuple[list[float], 
 
 
 def paused(running: Browser, address: str, count: int, settle_s: float = _SETTLE_S) -> tuple[list[Waits], list[Waits]]:
-    """On a recording of ``count`` frames that is paused: how long after each seek, and each of a slider's moves, with a
-    page that was opened ``settle_s`` ago."""
+    """Delays after each seek and each slider move on a paused recording of ``count`` frames, with a page that was
+    opened ``settle_s`` ago."""
     page = opened(running, address)
     time.sleep(settle_s)
     seeks = [{"seek": (_FAR * (n + 1)) % count} for n in range(_SEEKS)] if count > 1 else []

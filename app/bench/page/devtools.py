@@ -1,8 +1,7 @@
-"""Chromium without a window, spoken to by its DevTools protocol (https://chromedevtools.github.io/devtools-protocol).
+"""Headless Chromium, driven by its DevTools protocol (https://chromedevtools.github.io/devtools-protocol).
 
-Only scripts are run in its pages. A tool that drives browsers for tests watches all their requests too: the page then
-has each message of the stream encoded anew for it, which costs ten milliseconds and more a frame on two cores, and
-which nobody who looks at the page pays.
+It only runs scripts in pages. Browser test tools also watch all requests, so that every message of the stream is
+encoded again for the tool. That costs 10 ms and more per frame on two cores, which no real user pays.
 """
 
 from __future__ import annotations
@@ -31,17 +30,17 @@ FLAGS = (
     "--disable-component-update",
     "--disable-sync",
 )
-"""As a browser starts by itself where there is no graphics card: the page is composed by the processor, and WebGL
-is there for the 3D views."""
+"""The browser's own defaults on a machine without a GPU: the CPU composes the page, and WebGL is available for the 3D
+views."""
 SIZE_PX = (1440, 900)
 _STARTS_WITHIN_S, _LOOK_EVERY_S, _ANSWERS_WITHIN_S = 30.0, 0.05, 120.0
 
 
 @contextmanager
 def browser() -> Iterator[Browser]:
-    """Chromium with a profile of its own. BadInput where it is missing or does not start."""
+    """Chromium with its own profile. BadInput when it is missing or does not start."""
     if not CHROMIUM.exists():
-        raise BadInput(f"the page's bench needs a browser at {CHROMIUM}")
+        raise BadInput(f"the page benchmark needs a browser at {CHROMIUM}")
     with tempfile.TemporaryDirectory(prefix="cipv-browser-", ignore_cleanup_errors=True) as profile:
         command = [str(CHROMIUM), "--headless", "--remote-debugging-port=0", f"--user-data-dir={profile}", *FLAGS]
         running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -54,7 +53,7 @@ def browser() -> Iterator[Browser]:
 
 
 def _address(profile: Path, running: subprocess.Popen[bytes]) -> str:
-    """Where it listens: it writes the port and the path into its profile."""
+    """The address it listens on, which it writes to its profile."""
     said, deadline = profile / "DevToolsActivePort", time.monotonic() + _STARTS_WITHIN_S
     while time.monotonic() < deadline and running.poll() is None:
         port, _, path = said.read_text().partition("\n") if said.exists() else ("", "", "")
@@ -73,7 +72,7 @@ class Browser:
         self._told: set[tuple[str, str]] = set()
 
     def ask(self, method: str, session: str | None = None, **params: Any) -> dict[str, Any]:
-        """A command's answer. BadInput where the browser refuses it or is silent."""
+        """The answer to a command. BadInput when the browser refuses it or does not answer."""
         self._asked += 1
         command = {"id": self._asked, "method": method, "params": params} | ({"sessionId": session} if session else {})
         self._socket.send(json.dumps(command))
@@ -84,7 +83,7 @@ class Browser:
         return dict(answer["result"])
 
     def wait_for(self, event: str, session: str) -> None:
-        """Until the browser has told of something, now or before."""
+        """Wait until the browser has reported an event, now or earlier."""
         while (event, session) not in self._told:
             self._heard(event)
 
@@ -92,13 +91,13 @@ class Browser:
         try:
             said: dict[str, Any] = json.loads(self._socket.recv(timeout=_ANSWERS_WITHIN_S))
         except TimeoutError:
-            raise BadInput(f"the browser says nothing to {waiting_for}") from None
+            raise BadInput(f"the browser does not respond to {waiting_for}") from None
         if "method" in said:
             self._told.add((said["method"], said.get("sessionId", "")))
         return said
 
     def open(self, address: str, first: str = "") -> Page:
-        """A page with nothing kept from before, once it is loaded. first: a script that runs before its own."""
+        """A loaded page with an empty cache. first: a script that runs before the page's own."""
         context = self.ask("Target.createBrowserContext")["browserContextId"]
         width, height = SIZE_PX
         target = self.ask("Target.createTarget", url="about:blank", browserContextId=context)["targetId"]
@@ -112,7 +111,7 @@ class Browser:
         return Page(self, context, session)
 
     def cpu_s(self) -> dict[str, float]:
-        """Processor time so far, by kind of process."""
+        """CPU time so far, by kind of process."""
         spent: dict[str, float] = {}
         for process in self.ask("SystemInfo.getProcessInfo")["processInfo"]:
             spent[process["type"]] = spent.get(process["type"], 0.0) + process["cpuTime"]
@@ -126,7 +125,8 @@ class Page:
         self._browser, self._context, self._session = browser, context, session
 
     def call(self, function: str, *given: Any) -> Any:
-        """What a JavaScript function comes to, a promise awaited. BadInput with its words where it throws."""
+        """The value that a JavaScript function returns; a promise is awaited. BadInput with its message when it
+        throws."""
         script = f"({function})({', '.join(map(json.dumps, given))})"
         wanted = {"expression": script, "awaitPromise": True, "returnByValue": True}
         answer = self._browser.ask("Runtime.evaluate", self._session, **wanted)
@@ -135,5 +135,5 @@ class Page:
         return answer["result"].get("value")
 
     def close(self) -> None:
-        """And forget all that it kept."""
+        """Close it and discard its storage."""
         self._browser.ask("Target.disposeBrowserContext", browserContextId=self._context)

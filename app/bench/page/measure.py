@@ -1,5 +1,5 @@
-"""How fresh the page is: from a result made to its frame painted, in a real browser, and what painting costs it; and
-how soon a changed parameter shows in the stream while the drive plays."""
+"""Page latency in a real browser: from the creation of a result to the painted frame, the cost of painting, and how
+soon a changed parameter shows in the stream during playback."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ _REVISION = re.compile(rb'"params_revision":([0-9]+)')
 
 
 def figures(source: str, for_s: float) -> dict[str, Any]:
-    """Milliseconds. ``page``: latency from result made to painted, and processor time a frame by kind of process; when
-    paused, from a seek and from a slider's move to painted, the seek also with 100,000 labels in the labeling mode; and
-    from opening the address to the first frame painted. ``while_computed``: the same while the whole drive is computed
-    for the first time, with networks.
-    ``parameter``: while it plays, from the request to the first message with its result. BadInput without a browser."""
+    """All in milliseconds. ``page``: latency from result to paint, and CPU time per frame by kind of process; when
+    paused, latency from a seek and from a slider move to the paint, and from a seek with 100,000 labels in labeling
+    mode; from opening the address to the first painted frame. ``while_computed``: the same while the whole drive is
+    computed for the first time, with networks. ``parameter``: during playback, from the request to the first message
+    with its result. BadInput without a browser."""
     with browser() as running:
         with _dashboard(source) as address:
             live = _playing(running, address, for_s)
@@ -47,7 +47,7 @@ def figures(source: str, for_s: float) -> dict[str, Any]:
 
 @contextmanager
 def _dashboard(source: str) -> Iterator[str]:
-    """The address of a dashboard that plays, in a process of its own."""
+    """The address of a dashboard that plays a recording, in its own process."""
     code = "import sys; from app.cli import main; sys.exit(main())"
     folder = tempfile.TemporaryDirectory(prefix="cipv-bench-")
     labels = f"sqlite:///{folder.name}/labels.db"  # nobody's own are touched
@@ -102,8 +102,8 @@ def _still(running: Browser, address: str) -> dict[str, Any]:
 
 
 def _while_computed(running: Browser, address: str) -> dict[str, Any]:
-    """From the start on. frames_hz: how many are computed meanwhile. to_the_end: there was something to compute all the
-    time; a drive that is too short is done before."""
+    """Measured from the start. frames_hz: frames computed per second meanwhile. to_the_end: the computation lasted for
+    the whole measurement; a short drive is finished earlier."""
     _post(address, "POST", "/api/playback", {"playing": False})
     before, start = _state(address), time.monotonic()
     seeks, slides = paused(running, address, int(before["count"]), _SETTLE_BRIEFLY_S)
@@ -119,14 +119,14 @@ def _while_computed(running: Browser, address: str) -> dict[str, Any]:
 
 
 def _waits(waits: list[Waits]) -> dict[str, Any]:
-    """To the frame painted, and to the whole page: table, reasons and parameters follow the frame."""
+    """Until the frame is painted, and until the whole page is: table, reasons and parameters follow the frame."""
     whole = _spread([each.whole_ms for each in waits])
     return {**_spread([each.painted_ms for each in waits]), "whole": whole}
 
 
 def _paused_with_all_seen(address: str) -> int:
-    """Pause once the networks have looked at every frame, as they have when a person has waited for the timeline; how
-    many frames there are."""
+    """Pause after the networks have seen every frame, as when a user has waited for the timeline. Returns the number of
+    frames."""
     deadline = time.monotonic() + _ALL_SEEN_WITHIN_S
     while time.monotonic() < deadline:
         if not _state(address)["drive"]["running"]:
@@ -142,7 +142,7 @@ def _state(address: str) -> Any:
 
 
 def _parameter(address: str, for_s: float) -> dict[str, Any]:
-    """While the drive plays: one parameter, to and fro."""
+    """Change one parameter back and forth during playback."""
     waits_ms: list[float] = []
     with connect(_stream(address), max_size=None, compression=None) as socket:
         end = time.monotonic() + for_s
@@ -175,7 +175,7 @@ def _revision_of(message: bytes) -> int:
 
 
 def _drop_waiting(socket: Any) -> None:
-    """Forget what came while nobody waited for it."""
+    """Discard messages that arrived while nobody was waiting for them."""
     while True:
         try:
             socket.recv(timeout=0)

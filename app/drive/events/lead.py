@@ -8,6 +8,7 @@ import numpy as np
 
 from app.drive.events.event import Event, EventFinder, RunRows, ids
 from app.drive.frame_rows import Objects
+from pipeline.types import seeing_sensors_in_words
 
 LONGEST_LOOK_BACK = 30
 """Frames before a change in which an object's place in or out of the path is looked for."""
@@ -48,7 +49,7 @@ def _lead_change(run: RunRows, index: int, last: int | None, now: int | None, se
         return Event("cipv_switch", index, f"CIPV #{last} → #{now} at {at}", (now, last), "notice")
     if now in seen:
         return Event("cipv_switch", index, f"#{now} is the CIPV again at {at}", (now,), "info")
-    seen_by = {"V": "the camera", "L": "the LiDAR", "VL": "both sensors"}.get(row.source or "", "nobody")
+    seen_by = seeing_sensors_in_words(row.source or "")
     return Event("first_acquisition", index, f"#{now} acquired at {at} by {seen_by}", (now,), "info")
 
 

@@ -62,7 +62,7 @@ def put_proposals(
     flat = sum(all(each.cuboid is None for each in track.sightings) for track in found.tracks)
     more = [
         f"{known} more are labelled already" if known else "",
-        f"{flat} without a cuboid, which the camera alone has seen" if flat else "",
+        f"{flat} seen by the camera only, without a cuboid" if flat else "",
     ]
     return "; ".join((acted.what, *filter(None, more)))
 

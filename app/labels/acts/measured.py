@@ -46,7 +46,7 @@ def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> t
     if sighting.cuboid is not None:
         found = refit(frame.sweep.points, sighting.cuboid)
         cuboid = found.cuboid
-        note = f"laid on {found.points} points" + ("" if found.turned else "; they do not say how it is turned")
+        note = f"fitted to {found.points} points" + ("" if found.turned else "; its heading is not visible from them")
     else:
         seen = lift(frame, params, track.label, sighting.bbox)
         if not seen.points:

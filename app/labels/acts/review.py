@@ -43,7 +43,7 @@ def review_ok(draft: Draft, scope: Scope, act: ReviewOk) -> str:
             raise ActRefused(f"you have reviewed {_name(value)} already")
         made = value.origin.name if value.origin.maker == "person" else None
         if draft.person in (made, draft.changed_by(ref.kind, ref.id)):
-            raise ActRefused(f"you changed {_name(value)} last: a second person reviews it")
+            raise ActRefused(f"you changed {_name(value)} last: a second person must review it")
         draft.put(ref.kind, ref.id, replace(_answered(value), state="accepted", reviewer=draft.person))
         done.append(value)
     return f"reviewed and accepted {_names(done)}"

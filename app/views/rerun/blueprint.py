@@ -12,13 +12,13 @@ CAMERA = "world/camera"
 OVERLAYS = f"{CAMERA}/overlay"
 BEV_AHEAD_M, BEV_BEHIND_M, BEV_ASIDE_M = 80.0, 8.0, 24.0
 TTC_AXIS_S = 20.0
-"""A longer time to collision is no news."""
+"""Longer times to collision are not shown."""
 _BACKGROUND = (13, 17, 23)
 _NO_LEGEND = rrb.PlotLegend(visible=False)
 
 
 def blueprint(opening: RerunStartOptions = PLAYING) -> rrb.Blueprint:
-    """The layout that a replay carries inside its file."""
+    """The layout stored in the file."""
     camera = rrb.Spatial2DView(name="Camera", origin=CAMERA, contents=[f"{CAMERA}/image", f"{OVERLAYS}/**"])
     world = rrb.Spatial3DView(
         name="World",

@@ -1,4 +1,4 @@
-"""What is shown, streamed to a rerun viewer that runs beside: on a thread of its own, newest frame only."""
+"""Streams what is shown to a running rerun viewer, on its own thread, newest frame only."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from app.views.rerun.view import ReplayError, RerunSink, ViewerAddress
 logger = logging.getLogger("cipv.rerun")
 
 _PATIENCE_S = 2.0
-"""A viewer that takes a frame no faster is taken for gone, so that nothing piles up for it."""
+"""A viewer that takes longer for a frame counts as gone, so that nothing queues up for it."""
 _RETRY_S = 2.0
 _SCHEMES = ("rerun", "rerun+http", "rerun+https")
 
 
 class RerunFeed:
-    """Streams in a ``with`` block. A viewer that is not there, or leaves, is looked for again; frames meanwhile are
-    dropped. ReplayError for what is no viewer's address.
-
-    sent: frames that a viewer has taken so far."""
+    """Streams in a ``with`` block. Reconnects when there is no viewer or it leaves; frames are dropped meanwhile.
+    ReplayError when the address is not a viewer's. sent: frames that a viewer has received so far."""
 
     def __init__(self, engine: Engine, url: str) -> None:
         parts = urlsplit(url)
         if parts.scheme not in _SCHEMES or parts.hostname is None or parts.port is None:
-            raise ReplayError(f"{url}: a rerun viewer's address is like rerun+http://127.0.0.1:9876/proxy")
+            raise ReplayError(
+                f"{url}: not the address of a rerun viewer; expected e.g. rerun+http://127.0.0.1:9876/proxy"
+            )
         self._place = (parts.hostname, parts.port)
         self._viewer = ViewerAddress(url)
         self._engine = engine
@@ -76,7 +76,7 @@ class RerunFeed:
             sink.abandon()
 
     def _connect(self, snapshot: Snapshot) -> RerunSink | None:
-        """A sink, if somebody listens; else None, after a while, with the frame to be tried again."""
+        """A sink if a viewer listens; otherwise None after a while, with the frame to try again."""
         try:
             socket.create_connection(self._place, _PATIENCE_S).close()
         except OSError:

@@ -14,7 +14,7 @@ from pipeline.common.geometry import F64
 from pipeline.types import Box, FusedObject, Path, Picture, Result
 
 FAINT, THIN, THICK, POINT = (rr.Radius.ui_points(size) for size in (0.5, 1.0, 2.5, 1.4))
-"""Radii in points of the screen, the same however near one looks."""
+"""Radii in screen points, independent of the zoom."""
 _JPEG_QUALITY = 80
 
 
@@ -24,7 +24,7 @@ def sides(path: Path) -> dict[str, F64]:
 
 
 def to_bev(points: npt.NDArray[np.floating]) -> F64:
-    """Ego x, y as a picture seen from above, forward is up: right is −y, down is −x."""
+    """Ego x, y as image axes seen from above, forward up: right is −y, down is −x."""
     return np.column_stack([-points[:, 1], -points[:, 0]])
 
 
@@ -96,7 +96,7 @@ def boxes(
 
 
 def encoded(picture: Picture) -> rr.EncodedImage:
-    """The camera's own JPEG as it came; a raw picture is encoded once."""
+    """The camera's own JPEG unchanged; a raw image is encoded once."""
     if picture.encoded is not None and picture.encoded.startswith(b"\xff\xd8"):
         return rr.EncodedImage(contents=picture.encoded, media_type="image/jpeg")
     jpeg = cv2.imencode(".jpg", picture.bgr, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])[1]

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class RerunStartOptions:
-    """paused: it stands still at its first frame instead of playing. compact: laid out for a narrow pane, the camera
-    above and one other view at a time below it."""
+    """paused: it starts paused at the first frame. compact: for a narrow pane, the camera above and one other view at a
+    time below."""
 
     paused: bool = False
     compact: bool = False
 
 
 PLAYING = RerunStartOptions()
-"""As a file opens that somebody keeps."""
+"""How a saved file opens."""

@@ -32,12 +32,12 @@ _ARROW_S = 1.0
 
 
 class ReplayError(BadInput):
-    """A replay that cannot be written; the text is one sentence that names the file."""
+    """The .rrd file cannot be written; the message is one sentence that names the file."""
 
 
 @dataclass(frozen=True)
 class ViewerAddress:
-    """A running viewer, as it names itself: ``rerun+http://127.0.0.1:9876/proxy``."""
+    """A running viewer, by the address it prints: ``rerun+http://127.0.0.1:9876/proxy``."""
 
     url: str
 
@@ -78,13 +78,13 @@ class RerunSink:
         try:
             self._rec.save(path)
         except RuntimeError as error:
-            raise ReplayError(f"{path}: the replay cannot be written: {_cause(error)}") from None
+            raise ReplayError(f"{path}: cannot write the rerun file: {_cause(error)}") from None
 
     def _connect(self, viewer: ViewerAddress) -> None:
         try:
             self._rec.connect_grpc(viewer.url)
         except (RuntimeError, ValueError) as error:
-            raise ReplayError(f"{viewer.url}: no address of a rerun viewer: {error}") from None
+            raise ReplayError(f"{viewer.url}: not the address of a rerun viewer: {error}") from None
 
     def show(self, frame: Frame, result: Result) -> None:
         """Add one frame."""
@@ -97,7 +97,8 @@ class RerunSink:
         self._log_reasons(result)
 
     def flush(self, timeout_s: float) -> bool:
-        """Wait until what was shown is written or sent; false when that takes longer, as with a viewer that is gone."""
+        """Wait until everything shown is written or sent; false when that takes longer, for example because the viewer
+        is gone."""
         try:
             self._rec.flush(timeout_sec=timeout_s)
         except (RuntimeError, ValueError):
@@ -105,7 +106,7 @@ class RerunSink:
         return True
 
     def abandon(self) -> None:
-        """End without waiting for a viewer that does not answer."""
+        """Close without waiting for a viewer that does not answer."""
         self._rec.disconnect()
 
     def close(self) -> None:
@@ -246,7 +247,7 @@ class RerunSink:
             self._scalar(f"timing/{stage}", value)
 
     def _scalar(self, name: str, value: float | None) -> None:
-        """A None breaks the curve instead of drawing a number that nobody measured."""
+        """None interrupts the curve instead of drawing a value that was not measured."""
         self._put(f"curves/{name}", None if value is None else rr.Scalars(value))
 
     def _log_reasons(self, result: Result) -> None:
@@ -263,5 +264,5 @@ class RerunSink:
 
 
 def _cause(error: RuntimeError) -> str:
-    """The operating system's own words, without the library's frame around them."""
+    """The operating system's message, without the library's wrapping."""
     return str(error).removeprefix("Failed to create file: ").partition(" (os error")[0].lower()

@@ -1,4 +1,4 @@
-"""rerun's own web viewer, its files served by us.
+"""rerun's own web viewer, served by this program.
 
 The viewer is inside the ``rerun`` program that the wheel installs, which serves it on every interface by itself. So the
 program is started once, on loopback, its two files are taken over, and it is ended. It runs with a home of its own and
@@ -29,11 +29,11 @@ _BLOCK = 1 << 20
 
 
 class NoViewer(BadInput):
-    """This installation has no web viewer; the text says why."""
+    """This installation has no web viewer; the message says why."""
 
 
 class ViewerFiles:
-    """The viewer's files, fetched when they are asked for first. Any thread. ``close`` removes them."""
+    """The viewer's files, fetched when first requested. Thread-safe. ``close`` removes them."""
 
     def __init__(self, program: Path | None = None) -> None:
         self._program = program
@@ -41,7 +41,7 @@ class ViewerFiles:
         self._folder: Path | None = None
 
     def path(self, name: str) -> Path:
-        """Where one of ``FILES`` lies. NoViewer when the viewer cannot be had."""
+        """The path of one of ``FILES``. NoViewer when the viewer is not available."""
         if name not in FILES:
             raise NoViewer(f"the viewer has no file {name}")
         with self._lock:
@@ -97,7 +97,7 @@ def _fetch_into(program: Path, folder: Path) -> None:
             with _get(port, name) as response, (folder / name).open("wb") as file:
                 shutil.copyfileobj(response, file, _BLOCK)
     except OSError as error:
-        raise NoViewer(f"the rerun program did not give its web viewer: {error}") from None
+        raise NoViewer(f"the rerun program did not serve its web viewer: {error}") from None
     finally:
         server.kill()
         server.wait()
@@ -127,7 +127,7 @@ def _get(port: int, name: str) -> IO[bytes]:
 
 
 def free_ports(count: int) -> list[int]:
-    """Ports of loopback that nobody listens on now."""
+    """Free ports on loopback."""
     sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
     ports = [each.getsockname()[1] for each in sockets]
     for each in sockets:

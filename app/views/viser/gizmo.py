@@ -1,6 +1,5 @@
-"""A cuboid under a hand in the 3D view: one gizmo moves and turns it, a knob on each face but the lowest moves that.
-
-The gizmo of viser does not resize, so each knob is a gizmo that moves along one axis; the opposite face is held."""
+"""Editing a cuboid in the 3D view: one gizmo moves and turns it, and a handle on each face except the bottom moves that
+face. viser's gizmo cannot resize, so each handle is a gizmo that moves along one axis while the opposite face stays."""
 
 from __future__ import annotations
 
@@ -24,13 +23,13 @@ FACES = {"front": (0, 1), "rear": (0, -1), "left": (1, 1), "right": (1, -1), "to
 _SMALLEST_M = 0.2
 _KNOB_M = 0.8
 _UPRIGHT = ((0.0, 0.0), (0.0, 0.0), (-1000.0, 1000.0))
-"""A cuboid stands: it turns about z alone."""
+"""A cuboid is upright: it turns about z only."""
 _COLOR = (255, 255, 255)
 
 
 class CuboidGizmo:
-    """Shown while a cuboid is held. Any thread; ``on_drag`` is called on viser's event loop and must be quick. A drag
-    is about the label that it began with, whatever is held meanwhile."""
+    """Shown while a cuboid is edited. Thread-safe; ``on_drag`` is called on viser's event loop and must be quick. A
+    drag belongs to the label that it started on, even if another one is selected meanwhile."""
 
     def __init__(self, scene: viser.SceneApi, on_drag: OnDrag) -> None:
         self._scene, self._on_drag = scene, on_drag
@@ -42,14 +41,14 @@ class CuboidGizmo:
         self._handles: dict[str, viser.TransformControlsHandle] = {}
 
     def hold(self, held: HeldCuboid | None) -> None:
-        """Show it here; None takes it away. While a hand drags something, the hand is right."""
+        """Show it here; None removes it. During a drag the user's handle takes precedence."""
         with self._lock:
             self._wanted = held
             if self._before is None:
                 self._show(held)
 
     def leave(self, client: int) -> None:
-        """This browser is gone: what its hand had stays where it has brought it."""
+        """This browser disconnected: what it dragged stays where it is."""
         with self._lock:
             held = self._held
             if self._before is None or held is None or client != self._hand:
@@ -103,13 +102,13 @@ class CuboidGizmo:
         return follow
 
     def _let_go(self, held: HeldCuboid) -> None:
-        """The hand is off it. Its page says where it is from now on; another label that is held by now is shown."""
+        """The drag is over. From now on the page says where it is; a label selected meanwhile is shown."""
         self._before = self._hand = None
         if not held.is_of(self._wanted):
             self._show(self._wanted)
 
     def _place(self, cuboid: Cuboid, held: str | None) -> None:
-        """Draw it, and put every handle but the held one where it belongs."""
+        """Draw it, and place every handle except the dragged one."""
         edges = cuboid_edges(cuboid)
         self._scene.add_line_segments(f"{NODE}/edges", edges, _COLOR, thickness=3.0, thickness_units="screen")
         turn = (math.cos(cuboid.yaw_rad / 2), 0.0, 0.0, math.sin(cuboid.yaw_rad / 2))

@@ -1,4 +1,4 @@
-"""Sliders, switches and choices of every parameter in the 3D view, built from the parameters' own schema."""
+"""Sliders, switches and choices for every parameter in the 3D view, built from the parameters' schema."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ OnChange = Callable[[str, Any], None]
 
 
 class ParamsGui:
-    """One folder a section, all closed at first; a parameter that may be None has a switch "auto" before its slider.
-
-    ``on_change(name, value)`` is called with a dotted name when a person moves something, never for ``set``.
+    """One folder per section, all closed at first; a parameter that may be None has an "auto" switch before its slider.
+    ``on_change(name, value)`` is called with a dotted name when the user changes something, never for ``set``.
     """
 
     def __init__(self, gui: viser.GuiApi, params: Params, on_change: OnChange) -> None:
@@ -39,10 +38,9 @@ class ParamsGui:
         return tuple(self._inputs)
 
     def set(self, params: Params) -> None:
-        """Show these values to everybody. Nobody is told of a change.
-
-        Only what differs is written: a slider that a person has just moved, and whose word is still on its way to
-        ``on_change``, would otherwise be put back and the move lost."""
+        """Show these values to everybody, without calling ``on_change``. Only differences are written: otherwise a
+        slider that the user has just moved, whose ``on_change`` is still pending, would jump back and the change would
+        be lost."""
         for section, values in params.model_dump().items():
             for key, value in values.items():
                 name = f"{section}.{key}"
@@ -61,7 +59,7 @@ class ParamsGui:
     def _add(self, name: str, spec: Mapping[str, Any], value: Any) -> None:
         label, hint = _label(name, spec), spec.get("description", "")
         if "anyOf" in spec:
-            auto = self._gui.add_checkbox(f"{label} auto", value is None, hint="Take it from the calibration")
+            auto = self._gui.add_checkbox(f"{label} auto", value is None, hint="Use the value of the calibration")
             self._autos[name] = auto
             auto.on_update(lambda event: self._auto_moved(name, event))
         handle = self._input(label, hint, spec, value)
@@ -100,7 +98,7 @@ class ParamsGui:
 
 
 _UNIT_SUFFIXES = frozenset({"m", "px", "deg", "s", "mps", "mps2", "kmh"})
-"""Ends of names in code that say the unit."""
+"""Name suffixes that state the unit."""
 
 
 def _words(name: str) -> str:

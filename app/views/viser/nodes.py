@@ -1,4 +1,5 @@
-"""One function a part of the 3D scene: each puts its node under its fixed name, or hides it when there is nothing."""
+"""One function per part of the 3D scene. Each sets its node under a fixed name, or hides it when there is nothing to
+show."""
 
 from __future__ import annotations
 
@@ -38,7 +39,7 @@ def cloud(scene: viser.SceneApi, points: npt.NDArray[np.float32], colors: outlin
 
 @dataclass
 class Strokes:
-    """Parts of one node, each with its colour."""
+    """The parts of one node, each with its colour."""
 
     parts: list[F64] = field(default_factory=list)
     colors: list[Rgb] = field(default_factory=list)
@@ -77,7 +78,7 @@ def arrows(scene: viser.SceneApi, strokes: Strokes) -> None:
 def filled(
     scene: viser.SceneApi, name: str, each: FusedObject | None, color: Rgb, opacity: float, floor_m: float
 ) -> None:
-    """An object filled in, whichever sensor gave its place."""
+    """An object as a solid box, whichever sensor gave its place."""
     if each is None or each.bev is None:
         return _hide(scene, name)
     corners = np.asarray(each.bev)
@@ -130,7 +131,7 @@ def path(scene: viser.SceneApi, corridor: Path, floor_m: float) -> None:
 
 
 def floor(scene: viser.SceneApi, floor_m: float) -> None:
-    """What stands on the ground, at this frame's ground: a grid of ten-metre squares and the ego car."""
+    """A grid of ten-metre squares and the ego car, at this frame's ground height."""
     at: Point3 = (60.0, 0.0, floor_m - 0.02)
     ego = outlines.ego_cuboid(floor_m)
     grid, car = scene.get_handle_by_name("/grid"), scene.get_handle_by_name("/ego")
@@ -156,7 +157,7 @@ def camera_position(frame: Frame) -> Point3:
 
 
 def picture(scene: viser.SceneApi, frame: Frame, wanted: bool) -> None:
-    """The picture where the camera sees it, true to K, with the edges of its view. Distortion is left as it is."""
+    """The camera image in its frustum, true to K. Distortion is not removed."""
     if not wanted or frame.picture is None or frame.camera is None:
         _hide(scene, "/camera/picture")
         return _hide(scene, "/camera/edges")
@@ -189,7 +190,7 @@ def picture(scene: viser.SceneApi, frame: Frame, wanted: bool) -> None:
 
 
 def _linear(colors: Sequence[Rgb]) -> outlines.U8:
-    """sRGB to linear light: the client takes the colours of a line's ends as linear, and would show them pale."""
+    """sRGB to linear light: the client interprets the colours of line ends as linear, and would show them too pale."""
     level = np.asarray(colors, dtype=np.float64) / 255.0
     light = np.where(level <= 0.04045, level / 12.92, ((level + 0.055) / 1.055) ** 2.4)
     return np.rint(light * 255.0).astype(np.uint8)
@@ -201,7 +202,7 @@ def _segments(line: F64) -> F64:
 
 
 def _stand_at(handle: viser.SceneNodeHandle, position: Point3) -> None:
-    """Moving a node that is there costs a tenth of making it anew."""
+    """Moving an existing node costs a tenth of creating it again."""
     handle.position = position
     handle.visible = True
 

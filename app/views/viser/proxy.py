@@ -41,9 +41,9 @@ _GONE = "The 3D view is not running."
 
 
 def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConnection], bool]) -> APIRouter:
-    """Routes for ``/viser/``. ``get_port``: where viser listens on loopback now, None when it does not; it may take a
-    while, and is asked on any thread.
-    ``allowed``: the application's own rule; a WebSocket must besides come from a page of the same host and port.
+    """Routes for ``/viser/``. ``get_port``: viser's current port on loopback, None when it does not run; it may take a
+    while, and is called on any thread. ``allowed``: the application's own rule; a WebSocket must also come from a page
+    of the same host and port.
 
     HTTP: 403 not allowed, 502 with one sentence when viser is not there. WebSocket: refused before it opens (HTTP 403)
     when not allowed, closed with 1011 when viser is not there.
@@ -76,7 +76,8 @@ def viser_router(get_port: Callable[[], int | None], allowed: Callable[[HTTPConn
 
 
 def _same_origin(browser: WebSocket) -> bool:
-    """Browsers always name the page that opens a WebSocket; programs name none, and ``allowed`` judges those."""
+    """Browsers always send the origin of the page that opens a WebSocket; programs send none and are left to
+    ``allowed``."""
     origin = browser.headers.get("origin")
     return origin is None or urlsplit(origin).netloc.lower() == browser.headers.get("host", "").lower()
 
@@ -95,7 +96,7 @@ def _fetch(port: int, path: str, accept_encoding: str) -> Response:
 
 
 async def _bridge(browser: WebSocket, port: int | None) -> None:
-    """Join the browser to viser until either leaves. Each direction waits for its receiver, so nothing piles up."""
+    """Connect the browser to viser until either leaves. Each direction waits for its receiver, so nothing queues up."""
     offered = [Subprotocol(name) for name in browser.scope.get("subprotocols", [])]
     try:
         if port is None:
@@ -155,5 +156,5 @@ async def _to_browser(viser: ClientConnection, browser: WebSocket) -> None:
 
 
 def _sendable(code: int | None) -> int:
-    """A close code that may go over the wire: "none given" and "connection lost" may not."""
+    """A close code that may be sent: "none given" and "connection lost" may not."""
     return CloseCode.GOING_AWAY if code in (None, CloseCode.NO_STATUS_RCVD, CloseCode.ABNORMAL_CLOSURE) else int(code)

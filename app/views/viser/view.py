@@ -1,7 +1,7 @@
-"""The 3D view in a browser: one viser server on loopback that shows the newest frame to whoever looks.
+"""The 3D view in a browser: one viser server on loopback that shows the newest frame to every client.
 
-Every scene node has a fixed name and is replaced in place, so a view that runs for days holds as many nodes as the
-picture has parts, and a browser that joins late gets the present state from viser itself.
+Every scene node has a fixed name and is replaced in place, so the number of nodes does not grow over days, and a
+browser that joins late gets the current state from viser.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _ARROW_S = 1.0
 
 
 class Pose(NamedTuple):
-    """Where an eye is, at what it looks, and which way is up there. Ego frame, metres."""
+    """Position, look-at point and up direction of a view. Ego frame, metres."""
 
     eye: Point3
     target: Point3
@@ -53,7 +53,7 @@ POSES = {
 
 @dataclass(frozen=True)
 class _Display:
-    """What the person looking has chosen."""
+    """What the user has chosen."""
 
     color_by: scene.ColorBy = "kind"
     point_size_m: float = 0.06
@@ -62,11 +62,10 @@ class _Display:
 
 
 class ViserView:
-    """Starts the server at once. ``port`` 0 takes a free one; a taken port silently becomes the next: read ``port``.
-
-    ``on_change(name, value)`` hears of every slider that a person moves, on a thread of viser's; ``on_drag(held,
-    ended)`` of a held cuboid that is dragged; ``on_pick(id)`` of every click into the scene: the object that was met,
-    or None.
+    """Starts the server at once. ``port`` 0 takes a free one; an occupied port silently becomes the next: read
+    ``port``. Callbacks, on a thread of viser: ``on_change(name, value)`` for every slider that the user moves,
+    ``on_drag(held, ended)`` for a dragged cuboid, ``on_pick(id)`` for every click into the scene, with the object that
+    was hit or None.
     """
 
     def __init__(
@@ -102,11 +101,11 @@ class ViserView:
 
     @property
     def watchers(self) -> int:
-        """How many browsers hold this view."""
+        """Number of browsers that show this view."""
         return len(self._server.get_clients())
 
     def on_watched(self, callback: Callable[[], None]) -> None:
-        """Call ``callback``, on a thread of viser's, when a browser comes to look."""
+        """Call ``callback``, on a thread of viser, when a browser connects."""
         self._server.on_client_connect(lambda _: callback())
 
     @property
@@ -115,13 +114,13 @@ class ViserView:
         return self._server.get_port()
 
     def show(self, frame: Frame, result: Result) -> None:
-        """Show this frame to everybody, now and to whoever joins later. Safe from any thread."""
+        """Show this frame to all browsers, including those that join later. Thread-safe."""
         with self._lock:
             self._shown = (frame, result)
             self._draw()
 
     def select(self, number: int | None) -> None:
-        """Mark this object, or none."""
+        """Highlight this object, or none."""
         with self._lock:
             if number != self._selected:
                 self._selected = number
@@ -132,7 +131,7 @@ class ViserView:
         self._gizmo.hold(held)
 
     def set_params(self, params: Params) -> None:
-        """Put the sliders where the parameters are; ``on_change`` does not hear of it."""
+        """Set the sliders to these parameters, without calling ``on_change``."""
         self._params.set(params)
 
     def close(self) -> None:
@@ -144,7 +143,7 @@ class ViserView:
         self._gizmo.leave(client.client_id)
 
     def _met(self, origin: Point3, direction: Point3) -> int | None:
-        """The object that a click's ray meets."""
+        """The object that a click's ray hits."""
         with self._lock:
             shown = self._shown
         if shown is None:
@@ -158,7 +157,7 @@ class ViserView:
         self._scene.world_axes.visible = False
 
     def _add_cameras(self) -> None:
-        """One button a pose; it moves the camera of whoever pressed it."""
+        """One button per pose; it moves the camera of the browser that pressed it."""
         group = self._server.gui.add_button_group("Camera", tuple(POSES))
 
         def take(event: viser.GuiEvent[Any]) -> None:
@@ -240,7 +239,7 @@ class ViserView:
             viser_nodes.filled(self._scene, name, found, rgb(role), opacity, floor_m)
 
     def _draw_labels(self, result: Result, floor_m: float) -> None:
-        """Labels are numbered places that objects share, not nodes of their own: ids come and go without end."""
+        """Labels are numbered slots that objects reuse, not one node per object: new ids never stop coming."""
         named = [each for each in result.objects if self._has_label(each, result) and each.bev is not None]
         for place in range(max(len(named), self._labels)):
             if place < len(named):
@@ -257,7 +256,7 @@ class ViserView:
 
 
 class _silent:
-    """viser prints its own address, which is not the one people should open."""
+    """viser prints its own address, which is not the one to open."""
 
     def __enter__(self) -> None:
         self._was = rich.get_console().quiet

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import APIRouter, HTTPException, Query
 from pydantic import BaseModel, Field
@@ -21,6 +21,7 @@ from app.web.routes.names import one_of
 from app.web.routes.refusals import open_recording, refusing
 from app.web.routes.shapes import StatusJson
 from pipeline.common.clips import first_frames
+from pipeline.types import ObjectSource
 
 
 class Columns(BaseModel):
@@ -43,7 +44,7 @@ class Curve(BaseModel):
     id: int
     run: int
     index: list[int]
-    source: list[Literal["V", "L", "VL"]]
+    source: list[ObjectSource]
     carried: list[bool]
     in_path: list[bool]
     distance_m: list[float | None]

@@ -11,9 +11,9 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict
 
 from app.labels.service.tasks import TaskKind
+from pipeline.types import ObjectSource
 
 Point = tuple[float, float]
-Sees = Literal["V", "L", "VL"]
 
 
 def file_of(media_type: str) -> dict[int | str, dict[str, Any]]:
@@ -60,7 +60,7 @@ class ObjectJson(_Exact):
     """Ego frame, metres and m/s; velocity is relative to us. bbox: x1 y1 x2 y2 in pixels of the camera."""
 
     id: int
-    source: Sees
+    source: ObjectSource
     type: str | None
     type_score: float | None
     bbox: tuple[float, float, float, float] | None
@@ -79,7 +79,7 @@ class ObjectJson(_Exact):
     moving: bool | None
     ttc_s: float | None
     carried: bool
-    seen_by: Literal["", "V", "L", "VL"]
+    seen_by: ObjectSource | Literal[""]
     hits: int
     lidar_points: int
     lateral_mps: float | None

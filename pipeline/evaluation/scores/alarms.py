@@ -1,7 +1,7 @@
-"""Warning and braking against when the labels say they are due.
+"""Warnings and braking, compared with when the labels say that they are due.
 
-Due is what the emergency brake's own limits say of the true lead's range and closing speed. Only drives whose ego speed
-is known have a brake at all.
+They are due when the true lead's range and closing speed exceed the emergency brake's own limits. Only drives with
+known ego speed are scored.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ _ACTING: dict[AlarmKind, frozenset[str]] = {
 
 @dataclass(frozen=True)
 class Alarm:
-    """One danger, or one alarm without any. due_ns, acted_ns: None where there was none. delay_s: acted after it was
-    due; negative: before. true_ttc_s: of the true lead when it acted, None where it had none."""
+    """One dangerous moment, or one false alarm. due_ns, acted_ns: None where there was none. delay_s: acted after it
+    was due; negative: before. true_ttc_s: of the true lead when it acted, None where it had none."""
 
     kind: AlarmKind
     due_ns: int | None
@@ -46,7 +46,7 @@ class Alarm:
 
     @property
     def t_ns(self) -> int:
-        """When it is to be looked at."""
+        """The moment to show for it."""
         return (self.due_ns if self.due_ns is not None else self.acted_ns) or 0
 
 
@@ -59,7 +59,7 @@ class _Moment:
 
 
 def alarms(frames: Sequence[tuple[Result, FrameTruth]], params: AebParams) -> list[Alarm]:
-    """Every warning and braking that was due or done, where it is known who leads, and where. None without ego
+    """Every warning and braking that was due or given, in frames with a known lead at a known place. None without ego
     speed."""
     moments = [
         _Moment(truth.t_ns, *_danger(truth, params), result.acc)
@@ -72,7 +72,7 @@ def alarms(frames: Sequence[tuple[Result, FrameTruth]], params: AebParams) -> li
 
 
 def _danger(truth: FrameTruth, params: AebParams) -> tuple[float, float]:
-    """The true lead's TTC, s, and the deceleration it asks for; infinity and 0 where it does not come nearer."""
+    """The true lead's TTC in s and the deceleration it requires; infinity and 0 where it does not come nearer."""
     lead = truth.lead
     velocity = (truth.velocity_mps or {}).get(lead.id) if lead is not None and lead.id is not None else None
     if lead is None or velocity is None:
@@ -90,7 +90,7 @@ def _due(ttc_s: float, needed_mps2: float) -> Callable[[_Moment], bool]:
 
 
 def _of_kind(kind: AlarmKind, moments: Sequence[_Moment], is_due: Callable[[_Moment], bool]) -> list[Alarm]:
-    """Each danger with the first alarm that overlaps it, then the alarms that overlap none."""
+    """Each dangerous moment with the first alarm that overlaps it, then the alarms that overlap none."""
     dangers = _runs(moments, is_due)
     acts = _runs(moments, lambda moment: moment.acc.state in _ACTING[kind])
     found, used = [], set()

@@ -1,4 +1,4 @@
-"""One drive's results against its truth: every count that the figures are made of."""
+"""One drive's results compared with its truth: every count that the scores are computed from."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from pipeline.types import Result
 
 @dataclass(frozen=True)
 class Rules:
-    """What is asked: which vehicle leads, and when the emergency brake is due."""
+    """The rules of scoring: which vehicle is the lead, and when the emergency brake is due."""
 
     lead: LeadRule = field(default_factory=LeadRule)
     aeb: AebParams = field(default_factory=AebParams)
@@ -36,7 +36,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class FrameScore:
-    """One labelled frame. index: in the recording. judged: None where nobody knows who leads."""
+    """One labelled frame. index: in the recording. judged: None where the lead is not known."""
 
     index: int
     t_ns: int
@@ -69,8 +69,7 @@ class DriveScore:
 
 
 def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> DriveScore:
-    """Judge the results of one run. Frames are told apart by their ticks; BadInput when none of the labelled ones has
-    a result."""
+    """Judge the results of one run. Frames are matched by their ticks; BadInput when no labelled frame has a result."""
     pairs = [(result, truth.frames[result.t_ns]) for result in results if result.t_ns in truth.frames]
     if not pairs:
         raise BadInput(f"{truth.uri}: no labelled frame has a result; these results are of another recording")
@@ -102,14 +101,14 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
 
 
 def judged(result: Result, known: FrameTruth, rules: Rules) -> Judged | None:
-    """One labelled frame's verdict; None where nobody knows who leads."""
+    """One labelled frame's verdict; None where the lead is not known."""
     if known.lead_box is not None:
         return judge_lead_box(result, known.lead_box[1])
     return judge_lead(result, known.lead, rules.lead) if known.lead_known else None
 
 
 def _moment(result: Result, known: FrameTruth, judged: Judged) -> Moment:
-    """A lead beyond the range asked for is none."""
+    """A lead beyond the scored range counts as none."""
     lead = known.lead.id if known.lead is not None and judged.truth_m is not None else None
     if known.lead_box is not None:
         lead = known.lead_box[0]

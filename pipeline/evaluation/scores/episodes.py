@@ -1,4 +1,4 @@
-"""The lead over time: when it was taken, lost and exchanged, and how soon one that cuts in was seen."""
+"""The lead over time: when it was acquired, lost and switched, and how soon a vehicle that cuts in was chosen."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pipeline.labels.link_identities import MAX_GAP_S
 
 @dataclass(frozen=True)
 class Moment:
-    """One frame in which it is known who leads. lead: None where none does; chosen: the CIPV's number."""
+    """One frame with a known lead. lead: None where there is none; chosen: the CIPV's id."""
 
     t_ns: int
     lead: int | None
@@ -24,9 +24,9 @@ class Moment:
 
 @dataclass(frozen=True)
 class Acquisition:
-    """One lead from when it leads. range_m: in the first frame in which it was rightly chosen, None when it never was;
-    after_s: how long that took. from_start: it led already when the recording began, so nobody knows since when.
-    drop_outs: how often it was lost again, without any CIPV."""
+    """One lead from when it leads. range_m: its range in the first frame in which it was correctly chosen, None when it
+    never was; after_s: how long that took. from_start: it was the lead when the recording began, so its start is
+    unknown. drop_outs: how often it was lost again, with no CIPV."""
 
     lead: int
     t_ns: int
@@ -38,7 +38,7 @@ class Acquisition:
 
 @dataclass(frozen=True)
 class CutIn:
-    """A vehicle that comes between. latency_s: from when it leads until it is the CIPV; None when it never was."""
+    """A vehicle that cuts in. latency_s: from when it becomes the lead until it is the CIPV; None when it never was."""
 
     lead: int
     t_ns: int
@@ -62,12 +62,13 @@ def judged_s(moments: Sequence[Moment]) -> float:
 
 
 def count_switches(moments: Sequence[Moment]) -> int:
-    """How often the CIPV's number changed while the lead stayed the same."""
+    """How often the CIPV's id changed while the lead stayed the same."""
     return sum(switches((m.lead, m.chosen) for m in part) for part in stretches(moments))
 
 
 def _reigns(moments: Sequence[Moment]) -> list[tuple[list[Moment], bool]]:
-    """Each lead's frames from when it leads until it no longer does, and whether a stretch begins with them."""
+    """Each lead's frames from when it becomes the lead until it no longer is, and whether a stretch begins with
+    them."""
     found: list[tuple[list[Moment], bool]] = []
     for part in stretches(moments):
         last: int | None = None
@@ -81,7 +82,7 @@ def _reigns(moments: Sequence[Moment]) -> list[tuple[list[Moment], bool]]:
 
 
 def acquisitions(moments: Sequence[Moment]) -> list[Acquisition]:
-    """One a lead, in order of time."""
+    """One per lead, in order of time."""
     found = []
     for reign, from_start in _reigns(moments):
         first = next((n for n, m in enumerate(reign) if m.judged.verdict == "correct"), None)
@@ -102,8 +103,8 @@ def acquisitions(moments: Sequence[Moment]) -> list[Acquisition]:
 def cut_ins(
     moments: Sequence[Moment], truth: Mapping[int, FrameTruth], labelled: Sequence[tuple[int, int]] | None
 ) -> list[CutIn]:
-    """``labelled``: tick and object of each, as people saw them. Without: each lead that a frame before was labelled
-    beside the way, nearer than who led then."""
+    """``labelled``: tick and object of each, as people labelled them. Without them: each lead that was labelled outside
+    the lane in the frame before, nearer than the lead of that frame."""
     reigns = [reign for reign, _ in _reigns(moments)]
     if labelled is not None:
         return [cut_in for tick, lead in labelled if (cut_in := _labelled(reigns, tick, lead)) is not None]
@@ -117,7 +118,8 @@ def cut_ins(
 
 
 def _labelled(reigns: Sequence[Sequence[Moment]], tick: int, lead: int) -> CutIn | None:
-    """Of an event: the lead's next reign, or the one it falls into. None where who leads then is not known."""
+    """Of an event: the next episode in which it is the lead, or the one that the event falls into. None where the lead
+    is not known then."""
     reign = next((each for each in reigns if each[0].lead == lead and each[-1].t_ns >= tick), None)
     if reign is None:
         return None

@@ -1,4 +1,4 @@
-"""Errors of place and speed by range and by sensor, in the form of the paper's Table 4: smallest, largest, mean."""
+"""Position and speed errors by range and by sensor, in the form of the paper's Table 4: smallest, largest, mean."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Iterable, Sequence
 from pipeline.evaluation.report_sections import Cell, Chart, Section, Series, Table
 from pipeline.evaluation.scores.figures import Drives
 from pipeline.evaluation.scores.matching import MAX_RANGE_M, Error
+from pipeline.types import MOST_SENSORS_FIRST
 
-SOURCES = ("VL", "V", "L")
 BIN_M = 10
 _ERRORS = ("distance_m", "lateral_m", "longitudinal_m", "speed_mps")
 COLUMNS = (
@@ -50,24 +50,24 @@ _CHARTS = {
 
 
 def _scatter(title: str, unit: str, name: str, errors: Sequence[Error]) -> Chart:
-    """One error of every vehicle in every frame, by who saw it."""
+    """One error of every vehicle in every frame, by sensor."""
     lines = []
-    for source in SOURCES:
+    for source in MOST_SENSORS_FIRST:
         pairs = [(e.range_m, value) for e in errors if e.source == source and (value := getattr(e, name)) is not None]
         lines.append(Series.of_points(source, pairs))
     return Chart(title, "true range m", f"estimated − true {unit}", tuple(lines))
 
 
 def error_rows(run: Drives) -> tuple[tuple[Cell, ...], ...]:
-    """By who saw it over all ranges, then by range bin, all together and by who saw it. Empty groups are left out."""
+    """By sensor over all ranges, then for each range bin in total and by sensor. Empty groups are left out."""
     every = _all_errors(run)
     groups: list[tuple[str, str, list[Error]]] = [("all", "any", every)]
-    groups += [("all", source, [e for e in every if e.source == source]) for source in SOURCES]
+    groups += [("all", source, [e for e in every if e.source == source]) for source in MOST_SENSORS_FIRST]
     for low in range(0, int(MAX_RANGE_M), BIN_M):
         inside = [error for error in every if low <= error.range_m < low + BIN_M]
         name = f"{low}–{low + BIN_M} m"
         groups.append((name, "any", inside))
-        groups += [(name, source, [e for e in inside if e.source == source]) for source in SOURCES]
+        groups += [(name, source, [e for e in inside if e.source == source]) for source in MOST_SENSORS_FIRST]
     return tuple((name, source, len(errors), *_table_4(errors)) for name, source, errors in groups if errors)
 
 

@@ -1,8 +1,8 @@
-"""The figures of a run, each declared once: its name, which way is good, what a drive brings to it and how drives make
-it; with confidence intervals by bootstrap over drives.
+"""The figures of a run, each declared once: its name, which direction is better, what a drive contributes and how the
+contributions combine; with confidence intervals by bootstrap over drives.
 
-A figure of several drives weighs each by what was judged in it. Frames of one drive depend on one another, so only
-whole drives are drawn anew (Efron's percentile bootstrap); one drive alone has no interval.
+A figure of several drives weights each by how much of it was scored. Frames of one drive depend on one another, so only
+whole drives are resampled (Efron's percentile bootstrap); a single drive has no interval.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pipeline.evaluation.scores.drive import DriveScore
 from pipeline.evaluation.scores.tracking import Counts, hota_of, idf1_sums, mota_sums, precision_sums, recall_sums
 
 Sums = tuple[float, float]
-"""What a drive adds above and below a fraction line."""
+"""What a drive adds to a numerator and a denominator."""
 Drives = Sequence[DriveScore]
 RESAMPLES, CONFIDENCE, SEED = 1000, 0.95, 0
 
@@ -32,7 +32,7 @@ def ratio(parts: Sequence[Sums]) -> float | None:
 
 @dataclass(frozen=True)
 class Figure:
-    """One score: how it is called, and how it is computed over drives."""
+    """One score: its name, and how it is computed over drives."""
 
     name: str
     """For scripts."""
@@ -117,11 +117,11 @@ def bootstrap(parts: Sequence[Any], whole: Callable[[Sequence[Any]], float | Non
     return Interval(float(low), float(high))
 
 
-# ---------------------------------------------------------------- what a drive brings
+# ---------------------------------------------------------------- what a drive contributes
 
 
 def _sums(values: Iterable[float | None]) -> Sums:
-    """Of a mean over what is known."""
+    """For a mean over the known values."""
     known = [value for value in values if value is not None]
     return float(sum(known)), float(len(known))
 

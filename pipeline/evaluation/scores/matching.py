@@ -1,4 +1,4 @@
-"""Which believed object stands for which labelled vehicle, and how far off it is (paper, Table 4)."""
+"""Matching of the pipeline's objects with labelled vehicles, and their errors (paper, Table 4)."""
 
 from __future__ import annotations
 
@@ -13,25 +13,26 @@ from pipeline.decision.path_position import near_face_middle
 from pipeline.evaluation.lead_verdict import LABELLED_VEHICLES, SAME_BOX_IOU, nearest_face_m
 from pipeline.evaluation.scores.truth import FrameTruth
 from pipeline.params import CipvParams
-from pipeline.types import VEHICLES, Box, FusedObject, Point2, Result, SourceKind
+from pipeline.types import VEHICLES, Box, FusedObject, ObjectSource, Point2, Result
 from pipeline.types.source import TruthObject
 
 MAX_RANGE_M = 60.0
 HALF_ANGLE_RAD = np.radians(35.0)
-"""Vehicles are looked for ahead to this range and this far to either side: about what a front camera sees."""
+"""Vehicles are scored ahead up to this range and this angle to either side: about the view of a front camera."""
 SIDE_M, LEAST_M = 2.5, 2.0
-SHARE: dict[SourceKind, float] = {"V": 0.35, "VL": 0.15, "L": 0.15}
-"""What may stand for a vehicle: no farther to its side, and no farther off lengthwise than this share of its range. A
-LiDAR's range is right or that of another thing; a box height's may be off by a third."""
+RANGED_SHARE, UNRANGED_SHARE = 0.15, 0.35
+"""An object may match a vehicle up to ``SIDE_M`` sideways, and lengthwise up to this share of its range: one for
+objects whose range was measured, one for those whose range comes from the box height. A measured range is either right
+or that of something else; one from a box height may be off by a third."""
 CONFIRM_HITS = CipvParams().confirm_hits
 _NEVER = 1e6
 
 
 class Error(NamedTuple):
-    """One matched vehicle in one frame: who saw it, its true range, and believed minus true of its distance, of its
-    nearest face's middle (lateral, longitudinal), and of its velocity along the car's axis; metres, m/s."""
+    """One matched vehicle in one frame: the sensors, its true range, and estimated minus true distance, position of the
+    nearest face's middle (lateral, longitudinal) and velocity along the ego car's axis; metres, m/s."""
 
-    source: SourceKind
+    source: ObjectSource
     range_m: float
     distance_m: float
     lateral_m: float
@@ -40,7 +41,7 @@ class Error(NamedTuple):
 
 
 def vehicles(objects: Iterable[TruthObject]) -> list[TruthObject]:
-    """The labelled vehicles that are looked for."""
+    """The labelled vehicles that are scored."""
     return [item for item in objects if item.label.lower() in LABELLED_VEHICLES and _looked_for(item)]
 
 
@@ -56,8 +57,8 @@ def face_of(item: TruthObject) -> Point2:
 
 
 def errors(result: Result, truth: FrameTruth) -> tuple[Error, ...]:
-    """One a labelled vehicle that an object seen in this frame stands for. Any object may, whatever its class: what is
-    asked is how well its place is known."""
+    """One per labelled vehicle that matches an object seen in this frame, whatever the object's class: only its
+    position is scored here."""
     wanted = vehicles(truth.objects)
     seen = [
         item for item in result.objects if item.bev is not None and item.distance_m is not None and not item.carried
@@ -66,14 +67,14 @@ def errors(result: Result, truth: FrameTruth) -> tuple[Error, ...]:
 
 
 def _pairs(wanted: Sequence[TruthObject], seen: Sequence[FusedObject]) -> list[tuple[int, int]]:
-    """One to one, the nearest first in sum."""
+    """One-to-one assignment with the smallest total distance."""
     if not wanted or not seen:
         return []
     true = np.array([face_of(item) for item in wanted])
     believed = _faces(seen)
     off = np.abs(believed[None] - true[:, None])
     ranges = np.array([nearest_face_m(item) for item in wanted])
-    shares = np.array([SHARE[item.source] for item in seen])
+    shares = np.array([RANGED_SHARE if item.ranged else UNRANGED_SHARE for item in seen])
     reach = np.maximum(LEAST_M, ranges[:, None] * shares[None])
     away = np.abs(np.array([item.distance_m for item in seen])[None] - ranges[:, None])
     cost = np.where((off[..., 1] <= SIDE_M) & (away <= reach), np.hypot(off[..., 0], off[..., 1]), _NEVER)
@@ -100,16 +101,16 @@ def _error(item: FusedObject, true: TruthObject, truth: FrameTruth) -> Error:
 def claims(
     result: Result, wanted: Sequence[TruthObject], within_m: float, unplaced: Sequence[Box] = ()
 ) -> list[FusedObject]:
-    """The objects that claim to be vehicles, to be judged as detections: those of a vehicle's class, in the field that
-    is looked at, seen in this frame, by both sensors or often enough (as a lead must be).
+    """The objects to be scored as detections of vehicles: those of a vehicle's class, in the scored field, seen in this
+    frame, and by both sensors or often enough (as for a lead).
 
-    A nameless LiDAR object claims nothing: it counts where it lies within ``within_m`` of a labelled vehicle that no
-    named one stands for, and is otherwise not judged, as roadside returns must not be. Nor is what no labelled place is
-    near and the picture shows where one of ``unplaced`` is: a vehicle is there, and nobody knows how far off.
+    A LiDAR object without a class does not claim to be a vehicle: it counts where it lies within ``within_m`` of a
+    labelled vehicle that no classified object matches, and is otherwise ignored, like roadside returns. Also ignored is
+    an object far from every labelled position whose picture box matches one of ``unplaced``: there is a vehicle, but
+    its distance is unknown.
     """
     placed = [item for item in result.objects if item.bev is not None and item.distance_m is not None]
-    placed = [item for item in placed if not item.carried and (item.source == "VL" or item.hits >= CONFIRM_HITS)]
-    field = [item for item in placed if _in_field(item)]
+    field = [item for item in placed if not item.carried and _is_confirmed(item) and _in_field(item)]
     faces = np.array([face_of(true) for true in wanted]).reshape(-1, 2)
     named = [item for item in field if item.label in VEHICLES]
     named = [item for item in named if _is_near(item, faces, within_m) or not _is_in_one_of(item, unplaced)]
@@ -134,6 +135,10 @@ def _is_in_one_of(item: FusedObject, boxes: Sequence[Box]) -> bool:
     if item.bbox is None or not boxes:
         return False
     return bool(iou_matrix(np.array([item.bbox]), np.array(boxes)).max() >= SAME_BOX_IOU)
+
+
+def _is_confirmed(item: FusedObject) -> bool:
+    return item.tracked_by_two_sensors or item.hits >= CONFIRM_HITS
 
 
 def _in_field(item: FusedObject) -> bool:

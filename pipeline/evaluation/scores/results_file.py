@@ -1,4 +1,4 @@
-"""A ``results.jsonl`` file read back, as far as scores need it."""
+"""Reading a ``results.jsonl`` file back, as far as scores need it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.common.errors import BadInput
 from pipeline.common.geometry import Cuboid
-from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth
+from pipeline.types import OBJECT_SOURCES, AccCommand, Cipv, EgoState, FusedObject, Layers, Path, Result, SensorHealth
 from pipeline.types.result_json import VERSION
 
 EMPTY = Layers(np.zeros((0, 4), np.float32), np.zeros(0, np.int32))
@@ -31,7 +31,7 @@ def read_results(path: FilePath) -> list[Result]:
         raise BadInput(f"{path}: not a text file; expected the JSON lines of `cipv run --out`") from None
     results = [_result(line, f"{path}, line {n}") for n, line in enumerate(text.split("\n"), 1) if line.strip()]
     if not results:
-        raise BadInput(f"{path}: no results in it")
+        raise BadInput(f"{path}: contains no results")
     results.sort(key=lambda result: result.t_ns)
     twice = next((a.frame for a, b in pairwise(results) if a.t_ns == b.t_ns), None)
     if twice is not None:
@@ -80,7 +80,7 @@ def _cipv(row: dict[str, Any] | None) -> Cipv | None:
 
 
 def _acc(row: dict[str, Any] | None) -> AccCommand | None:
-    """Its state, which is all that is judged of it."""
+    """Its state, the only part that is scored."""
     if row is None:
         return None
     state = row["state"]
@@ -94,7 +94,7 @@ def _object(row: dict[str, Any]) -> FusedObject:
     if bev is not None and len(bev) != 4:
         raise ValueError("four corners")
     box = row["cuboid"]
-    if row["source"] not in ("V", "L", "VL"):
+    if row["source"] not in OBJECT_SOURCES:
         raise ValueError(row["source"])
     if row["type"] is not None and not isinstance(row["type"], str):
         raise ValueError(row["type"])

@@ -1,6 +1,6 @@
 """Detection and tracking of vehicles: precision, recall, MOTA, IDF1 and HOTA, as trackeval counts them.
 
-Places are compared, not picture boxes: the similarity of two is 1 − d/4 m, d between the middles of their nearest
+Positions are compared, not picture boxes: the similarity of two is 1 − d/4 m, d between the middles of their nearest
 faces, so the usual threshold of 0.5 is the 2 m of nuScenes. HOTA averages over d = 3.8 … 0.2 m.
 """
 
@@ -19,16 +19,16 @@ from pipeline.evaluation.scores.truth import FrameTruth
 from pipeline.types import I64, Point2, Result
 
 ZERO_M = 4.0
-"""From this distance on two places have nothing in common."""
+"""From this distance on, the similarity is 0."""
 MATCH_M = 0.5 * ZERO_M
 MISSING = "Detection and tracking scores need trackeval, which `make install` brings."
 Named = list[tuple[int, Point2]]
-"""Numbers and places of one frame's vehicles."""
+"""Ids and positions of one frame's vehicles."""
 
 
 @dataclass(frozen=True)
 class Counts:
-    """One drive's counts in trackeval's own form, to be summed up with others'."""
+    """One drive's counts in trackeval's form, to be summed over drives."""
 
     clear: dict[str, Any]
     identity: dict[str, Any]
@@ -36,13 +36,13 @@ class Counts:
 
 
 def is_available() -> bool:
-    """Whether trackeval is there."""
+    """Whether trackeval is installed."""
     return _metrics() is not None
 
 
 def of_frames(frames: Sequence[tuple[Result, FrameTruth]]) -> Counts | None:
-    """A drive's labelled frames, in order. Those that are not labelled whole are left out: a vehicle that nobody has
-    looked at is not there falsely. None where no vehicle's place is labelled in the others, and without trackeval."""
+    """A drive's labelled frames, in order. Frames that are not fully labelled are left out: an object without a label
+    may be right there. None where no vehicle's position is labelled in the other frames, and without trackeval."""
     truths, believed = [], []
     for result, truth in frames:
         if not truth.whole:
@@ -55,7 +55,7 @@ def of_frames(frames: Sequence[tuple[Result, FrameTruth]]) -> Counts | None:
 
 
 def count(truths: Sequence[Named], believed: Sequence[Named]) -> Counts | None:
-    """Frame by frame: what is there, and what is believed to be."""
+    """Frame by frame: the true vehicles, and the claimed ones."""
     metrics = _metrics()
     if metrics is None:
         return None
@@ -64,31 +64,31 @@ def count(truths: Sequence[Named], believed: Sequence[Named]) -> Counts | None:
 
 
 def precision_sums(counts: Counts) -> tuple[int, int]:
-    """Rightly claimed vehicles over all that were claimed."""
+    """Precision: correctly claimed vehicles over all claimed ones."""
     clear = counts.clear
     return clear["CLR_TP"], clear["CLR_TP"] + clear["CLR_FP"]
 
 
 def recall_sums(counts: Counts) -> tuple[int, int]:
-    """Found vehicles over all that are there."""
+    """Recall: found vehicles over all true ones."""
     clear = counts.clear
     return clear["CLR_TP"], clear["CLR_TP"] + clear["CLR_FN"]
 
 
 def mota_sums(counts: Counts) -> tuple[int, int]:
-    """Found less falsely claimed less switched, over all that are there (CLEAR MOT)."""
+    """(Found − falsely claimed − switched) over all true ones (CLEAR MOT)."""
     clear = counts.clear
     return clear["CLR_TP"] - clear["CLR_FP"] - clear["IDSW"], clear["CLR_TP"] + clear["CLR_FN"]
 
 
 def idf1_sums(counts: Counts) -> tuple[int, int]:
-    """Twice what is rightly named, over what is there and what is claimed."""
+    """Twice the correctly identified over the true plus the claimed."""
     named = counts.identity
     return 2 * named["IDTP"], 2 * named["IDTP"] + named["IDFN"] + named["IDFP"]
 
 
 def hota_of(drives: Sequence[Counts]) -> float | None:
-    """HOTA of several drives as one, 0–1; None where no vehicle is there."""
+    """HOTA of several drives as one, 0–1; None without vehicles."""
     metrics = _metrics()
     if metrics is None or not any(recall_sums(drive)[1] for drive in drives):
         return None

@@ -1,9 +1,9 @@
-"""What is true of a drive, in the form that scores need: who leads in each frame, and every labelled vehicle with its
+"""The truth of a drive in the form that scores need: the lead in each frame, and every labelled vehicle with its
 velocity.
 
-A frame is labelled *whole* when every vehicle in it is: only there is it false to claim another one. A recording's own
-truth always is. Of what people label, a frame is whole where no vehicle is left proposed, and where something says that
-all were looked for: proposals that were taken there, truth that was imported, or a person's tag.
+A frame is labelled *whole* when every vehicle in it is labelled; only there does an object without a label count as
+false. A recording's own truth is always whole. A frame labelled by people is whole when no vehicle in it is only
+proposed, and something confirms that all were labelled: accepted proposals there, imported truth, or a person's tag.
 """
 
 from __future__ import annotations
@@ -27,15 +27,16 @@ _COUNTED = ("accepted", "corrected")
 
 
 class NoTruth(BadInput):
-    """A recording, or a file, without labels to judge by."""
+    """A recording or file without labels to score against."""
 
 
 @dataclass(frozen=True)
 class FrameTruth:
-    """A labelled frame. lead: None where none leads. lead_known: false where one can't tell, or the lead's place is not
-    labelled. velocity_mps: relative to ego in the turning ego frame, by object id, of those that neighbouring frames
-    show. lead_box: the lead's id and picture box where only the picture shows it; ``lead`` is None then. whole: every
-    vehicle in it is labelled. unplaced: picture boxes of labelled vehicles whose place nobody knows."""
+    """A labelled frame. lead: None where there is none. lead_known: false where the lead is unclear, or its position is
+    not labelled. velocity_mps: relative to ego in the turning ego frame, by object id, for those that neighbouring
+    frames show. lead_box: the lead's id and picture box where it is labelled in the picture only; ``lead`` is None
+    then. whole: every vehicle in it is labelled. unplaced: picture boxes of labelled vehicles whose position is
+    unknown."""
 
     t_ns: int
     objects: tuple[TruthObject, ...]
@@ -50,7 +51,8 @@ class FrameTruth:
 @dataclass(frozen=True)
 class DriveTruth:
     """uri: of the recording. ticks: of all its frames. frames: the labelled ones, by tick. cut_ins: tick and object of
-    each labelled cut-in; None where nobody labels them, and the true leads tell. notes: what a person should know."""
+    each labelled cut-in; None where they are not labelled and follow from the true leads. notes: what a user should
+    know."""
 
     uri: str
     ticks: tuple[int, ...]
@@ -60,9 +62,8 @@ class DriveTruth:
 
 
 def of_source(source: Source, rule: LeadRule) -> DriveTruth:
-    """A recording's own labels. The lead is the nearest vehicle in the lane, the lane taken as straight.
-
-    NoTruth when no frame is labelled. Labels without identities are linked over frames by nearness.
+    """A recording's own labels. The lead is the nearest vehicle in the lane, which is assumed to be straight. NoTruth
+    when no frame is labelled. Labels without identities are linked from frame to frame by distance.
     """
     ticks = tuple(source.t_ns(index) for index in range(len(source)))
     labelled = {tick: truth for index, tick in enumerate(ticks) if (truth := source.truth(index)) is not None}
@@ -75,8 +76,8 @@ def of_source(source: Source, rule: LeadRule) -> DriveTruth:
 
 
 def _over_time(frames: Mapping[int, FrameTruth], followed: bool) -> tuple[dict[int, FrameTruth], tuple[str, ...]]:
-    """The frames with velocities, and what of these does not count. Where the labels do not follow who is who, objects
-    are linked by nearness first."""
+    """The frames with velocities, and sentences on velocities that do not count. Labels without identities are linked
+    by distance first."""
     if not followed:
         objects = linked({tick: frame.objects for tick, frame in frames.items()})
         frames = {tick: _renamed(frame, objects[tick]) for tick, frame in frames.items()}
@@ -96,23 +97,22 @@ def _lead_of(frame: FrameTruth) -> int | None:
 
 
 def _renamed(frame: FrameTruth, objects: tuple[TruthObject, ...]) -> FrameTruth:
-    """The frame with other ids, in the same order."""
+    """The frame with new ids, in the same order."""
     lead = next((new for old, new in zip(frame.objects, objects, strict=True) if old is frame.lead), None)
     return replace(frame, objects=objects, lead=lead)
 
 
 def _only_the_leads(frame: FrameTruth) -> FrameTruth:
-    """Without the velocities of all others: what stands beside the road is easily linked to its neighbour."""
+    """Keep only the lead's velocity: objects beside the road are easily linked to their neighbours."""
     kept = {key: velocity for key, velocity in (frame.velocity_mps or {}).items() if key == _lead_of(frame)}
     return replace(frame, velocity_mps=kept)
 
 
 def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
-    """What people labelled. Only what a person or an import stands behind counts: a proposal nobody has looked at is
-    the pipeline's own opinion, and a rejected one is nobody's.
-
-    Where no lead is labelled at all, it is the nearest vehicle in the lane, the lane taken as straight, of frames that
-    are labelled whole. NoTruth when nothing counts. Where each track is in one frame only, they are linked by nearness.
+    """Labels made by people. Only labels that a person accepted or an import brought count: an unreviewed proposal is
+    the pipeline's own output. If no lead is labelled at all, it is the nearest vehicle in the lane, which is assumed to
+    be straight, in frames that are labelled whole. NoTruth when nothing counts. If each track is in one frame only,
+    tracks are linked by distance.
     """
     tracks = {track.id: track for track in labels.tracks if track.state in _COUNTED}
     ranges = [each for each in labels.leads if each.state in _COUNTED]
@@ -144,7 +144,7 @@ def of_labels(labels: LabelSet, rule: LeadRule) -> DriveTruth:
 
 
 def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, FrameTruth], left: int) -> list[str]:
-    """What does not count, and why. left: frames in which a vehicle is only proposed."""
+    """What does not count, and why. left: frames with a vehicle that is only proposed."""
     proposed = {track.id for track in labels.tracks if track.state == "proposed"}
     notes = []
     for lead in sorted({each.lead for each in ranges if isinstance(each.lead, int) and each.lead in proposed}):
@@ -174,14 +174,14 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
 
 
 def _as_proposed(labels: LabelSet) -> tuple[int, int]:
-    """(cuboids that were accepted as the pipeline saw them, all that count)."""
+    """(cuboids accepted unchanged from the pipeline, all that count)."""
     counted = [track for track in labels.tracks if track.state in _COUNTED]
     placed = {track.id: sum(each.cuboid is not None for each in track.sightings) for track in counted}
     return sum(placed[track.id] for track in counted if track.origin.maker == "pipeline"), sum(placed.values())
 
 
 def _said_whole(labels: LabelSet) -> set[int]:
-    """The frames of which something says that every vehicle was looked for."""
+    """The frames for which something confirms that every vehicle is labelled."""
     asked = {frame for tag in labels.tags if tag.tag == WHOLE_TAG for frame in range(tag.first, tag.last + 1)}
     for lead in labels.leads:
         if lead.origin.maker == "pipeline":
@@ -193,7 +193,7 @@ def _said_whole(labels: LabelSet) -> set[int]:
 
 
 def _left_proposed(labels: LabelSet) -> set[int]:
-    """The frames with a vehicle that nobody has looked at."""
+    """The frames with an unreviewed vehicle."""
     left = [track for track in labels.tracks if track.state == "proposed" and track.label.lower() in LABELLED_VEHICLES]
     return {each.frame for track in left for each in track.sightings}
 
@@ -213,7 +213,7 @@ def _objects_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Truth
 
 
 def _unplaced_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Box, ...]]:
-    """Boxes of what only the picture shows."""
+    """Boxes of vehicles that are labelled in the picture only."""
     found: dict[int, tuple[Box, ...]] = {}
     for track in tracks.values():
         for seen in track.sightings:
@@ -223,7 +223,7 @@ def _unplaced_by_frame(tracks: Mapping[int, LabelTrack]) -> dict[int, tuple[Box,
 
 
 def with_velocities(frames: Mapping[int, FrameTruth]) -> tuple[dict[int, FrameTruth], frozenset[tuple[int, int]]]:
-    """Each frame with its objects' velocities; tick and object of those that jump."""
+    """Each frame with its objects' velocities; tick and object of each jump."""
     places = {
         tick: {item.id: item.cuboid.center[:2] for item in frames[tick].objects if item.id is not None}
         for tick in frames  # in recorded order: two clips may overlap in time

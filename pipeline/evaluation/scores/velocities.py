@@ -1,10 +1,10 @@
-"""How fast labelled vehicles move, from where they are in the labelled frames around.
+"""Velocities of labelled vehicles, from their positions in the neighbouring labelled frames.
 
-A parabola is laid through a vehicle's places within 0.3 s of each frame, and through those of the frames right before
-and after in any case (Savitzky and Golay 1964, for uneven times): a label is a few centimetres to decimetres off, and
-two of them 0.2 s apart give a speed that is off by metres a second. Through fewer than four places it is a line. Where
-places lie farther beside it than labels are off, the track jumps, as one accepted from the pipeline may that took two
-vehicles for one: no speed can be told of it there.
+A parabola is fitted to a vehicle's positions within 0.3 s of each frame, always including the frames right before and
+after (Savitzky and Golay 1964, for uneven times): a label is off by centimetres to decimetres, and two labels 0.2 s
+apart would give a speed that is off by metres per second. With fewer than four positions it is a line. Where positions
+deviate from it by more than the error of labels, the track jumps, for example because the pipeline confused two
+vehicles; no speed is given there.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ from pipeline.types import F64, I64, Mask, Point2
 _HALF_S = 0.3
 _JUMP_M = 0.3
 _ACCEL_MPS2 = 4.0
-"""Relative to ego: what a line, which knows no acceleration, may miss."""
+"""Relative to ego: the deviation that an unmodelled acceleration may cause in a line fit."""
 _PARABOLA = 4
 _MOST_BESIDE = 10
-"""Places that are looked at before and after a frame, however dense they are."""
+"""At most this many positions before and after a frame are used."""
 
 Sightings = Iterable[tuple[int, Mapping[int, Point2]]]
-"""Of labelled frames in order: the tick, and where each vehicle is, by id; ego frame, metres."""
+"""Labelled frames in order: the tick, and each vehicle's position by id; ego frame, metres."""
 
 
 @dataclass(frozen=True)
 class Velocities:
     """mps: by tick and id, relative to ego in the turning ego frame, of those that neighbouring frames show. jumps:
-    tick and id of those that cannot have moved so."""
+    tick and id of implausible moves."""
 
     mps: Mapping[int, Mapping[int, Point2]]
     jumps: frozenset[tuple[int, int]]
 
 
 def velocities(sightings: Sightings) -> Velocities:
-    """One side only where a vehicle comes or goes; none across a gap."""
+    """One-sided where a vehicle appears or disappears; none across a gap."""
     rows = [(key, n, t_ns, *place) for n, (t_ns, places) in enumerate(sightings) for key, place in places.items()]
     rows.sort(key=lambda row: row[:2])
     if not rows:

@@ -9,12 +9,12 @@ from pipeline.evaluation.lead_verdict import Verdict
 from pipeline.evaluation.scores.drive import DriveScore, FrameScore
 
 _WEIGHT: dict[Verdict, int] = {"none": 0, "correct": 0, "missed": 1, "wrong": 2, "false": 3}
-"""A CIPV where nothing leads is worse than one that is not where the lead is, and that is worse than none."""
+"""A false CIPV is worse than a wrong one, and a wrong one is worse than a missed one."""
 
 
 @dataclass(frozen=True)
 class Bad:
-    """One frame. before: the other run's verdict, where two are compared. Metres; None where there is none."""
+    """One frame. before: the other run's verdict, where two runs are compared. Metres; None where not available."""
 
     uri: str
     index: int
@@ -27,7 +27,8 @@ class Bad:
 
 
 def worst(drives: Sequence[DriveScore], most: int) -> list[Bad]:
-    """By verdict, then by the size of the lead's distance error; at most so many. Frames without fault are none."""
+    """By verdict, then by the lead's absolute distance error; at most ``most``. Frames without any error are left
+    out."""
     every = [bad for drive in drives for frame in drive.frames if (bad := _bad(drive.uri, frame)) is not None]
     every = [bad for bad in every if _weight(bad) > 0 or bad.error_m]
     return sorted(every, key=lambda bad: (-_weight(bad), -abs(bad.error_m or 0.0)))[:most]

@@ -1,8 +1,7 @@
-"""The drives of the experiment on curves: every frame is run and judged once for each source of the path.
+"""The drives of the curve experiment: every frame is run and scored once for each path source.
 
-Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge and no nearer
-vehicle hides it. Missing one that has just come into sight is not counted before confirmation can be through
-(``true_lead.InSight``).
+Truth is the vehicle in the ego lane, decidable while no vehicle is at the lane's edge and no nearer vehicle hides it.
+Missing a lead that has just come into sight does not count until it can have been confirmed (``true_lead.InSight``).
 """
 
 from __future__ import annotations
@@ -40,9 +39,10 @@ SOURCES: Mapping[str, Mapping[str, bool]] = {
     "fused": {},
     LIDAR_ALONE: {},
 }
-"""Which parameters leave each source of the path; the last has all of them but no camera, so no boxes and no lines."""
+"""The parameters that select each path source; the last one has all of them but no camera, so neither boxes nor
+lines."""
 BOXES = BoxNoise(reach_m=105.0)
-"""As measured of the embedded detector (``truth_boxes``), its reach included."""
+"""As measured for the embedded detector (``truth_boxes``), its reach included."""
 LINES = LineNoise()
 LOOK_AHEAD_M = (10, 30, 60, 100)
 _TRUE_WAY_M = 130.0
@@ -53,9 +53,9 @@ Verdict = Literal["right", "missed", "decoy", "none", "false", "undecided"]
 
 @dataclass(frozen=True)
 class Frames:
-    """One drive with one set of sources, an entry a frame: verdicts, range of the true lead (None without), whether the
-    car that cuts in is known by then, and (N, 4) the path's errors at 10, 30, 60, 100 m (NaN where the true way ends)
-    with its sigmas there."""
+    """One drive with one set of sources, one entry per frame: verdict, range of the true lead (None without one),
+    whether the car that cuts in is recognised, and (N, 4) the path's errors at 10, 30, 60, 100 m (NaN where the true
+    path ends) with its sigmas there."""
 
     t_s: tuple[float, ...]
     verdicts: tuple[Verdict, ...]
@@ -67,7 +67,7 @@ class Frames:
 
 
 def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[World, Frame]]:
-    """Each moment of a drive along its script, with given detections. lines None: the road has none."""
+    """Each tick of a scripted drive, with given detections. lines None: the road has no lane lines."""
     sensors = Sensors(scene, scene.ego.start_m + scene.ego.travelled_m(scene.duration_s))
     for index in range(scene.frame_count()):
         now = world_state.at(scene, index / scene.rate_hz)
@@ -80,8 +80,8 @@ def seen(scene: Scenario, lines: LineNoise | None = LINES) -> Iterator[tuple[Wor
 
 @dataclass(frozen=True)
 class Moment:
-    """A frame and what is true then, whatever the pipeline estimates. lead: the first vehicle in the lane within reach,
-    None without one; doubtful: nobody can say. beyond: the first within a third more than the reach."""
+    """A frame and its truth. lead: the first vehicle in the lane within reach, None without one; doubtful: not
+    decidable. beyond: the first one within a third more than the reach."""
 
     now: World
     frame: Frame
@@ -100,7 +100,7 @@ class Moment:
 
 
 def moments(scene: Scenario, frames: Iterable[tuple[World, Frame]], reach_m: float) -> Iterator[Moment]:
-    """The truth of each frame of a drive, from its first one on. reach_m: how far a lead counts."""
+    """The truth of each frame of a drive. reach_m: leads beyond this do not count."""
     way, in_sight = Way.of(scene), InSight()
     for now, frame in frames:
         assert frame.camera is not None
@@ -116,8 +116,8 @@ def moments(scene: Scenario, frames: Iterable[tuple[World, Frame]], reach_m: flo
 def driven(
     scene: Scenario, reach_m: float, names: Sequence[str] = tuple(SOURCES), over_line_s: float | None = None
 ) -> dict[str, Frames]:
-    """Every frame once through the sensors, and through the pipeline once for each set of sources, by their names.
-    over_line_s: when a wheel of vehicle 2 is over the line, where it cuts in."""
+    """Every frame once through the sensors, and once through the pipeline for each named set of sources. over_line_s:
+    when a wheel of vehicle 2 crosses the lane line, if it cuts in."""
     warm_up()
     settings = {name: with_changes(Params(), SOURCES[name]) for name in names}
     states = dict.fromkeys(names, State())
@@ -157,7 +157,7 @@ def judge(moment: Moment, result: Result) -> Verdict:
 
 
 def _is_told(now: World, result: Result, actor: int) -> bool:
-    """Whether the car that cuts in is the CIPV or said to be the next."""
+    """Whether the car that cuts in is the CIPV or announced as the next one."""
     state = next(each for each in now.actors if each.actor.id == actor)
     known = {lead.id for lead in (result.cipv, result.next_cipv) if lead is not None}
     places = [near_face_middle(item.bev) for item in result.objects if item.id in known and item.bev is not None]
@@ -165,7 +165,7 @@ def _is_told(now: World, result: Result, actor: int) -> bool:
 
 
 def _errors_m(path: Path, true_path: Path | None) -> tuple[float, ...]:
-    """Sideways distance of the path's points at 10, 30, 60, 100 m from the way really driven."""
+    """Sideways distance of the path's points at 10, 30, 60, 100 m from the path really driven."""
     if true_path is None:
         return (np.nan,) * len(LOOK_AHEAD_M)
     points = path.center[[min(s, len(path.center) - 1) for s in LOOK_AHEAD_M]]

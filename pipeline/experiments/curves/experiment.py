@@ -1,11 +1,11 @@
-"""Experiment: is the CIPV right in curves, and which source of the path makes it so?
+"""Experiment: is the CIPV right in curves, and which path source contributes what?
 
 Bends at 3 m/s² lateral acceleration, S-curves and straights; a lead in the lane draws away while cars drive in the
-lanes beside it at 20–100 m. Detections are given: true boxes with the errors measured of the embedded detector, a
-simulated LiDAR. Every frame goes through the pipeline with each source of the path alone, with none, without a route,
-and with all fused. Truth is the vehicle in the ego lane, decidable while neither it nor another lies at the lane's edge
-and no nearer vehicle hides it. Missing one that has just come into sight is not counted before confirmation can be
-through (``true_lead.InSight``).
+lanes beside it at 20–100 m. Detections are given: true boxes with the errors measured for the embedded detector, and a
+simulated LiDAR. Every frame goes through the pipeline with each path source alone, with none, without a route, and with
+all fused. Truth is the vehicle in the ego lane, decidable while no vehicle is at the lane's edge and no nearer vehicle
+hides it. Missing a lead that has just come into sight does not count until it can have been confirmed
+(``true_lead.InSight``).
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def run(case: CurveCase) -> Outcome:
 
 
 def _scenario(case: CurveCase) -> tuple[Scenario, float | None]:
-    """And when the wheel of who cuts in is over the line."""
+    """The scenario, and when the wheel of the car that cuts in crosses the lane line."""
     layout = scenarios.LAYOUTS[case.layout]
     return (
         scenarios.cut_in(layout, case.seed) if case.kind == "cut_in" else (scenarios.scenario(layout, case.seed), None)
@@ -62,14 +62,14 @@ def _scenario(case: CurveCase) -> tuple[Scenario, float | None]:
 
 
 def as_drive(case: CurveCase, outcome: Outcome) -> ExperimentDrive:
-    """The drive with all sources of the path fused."""
+    """The drive with all path sources fused."""
     fused = outcome["fused"]
     share, frames = share_right([fused])
     return ExperimentDrive(
         f"curves_{case.kind}_{case.layout}_{case.seed}",
         f"{scenarios.LAYOUTS[case.layout].title}: "
         f"{'cut-in' if case.kind == 'cut_in' else 'following'}, run {case.seed}",
-        (f"All sources of the path fused: right in {100.0 * share:.1f} % of {frames} decidable frames.",),
+        (f"All path sources fused: right in {100.0 * share:.1f} % of {frames} decidable frames.",),
         _scenario(case)[0],
         Params(),
         "both",
@@ -108,7 +108,7 @@ def share_right(drives: Sequence[Frames], reach_m: float = np.inf) -> tuple[floa
 
 
 def longest_wrong_s(drive: Frames) -> float:
-    """The longest time for which a decoy was the CIPV without a break."""
+    """The longest uninterrupted time for which a decoy was the CIPV."""
     longest, since = 0.0, None
     step_s = drive.t_s[1] - drive.t_s[0]
     for t_s, verdict in zip(drive.t_s, drive.verdicts, strict=True):
@@ -121,7 +121,7 @@ def longest_wrong_s(drive: Frames) -> float:
 
 
 def told_before_line_s(drive: Frames) -> float | None:
-    """By how many seconds before its wheel was over the line the car that cuts in was told and stayed so; negative:
+    """How many seconds before its wheel crossed the lane line the car that cuts in was recognised for good; negative:
     after it. None: never."""
     assert drive.over_line_s is not None
     if not drive.told[-1]:
@@ -135,9 +135,9 @@ def report(cases: Sequence[CurveCase], outcomes: Sequence[Outcome]) -> Section:
     cut_ins = _by_layout("cut_in", cases, outcomes)
     return Section(
         "curves",
-        "Curves: the CIPV at up to 3 m/s² lateral, by source of the path",
+        "Curves: the CIPV at up to 3 m/s² lateral, by path source",
         (
-            "Given detections: true boxes that err as the embedded detector was measured to (3 % of the height that "
+            "Given detections: true boxes with the errors measured for the embedded detector (3 % of the height that "
             "stays with a vehicle, 3 % and 0.7 px new in each frame, half missed at 105 m), a simulated VLP-16, lane "
             "lines with 1.5 px of noise to 55 m, RTK GNSS on a surveyed route with 0.3° of course noise, yaw rate with "
             "0.0024 rad/s of noise and 0.0005 rad/s of bias. A lead that came into sight fewer frames ago than "
@@ -146,12 +146,12 @@ def report(cases: Sequence[CurveCase], outcomes: Sequence[Outcome]) -> Section:
         ),
         (
             Table("CIPV right, % of decidable frames", _CHOICE_COLUMNS, tuple(_choice_rows(follows)), decimals=1),
-            Table("Path against the way really driven", _PATH_COLUMNS, tuple(_path_rows(follows)), decimals=2),
+            Table("Path compared with the path really driven", _PATH_COLUMNS, tuple(_path_rows(follows)), decimals=2),
             Table(
-                "Cut-in: told before its wheel is over the line, s",
+                "Cut-in: recognised before its wheel crosses the line, s",
                 ("road", "drives", "least", "mean"),
                 tuple(_cut_in_rows(cut_ins)),
-                "Told: it is the CIPV or said to be the next. All sources fused.",
+                "Recognised: it is the CIPV or announced as the next one. All sources fused.",
             ),
         ),
         failures=(
@@ -197,7 +197,7 @@ def _choice_rows(follows: dict[str, dict[str, list[Frames]]]) -> Iterator[tuple[
 
 
 def _path_rows(follows: dict[str, dict[str, list[Frames]]]) -> Iterator[tuple[Cell, ...]]:
-    """Mean absolute errors, and the root mean square of error over sigma: 1 is an honest sigma."""
+    """Mean absolute errors, and the root mean square of error over sigma: 1 means that sigma is correct."""
     for layout, by_source in follows.items():
         for name, drives in by_source.items():
             errors = np.array([row for drive in drives for row in drive.errors_m])
@@ -221,17 +221,17 @@ def _cut_in_rows(cut_ins: dict[str, dict[str, list[Frames]]]) -> Iterator[tuple[
 
 
 def _told_too_late(cut_ins: dict[str, dict[str, list[Frames]]]) -> Iterator[str]:
-    """A cut-in must be told at the latest when the wheel is over the line."""
+    """A cut-in must be recognised at the latest when the wheel crosses the line."""
     for layout, by_source in cut_ins.items():
         before = [told_before_line_s(drive) for drive in by_source["fused"]]
         late = sum(value is None or value < 0.0 for value in before)
         if late:
             title = scenarios.LAYOUTS[layout].title
-            yield f"{title}: {late} of {len(before)} cut-ins told after the wheel was over the line."
+            yield f"{title}: {late} of {len(before)} cut-ins recognised after the wheel crossed the line."
 
 
 def _held(layout: str, fused: list[Frames]) -> bool:
-    """Right in 99 % of the frames to 60 m and in as many to the reach as is wanted there, no decoy for long."""
+    """Right in 99 % of the frames up to 60 m, in the required share up to the reach, and no decoy for long."""
     near, far = share_right(fused, 60.0)[0], share_right(fused)[0]
     wrong_s = max(longest_wrong_s(drive) for drive in fused)
     return near >= 0.99 and far >= scenarios.LAYOUTS[layout].wanted and wrong_s <= LONGEST_WRONG_S + 1e-9

@@ -1,5 +1,5 @@
-"""The roads and the traffic of the experiment ``curves``: bends at 3 m/s² lateral, S-curves and straights, a lead ahead
-in the lane that draws away, and decoys beside it."""
+"""The roads and the traffic of the experiment ``curves``: bends at 3 m/s² lateral, S-curves and straights, a lead in
+the lane that draws away, and decoys beside it."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ Shape = Literal["straight", "bend", "s_curve"]
 
 @dataclass(frozen=True)
 class Layout:
-    """A road and a speed on it; radius_m of its bends, None when straight. reach_m: how far ahead the choice is judged.
-    wanted: the share of frames that must be right."""
+    """A road and a speed on it; radius_m of its bends, None when straight. reach_m: how far ahead the choice is scored.
+    wanted: the required share of correct frames."""
 
     name: str
     title: str
@@ -52,7 +52,7 @@ LAYOUTS = {
 
 
 def scenario(layout: Layout, seed: int) -> Scenario:
-    """Even seeds bend to the left first, odd ones to the right. The lead drives away from 20 m to the judged reach; two
+    """Even seeds bend to the left first, odd ones to the right. The lead drives away from 20 m to the scored reach; two
     cars drive in either lane beside, at 20–100 m, a little faster or slower than the ego car."""
     rng = np.random.default_rng([seed, list(LAYOUTS).index(layout.name)])
     speed = layout.speed_mps
@@ -66,8 +66,8 @@ def scenario(layout: Layout, seed: int) -> Scenario:
 
 
 def cut_in(layout: Layout, seed: int) -> tuple[Scenario, float]:
-    """The same road with a lead at 60 m and a car that moves over from beside in front of it; and the time at which its
-    nearer wheel is over the line. It needs 3 s for the change."""
+    """The same road with a lead at 60 m and a car that cuts in before it from the next lane within 3 s; and the time at
+    which its nearer wheel crosses the lane line."""
     side = 1 if seed % 2 else -1
     start_s, takes_s = 5.0, 3.0
     change = {"start_s": start_s, "duration_s": takes_s, "lane": LANE}
@@ -100,7 +100,7 @@ def _scene(layout: Layout, seed: int, actors: list[dict[str, Any]]) -> Scenario:
 
 
 def _segments(layout: Layout, side: float) -> list[dict[str, float]]:
-    """A transition's length follows from the lateral jerk that drivers take, v³/(R·j)."""
+    """The length of a transition follows from the usual lateral jerk, v³/(R·j)."""
     if layout.radius_m is None:
         return [{"length_m": 5000.0}]
     bend = side / layout.radius_m

@@ -1,4 +1,4 @@
-"""The drives of the car-to-car rear grid: every cell, its approach, and whether it went as the protocol wants it."""
+"""The drives of the car-to-car rear grid: every cell, its approach, and whether it met the protocol."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ NETWORK_SAMPLE: tuple[tuple[Test, float, int], ...] = (
     *(("CCRs", 40.0, overlap) for overlap in (-50, 50)),
     *(("CCRm", speed, 100) for speed in (40.0, 60.0, 80.0)),
 )
-"""What is driven with the embedded network on drawn pictures too, beside the lead that brakes at 6 m/s² 40 m ahead."""
+"""Cells that are also driven with the embedded network on rendered pictures, besides the lead that brakes at 6 m/s² 40
+m ahead."""
 
 
 def kind_said(kind: SensorSetup) -> str:
@@ -47,7 +48,8 @@ def kind_said(kind: SensorSetup) -> str:
 
 @dataclass(frozen=True)
 class EuroNcapCase:
-    """speed_kmh: of the ego car. overlap: %. gap_m, decel_mps2: CCRb only. boxes: whose the camera's are."""
+    """speed_kmh: of the ego car. overlap: %. gap_m, decel_mps2: CCRb only. boxes: where the camera's boxes come
+    from."""
 
     test: Test
     speed_kmh: float
@@ -64,7 +66,7 @@ class EuroNcapCase:
 
     @property
     def name(self) -> str:
-        """Fit for a file."""
+        """As part of a file name."""
         what = f"gap{self.gap_m:.0f}_brake{self.decel_mps2:.0f}" if self.test == "CCRb" else f"overlap{self.overlap}"
         kind = "_".join((SENSORS[self.sensors], self.controller.replace(" + ", "+"), self.boxes))
         return f"{self.test}_{self.speed_kmh:.0f}kmh_{what}_{kind}".lower()
@@ -81,7 +83,7 @@ class EuroNcapCase:
 
 @dataclass(frozen=True)
 class Result:
-    """impact_kmh: relative, 0 when avoided. void: why the run does not count, empty when it does."""
+    """impact_kmh: relative, 0 when avoided. void: why the run is not valid; empty when it is."""
 
     impact_kmh: float
     void: str
@@ -156,8 +158,8 @@ def as_drive(case: EuroNcapCase, result: Result) -> ExperimentDrive:
 
 
 def _void(case: EuroNcapCase, drive: DriveRecord) -> str:
-    """Why the approach was not as the protocol wants it: speed within 0 to +1 km/h from the test's start until the car
-    brakes by itself, which it may not do before the start."""
+    """Why the approach did not meet the protocol: the speed must stay within 0 to +1 km/h from the start of the test
+    until the car brakes by itself, and it must not brake before the start."""
     wanted = case.speed_kmh * KMH
     for t_s, speed, state, accel in zip(drive.t_s, drive.speed_mps, drive.states, drive.accel_mps2, strict=True):
         acts = accel < -0.5 or state in ("partial_brake", "full_brake")

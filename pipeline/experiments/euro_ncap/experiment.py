@@ -2,8 +2,8 @@
 
 CCRs: 10–80 km/h towards a standing car. CCRm: 30–80 km/h towards one that drives 20 km/h. Both in steps of 5 km/h, at
 five overlaps. CCRb: both at 50 km/h, 12 or 40 m apart, the lead brakes at 2 or 6 m/s². Impact speeds are relative, in
-the colours of Euro NCAP's protocol of 2026 (``ncap_limits``). As in a test, a robot holds the speed until AEB acts; a
-run whose approach left the protocol's tolerance is void.
+the colours of Euro NCAP's protocol of 2026 (``ncap_limits``). As in a real test, a robot holds the speed until AEB
+acts; a run whose approach leaves the protocol's tolerance is void.
 """
 
 from __future__ import annotations
@@ -45,10 +45,10 @@ def report(cases: Sequence[EuroNcapCase], results: Sequence[Result]) -> Section:
         (
             f"Every run starts {RUN_UP_S:g} s before TTC {START_TTC_S:g} s with the speed held; the camera's boxes "
             "are projected truth with a detector's errors, and in a sample of the cells (network) the embedded "
-            "network's on drawn pictures. AEB: a robot holds the speed and only AEB brakes. ACC: the "
+            "network's on rendered pictures. AEB: a robot holds the speed and only AEB brakes. ACC: the "
             "paper's speed law alone, set to the test speed. Cells are relative impact speeds in km/h; 0 is avoided. "
             "Colours are those of Euro NCAP's protocol of 2026, whose bands depend on the test speed: green avoided, "
-            "then yellow, orange, brown, red. Grey: the approach was not as the protocol wants it.",
+            "then yellow, orange, brown, red. Grey: the approach did not meet the protocol.",
             _verdict(done),
         ),
         tuple(tables),
@@ -128,7 +128,8 @@ def _passes(case: EuroNcapCase, result: Result, limit_kmh: float) -> Coloured:
 
 
 def _verdict(done: dict[EuroNcapCase, Result]) -> str:
-    """AEB alone: how many cells fused ends slower than the LiDAR alone, and how many faster."""
+    """AEB alone: in how many cells the impact is slower with both sensors than with the LiDAR alone, and in how many
+    faster."""
     pairs = [
         (result, done[other])
         for case, result in done.items()

@@ -14,14 +14,15 @@ BANDS: tuple[tuple[float, tuple[tuple[float, Tone], ...]], ...] = (
     (30.0, ((10.0, "brown"),)),
     (0.0, ()),
 )
-"""From which speed of the ego car, km/h, which relative impact speeds, km/h, have a colour: each those below. Green is
-an impact avoided, red all others. The protocol tests every 10 km/h; in between, the bands of the speed below hold."""
+"""From each ego speed on, km/h: the relative impact speeds, km/h, below which each colour applies. Green is an avoided
+impact, red is everything else. The protocol tests every 10 km/h; in between, the bands of the lower speed apply."""
 R152_LIMITS: tuple[tuple[float, float], ...] = ((42.0, 0.0), (45.0, 15.0), (50.0, 25.0), (55.0, 30.0), (60.0, 35.0))
-"""UN R152, 5.2.1.4, category M1 unladen: up to this relative speed, km/h, the impact may be no faster than that."""
+"""UN R152, 5.2.1.4, category M1 unladen: for relative speeds up to the first number, km/h, the impact may be no faster
+than the second."""
 
 
 def impact_tone(speed_kmh: float, impact_kmh: float) -> Tone:
-    """Euro NCAP's colour of a relative impact speed at this speed of the ego car; 0 is an impact avoided."""
+    """Euro NCAP's colour of a relative impact speed at this ego speed; 0 is an avoided impact."""
     if impact_kmh <= 0.0:
         return "green"
     bands = next(bands for from_kmh, bands in BANDS if speed_kmh >= from_kmh)
@@ -29,5 +30,5 @@ def impact_tone(speed_kmh: float, impact_kmh: float) -> Tone:
 
 
 def r152_limit_kmh(relative_kmh: float) -> float | None:
-    """The impact speed that the Regulation permits; None beyond the speeds that it covers."""
+    """The permitted impact speed; None beyond the speeds that the Regulation covers."""
     return next((limit for up_to, limit in R152_LIMITS if relative_kmh <= up_to), None)

@@ -1,8 +1,7 @@
-"""Experiment: adaptive cruise control after the manner of ISO 15622 (2018).
-
-Acquisition range; telling two vehicles 3.5 m apart; following through curves of 500, 250 and 125 m radius; stopping
-behind a lead that brakes at 2.5 m/s²; time gap in following. ACC alone in the closed loop, braking no harder than the
-3.5 m/s² that the standard permits, with the LiDAR alone and with both sensors.
+"""Experiment: adaptive cruise control, modelled on ISO 15622 (2018). Acquisition range; discriminating two vehicles 3.5
+m apart; following through curves of 500, 250 and 125 m radius; stopping behind a lead that brakes at 2.5 m/s²; time gap
+in following. ACC alone in the closed loop, braking no harder than the 3.5 m/s² that the standard permits, with the
+LiDAR alone and with both sensors.
 """
 
 from __future__ import annotations
@@ -45,15 +44,15 @@ class FollowingCase:
 
     @property
     def name(self) -> str:
-        """Fit for a file."""
+        """As part of a file name."""
         return f"iso_{self.test}_{self.value:g}_{SENSORS[self.sensors]}_{self.seed}".lower()
 
 
 @dataclass(frozen=True)
 class Outcome:
     """acquired_m: range when the lead first was the CIPV, None if never. kept: share of the frames from then on in
-    which it was. smallest_gap_m: range to the lead. smallest_time_gap_s: that over own speed, while driving; None when
-    it never drove. touched: there was contact. t_s, range_m, speed_mps, motions of the ego vehicle: each tick."""
+    which it still was. smallest_gap_m: range to the lead. smallest_time_gap_s: gap over ego speed while driving; None
+    when it never drove. touched: there was contact. t_s, range_m, speed_mps, motions of the ego vehicle: each tick."""
 
     acquired_m: float | None
     kept: float
@@ -137,8 +136,7 @@ def as_drive(case: FollowingCase, outcome: Outcome) -> ExperimentDrive:
 
 
 class _Row(NamedTuple):
-    """One tick. seen: the lead is the CIPV. counted: the tick counts for whether it is kept. motion: the ego
-    vehicle's."""
+    """One tick. seen: the lead is the CIPV. counted: the tick counts for ``kept``. motion: the ego vehicle's."""
 
     t_s: float
     range_m: float
@@ -173,7 +171,7 @@ def report(cases: Sequence[FollowingCase], outcomes: Sequence[Outcome]) -> Secti
     rows = tuple(_row(by_case) for by_case in driven.values())
     return Section(
         "iso",
-        "ACC after the manner of ISO 15622",
+        "ACC, modelled on ISO 15622",
         (
             f"ACC alone, braking at {ACC_BRAKE_MPS2:g} m/s² at most. Acquisition: the range at which the lead first is "
             "the CIPV (mean). Kept: share of the frames from then on in which it still is. Passed: no contact, kept in "
@@ -207,7 +205,7 @@ _COLUMNS = (
 
 
 def _row(by_case: dict[FollowingCase, Outcome]) -> tuple[AnyCell, ...]:
-    """The runs of one test with one set of sensors; its last cell leads to the first that did not pass."""
+    """The runs of one test with one set of sensors; the last cell links to the first one that failed."""
     first, group = next(iter(by_case)), list(by_case.values())
     shown = next((case for case, each in by_case.items() if not passed(each)), first)
     acquired = [each.acquired_m for each in group if each.acquired_m is not None]
@@ -232,7 +230,7 @@ def passed(outcome: Outcome) -> bool:
 
 
 def _verdicts(groups: dict[Key, list[Outcome]]) -> list[str]:
-    """Test by test: how many of its runs pass with each set of sensors."""
+    """For each test, how many runs pass with each set of sensors."""
     found = []
     for test in dict.fromkeys(key[0] for key in groups):
         count = {
@@ -259,4 +257,4 @@ def _chart(test: Test, value: float, groups: dict[Key, list[Outcome]]) -> Chart:
     return Chart(f"{test}, {name}: range to the lead", "time s", "range m", lines)
 
 
-ISO = Experiment("iso", "iso", "ACC after the manner of ISO 15622", cases, run, report, as_drive)
+ISO = Experiment("iso", "iso", "ACC, modelled on ISO 15622", cases, run, report, as_drive)

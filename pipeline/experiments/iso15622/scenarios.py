@@ -13,7 +13,7 @@ LEAD_BRAKE_MPS2 = 2.5
 RADII_M = (500.0, 250.0, 125.0)
 CURVE_LATERAL_MPS2 = 2.0
 BEND_FROM_M = 210.0
-"""Where a curve's radius is constant from."""
+"""From here on a curve's radius is constant."""
 _TRANSITION_M = 30.0
 _LANE_WIDTH_M = 3.5
 
@@ -44,8 +44,8 @@ def scenario(test: Test, value: float, seed: int) -> Scenario:
 
 
 def _traffic(test: Test, speed_mps: float) -> tuple[list[dict[str, Any]], float]:
-    """The vehicles, the lead first, and how long the drive lasts, s. A lead that goes as fast as the ego car starts
-    where ACC would have it: 5 m and 1.8 s ahead (``acc.min_gap_m``, ``acc.time_gap_s``)."""
+    """The vehicles, the lead first, and how long the drive lasts, s. A lead at the ego car's speed starts at the
+    distance ACC would keep: 5 m and 1.8 s ahead (``acc.min_gap_m``, ``acc.time_gap_s``)."""
     steady, gap_m = {0.0: speed_mps}, 5.0 + 1.8 * speed_mps
     match test:
         case "acquisition":

@@ -1,9 +1,8 @@
-"""Experiment: where a fused object is, against where it is believed to be (paper, Table 4).
+"""Experiment: position error of fused objects (paper, Table 4).
 
 Three layouts, 20 runs each; objects seen by both sensors (VL) and by the camera alone (V), up to 60 m. The printed
-table cannot be taken at its word: its "only vision" distance error (at most 0.499 m, mean 0.246 m) is what rounding to
-a metre gives, not what a few pixels of noise on a box's height give, and its lateral and longitudinal maxima are one
-number.
+table is not plausible: its "only vision" distance error (at most 0.499 m, mean 0.246 m) is that of rounding to a metre,
+not of a few pixels of noise in a box's height, and its lateral and longitudinal maxima are the same number.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ PRINTED: dict[tuple[str, str], tuple[float, ...]] = {
 
 @dataclass(frozen=True)
 class BevCase:
-    """layout: a, b or c. boxes: whose the camera's are."""
+    """layout: a, b or c. boxes: where the camera's boxes come from."""
 
     layout: str
     seed: int
@@ -54,7 +53,7 @@ class BevCase:
 
     @property
     def kind(self) -> BevVariant:
-        """What runs that differ by their seed alone have in common."""
+        """What runs that differ only by their seed have in common."""
         return self.layout, self.sensors, self.boxes
 
 
@@ -63,7 +62,7 @@ BevVariant = tuple[str, Sensors, Boxes]
 
 @dataclass(frozen=True)
 class Sighting:
-    """The target in one frame: its true range, and where it was believed to be; None when no object stands for it."""
+    """The target in one frame: its true range, and its estimated place; None when no object matches it."""
 
     range_m: float
     error: Error | None
@@ -71,7 +70,7 @@ class Sighting:
 
 @dataclass(frozen=True)
 class Error:
-    """source: whose object it is. Believed minus true, of the range and of the nearest face's middle, m."""
+    """source: the object's sensors. Estimated minus true range and position of the nearest face's middle, m."""
 
     source: str
     distance_m: float
@@ -80,7 +79,7 @@ class Error:
 
 
 def cases(short: bool) -> list[BevCase]:
-    """The network looks in one layout only: a drawn picture takes ten times as long as all the rest."""
+    """The network runs in one layout only: rendering a picture takes ten times as long as everything else."""
     given = [BevCase(each.layout, each.seed, sensors) for sensors in COMPARED for each in layouts.cases(short)]
     return given if short else given + [BevCase("a", seed, boxes="network") for seed in range(_BY_NETWORK)]
 
@@ -112,8 +111,8 @@ def _scenario(case: BevCase) -> Scenario:
 
 
 def sighting(tick: LoopStep) -> Sighting | None:
-    """Of the object that stands for the target: the one whose place in the picture overlaps the target's most, however
-    far off its distance is. One that is carried stands for nothing. None beyond 60 m and beside the car."""
+    """The errors of the object that matches the target: the one whose picture box overlaps the target's most, whatever
+    its distance. Carried objects do not count. None beyond 60 m and beside the car."""
     target, camera = target_of(tick), tick.frame.camera
     assert camera is not None
     truth_m = true_range_m(target)
@@ -173,12 +172,12 @@ def report(cases: Sequence[BevCase], runs: Sequence[list[Sighting]]) -> Section:
 
 
 def _verdict(layout: str, by_kind: dict[BevVariant, list[Sighting]]) -> str:
-    """Fused against the LiDAR alone, which drove the same runs without a camera: how often each knows where the car is,
-    and how well in range where both do."""
+    """Both sensors compared with the LiDAR alone in the same runs: how often each places the car, and the range error
+    where both do."""
     title = LAYOUTS[layout].capitalize()
     fused, lidar = (by_kind.get((layout, sensors, "truth"), []) for sensors in ("both", "lidar"))
     if not fused or not lidar:
-        return f"{title}: not driven both ways."
+        return f"{title}: not driven in both ways."
     both = [
         (abs(ours.error.distance_m), abs(theirs.error.distance_m))
         for ours, theirs in zip(fused, lidar, strict=True)
@@ -222,7 +221,7 @@ _COLUMNS = (
 
 
 def _figures(seen: list[Sighting], source: str) -> tuple[Cell, ...]:
-    """Frames with an object of this source, frames with no object at all, and the errors."""
+    """Frames with an object of this source, frames without any object, and the errors."""
     errors = [each.error for each in seen if each.error is not None and each.error.source == source]
     figures: list[Cell] = [len(errors), sum(each.error is None for each in seen)]
     for name in ("distance_m", "lateral_m", "longitudinal_m"):

@@ -1,9 +1,9 @@
 """Experiment: three braking manoeuvres in the closed loop (paper, section AEB test).
 
 CCRs: 100 km/h towards a standing car. CCRm: 50 km/h towards one that drives 20 km/h. CCRb: both at 50 km/h, 50 m apart,
-and the lead brakes at 6 m/s² to standstill. The LiDAR alone against both sensors, ACC alone against ACC with AEB.
+and the lead brakes at 6 m/s² to standstill. The LiDAR alone compared with both sensors, and ACC alone with ACC and AEB.
 
-The paper reports no drive, only the constant deceleration that its detection ranges would ask for: ``closed_forms``.
+The paper reports no drives, only the constant deceleration that its detection ranges would require: ``closed_forms``.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Key = tuple[Manoeuvre, Sensors, str, Boxes]
 _LEAD_BRAKES_AT_S = 2.0
 _SHOWN_AT_S: dict[Manoeuvre, float] = {"CCRs": 3.0, "CCRm": 7.0, "CCRb": 3.0}
 _CLEAR_MPS, _CLEAR_M = 0.3, 0.3
-"""Impact speed or gap that must differ by more before one is called better."""
+"""Smallest difference in impact speed or gap that counts as better."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +40,12 @@ class BrakingCase:
 
     @property
     def key(self) -> Key:
-        """What runs that differ by their seed alone have in common."""
+        """What runs that differ only by their seed have in common."""
         return self.manoeuvre, self.sensors, self.controller, self.boxes
 
     @property
     def name(self) -> str:
-        """Fit for a file."""
+        """As part of a file name."""
         controller = self.controller.replace(" + ", "+")
         return f"{self.manoeuvre}_{SENSORS[self.sensors]}_{controller}_{self.boxes}_{self.seed}".lower()
 
@@ -180,10 +180,10 @@ def _mean(values: Iterable[float | None]) -> float | None:
 
 
 def _verdict(manoeuvre: Manoeuvre, done: list[tuple[BrakingCase, DriveRecord]]) -> str:
-    """Fused against the LiDAR alone, in words, with AEB."""
+    """Both sensors compared with the LiDAR alone, with AEB, as a sentence."""
 
     def worst(sensors: Sensors) -> tuple[float, float]:
-        """Impact (0 without) and negative gap: smaller is better."""
+        """Impact speed (0 without one) and negated gap: smaller is better."""
         return max(
             (drive.impact_mps or 0.0, -drive.smallest_gap_m)
             for case, drive in done

@@ -1,10 +1,10 @@
 """Experiment: is the closest in-path vehicle the right one? (paper, section CIPV, its four scenarios.)
 
 Straight road, left turn, and two turns across the path, each with the LiDAR alone, the camera alone and both. The ego
-vehicle follows its script, and GNSS knows the road that it means to drive, as the paper's did. Truth is the way that it
-will really drive: the nearest vehicle of which 0.9 m (half of what is narrower) reach into a corridor along it. Within
-0.3 m of that edge either answer is right, where a nearer vehicle hides the lead nobody can say, and a lead that has
-just come into sight must be seen as often as confirmation asks (``cipv.confirm_hits``): such frames do not count.
+vehicle follows its script, with a planned route for its GNSS, as in the paper. Truth is the nearest vehicle of which
+0.9 m (or half of a narrower one) reach into a corridor along the path that the car will really drive. Within 0.3 m of
+that limit either answer is right; where a nearer vehicle hides the lead there is no answer; and a lead that has just
+come into sight must first be confirmed (``cipv.confirm_hits``). Such frames do not count.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ _MARGIN_M = 12.0
 Key = tuple[str, Sensors]
 Verdict = Literal["correct", "none", "missed", "false", "wrong", "edge", "hidden", "new"]
 UNDECIDABLE = ("edge", "hidden", "new")
-"""edge: either answer is right · hidden: a nearer vehicle covers the lead · new: it was covered, or the drive had not
-begun, so short a time ago that it cannot be confirmed yet."""
+"""edge: either answer is right · hidden: a nearer vehicle covers the lead · new: the lead came into sight, or the drive
+began, too recently for confirmation."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class ChoiceCase:
 
     @property
     def name(self) -> str:
-        """Fit for a file."""
+        """As part of a file name."""
         return f"choosing_{self.scene}_{SENSORS[self.sensors]}_{self.seed}".lower()
 
 
@@ -104,7 +104,7 @@ def as_drive(case: ChoiceCase, frames: list[Frame]) -> ExperimentDrive:
 
 
 def judge(way: Way, tick: LoopStep, in_sight: InSight) -> Frame:
-    """The frame's CIPV against the vehicle that the car will really meet first."""
+    """The frame's CIPV compared with the vehicle that the car will really meet first."""
     lead, doubtful = true_lead(tick.world, way.ahead(tick.world))
     chosen = tick.result.chosen()
     if chosen is not None and (chosen.distance_m or 0.0) > MAX_M:
@@ -116,7 +116,7 @@ def judge(way: Way, tick: LoopStep, in_sight: InSight) -> Frame:
     elif lead is not None and in_sight.is_hidden(lead.actor.id):
         verdict = "hidden"
     elif lead is None:
-        # what drives only just too far ahead a camera may take for less
+        # a camera may underestimate the distance of a vehicle just beyond the limit
         beyond = chosen is not None and true_lead(tick.world, way.ahead(tick.world), MAX_M + _MARGIN_M)[0] is not None
         verdict = "none" if chosen is None else "edge" if beyond else "false"
     elif chosen is None or chosen.bev is None:
@@ -134,7 +134,7 @@ def judge(way: Way, tick: LoopStep, in_sight: InSight) -> Frame:
 
 
 def acquired_m(frames: Sequence[Frame]) -> list[float]:
-    """For each true lead: its range in the first frame in which it was rightly chosen."""
+    """For each true lead, its range in the first frame in which it was correctly chosen."""
     first: dict[int, float] = {}
     for frame in frames:
         if frame.verdict == "correct" and frame.lead is not None and frame.lead_m is not None:
@@ -165,7 +165,7 @@ def report(cases: Sequence[ChoiceCase], runs: Sequence[list[Frame]]) -> Section:
                 "Frames",
                 _COLUMNS,
                 tuple(_row(scene, sensors, by_name) for (scene, sensors), by_name in driven.items()),
-                "The share leads to the run with the least.",
+                "The share links to the worst run.",
                 decimals=1,
             ),
         ),
@@ -199,7 +199,7 @@ _COLUMNS = (
 
 
 def _row(scene: str, sensors: Sensors, by_name: dict[str, list[Frame]]) -> tuple[AnyCell, ...]:
-    """The runs of one scenario with one set of sensors; the share leads to the worst of them."""
+    """The runs of one scenario with one set of sensors; the share links to the worst one."""
     runs = list(by_name.values())
     worst = min(by_name, key=lambda name: _share_correct([by_name[name]]), default="")
     frames = [frame for run in runs for frame in run if frame.verdict not in UNDECIDABLE]

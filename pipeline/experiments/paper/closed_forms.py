@@ -1,5 +1,5 @@
-"""The constant decelerations that the paper reports of its braking manoeuvres (section AEB test), as printed and as
-physics has them."""
+"""The constant decelerations that the paper reports for its braking manoeuvres (section AEB test), as printed and as
+physically correct."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ LEAD_DECEL_MPS2 = 6.0
 
 @dataclass(frozen=True)
 class Printed:
-    """A manoeuvre as the paper computes it: speed before and after, km/h; the gap it wants to be left, m; detection
-    ranges, m, and the decelerations that it prints for them."""
+    """A manoeuvre as the paper computes it: speed before and after, km/h; the remaining gap, m; detection ranges, m,
+    and the decelerations printed for them."""
 
     speed_kmh: float
     end_kmh: float
@@ -35,7 +35,7 @@ PAPER: dict[Manoeuvre, Printed] = {
 
 
 def printed_decel_mps2(speed_mps: float, end_mps: float, detected_m: float, keep_m: float) -> float:
-    """The paper's formula: (v² − v₀²) / (2·(d − d_keep)). It takes the lead for standing, whatever it does."""
+    """The paper's formula: (v² − v₀²) / (2·(d − d_keep)). It assumes a standing lead."""
     return (speed_mps**2 - end_mps**2) / (2.0 * (detected_m - keep_m))
 
 
@@ -52,7 +52,7 @@ def needed_behind_braking_mps2(
 
 
 def closed_forms() -> Table:
-    """The printed decelerations, out of the printed formula, and the right physics beside."""
+    """The printed decelerations, the printed formula, and the correct physics."""
     rows = []
     for manoeuvre, paper in PAPER.items():
         speed, end = paper.speed_kmh * KMH, paper.end_kmh * KMH
@@ -71,7 +71,7 @@ def closed_forms() -> Table:
         "Constant deceleration needed from the paper's detection ranges, m/s²",
         ("manoeuvre", "sensors", "detected at m", "gap kept m", "printed", "printed formula", "physics"),
         tuple(rows),
-        "The print takes every lead for standing. Physics: CCRm closes at 30 km/h only; in CCRb the lead's own "
+        "The printed formula assumes a standing lead. Physics: CCRm closes at 30 km/h only; in CCRb the lead's own "
         f"stopping distance (at {LEAD_DECEL_MPS2:g} m/s²) adds to the gap.",
         3,
     )

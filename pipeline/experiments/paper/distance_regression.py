@@ -1,7 +1,7 @@
 """Experiment: distance from box height, fitted in the scene (paper, Distance Estimation with Regression).
 
 Three layouts, 20 runs each. Boxes are projected truth with a detector's errors. The law is fitted to the even runs of
-the first layout and judged on everything else.
+the first layout and tested on everything else.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ def report(cases: Sequence[LayoutCase], runs: Sequence[list[Sample]]) -> Section
             "which are 1.59 m tall; these are 1.48 m. Depth is along the optical axis. Boxes cut by the picture's edge "
             "are left out.",
             GIVEN_SAID,
-            "Fused against the LiDAR alone: not asked here, these are the camera's boxes alone.",
+            "No comparison with the LiDAR: this experiment uses the camera's boxes only.",
         ),
         (
             _law_table(free, pinhole, judged),

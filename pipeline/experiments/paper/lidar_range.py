@@ -1,4 +1,4 @@
-"""Experiment: how far the LiDAR recognises a car, and how exact its distance is (paper, LiDAR range check).
+"""Experiment: how far the LiDAR detects a car, and how accurate its distance is (paper, LiDAR range check).
 
 The car stands; the ego vehicle drives up to it from 100 m at 36 km/h. The paper measures 2.14 % mean error, 0.47 m at
 most, and recognition up to 35 m, with RTK GNSS as truth. Here truth is the simulator's own.
@@ -35,7 +35,7 @@ class RangeCase:
 
 @dataclass(frozen=True)
 class Sighting:
-    """One tick: the true range, and the measured one where the LiDAR had the car in this sweep."""
+    """One tick: the true range, and the measured one if the car was detected in this sweep."""
 
     true_m: float
     measured_m: float | None
@@ -78,8 +78,8 @@ def as_drive(case: RangeCase, seen: list[Sighting]) -> ExperimentDrive:
 
 
 def _measured_m(tick: LoopStep) -> float | None:
-    """The range of the nearest object in the car's lane, where nothing else stands, however far off it is; carried ones
-    are guesses and do not count."""
+    """The range of the nearest object in the car's lane, where nothing else stands, whatever its error; carried objects
+    do not count."""
     ahead = [
         item.distance_m
         for item in tick.result.objects
@@ -117,7 +117,7 @@ def report(cases: Sequence[RangeCase], runs: Sequence[list[Sighting]]) -> Sectio
             "A standing vehicle from 100 m to 4 m, one LiDAR, no camera. Recognised: at least half of the sweeps in a "
             "5 m bin hold it, and so do all nearer bins. Errors are over all sweeps that hold it, of the nearest "
             "object in its lane, however far off.",
-            "Fused against the LiDAR alone: not asked here, there is no camera. Within this reach a fused distance is "
+            "No comparison with both sensors: there is no camera here. Within this reach a fused distance is "
             "the LiDAR's; what the camera adds beyond it is in the experiments that follow.",
         ),
         (Table("Range and error", _COLUMNS, (_PRINTED_ROW, *(_row(kind, seen) for kind, seen in by_kind.items()))),),

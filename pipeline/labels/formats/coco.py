@@ -113,7 +113,7 @@ def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     ]
     first = max(found, default=0) + 1
     tracks += [LabelTrack(first + i, label, (one,), "accepted", origin) for i, (label, one) in enumerate(alone)]
-    note = (f"{len(alone):,} boxes without identity: each is a track of its own",) if alone else ()
+    note = (f"{len(alone):,} boxes without identity: each becomes its own track",) if alone else ()
     return Imported(replace(drive.empty(), tracks=tuple(tracks)), note)
 
 

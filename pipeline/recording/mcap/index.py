@@ -207,7 +207,7 @@ class _Walk:
     def _conclude(self, offset: int, has_ended: bool) -> None:
         found = self.directory
         found.sound_bytes = offset
-        found.problem = "it was not closed as usual and has no index"
+        found.problem = "it was not closed properly and has no index"
         if not has_ended:
             found.is_cut = True
             found.problem = f"it is cut off after {offset / 1e6:.1f} MB"

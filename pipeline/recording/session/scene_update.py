@@ -18,7 +18,8 @@ _FLAT_M = 0.1
 
 
 def objects_message(result: dict[str, Any], t_ns: int) -> bytes:
-    """The boxes of a result in the contract's form, in the ego frame. They replace those of the frame before."""
+    """The boxes of a result (as JSON, docs/reference/results.md) in the ego frame. They replace those of the frame
+    before."""
     lead = (result.get("cipv") or {}).get("id")
     entities = [
         _entity(each, box, is_lead=each.get("id") == lead, t_ns=t_ns)

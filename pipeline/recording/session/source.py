@@ -114,7 +114,7 @@ class SessionSource:
             return None
 
     def result(self, index: int) -> dict[str, Any] | None:
-        """What was believed of the frame when it was recorded, in the contract's JSON; null when nothing was."""
+        """The result of the frame when it was recorded, as JSON (docs/reference/results.md); None without one."""
         try:
             found = json.loads(self.file.message(topics.RESULTS, self.log_time_ns(index)).data)
         except (Damaged, ValueError, RecursionError):

@@ -109,7 +109,7 @@ class SessionWriter:
         received_ns: int | None = None,
         truth: tuple[TruthObject, ...] | None = None,
     ) -> None:
-        """Append a frame with what was believed of it, if anything. A result may be in the contract's JSON already.
+        """Append a frame, with its result if there is one. A result may be JSON already (docs/reference/results.md).
 
         received_ns: when the frame was made, by the recorder's clock; None for one that comes from a recording.
         """

@@ -1,4 +1,4 @@
-"""What is painted once per scenario: the sky with clouds and far hills, and the grain of the ground."""
+"""What is rendered once per scenario: the sky with clouds and far hills, and the texture of the ground."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _LEVELS_M = (
     (36.0, 6.0),
     (55.0, 9.0),
 )
-"""From this distance on the ground's grain is blurred by so many pixels of its tile: a coarse mip chain."""
+"""From this distance on, the ground's texture is blurred by this many pixels: a coarse mip chain."""
 _GRAIN_ENDS_M = 110.0
 _LEVEL = -1e-4  # slope at which a ray counts as looking down
 _CLEAREST_FAR = 0.5  # fields at the horizon keep a colour, or they would look like water
@@ -33,7 +33,7 @@ _CLEAREST_FAR = 0.5  # fields at the horizon keep a colour, or they would look l
 
 @lru_cache(maxsize=4)
 def sky(width: int, horizon: int, seed: int) -> U8:
-    """(horizon + 2, 3·width, 3): a panorama three pictures wide, to be cut by the heading."""
+    """(horizon + 2, 3·width, 3): a panorama three pictures wide, cropped by the heading."""
     rng = np.random.default_rng([seed, 3])
     rows, columns = horizon + 2, 3 * width
     height = np.linspace(1.0, 0.0, rows, dtype=np.float32)[:, None]
@@ -66,7 +66,7 @@ def _ridge(picture: F32, rng: np.random.Generator, horizon: int, size_px: int, b
 
 
 def _octaves(rng: np.random.Generator, size: int, steps: tuple[int, ...]) -> F32:
-    """(size, size) noise from 0 to 1 that repeats at its edges, the sum of ever finer grids."""
+    """(size, size) tileable noise from 0 to 1, the sum of ever finer grids."""
     total = np.zeros((size, size), dtype=np.float32)
     for weight, step in zip(0.62 ** np.arange(len(steps)), steps, strict=True):
         grid = rng.random((step, step)).astype(np.float32)
@@ -79,7 +79,7 @@ def _octaves(rng: np.random.Generator, size: int, steps: tuple[int, ...]) -> F32
 
 
 class Ground:
-    """Grain and haze of a flat ground under a fixed camera; only the place along the road changes."""
+    """Texture and haze of a flat ground under a fixed camera; only the place along the road changes."""
 
     def __init__(self, camera: CameraCalibration, ground_z_m: float, seed: int) -> None:
         self.horizon, x, y, distance = _ground_under(camera, ground_z_m)
@@ -98,7 +98,7 @@ class Ground:
         self._gain = np.full((*distance.shape, 3), 128, dtype=np.uint8)
 
     def finish(self, below_horizon: U8, along_m: float, left_m: float) -> None:
-        """Give flat-coloured ground its grain and its haze, in place."""
+        """Apply texture and haze to flat-coloured ground, in place."""
         gain = self._gain.copy()
         row, column = (int((way % TILE_M) / TILE_M * _TILE_PX) for way in (along_m, left_m))
         for band, tile, map1, map2 in self._bands:
@@ -123,7 +123,7 @@ def _ground_under(camera: CameraCalibration, ground_z_m: float) -> tuple[int, F6
 
 
 def _rays(camera: CameraCalibration, rows: Ints, columns: Ints) -> F64:
-    """(rows, columns, 3) where pixels look, camera axes, z = 1."""
+    """(rows, columns, 3) viewing directions of pixels, camera axes, z = 1."""
     v, u = np.meshgrid(rows, columns, indexing="ij")
     K = camera.K
     seen = np.column_stack([((u - K[0, 2]) / K[0, 0]).ravel(), ((v - K[1, 2]) / K[1, 1]).ravel()])
@@ -140,7 +140,7 @@ def _grain(seed: int) -> U8:
 
 
 def _wrapped(tile: U8, blur_px: float) -> U8:
-    """The tile twice over in both directions, so that any shift can be cut out of it."""
+    """The tile repeated twice in both directions, so that any shift can be cropped from it."""
     if blur_px > 0.0:
         rim = int(4 * blur_px) + 1
         padded = cv2.GaussianBlur(np.pad(tile, rim, mode="wrap"), (0, 0), blur_px)

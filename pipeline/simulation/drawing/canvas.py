@@ -1,6 +1,6 @@
 """Filling polygons of the ego frame into a picture: projection, clipping at the near plane, daylight and haze.
 
-Polygons are gathered first and shaded, projected and clipped all together; a picture has about a thousand of them.
+Polygons are collected first, then shaded, projected and clipped together; a picture has about a thousand of them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ NEAR_M = 0.4
 HAZE_M = 420.0
 HAZE_BGR = np.array([214.0, 200.0, 184.0])
 SUN = np.array([-0.55, 0.45, 0.70])
-"""Where the light comes from, ego axes: behind, to the left and above; unit length."""
+"""Direction of the light, ego axes: from behind, the left and above; unit length."""
 _SHIFT = 4  # OpenCV takes coordinates in 1/16 px
 _FAR_OUTSIDE_PX = 20_000.0
 _PIECE_PX, _MOST_PIECES = 160.0, 64  # an edge of 160 px in the picture's corner is bent by a quarter of a pixel
@@ -28,15 +28,15 @@ Ints = npt.NDArray[np.int64]
 
 
 def hazed(bgr: F64, distance_m: npt.ArrayLike) -> F64:
-    """(…, 3) colours as seen through the air over a distance."""
+    """(…, 3) colours with the haze of a distance."""
     clear = np.exp(-np.asarray(distance_m, dtype=np.float64) / HAZE_M)[..., None]
     mixed: F64 = bgr * clear + HAZE_BGR * (1.0 - clear)
     return mixed
 
 
 def lit(bgr: F64, normals: F64) -> F64:
-    """(F, 3) colours of surfaces with (F, 3) normals in the ego frame: sun, sky from above, a little from everywhere.
-    A normal of length zero is left as it is."""
+    """(F, 3) colours of surfaces with (F, 3) normals in the ego frame: sun, sky light from above, ambient light.
+    Colours with a zero normal are unchanged."""
     sun = np.maximum(normals @ SUN, 0.0)
     sky = 0.5 + 0.5 * normals[:, 2]
     shaded = np.minimum(bgr * (0.36 + 0.52 * sun + 0.30 * sky)[:, None] + 14.0 * sky[:, None], 255.0)
@@ -62,8 +62,8 @@ class Canvas:
         self._faces: list[tuple[tuple[Point, ...], Colour, Point]] = []
 
     def add(self, points: F64, counts: Ints, colours: F64, normals: F64 | None = None) -> None:
-        """Polygons one after another: (V, 3) ego points, (P,) corners of each, (P, 3) colours and (P, 3) normals, by
-        which they are shaded; without them colours stay as they are, apart from the haze."""
+        """Polygons: (V, 3) ego points, (P,) numbers of corners, (P, 3) colours and (P, 3) normals for shading. Without
+        normals only haze is applied."""
         self._gather_faces()
         self._points.append(points)
         self._counts.append(counts)
@@ -75,7 +75,7 @@ class Canvas:
         self._faces.append((corners, bgr, normal))
 
     def _gather_faces(self) -> None:
-        """Turn single faces into arrays, all at once: one by one they would cost more than filling them."""
+        """Turn single faces into arrays all at once; one by one this would cost more than filling them."""
         if not self._faces:
             return
         corners, colours, normals = zip(*self._faces, strict=True)
@@ -86,7 +86,7 @@ class Canvas:
         self._normals.append(np.array(normals, dtype=np.float64))
 
     def paint(self, haze: bool = True) -> None:
-        """Shade, project and fill everything gathered, and forget it."""
+        """Shade, project and fill all collected polygons, and clear the collection."""
         self._gather_faces()
         if not self._points:
             return
@@ -117,7 +117,7 @@ class Canvas:
             cv2.fillPoly(self.bgr, [fixed[starts_list[i] : ends[i]]], colour_list[i], cv2.LINE_AA, _SHIFT)
 
     def _fine_edges(self, flat: F64, counts: Ints) -> tuple[F64, Ints]:
-        """Cut long edges into pieces: behind a lens a straight edge is bent."""
+        """Subdivide long edges: lens distortion bends straight edges."""
         if not self._distortion.size:
             return flat, counts
         after = np.arange(1, len(flat) + 1)

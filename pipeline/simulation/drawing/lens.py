@@ -1,4 +1,4 @@
-"""What sets a real camera apart from a pinhole: lens distortion, blur, exposure that wanders, noise."""
+"""What distinguishes a real camera from a pinhole: lens distortion, blur, varying exposure, noise."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ _WIDEST_TAN = 1.1  # tangent of the angle off the axis to which the lens is mode
 
 
 class CameraModel(Strict):
-    """How far from ideal the camera is; all zero is a perfect pinhole.
+    """The camera's imperfections; all zero is a perfect pinhole.
 
     k1, k2: radial distortion as OpenCV has it, r_d = r·(1 + k1·r² + k2·r⁴). blur_px: standard deviation of the blur.
-    noise: standard deviation in grey levels of 255. exposure_stops: how far the exposure wanders to either side."""
+    noise: standard deviation in grey levels of 255. exposure_stops: amplitude of the exposure's variation."""
 
     k1: float = Field(default=-0.08, ge=-0.3, le=0.3)
     k2: float = Field(default=0.012, ge=-0.1, le=0.1)
@@ -30,7 +30,7 @@ class CameraModel(Strict):
     def _sees_its_corners(self) -> CameraModel:
         radius = np.linspace(0.0, _WIDEST_TAN, 200)
         if np.any(1.0 + 3.0 * self.k1 * radius**2 + 5.0 * self.k2 * radius**4 <= 0.1):
-            raise ValueError(f"k1 = {self.k1:g}, k2 = {self.k2:g}: this lens folds the picture's corners over")
+            raise ValueError(f"k1 = {self.k1:g}, k2 = {self.k2:g}: the lens folds the picture over at its corners")
         return self
 
 
@@ -40,7 +40,7 @@ ORDINARY = CameraModel()
 
 def distorted(flat: F64, distortion: F64) -> F64:
     """(N, 2) of directions x/z, y/z: where a lens puts them, as OpenCV has it; distortion: k1 and k2 first, or empty.
-    Beyond what the lens is modelled for, the distortion grows no more, so that nothing outside folds back inside."""
+    Beyond the modelled angle the distortion stays constant, so that nothing outside folds back inside."""
     if not distortion.size:
         return flat
     k1, k2 = distortion[:2]
@@ -49,8 +49,8 @@ def distorted(flat: F64, distortion: F64) -> F64:
 
 
 def undistorted(flat: F64, distortion: F64) -> F64:
-    """The inverse of ``distorted`` within the picture. The radial law has no inverse in closed form; it is tabulated
-    and read backwards."""
+    """The inverse of ``distorted`` within the picture. The radial law has no closed-form inverse, so it is tabulated
+    and interpolated backwards."""
     if not distortion.size:
         return flat
     ideal = np.linspace(0.0, _WIDEST_TAN, 4000)
@@ -67,7 +67,7 @@ class Sensor:
         self._grain = _grain(camera, model.noise, seed)
 
     def expose(self, seen: U8, t_s: float) -> U8:
-        """(H, W, 3) uint8 as the camera gives it at time t, from what falls on its sensor."""
+        """(H, W, 3) uint8 as the camera delivers it at time t, from the ideal picture."""
         if self._model.blur_px > 0.0:
             seen = np.asarray(cv2.GaussianBlur(seen, (0, 0), self._model.blur_px), dtype=np.uint8)
         gain = 2.0 ** (self._model.exposure_stops * np.sin(2 * np.pi * t_s / _EXPOSURE_PERIOD_S + self._seed))
@@ -78,7 +78,7 @@ class Sensor:
 
 
 def _grain(camera: CameraCalibration, sigma: float, seed: int) -> U8:
-    """Noise about 128, somewhat larger than a picture, so that every picture gets its own cut."""
+    """Noise around 128, somewhat larger than a picture, so that every picture gets its own crop."""
     rng = np.random.default_rng([seed, 6])
     shape = (camera.height + _NOISE_ROOM_PX, camera.width + _NOISE_ROOM_PX, 3)
     return np.clip(np.round(128.0 + sigma * rng.standard_normal(shape, dtype=np.float32)), 0, 255).astype(np.uint8)

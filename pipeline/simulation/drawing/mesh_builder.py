@@ -1,7 +1,7 @@
-"""Putting meshes together from faces, lofts and wheels.
+"""Building meshes from faces, lofts and wheels.
 
-Axes of a vehicle: x forward, y left, z up from the road, metres, origin on the road below its middle. Faces are kept in
-the order in which they may be painted once those that look away are left out.
+Axes of a vehicle: x forward, y left, z up from the road, metres, origin on the road below its middle. Faces are in
+painting order, valid once back faces are removed.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ _GLOWS = frozenset({BRAKE, "head", "plate"})
 
 @dataclass(frozen=True)
 class Mesh:
-    """F faces, each with corners of its own, one face after another.
+    """F faces with separate corners, one face after another.
 
-    vertices: (V, 3). counts: (F,) corners of each face. face_of_vertex: (V,). normals: (F, 3), outward. middles:
-    (F, 3). base: (F, 3) blue green red. painted, brakes: (F,) whose colour the vehicle decides. glows: (F,) not
+    vertices: (V, 3). counts: (F,) corners of each face. face_of_vertex: (V,). normals: (F, 3), outward. middles: (F,
+    3). base: (F, 3) blue green red. painted, brakes: (F,) faces whose colour depends on the vehicle. glows: (F,) not
     shaded. group: (F,) index of the part; parts are painted far to near, group_x: their places along x.
     """
 
@@ -73,7 +73,7 @@ class MeshBuilder:
     group: int = 0
 
     def face(self, corners: F64, colour: str, outward: tuple[float, float, float]) -> None:
-        """A flat face; its normal is turned to the side of ``outward``."""
+        """A flat face; its normal is oriented along ``outward``."""
         normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
         length = float(np.linalg.norm(normal))
         if length < 1e-9:

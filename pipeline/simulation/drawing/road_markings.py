@@ -1,4 +1,4 @@
-"""Painting the ground with its markings, in flat colours that ``backdrop.Ground`` then gives grain and haze."""
+"""Painting the ground and its markings in flat colours, to which ``backdrop.Ground`` then adds texture and haze."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def paint_ground(canvas: Canvas, road: Road, world: World, horizon: int) -> None
 
 
 def _add(canvas: Canvas, world: World, line: Line, strips: list[_Strip]) -> None:
-    """Hand strips beside a line to the canvas."""
+    """Add strips along a line to the canvas."""
     s, d = (np.concatenate([strip[i] for strip in strips]) for i in (0, 1))
     flat = world.to_ego(line.to_world(s, d))
     counts, colours = np.array([len(strip[0]) for strip in strips]), np.array([strip[2] for strip in strips])
@@ -65,7 +65,7 @@ def _add(canvas: Canvas, world: World, line: Line, strips: list[_Strip]) -> None
 
 
 def _junction(crossing: Crossing, road: Road) -> tuple[float, float]:
-    """From where to where along the road its markings leave room for a crossing."""
+    """The intervals along the road in which markings are interrupted for a crossing."""
     turn = np.radians(crossing.angle_deg)
     widest = max(abs(edge) for pair in road.edges_m() for edge in pair)
     half = crossing.half_width_m() / np.sin(turn) + widest / abs(np.tan(turn)) + _CORNER_M
@@ -101,7 +101,7 @@ def _carriageways(road: Road, s_m: F64) -> list[_Strip]:
 
 
 def _wheel_tracks(road: Road, s_m: F64) -> list[_Strip]:
-    """The darker bands that wheels have worn into each lane."""
+    """The darker wheel tracks in each lane."""
     lanes = (*range(-road.lanes_forward, 0), *range(1, road.lanes_oncoming + 1))
     middles = [road.lane_offset_m(lane) + wheel for lane in lanes for wheel in (-_WHEELS_M, _WHEELS_M)]
     return [_strip(s_m, middle - _TRACK_M / 2, middle + _TRACK_M / 2, _WORN) for middle in middles]
@@ -138,7 +138,7 @@ def _undivided(road: Road) -> bool:
 
 
 def _without(s_m: F64, open_m: list[tuple[float, float]]) -> list[F64]:
-    """A rising row of places cut into the stretches outside the open intervals."""
+    """Ascending positions split into the stretches outside the open intervals."""
     parts, start = [], float(s_m[0])
     for low, high in sorted(open_m):
         parts.append((start, low))

@@ -1,4 +1,4 @@
-"""What trees, buildings, guard rails, posts and signs look like: polygons for the canvas."""
+"""Polygons of trees, buildings, guard rails, posts and signs."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _DETAIL_M = 90.0
 _STOREY_M = 3.2
 _TURN, _COARSE_TURN = (np.linspace(0.0, 2 * np.pi, steps, endpoint=False) for steps in (24, 10))
 _CROWN = np.array([[1.0, 0.0, 0.0, 0.78], [0.80, -0.10, 0.16, 1.0], [0.50, -0.22, 0.34, 1.24]])
-"""Rounds of leaves: size, shift to the right and up in crown radii, brightness."""
+"""Foliage discs: size, offset to the right and up in crown radii, brightness."""
 
 
 def add_thing(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> None:
-    """Add the polygons of a thing that stands at ego x, y, turned by yaw."""
+    """Add the polygons of an item at ego x, y with this yaw."""
     match thing.kind:
         case "tree":
             _tree(canvas, thing, x, y)
@@ -43,7 +43,7 @@ def add_thing(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> N
 
 
 def _tree(canvas: Canvas, thing: Thing, x: float, y: float) -> None:
-    """A trunk and overlapping rounds of leaves, the upper ones lighter; all stand square to the ego axis."""
+    """A trunk and overlapping foliage discs, the upper ones lighter; all face the ego axis."""
     points, counts, colours = _tree_shape(thing, hypot(x, y) < _DETAIL_M)
     canvas.add(points + np.array([x, y, -LIDAR_HEIGHT_M]), counts, colours)
 
@@ -73,7 +73,7 @@ def _building(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> N
 
 
 def _rail(canvas: Canvas, thing: Thing, x: float, y: float, yaw: float) -> None:
-    """A W-beam on posts; far away one strip stands for it."""
+    """A W-beam on posts; a single strip when far away."""
     dx, dy = cos(yaw) * thing.length_m / 2, sin(yaw) * thing.length_m / 2
     start, end = (x - dx, y - dy), (x + dx, y + dy)
     if hypot(x, y) > _DETAIL_M:
@@ -117,7 +117,7 @@ def _walls(
     high_m: float,
     inset_m: float = 0.0,
 ) -> None:
-    """The walls of an upright box that can be seen, shaded, as far as ``inset_m`` from their ends."""
+    """The visible walls of an upright box, shaded, up to ``inset_m`` from their ends."""
     c, s = cos(yaw), sin(yaw)
     half_l, half_w = thing.length_m / 2, thing.width_m / 2
     for nx, ny, reach, half in ((c, s, half_l, half_w), (-c, -s, half_l, half_w), (-s, c, half_w, half_l),

@@ -1,4 +1,4 @@
-"""A drawn camera: 1280×720, 78° diagonal field of view, behind the windshield, looking 2° down.
+"""A rendered camera: 1280×720, 78° diagonal field of view, behind the windshield, looking 2° down.
 
 The LiDAR sits in the bumper, 1.6 m ahead of the camera and 0.8 m below it, so the parallax between them is real.
 """
@@ -30,7 +30,7 @@ _BRAKE_ON, _BRAKE_OFF = (70.0, 60.0, 255.0), (36.0, 30.0, 150.0)
 
 
 def calibration(model: CameraModel = ORDINARY) -> CameraCalibration:
-    """The camera exactly as its pictures are: pinhole with radial distortion."""
+    """The exact calibration of its pictures: pinhole with radial distortion."""
     focal = float(np.hypot(WIDTH, HEIGHT) / 2 / np.tan(np.radians(DIAGONAL_FOV_DEG / 2)))
     K = np.array([[focal, 0.0, WIDTH / 2], [0.0, focal, HEIGHT / 2], [0.0, 0.0, 1.0]])
     axes = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # columns: camera x, y, z in level ego axes
@@ -42,7 +42,7 @@ def calibration(model: CameraModel = ORDINARY) -> CameraCalibration:
 
 
 class DrawnCamera:
-    """Draws the world for one scenario. What does not change from moment to moment is prepared once."""
+    """Renders the world of one scenario. Static content is prepared once."""
 
     def __init__(self, road: Road, roadside: Roadside, seed: int, model: CameraModel = ORDINARY) -> None:
         self.camera = calibration(model)
@@ -56,7 +56,7 @@ class DrawnCamera:
         return self._sensor.expose(self._drawn(world), world.t_s)
 
     def _drawn(self, world: World) -> U8:
-        """What falls on the sensor: sharp and without noise."""
+        """The ideal picture: sharp and without noise."""
         bgr = np.empty((HEIGHT, WIDTH, 3), dtype=np.uint8)
         canvas = Canvas(bgr, self.camera)
         horizon = self._ground.horizon
@@ -80,7 +80,7 @@ class DrawnCamera:
         above[:, first.shape[1] :] = self._sky[: len(above), : width - first.shape[1]]
 
     def _add_standing(self, canvas: Canvas, world: World) -> None:
-        """Vehicles and what stands beside the road, far first (painter's algorithm)."""
+        """Vehicles and roadside items, farthest first (painter's algorithm)."""
         ahead = [state for state in world.actors if -_BEHIND_M < state.cuboid.center[0] < _AHEAD_M]
         jobs = [(*state.cuboid.center[:2], partial(_add_vehicle, canvas, state)) for state in ahead]
         for thing, x, y, yaw in self._roadside.near(world, _BEHIND_M, _AHEAD_M):
@@ -90,7 +90,7 @@ class DrawnCamera:
 
 
 def _add_shadow(canvas: Canvas, state: ActorState) -> None:
-    """The dark below a vehicle and the softer shade that the sun casts ahead and to the right."""
+    """The contact shadow below a vehicle, and the softer sun shadow ahead and to the right."""
     x, y, _ = state.cuboid.center
     length, width, _ = state.cuboid.size
     if not -_BEHIND_M < x < _AHEAD_M / 2:

@@ -1,5 +1,5 @@
-"""What is found in the pictures of a scenario without a network looking at them: the ``detections`` part of a scenario
-file. True boxes and true lane lines, with a detector's errors (``truth_boxes``, ``truth_lanes``)."""
+"""Simulated detections in a scenario's pictures, without a network: the ``detections`` part of a scenario file. True
+boxes and lane lines with a detector's errors (``truth_boxes``, ``truth_lanes``)."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from pipeline.simulation.world.roads import Strict
 
 
 class BoxNoise(Strict):
-    """A detector's errors. lasting_share, frame_share: standard deviation of each edge, as a share of the box's height,
-    that stays with a vehicle and that is new in each frame. edge_px: of each edge, never less. missed: share of clear
-    and near vehicles that a frame misses. reach_m, fall_off_m: where half are missed, and over how many metres that
-    comes. visible_share: less of a vehicle than this is not found.
+    """A detector's errors. lasting_share, frame_share: standard deviation of each edge as a share of the box's height,
+    once per vehicle and once per frame. edge_px: least standard deviation of an edge. missed: share of clear, near
+    vehicles missed per frame. reach_m, fall_off_m: distance at which half are missed, and width of that transition.
+    visible_share: vehicles less visible than this are not found.
 
     The defaults are near what the embedded detector does on drawn pictures (six scenarios, 500 clear vehicles): box
     heights 6 % off to 40 m and 7 % beyond, 1.5 px at least; 2 % missed to 80 m, half beyond 105 m. The reach is set
@@ -29,7 +29,8 @@ class BoxNoise(Strict):
 
 
 class LineNoise(Strict):
-    """sigma_px: of a point, across. missed: share of points that a frame lacks. reach_m: no paint is seen beyond."""
+    """sigma_px: standard deviation of a point across the line. missed: share of points missed per frame. reach_m: no
+    paint is seen beyond it."""
 
     sigma_px: float = Field(default=1.5, ge=0.0, le=100.0)
     missed: float = Field(default=0.3, ge=0.0, le=1.0)

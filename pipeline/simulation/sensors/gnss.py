@@ -1,8 +1,8 @@
 """A simulated RTK receiver: where the ego origin is on the Earth, with noise.
 
-The world's x, y plane is laid at the scenario's origin so that x points in a chosen compass direction; from there the
-way goes over Earth-centred coordinates to latitude and longitude on the WGS 84 ellipsoid (NIMA TR8350.2; the way back
-after Bowring 1985, exact to well under a millimetre this close to the ground).
+The world's x, y plane is placed at the scenario's origin with x in a chosen compass direction, and converted via
+Earth-centred coordinates to latitude and longitude on the WGS 84 ellipsoid (NIMA TR8350.2; the inverse after Bowring
+1985, exact to well under a millimetre this close to the ground).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _SLOWEST_COURSE_MPS = 0.5
 
 
 def fix(world: World, model: GnssModel, seed: int, index: int, t_ns: int) -> GnssFix:
-    """What the receiver says at one moment. The same seed and index give the same noise."""
+    """The receiver's fix at one moment. The same seed and index give the same noise."""
     noise = np.random.default_rng([seed, 8, index]).standard_normal(5)
     x, y, heading = world.pose
     turn = np.radians(90.0 - model.x_axis_deg)  # of the x axis, counter-clockwise from east

@@ -1,10 +1,10 @@
-"""Where in the world a scenario lies and how good its GNSS receiver is: the ``gnss`` part of a scenario file. How well
-the car measures its own motion: the ``odometry`` part.
+"""A scenario's place on the Earth and the noise of its GNSS receiver: the ``gnss`` part of a scenario file. The noise
+of the car's own motion: the ``odometry`` part.
 
-What the noises are was measured on 60 s of a real drive (comma2k19: u-blox receiver, phone gyroscope, speed from the
-car's bus; tests/accuracy/test_comma2k19.py measures them anew): course 0.31° at 17 m/s; yaw rate 0.0024 rad/s white
-when averaged over 0.1 s, with a bias of 0.0005 rad/s; speed 0.08 m/s against the receiver's. The place is RTK's, as in
-the paper: that drive's receiver was off by metres, but from fix to fix scattered by 0.02 m sideways.
+The noise was measured on 60 s of a real drive (comma2k19: u-blox receiver, phone gyroscope, speed from the car's bus;
+tests/accuracy/test_comma2k19.py repeats the measurement): course 0.31° at 17 m/s; yaw rate 0.0024 rad/s white when
+averaged over 0.1 s, with a bias of 0.0005 rad/s; speed 0.08 m/s against the receiver's. The position noise is that of
+RTK, as in the paper: that drive's receiver was off by metres, but scattered by only 0.02 m sideways from fix to fix.
 """
 
 from __future__ import annotations

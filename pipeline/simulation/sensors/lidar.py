@@ -1,4 +1,4 @@
-"""A VLP-16 by ray casting: every ray at its own time, with noise on its range, and the returns that it loses.
+"""A ray-cast VLP-16: every ray at its own time, with range noise and lost returns.
 
 A return is strong enough to be counted by chance, which falls off with range: a surface that sends back a share ρ of
 the light, met at an angle θ from its normal, gives a power that goes with ρ·cos θ/R², so the range at which it is lost
@@ -66,7 +66,7 @@ class Lidar:
         return self._returns(range_m, met, cosine, boxes, rng, t_ns)
 
     def _returns(self, range_m: F64, met: Ints, cosine: F64, boxes: F64, rng: np.random.Generator, t_ns: int) -> Sweep:
-        """The points of the rays that come back: strong enough, with noise on their range."""
+        """The points of the rays that return: strong enough, with range noise."""
         shape = range_m.shape
         chance, noise = rng.random(shape, dtype=np.float32), rng.standard_normal(shape, dtype=np.float32)
         column, ring = np.nonzero(range_m < MAX_RANGE_M)

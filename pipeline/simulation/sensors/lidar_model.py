@@ -1,4 +1,4 @@
-"""How the simulated LiDAR is mounted and how well it measures: the ``lidar`` part of a scenario file."""
+"""Mount and noise of the simulated LiDAR: the ``lidar`` part of a scenario file."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pipeline.types import F64
 
 
 class LidarModel(Strict):
-    """motion: rays are cast each at its own time, so what moves is distorted as in a raw sweep. range_sigma_m: noise of
-    the range. dropout: share of returns lost for no reason. up_m, roll_deg, pitch_deg, yaw_deg: how the sensor sits off
-    the ego origin; points are given in the level ego frame all the same. Positive pitch looks down."""
+    """motion: each ray is cast at its own time, so moving objects are distorted as in a raw sweep. range_sigma_m: range
+    noise. dropout: share of returns lost at random. up_m, roll_deg, pitch_deg, yaw_deg: the sensor's mount relative to
+    the ego origin; points are still given in the level ego frame. Positive pitch looks down."""
 
     motion: bool = True
     range_sigma_m: float = Field(default=0.015, ge=0.0, le=0.5)

@@ -46,7 +46,7 @@ def directions() -> F64:
 
 @numba.njit(cache=True, nogil=True)
 def cast(rays: F64, times_s: F64, boxes: F64, ground: F64, spare: int) -> tuple[F64, Ints, F64]:
-    """What each ray of a sensor at the origin meets first, every ray at its own time.
+    """The first hit of each ray of a sensor at the origin, every ray at its own time.
 
     rays: (COLUMNS, 16, 3). times_s: (COLUMNS,) after the moment to which the boxes belong. boxes: (B, 13). ground: z =
     ground[0] + ground[1]·x + ground[2]·y. spare: by how many columns a mount may turn a ray away from where its column

@@ -1,6 +1,5 @@
-"""The ego vehicle's sensors in one scenario: any moment of the world as the ``Frame`` that the pipeline takes.
-
-Recorded drives and closed loops see the world through this one place, so both see the same.
+"""The ego vehicle's sensors in one scenario: any moment of the world as a ``Frame`` for the pipeline. Recorded drives
+and closed loops both use it, so both see the same.
 """
 
 from __future__ import annotations
@@ -23,8 +22,8 @@ _BEFORE_M, _BEYOND_M = 100.0, 600.0
 
 
 class Sensors:
-    """LiDAR, camera, speedometer and GNSS. end_m: how far along the road the ego vehicle gets; the roadside ends 600 m
-    later. The same world and index give the same frame."""
+    """LiDAR, camera, speedometer and GNSS. end_m: how far the ego vehicle gets along the road; the roadside ends 600 m
+    beyond. The same world and index give the same frame."""
 
     def __init__(self, scenario: Scenario, end_m: float) -> None:
         self._scenario = scenario
@@ -34,8 +33,8 @@ class Sensors:
         )
 
     def frame(self, now: World, index: int, t_ns: int, picture: bool = True) -> Frame:
-        """What the sensors give at one tick. picture: draw the camera's picture; without it the frame is made ten times
-        faster, and still says how the camera is mounted."""
+        """What the sensors deliver at one tick. picture: render the camera's picture; without it the frame is made ten
+        times faster and still has the camera calibration."""
         return evolve(
             self.outline(now, index, t_ns),
             sweep=self.sweep(now, index, t_ns),
@@ -44,7 +43,7 @@ class Sensors:
         )
 
     def outline(self, now: World, index: int, t_ns: int) -> Frame:
-        """The same without sweep, picture and route, which take nearly all of the time."""
+        """The same without sweep, picture and route, which take nearly all the time."""
         return Frame(
             index,
             f"{index:06d}",

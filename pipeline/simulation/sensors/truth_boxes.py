@@ -1,8 +1,7 @@
-"""A detector's boxes without a network: true vehicles projected into the picture, with a detector's errors.
-
-The fast path of the closed loop. What a network does wrong is put in by its size: boxes off by a share of their height
-(a part that stays with each vehicle, since a network misjudges the same shape the same way, and a part new in every
-frame), objects missed more often the farther they are, and hidden ones not seen at all. No false alarms.
+"""A detector's boxes without a network: true vehicles projected into the picture, with a detector's errors. The fast
+path of the closed loop. The errors of a network are modelled: box edges are off by a share of the height (one part
+constant per vehicle, since a network misjudges the same shape in the same way, and one part new in every frame),
+farther objects are missed more often, and hidden ones are not seen. There are no false positives.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from pipeline.simulation.world.world_state import ActorState, World
 from pipeline.types import F64, Box, CameraCalibration, DistanceLaw, RawBoxes
 
 LABELS = {"car": "car", "van": "car", "truck": "truck", "bus": "bus", "motorcycle": "motorcycle"}
-"""What a network taught on COCO calls each kind of actor; it has no vans."""
+"""The COCO class of each kind of actor; COCO has no vans."""
 LAW = DistanceLaw(
     coefficient=907.0 * SIZES_M["car"][2],
     exponent=-1.0,
@@ -28,7 +27,7 @@ LAW = DistanceLaw(
     bus_ratio=SIZES_M["bus"][2] / SIZES_M["car"][2],
     motorcycle_ratio=SIZES_M["motorcycle"][2] / SIZES_M["car"][2],
 )
-"""What a true box's height tells: a pinhole camera's law, of vehicles as tall as the simulator's usually are."""
+"""The distance law of true boxes: a pinhole camera's, for vehicles of the simulator's usual height."""
 _SCORE = 0.9
 _SAMPLES = 12
 

@@ -1,8 +1,8 @@
 """A lane detector's points without a network: the road's true lane lines projected into the picture, with noise.
 
 The counterpart of ``truth_boxes`` for lines. Every line of the carriageway that the ego car drives on is seen up to
-where paint is a few pixels wide; each point errs sideways by itself, and some are missed. Nearer vehicles do not hide
-paint here.
+where paint is a few pixels wide; each point has its own sideways error, and some are missed. Vehicles do not hide paint
+here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Actors on the road: what they are, and where their script has them at any time.
+"""Actors on the road: what they are, and where their script puts them at any time.
 
 Speed is piecewise linear in time, so the way driven is piecewise quadratic and exact. A lane change is a smooth step
 (quintic, no jump in sideways acceleration) between two lanes' middles.
@@ -30,9 +30,9 @@ _SLOPE_S = 0.05
 
 
 class Brake(Strict):
-    """Braking at a constant deceleration down to a speed, which is then kept. It starts at a time, or when the gap
-    between the ego origin and the vehicle's nearest face has first shrunk to ``at_gap_m``: that is the gap of the drive
-    as scripted, so a closed loop meets the same traffic whatever its ego vehicle does."""
+    """Constant deceleration down to a speed, which is then held. It starts at a time, or when the gap between the ego
+    origin and the vehicle's nearest face has first shrunk to ``at_gap_m``: that is the gap of the drive as scripted, so
+    a closed loop meets the same traffic whatever its ego vehicle does."""
 
     at_s: float | None = Field(default=None, ge=0.0, le=3600.0)
     at_gap_m: float | None = Field(default=None, gt=0.0, le=1000.0)
@@ -47,7 +47,7 @@ class Brake(Strict):
 
 
 class Speeds(Strict):
-    """speed_mps: time in seconds → speed, linear in between, constant outside. brake: takes over from there on."""
+    """speed_mps: time in seconds → speed, linear in between, constant outside. brake: replaces it from its start on."""
 
     speed_mps: dict[float, float] = Field(min_length=1)
     brake: Brake | None = None
@@ -61,8 +61,8 @@ class Speeds(Strict):
 
     @property
     def corners(self) -> list[tuple[float, float]]:
-        """(time, speed) between which the speed is linear, braking included. A brake whose gap is not yet turned into
-        a time does nothing."""
+        """(time, speed) between which the speed is linear, braking included. A brake whose gap is not yet converted
+        into a time has no effect."""
         planned = list(self.speed_mps.items())
         if self.brake is None or self.brake.at_s is None:
             return planned
@@ -101,7 +101,7 @@ class Script(Speeds):
         lane = self.lane
         for change in self.lane_changes:
             if change.start_s < free_at:
-                raise ValueError(f"the lane change at {change.start_s:g} s starts before the one before it ends")
+                raise ValueError(f"the lane change at {change.start_s:g} s starts before the previous one ends")
             if (change.lane > 0) != (lane > 0):
                 raise ValueError(f"the lane change at {change.start_s:g} s leads to the other carriageway")
             free_at, lane = change.start_s + change.duration_s, change.lane

@@ -1,9 +1,9 @@
-"""The ego vehicle: what a pedal command does to its motion, and how it keeps to its lane.
+"""The ego vehicle: its response to pedal commands, and how it keeps its lane.
 
 Longitudinal: drive-by-wire with a dead time, pedals scaled to accelerations (paper, section ACC), a first-order lag and
 a limited jerk while the brakes build up pressure, and tyres that share μ·g between braking and cornering (friction
-circle). It neither rolls backwards nor slows down by itself: a pedal at 0 holds the speed. Lateral: a driver who steers
-after the lane's own course, no harder than the tyres allow.
+circle). It neither rolls backwards nor slows down by itself: with both pedals at 0 it holds its speed. Lateral: a
+driver who follows the lane, within the grip of the tyres.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pipeline.simulation.world.actors import Motion
 
 GRAVITY_MPS2 = 9.81
 _LANE_STIFFNESS_PER_S2, _LANE_DAMPING_PER_S = 2.0, 2.8
-"""A critically damped return to the lane's course within about two seconds."""
+"""A critically damped return to the lane within about two seconds."""
 _MAX_DRIFT_RAD = 0.3
 
 
@@ -65,15 +65,15 @@ class VehicleState:
 
 
 def command(state: VehicleState, pedals: Pedals, model: VehicleModel) -> VehicleState:
-    """Send pedals by wire; they act after the dead time."""
+    """Send a pedal command; it acts after the dead time."""
     return evolve(state, pending=(*state.pending, (state.t_s + model.dead_time_s, pedals)))
 
 
 def advance(
     state: VehicleState, lane: Motion, curvature_per_m: float, dt_s: float, model: VehicleModel
 ) -> VehicleState:
-    """The vehicle ``dt_s`` later. lane: where the driver wants to be from side to side, of which only d and its
-    derivatives count. curvature_per_m: of the road here. dt_s should be a few milliseconds."""
+    """The vehicle ``dt_s`` later. lane: the driver's target motion, of which only d and its derivatives are used.
+    curvature_per_m: of the road here. dt_s should be a few milliseconds."""
     state = _receive(state)
     wanted = _pedal_accel(state.pedals, model)
     braking = wanted < 0.0 or state.accel_mps2 < 0.0

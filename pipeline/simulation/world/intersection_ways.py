@@ -50,7 +50,7 @@ class Route:
 
 
 def route(actor: CrossingActor, road: Road) -> Route:
-    """The way an actor takes. ValueError when the road has no such crossing or lane."""
+    """The path an actor takes. ValueError when the road has no such crossing or lane."""
     if actor.crossing >= len(road.crossings):
         raise ValueError(f"actor {actor.id}: no crossing {actor.crossing}: the road has {len(road.crossings)}")
     crossing = road.crossings[actor.crossing]

@@ -1,4 +1,4 @@
-"""The road that a scenario's ego vehicle means to drive, as a route on the Earth: what a map or an old drive gives."""
+"""The planned route of a scenario's ego vehicle on the Earth, as a map or an earlier drive would give it."""
 
 from __future__ import annotations
 

@@ -29,14 +29,14 @@ class Strict(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A changed copy, validated anew, into which nothing worked out from the old values is carried."""
+        """A changed copy, validated again, without values cached from the original."""
         fields = {name: getattr(self, name) for name in type(self).model_fields}
         return type(self).model_validate({**fields, **(update or {})})
 
 
 class Segment(Strict):
-    """A stretch of road, straight unless it says otherwise; curvature is positive to the left. ``radius_m`` may stand
-    for ``curvature_per_m``. With ``end_curvature_per_m`` the curvature changes evenly along the segment: a transition
+    """A stretch of road, straight by default; curvature is positive to the left. ``radius_m`` may stand for
+    ``curvature_per_m``. With ``end_curvature_per_m`` the curvature changes evenly along the segment: a transition
     (clothoid) between a straight and a bend."""
 
     length_m: float = Field(gt=0.0, le=100_000.0)

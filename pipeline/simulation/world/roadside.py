@@ -1,6 +1,5 @@
-"""What stands beside a road: guard rails, delineator posts, trees, buildings and sign gantries, placed by seed.
-
-Everything is placed in (s, d) once per scenario and looked up by s, so both sensors see the same things.
+"""Roadside items: guard rails, delineator posts, trees, buildings and sign gantries, placed by seed. They are placed in
+(s, d) once per scenario and looked up by s, so both sensors see the same items.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ _POST_STEP_M = 25.0
 _GANTRY_STEP_M = 450.0
 SIGN_LOW_M, SIGN_HIGH_M = 5.3, 7.6
 _BY_THE_ROAD = frozenset({"rail", "post", "gantry_leg", "gantry_sign"})
-"""These stand where they do because the road is there; they only make way for crossings."""
+"""These belong to the road, so only crossings displace them."""
 _COURSE_STEP_M = 4.0
 _CORNER_M = 5.0
 _LEAST_MEDIAN_M = 1.0
@@ -32,7 +31,7 @@ _LEAST_MEDIAN_M = 1.0
 @dataclass(frozen=True)
 class Thing:
     """An upright box beside the road: its middle (s, d), length along the road, width across, from low to high above
-    the road. variant: a number from 0 to 1 for what differs between two of a kind (colour, shape)."""
+    the road. variant: a number from 0 to 1 that varies colour and shape."""
 
     kind: ThingKind
     s_m: float
@@ -45,8 +44,8 @@ class Thing:
 
 
 def place(road: Road, seed: int, start_m: float, end_m: float) -> tuple[Thing, ...]:
-    """Everything beside the road from s = start to end, in order of s. What stands at a place depends on the seed and
-    the start, not on the end: each kind has dice of its own."""
+    """Everything beside the road from s = start to end, in order of s. The items at a place depend on the seed and the
+    start, not on the end: each kind has its own random generator."""
     right = road.edges_m()[0][0] - road.shoulder_m
     left = road.edges_m()[-1][1] + road.shoulder_m
     things = [
@@ -83,7 +82,7 @@ def _off_the_road(things: list[Thing], road: Road, start_m: float, end_m: float)
 
 @dataclass(frozen=True)
 class Roadside:
-    """Placed things with their world poses, ready to be cut to what is near."""
+    """Placed items with their world poses, ready to be filtered by distance."""
 
     things: tuple[Thing, ...]
     s_m: F64
@@ -96,7 +95,7 @@ class Roadside:
         return Roadside(things, s_m, road.to_world(s_m, np.array([thing.d_m for thing in things])))
 
     def near(self, world: World, behind_m: float, ahead_m: float) -> list[tuple[Thing, float, float, float]]:
-        """Things within reach along the road, each with its ego x, y and yaw, in order of s."""
+        """Items within reach along the road, each with its ego x, y and yaw, in order of s."""
         first, last = np.searchsorted(self.s_m, [world.s_m - behind_m, world.s_m + ahead_m])
         poses = self.poses[first:last]
         places = world.to_ego(poses)
@@ -127,7 +126,7 @@ def _posts(start_m: float, end_m: float, right_m: float, left_m: float) -> list[
 
 
 def _gantries(start_m: float, end_m: float, right_m: float) -> list[Thing]:
-    """A sign bridge over the forward carriageway now and then."""
+    """A sign gantry over the forward carriageway now and then."""
     things = []
     first = np.ceil(start_m / _GANTRY_STEP_M) * _GANTRY_STEP_M
     for s in np.arange(first, end_m, _GANTRY_STEP_M):

@@ -1,4 +1,4 @@
-"""The world at one moment, seen from the ego vehicle: who is where, and how the ego vehicle moves.
+"""The world at one moment, seen from the ego vehicle: where the actors are, and how the ego vehicle moves.
 
 Ego frame: x forward, y left, z up, origin at the LiDAR, which sits level in the middle of the front bumper.
 """
@@ -134,7 +134,7 @@ def _driving(scenario: Scenario, world: World) -> list[ActorState]:
 
 
 def _crossing(scenario: Scenario, world: World) -> list[ActorState]:
-    """Those that come over a crossing."""
+    """The actors that cross an intersection."""
     states = []
     for actor, way in zip(scenario.crossing_actors, scenario.routes, strict=True):
         s_m = way.arrival_m + actor.travelled_m(world.t_s) - actor.travelled_m(actor.arrive_s)

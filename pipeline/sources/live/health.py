@@ -78,7 +78,7 @@ class StreamStats:
 
 
 def not_delivering(streams: Iterable[StreamHealth]) -> str:
-    """``lidar absent (nothing on UDP port 2368 yet), camera silent``: who does not deliver, in a sentence that stays
+    """``lidar absent (no data on UDP port 2368 yet), camera silent``: who does not deliver, in a sentence that stays
     the same while it is so; empty when all do."""
     bad = (each for each in streams if each.state != "ok")
     return ", ".join(f"{each.sensor} {each.state}" + (f" ({each.note})" if each.note else "") for each in bad)

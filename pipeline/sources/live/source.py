@@ -76,7 +76,7 @@ class LiveSensors:
             self.inputs["ego"] = CanInput(can, offset_ms, self._clock, self._take_ego)
         elif config.ego is not None:
             self._ego_stats = StreamStats("ego")
-            self._ego_stats.note = "its speed comes from gnss, which gives none yet"
+            self._ego_stats.note = "its speed comes from gnss, which delivers none yet"
             self._ego_offset_ns = round(config.ego.time_offset_ms * 1e6)
 
     def start(self) -> None:

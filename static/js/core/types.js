@@ -4,7 +4,7 @@
  *
  * @typedef {[number, number]} Point2
  * @typedef {(Point2|null)[]} Pixels
- * @typedef {"V"|"L"|"VL"} SourceKind
+ * @typedef {"V"|"L"|"VL"} ObjectSource
  *
  * @typedef {object} Gate
  * @property {string} name
@@ -14,7 +14,7 @@
  *
  * @typedef {object} FusedObject
  * @property {number} id
- * @property {SourceKind} source
+ * @property {ObjectSource} source
  * @property {string|null} type
  * @property {number|null} type_score
  * @property {[number, number, number, number]|null} bbox
@@ -32,7 +32,7 @@
  * @property {boolean|null} moving
  * @property {number|null} ttc_s
  * @property {boolean} carried
- * @property {""|SourceKind} seen_by
+ * @property {""|ObjectSource} seen_by
  * @property {number} hits
  * @property {number} lidar_points
  * @property {number|null} lateral_mps

@@ -3,10 +3,10 @@
  * `tests/app/page/test_page_types.py` checks every key against real messages.
  * @typedef {import("../core/types.js").AccState} AccState
  * @typedef {import("../core/types.js").ParamValue} ParamValue
- * @typedef {import("../core/types.js").SourceKind} SourceKind
+ * @typedef {import("../core/types.js").ObjectSource} ObjectSource
  * @typedef {object} Columns one entry per frame; CIPV values are null without a CIPV
  * @property {(number|null)[]} cipv_id
- * @property {(SourceKind|null)[]} source
+ * @property {(ObjectSource|null)[]} source
  * @property {(boolean|null)[]} carried
  * @property {(number|null)[]} distance_m
  * @property {(number|null)[]} closing_speed_mps
@@ -43,7 +43,7 @@
  * @property {number} id
  * @property {number} run
  * @property {number[]} index
- * @property {SourceKind[]} source
+ * @property {ObjectSource[]} source
  * @property {(number|null)[]} distance_m
  * @property {(number|null)[]} closing_speed_mps
  * @property {(number|null)[]} ttc_s

@@ -1,4 +1,4 @@
-"""The bench of the packet decoder: the contract's shape, and peers that do the same work."""
+"""The bench of the packet decoder: the shape that is printed, and peers that do the same work."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from tests.pipeline.sources.live.rig import Replaying, loopback_config
 
 
 class Unplugged(Sensors):
-    """Sensors that give two frames and then break the line."""
+    """Sensors that give two frames and then make the pipeline fail."""
 
     lidar_mount = None
 

@@ -64,5 +64,5 @@ FOO = SourceOptions("foo")
 
 @pytest.mark.parametrize("begin", [Serve("foo").engine, Record(FOO), Run(FOO)], ids=["serve", "record", "run"])
 def test_who_takes_live_sensors_names_them_among_what_can_be_typed(begin: Callable[[], object]) -> None:
-    with pytest.raises(SourceError, match=r"foo: not a source; type one of .*, live:<config.yaml>$"):
+    with pytest.raises(SourceError, match=r"foo: not a source; use one of .*, live:<config.yaml>$"):
         begin()

@@ -33,7 +33,7 @@ def cipv(*arguments: object) -> int:
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Eleven frames of a simulated drive, through the line."""
+    """Eleven frames of a simulated drive with their results."""
     out = tmp_path_factory.mktemp("recorded") / "drive.mcap"
     assert cipv("record", "sim:straight", "--out", out, "--seconds", 1, *LIDAR_ONLY) == 0
     return out
@@ -109,7 +109,7 @@ def test_export_writes_a_clip_in_each_form(recorded: Path, tmp_path: Path) -> No
 
 
 def test_export_of_a_session_without_results_runs_the_line(recorded: Path, tmp_path: Path) -> None:
-    """The table of the inputs alone is the table of what was recorded: the line is the same."""
+    """The table made from the inputs alone equals the table of the recorded results: the pipeline is the same."""
     assert cipv("export", recorded, "--csv", tmp_path / "recorded.csv", *LIDAR_ONLY) == 0
     assert cipv("export", "sim:straight", "--to", 1, "--csv", tmp_path / "anew.csv", *LIDAR_ONLY) == 0
     assert (tmp_path / "recorded.csv").read_text() == (tmp_path / "anew.csv").read_text()

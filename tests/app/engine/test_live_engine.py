@@ -150,7 +150,7 @@ def test_paused_the_frame_is_held_while_the_line_goes_on_and_playing_jumps_to_no
     engine.control.change(playing=True)
     now = engine.wait_for(shows(3), WAIT_S)
     assert now.processed is not None
-    assert max(item.hits for item in now.processed.result.objects) == 4, "the line saw every tick"
+    assert max(item.hits for item in now.processed.result.objects) == 4, "the pipeline ran on every tick"
 
 
 def test_a_parameter_runs_the_held_frame_again_without_a_network(start: Start) -> None:

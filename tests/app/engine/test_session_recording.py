@@ -185,7 +185,7 @@ def test_what_goes_wrong_is_one_sentence(
             break
     assert "No space left on device" in client.get("/api/recording").json()["error"]
     assert not engine.desk.mark("lost")
-    show(engine, 2), "the line goes on"
+    show(engine, 2), "the pipeline goes on"
 
 
 def test_nothing_open_is_nothing_to_record(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from http.client import HTTPConnection
 
 import httpx
@@ -68,10 +69,15 @@ def test_a_drive_is_looked_through_once_while_it_is_open(client: httpx.Client, m
     assert len(looked) == 1
 
 
-def test_every_format_is_listed_with_what_the_page_says_of_it(client: httpx.Client) -> None:
+def test_every_format_is_listed_with_what_the_page_says_of_it(
+    client: httpx.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    added = replace(FORMATS["csv"], name="names", title="Names", about="what there is")
+    monkeypatch.setitem(FORMATS, "names", added)
     listed = client.get("/api/labels/formats").json()
     assert [each["name"] for each in listed] == list(FORMATS)
     assert listed[0] == {"name": "native", "title": "CIPV Studio", "about": "all labels"}
+    assert listed[-1] == {"name": "names", "title": "Names", "about": "what there is"}
 
 
 @pytest.mark.parametrize("name", ["native", "openlabel", "kitti-tracking"])

@@ -199,7 +199,7 @@ def test_a_pause_is_heard_while_the_picture_is_made_wider(site: Site, monkeypatc
 
 
 def believed(client: ClientConnection) -> bool:
-    """Whether a page takes it to play: what came last holds. Asked twice: the first answer may stand before a state
+    """Whether a page takes it to play: the last message holds. Asked twice: the first answer may stand before a state
     that goes out with it."""
     playing, answers = True, 0
     client.send(json.dumps({"ping": 1}))

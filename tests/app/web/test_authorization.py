@@ -286,7 +286,7 @@ def test_ten_gigabytes_in_pieces_are_cut_off(
     assert largest <= sent + len(block), "nothing that may come was cut off"
     assert sent < largest + (64 << 20), "cut off within what the system's buffers hold"
     assert _resident_bytes() - before < 64 << 20
-    assert list(tmp_path.iterdir()) == [], "what came of it is thrown away"
+    assert list(tmp_path.iterdir()) == [], "the outcome is discarded"
     assert visitor("person").get("/api/state").status_code == 200
 
 

@@ -18,7 +18,7 @@ PATH = corridor(None, PathParams(half_width_m=1.5))
 
 
 def judged(item: FusedObject, ego_mps: float | None = 20.0) -> FusedObject:
-    """The object as the line describes it before anybody reacts."""
+    """The object as the pipeline describes it before any reaction."""
     ego = EgoState(0, ego_mps) if ego_mps is not None else None
     (item,) = choose(CipvState(), describe([item], ego, MotionParams()), PATH, moment(ego), CipvParams())[1].objects
     return item

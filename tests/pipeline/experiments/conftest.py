@@ -20,7 +20,7 @@ SeeAgain = Callable[[ExperimentDrive, int], list[Result]]
 
 @pytest.fixture
 def see_again(tmp_path: Path) -> SeeAgain:
-    """What the line believes in the first frames of a kept drive whose detections are given, opened as a file."""
+    """The pipeline's results in the first frames of a saved drive with given detections, opened as a file."""
 
     def believed(driven: ExperimentDrive, frames: int) -> list[Result]:
         file = tmp_path / f"{driven.name}.yaml"

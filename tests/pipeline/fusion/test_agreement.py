@@ -9,13 +9,13 @@ import pytest
 from pipeline.fusion.agreement import AgreementState, follow, heed
 from pipeline.params import FusionParams, PathParams
 from pipeline.path.corridor import corridor
-from pipeline.types import FusedObject, SourceKind
+from pipeline.types import FusedObject, ObjectSource
 from tests.pipeline.build import fused
 
 PARAMS = FusionParams()
 
 
-def at(number: int, bearing_deg: float, source: SourceKind, range_m: float = 20.0, **more: float) -> FusedObject:
+def at(number: int, bearing_deg: float, source: ObjectSource, range_m: float = 20.0, **more: float) -> FusedObject:
     turn = radians(bearing_deg)
     return fused(number, range_m * cos(turn), range_m * sin(turn), source, **more)  # type: ignore[arg-type]
 

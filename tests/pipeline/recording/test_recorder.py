@@ -1,4 +1,4 @@
-"""Recording never holds up the line, never loses a frame without saying so, and leaves whole files behind."""
+"""Recording never blocks the pipeline, never loses a frame silently, and leaves complete files."""
 
 from __future__ import annotations
 
@@ -233,7 +233,7 @@ def test_a_disk_that_hangs_is_not_waited_for_for_ever(tmp_path: Path, monkeypatc
         stopping.start()
         stopping.join(10.0)
         assert not stopping.is_alive()
-        assert stopped[0].error == "recording stopped: the disk does not answer; 0 frames until then are kept"
+        assert stopped[0].error == "recording stopped: the disk does not respond; the 0 frames before are saved"
         assert recorder.stop() == stopped[0]
         may_write.set()
         recorder._thread.join(10.0)
@@ -278,7 +278,7 @@ def test_frames_are_counted_once_when_the_next_file_cannot_be_made(tmp_path: Pat
     assert state.frames == len(session) == 4
     assert state.bytes == (tmp_path / "a.mcap").stat().st_size
     assert state.seconds == pytest.approx(0.3)
-    assert "4 frames until then are kept" in str(state.error)
+    assert "4 frames before are saved" in str(state.error)
 
 
 _RECORD_FOR_EVER = """
@@ -346,7 +346,7 @@ def test_a_full_disk_stops_the_recording_says_so_and_keeps_what_is_there(tmp_pat
     assert process.returncode == 0
     assert "recording stopped: File too large" in error
     session = SessionSource("a", str(path))
-    assert f"{len(session)} frames until then are kept" in error
+    assert f"{len(session)} frames before are saved" in error
     assert path.stat().st_size <= 1_000_000
     assert not session.file.directory.is_cut
     for index in range(len(session)):

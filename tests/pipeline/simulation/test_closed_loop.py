@@ -1,4 +1,4 @@
-"""The loop is closed: what the line commands moves the car, and the same drive comes out twice."""
+"""The loop is closed: the pipeline's commands move the car, and the same drive is reproduced."""
 
 from __future__ import annotations
 

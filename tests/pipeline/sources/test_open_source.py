@@ -13,8 +13,8 @@ from pipeline.sources import SourceError, open_any, open_source
 @pytest.mark.parametrize(
     ("uri", "says"),
     [
-        ("nosuch:thing", "no kind of source is called 'nosuch'; type one of session.mcap, pcap:<file>, rosbag:<path>"),
-        ("", "not a source; type one of session.mcap, pcap:<file>"),
+        ("nosuch:thing", "unknown kind of source 'nosuch'; use one of session.mcap, pcap:<file>, rosbag:<path>"),
+        ("", "not a source; use one of session.mcap, pcap:<file>"),
         ("/somewhere/else", "/somewhere/else: not a source"),
         ("C:\\drives\\one", "not a source"),
         ("astyx:", "no folder given"),
@@ -91,5 +91,5 @@ def test_a_date_folder_points_to_its_drives(kitti_raw: Path) -> None:
 
 @pytest.mark.parametrize("rings", [0, 15, 32])
 def test_kitti_gives_16_or_64_rings(kitti: Path, rings: int) -> None:
-    with pytest.raises(SourceError, match=f"{rings} rings asked for"):
+    with pytest.raises(SourceError, match=f"{rings} rings requested"):
         open_source(f"kitti:{kitti}", rings=rings)

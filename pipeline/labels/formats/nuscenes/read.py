@@ -111,7 +111,7 @@ def read(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
             in_order = tuple(sightings[frame] for frame in sorted(sightings))
             tracks.append(LabelTrack(numbers[token], _label(category.name), in_order, "accepted", origin))
     tracks.sort(key=lambda track: track.id)
-    note = (f"{outside:,} annotations are of samples that are no frame of this recording",) if outside else ()
+    note = (f"{outside:,} annotations belong to samples that are not frames of this recording",) if outside else ()
     return Imported(replace(drive.empty(), tracks=tuple(tracks)), note)
 
 
@@ -189,7 +189,7 @@ def _check_camera(
             between = Rotation.from_matrix(ours.T_camera_ego[:3, :3] @ T_camera_ego[:3, :3].T).magnitude()
             if between > _LARGEST_TURN_RAD:
                 raise BadInput(
-                    f"{what} is turned {np.degrees(between):.0f}° from the recording's; is it of another car?"
+                    f"{what} is turned {np.degrees(between):.0f}° from the recording's; is it from another car?"
                 )
 
 

@@ -1,4 +1,4 @@
-"""nuScenes' tables (Caesar et al. 2020; nuscenes-devkit, docs/schema_nuscenes.md): a folder of JSON lists whose rows
+"""nuScenes' tables (Caesar et al. 2020; nuscenes-devkit/docs/schema_nuscenes.md): a folder of JSON lists whose rows
 name each other by token.
 
 Cuboids are in the global frame, ``size`` is width, length, height, quaternions are w x y z. Here the global frame is

@@ -248,5 +248,5 @@ def _as_id(uid: str) -> int | None:
 
 def _of_length(values: list[float], lengths: tuple[int, ...], what: str) -> list[float]:
     if len(values) not in lengths or not all(math.isfinite(value) and abs(value) < 1e9 for value in values):
-        raise BadInput(f"{what} of {len(values)} numbers, or of impossible ones")
+        raise BadInput(f"{what} of {len(values)} numbers, or with values out of range")
     return values

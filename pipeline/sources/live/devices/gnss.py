@@ -37,7 +37,7 @@ class GnssInput:
     ) -> None:
         self.stats = StreamStats("gnss")
         if config.udp_port is not None:
-            self.stats.note = f"nothing on UDP port {config.udp_port} yet"
+            self.stats.note = f"no data on UDP port {config.udp_port} yet"
         self._clock, self._deliver, self._utc_to_host_ns = clock, deliver, utc_to_host_ns
         self._offset_ns = round(config.time_offset_ms * 1e6)
         self._own = FollowedClock()

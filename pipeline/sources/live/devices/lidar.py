@@ -22,7 +22,7 @@ class LidarInput:
 
     def __init__(self, config: LidarConfig, clock: HostClock, deliver: Deliver[Sweep]) -> None:
         self.stats = StreamStats("lidar")
-        self.stats.note = f"nothing on UDP port {config.data_port} yet"
+        self.stats.note = f"no data on UDP port {config.data_port} yet"
         self.pps: str | None = None
         self.follows_gps = False
         self._clock, self._deliver = clock, deliver

@@ -69,7 +69,7 @@ def read_device(device: int | str, receive: Receive, stop: Stop) -> None:
         while not stop:
             ok, pixels = capture.read()
             if not ok or pixels is None:
-                raise DeviceLost(f"camera {device}: gives no pictures")
+                raise DeviceLost(f"camera {device}: delivers no pictures")
             receive(Shot(pixels=np.ascontiguousarray(pixels, dtype=np.uint8)))
     finally:
         capture.release()

@@ -4,32 +4,21 @@
 import { Refused, request } from "../../core/api.js";
 import { el, text } from "../../core/dom.js";
 import { get } from "../../core/store.js";
-import { attachMenu } from "../../workspace/menu.js";
+import { attachMenu, refill } from "../../workspace/menu.js";
 import { act } from "../acts/queue.js";
 import { propose, say } from "../acts/commands.js";
 import { personName } from "../state/person.js";
 
 /** @typedef {import("../state/types.js").Version} Version */
 
-/** Formats in `pipeline/labels/formats/registry.py`: key, name, contents. */
-const FORMATS = [
-  ["native", "CIPV Studio", "all labels"],
-  ["mcap", "MCAP session", "labels as a channel"],
-  ["openlabel", "OpenLABEL", "ASAM OpenLABEL 1.0"],
-  ["nuscenes", "nuScenes", "JSON tables"],
-  ["kitti", "KITTI object", "one file per frame"],
-  ["kitti-tracking", "KITTI tracking", "single file"],
-  ["coco", "COCO", "image boxes"],
-  ["csv", "CSV", "lead per frame"],
-];
+/** @typedef {{name: string, title: string, about: string}} Format One entry of `/api/labels/formats`. */
+
+/** @type {Format[]} Empty until the server has listed them. */
+let formats = [];
 
 const versions = el("div", { class: "open-list" }),
   problem = el("p", { class: "params-error", aria: { role: "alert" } });
-const which = el(
-  "select",
-  { aria: { label: "File format" } },
-  ...FORMATS.map(([key, words]) => el("option", { value: key, textContent: words })),
-);
+const which = el("select", { aria: { label: "File format" } });
 const file = el("input", { type: "file", aria: { label: "Label file" } });
 const freezeName = el("input", {
   type: "text",
@@ -48,22 +37,32 @@ export function exportButton() {
     title: "Export labels to a file",
   });
   attachMenu(button, "Export labels", () => {
-    const rows = FORMATS.map(([key, words, about]) => ({
-      key,
-      node: el(
-        "a",
-        { class: "item", href: `api/labels/export?format=${key}&version=working` },
-        el("b", { textContent: words }),
-        el("span", { class: "facts", textContent: about }),
-      ),
-    }));
-    for (const { key, node } of rows) {
-      node.setAttribute("download", "");
-      tellLoss(key, node);
-    }
-    return [el("h3", { textContent: "Export labels" }), ...rows.map(({ node }) => node)];
+    if (!formats.length) listFormats().then(() => refill(button, exportRows));
+    return exportRows();
   });
   return button;
+}
+
+/** One download link for each format. */
+function exportRows() {
+  const links = formats.map(({ name, title, about }) => {
+    const link = el(
+      "a",
+      { class: "item", href: `api/labels/export?format=${name}&version=working` },
+      el("b", { textContent: title }),
+      el("span", { class: "facts", textContent: about }),
+    );
+    link.setAttribute("download", "");
+    tellLoss(name, link);
+    return link;
+  });
+  return [el("h3", { textContent: "Export labels" }), ...links];
+}
+
+/** Ask the server which formats it reads and writes; without an answer the next look asks again. */
+async function listFormats() {
+  formats = await request("api/labels/formats").catch(() => []);
+  which.replaceChildren(...formats.map(({ name, title }) => el("option", { value: name, textContent: title })));
 }
 
 /** @param {string} key @param {HTMLElement} node */
@@ -97,6 +96,7 @@ export function setUp(parent) {
 
 /** Reload the versions. */
 export async function look() {
+  if (!formats.length) listFormats();
   /** @type {Version[]} */
   const found = await request("api/labels/versions").catch(() => []);
   versions.replaceChildren(
@@ -140,6 +140,7 @@ async function upload(event) {
     person = await personName(),
     drive = get("labels")?.drive;
   if (!given || person === null || !drive) return;
+  if (!formats.length) await listFormats();
   await attempt(async () => {
     const query = new URLSearchParams({ format: which.value, person, drive });
     const address = new URL(`api/labels/import?${query}`, document.baseURI);

@@ -1,5 +1,6 @@
 /** A ribbon of the CIPV per frame, coloured by id and hatched by source. */
 import { ui } from "../../core/colors.js";
+import { isTrackedByTwo } from "../../core/object_sources.js";
 import { get } from "../../core/store.js";
 
 /** @typedef {import("../../drive/types.js").Series} Series */
@@ -74,7 +75,7 @@ function drawStretch(ctx, { id, source, carried }, box, look) {
   ctx.globalAlpha = carried ? 0.4 : 1;
   ctx.fillStyle = colorOf(id, look.isLight);
   ctx.fillRect(box.x, box.top, box.width, box.height);
-  if (source !== "VL") hatch(ctx, box, source === "V" ? 1 : -1, look.isLight);
+  if (!isTrackedByTwo({ source })) hatch(ctx, box, source === "V" ? 1 : -1, look.isLight);
   ctx.globalAlpha = 1;
   if (id === look.chosen) {
     ctx.strokeStyle = look.ring;
@@ -85,7 +86,7 @@ function drawStretch(ctx, { id, source, carried }, box, look) {
   ctx.fillStyle = look.isLight ? "#fff" : "#0a0c0f";
   ctx.font = '600 10.5px system-ui, "DejaVu Sans", sans-serif';
   ctx.textBaseline = "middle";
-  if (source !== "VL") plate(ctx, `#${id}`, box, colorOf(id, look.isLight));
+  if (!isTrackedByTwo({ source })) plate(ctx, `#${id}`, box, colorOf(id, look.isLight));
   ctx.fillText(`#${id}`, box.x + 5, box.top + box.height / 2 + 0.5);
   ctx.textBaseline = "alphabetic";
 }

@@ -1,5 +1,6 @@
 /** Draws the gates of the selected object in the views, with value and limit. */
 import { num } from "../../core/format.js";
+import { isTrackedByTwo } from "../../core/object_sources.js";
 import { middle } from "./trails.js";
 
 /** @typedef {import("../../core/types.js").FusedObject} FusedObject */
@@ -107,7 +108,7 @@ function drawOffset(ctx, center, item, labels, plan) {
  * @param {Plan} plan
  */
 function drawRange(ctx, item, seen, labels, plan) {
-  if (!seen || !item.closest_point || item.source !== "VL") return;
+  if (!seen || !item.closest_point || !isTrackedByTwo(item)) return;
   const gate = gateOf(item, "range_sigmas"),
     [x, y] = item.closest_point;
   const reach = seen.sigma_m * (gate?.limit ?? 1),

@@ -1,6 +1,7 @@
 /** Camera overlay: path corridor, and boxes, cuboid and name of each object. */
 import { onPicture, roleOf } from "../../core/colors.js";
 import { num } from "../../core/format.js";
+import { isPictured } from "../../core/object_sources.js";
 import { get } from "../../core/store.js";
 
 /** @typedef {import("../../core/types.js").Frame} Frame */
@@ -97,7 +98,7 @@ export function drawObjects(ctx, { result, display }, layers, labels, X, Y) {
 }
 
 /** No tags for roadside returns and carried objects: they would clutter the image. @param {FusedObject} item */
-const deservesTag = (item) => !item.carried && (item.source !== "L" || item.in_path);
+const deservesTag = (item) => !item.carried && (isPictured(item) || item.in_path);
 
 /**
  * @param {CanvasRenderingContext2D} ctx

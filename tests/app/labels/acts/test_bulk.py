@@ -50,7 +50,7 @@ def test_what_the_camera_alone_has_seen_is_proposed_without_a_cuboid_and_that_is
     solid = replace(flat, id=8, cuboid=Cuboid((20.0, 3.0, 0.7), (4.0, 1.8, 1.5), 0.0))
     found = propose({frame: [flat, solid] for frame in (10, 11)}, {}, PIPELINE)
     said = put_proposals(labels, found, "Ada", 0, 20)
-    assert said == "proposed 2 tracks in frames 1–21; 1 without a cuboid, which the camera alone has seen"
+    assert said == "proposed 2 tracks in frames 1–21; 1 seen by the camera only, without a cuboid"
     assert sorted(each.cuboid is None for _, each in labels.window(10, 10)[1][10]) == [False, True]
 
 

@@ -25,7 +25,7 @@ def test_a_correction_that_is_accepted_stays_one_until_a_second_person_reviews_i
     act(labels, kind="relabel", track=1, label="Truck")
     assert (track(labels).label, track(labels).state, track(labels).origin.name) == ("truck", "corrected", "Ada")
     assert act(labels, kind="accept", items=[("track", 1)]).act is None
-    with pytest.raises(ActRefused, match="you changed #1 last: a second person reviews it"):
+    with pytest.raises(ActRefused, match="you changed #1 last: a second person must review it"):
         act(labels, kind="review_ok", items=[("track", 1)])
     act(labels, "Bob", kind="review_ok", items=[("track", 1)])
     assert (track(labels).state, track(labels).origin.name, track(labels).reviewer) == ("accepted", "Ada", "Bob")
@@ -54,7 +54,7 @@ def test_ones_own_work_is_reviewed_by_another(
             act(labels, person, kind=kind, items=[("track", 1)], comment=more)
         else:
             labels.log.move(kind, person)
-    with pytest.raises(ActRefused, match="a second person reviews it"):
+    with pytest.raises(ActRefused, match="a second person must review it"):
         act(labels, refused, kind="review_ok", items=[("track", 1)])
     act(labels, "Cy", kind="review_ok", items=[("track", 1)])
     assert track(labels).state == "accepted"

@@ -62,5 +62,5 @@ def test_shown_frames_reach_a_viewer_also_one_that_comes_late(engine: Engine, tm
 
 @pytest.mark.parametrize("url", ["", "nowhere", "http://127.0.0.1:9876", "rerun+http://127.0.0.1/proxy"])
 def test_what_is_no_viewers_address_is_said(engine: Engine, url: str):
-    with pytest.raises(ReplayError, match="a rerun viewer's address is like"):
+    with pytest.raises(ReplayError, match="not the address of a rerun viewer"):
         RerunFeed(engine, url)

@@ -173,7 +173,7 @@ def test_closing_twice_is_allowed(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("where", ["missing/folder/a.rrd", "."])
 def test_a_file_that_cannot_be_made_is_one_sentence(tmp_path: Path, where: str) -> None:
-    with pytest.raises(ReplayError, match=r"the replay cannot be written: \w+") as caught:
+    with pytest.raises(ReplayError, match=r"cannot write the rerun file: \w+") as caught:
         RerunSink(tmp_path / where)
     assert str(tmp_path / where) in str(caught.value)
     assert "\n" not in str(caught.value)

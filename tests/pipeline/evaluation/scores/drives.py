@@ -34,7 +34,7 @@ def truth(*frames: Mapping[int, Place] | None, uri: str = "made:1") -> DriveTrut
 
 
 def believed(n: int, objects: Sequence[FusedObject], lead: int | None, acc: str | None = None) -> Result:
-    """What the line says of frame ``n``. acc: the state of the controller, null where ego speed is not known."""
+    """The pipeline's result of frame ``n``. acc: the state of the controller, None where ego speed is not known."""
     distance = next((item.distance_m for item in objects if item.id == lead), None)
     return dataclasses.replace(
         EMPTY,

@@ -15,6 +15,8 @@ from pipeline.labels.model import Origin
 from tests.pipeline.labels.formats.sets import drive
 from tests.pipeline.labels.formats.test_round_trip import full_set
 
+ROOT = Path(__file__).parents[4]
+
 ONE_FILE = """
 import json
 
@@ -51,6 +53,12 @@ def test_it_is_written_and_read(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "labels.json").read_bytes())
     found = import_labels(tmp_path / "labels.json", drive(), "names", Origin("import", "a test", 0))
     assert "names are not kept" in found.notes[0]
+
+
+def test_the_page_has_no_list_of_its_own() -> None:
+    modules = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "static" / "js").rglob("*.js"))
+    assert "api/labels/formats" in modules
+    assert [kind.name for kind in FORMATS.values() if f'"{kind.about}"' in modules] == []
 
 
 @pytest.mark.parametrize("name", list(FORMATS))

@@ -1,4 +1,4 @@
-"""A session of raw packets gives the sweeps that the line saw."""
+"""A session of raw packets gives the sweeps that the pipeline processed."""
 
 from __future__ import annotations
 

@@ -1,0 +1,56 @@
+"""Which sensors have an object, as results say it: one letter for each sensor, and what can be asked of the letters.
+
+Stages ask an object for what its sensors can do (``FusedObject.ranged``); only what reads stored rows asks here.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+ObjectSource = Literal["V", "L", "VL"]
+"""Vision only, LiDAR only, or both (paper, Table 3 "Name")."""
+
+OBJECT_SOURCES: tuple[ObjectSource, ...] = get_args(ObjectSource)
+MOST_SENSORS_FIRST: tuple[ObjectSource, ...] = tuple(sorted(OBJECT_SOURCES, key=len, reverse=True))
+"""The order of tables."""
+
+SENSOR_NAMES = {"V": "camera", "L": "LiDAR"}
+"""What people call the sensor of each letter."""
+
+
+def is_camera_in(sensors: str) -> bool:
+    """Whether the camera is one of them."""
+    return "V" in sensors
+
+
+def is_ranging_in(sensors: str) -> bool:
+    """Whether a sensor that measures range is one of them; today that is the LiDAR."""
+    return "L" in sensors
+
+
+def is_lidar_in(sensors: str) -> bool:
+    """Whether the LiDAR is one of them."""
+    return "L" in sensors
+
+
+def are_several(sensors: str) -> bool:
+    """Whether they are more than one sensor."""
+    return len(sensors) > 1
+
+
+def sensors_in_words(source: str) -> str:
+    """``camera only``, ``LiDAR only``, ``both sensors``."""
+    if are_several(source):
+        return "both sensors" if len(source) == 2 else ", ".join(_names(source))
+    return ", ".join(f"{name} only" for name in _names(source))
+
+
+def seeing_sensors_in_words(sensors: str) -> str:
+    """Who sees an object, as the end of a sentence: ``the camera``, ``the LiDAR``, ``both sensors``, ``no sensor``."""
+    if are_several(sensors):
+        return sensors_in_words(sensors)
+    return "".join(f"the {name}" for name in _names(sensors)) or "no sensor"
+
+
+def _names(sensors: str) -> list[str]:
+    return [SENSOR_NAMES[letter] for letter in sensors]
