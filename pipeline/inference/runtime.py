@@ -17,6 +17,7 @@ import onnxruntime as ort
 from pipeline.common.errors import BadInput
 from pipeline.inference import model_registry
 from pipeline.inference.cancellation import Stopped, of_this_thread
+from pipeline.inference.denormals import flush_to_zero, flush_weights
 from pipeline.types import F32
 
 _GIVES_WAY = 5
@@ -46,11 +47,13 @@ def find_graph(spec: str | None, task: model_registry.Task) -> Path | None:
 
 
 def read_graph(path: Path) -> onnx.ModelProto:
-    """The graph in a file. DetectorError when it holds none."""
+    """The graph in a file, its denormal weights set to zero. DetectorError when it holds none."""
     try:
-        return onnx.load(path)
+        model = onnx.load(path)
     except Exception as error:  # protobuf's own errors have no common base class
         raise DetectorError(f"{path} is not an ONNX file: {str(error).splitlines()[0]}") from None
+    flush_weights(model)
+    return model
 
 
 def open_session(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
@@ -75,6 +78,7 @@ def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
     options.log_severity_level = _FATAL
     # Spinning workers starve the LiDAR chain between two pictures.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    options.add_session_config_entry("session.set_denormal_as_zero", "1")
     available = [name for name in _PROVIDERS if name in ort.get_available_providers()]
     refusal: Exception | None = None
     for first in range(len(available)):
@@ -89,7 +93,7 @@ def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
     """Every output for one input. DetectorError when the network fails on it, Stopped when the run was cancelled."""
     options, stop = ort.RunOptions(), of_this_thread()
     options.log_severity_level = _FATAL
-    with stop.ends(options):
+    with stop.ends(options), flush_to_zero():
         try:
             outputs = session.run(None, {session.get_inputs()[0].name: blob}, options)
         except Exception as error:
