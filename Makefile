@@ -3,6 +3,9 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
+# Where this is set, each process compiles every library anew: seconds per start, minutes per run of the tests.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: install demo test check fix bench docs screenshots suite soak lock clean
 
 install: .venv/.installed
@@ -20,9 +23,10 @@ install: .venv/.installed
 demo: install
 	@$(BIN)/cipv demo
 
-# A file's tests stay in one process: they share servers and browsers.
+# A file's tests stay in one process: they share servers and browsers. Four processes on two cores too: many tests wait for
+# a browser or a sensor's next packet. Files in the order of tests/conftest.py, the long ones first.
 test: install check
-	@$(BIN)/python -m pytest -q --numprocesses logical --maxprocesses 4 --dist loadfile $(TESTS)
+	@$(BIN)/python -m pytest -q --numprocesses 4 --dist loadfile --no-loadscope-reorder $(TESTS)
 
 check: install
 	@$(BIN)/ruff check app pipeline tests

@@ -21,6 +21,14 @@ _LABELS = tempfile.TemporaryDirectory(prefix="cipv-test-labels-", ignore_cleanup
 os.environ["CIPV_LABELS_URL"] = f"sqlite:///{_LABELS.name}/labels.db"
 
 ROOT = Path(__file__).resolve().parent.parent
+_LONG = ("soak", "accuracy", "browser", "golden", "app/commands", "app/labels/test_kill.py", "pipeline/experiments")
+"""Where the files are that take longest. They begin first: one left to the end would keep a single process busy."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long files first, the rest in its order."""
+    long = [ROOT / "tests" / each for each in _LONG]
+    items.sort(key=lambda item: next((i for i, each in enumerate(long) if item.path.is_relative_to(each)), len(long)))
 
 
 @pytest.fixture(scope="session")
