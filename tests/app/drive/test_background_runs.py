@@ -20,7 +20,7 @@ from pipeline.run import Sensors, run
 from pipeline.step import State, step
 from tests.app.engine.recording_helpers import CountingDetector, Recording, SlowDetector
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 
 def with_hits(hits: int) -> Params:
