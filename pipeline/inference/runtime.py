@@ -19,7 +19,7 @@ from pipeline.common.fast_replace import evolve
 from pipeline.inference import model_registry
 from pipeline.inference.cancellation import Stopped, of_this_thread
 from pipeline.inference.denormals import flush_to_zero, flush_weights
-from pipeline.inference.graph import Size, input_size, with_input_size
+from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size, with_unit_picture
 from pipeline.inference.tuning import Way, kept_way
 from pipeline.types import F32
 
@@ -120,7 +120,7 @@ def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
 def ways_of(path: Path) -> Callable[[Way], Callable[[], Sequence[F32]]]:
     """For ``pipeline.inference.tuning``: the network in a file on the same noisy picture, one way after the other.
     DetectorError when it takes no picture."""
-    model = read_graph(path)
+    model = with_empty_masks(with_unit_picture(read_graph(path)))  # each leaves the other's graphs as they are
     try:
         own = input_size(model)
     except ValueError as error:
