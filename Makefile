@@ -2,8 +2,12 @@
 
 PYTHON ?= python3
 BIN := .venv/bin
+PROCESSES ?= 3
 
-.PHONY: install demo test check fix bench docs screenshots suite soak fuzz sbom lock clean
+# Where this is set, each process compiles every library anew: seconds per start, minutes per run of the tests.
+unexport PYTHONDONTWRITEBYTECODE
+
+.PHONY: install demo test check check-types check-layers check-style fix bench docs screenshots suite soak fuzz sbom lock clean
 
 install: .venv/.installed
 
@@ -20,15 +24,23 @@ install: .venv/.installed
 demo: install
 	@$(BIN)/cipv demo
 
-# A file's tests stay in one process: they share servers and browsers.
+# A file's tests stay in one process: they share servers and browsers. Three processes on two cores too: many tests wait for
+# a browser or a sensor's next packet. tests/conftest.py orders the files, the long ones first.
 test: install check
-	@$(BIN)/python -m pytest -q --numprocesses logical --maxprocesses 4 --dist loadfile $(TESTS)
+	@$(BIN)/python -m pytest -q --numprocesses $(PROCESSES) --dist loadfile --no-loadscope-reorder $(TESTS)
 
 check: install
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync check-types check-layers check-style
+
+check-types:
+	@$(BIN)/mypy
+
+check-layers:
+	@$(BIN)/lint-imports --no-cache
+
+check-style:
 	@$(BIN)/ruff check app pipeline tests
 	@$(BIN)/ruff format --check app pipeline tests
-	@$(BIN)/mypy
-	@$(BIN)/lint-imports --no-cache
 
 fix: install
 	@$(BIN)/ruff check --fix app pipeline tests

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from itertools import zip_longest
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,23 @@ _LABELS = tempfile.TemporaryDirectory(prefix="cipv-test-labels-", ignore_cleanup
 os.environ["CIPV_LABELS_URL"] = f"sqlite:///{_LABELS.name}/labels.db"
 
 ROOT = Path(__file__).resolve().parent.parent
+_LONG = ("soak", "accuracy", "golden", "app/commands", "app/labels/test_kill.py", "pipeline/experiments")
+_WAITING = ("browser",)
+"""Where the files are that take longest, by what they do: compute, or wait for a browser."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long files first: one left to the end would keep a single process busy. Computing and waiting ones alternate, so
+    that neither the cores idle nor every process drives a browser at once."""
+    files = list(dict.fromkeys(item.path for item in items))
+    long, waiting = ([file for file in files if _is_in(file, places)] for places in (_LONG, _WAITING))
+    alternating = [file for pair in zip_longest(long, waiting) for file in pair if file is not None]
+    order = {file: number for number, file in enumerate(dict.fromkeys([*alternating, *files]))}
+    items.sort(key=lambda item: order[item.path])
+
+
+def _is_in(file: Path, places: tuple[str, ...]) -> bool:
+    return any(file.is_relative_to(ROOT / "tests" / place) for place in places)
 
 
 @pytest.fixture(scope="session")

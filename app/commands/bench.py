@@ -13,6 +13,7 @@ from rich.table import Table
 
 from app.bench import clients as clients_bench
 from app.bench.demands import PAGE_DEMANDS, broken, page_rows
+from app.bench.other_load import load_warning, read_cpu_times
 from app.bench.page import measure as page_bench
 from app.bench.suite import run_all
 from app.commands.support.options import PipelineOptions
@@ -48,11 +49,15 @@ class Bench:
                 live["page"] = page_bench.figures(self.page, PAGE_S)
             print(json.dumps(live, indent=1))
             return _judge(broken(page_rows(live["page"]), PAGE_DEMANDS) if "page" in live else ())
+        before = read_cpu_times()
         figures = run_all(self.pipeline.parameters(), self.pipeline.detector)
+        warning = load_warning(before, read_cpu_times())
         if self.json:
             print(json.dumps(figures, indent=1))
         else:
             Console().print(_table(figures))
+        if warning is not None:
+            print(f"cipv: {warning}", file=sys.stderr)
         return _judge(broken(figures))
 
 

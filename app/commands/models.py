@@ -11,7 +11,11 @@ from typing import Annotated, Literal
 import tyro
 
 from app.commands.support.progress_bars import bytes_progress, task_progress
+from pipeline.common.errors import BadInput
 from pipeline.inference.model_registry import ModelEntry, known_model, list_models, own_file, pull, register, store
+from pipeline.inference.model_registry import find as find_model
+from pipeline.inference.runtime import ways_of
+from pipeline.inference.tuning import fastest, keep, tune
 from pipeline.lanes.network import open_lane_network
 from pipeline.types import REAL_VEHICLES
 from pipeline.vision.detector import open_detector
@@ -84,13 +88,47 @@ class RegisterModel:
 
 
 @dataclass(frozen=True)
+class TuneModel:
+    """Find the fastest way to run a network on this machine, and use it from then on.
+
+    Tries the installed providers, numbers of threads, graph optimisation levels and the memory arena. A way whose
+    outputs differ is not used. Run it while nothing else does.
+
+    Example: cipv models tune twinlitenet
+    """
+
+    spec: tyro.conf.Positional[str]
+    """Name or ONNX file"""
+    threads: int = 2
+    """Number of threads it runs on untuned"""
+
+    def __call__(self) -> int:
+        path = find_model(self.spec)
+        if path is None:
+            raise BadInput(f"no network {self.spec!r} is installed; see `cipv models list`")
+        trials = []
+        for trial in tune(ways_of(path), self.threads):
+            trials.append(trial)
+            took = f"{trial.best_ms:8.1f} ms" if trial.best_ms is not None else f"not used: {trial.refused}"
+            print(f"{took}  {trial.way}")
+        usual, best = trials[0], fastest(trials)
+        keep(path, best.way)
+        if best is usual or usual.best_ms is None or best.best_ms is None:
+            print(f"{path.stem}: nothing is faster than the usual way")
+        else:
+            print(f"{path.stem}: {best.way}, {usual.best_ms / best.best_ms:.2f} times as fast as the usual way")
+        return 0
+
+
+@dataclass(frozen=True)
 class Models:
-    """Networks: list them, download an official one, register your own ONNX file."""
+    """Networks: list them, download an official one, register your own ONNX file, make one fast."""
 
     action: (
         Annotated[ListModels, tyro.conf.subcommand("list")]
         | Annotated[PullModel, tyro.conf.subcommand("pull")]
         | Annotated[RegisterModel, tyro.conf.subcommand("register")]
+        | Annotated[TuneModel, tyro.conf.subcommand("tune")]
     )
 
     def __call__(self) -> int:

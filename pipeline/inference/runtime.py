@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -15,8 +15,12 @@ import onnx
 import onnxruntime as ort
 
 from pipeline.common.errors import BadInput
+from pipeline.common.fast_replace import evolve
 from pipeline.inference import model_registry
 from pipeline.inference.cancellation import Stopped, of_this_thread
+from pipeline.inference.denormals import flush_to_zero, flush_weights
+from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size, with_unit_picture
+from pipeline.inference.tuning import Way, kept_way
 from pipeline.types import F32
 
 _GIVES_WAY = 5
@@ -25,7 +29,10 @@ of them for seconds on end and take twice as long. The calling thread computes t
 them nicer, the network would lose to whatever else runs."""
 _FATAL = 4
 """Log level: only this is written to standard error; everything else is raised as an exception."""
-_PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
+
+
+_TUNED_SIZE: Size = (384, 640)
+"""Input of a graph of free size while it is tuned: 16:9."""
 
 
 class DetectorMissing(BadInput):
@@ -46,17 +53,21 @@ def find_graph(spec: str | None, task: model_registry.Task) -> Path | None:
 
 
 def read_graph(path: Path) -> onnx.ModelProto:
-    """The graph in a file. DetectorError when it holds none, or is not the file that was installed here."""
+    """The graph in a file, its denormal weights set to zero. DetectorError when it holds none, or is not the file that
+    was installed here."""
     try:
-        return onnx.load_from_string(model_registry.read_verified(path))
+        model = onnx.load_from_string(model_registry.read_verified(path))
     except model_registry.ModelError as error:
         raise DetectorError(str(error)) from None
     except Exception as error:  # protobuf's own errors have no common base class
         raise DetectorError(f"{path} is not an ONNX file: {_first_line(error)}") from None
+    flush_weights(model)
+    return model
 
 
 def open_session(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
-    """The graph on the best provider that accepts it: TensorRT, CUDA, CPU. path: only for the error text."""
+    """The graph as ``cipv models tune`` found best for the file at ``path``; untuned, on the best provider that accepts
+    it: TensorRT, CUDA, CPU."""
     # Threads inherit niceness, and an unprivileged thread cannot lower its own again: so another thread opens it.
     with ThreadPoolExecutor(1, "cipv-open-network", _give_way) as opener:
         return opener.submit(_open, graph, path, threads).result()
@@ -70,18 +81,26 @@ def _give_way() -> None:
             os.setpriority(os.PRIO_PROCESS, this, os.getpriority(os.PRIO_PROCESS, this) + _GIVES_WAY)
 
 
-def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
+def open_as(graph: bytes, way: Way) -> ort.InferenceSession:
+    """The graph on the providers, threads and options of a way. Raises onnxruntime's own errors."""
     options = ort.SessionOptions()
-    options.intra_op_num_threads = threads
+    options.intra_op_num_threads = way.threads
     options.inter_op_num_threads = 1
     options.log_severity_level = _FATAL
+    options.graph_optimization_level = getattr(ort.GraphOptimizationLevel, way.optimisation)
+    options.enable_cpu_mem_arena = way.arena
     # Spinning workers starve the LiDAR chain between two pictures.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
-    available = [name for name in _PROVIDERS if name in ort.get_available_providers()]
+    options.add_session_config_entry("session.set_denormal_as_zero", "1")
+    return ort.InferenceSession(graph, options, providers=list(way.providers))
+
+
+def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
+    way = kept_way(path, threads)
     refusal: Exception | None = None
-    for first in range(len(available)):
+    for first in range(len(way.providers)):
         try:
-            return ort.InferenceSession(graph, options, providers=available[first:])
+            return open_as(graph, evolve(way, providers=way.providers[first:]))
         except Exception as error:  # onnxruntime raises a class for each status code, without a common base
             refusal = error
     raise DetectorError(f"{path.name} cannot be run: {_first_line(refusal)}")
@@ -91,7 +110,7 @@ def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
     """Every output for one input. DetectorError when the network fails on it, Stopped when the run was cancelled."""
     options, stop = ort.RunOptions(), of_this_thread()
     options.log_severity_level = _FATAL
-    with stop.ends(options):
+    with stop.ends(options), flush_to_zero():
         try:
             outputs = session.run(None, {session.get_inputs()[0].name: blob}, options)
         except Exception as error:
@@ -99,6 +118,24 @@ def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:
                 raise Stopped from None
             raise DetectorError(f"the network failed: {_first_line(error)}") from None
     return [np.asarray(output) for output in outputs]
+
+
+def ways_of(path: Path) -> Callable[[Way], Callable[[], Sequence[F32]]]:
+    """For ``pipeline.inference.tuning``: the network in a file on the same noisy picture, one way after the other.
+    DetectorError when it takes no picture."""
+    model = with_empty_masks(with_unit_picture(read_graph(path)))  # each leaves the other's graphs as they are
+    try:
+        own = input_size(model)
+    except ValueError as error:
+        raise DetectorError(f"{path.name} cannot be tuned: {error}") from None
+    graph = (model if own else with_input_size(model, _TUNED_SIZE)).SerializeToString()
+    noise = np.random.default_rng(0).random((1, 3, *(own or _TUNED_SIZE)), np.float32)
+
+    def run(way: Way) -> Callable[[], Sequence[F32]]:
+        session = open_as(graph, way)
+        return lambda: run_session(session, noise)
+
+    return run
 
 
 def _first_line(error: Exception | None) -> str:

@@ -123,7 +123,8 @@ def _loaded(path: Path, threads: int, horizon: float) -> LaneNetwork:
     if head.horizon is not None:
         name += f"-{horizon:.3f}"
     notes = (f"lane lines by the network {path.stem}",)
-    return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, threads, horizon, sha256, session)
+    count = session.get_session_options().intra_op_num_threads
+    return LaneNetwork(name, tuple(session.get_providers()), size, head, notes, count, horizon, sha256, session)
 
 
 def _placed(picture: Size, size: Size, head: Head, horizon: float) -> _Placed:

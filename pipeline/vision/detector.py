@@ -174,7 +174,7 @@ def _at_size(
         found.law or REAL_VEHICLES,
         decoder.name,
         (*notes, *((found.note,) if found.note else ())),
-        threads,
+        session.get_session_options().intra_op_num_threads,
         sha256,
         graph,
         session,

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any, Protocol, TypeVar
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 T = TypeVar("T")
 
 

@@ -25,7 +25,7 @@ from pipeline.sources import Source, open_source
 from pipeline.types import U8, RawBoxes
 from pipeline.vision.detector import Detector
 
-WAIT_MS = 60_000
+WAIT_MS = 180_000
 START = 60
 """A frame of the scenario with traffic around."""
 expect.set_options(timeout=WAIT_MS)

@@ -14,7 +14,7 @@ from app.clips.export_queue import MOST_EXPORTS, ExportQueue, ExportRefused, Exp
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 
 class Ended:

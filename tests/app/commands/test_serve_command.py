@@ -16,7 +16,7 @@ from pipeline.common.progress import Progress
 from pipeline.types.source import AnySource, SourceError
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 Opened = list[str]
 
 

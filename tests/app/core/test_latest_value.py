@@ -6,7 +6,7 @@ import threading
 
 from app.core.latest_value import Newest
 
-WAIT_S = 20.0
+WAIT_S = 180.0
 
 
 def test_only_the_newest_is_taken() -> None:

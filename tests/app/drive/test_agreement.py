@@ -22,7 +22,7 @@ from pipeline.types.source import Source, TruthObject
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 from tests.looking import yolox_nano
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 
 class First:

@@ -22,7 +22,7 @@ from pipeline.step import State, step
 from pipeline.types import Frame
 from tests.app.engine.recording_helpers import CountingDetector, Recording, SlowDetector
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 
 def with_hits(hits: int) -> Params:

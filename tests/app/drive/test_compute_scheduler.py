@@ -18,7 +18,7 @@ from pipeline.types import Frame
 from tests.app.engine.recording_helpers import Options
 from tests.app.engine.test_live_engine import Sensors
 
-WAIT_S = 30.0
+WAIT_S = 180.0
 FOR_EVER_S = 1e6
 A_WHILE_S = 0.05
 """Somebody who does not wait has gone on by then. Where a machine is too slow for that, a test sees nothing wrong."""

@@ -13,7 +13,7 @@ from pipeline.types import Result
 from pipeline.types.result_json import to_json
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 
 Start = Callable[..., tuple[Engine, Recording, CountingDetector]]

@@ -26,7 +26,7 @@ from pipeline.types.source import AnySource, SourceError, Tap
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 from tests.app.waiting import wait_until
 
-WAIT_S = 30.0
+WAIT_S = 180.0
 
 
 class Sensors:

@@ -23,7 +23,7 @@ from tests.app.engine.recording_helpers import CountingDetector, Recording
 from tests.app.engine.test_live_engine import Sensors, shows
 from tests.app.web.serving import serving
 
-WAIT_S = 30.0
+WAIT_S = 180.0
 
 
 class Car:

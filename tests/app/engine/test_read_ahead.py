@@ -10,7 +10,7 @@ import pytest
 
 from app.engine.read_ahead import ReadAhead
 
-WAIT_S = 20.0
+WAIT_S = 180.0
 
 
 @dataclass

@@ -27,7 +27,7 @@ from tests.app.engine.recording_helpers import CountingDetector, Recording, open
 from tests.app.waiting import Runs, loop_apart
 from tests.pipeline.recording.frames import same
 
-WAIT_S = 30.0
+WAIT_S = 180.0
 
 
 @pytest.fixture

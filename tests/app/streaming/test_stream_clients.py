@@ -31,7 +31,7 @@ from pipeline.params import Params
 from pipeline.types import Picture
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 FAST_FRAMES = 40
 """More than the system's buffers between a server and a client that does not read can hold."""
 

@@ -167,7 +167,7 @@ class SceneClient:
     def read_until(self, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         """The first message that is wanted; TimeoutError when none comes."""
         while True:
-            data = self.connection.recv(timeout=20)
+            data = self.connection.recv(timeout=180)
             assert isinstance(data, bytes)
             self.largest = max(self.largest, len(data))
             packed = data[16 : 16 + int.from_bytes(data[8:16], "little")]

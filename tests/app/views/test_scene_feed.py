@@ -15,7 +15,7 @@ from app.views.scene_feed import SceneFeed
 from pipeline.params import Params
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 
 @pytest.fixture

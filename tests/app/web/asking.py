@@ -12,7 +12,7 @@ from websockets.sync.client import ClientConnection
 from app.engine.engine import Engine
 from app.engine.snapshot import Snapshot
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 
 def reach(engine: Engine, condition: Callable[[Snapshot], bool]) -> Snapshot:

@@ -16,7 +16,7 @@ from pipeline.params import Params
 from pipeline.types.source import Source
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 
 @contextmanager

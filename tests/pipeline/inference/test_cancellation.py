@@ -15,7 +15,7 @@ from pipeline.inference.cancellation import Stop, Stopped, of_this_thread
 from pipeline.inference.runtime import DetectorError, open_session, run_session
 from tests.pipeline.vision.networks import IR_VERSION
 
-WAIT_S = 30.0
+WAIT_S = 180.0
 ONE = np.ones(1, np.float32)
 
 

@@ -18,7 +18,7 @@ from pipeline.params import Params
 from tests.app.engine.recording_helpers import CountingDetector, Recording, opener
 from tests.app.waiting import wait_until
 
-WAIT_S = 60.0
+WAIT_S = 180.0
 
 
 @pytest.fixture

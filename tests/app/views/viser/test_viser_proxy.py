@@ -42,7 +42,7 @@ class Web(uvicorn.Server):
 
     def __enter__(self) -> Web:
         self._thread.start()
-        assert self._ready.wait(20)
+        assert self._ready.wait(180)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -50,7 +50,7 @@ class Web(uvicorn.Server):
         self._thread.join(20)
 
     def get(self, path: str, **options: Any) -> httpx.Response:
-        return httpx.get(self.origin + path, trust_env=False, timeout=20, **options)
+        return httpx.get(self.origin + path, trust_env=False, timeout=180, **options)
 
 
 @pytest.fixture
@@ -107,7 +107,7 @@ def test_sliders_come_through_the_other_way(open_scene: Any) -> None:
             client = open_scene(web.port, "/viser", origin=web.origin)
             client.read_present_state()
             client.move(client.inputs("Z weight")[0]["uuid"], 0.25)
-            assert heard.wait(20)
+            assert heard.wait(180)
     finally:
         view.close()
     assert moved == [("cluster.z_weight", 0.25)]
@@ -185,4 +185,4 @@ def test_when_the_browser_leaves_viser_is_told(web: Web, view: ViserView, open_s
     client = open_scene(web.port, "/viser", origin=web.origin)
     client.read_present_state()
     client.connection.close()
-    assert gone.wait(20)
+    assert gone.wait(180)

@@ -104,7 +104,7 @@ def test_check_says_rates_clock_offsets_and_skew() -> None:
     for sensor in ("lidar", "camera"):
         offset_ms = reports[sensor].clock_offset_ms
         assert offset_ms is not None
-        assert -2.0 < offset_ms < 200.0, "one machine, one clock: the way over loopback is all there is"
+        assert -2.0 < offset_ms < 2000.0, "one machine, one clock: leap seconds or wrong units would be more"
     assert reports["camera"].skew_ms is not None
     assert abs(reports["camera"].skew_ms) < 60.0
     assert reports["ego"].clock_offset_ms is None

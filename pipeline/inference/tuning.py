@@ -1,0 +1,199 @@
+"""Which way of running a network is fastest on this machine: tried once, kept beside the networks.
+
+What is kept belongs to a file, a processor and a version of onnxruntime; with another of these the network runs as
+untuned. A way that changes the network's outputs is never kept.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import onnxruntime as ort
+
+from pipeline.common.data_dir import file_sha256
+from pipeline.common.fast_replace import evolve
+from pipeline.inference.model_registry import store
+from pipeline.types import F32
+
+PROVIDERS = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "OpenVINOExecutionProvider", "CPUExecutionProvider")
+"""Those that may run a network, in the order of preference of an untuned one (which leaves OpenVINO out)."""
+_UNTUNED = tuple(name for name in PROVIDERS if name != "OpenVINOExecutionProvider")
+_AGREE = 1e-3
+"""Largest difference of an output, in shares of its largest value: another order of summation, no other precision."""
+_WORTH = 0.97
+"""A way must take less than this share of the best one's time to be preferred: the rest is what two tries differ by."""
+_ROUNDS = 7
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way of running a network."""
+
+    providers: tuple[str, ...]
+    """Of onnxruntime, in the order in which they are tried for each node."""
+    threads: int
+    """Of one run."""
+    optimisation: str = "ORT_ENABLE_ALL"
+    """Level of graph optimisation, onnxruntime's name."""
+    arena: bool = True
+    """Whether memory is kept between runs."""
+
+    def __str__(self) -> str:
+        level = self.optimisation.removeprefix("ORT_").replace("_", " ").lower()
+        return f"{_short(self.providers[0])}, {self.threads} threads, {level}, {'with' if self.arena else 'no'} arena"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What one way took."""
+
+    way: Way
+    best_ms: float | None
+    """The shortest of its runs: other work on the machine only ever adds. None when it could not run or its outputs
+    differ."""
+    refused: str = ""
+    """Why."""
+
+
+def untuned(threads: int) -> Way:
+    """How a network runs that nobody tuned: on the best provider that is installed."""
+    there = ort.get_available_providers()
+    return Way(tuple(name for name in _UNTUNED if name in there), threads)
+
+
+def kept_way(path: Path, threads: int) -> Way:
+    """The tuned way of a network's file on this machine, or the untuned one."""
+    rows, usual = _read(_file()), untuned(threads)
+    row = rows.get(_key(path)) if rows else None
+    if row is None:
+        return usual
+    try:
+        way = Way(tuple(row["providers"]), int(row["threads"]), str(row["optimisation"]), bool(row["arena"]))
+    except (KeyError, TypeError, ValueError):
+        return usual
+    known = hasattr(ort.GraphOptimizationLevel, way.optimisation) and 1 <= way.threads <= 64
+    return way if known and set(way.providers) <= set(ort.get_available_providers()) else usual
+
+
+def keep(path: Path, way: Way) -> None:
+    """Run this file's network this way from now on. OSError when the store cannot be written."""
+    file = _file()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_suffix(".part")
+    part.write_text(
+        json.dumps(_read(file) | {_key(path): asdict(way)}, indent=1, sort_keys=True) + "\n", encoding="utf-8"
+    )
+    part.replace(file)
+
+
+def tune(run: Callable[[Way], Callable[[], Sequence[F32]]], threads: int) -> Iterator[Trial]:
+    """Try each way, the untuned one first; the best of those before is varied in one thing at a time.
+
+    run: gives for a way a function that runs the network once on a fixed input; either may raise.
+    """
+    best, expected = _timed(run, untuned(threads), None)
+    yield best
+    for vary in (_other_providers, _other_threads, _other_levels, _no_arena):
+        for way in vary(best.way):
+            trial, _ = _timed(run, way, expected)
+            yield trial
+            if trial.best_ms is not None and best.best_ms is not None and trial.best_ms < _WORTH * best.best_ms:
+                best = trial
+
+
+def fastest(trials: Sequence[Trial]) -> Trial:
+    """The one to keep: the first of which no later one is faster by more than the spread."""
+    best = trials[0]
+    for each in trials[1:]:
+        if each.best_ms is not None and best.best_ms is not None and each.best_ms < _WORTH * best.best_ms:
+            best = each
+    return best
+
+
+def _timed(
+    run: Callable[[Way], Callable[[], Sequence[F32]]], way: Way, expected: Sequence[F32] | None
+) -> tuple[Trial, Sequence[F32]]:
+    try:
+        once = run(way)
+        outputs = once()
+        if expected is not None and not _agree(outputs, expected):
+            return Trial(way, None, "its outputs differ"), outputs
+        taken = []
+        for _ in range(_ROUNDS):
+            start = perf_counter()
+            once()
+            taken.append(perf_counter() - start)
+    except Exception as error:  # onnxruntime raises a class for each status code, without a common base
+        if expected is None:
+            raise
+        return Trial(way, None, (str(error).splitlines() or ["no reason given"])[0]), ()
+    return Trial(way, min(taken) * 1e3), outputs
+
+
+def _agree(ours: Sequence[F32], theirs: Sequence[F32]) -> bool:
+    if len(ours) != len(theirs):
+        return False
+    return all(
+        a.shape == b.shape and bool(np.all(np.abs(a - b) <= _AGREE * max(1e-6, float(np.abs(b).max(initial=0.0)))))
+        for a, b in zip(ours, theirs, strict=True)
+    )
+
+
+def _other_providers(way: Way) -> Iterator[Way]:
+    there = [name for name in PROVIDERS if name in ort.get_available_providers()]
+    for place, name in enumerate(there):
+        if name != way.providers[0]:
+            yield evolve(way, providers=tuple(there[place:]))
+
+
+def _other_threads(way: Way) -> Iterator[Way]:
+    cores = os.cpu_count() or 1
+    yield from (evolve(way, threads=n) for n in (1, 2, 4, cores) if n <= cores and n != way.threads)
+
+
+def _other_levels(way: Way) -> Iterator[Way]:
+    yield from (evolve(way, optimisation=level) for level in ("ORT_ENABLE_EXTENDED", "ORT_ENABLE_BASIC"))
+
+
+def _no_arena(way: Way) -> Iterator[Way]:
+    yield evolve(way, arena=False)
+
+
+def _file() -> Path:
+    return store() / "tuning.json"
+
+
+def _read(file: Path) -> dict[str, dict[str, Any]]:
+    """What is kept; nothing when the file is missing or damaged: then networks run untuned."""
+    try:
+        rows = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return {key: row for key, row in rows.items() if isinstance(row, dict)} if isinstance(rows, dict) else {}
+
+
+def _key(path: Path) -> str:
+    machine = hashlib.sha256(f"{_processor()} {os.cpu_count()}".encode()).hexdigest()[:12]
+    return f"{file_sha256(path)[:16]} {machine} {ort.__version__}"
+
+
+def _processor() -> str:
+    """Its model's name."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    return next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), platform.machine())
+
+
+def _short(provider: str) -> str:
+    return provider.removesuffix("ExecutionProvider")

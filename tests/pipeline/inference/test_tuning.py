@@ -1,0 +1,98 @@
+"""The fastest way is kept for one file on one machine, and only if it gives the same outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from time import sleep
+
+import numpy as np
+import pytest
+
+from pipeline.inference import tuning
+from pipeline.inference.runtime import open_session, ways_of
+from pipeline.inference.tuning import Trial, Way, fastest, keep, kept_way, tune, untuned
+from pipeline.types import F32
+from tests.pipeline.vision import networks
+
+CPU = "CPUExecutionProvider"
+
+
+@pytest.fixture
+def network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A small network, and a store of its own."""
+    monkeypatch.setenv("CIPV_HOME", str(tmp_path / "home"))
+    return networks.yolox(tmp_path / "tiny.onnx")
+
+
+def test_a_kept_way_is_the_one_it_runs_in(network: Path) -> None:
+    keep(network, Way((CPU,), 3, "ORT_ENABLE_BASIC", arena=False))
+    options = open_session(network.read_bytes(), network, 2).get_session_options()
+    assert options.intra_op_num_threads == 3
+    assert options.graph_optimization_level.name == "ORT_ENABLE_BASIC"
+    assert not options.enable_cpu_mem_arena
+
+
+def test_it_belongs_to_the_file_the_processor_and_the_version(network: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    keep(network, Way((CPU,), 3))
+    assert kept_way(network, 2).threads == 3
+    monkeypatch.setattr(tuning, "_processor", lambda: "another")
+    assert kept_way(network, 2) == untuned(2)
+
+
+def test_another_file_runs_untuned(network: Path, tmp_path: Path) -> None:
+    keep(network, Way((CPU,), 3))
+    other = tmp_path / "other.onnx"
+    other.write_bytes(network.read_bytes() + b"\0")
+    assert kept_way(other, 2) == untuned(2)
+
+
+@pytest.mark.parametrize("damage", ["no JSON", "[]", '{"a": 1}'])
+def test_what_is_kept_may_be_damaged(network: Path, damage: str) -> None:
+    keep(network, Way((CPU,), 3))
+    (tuning.store() / "tuning.json").write_text(damage, encoding="utf-8")
+    assert kept_way(network, 2) == untuned(2)
+
+
+@pytest.mark.parametrize("way", [Way(("NoSuchProvider",), 2), Way((CPU,), 0), Way((CPU,), 2, "FASTEST")])
+def test_a_way_that_cannot_be_gone_is_not(network: Path, way: Way) -> None:
+    keep(network, way)
+    assert kept_way(network, 2) == untuned(2)
+
+
+def test_every_way_of_a_real_network_is_tried_and_gives_its_outputs(network: Path) -> None:
+    trials = list(tune(ways_of(network), 2))
+    assert trials[0].way == untuned(2)
+    assert len({trial.way for trial in trials}) == len(trials) >= 4
+    assert not [trial for trial in trials if trial.best_ms is None]
+
+
+def _made(slow: Callable[[Way], bool], output: Callable[[Way], float]) -> Callable[[Way], Callable[[], Sequence[F32]]]:
+    """Ways that take 5 ms or nothing, and give one number."""
+
+    def run(way: Way) -> Callable[[], Sequence[F32]]:
+        def once() -> Sequence[F32]:
+            if slow(way):
+                sleep(0.005)
+            return [np.array([output(way)], np.float32)]
+
+        return once
+
+    return run
+
+
+def test_the_faster_one_is_chosen_unless_its_outputs_differ() -> None:
+    def is_slow(way: Way) -> bool:
+        return way.optimisation != "ORT_ENABLE_BASIC"
+
+    honest = list(tune(_made(is_slow, lambda _: 1.0), 2))
+    assert fastest(honest).way.optimisation == "ORT_ENABLE_BASIC"
+    wrong = list(tune(_made(is_slow, lambda way: 1.0 if is_slow(way) else 1.1), 2))
+    assert fastest(wrong).way.optimisation != "ORT_ENABLE_BASIC"
+    assert {trial.refused for trial in wrong if not is_slow(trial.way)} == {"its outputs differ"}
+
+
+def test_a_gain_within_the_spread_changes_nothing() -> None:
+    usual, little = Trial(Way((CPU,), 2), 10.0), Trial(Way((CPU,), 1), 9.9)
+    assert fastest([usual, little]) is usual
+    assert fastest([usual, little, Trial(Way((CPU,), 4), 5.0)]).way.threads == 4
