@@ -24,8 +24,8 @@ from pipeline.common.geometry import F64
 from pipeline.params import FusionParams
 from pipeline.types import F32, I32, VEHICLES, Ground, Point3, VisionMeasurement
 
-NEAREST_M = 20.0
-"""Nearer vehicles have a cluster, or something hides them."""
+NEAREST_M = 30.0
+"""By the camera. Nearer vehicles have a cluster, or something hides them."""
 SIGMA_M = 0.5
 """Of the nearest point of a vehicle by a few returns. Measured on Astyx beyond 30 m: 80 % between −0.4 and +0.4 m; a
 return of a roof or a flank lies up to 2.5 m further, which is less than σ of the camera's distance there."""
