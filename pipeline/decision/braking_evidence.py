@@ -30,5 +30,6 @@ def _justified(item: FusedObject, params: ExistenceParams) -> Braking:
         return Braking.COMFORT
     is_steady = item.camera_ranges >= params.camera_ranges
     if item.ranged:
-        return Braking.FULL if is_steady or item.lidar_hits >= RANGED_SIGHTINGS else Braking.PARTIAL
+        # a camera track, however long, does not make one LiDAR sighting a measured speed
+        return Braking.FULL if item.lidar_hits >= RANGED_SIGHTINGS else Braking.PARTIAL
     return Braking.PARTIAL if is_steady else Braking.COMFORT

@@ -27,6 +27,9 @@ from pipeline.types import (
 
 _CONTRADICT_SIGMAS, _CONTRADICT_MPS = 5.0, 1.0
 """Speeds that differ by more than both contradict each other."""
+_VAGUE_MPS, _VAGUE_RADPS = 1.0, 2.0 * pi / 180.0
+"""Less sure own motion is not used: 1 m/s no longer tells a standing car from one that creeps, and 2°/s at 10 m/s
+put the path at 30 m off by 1.6 m, half a lane."""
 _SPEED_SIGMA_MPS: dict[MotionSource, tuple[float, float]] = {"can": (0.1, 0.01), "ins": (0.05, 0.0), "gnss": (0.2, 0.0)}
 """Of each source: a constant part, and a share of the speed (a tyre's radius wears by a hundredth)."""
 _YAW_RATE_SIGMA_RADPS: dict[MotionSource, float] = {"can": 0.005, "ins": 0.002, "gnss": 1.0 * pi / 180.0}
@@ -100,7 +103,7 @@ def measure(
     sources = [_usual(each) for each in given] + ([_of_lidar(placed)] if placed is not None else [])
     state = OwnMotionState(odometry, courses)
     notes = (note,) if note and (params.source == "lidar" or not given) else ()
-    trusted = [each for each in sources if _may(each.source, params)]
+    trusted = [each for each in map(_as_far_as_usable, sources) if each is not None and _may(each.source, params)]
     if recorded is not None and received is not None and params.source == "auto":
         trusted = [each for each in trusted if each.source != "gnss"]  # as good as the car's own, but later
     if not trusted:
@@ -138,6 +141,15 @@ def _of_lidar(placed: LidarMotion) -> MotionEstimate:
     return MotionEstimate(
         "lidar", placed.speed_mps, placed.speed_sigma_mps, placed.yaw_rate_radps, placed.yaw_rate_sigma_radps
     )
+
+
+def _as_far_as_usable(each: MotionEstimate) -> MotionEstimate | None:
+    """The estimate without what is too vague to use: a bad yaw rate bends the path more than none would."""
+    if each.speed_sigma_mps > _VAGUE_MPS:
+        return None
+    if each.yaw_rate_sigma_radps is not None and each.yaw_rate_sigma_radps > _VAGUE_RADPS:
+        return evolve(each, yaw_rate_radps=None, yaw_rate_sigma_radps=None)
+    return each
 
 
 def _as_ego(own: OwnMotion, frame: Frame, recorded: EgoState | None) -> EgoState:

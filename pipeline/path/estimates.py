@@ -62,6 +62,11 @@ def samples(length_m: float) -> F64:
     return s
 
 
+SHARPEST_BEGIN_PER_M2 = 0.0044
+"""How fast a road's curvature changes along it at most: a street corner of 15 m radius that begins over 15 m. Lateral
+jerk bounds it at speed; a car that creeps could turn its wheels on the spot, but the road ahead of it does not."""
+
+
 def arc(curvature: float, s: F64) -> tuple[F64, F64]:
     """(K, 2) points and (K,) headings at path lengths ``s`` of an arc from the origin along +x; curvature is positive
     to the left. At path length s the heading has turned by θ = s/r and the place has moved aside by r(1 − cos θ). It
@@ -84,7 +89,8 @@ def straight(ego: EgoState | None, params: PathParams) -> PathEstimate:
         speed2 = max(ego.speed_mps, params.min_speed_mps, 0.1) ** 2
         curvature_sigma = min(params.lateral_accel_mps2 / speed2, _TIGHTEST_CURVATURE_PER_M)
     center = np.column_stack([s, np.zeros_like(s)])
-    return PathEstimate("straight", center, np.hypot(params.lane_keeping_sigma_m, 0.5 * curvature_sigma * s * s))
+    bends_by = np.minimum(0.5 * curvature_sigma * s * s, SHARPEST_BEGIN_PER_M2 / 6.0 * s**3)
+    return PathEstimate("straight", center, np.hypot(params.lane_keeping_sigma_m, bends_by))
 
 
 def between_lines(lane: EgoLane | None, params: PathParams) -> PathEstimate | None:

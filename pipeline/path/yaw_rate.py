@@ -24,7 +24,7 @@ import numpy as np
 
 from pipeline.common.fast_replace import evolve
 from pipeline.params import PathParams
-from pipeline.path.estimates import PathEstimate, arc, samples
+from pipeline.path.estimates import SHARPEST_BEGIN_PER_M2, PathEstimate, arc, samples
 from pipeline.types import EgoState
 
 _FASTEST_RADPS = 2.0
@@ -97,7 +97,7 @@ def ahead(yaw: YawRate | None, ego: EgoState | None, params: PathParams) -> Path
         params.lane_keeping_sigma_m**2
         + (params.lane_keeping_sigma_mps * time_s) ** 2
         + (0.5 * rate_sigma * speed * time_s**2) ** 2
-        + (params.lateral_jerk_mps3 / 6.0 * time_s**3) ** 2
+        + (min(params.lateral_jerk_mps3 / speed**3, SHARPEST_BEGIN_PER_M2) / 6.0 * s**3) ** 2
     )
     return PathEstimate("yaw_rate", center, np.sqrt(variance))
 
