@@ -23,7 +23,7 @@ from pipeline.experiments.paper.lidar_range import RANGING
 
 EXPERIMENTS: tuple[Experiment[Any, Any], ...] = (RANGING, REGRESSION, BEV_ERROR, CHOOSING, CURVES, BRAKING, NCAP, ISO)
 Keep = Callable[[Experiment[Any, Any], ExperimentDrive], None]
-SUITES = ("paper", "curves", "euroncap", "iso", "all", "robustness")
+SUITES = ("paper", "curves", "euroncap", "iso", "all")
 
 
 class NoSuchSuite(BadInput):

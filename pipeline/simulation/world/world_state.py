@@ -21,7 +21,7 @@ FloatOrArray = TypeVar("FloatOrArray", float, F64)
 
 LIDAR_HEIGHT_M = 0.5
 _BRAKING_MPS2 = -0.4
-_PARKED_BEHIND_M, _PARKED_AHEAD_M = 60.0, 250.0
+_PARKED_BEHIND_M, _PARKED_AHEAD_M = 120.0, 250.0
 """Parked vehicles beyond are left out: rows of them would take most of the time, and no sensor finds them there."""
 _SLOWEST_STEER_MPS = 2.0  # slower than this a lane change is a creep to the side, not a turn on the spot
 

@@ -35,6 +35,7 @@
  * @property {""|ObjectSource} seen_by
  * @property {number} hits
  * @property {number} lidar_points
+ * @property {"cluster"|"returns"|"box"|null} distance_from  what measured it in this frame
  * @property {number|null} lateral_mps
  * @property {number|null} crossing_s
  * @property {Gate[]} gates

@@ -7,7 +7,6 @@ import re
 from pathlib import Path
 
 from pipeline.fusion.vehicle_sizes import USUAL_SIZE_M
-from pipeline.labels.formats.registry import FORMATS
 from pipeline.labels.model import WHOLE_TAG
 
 LABELING = Path(__file__).resolve().parents[3] / "static" / "js" / "labeling"
@@ -18,12 +17,6 @@ def test_a_new_cuboid_is_as_large_as_one_that_nobody_measured() -> None:
     assert found is not None
     table = re.sub(r",\s*\}", "}", re.sub(r"(\w+):", r'"\1":', found[1]))
     assert {name: tuple(size) for name, size in json.loads(table).items()} == USUAL_SIZE_M
-
-
-def test_every_format_can_be_chosen() -> None:
-    found = re.search(r"const FORMATS = \[(.*?)\];", (LABELING / "panels" / "files_tab.js").read_text(), re.DOTALL)
-    assert found is not None
-    assert set(re.findall(r'\["([a-z-]+)"', found[1])) == set(FORMATS)
 
 
 def test_the_page_offers_the_tag_of_frames_whose_vehicles_are_all_labelled() -> None:

@@ -70,7 +70,7 @@ def test_a_path_of_no_known_kind_is_answered_with_what_it_holds(astyx: Path, tmp
     odd = tmp_path / "odd"
     (odd / "radar").mkdir(parents=True)
     (odd / "a.csv").write_text("x")
-    with pytest.raises(SourceError, match=r"it holds 1 \.csv files and folders radar; type one of"):
+    with pytest.raises(SourceError, match=r"it holds 1 \.csv files and folders radar; use one of"):
         open_source(str(odd))
     with pytest.raises(SourceError, match=r"not a source: a \.csv file; type"):
         open_source(str(odd / "a.csv"))

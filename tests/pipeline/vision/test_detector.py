@@ -82,7 +82,7 @@ def test_a_graph_that_holds_its_size_keeps_it_and_says_so(tmp_path: Path) -> Non
 def test_a_constant_grid_of_equal_cell_count_is_refused(tmp_path: Path) -> None:
     """32×128 has as many pixels as 64×64, so such a graph runs without complaint, on the wrong grid."""
     path = str(networks.yolov8(tmp_path / "v8.onnx"))
-    with pytest.raises(DetectorError, match="graph may hold a grid"):
+    with pytest.raises(DetectorError, match="graph may contain a grid"):
         open_detector(path, None, input_size=(32, 128))
 
 

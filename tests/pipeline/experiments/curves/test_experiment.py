@@ -9,8 +9,8 @@ from pipeline.common.fast_replace import evolve
 from pipeline.experiments.curves import experiment, scenarios
 from pipeline.experiments.curves.drives import SOURCES, Frames, seen
 from pipeline.experiments.curves.experiment import CurveCase, Outcome, longest_wrong_s, share_right, told_before_line_s
+from pipeline.simulation.sensors.senses import Senses
 from pipeline.simulation.world import world_state
-from pipeline.sources.simulated import sensed
 
 
 def drive(
@@ -84,7 +84,7 @@ def test_a_drive_seen_again_has_the_boxes_and_lines_that_it_had(outcomes: dict[C
     scene = kept.as_seen()
     _, driven = next(iter(seen(scene)))
     now = world_state.at(scene, 0.0)
-    again = sensed(evolve(driven, raw_boxes=None, raw_lanes=None), now, scene)
+    again = Senses(scene).sensed(evolve(driven, raw_boxes=None, raw_lanes=None), now)
     for ours, theirs in ((again.raw_boxes, driven.raw_boxes), (again.raw_lanes, driven.raw_lanes)):
         assert ours is not None
         assert theirs is not None
