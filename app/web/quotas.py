@@ -26,6 +26,8 @@ AT_ONCE: Mapping[Role, int] = {"person": 30, "display": 6}
 """Requests of a role under way, over all its clients. Browsers send six at a time; together they leave some threads."""
 STREAMS: Mapping[Role, int] = {"person": 48, "display": 16}
 """Open WebSockets of a role."""
+_WORK = "/api/"
+"""Requests that may take long."""
 _LOOK_S = 0.25
 T = TypeVar("T")
 
@@ -42,6 +44,9 @@ class RoleQuota:
             return await self._app(scope, receive, send)
         role: Role = "display" if is_display(HTTPConnection(scope)) else "person"
         kind, limits = (scope["type"], AT_ONCE if scope["type"] == "http" else STREAMS)
+        if kind == "http" and not scope["path"].startswith(_WORK):
+            # the files of a page, of which a browser asks for more than a few at once, and without which it is no page
+            return await self._app(scope, receive, send)
         if self._under_way[kind, role] >= limits[role]:
             if kind == "websocket":
                 await receive()

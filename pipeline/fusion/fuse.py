@@ -21,6 +21,8 @@ from pipeline.fusion.vehicle_sizes import LONGEST_M
 from pipeline.params import FusionParams
 from pipeline.types import Box, FusedObject, Gate, LidarTrack, Point2, VisionTrack
 
+_SURELY_ONE = 0.5
+
 
 @dataclass(frozen=True)
 class FusionState:
@@ -40,15 +42,22 @@ class Fusion:
     vision_boxes: dict[int, Box]
 
     def ranged_boxes(self) -> dict[int, tuple[float, float]]:
-        """Distance and its standard deviation by the LiDAR, by id of the vision track, of what both see now."""
+        """Distance and its standard deviation by the LiDAR, by id of the vision track, of what both surely see now: boxes
+        that overlap by less than a half may be those of two vehicles, one beside the other."""
         return {
             item.vision_track: (item.distance_m, item.distance_sigma_m)
             for item in self.objects
             if item.vision_track is not None
             and item.seen_by_two_sensors
+            and self._overlap(item.id) >= _SURELY_ONE
             and item.distance_m is not None
             and item.distance_sigma_m is not None
         }
+
+    def _overlap(self, number: int) -> float:
+        """IoU of the two boxes of an object that both have; 0 where one has none."""
+        hit, seen = self.lidar_boxes.get(number), self.vision_boxes.get(number)
+        return float(iou_matrix(np.array([hit]), np.array([seen]))[0, 0]) if hit and seen else 0.0
 
 
 def fuse(

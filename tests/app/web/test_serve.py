@@ -135,7 +135,7 @@ def test_whoever_ends_it_its_recording_is_closed_first(tmp_path: Path, numbers: 
         with httpx.Client(base_url=program.stdout.readline().strip(), timeout=60) as client:
             client.post("/api/recording", json={"on": True}).raise_for_status()
             with connect(f"{client.base_url}/api/stream".replace("http", "ws"), max_size=None) as stream:
-                while client.get("/api/state").json()["recording"]["frames"] < 2:
+                while (client.get("/api/state").json()["recording"] or {"frames": 0})["frames"] < 2:
                     stream.recv(60)  # a frame or a state: something has happened
                 for number in numbers:
                     program.send_signal(number)

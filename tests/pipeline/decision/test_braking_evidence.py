@@ -24,9 +24,7 @@ BOTH = replace(fused(1, 30.0), existence=0.95, lidar_hits=5)
         pytest.param(replace(CAMERA, camera_ranges=99, existence=0.6), Braking.COMFORT, id="for long, but doubtful"),
         pytest.param(replace(BOTH, lidar_hits=1), Braking.PARTIAL, id="the LiDAR, once"),
         pytest.param(replace(BOTH, lidar_hits=3), Braking.FULL, id="the LiDAR, three times"),
-        pytest.param(
-            replace(BOTH, lidar_hits=1, camera_ranges=8), Braking.PARTIAL, id="long followed, now measured once"
-        ),
+        pytest.param(replace(BOTH, lidar_hits=1, camera_ranges=8), Braking.PARTIAL, id="for long, now measured"),
         pytest.param(replace(BOTH, existence=0.5), Braking.COMFORT, id="measured, but doubtful"),
     ],
 )
