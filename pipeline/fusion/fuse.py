@@ -42,8 +42,8 @@ class Fusion:
     vision_boxes: dict[int, Box]
 
     def ranged_boxes(self) -> dict[int, tuple[float, float]]:
-        """Distance and its standard deviation by the LiDAR, by id of the vision track, of what both surely see now: boxes
-        that overlap by less than a half may be those of two vehicles, one beside the other."""
+        """Distance and its standard deviation by the LiDAR, by id of the vision track, of what both surely see now:
+        boxes that overlap by less than a half may be those of two vehicles, one beside the other."""
         return {
             item.vision_track: (item.distance_m, item.distance_sigma_m)
             for item in self.objects
