@@ -226,7 +226,9 @@ def test_a_dark_picture_ends_in_less_confidence_and_no_wrong_lead(data_dir: Path
     for result in results:
         assert result.layers.lanes is not None
         assert result.layers.lanes.left is None or result.layers.lanes.right is None
-        assert result.path.sigma_m["30"] >= by_day[result.frame].path.sigma_m["30"]
+    carried = [each for each in results if by_day[each.frame].path.source == "lane"]
+    assert len(carried) >= len(results) - 1, "the first frame shows one line, which is weighed against a guess"
+    assert all(each.path.sigma_m["30"] >= by_day[each.frame].path.sigma_m["30"] for each in carried)
 
 
 def _darker(frame: Frame, light: float) -> Frame:
