@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import tempfile
-from itertools import zip_longest
 from pathlib import Path
 
 import pytest
@@ -28,12 +27,12 @@ _WAITING = ("browser",)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Long files first: one left to the end would keep a single process busy. Computing and waiting ones alternate, so
-    that neither the cores idle nor every process drives a browser at once."""
+    """Long files first: one left to the end would keep a single process busy."""
     files = list(dict.fromkeys(item.path for item in items))
     long, waiting = ([file for file in files if _is_in(file, places)] for places in (_LONG, _WAITING))
-    alternating = [file for pair in zip_longest(long, waiting) for file in pair if file is not None]
-    order = {file: number for number, file in enumerate(dict.fromkeys([*alternating, *files]))}
+    # a browser keeps an event loop in its process, in which no other can run: its files come last
+    others = [file for file in files if file not in waiting]
+    order = {file: number for number, file in enumerate(dict.fromkeys([*long, *others, *waiting]))}
     items.sort(key=lambda item: order[item.path])
 
 
