@@ -71,9 +71,15 @@ def stream(address: str) -> Callable[..., ClientConnection]:
 @pytest.fixture(autouse=True)
 def _at_the_start(engine: Engine) -> None:
     """Each test begins at the first frame of the first recording with default parameters."""
-    before = engine.snapshot.sequence
-    engine.control.set_params(Params(), "default")
+    held = engine.snapshot.processed
+    old = held.frame if held is not None else None
     engine.control.change(uri="test:car", playing=False, target=None, steps=0)
+    revision = engine.control.set_params(Params(), "default")
     engine.wait_for(
-        lambda s: s.sequence > before and s.uri == "test:car" and s.index == 0 and s.processed is not None, WAIT_S
+        lambda s: (
+            (s.uri, s.index, s.params_revision) == ("test:car", 0, revision)
+            and s.processed is not None
+            and s.processed.frame is not old
+        ),
+        WAIT_S,
     )

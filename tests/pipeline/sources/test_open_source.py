@@ -72,7 +72,7 @@ def test_a_path_of_no_known_kind_is_answered_with_what_it_holds(astyx: Path, tmp
     (odd / "a.csv").write_text("x")
     with pytest.raises(SourceError, match=r"it holds 1 \.csv files and folders radar; use one of"):
         open_source(str(odd))
-    with pytest.raises(SourceError, match=r"not a source: a \.csv file; type"):
+    with pytest.raises(SourceError, match=r"not a source: a \.csv file; use one of session"):
         open_source(str(odd / "a.csv"))
     with pytest.raises(SourceError, match=f"it holds recordings, for example {astyx}"):
         open_source(str(astyx.parent))

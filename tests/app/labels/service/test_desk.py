@@ -40,6 +40,7 @@ def test_two_long_addresses_are_two_drives(desk: LabelDesk, control: Control) ->
     long = "live:" + "a" * 200
     desk.open(long + "1", None)
     control.change_params({"cipv.confirm_hits": 5})
+    desk.refresh()
     assert desk.state.can_undo
     desk.open(long + "2", None)
     desk.refresh()
