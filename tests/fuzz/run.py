@@ -75,18 +75,23 @@ def mutated(data: bytes, other: bytes, chance: random.Random) -> bytes:
 
 @contextmanager
 def within_budget() -> Any:
-    """OverTime after ``BUDGET_S``. An address space that is full raises MemoryError by itself."""
+    """OverTime after ``BUDGET_S`` of computing, or ten times that of waiting: a busy machine is no finding. An address
+    space that is full raises MemoryError by itself."""
 
     def late(*_: object) -> None:
         raise OverTime
 
-    before = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, BUDGET_S)
+    timers = {signal.ITIMER_PROF: (signal.SIGPROF, BUDGET_S), signal.ITIMER_REAL: (signal.SIGALRM, 10 * BUDGET_S)}
+    before = {number: signal.signal(number, late) for number, _ in timers.values()}
+    for timer, (_, seconds) in timers.items():
+        signal.setitimer(timer, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        for timer in timers:
+            signal.setitimer(timer, 0)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def outcome(target: Target, data: bytes) -> tuple[str, bool]:

@@ -17,8 +17,9 @@ from pipeline.recording.topics import PACKETS
 from pipeline.types import F64, Sweep
 from pipeline.types.source import SourceError
 
-PACKETS_BEFORE_NS, _PACKETS_AFTER_NS = 800_000_000, 200_000_000
-"""How long before and after the tick the packets of its sweep may have been received."""
+_USUALLY_BEFORE_NS, PACKETS_BEFORE_NS, _PACKETS_AFTER_NS = 800_000_000, 4_000_000_000, 200_000_000
+"""How long before the tick the packets of its sweep were usually received, and may have been at most: a tick is stored
+when the pipeline is done with it, which on a busy machine is late. How long after it they may have been written."""
 _SAME_SWEEP_NS = 40_000_000
 """Stamps of a sweep decoded with and without what came long before differ by far less; sweeps lie 100 ms apart."""
 _HEADER, _TIME = "std_msgs/msg/Header", "builtin_interfaces/msg/Time"
@@ -40,17 +41,24 @@ class RawLidar:
 def sweep_of_packets(ref: PacketsRef, at_ns: int, file: McapFile) -> Sweep:
     """The sweep of a tick stored at log time ``at_ns``, decoded anew. Damaged when its packets are not there."""
     try:
-        decoder = Vlp16Decoder(rigid_transform(np.reshape(ref.T_ego_lidar, (4, 4)), "T_ego_lidar"))
+        mount = rigid_transform(np.reshape(ref.T_ego_lidar, (4, 4)), "T_ego_lidar")
     except (SourceError, ValueError):
         raise Damaged("the LiDAR's mount cannot be read") from None
-    scans = file.messages((PACKETS,), at_ns - PACKETS_BEFORE_NS, at_ns + _PACKETS_AFTER_NS)
+    wanted_ns = ref.t_ns - ref.offset_ns
+    for before_ns in (_USUALLY_BEFORE_NS, PACKETS_BEFORE_NS):
+        sweeps = _sweeps(Vlp16Decoder(mount), file, at_ns - before_ns, at_ns + _PACKETS_AFTER_NS)
+        near = [each for each in sweeps if abs(each.t_ns - wanted_ns) < _SAME_SWEEP_NS]
+        if near:
+            return replace(min(near, key=lambda each: abs(each.t_ns - wanted_ns)), t_ns=ref.t_ns)
+    raise Damaged("the session lacks the packets of this sweep")
+
+
+def _sweeps(decoder: Vlp16Decoder, file: McapFile, from_ns: int, to_ns: int) -> list[Sweep]:
+    """What the packets stored between two log times make."""
+    scans = file.messages((PACKETS,), from_ns, to_ns)
     packets = [packet for stored in scans for packet in packets_from(stored.data)]
     sweeps = [decoder.push(payload, t_ns) for t_ns, payload in packets] + [decoder.flush()]
-    wanted_ns = ref.t_ns - ref.offset_ns
-    near = [each for each in sweeps if each is not None and abs(each.t_ns - wanted_ns) < _SAME_SWEEP_NS]
-    if not near:
-        raise Damaged("the session lacks the packets of this sweep")
-    return replace(min(near, key=lambda each: abs(each.t_ns - wanted_ns)), t_ns=ref.t_ns)
+    return [each for each in sweeps if each is not None]
 
 
 def scan_message(packets: list[tuple[int, bytes]]) -> bytes:

@@ -354,17 +354,28 @@ def test_a_full_disk_stops_the_recording_says_so_and_keeps_what_is_there(tmp_pat
 
 
 def test_a_writer_that_is_slow_and_goes_on_is_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As on a machine whose processors have other work: longer than the patience in all, and never at once."""
-    monkeypatch.setattr(recorder_module, "_PATIENCE_S", 0.3)
-    write = Segments.write
+    """As on a machine whose processors have other work: one frame in each ``_PATIENCE_S``, which is over many times."""
+    monkeypatch.setattr(recorder_module, "_PATIENCE_S", 0.0)
+    allowed, write = threading.Semaphore(0), Segments.write
 
-    def slowly(self: Segments, *arguments: Any, **named: Any) -> None:
-        threading.Event().wait(0.1)
+    def when_allowed(self: Segments, *arguments: Any, **named: Any) -> None:
+        assert allowed.acquire(timeout=20.0)
         write(self, *arguments, **named)
 
-    monkeypatch.setattr(Segments, "write", slowly)
+    monkeypatch.setattr(Segments, "write", when_allowed)
     recorder = Recorder(tmp_path / "a.mcap", ABOUT)
     for index in range(6):
         assert recorder.put(full(index))
+    thread, rounds = recorder._thread, []
+
+    def one_more(patience_s: float) -> None:
+        rounds.append(patience_s)
+        allowed.release()
+        done = recorder._done
+        while thread.is_alive() and recorder._done == done:
+            threading.Thread.join(thread, 0.001)
+
+    monkeypatch.setattr(thread, "join", one_more)
     state = recorder.stop()
     assert (state.error, state.frames) == (None, 6)
+    assert len(rounds) >= 6

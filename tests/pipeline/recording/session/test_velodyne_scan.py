@@ -30,8 +30,8 @@ def mounted() -> RawLidar:
     return RawLidar(T_ego_lidar, OFFSET_NS)
 
 
-def record(recorder: Segments, lidar: RawLidar) -> list[Frame]:
-    """Packets as they come, and a frame after each sweep that they complete."""
+def record(recorder: Segments, lidar: RawLidar, behind: int = 0) -> list[Frame]:
+    """Packets as they come, and a frame for each sweep that they complete, when so many more sweeps have come."""
     decoder, batch, frames = Vlp16Decoder(lidar.T_ego_lidar), [], []
     for packet, t_ns in drive(SWEEPS):
         sweep = decoder.push(packet, t_ns)
@@ -41,9 +41,12 @@ def record(recorder: Segments, lidar: RawLidar) -> list[Frame]:
             batch = []
         if sweep is not None:
             frame = replace(full(len(frames)), t_ns=sweep.t_ns, sweep=replace(sweep, t_ns=sweep.t_ns + OFFSET_NS))
-            recorder.write(frame, received_ns=t_ns + 30_000_000)
             frames.append(frame)
+            if len(frames) > behind:
+                recorder.write(frames[-1 - behind], received_ns=t_ns + 30_000_000)
     recorder.write_packets(batch)
+    for frame in frames[len(frames) - behind :]:
+        recorder.write(frame, received_ns=t_ns + 60_000_000)
     recorder.close()
     return frames
 
@@ -66,6 +69,13 @@ def test_sweeps_are_made_anew_of_their_packets(tmp_path: Path) -> None:
     again, part = (SessionSource(name, str(tmp_path / f"{name}.mcap")) for name in "bc")
     assert same_points(again.frame(5).sweep, frames[5].sweep)
     assert [same_points(part.frame(k).sweep, frames[5 + k].sweep) for k in range(4)] == [True] * 4
+
+
+def test_a_pipeline_that_lags_behind_the_sensor_loses_no_sweep(tmp_path: Path) -> None:
+    lidar = mounted()
+    frames = record(Segments(tmp_path / "a.mcap", ABOUT, raw_lidar=lidar), lidar, behind=15)
+    session = SessionSource("a", str(tmp_path / "a.mcap"))
+    assert [same_points(session.frame(k).sweep, frame.sweep) for k, frame in enumerate(frames)] == [True] * len(frames)
 
 
 def test_a_new_file_begins_with_the_packets_of_its_first_sweep(tmp_path: Path) -> None:
