@@ -13,7 +13,7 @@ from pipeline.common.garbage_collection import collect_rarely
 from pipeline.common.geometry import iou_matrix
 from pipeline.decision import path_position
 from pipeline.ego_motion import registration, structure
-from pipeline.fusion import existence
+from pipeline.fusion import free_road
 from pipeline.lanes import road_lines
 from pipeline.path import corridor
 from pipeline.vision import place_filter
@@ -36,7 +36,7 @@ def _warm_up() -> None:
     iou_matrix(np.zeros((1, 4)), np.zeros((1, 4)))
     structure.warm_up()
     registration.warm_up()
-    existence.warm_up()
+    free_road.warm_up()
     place_filter.warm_up()
     road_lines.warm_up()
     corridor.warm_up()

@@ -8,13 +8,14 @@ Where the path is not known well enough to tell the lead, ACC does not accelerat
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.decision.reaction_candidates import enters_corridor, is_dependable
 from pipeline.params import AccParams
-from pipeline.types import AccCommand, Braking, Cipv, EgoState, Path, Situation
+from pipeline.types import AccCommand, Braking, Cipv, EgoState, FusedObject, Path, Situation
 
 STANDSTILL_MPS = 0.1
 CREEP_MPS = 3.0
@@ -30,6 +31,8 @@ class AccState:
     """Integral of the speed error over time."""
     error_mps: float | None = None
     """Speed error of the frame before; None at the start."""
+    on_course: Mapping[int, int] = field(default_factory=dict)
+    """By object id, for how many frames in a row its course has led into the corridor."""
 
 
 @dataclass(frozen=True)
@@ -53,11 +56,14 @@ def control(state: AccState, situation: Situation, params: AccParams) -> tuple[A
     ego = situation.now.ego
     if ego is None:
         return AccState(), None
+    threats = _on_course(situation, params)
+    on_course = {item.id: state.on_course.get(item.id, 0) + 1 for item in threats}
+    confirmed = [item for item in threats if on_course[item.id] >= params.confirm_frames]
     # Each rule demands a speed, and the smallest demand wins
     demand = min(
         (
             follow(ego, situation.lead, params),
-            *avoid(ego, situation, params),
+            *avoid(ego, confirmed, params),
             *hold(ego, situation.path, params),
         ),
         key=lambda wish: wish.speed_mps,
@@ -65,9 +71,9 @@ def control(state: AccState, situation: Situation, params: AccParams) -> tuple[A
     # A PID turns the speed error into an acceleration, and that into pedals
     state, accel = pid(state, demand.speed_mps - ego.speed_mps, situation.now.dt_s, params)
     accel = min(accel, 0.0) if demand.no_faster else accel
-    if demand.object_id is not None and _justified(demand.object_id, situation) is Braking.COMFORT:
+    if demand.object_id is not None and _justified(demand.object_id, situation) is not Braking.FULL:
         accel = max(accel, -params.comfort_decel_mps2)
-    return state, AccCommand(
+    return replace(state, on_course=on_course), AccCommand(
         state=demand.state,
         desired_speed_mps=demand.speed_mps,
         accel_mps2=accel,
@@ -121,17 +127,25 @@ def _approach_speed_mps(ego: EgoState, cipv: Cipv, params: AccParams) -> float:
     return lead_mps + math.sqrt(2.0 * params.approach_decel_mps2 * spare_m)
 
 
-def avoid(ego: EgoState, situation: Situation, params: AccParams) -> list[Demand]:
+def avoid(ego: EgoState, threats: Iterable[FusedObject], params: AccParams) -> list[Demand]:
     """Slow down for objects other than the CIPV while their TTC is below the limit (paper, Algorithm 3; its "slow down
-    until TTC goes below" means above). Only for those whose course leads into the corridor by then: an oncoming car in
-    its own lane also has a short TTC, and passes."""
+    until TTC goes below" means above)."""
     return [
         Demand(
-            ego.speed_mps * item.ttc_s / params.ttc_limit_s,
+            ego.speed_mps * (item.ttc_s or 0.0) / params.ttc_limit_s,
             "warn",
             f"#{item.id} would be hit in {item.ttc_s:.1f} s",
             item.id,
         )
+        for item in threats
+    ]
+
+
+def _on_course(situation: Situation, params: AccParams) -> list[FusedObject]:
+    """The objects other than the CIPV that would be hit before the TTC limit. Only those whose course leads into the
+    corridor by then: an oncoming car in its own lane also has a short TTC, and passes."""
+    return [
+        item
         for item in situation.objects
         if (situation.lead is None or item.id != situation.lead.id)
         and item.ttc_s is not None

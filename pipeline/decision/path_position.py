@@ -108,11 +108,20 @@ class Place(NamedTuple):
 
 
 def believed_mps(sideways_mps: float | None, item: FusedObject) -> float:
-    """The part of a sideways speed that noise does not explain."""
+    """The part of a sideways speed that neither noise explains nor a footprint that grows as more of it comes into
+    view."""
     if sideways_mps is None or item.moving is False:
         return 0.0
     doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * (item.distance_m or 0.0) if not item.ranged else 0.0)
-    return copysign(max(abs(sideways_mps) - doubt, 0.0), sideways_mps)
+    return copysign(max(abs(sideways_mps) - doubt, 0.0), sideways_mps) * _rigid_share(item)
+
+
+def _rigid_share(item: FusedObject) -> float:
+    """How much of its sideways speed is motion of the whole object. Nothing is known of what the LiDAR does not
+    follow."""
+    if item.rigid_mps is None or item.velocity_mps is None or not item.velocity_mps[1]:
+        return 1.0
+    return min(max(item.rigid_mps / item.velocity_mps[1], 0.0), 1.0)
 
 
 def place(
@@ -147,7 +156,7 @@ def place(
 def warm_up() -> None:
     """Compile the kernel before the first frame."""
     center = np.column_stack([np.arange(3.0), np.zeros(3)])
-    _against(np.zeros((1, 18)), center, center, center, 1.5, np.zeros(3), STEP_M, 0.9, True, 0.0, 0.0)
+    _against(np.zeros((1, 19)), center, center, center, 1.5, np.zeros(3), STEP_M, 0.9, True, 0.0, 0.0)
 
 
 def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
@@ -161,7 +170,7 @@ def near_face_middle(bev: tuple[Point2, Point2, Point2, Point2]) -> Point2:
 
 def _numbers(item: FusedObject) -> tuple[float, ...]:
     """One row for ``_against``: the four corners x y, yaw, velocity x y, sigma of the distance, whether only the camera
-    has it, whether it is carried, ``box_sides``. NaN where unknown."""
+    has it, whether it is carried, ``box_sides``, how much of its sideways speed is its own. NaN where unknown."""
     a, b, c, d = item.bev  # type: ignore[misc]
     e, f = item.box_sides if item.box_sides is not None else _NO_SIDES
     yaw_rad = item.cuboid.yaw_rad if item.cuboid is not None else nan
@@ -178,12 +187,13 @@ def _numbers(item: FusedObject) -> tuple[float, ...]:
         item.carried,
         *e,
         *f,
+        _rigid_share(item),
     )
 
 
 @numba.njit(cache=True, nogil=True)
 def _against(rows, center, left, right, half_width, profile, step, overlap, ego_known, speed, yaw_rate):  # type: ignore[no-untyped-def]  # pragma: no cover
-    """(N, 11) of (N, 18) rows as ``_numbers`` gives them: distances from the centre to the left and to the right edge
+    """(N, 11) of (N, 19) rows as ``_numbers`` gives them: distances from the centre to the left and to the right edge
     there, sideways speed, then the numbers of ``Place`` as far as ``sigma_m``. half_width: of a path that has no edges
     of its own, else 0."""
     middles = np.empty((len(rows), 2))
@@ -212,7 +222,7 @@ def _against(rows, center, left, right, half_width, profile, step, overlap, ego_
         forward = along * cos + across * sin
         if ego_known and forward > _SLOWEST_MPS:  # the nose of one that moves over is farther that way than its rear
             doubt = SIDEWAYS_SIGMA_MPS + (CAMERA_SIDEWAYS_PER_S * ahead if rows[n, 12] else 0.0)
-            nose = _CAR_LENGTH_M * min(max(abs(sideways) - doubt, 0.0) / forward, _MOST_TURNED)
+            nose = _CAR_LENGTH_M * min(max(abs(sideways) - doubt, 0.0) * rows[n, 18] / forward, _MOST_TURNED)
             low, high = (low, high + nose) if sideways > 0.0 else (low - nose, high)
         half_left = half_width + np.hypot(left[k, 0] - center[k, 0], left[k, 1] - center[k, 1])
         half_right = half_width + np.hypot(right[k, 0] - center[k, 0], right[k, 1] - center[k, 1])

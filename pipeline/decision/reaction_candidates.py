@@ -32,14 +32,6 @@ def enters_corridor(item: FusedObject, path: Path) -> bool:
         return item.in_path
     if item.closest_point is None or item.closest_point[0] < ABREAST_M:
         return False  # beside the car already: braking would not avoid it
-    sideways = believed_mps(item.lateral_mps, item) * _rigid_share(item)
+    sideways = believed_mps(item.lateral_mps, item)
     toward = -sideways if item.path_offset_m > 0 else sideways
     return abs(item.path_offset_m) - max(toward, 0.0) * item.ttc_s <= path.half_width_m
-
-
-def _rigid_share(item: FusedObject) -> float:
-    """How much of its sideways speed is motion of the whole object: the rest is a footprint that grows as more of it
-    comes into view. Nothing is known of what the LiDAR does not follow."""
-    if item.rigid_mps is None or item.velocity_mps is None or not item.velocity_mps[1]:
-        return 1.0
-    return min(max(item.rigid_mps / item.velocity_mps[1], 0.0), 1.0)

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.lidar import boxes, cluster, deskew, downsample, ground
 from pipeline.params import Params
-from pipeline.types import F32, I32, EgoState, Ground, Obstacle, Sweep
+from pipeline.types import F32, I32, U8, EgoState, Ground, Obstacle, Sweep
 
 
 @dataclass(frozen=True)
@@ -19,6 +19,8 @@ class SegmentedSweep:
 
     points: F32
     """(N, 4) float32 ``x y z intensity``, deskewed, before down-sampling."""
+    ring: U8
+    """(N,) uint8, the channel of each point."""
     kind: I32
     """(N,) int32, what each point was taken for (``pipeline.types.Layers``)."""
     obstacles: tuple[Obstacle, ...] | None
@@ -29,7 +31,7 @@ class SegmentedSweep:
     """Ego x y z of the sensor, where its rays start."""
 
 
-_NO_SWEEP = SegmentedSweep(np.zeros((0, 4), np.float32), np.zeros(0, np.int32), None, None)
+_NO_SWEEP = SegmentedSweep(np.zeros((0, 4), np.float32), np.zeros(0, np.uint8), np.zeros(0, np.int32), None, None)
 
 
 def segment(sweep: Sweep | None, ego: EgoState | None, params: Params, clock: Stopwatch) -> SegmentedSweep:
@@ -56,4 +58,5 @@ def segment(sweep: Sweep | None, ego: EgoState | None, params: Params, clock: St
     # An upright box around each cluster
     obstacles = boxes.fit_obstacles(sweep.points, labels, plane, params.box)
     clock.lap("boxes")
-    return SegmentedSweep(sweep.points, cluster.kinds(labels, keep, plane.mask), obstacles, plane, sweep.origin)
+    kinds = cluster.kinds(labels, keep, plane.mask)
+    return SegmentedSweep(sweep.points, sweep.ring, kinds, obstacles, plane, sweep.origin)

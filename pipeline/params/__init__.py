@@ -108,6 +108,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
     "default": {},
     "paper": {
         "motion": {"source": "can"},
+        "cluster": {"divide_m": 3.0},
         "box": {"method": "axis_aligned"},
         "lidar_tracking": {"filter": "trajectory", "rigid_sideways": False},
         "detection": {"far_view": False, "car_prior": 1.0},
@@ -138,7 +139,7 @@ PRESETS: Mapping[str, Mapping[str, Mapping[str, Any]]] = {
             "become_probability": 0.0,
             "stay_probability": 0.0,
         },
-        "acc": {"comfort_decel_mps2": 8.0, "approach_decel_mps2": 0.0},
+        "acc": {"comfort_decel_mps2": 8.0, "approach_decel_mps2": 0.0, "confirm_frames": 1},
         "aeb": {"enabled": False},
     },
 }

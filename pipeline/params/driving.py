@@ -120,13 +120,16 @@ class AccParams(Section):
     min_gap_m: float = slider(5.0, 1.0, 20.0, 0.5, "m", "d_min: gap at standstill")
     time_gap_s: float = slider(1.8, 0.8, 4.0, 0.1, "s", "d_desired = d_min + time gap × speed")
     ttc_limit_s: float = slider(2.5, 0.5, 10.0, 0.1, "s", "Slow down for any object that would be hit sooner than this")
+    confirm_frames: int = slider(
+        2, 1, 10, 1, "frames", "Frames in a row in which an object beside the path is on a collision course first"
+    )
     kp: float = slider(2.0, 0.0, 5.0, 0.05, "1/s", "PID: proportional gain")
     ki: float = slider(0.05, 0.0, 2.0, 0.01, "1/s²", "PID: integral gain")
     kd: float = slider(0.0, 0.0, 2.0, 0.01, "", "PID: derivative gain")
     max_accel_mps2: float = slider(2.0, 0.5, 5.0, 0.1, "m/s²", "Acceleration at full accelerator")
     max_decel_mps2: float = slider(8.0, 1.0, 10.0, 0.1, "m/s²", "Deceleration at full brake")
     comfort_decel_mps2: float = slider(
-        3.5, 0.5, 10.0, 0.1, "m/s²", "ACC brakes no harder for a lead on weak evidence (ISO 15622 permits 3.5 at speed)"
+        3.5, 0.5, 10.0, 0.1, "m/s²", "ACC brakes no harder on weak evidence (ISO 15622 permits 3.5 at speed)"
     )
     approach_decel_mps2: float = slider(
         2.5,

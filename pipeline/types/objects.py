@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Generic, Literal, NamedTuple, TypeVar
 
@@ -77,6 +78,15 @@ class VisionMeasurement:
     """Standard deviation of ``ranged_m``."""
     returns: int = 0
     """How many returns that is."""
+    class_factors: Mapping[str, float] = field(default_factory=dict)
+    """By class name: how many times as far away the same box would be, were it of that class and not a car's."""
+
+    def distance_as(self, label: str) -> float | None:
+        """The distance if the object is of this class, whatever the detector called it this time."""
+        said, meant = self.class_factors.get(self.detection.label), self.class_factors.get(label)
+        if self.distance_m is None or said is None or meant is None:
+            return self.distance_m
+        return self.distance_m * meant / said
 
 
 class Obstacle(NamedTuple):

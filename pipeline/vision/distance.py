@@ -118,6 +118,8 @@ def measure(
     known = np.isfinite(range_m)
     placed = known & np.isfinite(place).all(axis=1)
     columns = (range_m, sigma_m, place, known, placed, noise_share)
+    car = PowerLaw(law.coefficient, law.exponent)
+    factors = {name: each.coefficient / car.coefficient for name, each in _by_class(law, params.per_class).items()}
     rows = zip(detections, *(column.tolist() for column in columns), strict=True)
     return tuple(
         VisionMeasurement(
@@ -127,6 +129,7 @@ def measure(
             (x, y) if is_placed else None,
             noise if is_known else None,
             params.size_spread if is_known else None,
+            class_factors=factors,
         )
         for detection, at_m, sigma, (x, y), is_known, is_placed, noise in rows
     )

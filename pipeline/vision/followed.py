@@ -82,7 +82,9 @@ def take_place(
         if followed.place_filter is not None:
             return evolve(followed, track=with_place(followed.track, followed.place_filter, followed.placed))
         return evolve(followed, track=evolve(followed.track, distance_m=seen.distance_m, sigma_m=seen.sigma_m))
-    share, own_m = seen.sigma_m / seen.distance_m, seen.distance_m * followed.height.factor
+    # a truck that is called a car in one picture is as tall as before
+    by_class_m = seen.distance_as(followed.track.label) or seen.distance_m
+    share, own_m = seen.sigma_m / seen.distance_m, by_class_m * followed.height.factor
     if seen.size_share is not None:
         pixel_share = math.sqrt(max(share**2 - seen.size_share**2, 0.0))
         share = math.hypot(pixel_share, followed.height.share(seen.size_share))
@@ -127,11 +129,20 @@ def learned(followed: Followed, range_m: float, sigma_m: float, params: VisionTr
         or not seen.size_share
     ):
         return followed
-    height = learn(followed.height, seen.distance_m, seen.noise_share, seen.size_share, range_m, sigma_m)
+    by_class_m = seen.distance_as(followed.track.label) or seen.distance_m
+    height = learn(followed.height, by_class_m, seen.noise_share, seen.size_share, range_m, sigma_m)
     place = followed.place_filter
     if place is not None and height != followed.height:
         place = place_filter.scaled(place, height.factor / followed.height.factor)
     return evolve(followed, height=height, place_filter=place)
+
+
+def renamed(followed: Followed, label: str, seen: VisionMeasurement) -> Height:
+    """What was learned of its height, for the class that it is taken for now: its metres stay the same."""
+    before, now = seen.class_factors.get(followed.track.label), seen.class_factors.get(label)
+    if followed.height.sigma is None or before is None or now is None:
+        return followed.height
+    return followed.height._replace(mean=followed.height.mean + math.log(before / now))
 
 
 def _is_plausible(place: CvState, ego_speed_mps: float | None) -> bool:

@@ -22,7 +22,7 @@ from pipeline.common.geometry import F64, iou_matrix
 from pipeline.params import VisionTrackingParams
 from pipeline.types import Box, VisionMeasurement, VisionTrack
 from pipeline.vision.association import Expected, match, same_kind
-from pipeline.vision.followed import Followed, SpeedGuess, learned, predict_place, take_place, with_place
+from pipeline.vision.followed import Followed, SpeedGuess, learned, predict_place, renamed, take_place, with_place
 
 SPEED_SIGMA_MPS = 8.0
 """How fast a new object may be closing in or away, before a second sighting tells."""
@@ -191,7 +191,8 @@ def _seen(
     )
     if params.filter == "queue":
         track = evolve(track, distance_m=seen.distance_m, sigma_m=seen.sigma_m, position=seen.position)
-    current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter)
+    height = renamed(followed, label, seen)
+    current = evolve(followed, track=track, unseen_s=0.0, votes=votes, box_filter=box_filter, height=height)
     return take_place(current, seen, guess, ego_speed_mps, params) if params.filter == "kalman" else current
 
 

@@ -16,8 +16,24 @@ from pipeline.path.corridor import corridor
 from pipeline.types import AccCommand, Cipv, EgoState, FusedObject, Situation
 from tests.pipeline.build import fused, moment
 
-PARAMS = AccParams(set_speed_kmh=108.0, min_gap_m=5.0, time_gap_s=1.5, ttc_limit_s=2.5, kp=2.0, ki=0.05)
+PARAMS = AccParams(
+    set_speed_kmh=108.0, min_gap_m=5.0, time_gap_s=1.5, ttc_limit_s=2.5, confirm_frames=1, kp=2.0, ki=0.05
+)
 PATH = corridor(None, PathParams(half_width_m=1.5))
+
+
+def test_a_single_sweep_does_not_brake_for_what_is_beside_the_path() -> None:
+    """The corner of a parked car that comes into view jumps sideways once."""
+    swerving = (fused(1, 15.0, 3.0, velocity=(-12.0, -2.0)),)
+    ego = EgoState(0, 20.0)
+    objects = choose(CipvState(), describe(swerving, ego, MotionParams()), PATH, moment(ego), CipvParams())[1].objects
+    there, gone = (Situation(moment(ego, 0.1), PATH, seen, None) for seen in (objects, ()))
+    params, state, said = PARAMS.model_copy(update={"confirm_frames": 2}), AccState(), []
+    for now in (there, gone, there, there):
+        state, result = control(state, now, params)
+        assert result is not None
+        said.append(result.state)
+    assert said == ["cruise", "cruise", "cruise", "warn"]
 
 
 def command(speed_mps: float, gap_m: float | None, *others: FusedObject, state: AccState | None = None) -> AccCommand:

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.fusion.existence import ExistenceState, weigh
 from pipeline.params import ExistenceParams
-from pipeline.types import F32, FusedObject, Ground, Point3
+from pipeline.types import F32, U8, FusedObject, Ground, Point3
 from tests.pipeline.build import fused
 
 PARAMS = ExistenceParams()
@@ -24,6 +24,11 @@ class Rays:
     points: F32
     ground: Ground | None = ROAD
     origin: Point3 = (0.0, 0.0, 0.0)
+
+    @property
+    def ring(self) -> U8:
+        """Each height is a ring."""
+        return np.unique(self.points[:, 2], return_inverse=True)[1].astype(np.uint8)
 
 
 def returns(range_m: float, bearing_deg: float = 0.0, height_m: float = 0.6) -> F32:
@@ -66,6 +71,28 @@ def gate(item: FusedObject) -> bool | None:
 )
 def test_what_a_working_lidar_would_have_to_see(points: F32, exists: bool, said: bool | None) -> None:
     found = after(camera_car(), Rays(points))
+    assert found.existence is not None
+    assert (found.existence > 0.5, gate(found)) == (exists, said)
+
+
+ASIDE = np.concatenate([returns(30.0, bearing_deg=side) for side in (-20.0, 20.0)])
+"""A ring at body height, of which nothing comes back from straight ahead."""
+TARMAC = returns(6.0, height_m=0.0)
+"""The road before the place, which proves that the sensor looks there."""
+
+
+@pytest.mark.parametrize(
+    ("points", "range_m", "exists", "said"),
+    [
+        pytest.param([ASIDE, TARMAC], 12.0, False, False, id="the ring looks there and nothing comes back"),
+        pytest.param([ASIDE], 12.0, True, None, id="no ring has anything there: the window may be dirty"),
+        pytest.param([TARMAC], 12.0, True, None, id="no ring is known to look there at body height"),
+        pytest.param([ASIDE, TARMAC, returns(5.0)], 12.0, True, None, id="something nearer hides it"),
+        pytest.param([ASIDE, TARMAC], 45.0, True, None, id="too far for a VLP-16"),
+    ],
+)
+def test_silence_speaks_against_it(points: list[F32], range_m: float, exists: bool, said: bool | None) -> None:
+    found = after(camera_car(range_m, sigma_m=1.2), Rays(np.concatenate(points)))
     assert found.existence is not None
     assert (found.existence > 0.5, gate(found)) == (exists, said)
 

@@ -17,7 +17,7 @@ from pipeline.params import ClusterParams
 from pipeline.types import F32, I32
 from tests.pipeline.lidar.scenes import scan
 
-ALL = {"min_points": 1, "max_points": 50000, "max_range_m": 120.0, "front_only": False}
+ALL = {"min_points": 1, "max_points": 50000, "max_range_m": 120.0, "front_only": False, "divide_m": 3.0}
 
 
 def _kd_tree(points: F32, tolerance_m: float, z_weight: float) -> I32:
@@ -71,6 +71,37 @@ def test_two_rings_on_one_car_are_one_object_by_the_weight_on_height() -> None:
 
 def test_neighbours_in_the_next_lane_stay_two() -> None:
     assert _cluster(_points((20.0, 0.0, 0.0), (20.0, 1.2, 0.0)), tolerance_m=0.9).tolist() == [0, 1]
+
+
+def _along(start: tuple[float, float], end: tuple[float, float], step_m: float = 0.1) -> F32:
+    """Two rings of points along a line in the plan."""
+    count = int(np.hypot(end[0] - start[0], end[1] - start[1]) / step_m) + 1
+    x, y = np.linspace(start[0], end[0], count), np.linspace(start[1], end[1], count)
+    return np.concatenate([np.stack([x, y, np.full(count, z), np.zeros(count)], axis=1) for z in (0.0, 0.4)]).astype(
+        np.float32
+    )
+
+
+def test_a_lead_and_the_row_parked_beside_it_are_two() -> None:
+    """0.8 m apart, which the tolerance bridges: together they are wider than any vehicle."""
+    lead, parked = _along((12.0, -1.0), (12.0, 1.0)), _along((10.5, -1.8), (15.0, -1.8))
+    points = np.concatenate([lead, parked])
+    assert set(_cluster(points, tolerance_m=0.9)) == {0}
+    divided = _cluster(points, tolerance_m=0.9, divide_m=0.45)
+    assert set(divided[: len(lead)]) == {0}
+    assert set(divided[len(lead) :]) == {1}
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        pytest.param(_along((12.0, -2.4), (12.0, 2.4)), id="broadside: one surface without a gap"),
+        pytest.param(_along((12.0, -0.9), (12.0, 0.9), 0.6), id="a sparse rear, no wider than a vehicle"),
+        pytest.param(_along((9.0, 2.0), (21.0, 2.0), 0.7), id="a long flank seen along it"),
+    ],
+)
+def test_one_vehicle_stays_whole(points: F32) -> None:
+    assert set(_cluster(points, tolerance_m=0.9, divide_m=0.45)) == {0}
 
 
 def test_numbers_follow_the_first_point_and_small_clusters_take_none() -> None:

@@ -64,6 +64,41 @@ def test_a_lead_that_leaves_the_lidars_reach_keeps_its_distance(learns: bool) ->
     assert off < 2 * one.sigma_m / one.distance_m
 
 
+FACTORS = {"car": 1.0, "truck": 2.4}
+
+
+def called(label: str, range_m: float) -> VisionMeasurement:
+    """A truck at a range, by whatever name the detector gives it in this picture."""
+    one = seen(range_m / FACTORS["truck"] * FACTORS[label])
+    box = seen(range_m / FACTORS["truck"]).detection.bbox
+    return replace(one, detection=Detection(box, label, 0.8), class_factors=FACTORS)
+
+
+def test_a_truck_that_is_called_a_car_for_a_while_stays_where_it_is() -> None:
+    """By a car's law its box means 25 m, not 60."""
+    state = VisionTrackerState()
+    for k in range(20):
+        measured = called("car" if 8 <= k < 13 else "truck", 60.0)
+        state, (one,) = track(state, (measured,), 0.1 if k else None, PARAMS, 20.0)
+        assert one.label == "truck"
+        assert one.distance_m == pytest.approx(60.0, rel=0.05)
+
+
+def test_what_was_learned_is_kept_when_the_class_turns_out_to_be_another() -> None:
+    """Its metres are known; only what they are a multiple of changes."""
+    state, labels = VisionTrackerState(), []
+    for k in range(30):
+        measured = called("car" if k < 8 else "truck", 60.0)
+        state, (one,) = track(state, (measured,), 0.1 if k else None, PARAMS, 20.0)
+        if k < 6:
+            state = learn_heights(state, {one.id: (25.0 * 1.1, 0.2)}, PARAMS)
+        if k >= 6:
+            assert one.distance_m == pytest.approx(25.0 * 1.1, rel=0.05)
+        labels.append(one.label)
+    assert labels[0] == "car"
+    assert labels[-1] == "truck"
+
+
 def test_a_range_of_no_track_changes_nothing() -> None:
     state, _ = track(VisionTrackerState(), (seen(20.0),), None, PARAMS)
     assert learn_heights(state, {99: (25.0, 0.2)}, PARAMS) == state

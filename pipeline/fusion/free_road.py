@@ -1,0 +1,220 @@
+"""How the LiDAR's rays towards a place ended: at it, beyond it, before it, or nowhere.
+
+A place is a sector of the road ahead: as wide as most of a vehicle's body, and as deep as its distance is uncertain. It
+is looked at in slices of two metres, each between the heights where every vehicle is solid. Only where rays crossed
+every slice at such a height is anything known of the whole place.
+
+A ray that came back from behind a slice passed through it. One that came back from nowhere passed through it as well,
+if its sensor works: its ring has returns elsewhere, other rings have some in this very sector, and nothing stands
+before the place or right behind it. Wet black paint swallows some rays, so silence is told apart from passage.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Protocol
+
+import numba
+import numpy as np
+
+from pipeline.common.geometry import F64
+from pipeline.fusion.vehicle_sizes import usual_size_m
+from pipeline.types import F32, U8, FusedObject, Ground, Point3
+
+_BODY_LOW_M, _BODY_HIGH_M = 0.3, 1.2
+"""Heights over the road between which every vehicle is solid: under it is air, over it is glass."""
+_BODY_SHARE = 0.7
+"""Of its width; the sides may be off by the box's error."""
+_MIN_RAYS = 3
+"""Fewer may be one speck of dirt or one mixed pixel."""
+CLEAR_SHARE = 0.8
+"""Of the rays that reached the place, so many passed through where it is free."""
+_SILENT_RAYS = 10
+"""So many rays or more would have to be swallowed for a vehicle to be silent: two rings, 1° each."""
+_SILENT_M = 36.0
+"""Nearer than this the body of a vehicle returns rays, whatever its paint (measured: see ``existence``)."""
+_SLICE_M, _MOST_SLICES = 2.0, 24
+_AHEAD = 0.5
+"""Elevations of the rings are measured within 27° of straight ahead (as a tangent)."""
+_MIN_RING = 5
+"""Returns of a ring ahead from which its elevation is known."""
+_SIGMAS, _MARGIN_M = 2.0, 1.0
+"""The place reaches so many standard deviations, and a metre, to either side of the distance said."""
+_FLANK_M = 3.0
+"""Of a vehicle that stands slantwise the middle lies so much farther than its nearest corner."""
+
+
+class SweepRays(Protocol):
+    """A sweep as far as its rays matter."""
+
+    @property
+    def points(self) -> F32:
+        """(N, 4) float32 ``x y z intensity``, ego frame."""
+        ...
+
+    @property
+    def ring(self) -> U8:
+        """(N,) uint8, the channel of each point."""
+        ...
+
+    @property
+    def ground(self) -> Ground | None:
+        """The road; None without a sweep."""
+        ...
+
+    @property
+    def origin(self) -> Point3:
+        """Ego x y z of the sensor."""
+        ...
+
+
+class Rays(NamedTuple):
+    """How the rays towards one place ended, at body height."""
+
+    through: float
+    """Beyond it: of the slice that the fewest passed."""
+    stopped: float
+    """At it, in all slices."""
+    clear: float
+    """Of those that reached a slice, how many came back from beyond it: the least of all slices."""
+    silent: float
+    """As ``through``, with those that came back from nowhere."""
+    silent_share: float
+    """As ``clear``, with those that came back from nowhere."""
+
+    @property
+    def is_free(self) -> bool:
+        """Whether they show that nothing stands there."""
+        return self.through >= _MIN_RAYS and self.clear >= CLEAR_SHARE
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether a vehicle there would have to swallow nearly all rays."""
+        return self.silent >= _SILENT_RAYS and not self.is_stopped
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether rays ended there."""
+        return self.stopped >= _MIN_RAYS
+
+    @property
+    def free_share(self) -> float | None:
+        """Of those that reached the place, how many went on; None if too few did."""
+        if self.through + self.stopped >= _MIN_RAYS:
+            return self.clear
+        return self.silent_share if self.silent >= _SILENT_RAYS else None
+
+
+class _Beams(NamedTuple):
+    """The rings of a sweep."""
+
+    slope: F64
+    """(C,) height over distance ahead; NaN of a ring of which too little comes back."""
+    step_rad: float
+    """Between two rays of a ring."""
+
+
+def rays_to(objects: tuple[FusedObject, ...], sweep: SweepRays) -> dict[int, Rays]:
+    """How the rays towards each object ended that the LiDAR has no cluster of, by its id."""
+    asked = [item for item in objects if not item.seen_by_lidar and item.closest_point is not None and item.distance_m]
+    if not asked or not len(sweep.points) or sweep.ground is None:
+        return {}
+    origin = sweep.origin
+    places = np.array([_place(item, origin) for item in asked])
+    ends = np.concatenate([places[:, :2] * places[:, 2:3], places[:, :2] * places[:, 3:4]]) + np.array(origin[:2])
+    road = sweep.ground.height(ends).reshape(2, -1).T - origin[2]
+    at = np.asarray(origin, dtype=np.float64)
+    beams = _beams(sweep.points, sweep.ring, at)
+    rows = _count(
+        sweep.points, sweep.ring, at, np.concatenate([places, road], axis=1), beams.slope, beams.step_rad, _SILENT_M
+    )
+    return {item.id: Rays(*row) for item, row in zip(asked, rows.tolist(), strict=True)}
+
+
+def _place(item: FusedObject, origin: Point3) -> tuple[float, float, float, float, float]:
+    """Direction from the LiDAR (unit x, y), from how far to how far along it the object may begin, and half the angle
+    that its body takes, as a tangent."""
+    assert item.closest_point is not None
+    x, y = item.closest_point[0] - origin[0], item.closest_point[1] - origin[1]
+    range_m = max(math.hypot(x, y), 0.1)
+    spare = _SIGMAS * (item.distance_sigma_m or 0.0) + _MARGIN_M
+    half_m = _BODY_SHARE * usual_size_m(item.label or "car")[1] / 2
+    return x / range_m, y / range_m, max(range_m - spare, 0.5), range_m + spare, half_m / range_m
+
+
+def _beams(points: F32, ring: U8, origin: F64) -> _Beams:
+    slope = _slopes(points, ring, origin)
+    fullest = int(np.bincount(ring).argmax())
+    mine = points[ring == fullest]
+    azimuth = np.sort(np.arctan2(mine[:, 1] - origin[1], mine[:, 0] - origin[0]))
+    steps = np.diff(azimuth)
+    return _Beams(slope, float(np.median(steps)) if len(steps) else math.inf)
+
+
+def warm_up() -> None:
+    """Compile the kernels."""
+    points, ring = np.ones((1, 4), np.float32), np.zeros(1, np.uint8)
+    place = np.array([[1.0, 0.0, 1.0, 2.0, 1.0, 0.0, 0.0]])
+    _count(points, ring, np.zeros(3), place, _slopes(points, ring, np.zeros(3)), 0.1, _SILENT_M)
+
+
+@numba.njit(cache=True, nogil=True)
+def _slopes(points: F32, ring: U8, origin: F64) -> F64:
+    """(C,) mean height over distance of each ring ahead."""
+    rings = int(ring.max()) + 1
+    total, count = np.zeros(rings), np.zeros(rings)
+    for i in range(len(points)):
+        x, y, z = points[i, 0] - origin[0], points[i, 1] - origin[1], points[i, 2] - origin[2]
+        if x > 0.0 and abs(y) < _AHEAD * x:
+            total[ring[i]] += z / np.hypot(x, y)
+            count[ring[i]] += 1.0
+    for c in range(rings):
+        total[c] = total[c] / count[c] if count[c] >= _MIN_RING else np.nan
+    return total
+
+
+@numba.njit(cache=True, nogil=True)
+def _count(points, ring, origin, places, slope, step_rad, silent_m):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(K, 5) as ``Rays``, of (K, 7) places: unit x, y, near, far, tangent of half the angle, and the road's height at
+    near and far, all from ``origin``. slope, step_rad: the beams."""
+    out = np.zeros((len(places), 5))
+    through, stopped = np.zeros((len(places), _MOST_SLICES)), np.zeros((len(places), _MOST_SLICES))
+    seen, hidden = np.zeros((len(places), len(slope))), np.zeros(len(places))
+    for i in range(len(points)):
+        x, y, z = points[i, 0] - origin[0], points[i, 1] - origin[1], points[i, 2] - origin[2]
+        for k in range(len(places)):
+            along = x * places[k, 0] + y * places[k, 1]
+            if along <= 0.0 or abs(y * places[k, 0] - x * places[k, 1]) > places[k, 4] * along:
+                continue
+            seen[k, ring[i]] += 1.0
+            near, deep = places[k, 2], places[k, 3] - places[k, 2]
+            over_road = z - places[k, 5] - (places[k, 6] - places[k, 5]) * (along - near) / deep
+            hidden[k] += over_road > _BODY_LOW_M and (along < near or 0.0 < along - places[k, 3] < _FLANK_M)
+            slices = min(max(int(np.ceil(deep / _SLICE_M)), 1), _MOST_SLICES)
+            half = 0.5 * deep / slices
+            for b in range(slices):
+                at = near + (2 * b + 1) * half
+                height = z * at / along - places[k, 5] - (places[k, 6] - places[k, 5]) * (at - near) / deep
+                if _BODY_LOW_M <= height <= _BODY_HIGH_M:
+                    through[k, b] += along > at + half
+                    stopped[k, b] += at - half <= along <= at + half
+    for k in range(len(places)):
+        near, deep = places[k, 2], places[k, 3] - places[k, 2]
+        slices = min(max(int(np.ceil(deep / _SLICE_M)), 1), _MOST_SLICES)
+        half = 0.5 * deep / slices
+        rays, live = 2.0 * places[k, 4] / step_rad, seen[k].sum() >= _MIN_RAYS and hidden[k] < _MIN_RAYS
+        out[k, 0] = out[k, 2] = out[k, 3] = out[k, 4] = np.inf
+        for b in range(slices):
+            at = near + (2 * b + 1) * half
+            silent = 0.0
+            for c in range(len(slope)):
+                height = slope[c] * at - places[k, 5] - (places[k, 6] - places[k, 5]) * (at - near) / deep
+                if live and at <= silent_m and _BODY_LOW_M <= height <= _BODY_HIGH_M:
+                    silent += max(rays - seen[k, c], 0.0)
+            passed = through[k, b] + silent
+            out[k, 0] = min(out[k, 0], through[k, b])
+            out[k, 1] += stopped[k, b]
+            out[k, 2] = min(out[k, 2], through[k, b] / max(through[k, b] + stopped[k, b], 1.0))
+            out[k, 3] = min(out[k, 3], passed)
+            out[k, 4] = min(out[k, 4], passed / max(passed + stopped[k, b], 1.0))
+    return out
