@@ -108,7 +108,7 @@ class CipvParams(Section):
         15.0, 3.0, 40.0, 0.5, "m", "LiDAR-only objects: largest extent; excludes walls and hedges"
     )
     become_probability: float = slider(
-        0.5, 0.0, 0.95, 0.01, "", "A new lead exists, and is in the path, each with at least this probability"
+        0.7, 0.0, 0.95, 0.01, "", "A new lead exists, and is in the path, each with at least this probability"
     )
     stay_probability: float = slider(0.4, 0.0, 0.95, 0.05, "", "The lead stays it down to this probability of each")
 
