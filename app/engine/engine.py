@@ -7,7 +7,6 @@ its player's: ``app/playing/``.
 from __future__ import annotations
 
 import logging
-import threading
 import time
 from dataclasses import replace
 from functools import partial
@@ -16,6 +15,7 @@ from typing import Protocol, cast
 from app.core.control import Control, Wish
 from app.core.detection_cache import DetectionCache
 from app.core.jobs import BackgroundJob, JobStatus
+from app.core.watchdog import Stuck, Watchdog, at_work
 from app.drive.background_runs import BackgroundRuns
 from app.drive.open_recording import RunSetup
 from app.engine.detector_pool import DetectorPool, OpenDetector, OpenLanes
@@ -26,6 +26,7 @@ from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Notice, Snapshot
 from app.engine.snapshot_publisher import SnapshotPublisher
+from app.engine.takeovers import Takeovers
 from app.labels.service.desk import LabelDesk
 from pipeline.common.progress import Progress
 from pipeline.detection import Detectors
@@ -77,6 +78,7 @@ class Engine:
         far_view_px: int | None = None,
         desk: SessionRecorder | None = None,
         labels: LabelDesk | None = None,
+        watchdog: Watchdog | None = None,
     ) -> None:
         self.control = Control(Wish(params, preset, uri=uri, playing=playing))
         self._publisher = SnapshotPublisher(Snapshot(params, preset))
@@ -93,13 +95,15 @@ class Engine:
         self._player: Player | None = None
         self.detectors = Detectors()
         """Of what is open."""
-        self._thread = threading.Thread(target=self._work, name="cipv-engine", daemon=True)
+        self.watchdog = self.drives.watchdog = watchdog or Watchdog()
+        self.takeovers = Takeovers(self.watchdog, self._work, self._say_stuck, self.control.change, self.drives.turn)
 
     def start(self) -> None:
         self.drives.on_change = self.control.change
+        self.drives.on_stuck = self._say_stuck
         self.drives.start()
         self.labels.start(self.control)
-        self._thread.start()
+        self.takeovers.begin()
 
     def stop(self) -> None:
         """Close the recording, if there is one, then end the worker. A network run or a read in progress is finished
@@ -108,8 +112,7 @@ class Engine:
         self.desk.stop()
         ends_s = time.monotonic() + _PATIENCE_S
         self.drives.stop(_PATIENCE_S)
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(max(0.0, ends_s - time.monotonic()))
+        self.takeovers.end(max(0.0, ends_s - time.monotonic()))
         self.labels.stop()
 
     @property
@@ -121,7 +124,7 @@ class Engine:
     @property
     def alive(self) -> bool:
         """False when the worker has ended."""
-        return self._thread.is_alive()
+        return self.takeovers.thread.is_alive()
 
     @property
     def snapshot(self) -> Snapshot:
@@ -130,8 +133,13 @@ class Engine:
 
     # ------------------------------------------------------------ the worker
 
-    def _work(self) -> None:
+    def _work(self, is_first: bool) -> None:
+        """is_first: not in the place of another that hangs."""
+        if not is_first:
+            self._take_over()
         while True:
+            if self.takeovers.asked():
+                self._take_over()
             player = self._player
             wish = self.control.take(player.wait_s(self.snapshot.index) if player is not None else None)
             if wish.stop:
@@ -156,6 +164,33 @@ class Engine:
         with turn.foreground():
             processed = player.serve(wish, self.snapshot) if player is not None else None
             self._show(wish, processed)
+
+    # ------------------------------------------------------------ workers that hang
+
+    def _take_over(self) -> None:
+        """The same source, where the worker before, or its helper, hangs; with a fresh network where that does."""
+        player, gives_up = self._player, self.takeovers.gives_up
+        if player is None:
+            return
+        if gives_up:
+            self.detectors = Detectors()
+        elif self.takeovers.of_network:
+            self._detectors.forget()
+            with at_work("opening networks"):
+                self.detectors = self._detectors.both_for(player.source, [])
+        self._player = player.successor(self.detectors) or self._player_of(player.source, self.detectors)
+        if gives_up and not player.live:
+            self.control.change(playing=False)
+        elif not player.live:
+            self.control.change(target=self.snapshot.index)
+
+    def _say_stuck(self, stuck: Stuck, more: str = "") -> None:
+        """On every page, until another source is opened."""
+        text = f"{stuck.worker} hung for {stuck.seconds:.1f} s ({stuck.doing}) and was started anew"
+        text += "; the recording goes on" if self.desk.state is not None else ""
+        others = tuple(notice for notice in self.snapshot.notices if f"({stuck.doing})" not in notice.text)
+        said = Notice("warning", text[0].upper() + text[1:] + more)
+        self._publisher.publish(replace(self.snapshot, notices=(*others, said)))
 
     # ------------------------------------------------------------ opening
 
@@ -182,6 +217,7 @@ class Engine:
         detectors = self._detectors.both_for(source, notices)
         self.desk.stop()
         self._close()
+        self.takeovers.forget()
         player = self._player_of(source, detectors)
         player.open()
         self._player, self.detectors = player, detectors
@@ -232,7 +268,8 @@ class Engine:
         recording = cast("Source", source)
         pipeline = SeekablePipeline(recording, detectors, self._detections, self._sensors, self.drives.state_before)
         setup = RunSetup(recording, pipeline.timeline_s, detectors, self._sensors) if self._whole_drives else None
-        return RecordedPlayer(pipeline, self.control, self.drives, setup, self.desk)
+        watching = partial(self.takeovers.watching_helper, "reading ahead")
+        return RecordedPlayer(pipeline, self.control, self.drives, setup, self.desk, watching)
 
     def _close(self) -> None:
         player, self._player = self._player, None
