@@ -127,7 +127,12 @@ class LiveSensors:
         return self._clock.now_ns()
 
     def health(self) -> tuple[StreamHealth, ...]:
-        """How each configured sensor does now."""
+        """How each configured sensor does now. One whose driver or decoder hangs is started anew."""
+        for each in self.inputs.values():
+            for reader in each.readers:
+                reader.look(time.monotonic())
+                if reader.hung:
+                    each.stats.hung = reader.hung
         now_ns = self._clock.now_ns()
         stats = [each.stats for each in self.inputs.values()]
         if self._ego_stats is not None:
