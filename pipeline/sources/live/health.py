@@ -52,8 +52,8 @@ class StreamStats:
     def health(self, now_ns: int, impossible: int = 0) -> StreamHealth:
         """As of now. impossible: messages refused because they were measured long ago, or are yet to be.
 
-        Rate and jitter are over the last three seconds and None while fewer than three messages came in them; jitter is the standard
-        deviation of the gaps between arrivals."""
+        Rate and jitter are over the last three seconds and None while fewer than three messages came in them; jitter is
+        the standard deviation of the gaps between arrivals."""
         arrived = list(self._arrived)  # at once: a reader's thread may add to it meanwhile
         times = np.array([t for t in arrived if now_ns - t <= _WINDOW_NS], dtype=np.int64)
         gaps_ms = np.diff(times) / 1e6
