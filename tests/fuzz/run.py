@@ -116,6 +116,7 @@ def fuzz(name: str, target: Target, seconds: float, seed: int, build: Path, said
     chance = random.Random(f"{seed} {name}")
     corpus = build / "corpus" / name.replace(" ", "_").replace(",", "")
     corpus.mkdir(parents=True, exist_ok=True)
+    target.read(target.seeds[0])  # what is compiled the first time is not the parser's time
     kept = [*target.seeds, *(path.read_bytes() for path in sorted(corpus.iterdir()))]
     size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (size + BUDGET_BYTES, size + BUDGET_BYTES))
