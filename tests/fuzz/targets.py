@@ -179,4 +179,7 @@ def targets(folder: Path) -> dict[str, Target]:
 def all_targets() -> Iterator[dict[str, Target]]:
     """For a ``with`` of contextlib: the folder goes at the end."""
     with tempfile.TemporaryDirectory(prefix="cipv-fuzz-") as folder, suppress(KeyboardInterrupt):
-        yield targets(Path(folder))
+        known = targets(Path(folder))
+        for target in known.values():
+            target.read(target.seeds[0])  # what is compiled the first time is not the parser's time
+        yield known
