@@ -7,6 +7,7 @@ its player's: ``app/playing/``.
 from __future__ import annotations
 
 import logging
+import math
 import time
 from dataclasses import replace
 from functools import partial
@@ -39,6 +40,8 @@ logger = logging.getLogger("cipv.engine")
 
 _PATIENCE_S = 2.0
 _TELL_EVERY_S = 0.25
+_SAID_S = 60.0
+"""How long a worker that hung is spoken of."""
 _ABLATION: dict[Sensors, tuple[str, ...]] = {
     "both": (),
     "lidar": ("LiDAR only: no detection in the pictures",),
@@ -185,11 +188,12 @@ class Engine:
             self.control.change(target=self.snapshot.index)
 
     def _say_stuck(self, stuck: Stuck, more: str = "") -> None:
-        """On every page, until another source is opened."""
+        """On every page, the display in the car too, for a minute; what is off from now on, for good."""
         text = f"{stuck.worker} hung for {stuck.seconds:.1f} s ({stuck.doing}) and was started anew"
         text += "; the recording goes on" if self.desk.state is not None else ""
         others = tuple(notice for notice in self.snapshot.notices if f"({stuck.doing})" not in notice.text)
-        said = Notice("warning", text[0].upper() + text[1:] + more)
+        lasts_s = math.inf if more else _SAID_S
+        said = Notice("error", text[0].upper() + text[1:] + more, time.monotonic() + lasts_s)
         self._publisher.publish(replace(self.snapshot, notices=(*others, said)))
 
     # ------------------------------------------------------------ opening
@@ -284,7 +288,7 @@ class Engine:
         playing = player is not None and player.goes_on_after_failing() and self.snapshot.playing
         if not playing:
             self.control.change(playing=False)
-        notices = tuple(n for n in self.snapshot.notices if n.level != "error")
+        notices = tuple(n for n in self.snapshot.notices if n.stays)
         self._publisher.publish(
             replace(self.snapshot, busy=None, playing=playing, notices=(*notices, Notice("error", text)))
         )
@@ -317,7 +321,7 @@ class Engine:
                 sequence=shown.sequence + 1,
                 skipped=player.skipped,
                 made_unix_s=time.time(),
-                notices=tuple(n for n in shown.notices if n.level != "error"),
+                notices=tuple(n for n in shown.notices if n.stays),
             )
         self._publisher.publish(shown)
         if processed is not None:
