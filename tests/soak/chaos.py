@@ -14,7 +14,7 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from multiprocessing.context import ForkServerContext
@@ -74,7 +74,7 @@ class LabelledServer:
     """A server on one database, started anew whenever it was killed, and somebody who labels on it without a pause."""
 
     def __init__(self, context: ForkServerContext, url: str, figures: Figures) -> None:
-        self._context, self.url, self._figures = context, url, figures
+        self._context, self.url, self.figures = context, url, figures
         self._ahead_s = context.Value("d", 0.0)
         self.process: BaseProcess
         self.address = ""
@@ -95,7 +95,7 @@ class LabelledServer:
                     while not stop.is_set():
                         self._label_once(client, drive)
                 except (httpx.HTTPError, KeyError, ValueError):
-                    self._figures.refused += 1
+                    self.figures.refused += 1
                     stop.wait(0.1)
 
     def _label_once(self, client: httpx.Client, drive: int) -> None:
@@ -104,9 +104,9 @@ class LabelledServer:
         answer = client.post("/api/labels/act", json={"person": "Ada", "act": body, "drive": drive})
         if answer.is_success:
             self._said[answer.json()["act"]] = frame
-            self._figures.acts += 1
+            self.figures.acts += 1
         else:
-            self._figures.refused += 1
+            self.figures.refused += 1
             time.sleep(0.05)
 
     # ------------------------------------------------------------ what befalls it
@@ -148,7 +148,7 @@ class LabelledServer:
 
     def check(self) -> None:
         """Every act that was answered is there, and every final frame is what it was the first time."""
-        figures, said = self._figures, dict(self._said)
+        figures, said = self.figures, dict(self._said)
         database = Database(self.url)
         try:
             with database.reading() as connection:
@@ -241,29 +241,29 @@ def _read_back(path: Path, figures: Figures) -> int:
 # ------------------------------------------------------------ around them
 
 
-def half_open(address: Callable[[], str], stop: threading.Event, figures: Figures) -> None:
+def half_open(server: LabelledServer, stop: threading.Event) -> None:
     """A client that begins requests and ends none, and one that says what is no request."""
     held: list[socket.socket] = []
     while not stop.wait(0.05):
-        parts = urlsplit(address())
+        parts = urlsplit(server.address)
         with contextlib.suppress(OSError):
             held.append(socket.create_connection((parts.hostname or "", parts.port or 0), timeout=2.0))
             held[-1].sendall(random.choice([b"GET / HTTP/1.1\r\nX:", random.randbytes(64), b""]))
-            figures.clients += 1
+            server.figures.clients += 1
         while len(held) > 150:
             held.pop(0).close()
     for each in held:
         each.close()
 
 
-def deaf(address: Callable[[], str], stop: threading.Event, figures: Figures) -> None:
+def deaf(server: LabelledServer, stop: threading.Event) -> None:
     """Clients of the stream that never read, and say what nobody understands."""
     while not stop.is_set():
         with (
             contextlib.suppress(Exception),
-            connect(address().replace("http", "ws") + "/api/stream", max_queue=1) as stream,
+            connect(server.address.replace("http", "ws") + "/api/stream", max_queue=1) as stream,
         ):
-            figures.clients += 1
+            server.figures.clients += 1
             for _ in range(50):
                 stream.send(random.choice(["{}", "null", '{"seek": 1e999}', random.randbytes(200), "[" * 5000]))
                 if stop.wait(0.1):

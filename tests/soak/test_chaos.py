@@ -40,9 +40,12 @@ def test_chaos(tmp_path: Path) -> None:
         context, found = stack.enter_context(forking()), postgres.binaries()
         url = f"sqlite:///{tmp_path}/labels.db" if found is None else stack.enter_context(postgres.running(found))
         server = LabelledServer(context, url, figures)
-        stack.callback(server.process.kill)
-        address = lambda: server.address  # noqa: E731  # of the server of this moment
-        works = [partial(server.label, stop), *(partial(each, address, stop, figures) for each in (half_open, deaf))]
+        stack.callback(lambda: server.process.kill())  # of this moment, as its address
+        works = [
+            partial(server.label, stop),
+            partial(half_open, server, stop),
+            partial(deaf, server, stop),
+        ]
         threads = [threading.Thread(target=work) for work in works]
         stack.callback(lambda: [thread.join() for thread in threads])
         stack.callback(stop.set)
