@@ -32,7 +32,6 @@ BUDGET_S = 2.0
 BUDGET_BYTES = 1 << 30
 """Address space beyond what the process has when it begins."""
 _PATIENCE_S = 60.0
-_TOO_LONG = "more than "
 _LARGEST_INPUT = 1 << 20
 _MOST_KEPT = 200
 _TOKENS = (
@@ -96,20 +95,14 @@ def within_budget() -> Any:
 
 
 def outcome(target: Target, data: bytes) -> tuple[str, bool]:
-    """How it ended, in a word or a place of the code, and whether that is a finding. What took too long is read once
-    more: the machine may have been busy."""
-    how, is_finding = _outcome(target, data)
-    return _outcome(target, data) if how.startswith(_TOO_LONG) else (how, is_finding)
-
-
-def _outcome(target: Target, data: bytes) -> tuple[str, bool]:
+    """How it ended, in a word or a place of the code, and whether that is a finding."""
     try:
         with within_budget():
             target.read(data)
     except Refused as error:
         return f"{type(error).__name__}: {str(error)[:60]}", False
     except OverTime:
-        return f"{_TOO_LONG}{BUDGET_S:g} s", True
+        return f"more than {BUDGET_S:g} s", True
     except BaseException as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         return f"{type(error).__name__} in {Path(last.filename).name}:{last.lineno}", True
