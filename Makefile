@@ -64,10 +64,11 @@ suite: install
 	@$(BIN)/cipv scenarios run --suite all --report build/experiments.html --drives build/drives --json > build/experiments.json
 
 # Memory over a drive looped 100 times; live sensors for ten minutes with every fault; a day of frames at the display in the
-# car (about an hour). Writes build/soak*.json.
+# car (about an hour); and everything failing at random for CHAOS seconds. Writes build/soak*.json.
+CHAOS ?= 3600
 soak: install
 	@mkdir -p build
-	@$(BIN)/python -m pytest -q -m soak tests/soak tests/browser/display/test_all_day.py -s
+	@CIPV_CHAOS_SECONDS=$(CHAOS) $(BIN)/python -m pytest -q -m soak tests/soak tests/browser/display/test_all_day.py -s
 
 # Damaged inputs for every parser, `make fuzz SECONDS=3600`. Writes build/fuzz: what was found, and the corpus.
 SECONDS ?= 300

@@ -30,10 +30,12 @@ class ShowInfo:
     """An MCAP file, or any other source"""
     json: bool = False
     """Print the figures as JSON"""
+    quick: bool = False
+    """Do not check whether an MCAP file was changed, which reads all of it"""
 
     def __call__(self) -> int:
         if self.source.lower().endswith(".mcap"):
-            found = info(given_path(self.source.removeprefix("mcap:")))
+            found = info(given_path(self.source.removeprefix("mcap:")), is_quick=self.quick)
             _print_json(asdict(found)) if self.json else _print_info(found)
             return 0
         from app.commands.support.open_with_progress import opened_recording
@@ -60,6 +62,8 @@ def _print_info(found: Info) -> None:
     Console(width=None if sys.stdout.isatty() else _WIDE).print(_topics_table(found))
     for line in (*(about.notes if about else ()), *(f"mark: {mark}" for mark in found.marks)):
         print(line)
+    if found.chain is not None:
+        print("; ".join((f"hash chain: {found.chain.state}", *found.chain.changed)))
     if found.problem is not None:
         print(f"{found.problem}; run `cipv recover {found.path}` to repair it")
     if found.damaged_chunks:

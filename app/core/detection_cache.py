@@ -7,6 +7,7 @@ from time import perf_counter
 from typing import Protocol, cast
 
 from app.core.lru import BoundedCache
+from app.core.watchdog import NETWORK, at_work
 from pipeline.detection import Detects, Seen
 from pipeline.sources.fingerprint import fingerprint
 from pipeline.types import U8, Frame, RawBoxes, RawLanes
@@ -66,7 +67,8 @@ class CachedLook:
         if held is not None:
             return cast("Seen", held)
         start = perf_counter()
-        found = detector.detect(bgr)
+        with at_work(NETWORK + detector.name):
+            found = detector.detect(bgr)
         self.spent_ms += (perf_counter() - start) * 1e3
         self._cache.put(key, found)
         return found

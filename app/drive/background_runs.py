@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from app.core.detection_cache import DetectionCache
+from app.core.watchdog import Stuck, Watchdog
 from app.drive.compute_scheduler import ComputeScheduler
 from app.drive.full_run import DriveRun
 from app.drive.open_recording import OpenRecording, RunSetup
@@ -28,6 +29,8 @@ _TELL_EVERY_S = 0.25
 _PATIENCE_S = 10.0
 _TRY_AGAIN_S = 0.5
 """After the system could not read."""
+_MOST_HANGS = 3
+"""Of a frame, before its run is given up."""
 Phase = Literal["detect", "run", "done", "failed"]
 
 
@@ -62,6 +65,8 @@ class BackgroundRuns:
     def __init__(self, detections: DetectionCache) -> None:
         self.turn = ComputeScheduler()
         self.on_change: Callable[[], object] = lambda: None
+        self.on_stuck: Callable[[Stuck], object] = lambda stuck: None
+        self.watchdog = Watchdog()
         self._detections = detections
         self._condition = threading.Condition(threading.RLock())
         self._recording: OpenRecording | None = None
@@ -69,6 +74,7 @@ class BackgroundRuns:
         self._revision = 0
         self._told_s = 0.0
         self._phase: Phase = "run"
+        self._hangs = 0
         self._thread = threading.Thread(target=self._work, name="cipv-drives", daemon=True)
 
     @property
@@ -145,6 +151,23 @@ class BackgroundRuns:
 
     def _work(self) -> None:
         warm_up()
+        with self.watchdog.watching("the drive's run", self._start_anew):
+            self._run_all()
+
+    def _start_anew(self, stuck: Stuck) -> None:
+        """The worker hangs: another goes on with the frame, and gives the run up when that hangs again and again."""
+        self.on_stuck(stuck)
+        recording, self._hangs = self._recording, self._hangs + 1
+        run = recording.runs.unfinished() if recording is not None else None
+        if run is not None and self._hangs >= _MOST_HANGS:
+            run.note, self._hangs = f"frame {run.done + 1}: {stuck.doing} hangs", 0
+        with self._condition:
+            if not self._ended:
+                self._thread = threading.Thread(target=self._work, name="cipv-drives", daemon=True)
+                self._thread.start()
+        self.changed()
+
+    def _run_all(self) -> None:
         while (work := self._next()) is not None:
             with suppress(Stopped), self.turn.background():
                 self._advance(*work)

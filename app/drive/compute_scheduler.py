@@ -34,7 +34,8 @@ class ComputeScheduler:
 
     def __init__(self) -> None:
         self._condition = threading.Condition()
-        self._in_front = 0
+        self._in_front: list[int] = []
+        """The threads at work there."""
         self._served = 0
         self._playing = False
         self._ended = False
@@ -64,18 +65,26 @@ class ComputeScheduler:
     @contextmanager
     def foreground(self) -> Iterator[None]:
         """Work that takes priority. Not for waiting: nothing else runs meanwhile."""
+        thread_id = threading.get_ident()
         with self._condition:
-            self._in_front += 1
+            self._in_front.append(thread_id)
         try:
             yield
         finally:
             with self._condition:
-                self._in_front -= 1
+                if thread_id in self._in_front:
+                    self._in_front.remove(thread_id)
                 self._served += 1
                 if self._has_asked:
                     self._has_asked = False
                     self._rests_at_s = time.monotonic() + HAND_RESTS_S
                 self._condition.notify_all()
+
+    def leave_out(self, thread_id: int) -> None:
+        """A thread in front hangs: nobody waits for it any more."""
+        with self._condition:
+            self._in_front = [each for each in self._in_front if each != thread_id]
+            self._condition.notify_all()
 
     @contextmanager
     def stoppable(self) -> Iterator[None]:

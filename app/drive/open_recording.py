@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from app.core.detection_cache import DetectionCache
+from app.core.watchdog import at_work
 from app.drive.frame_inputs import InputStore
 from app.drive.full_run import DriveRun, KnownState, calibration_digest, digest
 from app.drive.run_registry import RunRegistry
@@ -110,7 +111,8 @@ class OpenRecording:
 
     def as_read(self, index: int) -> Frame:
         """A frame as its source gives it, without detections."""
-        return self.setup.source.frame(index)
+        with at_work("reading a frame"):
+            return self.setup.source.frame(index)
 
     def names(self) -> tuple[str, ...]:
         """The names of all frames; frames that were not read yet are read."""

@@ -42,6 +42,10 @@ class DetectorPool:
         self._opened: dict[_Kind, Detects[RawBoxes]] = {}
         self._opened_far: dict[_Kind, FarView | None] = {}
 
+    def forget(self) -> None:
+        """Open all anew when they are asked for: one of them hangs."""
+        self._opened, self._opened_far = {}, {}
+
     def both_for(self, source: AnySource, notices: list[Notice]) -> Detectors:
         """What looks at the source's pictures; what is missing is None, and a notice says so. Nothing where detections
         come with them."""

@@ -7,7 +7,7 @@ its player's: ``app/playing/``.
 from __future__ import annotations
 
 import logging
-import threading
+import math
 import time
 from dataclasses import replace
 from functools import partial
@@ -16,6 +16,7 @@ from typing import Protocol, cast
 from app.core.control import Control, Wish
 from app.core.detection_cache import DetectionCache
 from app.core.jobs import BackgroundJob, JobStatus
+from app.core.watchdog import Stuck, Watchdog, at_work
 from app.drive.background_runs import BackgroundRuns
 from app.drive.open_recording import RunSetup
 from app.engine.detector_pool import DetectorPool, OpenDetector, OpenLanes
@@ -26,6 +27,7 @@ from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Notice, Snapshot
 from app.engine.snapshot_publisher import SnapshotPublisher
+from app.engine.takeovers import Takeovers
 from app.labels.service.desk import LabelDesk
 from pipeline.common.progress import Progress
 from pipeline.detection import Detectors
@@ -38,6 +40,8 @@ logger = logging.getLogger("cipv.engine")
 
 _PATIENCE_S = 2.0
 _TELL_EVERY_S = 0.25
+_SAID_S = 60.0
+"""How long a worker that hung is spoken of."""
 _ABLATION: dict[Sensors, tuple[str, ...]] = {
     "both": (),
     "lidar": ("LiDAR only: no detection in the pictures",),
@@ -77,6 +81,7 @@ class Engine:
         far_view_px: int | None = None,
         desk: SessionRecorder | None = None,
         labels: LabelDesk | None = None,
+        watchdog: Watchdog | None = None,
     ) -> None:
         self.control = Control(Wish(params, preset, uri=uri, playing=playing))
         self._publisher = SnapshotPublisher(Snapshot(params, preset))
@@ -93,13 +98,15 @@ class Engine:
         self._player: Player | None = None
         self.detectors = Detectors()
         """Of what is open."""
-        self._thread = threading.Thread(target=self._work, name="cipv-engine", daemon=True)
+        self.watchdog = self.drives.watchdog = watchdog or Watchdog()
+        self.takeovers = Takeovers(self.watchdog, self._work, self._say_stuck, self.control.change, self.drives.turn)
 
     def start(self) -> None:
         self.drives.on_change = self.control.change
+        self.drives.on_stuck = self._say_stuck
         self.drives.start()
         self.labels.start(self.control)
-        self._thread.start()
+        self.takeovers.begin()
 
     def stop(self) -> None:
         """Close the recording, if there is one, then end the worker. A network run or a read in progress is finished
@@ -108,8 +115,7 @@ class Engine:
         self.desk.stop()
         ends_s = time.monotonic() + _PATIENCE_S
         self.drives.stop(_PATIENCE_S)
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(max(0.0, ends_s - time.monotonic()))
+        self.takeovers.end(max(0.0, ends_s - time.monotonic()))
         self.labels.stop()
 
     @property
@@ -121,7 +127,7 @@ class Engine:
     @property
     def alive(self) -> bool:
         """False when the worker has ended."""
-        return self._thread.is_alive()
+        return self.takeovers.thread.is_alive()
 
     @property
     def snapshot(self) -> Snapshot:
@@ -130,8 +136,13 @@ class Engine:
 
     # ------------------------------------------------------------ the worker
 
-    def _work(self) -> None:
+    def _work(self, is_first: bool) -> None:
+        """is_first: not in the place of another that hangs."""
+        if not is_first:
+            self._take_over()
         while True:
+            if self.takeovers.asked():
+                self._take_over()
             player = self._player
             wish = self.control.take(player.wait_s(self.snapshot.index) if player is not None else None)
             if wish.stop:
@@ -156,6 +167,34 @@ class Engine:
         with turn.foreground():
             processed = player.serve(wish, self.snapshot) if player is not None else None
             self._show(wish, processed)
+
+    # ------------------------------------------------------------ workers that hang
+
+    def _take_over(self) -> None:
+        """The same source, where the worker before, or its helper, hangs; with a fresh network where that does."""
+        player, gives_up = self._player, self.takeovers.gives_up
+        if player is None:
+            return
+        if gives_up:
+            self.detectors = Detectors()
+        elif self.takeovers.of_network:
+            self._detectors.forget()
+            with at_work("opening networks"):
+                self.detectors = self._detectors.both_for(player.source, [])
+        self._player = player.successor(self.detectors) or self._player_of(player.source, self.detectors)
+        if gives_up and not player.live:
+            self.control.change(playing=False)
+        elif not player.live:
+            self.control.change(target=self.snapshot.index)
+
+    def _say_stuck(self, stuck: Stuck, more: str = "") -> None:
+        """On every page, the display in the car too, for a minute; what is off from now on, for good."""
+        text = f"{stuck.worker} hung for {stuck.seconds:.1f} s ({stuck.doing}) and was started anew"
+        text += "; the recording goes on" if self.desk.state is not None else ""
+        others = tuple(notice for notice in self.snapshot.notices if f"({stuck.doing})" not in notice.text)
+        lasts_s = math.inf if more else _SAID_S
+        said = Notice("error", text[0].upper() + text[1:] + more, time.monotonic() + lasts_s)
+        self._publisher.publish(replace(self.snapshot, notices=(*others, said)))
 
     # ------------------------------------------------------------ opening
 
@@ -182,6 +221,7 @@ class Engine:
         detectors = self._detectors.both_for(source, notices)
         self.desk.stop()
         self._close()
+        self.takeovers.forget()
         player = self._player_of(source, detectors)
         player.open()
         self._player, self.detectors = player, detectors
@@ -232,7 +272,8 @@ class Engine:
         recording = cast("Source", source)
         pipeline = SeekablePipeline(recording, detectors, self._detections, self._sensors, self.drives.state_before)
         setup = RunSetup(recording, pipeline.timeline_s, detectors, self._sensors) if self._whole_drives else None
-        return RecordedPlayer(pipeline, self.control, self.drives, setup, self.desk)
+        watching = partial(self.takeovers.watching_helper, "reading ahead")
+        return RecordedPlayer(pipeline, self.control, self.drives, setup, self.desk, watching)
 
     def _close(self) -> None:
         player, self._player = self._player, None
@@ -247,7 +288,7 @@ class Engine:
         playing = player is not None and player.goes_on_after_failing() and self.snapshot.playing
         if not playing:
             self.control.change(playing=False)
-        notices = tuple(n for n in self.snapshot.notices if n.level != "error")
+        notices = tuple(n for n in self.snapshot.notices if n.stays)
         self._publisher.publish(
             replace(self.snapshot, busy=None, playing=playing, notices=(*notices, Notice("error", text)))
         )
@@ -280,7 +321,7 @@ class Engine:
                 sequence=shown.sequence + 1,
                 skipped=player.skipped,
                 made_unix_s=time.time(),
-                notices=tuple(n for n in shown.notices if n.level != "error"),
+                notices=tuple(n for n in shown.notices if n.stays),
             )
         self._publisher.publish(shown)
         if processed is not None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from time import monotonic, perf_counter
 
+from app.core.watchdog import NETWORK, at_work
 from app.engine.processed_frame import ProcessedFrame
 from app.engine.snapshot import Notice
 from pipeline.detection import Detectors, Detects, LiveDetectors, Seen
@@ -39,9 +40,16 @@ class LivePipeline:
     def close(self) -> None:
         self.source.close()
 
+    def successor(self, detectors: Detectors) -> LivePipeline:
+        """The same sensors, which stay open, from the newest tick on, with other detectors."""
+        fresh = LivePipeline(self.source, detectors, self._sensors)
+        fresh.newest, fresh._first_ns = self.newest, self._first_ns
+        return fresh
+
     def wait(self, params: Params, timeout_s: float) -> Frame | None:
         """The newest tick of the sensors; None when none arrived in time."""
-        return self.source.next(timeout_s, params.sync)
+        with at_work("the sensors' next tick"):
+            return self.source.next(timeout_s, params.sync)
 
     def run(self, frame: Frame, params: Params) -> ProcessedFrame:
         """Run the pipeline on what ``wait`` returned."""
@@ -49,7 +57,8 @@ class LivePipeline:
         self._first_ns = frame.t_ns if self._first_ns is None else self._first_ns
         before = self.newest.after if self.newest is not None else State()
         ask = _TimedLook()
-        frame, after, result = advance(before, frame, params, self._detectors.of(frame), self._sensors, ask)
+        with at_work("the pipeline"):
+            frame, after, result = advance(before, frame, params, self._detectors.of(frame), self._sensors, ask)
         self.newest = ProcessedFrame(before, frame, after, result, params, ask.spent_ms, exact=True)
         return self.newest
 
@@ -76,6 +85,7 @@ class _TimedLook:
 
     def __call__(self, detector: Detects[Seen], frame: Frame, bgr: U8) -> Seen:
         start = perf_counter()
-        found = detector.detect(bgr)
+        with at_work(NETWORK + detector.name):
+            found = detector.detect(bgr)
         self.spent_ms += (perf_counter() - start) * 1e3
         return found

@@ -11,6 +11,7 @@ from app.engine.live_pipeline import LivePipeline
 from app.engine.processed_frame import ProcessedFrame
 from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Snapshot
+from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.types import Frame
 from pipeline.types.source import LiveSource
@@ -32,6 +33,10 @@ class LivePlayer:
         self._pipeline, self._control, self._drives, self._desk = pipeline, control, drives, desk
         self._came: Frame | None = None
         self._health_told_s = 0.0
+
+    def successor(self, detectors: Detectors) -> LivePlayer:
+        """Goes on where this one hangs; the sensors stay open."""
+        return LivePlayer(self._pipeline.successor(detectors), self._control, self._drives, self._desk)
 
     @property
     def source(self) -> LiveSource:

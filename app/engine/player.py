@@ -7,6 +7,7 @@ from typing import Protocol
 from app.core.control import Wish
 from app.engine.processed_frame import ProcessedFrame
 from app.engine.snapshot import Snapshot
+from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.types.source import AnySource
 
@@ -59,6 +60,10 @@ class Player(Protocol):
 
     def goes_on_after_failing(self) -> bool:
         """Something went wrong: whether it plays on all the same."""
+        ...
+
+    def successor(self, detectors: Detectors) -> Player | None:
+        """Who goes on with these detectors where this one hangs; None where one made anew will do."""
         ...
 
     def close(self) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 
 logger = logging.getLogger("cipv.ahead")
 
@@ -16,9 +17,16 @@ logger = logging.getLogger("cipv.ahead")
 class ReadAhead:
     """Has ``prepare(index)`` run for one index at a time. ``on_ready`` is called when it has, on the thread that did.
 
-    What went wrong is left to who reads the frame in earnest: it goes wrong there again."""
+    ``watching``: around all that the thread does. What went wrong is left to who reads the frame in earnest: it goes
+    wrong there again."""
 
-    def __init__(self, prepare: Callable[[int], None], on_ready: Callable[[], object]) -> None:
+    def __init__(
+        self,
+        prepare: Callable[[int], None],
+        on_ready: Callable[[], object],
+        watching: Callable[[], AbstractContextManager[object]] = nullcontext,
+    ) -> None:
+        self._watching = watching
         self._prepare, self._on_ready = prepare, on_ready
         self._condition = threading.Condition()
         self._wanted: int | None = None
@@ -58,6 +66,10 @@ class ReadAhead:
             self._thread.join(patience_s)
 
     def _work(self) -> None:
+        with self._watching():
+            self._prepare_all()
+
+    def _prepare_all(self) -> None:
         while True:
             with self._condition:
                 self._condition.wait_for(lambda: self._ended or self._wanted is not None)

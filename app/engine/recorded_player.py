@@ -6,6 +6,8 @@ Nothing is queued: late frames are skipped, and a seek that is overtaken by anot
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 
 from app.core.control import Control, Wish
 from app.core.playback_clock import PlaybackClock
@@ -16,6 +18,7 @@ from app.engine.read_ahead import ReadAhead
 from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.session_recording import SessionRecorder
 from app.engine.snapshot import Snapshot
+from pipeline.detection import Detectors
 from pipeline.inference.cancellation import Stopped
 from pipeline.params import Params
 from pipeline.types.source import Source
@@ -26,7 +29,8 @@ _READ_PATIENCE_S = 1.0
 
 class RecordedPlayer:
     """A ``Player`` of one recording. ``setup`` says how its whole drive is computed in the background, so that any
-    frame is shown as it is there; None leaves that out. What is shown goes to the session recorder."""
+    frame is shown as it is there; None leaves that out. ``watching``: around the thread that works ahead. What is shown
+    goes to the session recorder."""
 
     live = False
 
@@ -37,6 +41,7 @@ class RecordedPlayer:
         drives: BackgroundRuns,
         setup: RunSetup | None,
         desk: SessionRecorder,
+        watching: Callable[[], AbstractContextManager[object]] = nullcontext,
     ) -> None:
         self.source: Source = pipeline.source
         self.count = len(pipeline.source)
@@ -45,10 +50,14 @@ class RecordedPlayer:
         self._pipeline, self._control, self._drives, self._setup, self._desk = pipeline, control, drives, setup, desk
         self._clock: PlaybackClock | None = None
         self._given_up: int | None = None
-        self._ahead = ReadAhead(self._prepare, control.change)
+        self._ahead = ReadAhead(self._prepare, control.change, watching)
 
     def open(self) -> None:
         self._drives.open(self._setup)
+
+    def successor(self, detectors: Detectors) -> None:
+        """Its frames are always there: one made anew will do. What it prepares is not waited for."""
+        self._ahead.end()
 
     def close(self) -> None:
         self._ahead.end(_READ_PATIENCE_S)

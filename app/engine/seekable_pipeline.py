@@ -12,6 +12,7 @@ from dataclasses import replace
 from app.core.detection_cache import DetectionCache
 from app.core.lru import BoundedCache
 from app.core.playback_clock import timeline_s
+from app.core.watchdog import at_work
 from app.engine.processed_frame import ProcessedFrame
 from pipeline.detection import Detectors
 from pipeline.params import Params
@@ -130,7 +131,9 @@ class SeekablePipeline:
 
     def _run(self, state: State, index: int, params: Params, detectors: Detectors, *, exact: bool) -> ProcessedFrame:
         spent_ms = self._ask.spent_ms
-        frame, after, result = advance(state, self._read(index), params, detectors, self._sensors, self._ask)
+        frame = self._read(index)
+        with at_work("the pipeline"):
+            frame, after, result = advance(state, frame, params, detectors, self._sensors, self._ask)
         ahead, ahead_ms = self._ahead_ms
         detect_ms = self._ask.spent_ms - spent_ms + (ahead_ms if ahead == index else 0.0)
         return ProcessedFrame(state, frame, after, result, params, detect_ms, exact)
@@ -153,7 +156,7 @@ class SeekablePipeline:
         return is_read and self._asked_at_once(index) is self._detectors
 
     def _read(self, index: int) -> Frame:
-        with self._reading:
+        with at_work("reading a frame"), self._reading:
             held = self._frames.get(index)
             if held is None:
                 held = self.source.frame(index)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -22,6 +23,13 @@ class Notice:
 
     level: Literal["info", "warning", "error"]
     text: str
+    until_s: float = 0.0
+    """An error goes with the next frame, but not before this time of ``time.monotonic``."""
+
+    @property
+    def stays(self) -> bool:
+        """Whether it is still shown with the next frame."""
+        return self.level != "error" or time.monotonic() < self.until_s
 
 
 @dataclass(frozen=True)

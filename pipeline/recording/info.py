@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipeline.recording import topics
+from pipeline.recording.mcap.chain import Chain, verify
 from pipeline.recording.mcap.reader import McapFile
 from pipeline.recording.session.provenance import About
 from pipeline.recording.session.source import SessionSource
@@ -47,7 +48,7 @@ class TopicInfo:
 @dataclass(frozen=True)
 class Info:
     """about: None for a file that is no session of ours. frames: by header time, where there are frames. problem: None
-    for a whole file."""
+    for a whole file. chain: whether it is as it was written, None when nobody looked."""
 
     path: str
     bytes: int
@@ -60,10 +61,12 @@ class Info:
     damaged_chunks: int
     marks: tuple[str, ...]
     problem: str | None
+    chain: Chain | None
 
 
-def info(path: Path) -> Info:
-    """Of any MCAP file; reads message indexes, not messages. BadInput when it is none."""
+def info(path: Path, *, is_quick: bool = False) -> Info:
+    """Of any MCAP file; BadInput when it is none. is_quick: reads message indexes, not messages, and leaves ``chain``
+    out, for which all bytes are read."""
     with McapFile(path) as file:
         times = file.log_times()
         listed = tuple(
@@ -85,6 +88,7 @@ def info(path: Path) -> Info:
             damaged_chunks=len(file.damaged),
             marks=marks,
             problem=file.directory.problem,
+            chain=None if is_quick else verify(path),
         )
 
 

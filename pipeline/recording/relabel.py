@@ -20,6 +20,7 @@ from mcap.writer import MCAP0_MAGIC, Writer
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
+from pipeline.recording.mcap.chain import ChainWriter, link_at
 from pipeline.recording.mcap.index import read_summary, summary_start
 from pipeline.recording.mcap.output import CHUNK_BYTES
 from pipeline.recording.mcap.reader import McapFile, Stored
@@ -27,6 +28,23 @@ from pipeline.recording.mcap.reader import McapFile, Stored
 _PIECE_BYTES = 1 << 20
 _CRC_BYTES = 4
 _LABELS = topics.channel(topics.LABELS)
+
+
+class _Chained:
+    """What ``mcap.writer`` writes to, which goes on with the chain of the bytes before."""
+
+    def __init__(self, file: BinaryIO, previous: str) -> None:
+        self.file, self.chain = file, ChainWriter(file, previous)
+
+    def write(self, data: bytes) -> int:
+        self.chain.wrote(data)
+        return self.file.write(data)
+
+    def tell(self) -> int:
+        return self.file.tell()
+
+    def flush(self) -> None:
+        self.file.flush()
 
 
 def relabel(file: McapFile, out: Path, labels: bytes, t_ns: int, progress: Progress = silent) -> bool:
@@ -48,8 +66,11 @@ def relabel(file: McapFile, out: Path, labels: bytes, t_ns: int, progress: Progr
             with target:
                 before = file.directory.chunks[place - 1]
                 end = before.offset + before.length + before.index_length
+                link = link_at(source, end)
+                end += link[1] if link is not None else 0
                 _copy(source, target, end, progress)
-                _write_rest(file, summary, place, end, target, labels, t_ns)
+                stream = _Chained(target, link[0].sha256) if link is not None else target
+                _write_rest(file, summary, place, end, stream, labels, t_ns)
                 os.fsync(target.fileno())
         except BaseException:
             out.unlink(missing_ok=True)
@@ -84,7 +105,7 @@ def _copy(source: BufferedReader, target: BinaryIO, end: int, progress: Progress
 
 
 def _write_rest(
-    file: McapFile, before: Summary, place: int, end: int, target: BinaryIO, labels: bytes, t_ns: int
+    file: McapFile, before: Summary, place: int, end: int, target: BinaryIO | _Chained, labels: bytes, t_ns: int
 ) -> None:
     """What comes after byte ``end``: the messages from chunk ``place`` on, the labels, what was attached, the summary.
     The library writes it as the end of a file that began with it; what lies before it is told of afterwards."""
@@ -92,7 +113,7 @@ def _write_rest(
     passed = [stored for at in range(place, len(chunks)) for stored in file.chunk(at)]
     kept = [stored for stored in passed if stored.channel.topic != topics.LABELS]
     log_time_ns = kept[-1].log_time_ns if kept else chunks[place - 1].end_ns
-    writer = Writer(target, CHUNK_BYTES)
+    writer = Writer(target, CHUNK_BYTES)  # type: ignore[arg-type]  # of a file it wants these three methods
     numbers = _register(writer, file, before)
     copied = Counter(before.statistics.channel_message_counts if before.statistics is not None else {})
     copied -= Counter(numbers[stored.channel] for stored in passed)
@@ -107,8 +128,11 @@ def _write_rest(
     for told in before.metadata_indexes:
         if told.offset >= end:
             writer.add_metadata(told.name, file.metadata(told.name) or {})
+    if isinstance(target, _Chained):
+        writer.flush()
+        target.chain.link(is_last=True)
     writer.finish()
-    _tell_of_all(target, before, end, copied)
+    _tell_of_all(target.file if isinstance(target, _Chained) else target, before, end, copied)
 
 
 def _register(writer: Writer, file: McapFile, before: Summary) -> dict[topics.Channel, int]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from pipeline.common.progress import Progress, silent
 from pipeline.recording import topics
 from pipeline.recording.errors import Damaged
+from pipeline.recording.mcap import chain
 from pipeline.recording.mcap.output import Output
 from pipeline.recording.mcap.reader import McapFile, Stored
 from pipeline.recording.session.frame_list import FrameList
@@ -122,7 +123,7 @@ def _copy(messages: Iterable[Stored], file: McapFile, out: Path) -> tuple[int, i
     """(messages, frames) written to a new file, with the metadata and, for a session, the list of its frames."""
     output, frames, copied = Output(out, profile=file.directory.profile), FrameList(), 0
     try:
-        for name in file.directory.metadata:
+        for name in file.directory.metadata.keys() - {chain.NAME}:  # the new file has its own
             output.add_metadata(name, file.metadata(name) or {})
         for stored in messages:
             output.add(stored.channel, stored.log_time_ns, stored.publish_time_ns, stored.data)

@@ -24,14 +24,19 @@ from pipeline.formats.velodyne.decoder import Vlp16Decoder
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import LabelSet
 from pipeline.recording.errors import Damaged
+from pipeline.recording.info import info
+from pipeline.recording.rewrite import recover
 from pipeline.recording.session.frame_record import frame_record_from
+from pipeline.recording.session.source import SessionSource
+from pipeline.recording.session.writer import SessionWriter
 from pipeline.simulation import scenario
 from pipeline.sources import open_source
 from pipeline.sources.live import config
 from pipeline.sources.live.devices.can import load_dbc
 from pipeline.sources.route_files import load_route
 from tests.pipeline.formats.velodyne.streams import drive
-from tests.pipeline.recording.frames import full, write
+from tests.pipeline.recording.frames import ABOUT, TRUTH, full, write
+from tests.pipeline.sources.bags import Kind, write_bag, write_packet_bag
 from tests.pipeline.sources.live.devices.test_wires import DBC
 from tests.pipeline.sources.test_fuzz import FILES
 from tests.pipeline.sources.test_route_files import GGA, GPX, POINTS, RMC
@@ -81,6 +86,10 @@ def _frames_of(uri: str) -> None:
         source.truth(index)
 
 
+def _frames_of_bag(path: str) -> None:
+    _frames_of(f"rosbag:{path}")
+
+
 def _whole_recording(uri: str, _: str) -> None:
     """A recording one of whose files was written anew."""
     _frames_of(uri)
@@ -92,6 +101,42 @@ def _text(read: Callable[[str, str], object]) -> Callable[[bytes], object]:
 
 def _route(place: str) -> bytes:
     return GPX.format(1, 1, f"<trk><trkseg>{POINTS.format(place)}</trkseg></trk>").encode()
+
+
+def _bag(folder: Path, kind: Kind) -> bytes:
+    return write_bag(folder / "one.bag", kind, 2).read_bytes()
+
+
+def _many_chunks(folder: Path) -> bytes:
+    """A session whose frames lie in chunks of their own, chained by hash, with labels."""
+    path = folder / f"chunks{len(list(folder.iterdir()))}.mcap"
+    writer = SessionWriter(path, ABOUT, compression="lz4")
+    for index in range(4):
+        writer.write(full(index), truth=TRUTH)
+        writer.flush()
+    writer.write_labels(to_json(LabelSet("a", ("000000",), (100_000_000,))))
+    writer.write_mark("here")
+    writer.close()
+    return path.read_bytes()
+
+
+def _everything_of_session(path: str) -> None:
+    info(Path(path))
+    session = SessionSource("a", path)
+    try:
+        for index in range(min(len(session), _MOST_FRAMES)):
+            session.frame(index), session.result(index), session.params(index)
+        session.marks(), session.labels(), session.fixes()
+        for _ in session.outlines():
+            pass
+    finally:
+        session.close()
+
+
+def _recovered(path: str) -> None:
+    out = Path(path + ".whole")
+    out.unlink(missing_ok=True)
+    recover(Path(path), out)
 
 
 def targets(folder: Path) -> dict[str, Target]:
@@ -114,6 +159,13 @@ def targets(folder: Path) -> dict[str, Target]:
         "dbc": Target((DBC.encode(),), _by_file(folder, "a.dbc", lambda path: load_dbc(Path(path)))),
         "live config": Target((b"title: a\nlidar: {data_port: 2368}\n",), _by_file(folder, "a.yaml", config.load)),
         "session": Target((session.read_bytes(),), _by_file(folder, "a.mcap", _frames_of)),
+        "session in chunks": Target((_many_chunks(folder),), _by_file(folder, "b.mcap", _everything_of_session)),
+        "session cut off": Target((_many_chunks(folder)[:40_000],), _by_file(folder, "c.mcap", _recovered)),
+        "ros 1 bag": Target((_bag(folder, "ros1"),), _by_file(folder, "ros.bag", _frames_of_bag)),
+        "ros 1 bag of packets": Target(
+            (write_packet_bag(folder / "packets.bag", "ros1", 2).read_bytes(),),
+            _by_file(folder, "p.bag", _frames_of_bag),
+        ),
     }
     for name, (make, uri, inside) in FILES.items():
         (folder / name).mkdir()
@@ -127,4 +179,7 @@ def targets(folder: Path) -> dict[str, Target]:
 def all_targets() -> Iterator[dict[str, Target]]:
     """For a ``with`` of contextlib: the folder goes at the end."""
     with tempfile.TemporaryDirectory(prefix="cipv-fuzz-") as folder, suppress(KeyboardInterrupt):
-        yield targets(Path(folder))
+        known = targets(Path(folder))
+        for target in known.values():
+            target.read(target.seeds[0])  # what is compiled the first time is not the parser's time
+        yield known

@@ -26,6 +26,7 @@ from app.labels.store.items import (
 )
 from app.labels.store.tables import DriveRow, ItemRow, SightingRow, VersionRow
 from app.labels.store.values import KINDS, LONGEST_ITEM, Item, ItemKind, sighting_of
+from app.labels.store.version_chain import chained, check
 from app.labels.wording import WORKING
 from pipeline.labels.formats.native import from_json, to_json
 from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, LeadRange, PathLabel, Sighting
@@ -175,19 +176,21 @@ class DriveLabels:
             "labels": zlib.compress(to_json(labels), 1),
         }
         with self._database.writing() as connection:
-            if not self._database.insert_new(connection, VersionRow, values):
+            if not self._database.insert_new(connection, VersionRow, chained(connection, values)):
                 raise ActRefused(taken)  # somebody else froze under it at the same moment
         return version
 
     def version_json(self, name: str) -> bytes:
-        """The native file of a frozen version. NoSuchLabel when it is not there."""
+        """The native file of a frozen version. NoSuchLabel when it is not there, ActRefused when it is not as it was
+        frozen."""
         with self._database.reading() as connection:
-            data = connection.scalars(
-                select(VersionRow.labels).where(VersionRow.drive_id == self._id, VersionRow.name == name)
+            row = connection.execute(
+                select(VersionRow.__table__).where(VersionRow.drive_id == self._id, VersionRow.name == name)
             ).first()
-        if data is None:
-            raise NoSuchLabel(f"there is no version {name!r} of these labels")
-        return zlib.decompress(data)
+            if row is None:
+                raise NoSuchLabel(f"there is no version {name!r} of these labels")
+            check(connection, row)
+        return zlib.decompress(row.labels)
 
     # ------------------------------------------------------------ inside
 

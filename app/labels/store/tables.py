@@ -105,7 +105,8 @@ class ChangeRow(Base):
 
 
 class VersionRow(Base):
-    """A label set that was frozen under a name: the native file, compressed."""
+    """A label set that was frozen under a name: the native file, compressed. sha256: of all that and of the version
+    before (``previous``), empty for one from before there was a chain; see ``version_chain``."""
 
     __tablename__ = "version"
     drive_id: Mapped[int] = mapped_column(ForeignKey("drive.id"), primary_key=True)
@@ -115,3 +116,5 @@ class VersionRow(Base):
     tracks: Mapped[int] = mapped_column(Integer)
     frames: Mapped[int] = mapped_column(Integer)
     labels: Mapped[bytes] = mapped_column(LargeBinary)
+    previous: Mapped[str] = mapped_column(String(64), server_default="")
+    sha256: Mapped[str] = mapped_column(String(64), server_default="")

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pipeline.formats.velodyne.clock import SensorClock
-from pipeline.formats.velodyne.cutter import DecoderCounts, Rotation, RotationCutter, say_refused
+from pipeline.formats.velodyne.cutter import OUT_OF_ORDER, DecoderCounts, Rotation, RotationCutter, say_refused
 from pipeline.formats.velodyne.decoder import Vlp16Decoder
 from pipeline.formats.velodyne.packet import PACKET_BYTES, BadPacket, Packet, read_packet
 from pipeline.formats.velodyne.position import POSITION_BYTES, Position, read_position
 
 __all__ = [
+    "OUT_OF_ORDER",
     "PACKET_BYTES",
     "POSITION_BYTES",
     "BadPacket",

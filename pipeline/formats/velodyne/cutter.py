@@ -26,13 +26,19 @@ _PAUSE_AGREES_US = 50_000
 _AZIMUTH_TOLERANCE_CDEG, _AZIMUTH_TOLERANCE_SHARE = 300.0, 0.02
 _APART_SHARE = 0.5  # of a packet's span: nearer in time, two packets are one
 _EDGE_CDEG = 3_600.0
+_ENOUGH, _ENOUGH_AGAIN, _SETTLED_PACKETS = 2, 4, 7_540
+"""A clock that jumped is believed after two packets that follow on each other; within ten seconds of a jump after four.
+A clock is set once. Two sensors whose packets are mixed seem to jump all the time, and at one rate neither sends more
+than two in a row."""
+OUT_OF_ORDER = "time or azimuth out of order"
 
 
 @dataclass
 class DecoderCounts:
     """What came so far. refused: packets by reason. models: other Velodynes that sent packets. lost: packets that the
     time between their neighbours says are missing. sweeps: given. partial: rotations seen in part only (the first, the
-    last, one cut by a pause), not given."""
+    last, one cut by a pause), not given. jumps: how often the sensor's clock went back or ahead by more than the time
+    that had passed, the last time by jump_s."""
 
     packets: int = 0
     refused: Counter[str] = field(default_factory=Counter)
@@ -40,6 +46,8 @@ class DecoderCounts:
     lost: int = 0
     sweeps: int = 0
     partial: int = 0
+    jumps: int = 0
+    jump_s: float = 0.0
 
     def about_refused(self) -> str:
         """See ``say_refused``."""
@@ -103,6 +111,8 @@ class RotationCutter:
         self._reach_cdeg = (np.inf, np.inf)  # from where to where the rotation before was seen
         self._last: Placed | None = None
         self._suspect: Placed | None = None
+        self._suspects = 0
+        self._since_jump = _SETTLED_PACKETS
 
     def push(self, data: bytes, t_host_ns: int | None, origin: int = 0) -> Rotation | None:
         """Take one data packet; the rotation that it completes, if it is the first of the next. Never raises."""
@@ -116,6 +126,7 @@ class RotationCutter:
                 self.counts.models[bad.model] += 1
             return None
         done = self._finish(place is _NEXT) if place is not _HERE else None
+        self._since_jump += 1
         if place is _ANEW:
             self.clock.restart()
         if t_host_ns is not None:
@@ -171,11 +182,14 @@ class RotationCutter:
         if host_gap_us is not None and ahead_us > _CONTINUES_US and abs(host_gap_us - ahead_us) < _PAUSE_AGREES_US:
             self._last = placed
             return _AFTER_GAP
-        if suspect is not None and _follows(suspect, placed):
-            self._last = placed
+        self._suspects = self._suspects + 1 if suspect is not None and _follows(suspect, placed) else 1
+        if self._suspects >= (_ENOUGH if self._since_jump >= _SETTLED_PACKETS else _ENOUGH_AGAIN):
+            self.counts.jumps += 1
+            self.counts.jump_s = (ahead_us - (host_gap_us or 0)) / 1e6
+            self._last, self._suspects, self._since_jump = placed, 0, 0
             return _ANEW
         self._suspect = placed
-        raise BadPacket("time or azimuth out of order")
+        raise BadPacket(OUT_OF_ORDER)
 
     def _is_doubled(self, placed: Placed) -> bool:
         """Whether a packet of this time is there already; only some µs off, one of the two is spoiled."""

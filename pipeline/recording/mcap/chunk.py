@@ -18,7 +18,7 @@ from mcap.records import Channel, Chunk, Schema
 from pipeline.recording.errors import Damaged
 from pipeline.recording.mcap.index import RECORD_HEAD
 
-_LARGEST_CHUNK_BYTES = 256 << 20
+LARGEST_CHUNK_BYTES = 256 << 20
 """Unpacked. Recorders begin a new chunk after one to some dozen MB."""
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
@@ -51,7 +51,7 @@ def unpack(content: bytes) -> UnpackedChunk:
     """content: of the chunk's record. Damaged bytes make the decompressors and the library raise whatever they like;
     Damaged for what they do not see."""
     chunk = Chunk.read(ReadDataStream(io.BytesIO(content)))
-    if chunk.uncompressed_size > _LARGEST_CHUNK_BYTES:
+    if chunk.uncompressed_size > LARGEST_CHUNK_BYTES:
         raise Damaged("a chunk of an invalid size")
     data = _decompressed(chunk)
     length = len(data)

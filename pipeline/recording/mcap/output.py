@@ -14,6 +14,7 @@ from mcap.records import DataEnd, Footer
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
 from pipeline.common.errors import BadInput
+from pipeline.recording.mcap.chain import ChainWriter
 from pipeline.recording.topics import PROFILE, Channel
 
 CHUNK_BYTES = 1280 * 1024
@@ -27,15 +28,17 @@ _COMPRESSION = {"lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
 
 
 class _Stream:
-    """What ``mcap.writer`` writes to: straight to the system, all that it is given."""
+    """What ``mcap.writer`` writes to: straight to the system, all that it is given, chained by hash."""
 
     def __init__(self, path: Path) -> None:
         self.file = path.open("xb", buffering=0)
+        self.chain = ChainWriter(self.file)
 
     def write(self, data: bytes) -> int:
         rest = memoryview(data)
         while rest:
             rest = rest[self.file.write(rest) :]
+        self.chain.wrote(data)
         return len(data)
 
     def tell(self) -> int:
@@ -107,6 +110,7 @@ class Output:
         """After every message so far: the chunk in progress is closed first."""
         with self._failing_neatly():
             self._writer.flush()
+            self._stream.chain.link()
             self._pending_bytes = 0
             self._writer.add_attachment(log_time_ns, log_time_ns, name, media_type, data)
 
@@ -114,6 +118,7 @@ class Output:
         """Close the chunk in progress."""
         with self._failing_neatly():
             self._writer.flush()
+            self._stream.chain.link()
             self._pending_bytes = 0
             if to_disk:
                 os.fsync(self._stream.file.fileno())
@@ -123,6 +128,8 @@ class Output:
         if not self._is_open:
             return
         with self._failing_neatly():
+            self._writer.flush()
+            self._stream.chain.link(is_last=True)
             self._writer.finish()
             os.fsync(self._stream.file.fileno())
         self._is_open = False

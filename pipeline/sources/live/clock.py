@@ -39,6 +39,8 @@ class FollowedClock:
 
     def __init__(self) -> None:
         self._own = SensorClock()
+        self.jumps = 0
+        """How often it was set anew."""
         self._off_since_ns: int | None = None
 
     @property
@@ -57,6 +59,7 @@ class FollowedClock:
             self._off_since_ns = arrived_ns
         elif arrived_ns - self._off_since_ns >= _SET_AFTER_NS:
             self._off_since_ns = None
+            self.jumps += 1
             self._own.restart()
             self._own.observe(stamp_ns // 1000, arrived_ns)
             t_ns = self._own.to_ns(stamp_ns / 1000)

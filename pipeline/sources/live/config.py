@@ -19,6 +19,7 @@ from pipeline.types.source import SourceError
 Port = Annotated[int, Field(ge=1, le=65535)]
 Metres = Annotated[float, Field(ge=-20.0, le=20.0)]
 Degrees = Annotated[float, Field(ge=-180.0, le=180.0)]
+Host = Annotated[str, Field(pattern=r"^\d{1,3}(\.\d{1,3}){3}$")]
 OffsetMs = Annotated[float, Field(ge=-2000.0, le=2000.0)]
 
 
@@ -59,12 +60,14 @@ class Mount(Strict):
 
 
 class LidarConfig(Strict):
-    """A Velodyne on the network. interface: address of the network card to listen on; 0.0.0.0 is all of them."""
+    """A Velodyne on the network. interface: address of the network card to listen on; 0.0.0.0 is all of them. sender:
+    the sensor's address; None for the first that sends packets of a VLP-16."""
 
     model: Literal["VLP-16"] = "VLP-16"
     data_port: Port = 2368
     position_port: Port | None = 8308
     interface: str = "0.0.0.0"
+    sender: Host | None = None
     multicast_group: str | None = None
     time_offset_ms: OffsetMs = 0.0
     mount: Mount = Mount()
@@ -113,13 +116,14 @@ class CameraConfig(Strict):
 
 class GnssConfig(Strict):
     """A receiver's NMEA sentences: exactly one of serial (its device), tcp (host:port to connect to), udp_port (to
-    listen on)."""
+    listen on). interface, sender: of the UDP port, as of the LiDAR."""
 
     serial: str | None = None
     baud: Annotated[int, Field(ge=1200, le=4_000_000)] = 115_200
     tcp: str | None = Field(default=None, pattern=r"^.+:\d{1,5}$")
     udp_port: Port | None = None
     interface: str = "0.0.0.0"
+    sender: Host | None = None
     time_offset_ms: OffsetMs = 0.0
 
     @model_validator(mode="after")

@@ -12,6 +12,7 @@ lidar:                      # Velodyne on the network
   data_port: 2368
   position_port: 8308       # PPS and GPS state; null if the sensor does not send it
   interface: 0.0.0.0        # address of the network interface; 0.0.0.0 listens on all
+  sender: null              # the sensor's address, as 192.168.1.201; null takes the first VLP-16 that sends
   multicast_group: null     # for example 239.0.0.1 when the sensor sends to a group
   time_offset_ms: 0         # added to its time stamps
   mount:                    # pose of the sensor; points are levelled with it
@@ -43,6 +44,7 @@ gnss:                       # NMEA (GGA, RMC, optionally GST), preferably at 5 H
   # tcp: 192.168.1.30:9001
   # udp_port: 10110
   # interface: 0.0.0.0      # for udp_port
+  # sender: 192.168.1.30    # for udp_port: the only address that may send; without it the first receiver that does
   time_offset_ms: 0
 
 ego:                        # ego speed and yaw rate

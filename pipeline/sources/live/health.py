@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Literal
 
 import numpy as np
@@ -22,13 +22,16 @@ Sensor = Literal["lidar", "camera", "gnss", "ego"]
 
 class StreamStats:
     """Counts one sensor's messages. Times are of the host's timeline. note: what its reader has to say (why a device
-    cannot be opened, where its times come from). refused: packets by reason."""
+    cannot be opened, where its times come from). hung: how often its driver or decoder hung and was started anew.
+    refused: packets by reason. remarks: each is asked what else there is to say of it, and answers with an empty text
+    when nothing is."""
 
     def __init__(self, sensor: Sensor) -> None:
         self.sensor: Sensor = sensor
         self.note = ""
-        self.lost = 0
+        self.lost = self.hung = 0
         self.refused: Counter[str] = Counter()
+        self.remarks: tuple[Callable[[], str], ...] = ()
         self._arrived: deque[int] = deque(maxlen=_KEPT)
         self._newest_ns: int | None = None
 
@@ -46,9 +49,11 @@ class StreamStats:
         times = np.array(list(self._arrived)[-16:])
         return int(np.median(np.diff(times))) if len(times) >= _FEWEST else None
 
-    def health(self, now_ns: int) -> StreamHealth:
-        """As of now. Rate and jitter are over the last three seconds and None while fewer than three messages came in
-        them; jitter is the standard deviation of the gaps between arrivals."""
+    def health(self, now_ns: int, impossible: int = 0) -> StreamHealth:
+        """As of now. impossible: messages refused because they were measured long ago, or are yet to be.
+
+        Rate and jitter are over the last three seconds and None while fewer than three messages came in them; jitter is
+        the standard deviation of the gaps between arrivals."""
         arrived = list(self._arrived)  # at once: a reader's thread may add to it meanwhile
         times = np.array([t for t in arrived if now_ns - t <= _WINDOW_NS], dtype=np.int64)
         gaps_ms = np.diff(times) / 1e6
@@ -60,7 +65,7 @@ class StreamStats:
             age_ms=(now_ns - self._newest_ns) / 1e6 if self._newest_ns is not None else None,
             jitter_ms=float(gaps_ms.std()) if enough else None,
             lost=self.lost,
-            note=self._said(),
+            note=self._said(impossible),
         )
 
     def _state(self, now_ns: int) -> Literal["ok", "stale", "silent", "absent"]:
@@ -72,9 +77,11 @@ class StreamStats:
             return "silent"
         return "stale" if since >= max(_STALE_NS, missed_ns) else "ok"
 
-    def _said(self) -> str:
+    def _said(self, impossible: int) -> str:
         refused = say_refused(self.refused.copy())  # at once: a reader's thread may meet a new reason meanwhile
-        return "; ".join(text for text in (self.note, refused) if text)
+        times = f"{impossible} refused whose time cannot be" if impossible else ""
+        again = f"hung {self.hung} {'time' if self.hung == 1 else 'times'} and was started anew" if self.hung else ""
+        return "; ".join(text for text in (self.note, again, *(ask() for ask in self.remarks), times, refused) if text)
 
 
 def not_delivering(streams: Iterable[StreamHealth]) -> str:

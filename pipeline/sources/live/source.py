@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pipeline.ego_motion.from_gnss import MotionFromGnss
 from pipeline.params import SyncParams
@@ -59,6 +59,13 @@ class LiveSensors:
     def _wire(self, config: LiveConfig) -> None:
         """An input for each sensor of the config, each delivering to its own stream."""
         self.inputs: dict[str, Input] = {}
+        sync = self._sync
+        self._streams: dict[str, Stream[Any]] = {
+            "lidar": sync.sweeps,
+            "camera": sync.pictures,
+            "gnss": sync.fixes,
+            "ego": sync.egos,
+        }
         self._ego_stats: StreamStats | None = None
         self._motion = MotionFromGnss()
         calibration = config.camera.calibration if config.camera is not None else None
@@ -120,13 +127,18 @@ class LiveSensors:
         return self._clock.now_ns()
 
     def health(self) -> tuple[StreamHealth, ...]:
-        """How each configured sensor does now."""
+        """How each configured sensor does now. One whose driver or decoder hangs is started anew."""
+        for each in self.inputs.values():
+            for reader in each.readers:
+                reader.look(time.monotonic())
+                if reader.hung:
+                    each.stats.hung = reader.hung
         now_ns = self._clock.now_ns()
         stats = [each.stats for each in self.inputs.values()]
         if self._ego_stats is not None:
             stats.append(self._ego_stats)
         with self._came:
-            return tuple(each.health(now_ns) for each in stats)
+            return tuple(each.health(now_ns, self._streams[each.sensor].implausible) for each in stats)
 
     def _wait(self, timeout_s: float, params: SyncParams) -> Together[Shot] | None:
         end_s = time.monotonic() + timeout_s

@@ -12,6 +12,7 @@ from rosbags.highlevel import AnyReader
 
 from pipeline.common.user_files import check_regular
 from pipeline.formats.velodyne.ros import typestore
+from pipeline.sources.rosbag import unpack_budget
 from pipeline.types.source import SourceError
 
 _SUFFIXES = (".bag", ".db3", ".mcap")
@@ -34,6 +35,7 @@ class Bag:
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        unpack_budget.install()
         try:
             self._reader = AnyReader([path], default_typestore=typestore())
             self._reader.open()

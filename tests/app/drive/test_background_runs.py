@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import pytest
 
 from app.core.detection_cache import DetectionCache
 from app.core.playback_clock import timeline_s
+from app.core.watchdog import Stuck, Watchdog
 from app.drive.background_runs import BackgroundRuns
 from app.drive.frame_inputs import InputStore, without_pixels
 from app.drive.full_run import DriveRun, digest
@@ -19,7 +21,7 @@ from pipeline.detection import Detectors
 from pipeline.params import Params, with_changes
 from pipeline.run import Sensors, run
 from pipeline.step import State, step
-from pipeline.types import Frame
+from pipeline.types import U8, Frame, RawBoxes
 from tests.app.engine.recording_helpers import CountingDetector, Recording, SlowDetector
 
 WAIT_S = 180.0
@@ -314,3 +316,37 @@ def test_what_could_not_be_read_for_a_moment_is_no_frames_final_result(
     undisturbed = [result.objects for _, result in run(Recording(count=6), Params(), Detectors(CountingDetector()))]
     starved = [result.objects for _, result in run(Starved(count=6), Params(), Detectors(CountingDetector()))]
     assert starved == undisturbed
+
+
+@dataclass
+class Hanging(CountingDetector):
+    """Hangs in these of its calls until ``gate`` is set."""
+
+    at: tuple[int, ...] = ()
+    gate: threading.Event = field(default_factory=threading.Event)
+
+    def detect(self, bgr: U8) -> RawBoxes:
+        found = super().detect(bgr)
+        if self.calls in self.at:
+            self.gate.wait(WAIT_S)
+        return found
+
+
+@pytest.mark.parametrize(("at", "note"), [((3,), ""), ((3, 4, 5), "frame 3: the network counting hangs")])
+def test_a_network_that_hangs_is_tried_again_and_given_up_after_the_third_time(
+    drives: BackgroundRuns, at: tuple[int, ...], note: str
+):
+    detector, told = Hanging(at=at), list[Stuck]()
+    drives.watchdog, drives.on_stuck = Watchdog(first_s=1.0), told.append
+    drives.watchdog.start()
+    try:
+        drives.start()
+        drives.open(setup(Recording(), detector))
+        drives.want(Params(), "default")
+        of = wait_done(drives)
+    finally:
+        detector.gate.set()
+        drives.watchdog.stop()
+    assert [(stuck.worker, stuck.doing) for stuck in told] == [("the drive's run", "the network counting")] * len(at)
+    assert of.note == note
+    assert of.is_complete is not bool(note)

@@ -4,12 +4,14 @@ already in the process that the servers are forked from."""
 from __future__ import annotations
 
 import multiprocessing
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
 
 from app.core.server_address import listen_socket
 from app.engine.engine import Engine
@@ -24,7 +26,9 @@ from tests.app.web.serving import WAIT_S
 warm_up()
 
 
-def _serve(file: Path, tell: Connection) -> None:
+def _serve(file: Path | str, tell: Connection, ahead_s: Any) -> None:
+    if ahead_s is not None:
+        _set_clock(ahead_s)
     recording = Recording()
     engine = Engine(
         opener(recording),
@@ -32,7 +36,7 @@ def _serve(file: Path, tell: Connection) -> None:
         Params(),
         uri=recording.uri,
         whole_drives=True,
-        labels=LabelDesk(Database.in_file(file)),
+        labels=LabelDesk(Database.in_file(file) if isinstance(file, Path) else Database(file)),
     )
     engine.start()
     engine.wait_for(lambda shown: shown.labels.labelled, WAIT_S)
@@ -49,10 +53,18 @@ def forking() -> Iterator[ForkServerContext]:
     yield context
 
 
-def started(context: ForkServerContext, file: Path) -> tuple[BaseProcess, str]:
-    """The process and its address, as soon as it answers."""
+def _set_clock(ahead_s: Any) -> None:
+    """The system's clock, as this process sees it, is so much ahead, also when that changes."""
+    seconds, nanoseconds = time.time, time.time_ns
+    time.time = lambda: seconds() + ahead_s.value
+    time.time_ns = lambda: nanoseconds() + round(ahead_s.value * 1e9)
+
+
+def started(context: ForkServerContext, file: Path | str, ahead_s: Any = None) -> tuple[BaseProcess, str]:
+    """The process and its address, as soon as it answers. file: of SQLite, or a database's address. ahead_s: shared
+    value, by which the process's clock is ahead."""
     hear, tell = context.Pipe(duplex=False)
-    process = context.Process(target=_serve, args=(file, tell), daemon=True)
+    process = context.Process(target=_serve, args=(file, tell, ahead_s), daemon=True)
     process.start()
     assert hear.poll(WAIT_S), "the server does not start"
     address: str = hear.recv()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 from collections.abc import Callable
 
 logger = logging.getLogger("cipv.live")
@@ -16,6 +17,9 @@ CONNECT_S = 0.5
 SILENCE_S = 1.5
 """A connection that says nothing for so long is opened anew: its other end may have been unplugged."""
 _PATIENCE_S = 2.0
+HANGS_S = 11.0
+"""A reading that has not asked so long whether it is still wanted hangs in a driver or a decoder: the longest that one
+may take by itself is OpenCV's wait for a camera, 10 s, and a second more."""
 
 
 class DeviceLost(Exception):
@@ -23,18 +27,21 @@ class DeviceLost(Exception):
 
 
 class Stop:
-    """Asked by whoever reads, set when the reading shall end."""
+    """Asked by whoever reads, set when the reading shall end. asked_s: when it was asked last."""
 
     def __init__(self) -> None:
         self._event = threading.Event()
+        self.asked_s = time.monotonic()
 
     def __bool__(self) -> bool:
+        self.asked_s = time.monotonic()
         return self._event.is_set()
 
     def set(self) -> None:
         self._event.set()
 
     def wait(self, seconds: float) -> None:
+        self.asked_s = time.monotonic() + seconds
         self._event.wait(seconds)
 
 
@@ -49,10 +56,29 @@ class Reader:
         self._read, self._say = read, say
         self._stop = Stop()
         self._logged = ""
-        self._thread = threading.Thread(target=self._work, name=f"cipv-{name}", daemon=True)
+        self._name = f"cipv-{name}"
+        self.hung = 0
+        """How often it was started anew because it hung."""
+        self._thread = self._fresh()
 
     def start(self) -> None:
+        self._stop.asked_s = time.monotonic()
         self._thread.start()
+
+    def look(self, now_s: float) -> None:
+        """Start it anew if it hangs. The thread that does cannot be ended; it ends by itself should it ever come
+        back, and says nothing more."""
+        hangs_s = now_s - self._stop.asked_s
+        if not self._thread.is_alive() or hangs_s <= HANGS_S or self._stop:
+            return
+        logger.error("%s hangs for %.0f s and is started anew", self._name, hangs_s)
+        self._stop.set()
+        self.hung, self._stop = self.hung + 1, Stop()
+        self._thread = self._fresh()
+        self._thread.start()
+
+    def _fresh(self) -> threading.Thread:
+        return threading.Thread(target=self._work, args=(self._stop,), name=self._name, daemon=True)
 
     def end(self) -> None:
         """Ask it to end."""
@@ -70,15 +96,22 @@ class Reader:
             logger.exception("while reading %s", self._thread.name)
         self._logged = text
 
-    def _work(self) -> None:
-        while not self._stop:
-            try:
-                self._read(self._stop)
-            except DeviceLost as lost:
-                self._say(str(lost))
-            except OSError as error:
-                self._say(error.strerror or str(error))
-            except Exception as error:  # whatever a driver throws, the other sensors go on and this one is tried again
-                self._log_once(error)
-                self._say(f"{type(error).__name__}: {error}")
-            self._stop.wait(RETRY_S)
+    def _work(self, stop: Stop) -> None:
+        while not stop:
+            text = self._tried(stop)
+            if text and not stop:
+                self._say(text)
+            stop.wait(RETRY_S)
+
+    def _tried(self, stop: Stop) -> str:
+        """Why the reading ended."""
+        try:
+            self._read(stop)
+        except DeviceLost as lost:
+            return str(lost)
+        except OSError as error:
+            return error.strerror or str(error)
+        except Exception as error:  # whatever a driver throws, the other sensors go on and this one is tried again
+            self._log_once(error)
+            return f"{type(error).__name__}: {error}"
+        return ""

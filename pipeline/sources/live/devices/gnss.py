@@ -10,10 +10,11 @@ from dataclasses import replace
 
 import serial
 
-from pipeline.formats.nmea import NmeaReader
+from pipeline.formats.nmea import BadSentence, NmeaReader, parse_sentence
 from pipeline.sources.live.clock import FollowedClock, HostClock
 from pipeline.sources.live.config import GnssConfig
 from pipeline.sources.live.devices.device_reader import CONNECT_S, POLL_S, DeviceLost, Read, Reader, Stop
+from pipeline.sources.live.devices.sender_pin import SenderPin
 from pipeline.sources.live.devices.sensor_input import Deliver
 from pipeline.sources.live.devices.udp import read_datagrams
 from pipeline.sources.live.health import StreamStats
@@ -22,6 +23,9 @@ from pipeline.types import GnssFix
 _SILENT_POLLS = 10
 """Polls of a TCP connection without a byte, two seconds, before it is opened anew; receivers send once a second."""
 _LONGEST = 4096
+_MOST_LINES = 8
+_SILENT_S = 3.0
+"""Of a receiver that sends once a second, three of its periods, as the stream's health has it."""
 
 
 class GnssInput:
@@ -44,6 +48,10 @@ class GnssInput:
         self._sentences = NmeaReader()
         self._has_fix: bool | None = None
         self._rest = b""
+        self._pin = SenderPin(
+            "receiver", config.sender, _is_nmea, self.stats.refused, by_port=False, silent_s=_SILENT_S
+        )
+        self.stats.remarks = (self._pin.said, self._about_clock)
         self.readers: tuple[Reader, ...] = (Reader("gnss", self._read(config), self._say),)
 
     def clock_offset_ms(self) -> float | None:
@@ -52,7 +60,7 @@ class GnssInput:
     def _read(self, config: GnssConfig) -> Read:
         if config.udp_port is not None:
             port, interface = config.udp_port, config.interface
-            return lambda stop: read_datagrams(port, interface, None, self.receive, stop)
+            return lambda stop: read_datagrams(port, interface, None, self.receive, self._pin, stop)
         if config.tcp is not None:
             host, _, number = config.tcp.rpartition(":")
             return lambda stop: _read_tcp(host, int(number), self._bytes, stop)
@@ -95,8 +103,21 @@ class GnssInput:
         self.stats.arrived(arrived_ns, t_ns)
         self._deliver(t_ns, replace(fix, t_ns=t_ns), arrived_ns)
 
+    def _about_clock(self) -> str:
+        times = self._own.jumps
+        return f"its clock was set {times} {'time' if times == 1 else 'times'}" if times else ""
+
     def _say(self, text: str) -> None:
         self.stats.note = text
+
+
+def _is_nmea(data: bytes) -> bool:
+    """Whether a sentence is in it that a receiver may have sent."""
+    for line in data.splitlines()[:_MOST_LINES]:
+        with contextlib.suppress(BadSentence):
+            parse_sentence(line.decode("ascii", errors="replace"))
+            return True
+    return False
 
 
 def _read_tcp(host: str, port: int, receive: Callable[[bytes], None], stop: Stop) -> None:

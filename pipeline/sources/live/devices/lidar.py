@@ -5,14 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from pipeline.formats.velodyne import BadPacket, Vlp16Decoder, read_position
+from pipeline.formats.velodyne import OUT_OF_ORDER, BadPacket, Vlp16Decoder, read_packet, read_position
 from pipeline.sources.live.clock import HostClock
 from pipeline.sources.live.config import LidarConfig
 from pipeline.sources.live.devices.device_reader import Read, Reader
+from pipeline.sources.live.devices.sender_pin import BesidePin, SenderPin
 from pipeline.sources.live.devices.sensor_input import Deliver, whole_hours_off
 from pipeline.sources.live.devices.udp import read_datagrams
 from pipeline.sources.live.health import StreamStats
 from pipeline.types import Sweep
+
+_SILENT_S = 1.0
+"""A VLP-16 sends 754 packets a second; the stream's health calls it silent after as long."""
+_LOOK_EVERY, _MIXED_SHARE = 512, 0.3
+"""Of so many packets, this share that does not fit to the others: those of another sensor, which sends as many. One
+that was set anew costs one packet, and a bad network hardly one in a thousand."""
 
 
 class LidarInput:
@@ -31,10 +38,15 @@ class LidarInput:
         self.on_packet: Callable[[bytes, int], object] | None = None
         self._decoder = Vlp16Decoder(self.T_ego_lidar)
         self.stats.refused = self._decoder.counts.refused  # by the decoder; those of the position port are added
+        self._pin = SenderPin("LiDAR", config.sender, _is_data, self.stats.refused, by_port=True, silent_s=_SILENT_S)
+        self._looked, self._misfits, self._mixed = 0, 0, False
+        self.stats.remarks = (self._pin.said, self._about_clock)
         listen = partial(read_datagrams, interface=config.interface, group=config.multicast_group)
-        listeners = [("lidar", partial(listen, config.data_port, receive=self.receive))]
+        listeners = [("lidar", partial(listen, config.data_port, receive=self.receive, pin=self._pin))]
         if config.position_port is not None:
-            listeners.append(("lidar-position", partial(listen, config.position_port, receive=self.receive_position)))
+            beside = BesidePin(self._pin, config.sender)
+            positions = partial(listen, config.position_port, receive=self.receive_position, pin=beside)
+            listeners.append(("lidar-position", positions))
         self.readers: tuple[Reader, ...] = tuple(
             Reader(name, _until_stopped(read), self._say) for name, read in listeners
         )
@@ -60,6 +72,10 @@ class LidarInput:
         sweep = self._decoder.push(packet, arrived_ns)
         counts = self._decoder.counts
         self.stats.lost = counts.lost
+        if counts.packets - self._looked >= _LOOK_EVERY:
+            misfits = counts.refused[OUT_OF_ORDER]
+            self._mixed = misfits - self._misfits > _MIXED_SHARE * (counts.packets - self._looked)
+            self._looked, self._misfits = counts.packets, misfits
         if counts.models and self.stats.since_ns(arrived_ns) is None:
             self.stats.note = f"packets of a {', '.join(counts.models)}, not of a VLP-16"
         if sweep is not None:
@@ -77,8 +93,24 @@ class LidarInput:
             return
         self.pps, self.follows_gps = position.pps, position.locked
 
+    def _about_clock(self) -> str:
+        """What was wrong with the stamps of its packets."""
+        if self._mixed:
+            return "many packets do not fit to the others: does a second LiDAR have the same address?"
+        jumps, last_s = self._decoder.counts.jumps, self._decoder.counts.jump_s
+        often = "once" if jumps == 1 else f"{jumps} times, last"
+        return f"its clock jumped {often} by {last_s:+.3f} s" if jumps else ""
+
     def _say(self, text: str) -> None:
         self.stats.note = text
+
+
+def _is_data(data: bytes) -> bool:
+    try:
+        read_packet(data)
+    except BadPacket:
+        return False
+    return True
 
 
 def _until_stopped(read: Callable[..., None]) -> Read:

@@ -1,35 +1,66 @@
-"""Datagrams with the moment at which the system received them, however long this program took to look."""
+"""Datagrams with the moment at which the system received them, however long this program took to look.
+
+Once it is known who sends, the system itself turns away nearly all that others send (a socket filter, on Linux): their
+flood neither fills the socket's buffer nor takes this program's time. A few are let through, to be counted and named.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import errno
 import socket
 import struct
 import sys
 import time
 from collections.abc import Callable
+from typing import Protocol
 
 from pipeline.sources.live.devices.device_reader import POLL_S, DeviceLost, Stop
+from pipeline.sources.live.devices.sender_pin import Address
 
 _SO_TIMESTAMPNS = 35
-"""Linux: receive times with every datagram (socket(7)); Python has no name for it."""
+"""Linux: receive times with every datagram (socket(7)); Python has no name for it, nor for the next."""
+_SO_ATTACH_FILTER = 26
 _TIMESPEC = struct.Struct("qq")
 _BUFFER_BYTES = 4 << 20
 """About four seconds of a VLP-16."""
 _LARGEST = 65_535
+_ONE_OF = 32
+"""So many of others' datagrams are turned away for one that is looked at; a power of two. A second LiDAR sends 754 a
+second and is noticed at once; a flood of 100,000 a second costs as much as four LiDARs."""
 
 Receive = Callable[[bytes, int], None]
 """Takes a datagram and the system's clock when it came, nanoseconds since 1970."""
 
 
-def read_datagrams(port: int, interface: str, group: str | None, receive: Receive, stop: Stop) -> None:
+class Pin(Protocol):
+    """Whose datagrams are read. See ``sender_pin``."""
+
+    @property
+    def sender(self) -> Address | None: ...
+
+    def takes(self, data: bytes, sender: Address, at_ns: int) -> bool: ...
+
+    def nothing_came(self) -> None: ...
+
+
+def read_datagrams(port: int, interface: str, group: str | None, receive: Receive, pin: Pin, stop: Stop) -> None:
     """Listen until ``stop``. DeviceLost names the port when it cannot be listened on."""
+    let_in: Address | None = None
     with _listening(port, interface, group) as bound:
         while not stop:
-            with contextlib.suppress(TimeoutError):
-                data, ancillary, _, _ = bound.recvmsg(_LARGEST, socket.CMSG_SPACE(_TIMESPEC.size))
-                receive(data, _received_at(ancillary))
+            if pin.sender != let_in:
+                let_in = pin.sender
+                _let_in(bound, let_in)
+            try:
+                data, ancillary, _, sender = bound.recvmsg(_LARGEST, socket.CMSG_SPACE(_TIMESPEC.size))
+            except TimeoutError:
+                pin.nothing_came()
+                continue
+            at_ns = _received_at(ancillary)
+            if pin.takes(data, sender, at_ns):
+                receive(data, at_ns)
 
 
 def _listening(port: int, interface: str, group: str | None) -> socket.socket:
@@ -53,6 +84,34 @@ def _listening(port: int, interface: str, group: str | None) -> socket.socket:
             raise DeviceLost(f"{where} is in use by another program") from None
         raise DeviceLost(f"cannot listen on {where}: {error.strerror or error}") from None
     return bound
+
+
+def _let_in(bound: socket.socket, sender: Address | None) -> None:
+    """Have the system turn away what others send, but one of ``_ONE_OF``; None lets in everybody. Where it cannot,
+    ``Pin.takes`` alone decides."""
+    if sys.platform != "linux":
+        return
+    program = _program(sender)
+    code = ctypes.create_string_buffer(b"".join(struct.pack("=HBBI", *each) for each in program))
+    with contextlib.suppress(OSError):
+        told = struct.pack("HP", len(program), ctypes.addressof(code))
+        bound.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, told)
+
+
+def _program(sender: Address | None) -> list[tuple[int, int, int, int]]:
+    """In the classic BPF (linux/Documentation/networking/filter.rst): operation, lines to skip if true and if false,
+    operand. A datagram begins with its UDP header; the IP header is at an offset of its own."""
+    load, load_half, masked, if_equal, end = 0x20, 0x28, 0x54, 0x15, 0x06
+    source_host, source_port, random = 0xFFF0_0000 + 12, 0, 0xFFFF_F000 + 56
+    whole, nothing = (end, 0, 0, 0xFFFF_FFFF), (end, 0, 0, 0)
+    if sender is None:
+        return [whole]
+    host, port = int.from_bytes(socket.inet_aton(sender[0]), "big"), sender[1]
+    tests = [(load_half, 0, 0, source_port), (if_equal, 3, 0, port)] if port else []
+    to_sample, to_end = (0, len(tests)) if port else (3, 0)
+    found = (if_equal, to_sample, to_end, host)
+    sample = [(load, 0, 0, random), (masked, 0, 0, _ONE_OF - 1), (if_equal, 0, 1, 0)]
+    return [(load, 0, 0, source_host), found, *tests, *sample, whole, nothing]
 
 
 def _received_at(ancillary: list[tuple[int, int, bytes]]) -> int:

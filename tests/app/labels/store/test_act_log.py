@@ -166,3 +166,24 @@ def test_labels_of_one_drive_are_not_anothers(labels: DriveLabels, database: Dat
     other = DriveLabels(database, info(labels.info.key + " of another"))
     assert not other.has_labels()
     assert DriveLabels(database, replace(labels.info, uri="moved:elsewhere")).has_labels()
+
+
+def test_a_flood_of_acts_of_many_people_is_done_one_after_the_other(labels: DriveLabels) -> None:
+    """Thirty people, three acts each, all at once: more than the database is connected to at a time."""
+    wrong: list[BaseException] = []
+
+    def work(person: str) -> None:
+        try:
+            for number in range(3):
+                act(labels, person, AddTrack(kind="add_track", label="car", frame=number, cuboid=cuboid()))
+        except BaseException as error:
+            wrong.append(error)
+
+    people = [threading.Thread(target=work, args=(f"person {number}",)) for number in range(30)]
+    for each in people:
+        each.start()
+    for each in people:
+        each.join()
+    assert wrong == []
+    assert labels.revision == 90
+    assert sorted(labels.items("track")) == list(range(1, 91))

@@ -135,7 +135,7 @@ class Bench:
         """What the event's reader would have read."""
         each, now_ns = self.source.inputs[event.sensor], self.clock.at_ns
         if event.sensor == "lidar":
-            cast("LidarInput", each).receive(_stamped(event), now_ns)
+            cast("LidarInput", each).receive(stamped(event), now_ns)
         elif event.sensor == "camera":
             cast("CameraInput", each).receive(event.payload, event.stamp_ns // 1000)
         else:
@@ -144,7 +144,7 @@ class Bench:
             cast("GnssInput", each).receive(said, now_ns)
 
 
-def _stamped(event: WireEvent) -> bytes:
+def stamped(event: WireEvent) -> bytes:
     stamp = (event.stamp_ns % _HOUR_NS // 1000).to_bytes(4, "little")
     return bytes(event.payload[:1200] + stamp + event.payload[1204:]) if len(event.payload) == 1206 else event.payload
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import heapq
+import re
+from collections.abc import Iterator
 from typing import cast
 
 import numpy as np
@@ -11,8 +14,9 @@ from pipeline.params import SyncParams
 from pipeline.replay.faults import Fault
 from pipeline.sources.live.devices.gnss import GnssInput
 from pipeline.sources.live.devices.lidar import LidarInput
+from pipeline.types import Frame
 from tests.pipeline.formats.test_nmea import whole
-from tests.pipeline.sources.live.bench import START, Bench, Taken, sent, small_sweep
+from tests.pipeline.sources.live.bench import CONFIG, MS, SECOND, START, Bench, Taken, sent, small_sweep, stamped
 
 FROM_S, TO_S = 1.2, 2.4
 RECOVERED_WITHIN_S = 1.0
@@ -233,3 +237,53 @@ def test_a_receiver_that_talks_but_lost_its_position_says_so() -> None:
     assert said[1] == "no fix yet"
     assert (said[3], said[7]) == ("", "")
     assert said[5] == "no fix: the receiver has lost its position"
+
+
+def packets_of(bench: Bench, seconds: float, other: bool = False) -> Iterator[tuple[int, bytes]]:
+    """When each is sent and what, of a LiDAR that sees a wall 20 m away, or of another one."""
+    for event in sent([], seconds=seconds):
+        if event.sensor == "lidar":
+            stamp_ns = event.stamp_ns + (1_500 * MS + 700_000 if other else 0)
+            yield event.send_ns, stamped(event._replace(stamp_ns=stamp_ns))
+
+
+@pytest.mark.parametrize("jump_s", [-7.25, 3.5, 1800.0])
+def test_a_clock_that_jumps_is_said_and_spoils_no_sweep(jump_s: float) -> None:
+    bench = Bench()
+    lidar = cast("LidarInput", bench.source.inputs["lidar"])
+    taken: list[Frame] = []
+    for event in sent([], seconds=4.0):
+        bench.clock.at_ns = event.send_ns
+        jumped = event.sensor == "lidar" and event.send_ns - START > 2 * SECOND
+        bench.give(event._replace(stamp_ns=event.stamp_ns + round(jump_s * SECOND)) if jumped else event)
+        if (frame := bench.source.next(0.0)) is not None and frame.sweep is not None:
+            taken.append(frame)
+    assert lidar.stats.health(bench.clock.at_ns).note.startswith(f"its clock jumped once by {jump_s:+.1f}")
+    assert len(taken) >= 36, "one or two sweeps are lost where it jumps"
+    assert all(abs(len(f.sweep.points) - len(taken[5].sweep.points)) < 50 for f in taken[3:] if f.sweep)
+    ages_s = [(bench.clock.at_ns - START - (frame.t_ns - START)) / SECOND for frame in taken[-1:]]
+    assert max(ages_s) < 0.3, "on the host's timeline as before"
+
+
+def test_a_second_lidar_with_the_same_address_is_said_and_spoils_no_sweep() -> None:
+    """As both are bought: at 192.168.1.201. Nothing but their times and azimuths tells their packets apart."""
+    bench = Bench()
+    lidar = cast("LidarInput", bench.source.inputs["lidar"])
+    sizes = []
+    mixed = heapq.merge(packets_of(bench, 4.0), packets_of(bench, 4.0, other=True))
+    for send_ns, packet in mixed:
+        bench.clock.at_ns = send_ns
+        lidar.receive(packet, send_ns)
+        if (frame := bench.source.next(0.0)) is not None and frame.sweep is not None:
+            sizes.append(len(frame.sweep.points))
+    assert "does a second LiDAR have the same address?" in lidar.stats.health(bench.clock.at_ns).note
+    assert len(sizes) >= 30
+    assert max(sizes) - min(sizes[3:]) < 100
+
+
+def test_messages_measured_at_an_impossible_time_are_refused_and_said() -> None:
+    late = {"camera": {"url": "http://127.0.0.1:9/", "time_offset_ms": -2000.0}}
+    bench = Bench({**CONFIG, **late})
+    assert all(each.frame.picture is None for each in bench.drive(sent([], seconds=1.0)))
+    camera = next(each for each in bench.source.health() if each.sensor == "camera")
+    assert re.fullmatch(r"\d+ refused whose time cannot be", camera.note)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import resource
 import shutil
 import socket
 import subprocess
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.sources.live.devices.device_reader import DeviceLost, Stop
+from pipeline.sources.live.devices.video_stream import read_stream
 from pipeline.sources.live.source import LiveSensors
 from tests.pipeline.sources.live.rig import frames_until, free_port, loopback_config
 
@@ -57,3 +63,43 @@ def test_a_camera_that_speaks_rtsp(codec: str) -> None:
                 assert (health.sensor, health.note != "") == ("camera", True), "its pictures have no times of their own"
     finally:
         source.close()
+
+
+_OK = b"RTSP/1.0 200 OK\r\nCSeq: 1\r\n"
+FLOODS = {
+    "noise": (b"", os.urandom(65_536)),
+    "packets that nobody asked for": (_OK + b"Public: DESCRIBE\r\n\r\n", b"$\x00\xff\xff" + bytes(65_535)),
+    "a description of gigabytes": (_OK + b"Content-Length: 2147483647\r\n\r\n", b"a=x\r\n" * 10_000),
+}
+
+
+@pytest.mark.parametrize("flood", FLOODS)
+def test_a_camera_that_floods_instead_of_answering_is_given_up_and_takes_no_memory(flood: str) -> None:
+    """As fast as the loopback goes. Given up in a bounded time, however long it goes on."""
+    first, rest = FLOODS[flood]
+    ended = threading.Event()
+
+    def pour(client: socket.socket) -> None:
+        with client, contextlib.suppress(OSError):
+            client.settimeout(1.0)
+            client.recv(4096)
+            client.sendall(first)
+            while not ended.is_set():
+                client.sendall(rest)
+
+    def accept(listener: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while True:
+                threading.Thread(target=pour, args=(listener.accept()[0],), daemon=True).start()
+
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        threading.Thread(target=accept, args=(listener,), daemon=True).start()
+        before, began_s = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.monotonic()
+        try:
+            with pytest.raises(DeviceLost):
+                read_stream(f"rtsp://127.0.0.1:{listener.getsockname()[1]}/", lambda shot: None, Stop())
+        finally:
+            ended.set()
+            listener.shutdown(socket.SHUT_RDWR)
+        assert time.monotonic() - began_s < 15.0
+        assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50_000, "kilobytes"

@@ -1,0 +1,176 @@
+"""Notices worker threads that hang: in a network, in a decoder, in a file system that does not answer.
+
+Each worker says what it begins (``at_work``) and so, by ending it, how long that takes. What takes ``PATIENCE_S``
+longer than it ever has is taken to hang. A thread that hangs in native code cannot be killed: it is retired, that is
+left to itself, and ends by ``Retired`` should it ever come back; whoever owns the worker starts a fresh one. Code that
+hangs while it holds Python's own lock stops this watch, too; a supervisor that asks ``/healthz`` notices that.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+logger = logging.getLogger("cipv.watchdog")
+
+PATIENCE_S = 1.0
+FIRST_S = 30.0
+"""For what has been done less than ``_FEWEST`` times: the first runs of a network make room and compile."""
+NETWORK = "the network "
+"""What begins with that is a network's run."""
+_FEWEST, _KEPT = 20, 2000
+_LOOK_EVERY_S = 0.1
+_LATE_S = 0.5
+"""Where this watch itself comes so much too late, the machine is busy or was asleep, and nobody is blamed for that."""
+
+
+class Retired(BaseException):
+    """Raised in a worker that was taken to hang, once it is back: a fresh one does its work."""
+
+
+@dataclass(frozen=True)
+class Stuck:
+    """A worker that hangs."""
+
+    worker: str
+    """Its name, for people."""
+    doing: str
+    """What it began and does not end."""
+    seconds: float
+    """For how long."""
+    thread_id: int = 0
+    """Of the thread that hangs."""
+
+
+@dataclass(eq=False)
+class _Heart:
+    """A worker. doing: None while it waits for work."""
+
+    name: str
+    on_stuck: Callable[[Stuck], object]
+    thread_id: int = field(default_factory=threading.get_ident)
+    doing: str | None = None
+    since_s: float = 0.0
+    retired: bool = False
+
+
+class _OfThread(threading.local):
+    heart: _Heart | None = None
+    watchdog: Watchdog | None = None
+
+
+_of_thread = _OfThread()
+
+
+@contextmanager
+def at_work(doing: str) -> Iterator[None]:
+    """What this thread does in the block; within another one, instead of what that one says. On a thread that nobody
+    watches it says nothing. Retired when it took too long."""
+    heart, watchdog = _of_thread.heart, _of_thread.watchdog
+    if heart is None or watchdog is None:
+        yield
+        return
+    outer = heart.doing
+    watchdog.begins(heart, doing)
+    try:
+        yield
+    finally:
+        watchdog.begins(heart, outer)
+        if heart.retired:
+            raise Retired
+
+
+class Watchdog:
+    """The one place that knows what every worker does, and how long it usually takes. Any thread.
+
+    Args:
+        patience_s: how much longer than ever something may take.
+        first_s: how long it may take while that is not known.
+    """
+
+    def __init__(self, patience_s: float = PATIENCE_S, first_s: float = FIRST_S) -> None:
+        self._patience_s, self._first_s = patience_s, first_s
+        self._lock = threading.Lock()
+        self._hearts: set[_Heart] = set()
+        self._took_s: dict[str, deque[float]] = {}
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="cipv-watchdog", daemon=True)
+
+    def start(self) -> None:
+        self._thread.start()
+
+    def stop(self) -> None:
+        self._ended.set()
+
+    @contextmanager
+    def watching(self, name: str, on_stuck: Callable[[Stuck], object]) -> Iterator[None]:
+        """This thread is a worker as long as the block lasts. on_stuck: called on another thread, once, when it hangs;
+        from then on it is retired."""
+        heart = _Heart(name, on_stuck)
+        _of_thread.heart, _of_thread.watchdog = heart, self
+        with self._lock:
+            self._hearts.add(heart)
+        try:
+            yield
+        except Retired:
+            logger.warning("%s is back and ends: another has taken its place", name)
+        finally:
+            _of_thread.heart = _of_thread.watchdog = None
+            with self._lock:
+                self._hearts.discard(heart)
+
+    def begins(self, heart: _Heart, doing: str | None) -> None:
+        """A worker begins something, and so has ended what it did before."""
+        now_s = time.monotonic()
+        with self._lock:
+            if heart.doing is not None:
+                self._took_s.setdefault(heart.doing, deque(maxlen=_KEPT)).append(now_s - heart.since_s)
+            heart.doing, heart.since_s = doing, now_s
+
+    def allowed_s(self, doing: str) -> float:
+        """How long something may take."""
+        took_s = self._took_s.get(doing, ())
+        return max(took_s) + self._patience_s if len(took_s) >= _FEWEST else self._first_s
+
+    def look(self, now_s: float, late_s: float = 0.0) -> list[Stuck]:
+        """Retire who hangs, and tell. late_s: how much later than wanted this look is."""
+        found: list[tuple[_Heart, Stuck]] = []
+        with self._lock:
+            for heart in self._hearts:
+                if late_s > _LATE_S:
+                    heart.since_s += late_s
+                if heart.doing is None or heart.retired or now_s - heart.since_s <= self.allowed_s(heart.doing):
+                    continue
+                heart.retired = True
+                found.append((heart, Stuck(heart.name, heart.doing, now_s - heart.since_s, heart.thread_id)))
+        for heart, stuck in found:
+            logger.error("%s hangs: %s, for %.1f s\n%s", *_told(stuck), _stack(heart.thread_id))
+            try:
+                heart.on_stuck(stuck)
+            except Exception:  # the watch goes on, whatever becomes of one worker
+                logger.exception("%s could not be started anew", heart.name)
+        return [stuck for _, stuck in found]
+
+    def _watch(self) -> None:
+        looked_s = time.monotonic()
+        while not self._ended.wait(_LOOK_EVERY_S):
+            now_s = time.monotonic()
+            self.look(now_s, now_s - looked_s - _LOOK_EVERY_S)
+            looked_s = now_s
+
+
+def _told(stuck: Stuck) -> tuple[str, str, float]:
+    return stuck.worker, stuck.doing, stuck.seconds
+
+
+def _stack(thread_id: int) -> str:
+    """Where a thread is now."""
+    frame = sys._current_frames().get(thread_id)
+    return "".join(traceback.format_stack(frame)) if frame is not None else ""

@@ -1,0 +1,116 @@
+"""The engine's thread, and the fresh one that takes its place when it hangs."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import partial
+from typing import Protocol
+
+from app.core.watchdog import NETWORK, Stuck, Watchdog
+from app.drive.compute_scheduler import ComputeScheduler
+
+_MOST_HANGS = 3
+"""What hangs so often, of one source, is not tried again."""
+_GIVES_UP = ". It hangs again and again: networks are off and playback is paused until a source is opened"
+
+
+class Say(Protocol):
+    """Tells people of a worker that hangs."""
+
+    def __call__(self, stuck: Stuck, more: str = "") -> object:
+        """more: what else there is to say."""
+        ...
+
+
+class Takeovers:
+    """Runs ``work(is_first)`` on a thread of its own, and once more on another when that one hangs. ``wake`` makes a
+    worker that waits look at ``asked``.
+
+    What is recorded goes on meanwhile: the threads of the sensors and of the recorder have nothing to do with it. The
+    thread that hangs does nothing more, should it come back (``app.core.watchdog``).
+    """
+
+    def __init__(
+        self,
+        watchdog: Watchdog,
+        work: Callable[[bool], None],
+        say: Say,
+        wake: Callable[[], object],
+        turn: ComputeScheduler,
+    ) -> None:
+        self._watchdog, self._do, self._say, self._wake, self._turn = watchdog, work, say, wake, turn
+        self._lock = threading.Lock()
+        self._count, self._ended = 0, False
+        self._is_asked = False
+        self._last: Stuck | None = None
+        self._hangs: Counter[str] = Counter()
+        self.thread = self._fresh()
+
+    @property
+    def gives_up(self) -> bool:
+        """Whether something hangs again and again, so that networks shall not run, and playback shall not go on."""
+        return any(count >= _MOST_HANGS for count in self._hangs.values())
+
+    @property
+    def of_network(self) -> bool:
+        """Whether what hung last was a network."""
+        return self._last is not None and self._last.doing.startswith(NETWORK)
+
+    def asked(self) -> bool:
+        """For the worker, once each time: its helper hangs, so it shall go on with fresh parts."""
+        asked, self._is_asked = self._is_asked, False
+        return asked
+
+    def begin(self) -> None:
+        self._watchdog.start()
+        self.thread.start()
+
+    def end(self, patience_s: float) -> None:
+        """Begin no other, and wait for the one that works, unless it is the caller."""
+        with self._lock:
+            self._ended = True
+        self._watchdog.stop()
+        if self.thread.is_alive() and self.thread is not threading.current_thread():
+            self.thread.join(patience_s)
+
+    def forget(self) -> None:
+        """Another source may do better."""
+        self._hangs.clear()
+
+    def watching_helper(self, name: str) -> AbstractContextManager[None]:
+        """Around what another thread does for the present worker."""
+        return self._watchdog.watching(name, partial(self._on_helper_stuck, self._count))
+
+    def _fresh(self) -> threading.Thread:
+        return threading.Thread(target=self._work, args=(self._count,), name="cipv-engine", daemon=True)
+
+    def _work(self, count: int) -> None:
+        with self._watchdog.watching("the engine", partial(self._on_stuck, count)):
+            self._do(count == 0)
+
+    def _on_stuck(self, count: int, stuck: Stuck) -> None:
+        """On the watchdog's thread."""
+        with self._lock:
+            if count != self._count or self._ended:
+                return
+            self._count += 1
+            self._tell(stuck)
+            self.thread = self._fresh()
+            self.thread.start()
+
+    def _on_helper_stuck(self, count: int, stuck: Stuck) -> None:
+        """The worker itself is well, or is found to hang by the same thing."""
+        with self._lock:
+            if count == self._count and not self._ended:
+                self._tell(stuck)
+                self._is_asked = True
+        self._wake()
+
+    def _tell(self, stuck: Stuck) -> None:
+        self._last = stuck
+        self._hangs[stuck.doing] += 1
+        self._say(stuck, _GIVES_UP if self.gives_up else "")
+        self._turn.leave_out(stuck.thread_id)

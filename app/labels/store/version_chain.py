@@ -1,0 +1,45 @@
+"""Frozen versions chained by hash: each holds the SHA-256 of what it says and of the version before it.
+
+So one that is changed in the database, or taken out from under another, is refused when it is read. It is no signature:
+whoever may write the database can make the chain anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from sqlalchemy import Connection, select
+
+from app.labels.errors import ActRefused
+from app.labels.store.tables import VersionRow
+
+_SAID = ("name", "person", "t_unix_ms", "tracks", "frames")
+
+
+def chained(connection: Connection, values: Mapping[str, Any]) -> dict[str, Any]:
+    """A new version's row, after the last one of its drive."""
+    rows = connection.execute(
+        select(VersionRow.previous, VersionRow.sha256).where(VersionRow.drive_id == values["drive_id"])
+    ).all()
+    followed = {row.previous for row in rows}
+    previous = max((row.sha256 for row in rows if row.sha256 not in followed), default="")
+    return {**values, "previous": previous, "sha256": _sha256(values, previous)}
+
+
+def check(connection: Connection, row: VersionRow | Any) -> None:
+    """ActRefused when a version is not as it was frozen; one from before there was a chain is taken as it is."""
+    if not row.sha256:
+        return
+    if row.sha256 != _sha256({name: getattr(row, name) for name in (*_SAID, "labels")}, row.previous):
+        raise ActRefused(f"version {row.name!r} was changed in the database since it was frozen")
+    before = select(VersionRow.name).where(VersionRow.drive_id == row.drive_id, VersionRow.sha256 == row.previous)
+    if row.previous and connection.execute(before).first() is None:
+        raise ActRefused(f"the version before {row.name!r} was changed or taken out of the database")
+
+
+def _sha256(values: Mapping[str, Any], previous: str) -> str:
+    said = json.dumps([previous, *(values[name] for name in _SAID)], ensure_ascii=False)
+    return hashlib.sha256(said.encode() + b"\0" + values["labels"]).hexdigest()

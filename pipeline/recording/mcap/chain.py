@@ -1,0 +1,224 @@
+"""A file whose parts are chained by hash: after each chunk a metadata record holds the SHA-256 of all bytes since the
+record before, and of that record's own hash.
+
+So a byte that is changed, a part that is taken out and a part that is put in are found, and where. Whoever changes the
+file with this program, or makes the whole chain anew, leaves no trace: a chain shows damage and careless changes, it is
+no signature. Other programs ignore these records; they are not in the file's index.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, Literal, NamedTuple, Protocol
+
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import Metadata
+
+from pipeline.common.progress import Progress, silent
+from pipeline.common.user_files import open_regular
+from pipeline.recording.mcap.index import MAGIC, RECORD_HEAD, Unreadable, read_directory
+
+NAME = "cipv-studio/chain"
+BEGINNING = ""
+"""The hash before the first."""
+_PIECE_BYTES = 1 << 20
+_LONGEST_LINK = 1024
+
+State = Literal["not chained", "intact", "cut off", "changed"]
+
+
+class Link(NamedTuple):
+    """A record of the chain. previous: the hash in the record before. sha256: of that text and all bytes since that
+    record. is_last: no message follows."""
+
+    previous: str
+    sha256: str
+    is_last: bool
+
+    def record(self) -> bytes:
+        """As it is in the file."""
+        builder = RecordBuilder()
+        Metadata(NAME, {"previous": self.previous, "sha256": self.sha256, "last": str(int(self.is_last))}).write(
+            builder
+        )
+        return builder.end()
+
+
+@dataclass(frozen=True)
+class Chain:
+    """What the chain of a file says."""
+
+    state: State
+    """``cut off``: intact as far as it goes, and it does not go to the end."""
+    changed: tuple[str, ...] = ()
+    """Where the file is not as it was written, in words."""
+
+
+class Writes(Protocol):
+    """Where a file's bytes go."""
+
+    def write(self, data: bytes, /) -> int: ...
+
+
+class ChainWriter:
+    """Hashes what is written, and puts a link behind it when asked to. previous: the last link's hash in a file that is
+    gone on with."""
+
+    def __init__(self, stream: Writes, previous: str = BEGINNING) -> None:
+        self._stream, self._previous = stream, previous
+        self._hash = hashlib.sha256(previous.encode())
+        self._has_more = False
+
+    def wrote(self, data: bytes) -> None:
+        """These bytes were written."""
+        self._hash.update(data)
+        self._has_more = True
+
+    def link(self, *, is_last: bool = False) -> None:
+        """A record over everything since the one before; none when that is nothing."""
+        if not self._has_more and not is_last:
+            return
+        link = Link(self._previous, self._hash.hexdigest(), is_last)
+        self._stream.write(link.record())
+        self._previous = link.sha256
+        self._hash, self._has_more = hashlib.sha256(link.sha256.encode()), False
+
+
+def verify(path: Path, progress: Progress = silent) -> Chain:
+    """Read the whole file. progress: of bytes. OSError when it cannot be read."""
+    with open_regular(path) as file:
+        size = file.seek(0, io.SEEK_END)
+        return _Walk(file, size, progress).chain()
+
+
+def link_at(file: BinaryIO, offset: int) -> tuple[Link, int] | None:
+    """The link at a place of a file and how long its record is; None when there is none."""
+    file.seek(offset)
+    head = file.read(RECORD_HEAD.size)
+    if len(head) < RECORD_HEAD.size:
+        return None
+    opcode, length = RECORD_HEAD.unpack(head)
+    link = _link(file.read(length)) if opcode == Opcode.METADATA and length <= _LONGEST_LINK else None
+    return (link, RECORD_HEAD.size + length) if link is not None else None
+
+
+class _Walk:
+    """Record by record."""
+
+    def __init__(self, file: BinaryIO, size: int, progress: Progress) -> None:
+        self._file, self._size, self._progress = file, size, progress
+        self._links, self._has_data_end, self._ended = 0, False, False
+        self._changed: list[str] = []
+
+    def chain(self) -> Chain:
+        end = self._follow()
+        if not self._has_data_end and self._ends_whole():
+            self._changed.append(f"from byte {end:,} on it is no MCAP file")
+        if not self._links and not self._names_a_link():
+            return Chain("not chained")
+        if self._ended:
+            self._changed += self._differences_of_summary()
+        if self._changed:
+            return Chain("changed", tuple(self._changed))
+        return Chain("intact" if self._ended else "cut off")
+
+    def _ends_whole(self) -> bool:
+        return b"".join(self._pieces(max(0, self._size - len(MAGIC)), len(MAGIC))) == MAGIC
+
+    def _names_a_link(self) -> bool:
+        """Whether the file was chained, though no link can be come to."""
+        before = b""
+        for piece in self._pieces(0, self._size):
+            if NAME.encode() in before + piece:
+                return True
+            before = piece[-len(NAME) :]
+        return False
+
+    def _follow(self) -> int:
+        """Check link by link. Returns where it cannot go on."""
+        part, previous = hashlib.sha256(BEGINNING.encode()), BEGINNING
+        begin = offset = 0
+        offset += self._hashed(0, len(MAGIC), part)
+        has_more, is_last = False, False
+        while (found := self._head(offset)) is not None:
+            opcode, length = found
+            link = link_at(self._file, offset)
+            if opcode == Opcode.DATA_END:
+                self._has_data_end, self._ended = True, is_last
+                if has_more:
+                    self._changed.append(f"bytes {begin:,} to {offset:,} were put in")
+                return offset
+            if link is None:
+                self._hashed(offset, length, part)
+                has_more = True
+            else:
+                told = link[0]
+                if told.previous != previous:
+                    self._changed.append(f"something before byte {begin:,} was taken out or put in")
+                    part = self._part(begin, offset, told.previous)
+                if part.hexdigest() != told.sha256:
+                    self._changed.append(f"bytes {begin:,} to {offset:,} were changed")
+                self._links, previous, is_last = self._links + 1, told.sha256, told.is_last
+                begin, has_more = offset + length, False
+                part = hashlib.sha256(previous.encode())
+            offset += length
+            self._progress(offset, self._size)
+        return offset
+
+    def _part(self, begin: int, end: int, previous: str) -> hashlib._Hash:
+        part = hashlib.sha256(previous.encode())
+        self._hashed(begin, end - begin, part)
+        return part
+
+    def _head(self, offset: int) -> tuple[int, int] | None:
+        """Operation and length, with its head, of a record that is whole."""
+        self._file.seek(offset)
+        head = self._file.read(RECORD_HEAD.size)
+        if len(head) < RECORD_HEAD.size:
+            return None
+        opcode, length = RECORD_HEAD.unpack(head)
+        length += RECORD_HEAD.size
+        return (opcode, length) if opcode and offset + length <= self._size else None
+
+    def _hashed(self, offset: int, length: int, into: hashlib._Hash) -> int:
+        for piece in self._pieces(offset, length):
+            into.update(piece)
+        return length
+
+    def _pieces(self, offset: int, length: int) -> Iterator[bytes]:
+        self._file.seek(offset)
+        while length and (piece := self._file.read(min(length, _PIECE_BYTES))):
+            length -= len(piece)
+            yield piece
+
+    def _differences_of_summary(self) -> list[str]:
+        """The index at the file's end is made from what the chain covers, and must say the same."""
+        try:
+            by_index = read_directory(self._file, self._size)
+        except Unreadable as error:
+            return [str(error)]
+        if by_index.problem is not None:
+            return ["the index at its end is damaged"]
+        by_data = read_directory(self._file, self._size, walk=True)
+        by_data.metadata.pop(NAME, None)
+        same = [(each.offset, each.length, each.start_ns, each.end_ns) for each in by_index.chunks] == [
+            (each.offset, each.length, each.start_ns, each.end_ns) for each in by_data.chunks
+        ]
+        same = same and (by_index.attachments, by_index.metadata) == (by_data.attachments, by_data.metadata)
+        return [] if same else ["the index at its end does not fit to the data"]
+
+
+def _link(content: bytes) -> Link | None:
+    try:
+        record = Metadata.read(ReadDataStream(io.BytesIO(content)))
+        if record.name != NAME:
+            return None
+        values = record.metadata
+        return Link(values["previous"], values["sha256"], values["last"] == "1")
+    except Exception:  # damaged bytes make the library raise whatever they like
+        return None

@@ -1,0 +1,131 @@
+"""Whose datagrams a UDP port takes. UDP has no connection: whoever reaches the port is heard, so one sender is chosen.
+
+It is the first one that sends something valid, until it falls silent, or only the address that the config names. What
+others send is refused, counted and named, so that a second LiDAR on the port cannot spoil the sweeps of the first.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable
+
+Address = tuple[str, int]
+"""A sender's IPv4 address and port."""
+
+_NAMED_S = 3.0
+"""Others are named for so long after they were heard last."""
+_MOST_NAMED = 3
+OTHERS = "of another sender"
+"""Under which their datagrams are counted."""
+
+
+class SenderPin:
+    """What one port lets in. For one thread; ``said`` for any.
+
+    Args:
+        what: the kind of sensor, for people, as ``LiDAR``.
+        allowed: the only address that may send; None for the first that sends something valid.
+        is_valid: whether a datagram is one of such a sensor. What is not chooses no sender.
+        refused: where datagrams of others are counted.
+        by_port: the sensor sends all from one port, so another port of its address is another sender.
+        silent_s: a sender that has said nothing for so long is gone, and another may take its place.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        allowed: str | None,
+        is_valid: Callable[[bytes], bool],
+        refused: Counter[str],
+        *,
+        by_port: bool,
+        silent_s: float,
+        now_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._what, self._allowed, self._is_valid, self._refused = what, allowed, is_valid, refused
+        self._by_port, self._silent_s, self._now_s = by_port, silent_s, now_s
+        self.sender: Address | None = None
+        """Who sends; port 0 stands for any. None before the first, and once it has fallen silent."""
+        self._heard_s, self._sent_ns = 0.0, 0
+        self._last: Address | None = None
+        self._before: str | None = None
+        self._others: dict[str, tuple[float, bool]] = {}
+
+    def takes(self, data: bytes, sender: Address, at_ns: int) -> bool:
+        """Whether to read a datagram that came at ``at_ns``. While there is no sender everything of an allowed address
+        is read, so that the reader can say what is wrong with it."""
+        host, port = sender
+        who = (host, port if self._by_port else 0)
+        if who != self.sender:
+            has_gone = self.sender is None or at_ns - self._sent_ns > self._silent_s * 1e9
+            if not has_gone or self._allowed not in (None, host):
+                self._turn_away(data, host)
+                return False
+            if not self._is_valid(data):
+                return True
+            self._choose(who)
+        self._heard_s, self._sent_ns = self._now_s(), at_ns
+        return True
+
+    def nothing_came(self) -> None:
+        """Nobody has sent anything lately."""
+        if self.sender is not None and self._now_s() - self._heard_s > self._silent_s:
+            self._last, self.sender = self.sender, None
+
+    def said(self) -> str:
+        """Who else sends to the port, and whether the sender has changed; empty while there is nothing to say."""
+        now_s, sender = self._now_s(), self.sender
+        lately = {host: valid for host, (at_s, valid) in tuple(self._others.items()) if now_s - at_s <= _NAMED_S}
+        second = [host for host, valid in lately.items() if valid]
+        noise = [host for host, valid in lately.items() if not valid]
+        return "; ".join(
+            text
+            for text in (
+                f"a second {self._what} on this port is ignored: {_named(second)}" if second else "",
+                f"datagrams of {_named(noise)} are ignored" if noise else "",
+                f"comes from {sender[0]} now, before from {self._before}" if self._before and sender else "",
+            )
+            if text
+        )
+
+    def _choose(self, who: Address) -> None:
+        last = self.sender or self._last
+        if last is not None and last[0] != who[0]:
+            self._before = last[0]
+        self.sender = who
+        self._others.pop(who[0], None)
+
+    def _turn_away(self, data: bytes, host: str) -> None:
+        self._refused[OTHERS] += 1
+        if host in self._others or len(self._others) < _MOST_NAMED:
+            self._others[host] = self._now_s(), self._is_valid(data)
+            return
+        oldest = min(self._others, key=lambda each: self._others[each][0])
+        if self._now_s() - self._others[oldest][0] > _NAMED_S:
+            del self._others[oldest]
+
+
+class BesidePin:
+    """What a sensor's second port lets in: datagrams of the address that its first one has chosen, or of the allowed
+    one before that."""
+
+    def __init__(self, first: SenderPin, allowed: str | None) -> None:
+        self._first, self._allowed = first, allowed
+
+    @property
+    def sender(self) -> Address | None:
+        first = self._first.sender
+        return (first[0], 0) if first is not None else None
+
+    def takes(self, data: bytes, sender: Address, at_ns: int) -> bool:
+        """As of ``SenderPin``. Others are counted where the sweeps come from, not here."""
+        first = self._first.sender
+        return sender[0] == first[0] if first is not None else self._allowed in (None, sender[0])
+
+    def nothing_came(self) -> None:
+        """The first port says whether the sensor is silent."""
+
+
+def _named(hosts: list[str]) -> str:
+    return ", ".join(hosts)

@@ -1,0 +1,99 @@
+"""Budgets for what a bag unpacks to: ``rosbags`` has none, and a few kilobytes can unpack to terabytes.
+
+The library looks its decompressors up in tables of its modules; bounded ones are put there.
+"""
+
+from __future__ import annotations
+
+import bz2
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+from lz4.frame import LZ4FrameDecompressor
+from rosbags.rosbag1 import reader as rosbag1
+from rosbags.rosbag2 import reader as rosbag2
+from rosbags.rosbag2 import storage_mcap
+
+from pipeline.recording.mcap.chunk import LARGEST_CHUNK_BYTES
+
+_LARGEST_FILE_BYTES, _LARGEST_RATIO = 1 << 30, 50
+"""Of a bag that is compressed as one file: what it may unpack to whatever its size, and how many times its size. Clouds
+and pictures shrink to a third, logs to a twentieth."""
+
+Unpack = Callable[[bytes], bytes]
+
+
+class TooLarge(ValueError):
+    """What unpacks to more than it may."""
+
+
+class Decompressor(Protocol):
+    """As of bz2, lz4 and zstd."""
+
+    @property
+    def eof(self) -> bool: ...
+
+    def decompress(self, data: bytes, max_length: int) -> bytes: ...
+
+
+def bounded(new: Callable[[], Any], largest: int = LARGEST_CHUNK_BYTES) -> Unpack:
+    """Unpacks all of some bytes. TooLarge for more than ``largest``, of which no more than that was unpacked;
+    ValueError when they are cut off."""
+
+    def unpack(data: bytes) -> bytes:
+        decompressor: Decompressor = new()
+        unpacked = decompressor.decompress(data, max_length=largest + 1)
+        if len(unpacked) > largest:
+            raise TooLarge(f"a chunk that unpacks to more than {largest >> 20} MB")
+        if not decompressor.eof:
+            raise ValueError("a chunk that is cut off")
+        return unpacked
+
+    return unpack
+
+
+class _BoundedFile:
+    """Reads an unpacked file up to its budget."""
+
+    def __init__(self, file: Any, largest: int) -> None:
+        self._file, self._left = file, largest
+
+    def __enter__(self) -> _BoundedFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def read(self, size: int = -1) -> bytes:
+        data: bytes = self._file.read(size)
+        self._left -= len(data)
+        if self._left < 0:
+            raise TooLarge("a file that unpacks to more than it may")
+        return data
+
+
+class _Zstd:
+    """The part of the zstd module that the library's reader of ROS 2 bags uses."""
+
+    def __init__(self, module: Any) -> None:
+        self._module = module
+        self.decompress = bounded(module.ZstdDecompressor)
+
+    def open(self, file: Any, mode: str) -> Any:
+        size = Path(file.name).stat().st_size
+        return _BoundedFile(self._module.open(file, mode), max(_LARGEST_FILE_BYTES, _LARGEST_RATIO * size))
+
+
+def install() -> None:
+    """Put the bounded ones in the library's place. Safe to call twice."""
+    library: Any = rosbag2
+    if isinstance(library.zstd, _Zstd):
+        return
+    zstd, lz4 = bounded(library.zstd.ZstdDecompressor), bounded(LZ4FrameDecompressor)
+    library.zstd = _Zstd(library.zstd)
+    rosbag1.decompressors |= {"bz2": bounded(bz2.BZ2Decompressor), "lz4": lz4}
+    storage_mcap.DECOMPRESSORS |= {
+        "lz4": lambda data, _: lz4(data),
+        "zstd": lambda data, _: zstd(data),
+    }

@@ -1,0 +1,65 @@
+"""Who takes longer than ever is noticed; who is slow by habit, who waits, and a machine that slept are not blamed."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from app.core.watchdog import Retired, Stuck, Watchdog, at_work
+
+
+def worked(watchdog: Watchdog, doing: str, took_s: list[float], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each began and ended, on a clock that is put."""
+    for took in took_s:
+        with monkeypatch.context() as patch:
+            times = iter([0.0, took])
+            patch.setattr("app.core.watchdog.time.monotonic", lambda times=times: next(times))
+            with at_work(doing):
+                pass
+
+
+def _work_too_long(watchdog: Watchdog) -> None:
+    now_s = time.monotonic()
+    with at_work("the network"):
+        assert watchdog.look(now_s + 1.6) == []
+        assert watchdog.look(now_s + 1.9) != []
+        assert watchdog.look(now_s + 9.0) == [], "told once"
+
+
+def test_a_call_may_take_its_worst_time_and_the_patience_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    watchdog, told = Watchdog(patience_s=1.0, first_s=30.0), list[Stuck]()
+    with watchdog.watching("a worker", told.append):
+        assert watchdog.allowed_s("the network") == 30.0
+        worked(watchdog, "the network", [0.2] * 19 + [0.7], monkeypatch)
+        assert watchdog.allowed_s("the network") == pytest.approx(1.7)
+        with pytest.raises(Retired):
+            _work_too_long(watchdog)
+    (stuck,) = told
+    assert (stuck.worker, stuck.doing) == ("a worker", "the network")
+    assert stuck.thread_id == threading.get_ident()
+
+
+def test_who_waits_for_work_does_not_hang_nor_who_was_asleep_with_the_machine() -> None:
+    watchdog = Watchdog(first_s=1.0)
+    with watchdog.watching("a worker", lambda stuck: None):
+        assert watchdog.look(time.monotonic() + 1e6) == []
+        with at_work("reading"):
+            asleep_s = 3600.0
+            assert watchdog.look(time.monotonic() + asleep_s, late_s=asleep_s) == []
+
+
+def test_what_is_done_within_something_else_counts_for_itself() -> None:
+    watchdog = Watchdog(first_s=5.0)
+    with watchdog.watching("a worker", lambda stuck: None), at_work("the pipeline"):
+        with at_work("the network"):
+            pass
+        assert watchdog.look(time.monotonic() + 4.0) == []
+        with at_work("the network"):
+            assert watchdog.look(time.monotonic() + 4.0) == []
+
+
+def test_a_thread_that_nobody_watches_may_say_what_it_likes() -> None:
+    with at_work("anything"):
+        pass

@@ -1,0 +1,285 @@
+"""What runs in a chaos soak, and what befalls it: a server that is labelled on, a recorder, and who is around them."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import re
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing.context import ForkServerContext
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import httpx
+from sqlalchemy import select
+from websockets.sync.client import connect
+
+from app.labels.store.database import Database
+from app.labels.store.drive_labels import DriveLabels
+from app.labels.store.tables import DriveRow
+from pipeline.recording import topics
+from pipeline.recording.mcap.chain import verify
+from pipeline.recording.rewrite import recover
+from pipeline.recording.session.messages import log_text
+from pipeline.recording.session.source import SessionSource
+from tests.app.labels.conftest import info
+from tests.app.labels.kills import CUBOID
+from tests.app.labels.server_process import started
+from tests.conftest import ROOT
+from tests.pipeline.recording.frames import PERIOD_NS
+
+_ANSWER_S = 20.0
+_JUMPS_S = (-86_400.0, -30.0, 30.0, 86_400.0)
+_FRAMES = 30
+
+
+@dataclass
+class Figures:
+    """What happened in all, and what must be empty: ``wrong``."""
+
+    befell: Counter[str] = field(default_factory=Counter)
+    """By kind."""
+    acts: int = 0
+    """Labels that were answered as done."""
+    refused: int = 0
+    """Answered as not done, or not at all."""
+    sessions: int = 0
+    """That a recorder began, until it was killed or the disk was full."""
+    frames: int = 0
+    """Of these, read back."""
+    drives: int = 0
+    """Whole drives whose every final frame was compared."""
+    clients: int = 0
+    """That misbehaved."""
+    checks: int = 0
+    wrong: list[str] = field(default_factory=list)
+    resident_mb: list[float] = field(default_factory=list)
+    """Of the server, at each check."""
+
+
+class LabelledServer:
+    """A server on one database, started anew whenever it was killed, and somebody who labels on it without a pause."""
+
+    def __init__(self, context: ForkServerContext, url: str, figures: Figures) -> None:
+        self._context, self.url, self.figures = context, url, figures
+        self._ahead_s = context.Value("d", 0.0)
+        self.process: BaseProcess
+        self.address = ""
+        self._said: dict[int, int] = {}
+        self._first_rows: dict[str, list[Any]] | None = None
+        self._number = 0
+        self.start()
+
+    def start(self) -> None:
+        self.process, self.address = started(self._context, self.url, self._ahead_s)
+
+    def label(self, stop: threading.Event) -> None:
+        """One track after the other, until ``stop``; after each kill on the next server."""
+        while not stop.is_set():
+            with httpx.Client(base_url=self.address, timeout=_ANSWER_S) as client:
+                try:
+                    drive = client.get("/api/labels").json()["drive"]["id"]
+                    while not stop.is_set():
+                        self._label_once(client, drive)
+                except (httpx.HTTPError, KeyError, ValueError):
+                    self.figures.refused += 1
+                    stop.wait(0.1)
+
+    def _label_once(self, client: httpx.Client, drive: int) -> None:
+        frame, self._number = self._number % _FRAMES, self._number + 1
+        body = {"kind": "add_track", "label": f"car {self._number}", "frame": frame, "cuboid": CUBOID}
+        answer = client.post("/api/labels/act", json={"person": "Ada", "act": body, "drive": drive})
+        if answer.is_success:
+            self._said[answer.json()["act"]] = frame
+            self.figures.acts += 1
+        else:
+            self.figures.refused += 1
+            time.sleep(0.05)
+
+    # ------------------------------------------------------------ what befalls it
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.join()
+        self.start()
+
+    def freeze(self) -> None:
+        """As a machine that sleeps."""
+        os.kill(self.process.pid or 0, signal.SIGSTOP)
+        time.sleep(1.5)
+        os.kill(self.process.pid or 0, signal.SIGCONT)
+
+    def set_clock(self) -> None:
+        self._ahead_s.value = random.choice(_JUMPS_S)
+
+    def use_up_descriptors(self) -> None:
+        """It can open none for two seconds."""
+        pid = self.process.pid or 0
+        soft, hard = resource.prlimit(pid, resource.RLIMIT_NOFILE)
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (len(os.listdir(f"/proc/{pid}/fd")), hard))
+        time.sleep(2.0)
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (soft, hard))
+
+    def kill_database(self) -> None:
+        """One of PostgreSQL's processes dies, and all start anew. A file has none."""
+        folder = re.search(r"host=(\S+)", self.url)
+        if folder is None:
+            return
+        main = int((Path(folder[1]) / "data" / "postmaster.pid").read_text().split()[0])
+        for child in Path(f"/proc/{main}/task/{main}/children").read_text().split():
+            if b"tester" in Path(f"/proc/{child}/cmdline").read_bytes():
+                os.kill(int(child), signal.SIGKILL)
+                return
+
+    # ------------------------------------------------------------ what must hold
+
+    def check(self) -> None:
+        """Every act that was answered is there, and every final frame is what it was the first time."""
+        figures, said = self.figures, dict(self._said)
+        database = Database(self.url)
+        try:
+            with database.reading() as connection:
+                key = connection.scalars(select(DriveRow.key)).one()
+            changes = DriveLabels(database, info(key, count=_FRAMES)).changes()
+            made = {item.revision: changes.extents[item.id][0] for item in changes.items}
+        finally:
+            database.close()
+        figures.wrong += [f"act {act} is lost" for act, frame in said.items() if made.get(act) != frame]
+        rows = self._rows()
+        if self._first_rows is None:
+            self._first_rows = rows
+        figures.wrong += [f"column {name} differs" for name in rows if rows[name] != self._first_rows[name]]
+        figures.drives += 1
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        figures.resident_mb.append(round(int(re.findall(r"VmRSS:\s+(\d+)", status)[0]) / 1024, 1))
+        figures.checks += 1
+
+    def _rows(self) -> dict[str, list[Any]]:
+        with httpx.Client(base_url=self.address, timeout=_ANSWER_S) as client:
+            for _ in range(600):
+                with contextlib.suppress(httpx.HTTPError):
+                    found = client.get("/api/drive").json()
+                    if found.get("done") == _FRAMES:
+                        return {name: found["columns"][name] for name in _COLUMNS}
+                time.sleep(0.1)
+        raise AssertionError("the drive is not computed within a minute")
+
+
+_COLUMNS = ("cipv_id", "source", "distance_m", "closing_speed_mps", "ttc_s", "acc_state", "gaps")
+
+_RECORD = """
+import resource, sys, time
+from dataclasses import replace
+from pathlib import Path
+from pipeline.recording.recorder import Recorder
+from tests.pipeline.recording.frames import ABOUT, full, sweep
+recorder, points = Recorder(Path(sys.argv[1]), ABOUT, queued=4), sweep(0, points=20_000)
+size = int(sys.argv[2])
+if size:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+for index in range(10**9):
+    recorder.put(replace(full(index), sweep=replace(points, points=points.points.copy())))
+    time.sleep(0.004 * (index % 20 == 0))
+    if recorder.state.error:
+        print(recorder.state.error, flush=True)
+        break
+"""
+
+
+def record(folder: Path, chance: random.Random, figures: Figures) -> None:
+    """Record faster than the disk takes it, until the recorder is killed or its disk is full; then read it back."""
+    path, is_full = folder / "a.mcap", chance.random() < 0.5
+    path.unlink(missing_ok=True)
+    limit = chance.randint(2_000_000, 20_000_000) if is_full else 0
+    command = [sys.executable, "-c", _RECORD, str(path), str(limit)]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        if is_full:
+            told, _ = process.communicate(timeout=120)
+            if "recording stopped" not in told:
+                figures.wrong.append("a full disk is not said")
+        else:
+            while not path.exists() or path.stat().st_size < 1_000_000:
+                time.sleep(0.05)
+            time.sleep(chance.uniform(0.0, 1.0))
+            process.kill()
+    figures.befell["disk full" if is_full else "recorder killed"] += 1
+    figures.sessions += 1
+    figures.frames += _read_back(path, figures)
+
+
+def _read_back(path: Path, figures: Figures) -> int:
+    """How many frames; each is whole, and frames that are missing between them are said."""
+    out = path.with_name("b.mcap")
+    out.unlink(missing_ok=True)
+    if verify(path).state != "cut off":
+        figures.wrong.append(f"a session that was cut: {verify(path)}")
+    recover(path, out)
+    session = SessionSource("a", str(out))
+    times = [session.frame(index).t_ns for index in range(len(session))]
+    missing = (times[-1] - times[0]) // PERIOD_NS + 1 - len(times)
+    texts = (log_text(topics.NOTES, stored.data) for stored in session.file.messages((topics.NOTES,)))
+    said = sum(int(found[1]) for text in texts if (found := re.search(r"(\d+) frames", text)))
+    if missing > said:
+        figures.wrong.append(f"{missing} frames are missing, {said} are said")
+    session.close()
+    return len(times)
+
+
+# ------------------------------------------------------------ around them
+
+
+def half_open(server: LabelledServer, stop: threading.Event) -> None:
+    """A client that begins requests and ends none, and one that says what is no request."""
+    held: list[socket.socket] = []
+    while not stop.wait(0.05):
+        parts = urlsplit(server.address)
+        with contextlib.suppress(OSError):
+            held.append(socket.create_connection((parts.hostname or "", parts.port or 0), timeout=2.0))
+            held[-1].sendall(random.choice([b"GET / HTTP/1.1\r\nX:", random.randbytes(64), b""]))
+            server.figures.clients += 1
+        while len(held) > 150:
+            held.pop(0).close()
+    for each in held:
+        each.close()
+
+
+def deaf(server: LabelledServer, stop: threading.Event) -> None:
+    """Clients of the stream that never read, and say what nobody understands."""
+    while not stop.is_set():
+        with (
+            contextlib.suppress(Exception),
+            connect(server.address.replace("http", "ws") + "/api/stream", max_queue=1) as stream,
+        ):
+            server.figures.clients += 1
+            for _ in range(50):
+                stream.send(random.choice(["{}", "null", '{"seek": 1e999}', random.randbytes(200), "[" * 5000]))
+                if stop.wait(0.1):
+                    break
+        stop.wait(0.2)
+
+
+@contextmanager
+def pressure() -> Iterator[None]:
+    """Somebody else's programs: one that computes, and one that takes memory."""
+    hungry = "import time; held = bytearray(300 << 20); held[::4096] = b'x' * len(held[::4096]); time.sleep(600)"
+    commands = [[sys.executable, "-c", text] for text in ("while True: pass", hungry)]
+    processes = [subprocess.Popen(command) for command in commands]
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()

@@ -1,0 +1,89 @@
+"""Everything at once, at random: servers, recorders and databases are killed, disks and descriptors run out, clocks
+jump, clients misbehave, other programs take the machine. No act is lost, no gap is unsaid, no final frame is wrong, and
+memory stays. Looked at once a minute.
+
+``CIPV_CHAOS_SECONDS`` is how long, an hour by default. Writes build/soak_chaos.json. Live sensors with every fault are
+in ``test_live.py``.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from tests.app.labels import postgres
+from tests.app.labels.server_process import forking
+from tests.conftest import ROOT
+from tests.soak.chaos import Figures, LabelledServer, deaf, half_open, pressure, record
+
+SECONDS = float(os.environ.get("CIPV_CHAOS_SECONDS", "3600"))
+CHECK_EVERY_S = 60.0
+GROWN_MB = 150.0
+"""A server's resident size from the least to the most of its checks: whole drives that are held, and Python's own."""
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(7200)
+def test_chaos(tmp_path: Path) -> None:
+    seed = int(os.environ.get("CIPV_CHAOS_SEED", str(time.time_ns())))
+    figures, chance, stop = Figures(), random.Random(seed), threading.Event()
+    with ExitStack() as stack:
+        context, found = stack.enter_context(forking()), postgres.binaries()
+        url = f"sqlite:///{tmp_path}/labels.db" if found is None else stack.enter_context(postgres.running(found))
+        server = LabelledServer(context, url, figures)
+        stack.callback(lambda: server.process.kill())  # of this moment, as its address
+        works = [
+            partial(server.label, stop),
+            partial(half_open, server, stop),
+            partial(deaf, server, stop),
+        ]
+        threads = [threading.Thread(target=work) for work in works]
+        stack.callback(lambda: [thread.join() for thread in threads])
+        stack.callback(stop.set)
+        server.check()
+        for thread in threads:
+            thread.start()
+        _disturb(server, tmp_path, chance, figures)
+    grown_mb = max(figures.resident_mb) - min(figures.resident_mb)
+    report = {"seconds": SECONDS, "seed": seed, "database": url.partition(":")[0], "grown_MB": grown_mb}
+    report |= vars(figures)
+    (ROOT / "build").mkdir(exist_ok=True)
+    (ROOT / "build" / "soak_chaos.json").write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    print(json.dumps(report))
+    assert figures.wrong == []
+    assert figures.acts > 0
+    assert grown_mb < GROWN_MB
+
+
+def _disturb(server: LabelledServer, folder: Path, chance: random.Random, figures: Figures) -> None:
+    kinds: dict[str, Callable[[], None]] = {
+        "server killed": server.kill,
+        "server frozen": server.freeze,
+        "clock set": server.set_clock,
+        "descriptors used up": server.use_up_descriptors,
+        "database killed": server.kill_database,
+    }
+    ends_s = time.monotonic() + SECONDS
+    checked_s = time.monotonic()
+    while time.monotonic() < ends_s:
+        with pressure() if chance.random() < 0.3 else ExitStack():
+            kind = chance.choice([*kinds, "recorder"])
+            if kind == "recorder":
+                record(folder, chance, figures)
+            else:
+                kinds[kind]()
+                figures.befell[kind] += 1
+            time.sleep(chance.uniform(0.2, 2.0))
+        if time.monotonic() - checked_s >= min(CHECK_EVERY_S, SECONDS / 3):
+            server.check()
+            checked_s = time.monotonic()
+    server.check()
