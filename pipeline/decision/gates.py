@@ -190,11 +190,18 @@ def _probable(who: Candidate) -> Answer:
     """That it exists and that it is in the path: the less probable of the two decides. A weak box that nothing supports
     exists by less than a half; a car 60 m away on a road that may bend either way is in the path by less than a half,
     though it be straight ahead. The lead was seen in the path when that was known well enough: it is asked only on
-    which side of the edge it is now."""
-    limit = who.params.stay_probability if who.leads else who.params.become_probability
+    which side of the edge it is now.
+
+    A new lead must exist more surely than it must be in the path: braking for what is not there at all is worse than
+    for a car that is beside the path, and far away no place is sure."""
+    params = who.params
     there = who.item.existence if who.item.existence is not None else 1.0
     in_path = _in_path_probability(who) if who.odds > 0.0 else 1.0  # what is out of the path has a gate for that
-    probability = min(there, in_path)
+    asked = (
+        (there, params.stay_probability if who.leads else params.become_existence),
+        (in_path, params.stay_probability if who.leads else params.become_probability),
+    )
+    probability, limit = min(asked, key=lambda pair: pair[0] - pair[1])
     return probability >= limit, probability, limit
 
 
@@ -206,8 +213,8 @@ def _in_path_probability(who: Candidate) -> float:
 
 def _improbable(who: Candidate) -> str:
     there = who.item.existence
-    if there is not None and there < 0.5:
-        return f"probably not there: {100 * there:.0f} %"
+    if there is not None and there < (who.params.stay_probability if who.leads else who.params.become_existence):
+        return f"there with {100 * there:.0f} %: not probable enough"
     return f"in path with {100 * _in_path_probability(who):.0f} %: not probable enough"
 
 

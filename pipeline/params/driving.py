@@ -107,8 +107,9 @@ class CipvParams(Section):
     max_size_m: float = slider(
         15.0, 3.0, 40.0, 0.5, "m", "LiDAR-only objects: largest extent; excludes walls and hedges"
     )
+    become_existence: float = slider(0.7, 0.0, 0.95, 0.01, "", "A new lead exists with at least this probability")
     become_probability: float = slider(
-        0.7, 0.0, 0.95, 0.01, "", "A new lead exists, and is in the path, each with at least this probability"
+        0.5, 0.0, 0.95, 0.01, "", "A new lead is in the path with at least this probability"
     )
     stay_probability: float = slider(0.4, 0.0, 0.95, 0.05, "", "The lead stays it down to this probability of each")
 
