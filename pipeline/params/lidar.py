@@ -49,7 +49,7 @@ class ClusterParams(Section):
 
     tolerance_m: float = slider(0.9, 0.1, 3.0, 0.05, "m", "Points nearer to each other than this belong to one object")
     divide_m: float = slider(
-        0.45, 0.1, 3.0, 0.05, "m", "The same within what is wider than any vehicle; as large as the tolerance: off"
+        0.6, 0.1, 3.0, 0.05, "m", "The same within what is wider than any vehicle; as large as the tolerance: off"
     )
     z_weight: float = slider(0.4, 0.05, 1.0, 0.05, "", "Weight on height: below 1 joins rings that are 2° apart")
     min_points: int = slider(4, 1, 50, 1, "points", "Smaller clusters are dropped")
