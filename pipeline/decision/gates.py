@@ -183,7 +183,7 @@ def _placed(who: Candidate) -> Answer:
 
 
 def _uncertain(who: Candidate) -> str:
-    return f"its position across the path is uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
+    return f"lateral position uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
 
 
 def _probable(who: Candidate) -> Answer:
@@ -207,8 +207,8 @@ def _in_path_probability(who: Candidate) -> float:
 def _improbable(who: Candidate) -> str:
     there = who.item.existence
     if there is not None and there < 0.5:
-        return f"probably not there: {100 * there:.0f} %"
-    return f"in path with {100 * _in_path_probability(who):.0f} %: not probable enough"
+        return f"only {100 * there:.0f} % likely to exist"
+    return f"only {100 * _in_path_probability(who):.0f} % likely to be in path"
 
 
 CONDITIONS = Conditions(

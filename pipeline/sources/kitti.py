@@ -135,7 +135,7 @@ class KittiSource:
         count = int(turn.max()) + 1
         elevations_deg = ring_elevations_deg(points, turn, min(count, RINGS))
         if count > RINGS or not is_in_order(elevations_deg):
-            notes.append(f"{file}: points are not in KITTI's order; their rings are told by elevation")
+            notes.append(f"{file}: points are not in KITTI's order; rings are assigned by elevation")
             return rings_by_elevation(points, self._elevations_deg), None
         if count < RINGS:
             notes.append(f"{file}: {count} rings instead of {RINGS}; matched by this sweep's own elevations")

@@ -124,7 +124,7 @@ def _from_utm(lines: list[list[str]], east: int, north: int, zone_at: int | None
     named = {row[zone_at].strip() for row in rows if len(row) > zone_at} if zone_at is not None and not zone else {zone}
     epsg = {utm_epsg(each) for each in named}
     if len(epsg) != 1 or None in epsg:
-        wrong = f"not one UTM zone: {', '.join(sorted(named))[:80]}" if named - {""} else "its UTM zone is not said"
+        wrong = f"not one UTM zone: {', '.join(sorted(named))[:80]}" if named - {""} else "no UTM zone given"
         raise RouteError(f"{path}: {wrong}; add a column zone (32N) or epsg (32632), or open {path}?epsg=32632")
     pairs = [(_number(row[east]), _number(row[north])) for row in rows]
     places = [(x, y) for x, y in pairs if x is not None and y is not None]

@@ -80,7 +80,7 @@ def _notes(scene: scenario.Scenario) -> Iterator[str]:
     if scene.sensors == "camera":
         yield "This drive uses the camera alone; it has no LiDAR."
     if scene.detections is not None:
-        yield "Detections come with this drive: the truth, with a detector's errors. No network runs."
+        yield "Detections come with this drive: ground truth with a detector's errors. No network runs."
     if scene.faults != NONE:
         yield "The sensors of this drive have faults: see `faults` in its file."
 

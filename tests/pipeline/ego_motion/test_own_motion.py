@@ -69,7 +69,7 @@ def test_a_lidar_that_sees_too_little_is_said_only_where_it_is_missed() -> None:
     params, around = MotionParams(), Seen(ROAD, (), None)
     assert own_motion.measure(OwnMotionState(), bare, None, around, 0.1, params).notes == ()
     alone = own_motion.measure(OwnMotionState(), replace(bare, gnss=None), None, around, 0.1, params)
-    assert alone.notes == ("own motion from the LiDAR: too little stands around that is no vehicle",)
+    assert alone.notes == ("LiDAR odometry: too few static objects nearby",)
 
 
 def test_a_bus_that_counts_in_miles_is_contradicted() -> None:

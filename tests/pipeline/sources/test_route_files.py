@@ -63,7 +63,7 @@ def test_places_of_a_utm_zone(tmp_path: Path, text: str, asked: str) -> None:
 @pytest.mark.parametrize(
     ("text", "asked", "says"),
     [
-        pytest.param("easting,northing\n1,2\n3,4\n", "", "its UTM zone is not said", id="no zone"),
+        pytest.param("easting,northing\n1,2\n3,4\n", "", "no UTM zone given", id="no zone"),
         pytest.param("easting,northing\n1,2\n3,4\n", "?epsg=4326", "not one UTM zone: 4326", id="no UTM"),
         pytest.param("easting,northing\n1,2\n3,4\n", "?epsg=61N", "not one UTM zone: 61N", id="no such zone"),
         pytest.param("east,north,zone\n1,2,32N\n3,4,33N\n", "", "not one UTM zone: 32N, 33N", id="two zones"),
