@@ -24,6 +24,7 @@ from pipeline.common.errors import BadInput
 from pipeline.common.user_file_errors import given_path
 from pipeline.common.user_files import read_regular
 from pipeline.formats.nmea import parse_sentence
+from pipeline.formats.xml_text import parse_xml
 from pipeline.types import GnssFix, Route
 
 _LAT_NAMES = ("lat", "lat_deg", "latitude", "latitude_deg")
@@ -145,12 +146,7 @@ def utm_epsg(zone: str) -> int | None:
 
 
 def _gpx(text: str, path: str) -> tuple[Rows, float]:
-    if "<!DOCTYPE" in text[:10_000] or "<!ENTITY" in text:
-        raise RouteError(f"{path}: GPX needs no document type or entities, and none are read")
-    try:
-        root = ElementTree.fromstring(text.lstrip("\ufeff \r\n\t"))  # a text: the encoding it names is not tried
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise RouteError(f"{path}: not XML: {error}") from None
+    root = parse_xml(text, path, RouteError)
     for kind, point in (("trk", "trkpt"), ("rte", "rtept")):
         line = root.find(f"{{*}}{kind}")
         if line is not None:

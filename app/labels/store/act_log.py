@@ -22,7 +22,7 @@ from app.labels.store.draft import Draft, name_of
 from app.labels.store.invariants import check_whole
 from app.labels.store.tables import ActRow, ChangeRow, DriveRow
 from app.labels.store.undo_order import Steps, Way
-from app.labels.store.values import ItemKind, unpack, unpack_pair
+from app.labels.store.values import HistoryEntry, ItemKind, unpack, unpack_pair
 
 _LONGEST_HISTORY = 200
 
@@ -37,20 +37,6 @@ class Acted:
     what: str
     note: str = ""
     params: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class HistoryEntry:
-    """One act in the life of an item; contents as plain values, null where it was not there. note: as of ``Acted``."""
-
-    act: int
-    what: str
-    note: str
-    person: str
-    t_unix_ms: int
-    before: dict[str, Any] | None
-    after: dict[str, Any] | None
-    undone: bool
 
 
 @dataclass
