@@ -166,7 +166,7 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
     unsaid = len(frames) - whole - left
     why = [
         f"In {left} a vehicle is only proposed: accept or reject it." if left else "",
-        f"{unsaid} are not confirmed to have every vehicle labelled: tag them “{WHOLE_TAG}”." if unsaid else "",
+        f"Not confirmed as fully labelled: {unsaid}. Tag them “{WHOLE_TAG}”." if unsaid else "",
     ]
     judged = f"Detection and tracking are scored in {whole} of {len(frames)} labelled frames."
     notes.append(" ".join((judged, *filter(None, why))))
