@@ -35,7 +35,7 @@ class SimulatedSource:
         try:
             self._scenario = scenario.load(name)
         except scenario.ScenarioError as error:
-            raise SourceError(f"{uri}: {error}") from None
+            raise SourceError(str(error)) from None
         self.uri, self.title, self.rate_hz = uri, self._scenario.title, self._scenario.rate_hz
         self.notes = tuple(_notes(self._scenario))
         self._step_ns = round(1e9 / self.rate_hz)
