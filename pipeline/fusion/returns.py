@@ -21,7 +21,7 @@ import numpy as np
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64
-from pipeline.fusion.existence import SweepRays
+from pipeline.fusion.free_road import SweepRays
 from pipeline.params import FusionParams
 from pipeline.types import I32, VEHICLES, Ground, VisionMeasurement
 
