@@ -177,7 +177,7 @@ def measure_own_motion(state: State, frame: Frame, params: Params) -> own_motion
     found = own_motion.measure(before, frame, yaw_rate.believable(frame.ego), seen, dt_s, params.motion)
     late_ms = clock.timing_ms()["total"]
     if frame.streams and late_ms > _LATE_MS:  # of live sensors only: a recording's results do not depend on the clock
-        return found._replace(notes=(*found.notes, f"own motion from the LiDAR took {late_ms:.0f} ms"))
+        return found._replace(notes=(*found.notes, f"LiDAR odometry took {late_ms:.0f} ms"))
     return found
 
 

@@ -28,6 +28,11 @@ def warm_up() -> None:
         _warm_up()
 
 
+def is_warm() -> bool:
+    """Whether ``warm_up`` has nothing left to do."""
+    return _warm_up.cache_info().currsize > 0
+
+
 @cache
 def _warm_up() -> None:
     lidar.warm_up()

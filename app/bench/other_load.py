@@ -55,5 +55,5 @@ def load_warning(before: CpuTimes | None, after: CpuTimes | None) -> str | None:
         return None
     return (
         f"the machine was not idle: other programs took {others:.0%} of its processor time, other guests of its host "
-        f"{stolen:.0%}. Times are longer than on an idle machine; ratios to peers, taken in turns, hold"
+        f"{stolen:.0%}. Times are longer than on an idle machine; ratios to peers, measured alternately, still hold"
     )

@@ -104,7 +104,7 @@ def _summary(rows: Sequence[Row], names: Sequence[str], info: ClipInfo) -> Secti
     text = (
         f"Frames {names[0]} to {names[-1]} ({len(rows)}) of {info.uri}.",
         f"{with_lead} frames with a CIPV, {len(leads)} different vehicle{'s' if len(leads) != 1 else ''}. "
-        f"Made from the same input and parameters, a run has the digest {info.digest}.",
+        f"Runs with the same input and parameters have the digest {info.digest}.",
     )
     return Section("clip", "Clip", text)
 

@@ -91,8 +91,8 @@ class RegisterModel:
 class TuneModel:
     """Find the fastest way to run a network on this machine, and use it from then on.
 
-    Tries the installed providers, numbers of threads, graph optimisation levels and the memory arena. A way whose
-    outputs differ is not used. Run it while nothing else does.
+    Tries the installed providers, numbers of threads, graph optimisation levels and the memory arena. A setting whose
+    outputs differ is not used. Run it on an idle machine.
 
     Example: cipv models tune twinlitenet
     """
@@ -100,7 +100,7 @@ class TuneModel:
     spec: tyro.conf.Positional[str]
     """Name or ONNX file"""
     threads: int = 2
-    """Number of threads it runs on untuned"""
+    """Number of threads without tuning"""
 
     def __call__(self) -> int:
         path = find_model(self.spec)
@@ -114,15 +114,15 @@ class TuneModel:
         usual, best = trials[0], fastest(trials)
         keep(path, best.way)
         if best is usual or usual.best_ms is None or best.best_ms is None:
-            print(f"{path.stem}: nothing is faster than the usual way")
+            print(f"{path.stem}: nothing is faster than the default")
         else:
-            print(f"{path.stem}: {best.way}, {usual.best_ms / best.best_ms:.2f} times as fast as the usual way")
+            print(f"{path.stem}: {best.way}, {usual.best_ms / best.best_ms:.2f} times as fast as the default")
         return 0
 
 
 @dataclass(frozen=True)
 class Models:
-    """Networks: list them, download an official one, register your own ONNX file, make one fast."""
+    """Networks: list them, download an official one, register your own ONNX file, tune one for this machine."""
 
     action: (
         Annotated[ListModels, tyro.conf.subcommand("list")]

@@ -109,7 +109,7 @@ class RunRegistry:
         with self._lock:
             run = self.get(number)
             if run is self._current or run is self._base:
-                raise RunRefused("the present run and the base of comparison cannot be deleted")
+                raise RunRefused("the current run and the one it is compared with cannot be deleted")
             self._runs.remove(run)
 
     def _let_go(self) -> None:

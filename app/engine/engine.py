@@ -34,7 +34,7 @@ from pipeline.detection import Detectors
 from pipeline.params import Params
 from pipeline.run import Sensors
 from pipeline.types.source import AnySource, Source, SourceError, is_live_source
-from pipeline.warm_up import warm_up
+from pipeline.warm_up import is_warm, warm_up
 
 logger = logging.getLogger("cipv.engine")
 
@@ -42,6 +42,7 @@ _PATIENCE_S = 2.0
 _TELL_EVERY_S = 0.25
 _SAID_S = 60.0
 """How long a worker that hung is spoken of."""
+_COMPILING = "Preparing the pipeline … The first start after an installation takes about a minute."
 _ABLATION: dict[Sensors, tuple[str, ...]] = {
     "both": (),
     "lidar": ("LiDAR only: no detection in the pictures",),
@@ -161,6 +162,7 @@ class Engine:
                 if not self._open(wish.uri):
                     return
                 warm_up()  # as a rule ``drives`` has, beside the opening
+                self._publisher.publish(replace(self.snapshot, busy=None))
         player = self._player
         if player is not None:
             player.wait(wish.params)
@@ -245,7 +247,7 @@ class Engine:
                 lane_detector=detectors.lanes.name if detectors.lanes else None,
                 notices=tuple(notices),
                 processed=None,
-                busy=None,
+                busy=None if is_warm() else _COMPILING,
             )
         )
         return True

@@ -23,11 +23,11 @@ from pipeline.params import to_yaml as params_to_yaml
 from pipeline.simulation.drive_as_scenario import to_yaml
 
 _BY_NETWORK = (
-    "In the loop the embedded network looked for vehicles in the drawn pictures, as it does here. It looked for no "
-    "lane lines; a dashboard that does may estimate another path."
+    "The embedded network detected vehicles in the rendered pictures, as it does here, but no lane lines. A dashboard "
+    "that detects lane lines may estimate another path."
 )
-_LINK = """<p id="open" hidden>In a dashboard on this machine that is open already: <a href="">open it there</a>, with
-the parameters it drove with.</p>
+_LINK = """<p id="open" hidden>If a dashboard is open on this machine, <a href="">open the drive there</a> with the
+parameters it was driven with.</p>
 <script>
 if (location.protocol === "file:") {
   const folder = decodeURIComponent(location.pathname).replace(/[^/]*$/, ""), line = document.getElementById("open");

@@ -16,7 +16,7 @@ def chart_svg(chart: Chart) -> str:
     """A figure with axes, one line a series, and a legend below. Empty charts say that there is nothing."""
     drawn = [line for line in chart.series if line.x]
     if not drawn:
-        return f"<figure><figcaption>{escape(chart.title)}: nothing was measured</figcaption></figure>"
+        return f"<figure><figcaption>{escape(chart.title)}: no data</figcaption></figure>"
     x_ticks = ticks(min(min(line.x) for line in drawn), max(max(line.x) for line in drawn))
     y_ticks = ticks(min(0.0, min(min(line.y) for line in drawn)), max(max(line.y) for line in drawn))
     scale = _Scale(x_ticks, y_ticks)

@@ -27,13 +27,13 @@ class Metrics:
         self._sequence = 0
         self._shown_at: deque[float] = deque(maxlen=_MOST_FRAMES)
         to = self._registry
-        self._frames = Counter("cipv_frames", "Results made", registry=to)
+        self._frames = Counter("cipv_frames", "Results computed", registry=to)
         self._pipeline = Histogram(
             "cipv_line_seconds", "Time for one frame: all stages, without the networks", buckets=_BUCKETS_S, registry=to
         )
         self._detector = Histogram(
             "cipv_detector_seconds",
-            "Time for one picture that was not cached",
+            "Detector time for one picture that was not cached",
             buckets=_BUCKETS_S,
             registry=to,
         )
@@ -81,15 +81,19 @@ class _Now(Collector):
 
     def collect(self) -> Iterator[Metric]:
         shown, recording, traffic = self._engine.snapshot, self._engine.desk.state, self._stream.traffic
-        yield GaugeMetricFamily("cipv_engine_up", "1 while the worker lives", self._engine.alive)
-        yield GaugeMetricFamily("cipv_frames_per_second", "Results per second over the last seconds", self._rate_hz())
-        yield GaugeMetricFamily("cipv_frames_skipped", "Frames of the open source that were skipped", shown.skipped)
-        yield GaugeMetricFamily("cipv_clients", "Streams that are open", self._stream.clients)
+        yield GaugeMetricFamily("cipv_engine_up", "1 while the worker is running", self._engine.alive)
+        yield GaugeMetricFamily("cipv_frames_per_second", "Results per second, recently", self._rate_hz())
+        yield GaugeMetricFamily("cipv_frames_skipped", "Frames skipped since the source was opened", shown.skipped)
+        yield GaugeMetricFamily("cipv_clients", "Open streams", self._stream.clients)
         yield CounterMetricFamily("cipv_client_frames_sent", "Frames sent, over all clients", traffic.sent)
-        yield CounterMetricFamily("cipv_client_frames_dropped", "Frames that a slow client was spared", traffic.dropped)
-        yield GaugeMetricFamily("cipv_recording", "1 while it records", recording is not None and not recording.error)
-        yield GaugeMetricFamily("cipv_recording_bytes", "Of this recording", recording.bytes if recording else 0)
-        yield GaugeMetricFamily("cipv_recording_frames", "Of this recording", recording.frames if recording else 0)
+        yield CounterMetricFamily("cipv_client_frames_dropped", "Frames skipped for slow clients", traffic.dropped)
+        yield GaugeMetricFamily("cipv_recording", "1 while recording", recording is not None and not recording.error)
+        yield GaugeMetricFamily("cipv_recording_bytes", "Bytes of this recording", recording.bytes if recording else 0)
         yield GaugeMetricFamily(
-            "cipv_recording_frames_dropped", "That the disk was too slow for", recording.dropped if recording else 0
+            "cipv_recording_frames", "Frames of this recording", recording.frames if recording else 0
+        )
+        yield GaugeMetricFamily(
+            "cipv_recording_frames_dropped",
+            "Frames dropped because the disk was too slow",
+            recording.dropped if recording else 0,
         )

@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from typing import TypeVar
 
+from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection, Request
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Receive, Scope, Send
@@ -63,8 +64,8 @@ _TOO_MANY = JSONResponse({"detail": "too many requests at once"}, 429, {"retry-a
 
 
 async def while_waited_for(request: Request, threads: Executor, work: Callable[[Progress], T]) -> T:
-    """What ``work`` returns, done on a thread of these. Cancelled when the client leaves before; the work ends when it
-    next reports progress."""
+    """What ``work`` returns, done on a thread of these. When the client leaves before, the work ends as it next reports
+    progress, and HTTPException 499 is raised, which nobody is there to read."""
     gone = threading.Event()
 
     def progress(done: int, total: int) -> None:
@@ -77,5 +78,7 @@ async def while_waited_for(request: Request, threads: Executor, work: Callable[[
             if await request.is_disconnected():
                 gone.set()
         return working.result()
+    except Cancelled:
+        raise HTTPException(499, "the client has left") from None
     finally:
         gone.set()

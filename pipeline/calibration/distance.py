@@ -89,7 +89,7 @@ def fit_laws(pairs: Iterable[Pair], exponent: float | None = None) -> Mapping[st
         if len({pair.height_px for pair in members}) >= needed
     }
     if not fits:
-        raise TooFewPairs("no class has enough detected vehicles with a known distance to fit a law to")
+        raise TooFewPairs("too few detected vehicles with a known distance to fit a law")
     return fits
 
 
@@ -98,7 +98,9 @@ def as_overrides(fits: Mapping[str, LawFit]) -> dict[str, dict[str, float]]:
 
     TooFewPairs when there is no car, whose law the others are told by."""
     if "car" not in fits:
-        raise TooFewPairs("no car was detected with a known distance, and the other classes' laws are relative to it")
+        raise TooFewPairs(
+            "no car with a known distance was detected; the laws of other classes are relative to a car's"
+        )
     car = fits["car"].law
     section = {"coefficient": round(car.coefficient, 1), "exponent": round(car.exponent, 4)}
     for label in ("truck", "bus", "motorcycle"):

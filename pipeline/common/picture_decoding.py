@@ -49,7 +49,7 @@ def check_budget(data: bytes) -> None:
         raise TooMuch("neither a JPEG nor a PNG")
     check_pixels(*size)
     if data.startswith(_JPEG) and data.count(_SCAN) * size[0] * size[1] > _MOST_PASSES:
-        raise TooMuch("a JPEG of too many scans")
+        raise TooMuch("a JPEG with too many scans")
 
 
 def check_pixels(width: int, height: int) -> None:

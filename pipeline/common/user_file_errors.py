@@ -22,7 +22,7 @@ _IN_OUR_WORDS = {
     "extra_forbidden": "no such setting",
     "missing": "is missing",
     "list_type": "must be a list",
-    "model_type": "must be settings by name",
+    "model_type": "must be a mapping of settings",
 }
 
 
@@ -56,7 +56,7 @@ def parse_yaml(text: str, what: str, refuse: Callable[[str], BadInput] = BadInpu
     except ValueError as error:  # a day that is in no calendar, a number without end
         raise refuse(f"{what}: not YAML: {_without_content(str(error))}") from None
     except Exception:  # a value that is none of its tag's (``!!int ""``) makes PyYAML raise whatever it stumbles over
-        raise refuse(f"{what}: not YAML: a value that is not of its type") from None
+        raise refuse(f"{what}: not YAML: a value does not match its tag") from None
 
 
 def _without_content(text: str) -> str:

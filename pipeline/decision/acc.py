@@ -134,7 +134,7 @@ def avoid(ego: EgoState, threats: Iterable[FusedObject], params: AccParams) -> l
         Demand(
             ego.speed_mps * (item.ttc_s or 0.0) / params.ttc_limit_s,
             "warn",
-            f"#{item.id} would be hit in {item.ttc_s:.1f} s",
+            f"would hit #{item.id} in {item.ttc_s:.1f} s",
             item.id,
         )
         for item in threats
@@ -165,7 +165,7 @@ def hold(ego: EgoState, path: Path, params: AccParams) -> list[Demand]:
     allowed = ego.speed_mps if coasts else max(ego.speed_mps, CREEP_MPS)
     if allowed >= params.set_speed_kmh / 3.6:
         return []
-    why = f"own speed not measured for {ego.coasting.age_s:.1f} s" if ego.coasting is not None else path.doubt
+    why = f"ego speed not measured for {ego.coasting.age_s:.1f} s" if ego.coasting is not None else path.doubt
     holds = allowed <= ego.speed_mps
     limit = "ACC will not accelerate" if holds else f"ACC will not exceed {allowed * 3.6:.0f} km/h"
     return [Demand(allowed, "cruise", f"{why}: {limit}", no_faster=holds)]

@@ -134,7 +134,7 @@ def _next(state: AebState, worst: Threat | None, ego: EgoState, dt_s: float, par
 
 def _cause(threat: Threat) -> str:
     if threat.required_mps2 == inf:
-        return f"#{threat.id} in {threat.ttc_s:.1f} s, too close to brake in time"
+        return f"#{threat.id} in {threat.ttc_s:.1f} s, too close to stop in time"
     return f"#{threat.id} in {threat.ttc_s:.1f} s, {threat.required_mps2:.1f} m/s² needed"
 
 

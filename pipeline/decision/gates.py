@@ -183,7 +183,7 @@ def _placed(who: Candidate) -> Answer:
 
 
 def _uncertain(who: Candidate) -> str:
-    return f"its position across the path is uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
+    return f"lateral position uncertain by {who.place.sigma_m if who.place is not None else 0.0:.1f} m"
 
 
 def _probable(who: Candidate) -> Answer:
@@ -214,8 +214,8 @@ def _in_path_probability(who: Candidate) -> float:
 def _improbable(who: Candidate) -> str:
     there = who.item.existence
     if there is not None and there < (who.params.stay_probability if who.leads else who.params.become_existence):
-        return f"there with {100 * there:.0f} %: not probable enough"
-    return f"in path with {100 * _in_path_probability(who):.0f} %: not probable enough"
+        return f"only {100 * there:.0f} % likely to exist"
+    return f"only {100 * _in_path_probability(who):.0f} % likely to be in path"
 
 
 CONDITIONS = Conditions(

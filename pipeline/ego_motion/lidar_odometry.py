@@ -159,13 +159,13 @@ def follow(
     return Followed(after, _motion(new_speed, new_turning, pose) if agreeing >= _AGREEING else None)
 
 
-_CONTRADICTS = "own motion from the LiDAR: sweeps contradict each other"
+_CONTRADICTS = "LiDAR odometry: sweeps contradict each other"
 
 
 def _too_little(points: int, fixed: structure.Support) -> str:
     if points >= _FEWEST_POINTS and fixed.along_y >= _FEWEST_CELLS:
-        return "own motion from the LiDAR: nothing fixes it along the road, as in a tunnel"
-    return "own motion from the LiDAR: too little stands around that is no vehicle"
+        return "LiDAR odometry: no structure along the road, as in a tunnel"
+    return "LiDAR odometry: too few static objects nearby"
 
 
 def _foreseen(

@@ -181,10 +181,10 @@ def _contradictions(chosen: MotionEstimate, sources: list[MotionEstimate]) -> tu
         allowed = max(_CONTRADICT_SIGMAS * hypot(each.speed_sigma_mps, chosen.speed_sigma_mps), _CONTRADICT_MPS)
         if each is not chosen and apart > allowed:
             found.append(
-                f"own speed: {_NAMES[chosen.source]} {chosen.speed_mps * 3.6:.0f} km/h, "
+                f"ego speed: {_NAMES[chosen.source]} {chosen.speed_mps * 3.6:.0f} km/h, "
                 f"{_NAMES[each.source]} {each.speed_mps * 3.6:.0f} km/h"
             )
     return tuple(found)
 
 
-_NAMES: dict[MotionSource, str] = {"can": "CAN", "ins": "inertial unit", "gnss": "GNSS", "lidar": "LiDAR"}
+_NAMES: dict[MotionSource, str] = {"can": "CAN", "ins": "IMU", "gnss": "GNSS", "lidar": "LiDAR"}

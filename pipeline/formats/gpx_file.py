@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 from pyproj import Geod
 
+from pipeline.formats.xml_text import parse_xml
 from pipeline.types import GnssFix
 from pipeline.types.source import SourceError
 
@@ -20,12 +21,7 @@ _EARTH = Geod(ellps="WGS84")
 def parse_gpx(text: str, file: str) -> list[GnssFix]:
     """Every point of a GPX 1.0 or 1.1 track that has a time, in order. SourceError names the file where there is
     none."""
-    if "<!DOCTYPE" in text[:10_000] or "<!ENTITY" in text:
-        raise SourceError(f"{file}: GPX needs no document type or entities, and none are read")
-    try:
-        root = ElementTree.fromstring(text.lstrip("\ufeff \r\n\t").encode())
-    except ElementTree.ParseError as error:
-        raise SourceError(f"{file}: not XML: {error}") from None
+    root = parse_xml(text, file, SourceError)
     places: dict[int, tuple[float, float, float]] = {}
     for point in root.iterfind(".//{*}trkpt"):
         try:

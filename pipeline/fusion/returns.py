@@ -21,8 +21,9 @@ import numpy as np
 from pipeline.alignment.projection import Alignment
 from pipeline.common.fast_replace import evolve
 from pipeline.common.geometry import F64
+from pipeline.fusion.free_road import SweepRays
 from pipeline.params import FusionParams
-from pipeline.types import F32, I32, VEHICLES, Ground, Point3, VisionMeasurement
+from pipeline.types import I32, VEHICLES, Ground, VisionMeasurement
 
 NEAREST_M = 30.0
 """By the camera. Nearer vehicles have a cluster, or something hides them."""
@@ -45,27 +46,12 @@ _CLEARLY = 1.0
 """By how much, in log-likelihood, the best group beats the second."""
 
 
-class Sweep(Protocol):
+class Sweep(SweepRays, Protocol):
     """A segmented sweep, as far as single points matter."""
-
-    @property
-    def points(self) -> F32:
-        """(N, 4) float32 ``x y z intensity``, ego frame."""
-        ...
 
     @property
     def kind(self) -> I32:
         """(N,) what each point was taken for: ≥ 0 a cluster, −1 ground."""
-        ...
-
-    @property
-    def ground(self) -> Ground | None:
-        """The road; None without a sweep."""
-        ...
-
-    @property
-    def origin(self) -> Point3:
-        """Ego x y z of the sensor."""
         ...
 
 

@@ -21,7 +21,7 @@ from pipeline.inference.cancellation import Stopped, of_this_thread
 from pipeline.inference.denormals import flush_to_zero, flush_weights
 from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size, with_unit_picture
 from pipeline.inference.tuning import Way, kept_way
-from pipeline.types import F32
+from pipeline.types import F32, U8
 
 _GIVES_WAY = 5
 """Niceness added to a network's own threads. At equal priority a step that runs meanwhile may share its core with one
@@ -104,6 +104,12 @@ def _open(graph: bytes, path: Path, threads: int) -> ort.InferenceSession:
         except Exception as error:  # onnxruntime raises a class for each status code, without a common base
             refusal = error
     raise DetectorError(f"{path.name} cannot be run: {_first_line(refusal)}")
+
+
+def check_picture(bgr: U8) -> None:
+    """DetectorError for an array that is no picture (H, W, 3) uint8."""
+    if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
+        raise DetectorError(f"expected a picture of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
 
 
 def run_session(session: ort.InferenceSession, blob: F32) -> Sequence[F32]:

@@ -62,7 +62,7 @@ def lift(
         ].cuboid
         usual = Cuboid(seen.center, usual_size_m(label), seen.yaw_rad)
         found = onto_points(points, ground, usual)
-        return Lifted(found.cuboid, bbox, found.points, f"laid on the {found.points} points that are seen there")
+        return Lifted(found.cuboid, bbox, found.points, f"fitted to the {found.points} points there")
     if bbox is None:
         raise NothingThere("no points and no detection there: draw a box around it")
     law = _by_height(frame, params, alignment, label, bbox)

@@ -10,7 +10,7 @@ from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
 from pipeline.types.source import Source, TruthObject
 from pipeline.vision.classes import canonical
 
-LINKED = "the labels follow no identities over time: vehicles are linked over frames by nearness"
+LINKED = "the labels have no identities over time: vehicles are linked from frame to frame by distance"
 
 
 def truth_labels(

@@ -30,10 +30,10 @@ def check(labels: LabelSet, what: str) -> LabelSet:
         for each in at_frames:
             _require(0 <= each.frame < len(labels.frames), f"frame {each.frame} of {len(labels.frames)}")
         for event in labels.events:
-            _require(all(_fits(number) for number in event.tracks), "an event of impossible tracks")
+            _require(all(_fits(number) for number in event.tracks), "an event with an invalid track id")
         made: tuple[LabelTrack | LeadRange | PathLabel | EventLabel | FrameTag, ...]
         made = (*labels.tracks, *labels.leads, *at_frames, *labels.tags)
-        _require(all(_fits(label.origin.t_unix_ms) for label in made), "a time that no clock shows")
+        _require(all(_fits(label.origin.t_unix_ms) for label in made), "an invalid time")
     except ValueError as error:
         raise BadInput(f"{what}: {error}") from None
     return labels
@@ -49,12 +49,12 @@ def check_sighting(sighting: Sighting, what: str) -> Sighting:
 
 def _check_frames(labels: LabelSet) -> None:
     _require(len(labels.frames) == len(labels.t_ns), f"{len(labels.frames)} frames but {len(labels.t_ns)} times")
-    _require(all(_fits(t_ns) for t_ns in labels.t_ns), "a time that no clock shows")
+    _require(all(_fits(t_ns) for t_ns in labels.t_ns), "an invalid time")
 
 
 def _check_tracks(labels: LabelSet) -> None:
     ids = [track.id for track in labels.tracks]
-    _require(all(0 <= number < _LARGEST_INT for number in ids), "a track's id is a number from 0")
+    _require(all(0 <= number < _LARGEST_INT for number in ids), "a track id must not be negative")
     _require(len(set(ids)) == len(ids), "two tracks have the same id")
     for track in labels.tracks:
         _check_track(track, len(labels.frames))
@@ -62,8 +62,8 @@ def _check_tracks(labels: LabelSet) -> None:
 
 def _check_track(track: LabelTrack, count: int) -> None:
     frames = [each.frame for each in track.sightings]
-    _require(all(0 <= frame < count for frame in frames), f"track {track.id} is in a frame that is not there")
-    _require(frames == sorted(set(frames)), f"track {track.id}: its sightings are not by ascending frame")
+    _require(all(0 <= frame < count for frame in frames), f"track {track.id} is in a frame that does not exist")
+    _require(frames == sorted(set(frames)), f"track {track.id}: sightings are not in frame order")
     for sighting in track.sightings:
         wrong = _wrong_with(sighting)
         if wrong:
@@ -75,11 +75,11 @@ def _wrong_with(sighting: Sighting) -> str:
     if sighting.cuboid is not None:
         center, size, yaw_rad = sighting.cuboid
         if not _below(center, FARTHEST_M):
-            return "the cuboid has no place"
+            return "the cuboid has no valid position"
         if not all(0.0 < side <= LARGEST_SIDE_M for side in size):
-            return "the cuboid has no size"
+            return "the cuboid has no valid size"
         if not _below((yaw_rad,), LARGEST_YAW_RAD):
-            return "the cuboid has no direction"
+            return "the cuboid has no valid yaw"
     if sighting.bbox is not None:
         x1, y1, x2, y2 = sighting.bbox
         if not (_below(sighting.bbox, _LARGEST_PX) and x1 < x2 and y1 < y2):
@@ -102,7 +102,7 @@ def _check_apart(leads: list[LeadRange]) -> None:
 
 def _check_path(path: PathLabel) -> None:
     for line in (path.left, path.right):
-        _require(_below((v for point in line or () for v in point), FARTHEST_M), "a path line without place")
+        _require(_below((v for point in line or () for v in point), FARTHEST_M), "a path line without valid points")
 
 
 def _fits(number: int) -> bool:

@@ -14,7 +14,15 @@ import onnxruntime as ort
 
 from pipeline.common.data_dir import file_sha256
 from pipeline.inference.graph import Size, input_size, with_empty_masks, with_input_size
-from pipeline.inference.runtime import DetectorError, DetectorMissing, find_graph, open_session, read_graph, run_session
+from pipeline.inference.runtime import (
+    DetectorError,
+    DetectorMissing,
+    check_picture,
+    find_graph,
+    open_session,
+    read_graph,
+    run_session,
+)
 from pipeline.lanes.heads import Head, UnknownLaneHead, pick_head
 from pipeline.lanes.horizon import horizon_share
 from pipeline.types import F32, U8, CameraCalibration, RawLanes
@@ -50,8 +58,7 @@ class LaneNetwork:
 
         DetectorError for an array that is no such picture or a network that fails on it.
         """
-        if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
-            raise DetectorError(f"expected a picture of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
+        check_picture(bgr)
         placed = _placed((bgr.shape[0], bgr.shape[1]), self.input_size, self.head, self.horizon)
         found = self.head.points(run_session(self._session, self._blob(bgr, placed)))
         keep = found.score >= _MIN_SCORE

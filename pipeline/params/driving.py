@@ -8,19 +8,19 @@ from pipeline.params.declare import Section, choice, slider
 
 
 class MotionParams(Section):
-    """When an object counts as moving, and how long own motion is trusted after it was last measured."""
+    """When an object counts as moving, and how long ego motion is trusted after its last measurement."""
 
     source: Literal["auto", "can", "gnss", "lidar", "off"] = choice(
         "auto",
-        "Own motion: auto: the best of what is recorded, and the LiDAR where speed or yaw rate are missing; can: the "
-        "car's bus, its odometry or inertial unit only; gnss: a GNSS receiver only; lidar: the LiDAR, compared with "
-        "what is recorded; off: none",
+        "Source of ego motion. auto: the best recorded source, or LiDAR odometry where speed or yaw rate is missing; "
+        "can: vehicle bus, odometry or IMU only; gnss: GNSS receiver only; lidar: LiDAR odometry, checked against what "
+        "is recorded; off: none",
     )
     moving_mps: float = slider(1.5, 0.1, 10.0, 0.1, "m/s", "Speed over ground above which an object is moving")
     coast_s: float = slider(
-        2.0, 0.0, 5.0, 0.1, "s", "How long ACC and AEB go on with the last own speed when none is measured"
+        2.0, 0.0, 5.0, 0.1, "s", "How long ACC and AEB keep using the last ego speed once it is no longer measured"
     )
-    coast_accel_mps2: float = slider(1.0, 0.1, 5.0, 0.1, "m/s²", "Assumed change of own speed while it is not measured")
+    coast_accel_mps2: float = slider(1.0, 0.1, 5.0, 0.1, "m/s²", "Assumed change of ego speed while it is not measured")
     coast_turn_radps2: float = slider(
         0.03, 0.001, 0.2, 0.001, "rad/s²", "Assumed change of the yaw rate while it is not measured"
     )
@@ -46,12 +46,14 @@ class PathParams(Section):
     )
     lane_keeping_sigma_m: float = slider(0.2, 0.0, 1.0, 0.05, "m", "Usual distance from the lane's centre")
     lane_keeping_sigma_mps: float = slider(0.1, 0.0, 1.0, 0.05, "m/s", "Usual lateral speed within the lane")
-    route_reach_m: float = slider(8.0, 1.0, 50.0, 1.0, "m", "The car is off the route beyond this distance from it")
+    route_reach_m: float = slider(
+        8.0, 1.0, 50.0, 1.0, "m", "Farther from the route than this, the car counts as off it"
+    )
     gnss_gate_sigmas: float = slider(3.7, 1.0, 10.0, 0.1, "σ", "Fixes farther from the predicted position are rejected")
     gnss_restart_s: float = slider(
         2.0, 0.2, 30.0, 0.1, "s", "Accept fixes again, with more uncertainty, after rejecting them for this long"
     )
-    outlier_sigmas: float = slider(3.0, 1.0, 10.0, 0.1, "σ", "Sources that disagree more are left out")
+    outlier_sigmas: float = slider(3.0, 1.0, 10.0, 0.1, "σ", "Sources that deviate from the others by more are ignored")
     smoothing_s: float = slider(
         0.2, 0.0, 2.0, 0.05, "s", "Time constant with which the corridor follows its sources; 0: immediately"
     )
@@ -66,7 +68,7 @@ class PathParams(Section):
 class LaneParams(Section):
     """Lane lines: mapping from the image to the road, and tracking."""
 
-    max_range_m: float = slider(60.0, 15.0, 100.0, 5.0, "m", "Paint beyond this distance is ignored")
+    max_range_m: float = slider(60.0, 15.0, 100.0, 5.0, "m", "Lane markings beyond this distance are ignored")
     mount_height_m: float = slider(
         0.6, 0.0, 3.0, 0.05, "m", "Height of the ego origin above the road where neither LiDAR nor calibration gives it"
     )
@@ -77,16 +79,16 @@ class LaneParams(Section):
     max_heading_deg: float = slider(7.0, 1.0, 30.0, 0.5, "°", "Largest angle between a lane line and the car")
     gate_m: float = slider(0.7, 0.1, 2.0, 0.05, "m", "Largest distance of a line from its prediction")
     max_age_s: float = slider(1.0, 0.1, 5.0, 0.1, "s", "A line is dropped after this long without a detection")
-    pitch_sigma_deg: float = slider(
-        0.8, 0.0, 3.0, 0.1, "°", "Uncertainty of the camera's pitch against its calibration"
-    )
+    pitch_sigma_deg: float = slider(0.8, 0.0, 3.0, 0.1, "°", "Uncertainty of the calibrated camera pitch")
     pitch_drift_deg: float = slider(0.15, 0.01, 2.0, 0.01, "°/√s", "How fast the pitch drifts with load and suspension")
 
 
 class CipvParams(Section):
     """Which objects may be the closest in-path vehicle, and which one is."""
 
-    confirm_hits: int = slider(3, 1, 20, 1, "frames", "Sightings needed by an object that only one sensor sees")
+    confirm_hits: int = slider(
+        3, 1, 20, 1, "frames", "Detections needed to confirm an object that only one sensor sees"
+    )
     carried_may_become_lead: bool = choice(False, "Let an object that is not seen in this frame become the CIPV")
     hysteresis_m: float = slider(0.3, 0.0, 2.0, 0.05, "m", "The lead stays in the path up to this far outside its edge")
     min_overlap_m: float = slider(
@@ -95,23 +97,27 @@ class CipvParams(Section):
         2.0,
         0.05,
         "m",
-        "In path: at least this much of its width lies between the edges, or half of a narrower object",
+        "In path: at least this much of the object's width is inside the corridor, or half of a narrower object",
     )
     decide_s: float = slider(
-        0.3, 0.0, 2.0, 0.05, "s", "In path: time over which sightings are averaged; 0: this frame only"
+        0.3, 0.0, 2.0, 0.05, "s", "In path: time over which detections are averaged; 0: this frame only"
     )
-    max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "Largest uncertainty of a lead's position across the path")
-    cut_in_s: float = slider(3.0, 0.5, 6.0, 0.1, "s", "Lane crossings are announced this long ahead")
+    max_sigma_m: float = slider(4.0, 0.5, 20.0, 0.1, "m", "Largest lateral uncertainty of a lead")
+    cut_in_s: float = slider(3.0, 0.5, 6.0, 0.1, "s", "Cut-ins and cut-outs are predicted this far ahead")
     min_width_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "LiDAR-only objects: smallest width")
     min_height_m: float = slider(0.5, 0.1, 3.0, 0.1, "m", "LiDAR-only objects: smallest height")
     max_size_m: float = slider(
         15.0, 3.0, 40.0, 0.5, "m", "LiDAR-only objects: largest extent; excludes walls and hedges"
     )
-    become_existence: float = slider(0.7, 0.0, 0.95, 0.01, "", "A new lead exists with at least this probability")
-    become_probability: float = slider(
-        0.5, 0.0, 0.95, 0.01, "", "A new lead is in the path with at least this probability"
+    become_existence: float = slider(
+        0.7, 0.0, 0.95, 0.01, "", "To become the lead, an object must exist with at least this probability"
     )
-    stay_probability: float = slider(0.4, 0.0, 0.95, 0.05, "", "The lead stays it down to this probability of each")
+    become_probability: float = slider(
+        0.5, 0.0, 0.95, 0.01, "", "To become the lead, an object must be in the path with at least this probability"
+    )
+    stay_probability: float = slider(
+        0.4, 0.0, 0.95, 0.05, "", "The lead is kept while both probabilities are at least this"
+    )
 
 
 class AccParams(Section):
@@ -120,9 +126,9 @@ class AccParams(Section):
     set_speed_kmh: float = slider(100.0, 10.0, 200.0, 5.0, "km/h", "Speed with nothing ahead")
     min_gap_m: float = slider(5.0, 1.0, 20.0, 0.5, "m", "d_min: gap at standstill")
     time_gap_s: float = slider(1.8, 0.8, 4.0, 0.1, "s", "d_desired = d_min + time gap × speed")
-    ttc_limit_s: float = slider(2.5, 0.5, 10.0, 0.1, "s", "Slow down for any object that would be hit sooner than this")
+    ttc_limit_s: float = slider(2.5, 0.5, 10.0, 0.1, "s", "Slow down for any object with a shorter TTC")
     confirm_frames: int = slider(
-        2, 1, 10, 1, "frames", "Frames in a row in which an object beside the path is on a collision course first"
+        2, 1, 10, 1, "frames", "Consecutive frames on a collision course before ACC slows for an object beside the path"
     )
     kp: float = slider(2.0, 0.0, 5.0, 0.05, "1/s", "PID: proportional gain")
     ki: float = slider(0.05, 0.0, 2.0, 0.01, "1/s²", "PID: integral gain")
@@ -130,7 +136,7 @@ class AccParams(Section):
     max_accel_mps2: float = slider(2.0, 0.5, 5.0, 0.1, "m/s²", "Acceleration at full accelerator")
     max_decel_mps2: float = slider(8.0, 1.0, 10.0, 0.1, "m/s²", "Deceleration at full brake")
     comfort_decel_mps2: float = slider(
-        3.5, 0.5, 10.0, 0.1, "m/s²", "ACC brakes no harder on weak evidence (ISO 15622 permits 3.5 at speed)"
+        3.5, 0.5, 10.0, 0.1, "m/s²", "Hardest ACC braking on weak evidence (ISO 15622 permits 3.5 at speed)"
     )
     approach_decel_mps2: float = slider(
         2.5,
@@ -138,7 +144,7 @@ class AccParams(Section):
         10.0,
         0.1,
         "m/s²",
-        "A lead beyond the desired gap is slowed down for when it takes this; 0: not before the gap, as in the paper",
+        "Slow down for a lead beyond the desired gap once it takes this much; 0: only at the gap, as in the paper",
     )
     brake_limit_mps2: float = slider(
         8.0,
@@ -155,7 +161,7 @@ class AebParams(Section):
     deceleration exceeds its limit."""
 
     enabled: bool = choice(True, "Warn and brake in an emergency; off: ACC only, as in the paper")
-    min_speed_kmh: float = slider(5.0, 0.0, 30.0, 1.0, "km/h", "No stage starts below this own speed")
+    min_speed_kmh: float = slider(5.0, 0.0, 30.0, 1.0, "km/h", "No stage starts below this ego speed")
     warn_ttc_s: float = slider(2.2, 0.5, 6.0, 0.1, "s", "Warn below this time to collision")
     partial_ttc_s: float = slider(1.4, 0.3, 4.0, 0.1, "s", "Partial braking below this time to collision")
     full_ttc_s: float = slider(0.9, 0.2, 3.0, 0.1, "s", "Full braking below this time to collision")
@@ -164,10 +170,12 @@ class AebParams(Section):
     partial_decel_mps2: float = slider(4.0, 0.5, 8.0, 0.1, "m/s²", "Deceleration of partial braking")
     full_decel_mps2: float = slider(8.0, 2.0, 10.0, 0.1, "m/s²", "Deceleration of full braking")
     build_up_s: float = slider(
-        0.3, 0.0, 1.0, 0.05, "s", "Delay from the command to full brake pressure, driven unbraked"
+        0.3, 0.0, 1.0, 0.05, "s", "Delay from brake command to full pressure, counted as unbraked"
     )
     margin_m: float = slider(1.0, 0.0, 5.0, 0.1, "m", "Gap left after braking")
-    confirm_frames: int = slider(2, 1, 10, 1, "frames", "Frames in a row that must call for a stage before it starts")
+    confirm_frames: int = slider(
+        2, 1, 10, 1, "frames", "Consecutive frames that must call for a stage before it starts"
+    )
     release_ttc_s: float = slider(6.0, 1.0, 20.0, 0.5, "s", "Keep braking below this time to collision")
     release_s: float = slider(0.3, 0.0, 3.0, 0.1, "s", "Braking ends this long after the danger has passed")
     standstill_s: float = slider(2.0, 0.0, 10.0, 0.5, "s", "Hold the brakes for this long at standstill")

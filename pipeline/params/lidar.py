@@ -8,15 +8,15 @@ from pipeline.params.declare import Section, choice, slider
 
 
 class DeskewParams(Section):
-    """Motion compensation of the sweep by own speed and yaw rate."""
+    """Motion compensation of the sweep by ego speed and yaw rate."""
 
-    enabled: bool = choice(False, "Move points to where static objects are at the tick; moving vehicles get distorted")
+    enabled: bool = choice(False, "Correct points for ego motion during the sweep; vehicles that move are distorted")
 
 
 class DownsampleParams(Section):
     """Per-channel down-sampling (paper: "down-sampling … points of each channel")."""
 
-    blind_range_m: float = slider(1.0, 0.0, 5.0, 0.1, "m", "Nearer returns come from the own vehicle and are dropped")
+    blind_range_m: float = slider(1.0, 0.0, 5.0, 0.1, "m", "Nearer returns come from the ego vehicle and are dropped")
     keep_every: int = slider(1, 1, 10, 1, "points", "Keep every n-th point of each channel; 1 keeps all")
 
 
@@ -41,15 +41,15 @@ class GroundParams(Section):
     fit_half_width_m: float = slider(
         10.0, 2.0, 30.0, 0.5, "m", "Planes are fitted to points within this distance to either side"
     )
-    min_range_m: float = slider(2.0, 0.0, 5.0, 0.1, "m", "Nearer returns come from the own vehicle and are not fitted")
+    min_range_m: float = slider(2.0, 0.0, 5.0, 0.1, "m", "Nearer returns come from the ego vehicle and are not fitted")
 
 
 class ClusterParams(Section):
     """Exact Euclidean clustering with a weight on z (paper, Point Cloud Segmentation)."""
 
-    tolerance_m: float = slider(0.9, 0.1, 3.0, 0.05, "m", "Points nearer to each other than this belong to one object")
+    tolerance_m: float = slider(0.9, 0.1, 3.0, 0.05, "m", "Points closer together than this belong to one cluster")
     divide_m: float = slider(
-        0.6, 0.1, 3.0, 0.05, "m", "The same within what is wider than any vehicle; as large as the tolerance: off"
+        0.6, 0.1, 3.0, 0.05, "m", "The same inside a cluster wider than any vehicle; equal to the tolerance: off"
     )
     z_weight: float = slider(0.4, 0.05, 1.0, 0.05, "", "Weight on height: below 1 joins rings that are 2° apart")
     min_points: int = slider(4, 1, 50, 1, "points", "Smaller clusters are dropped")
@@ -94,5 +94,5 @@ class LidarTrackingParams(Section):
         5, 2, 20, 1, "frames", "trajectory: number of positions that the velocity is fitted to"
     )
     rigid_sideways: bool = choice(
-        True, "An object swerves only as far as both of its sides move; off: a footprint that grows counts as motion"
+        True, "An object moves sideways only as far as both its sides do; off: a growing footprint counts as motion"
     )

@@ -10,7 +10,7 @@ from pipeline.params.declare import Section, choice, slider
 class DetectionParams(Section):
     """Which of the detector's boxes are kept."""
 
-    far_view: bool = choice(True, "Use the boxes of the second look, at the far part of the picture in native pixels")
+    far_view: bool = choice(True, "Use the boxes of the second pass over the far part of the picture, in native pixels")
     min_score: float = slider(0.3, 0.05, 0.95, 0.01, "", "Boxes with a lower score are dropped")
     nms_iou: float = slider(
         0.55, 0.1, 0.95, 0.01, "", "Of two boxes that overlap more, the one with the lower score is dropped"
@@ -64,8 +64,8 @@ class DistanceParams(Section):
         0.5,
         0.01,
         "",
-        "Spread of heights within a class and of how a network boxes them, as a fraction. Measured: 0.10 to 0.18 about "
-        "a median off by up to 0.11, in four labelled drives",
+        "Relative spread of heights within a class and of how tightly a network boxes them. Measured in four labelled "
+        "drives: 0.10 to 0.18, around a median off by up to 0.11",
     )
 
 
@@ -78,7 +78,7 @@ class VisionTrackingParams(Section):
     queue_frames: int = slider(10, 1, 30, 1, "frames", "A box is dropped after this many frames without a detection")
     max_missed_s: float = slider(1.0, 0.1, 5.0, 0.1, "s", "A box is dropped after this long without a detection")
     gate_px: float = slider(80.0, 5.0, 400.0, 1.0, "px", "dist_th: largest movement of a box's centre between frames")
-    gate_sizes: float = slider(1.0, 0.1, 5.0, 0.1, "", "kalman: largest movement in box widths, where that is more")
+    gate_sizes: float = slider(1.0, 0.1, 5.0, 0.1, "", "kalman: largest movement in box widths, if that is more")
     gate_sigmas: float = slider(
         4.0, 1.0, 10.0, 0.1, "σ", "kalman: a box farther from the expected place and size is another object"
     )
@@ -89,16 +89,16 @@ class VisionTrackingParams(Section):
     bearing_sigma_deg: float = slider(0.3, 0.05, 3.0, 0.05, "°", "kalman: noise of a box's direction")
     accel_sigma_mps2: float = slider(3.0, 0.1, 20.0, 0.1, "m/s²", "kalman: acceleration noise of objects")
     learn_height: bool = choice(
-        True, "kalman: learn how tall a vehicle is while the LiDAR ranges it; off: as tall as its class"
+        True, "kalman: learn a vehicle's height while the LiDAR ranges it; off: assume that of its class"
     )
     max_nis: float = slider(
-        13.8, 3.0, 1000.0, 0.1, "", "kalman: a distance more surprising is refused; 13.8 is 99.9 % of χ² (2 degrees)"
+        13.8, 3.0, 1000.0, 0.1, "", "kalman: largest NIS of a distance; 13.8 is the 99.9 % quantile of χ² (2 degrees)"
     )
     restart_after: int = slider(
-        3, 1, 30, 1, "frames", "kalman: distances refused in a row before a track's place is measured anew"
+        3, 1, 30, 1, "frames", "kalman: consecutive rejected distances after which a track's position is reset"
     )
     ghost_iou: float = slider(
-        0.4, 0.1, 1.0, 0.05, "", "kalman: a carried box that overlaps a detected one more is dropped"
+        0.4, 0.1, 1.0, 0.05, "", "kalman: a carried box that overlaps a detected one by more is dropped"
     )
 
 
@@ -120,10 +120,15 @@ class ExistenceParams(Section):
 
     enabled: bool = choice(True, "Weigh the evidence for and against each object; off: every object exists")
     min_braking: float = slider(
-        0.8, 0.0, 0.99, 0.01, "", "An object that exists less probably is slowed down for, but not braked for"
+        0.8, 0.0, 0.99, 0.01, "", "A less probable object causes gentle deceleration only, no hard braking"
     )
     camera_ranges: int = slider(
-        8, 1, 50, 1, "frames", "Distances in a row after which the camera alone knows a closing speed to brake for"
+        8,
+        1,
+        50,
+        1,
+        "frames",
+        "Consecutive camera distances after which a closing speed may cause hard braking without LiDAR",
     )
 
 
@@ -144,13 +149,13 @@ class FusionParams(Section):
         1.0,
         0.05,
         "",
-        "Boxes that overlap more skip the range gate: those of cars 1.8 times as far away cannot overlap so",
+        "Boxes that overlap more skip the range gate: a car 1.8 times as far away cannot overlap this much",
     )
     range_gate_sigmas: float = slider(
         1.5, 0.5, 10.0, 0.1, "σ", "Largest difference of the two distances: 1.5 σ of a box's distance is 30 % of it"
     )
     single_returns: bool = choice(
-        True, "Range far vehicles by the few LiDAR returns inside their boxes that are no cluster"
+        True, "Range far vehicles by single LiDAR returns inside their boxes, too few for a cluster"
     )
     size_gate: bool = choice(
         True, "Do not join a box with a cluster longer than any vehicle of its class: hedges, walls, rails"

@@ -133,7 +133,7 @@ def _fades(ego: EgoState | None, estimates: list[PathEstimate]) -> bool:
 
 def _about_own_motion(ego: EgoState | None) -> tuple[str, ...]:
     if ego is not None and ego.coasting is not None:
-        return (f"own speed not measured for {ego.coasting.age_s:.1f} s: assuming {ego.speed_mps * 3.6:.0f} km/h",)
+        return (f"ego speed not measured for {ego.coasting.age_s:.1f} s: assuming {ego.speed_mps * 3.6:.0f} km/h",)
     return ()
 
 

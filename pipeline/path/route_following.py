@@ -76,7 +76,9 @@ def follow(
     state = _dead_reckoned(state, ego, dt_s or 0.0)
     state, notes = _with_fix(state, line, fix, ego, t_ns, dt_s or 0.0, params)
     if state.placed_anew:
-        notes = (f"GNSS position reset after a jump, uncertain by {state.doubt_m:.1f} m: it does not show the lane",)
+        notes = (
+            f"GNSS position reset after a jump, uncertain by {state.doubt_m:.1f} m: too inaccurate to tell the lane",
+        )
     return state, notes
 
 

@@ -38,7 +38,7 @@ class CameraServer:
             listener.bind((self._host, self.port))
         except OSError as error:
             listener.close()
-            why = "is taken" if error.errno == errno.EADDRINUSE else error.strerror
+            why = "is in use" if error.errno == errno.EADDRINUSE else error.strerror
             raise BadInput(f"camera on {self._host}:{self.port}: {why}") from None
         listener.listen()
         self.port = listener.getsockname()[1]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
+
+import yaml
 
 FOLDER = Path(__file__).parent / "scenarios"
 
@@ -14,4 +17,11 @@ def names() -> tuple[str, ...]:
 
 def offers() -> list[tuple[str, str]]:
     """(name, title) of every built-in scenario, for a list to choose from."""
-    return [(name, f"Simulation · {name.replace('_', ' ')}") for name in names()]
+    return [(name, f"Simulation · {_title(name)}") for name in names()]
+
+
+@cache
+def _title(name: str) -> str:
+    """As its file says; the rest of the file is not read."""
+    with (FOLDER / f"{name}.yaml").open(encoding="utf-8") as lines:
+        return next((str(yaml.safe_load(line)["title"]) for line in lines if line.startswith("title:")), name)

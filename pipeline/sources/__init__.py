@@ -94,7 +94,7 @@ def _holding(path: str) -> str:
         if not path or not place.exists():
             return ""
         if place.is_file():
-            return f": a {place.suffix} file" if place.suffix else ": a file of no known kind"
+            return f": a {place.suffix} file" if place.suffix else ": unknown file type"
         inside = sorted(place.iterdir())
         recordings = [each for each in inside if looks_like(each) is not None]
     except (OSError, RuntimeError, ValueError):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.formats.file_reading import decode_picture, picture_of, read_bytes, recording_folder
+from pipeline.formats.file_reading import picture_of, picture_size, read_bytes, recording_folder
 from pipeline.formats.kitti_calibration import KittiCalibration, parse_object_calibration, parse_raw_calibration
 from pipeline.formats.kitti_records import parse_labels, parse_oxts
 from pipeline.sources.hdl64_rings import (
@@ -52,7 +52,8 @@ class KittiSource:
         self._names = self._files.names
         if not self._names:
             raise SourceError(f"{path}: not a KITTI recording: {_what_it_holds(folder)}")
-        self._size = self._picture_size()
+        # object calibration files do not say how large the pictures are
+        self._size = picture_size(self._files.pictures.values()) or _NOMINAL_SIZE
         self._calibration = self._first_calibration(path)
         self._ticks = _ticks(self._names, self._files)
         self._moved = motion_of(self._files, self._calibration)
@@ -135,7 +136,7 @@ class KittiSource:
         count = int(turn.max()) + 1
         elevations_deg = ring_elevations_deg(points, turn, min(count, RINGS))
         if count > RINGS or not is_in_order(elevations_deg):
-            notes.append(f"{file}: points are not in KITTI's order; their rings are told by elevation")
+            notes.append(f"{file}: points are not in KITTI's order; rings are assigned by elevation")
             return rings_by_elevation(points, self._elevations_deg), None
         if count < RINGS:
             notes.append(f"{file}: {count} rings instead of {RINGS}; matched by this sweep's own elevations")
@@ -182,16 +183,6 @@ class KittiSource:
             )
         first = next(iter(self._files.calibrations.values()))
         return parse_object_calibration(read_bytes(first), first.name, self._size)
-
-    def _picture_size(self) -> tuple[int, int]:
-        """Width and height of the first readable picture; object calibration files do not say."""
-        for path in self._files.pictures.values():
-            try:
-                bgr, _ = decode_picture(path)
-            except SourceError:
-                continue
-            return bgr.shape[1], bgr.shape[0]
-        return _NOMINAL_SIZE
 
     def _ring_elevations(self) -> F64:
         """(64,) elevations of the rings in degrees, highest first, from the first whole sweep, because the laser mounts

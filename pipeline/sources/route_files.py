@@ -24,6 +24,7 @@ from pipeline.common.errors import BadInput
 from pipeline.common.user_file_errors import given_path
 from pipeline.common.user_files import read_regular
 from pipeline.formats.nmea import parse_sentence
+from pipeline.formats.xml_text import parse_xml
 from pipeline.types import GnssFix, Route
 
 _LAT_NAMES = ("lat", "lat_deg", "latitude", "latitude_deg")
@@ -124,7 +125,7 @@ def _from_utm(lines: list[list[str]], east: int, north: int, zone_at: int | None
     named = {row[zone_at].strip() for row in rows if len(row) > zone_at} if zone_at is not None and not zone else {zone}
     epsg = {utm_epsg(each) for each in named}
     if len(epsg) != 1 or None in epsg:
-        wrong = f"not one UTM zone: {', '.join(sorted(named))[:80]}" if named - {""} else "its UTM zone is not said"
+        wrong = f"not one UTM zone: {', '.join(sorted(named))[:80]}" if named - {""} else "no UTM zone given"
         raise RouteError(f"{path}: {wrong}; add a column zone (32N) or epsg (32632), or open {path}?epsg=32632")
     pairs = [(_number(row[east]), _number(row[north])) for row in rows]
     places = [(x, y) for x, y in pairs if x is not None and y is not None]
@@ -145,12 +146,7 @@ def utm_epsg(zone: str) -> int | None:
 
 
 def _gpx(text: str, path: str) -> tuple[Rows, float]:
-    if "<!DOCTYPE" in text[:10_000] or "<!ENTITY" in text:
-        raise RouteError(f"{path}: GPX needs no document type or entities, and none are read")
-    try:
-        root = ElementTree.fromstring(text.lstrip("\ufeff \r\n\t"))  # a text: the encoding it names is not tried
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise RouteError(f"{path}: not XML: {error}") from None
+    root = parse_xml(text, path, RouteError)
     for kind, point in (("trk", "trkpt"), ("rte", "rtept")):
         line = root.find(f"{{*}}{kind}")
         if line is not None:

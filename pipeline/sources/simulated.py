@@ -35,7 +35,7 @@ class SimulatedSource:
         try:
             self._scenario = scenario.load(name)
         except scenario.ScenarioError as error:
-            raise SourceError(f"{uri}: {error}") from None
+            raise SourceError(str(error)) from None
         self.uri, self.title, self.rate_hz = uri, self._scenario.title, self._scenario.rate_hz
         self.notes = tuple(_notes(self._scenario))
         self._step_ns = round(1e9 / self.rate_hz)
@@ -80,7 +80,7 @@ def _notes(scene: scenario.Scenario) -> Iterator[str]:
     if scene.sensors == "camera":
         yield "This drive uses the camera alone; it has no LiDAR."
     if scene.detections is not None:
-        yield "Detections come with this drive: the truth, with a detector's errors. No network runs."
+        yield "Detections come with this drive: ground truth with a detector's errors. No network runs."
     if scene.faults != NONE:
         yield "The sensors of this drive have faults: see `faults` in its file."
 

@@ -19,7 +19,15 @@ from pipeline.common.data_dir import file_sha256
 from pipeline.inference import model_registry
 from pipeline.inference.distance_laws import find_law
 from pipeline.inference.graph import MULTIPLE, Size, fitting_size, input_size, with_input_size, with_unit_picture
-from pipeline.inference.runtime import DetectorError, DetectorMissing, find_graph, open_session, read_graph, run_session
+from pipeline.inference.runtime import (
+    DetectorError,
+    DetectorMissing,
+    check_picture,
+    find_graph,
+    open_session,
+    read_graph,
+    run_session,
+)
 from pipeline.types import F32, REAL_VEHICLES, U8, DistanceLaw, RawBoxes
 from pipeline.vision.classes import class_names
 from pipeline.vision.heads import Decoder, UnknownHead, pick_decoder
@@ -69,8 +77,7 @@ class Detector:
 
         DetectorError for an array that is no such picture or a network that fails on it.
         """
-        if bgr.dtype != np.uint8 or bgr.ndim != 3 or bgr.shape[2] != 3 or 0 in bgr.shape:
-            raise DetectorError(f"expected a picture of (H, W, 3) uint8, got {bgr.shape} {bgr.dtype}")
+        check_picture(bgr)
         return self.decode(run_session(self._session, self.blob(bgr)), (bgr.shape[0], bgr.shape[1]))
 
     def blob(self, bgr: U8) -> F32:

@@ -59,7 +59,7 @@ def fit_power_law(heights_px: npt.ArrayLike, distances_m: npt.ArrayLike, exponen
     h = np.asarray(heights_px, dtype=np.float64).ravel()
     d = np.asarray(distances_m, dtype=np.float64).ravel()
     if h.shape != d.shape:
-        raise ValueError(f"{h.size} heights and {d.size} distances are no pairs")
+        raise ValueError(f"{h.size} heights but {d.size} distances")
     if not (np.isfinite(h).all() and np.isfinite(d).all() and (h > 0).all() and (d > 0).all()):
         raise ValueError("heights and distances must be positive and finite")
     needed = 2 if exponent is None else 1

@@ -50,7 +50,7 @@ def test_the_table_is_written(data_dir: Path) -> None:
 
 
 def _table(scores: dict[str, LeadScore], made_up: dict[str, int]) -> Iterator[str]:
-    yield "| | correct | missed | wrong | mean error | largest | of the distance | made up |"
+    yield "| | correct | missed | wrong | mean error | largest | relative | false leads |"
     yield "|---|---|---|---|---|---|---|---|"
     for name, total in scores.items():
         mean, most, share = total.mean_error_m, total.max_error_m, total.mean_relative_error

@@ -142,12 +142,12 @@ def test_a_click_in_the_picture_or_the_plan_selects(open_page: OpenPage, site: S
     plan = page.locator("#bev").bounding_box()
     assert plan is not None
     # the plan is fitted: from 5 m behind the bumper to 74 m ahead, at least 13 m to either side
-    per_metre = min(plan["height"] / 79, plan["width"] / 26)
+    per_metre = min((plan["height"] - 36) / 79, plan["width"] / 26)
     item = next(item for item in tick.result.objects if item.id == lead.id)
     assert item.bev is not None
     x, y = (sum(corner[axis] for corner in item.bev) / 4 for axis in (0, 1))
     page.locator("#bev").click(
-        position={"x": plan["width"] / 2 - y * per_metre, "y": plan["height"] - (x + 5) * per_metre}
+        position={"x": plan["width"] / 2 - y * per_metre, "y": plan["height"] - 36 - (x + 5) * per_metre}
     )
     expect(page.locator("tr.is-selected td").first).to_have_text(f"#{lead.id}")
 

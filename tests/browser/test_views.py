@@ -18,7 +18,7 @@ COLOURS = ("object", "range", "height", "intensity", "ring", "cluster", "ground"
 """``age`` needs a recording that says when each point was measured."""
 HOLD_PX = 24
 """How far from where it was set a tape's end may be: the nearest point holds it."""
-AHEAD_M, FROM_M, HALF_WIDTH_M = 79.0, -5.0, 13.0
+AHEAD_M, FROM_M, HALF_WIDTH_M, TOOLS_PX = 79.0, -5.0, 13.0, 36
 """What the plan shows until somebody moves it (viewport.js)."""
 
 
@@ -30,8 +30,10 @@ def of_store(page: Page, words: str) -> Any:
 def on_plan(page: Page, x_m: float, y_m: float) -> tuple[float, float]:
     """Where a place of the fitted plan is on the screen."""
     box = box_of(page.locator("#bev"))
-    per_metre = min(box["height"] / AHEAD_M, box["width"] / (2 * HALF_WIDTH_M))
-    return box["x"] + box["width"] / 2 - y_m * per_metre, box["y"] + box["height"] - (x_m - FROM_M) * per_metre
+    per_metre = min((box["height"] - TOOLS_PX) / AHEAD_M, box["width"] / (2 * HALF_WIDTH_M))
+    return box["x"] + box["width"] / 2 - y_m * per_metre, box["y"] + box["height"] - TOOLS_PX - (
+        x_m - FROM_M
+    ) * per_metre
 
 
 def in_picture(page: Page, u: float, v: float) -> tuple[float, float]:

@@ -18,6 +18,7 @@ from app.labels.store.database import Database
 from pipeline.detection import detector_for, lanes_for
 from pipeline.params import Params
 from pipeline.sources import open_source
+from pipeline.vision.far_view import WINDOW_PX
 from tests.browser.conftest import Site
 from tests.browser.labels.hands import begin
 
@@ -82,6 +83,7 @@ def dashboard() -> Iterator[Site]:
             uri=SOURCE,
             whole_drives=True,
             open_lanes=lanes_for,
+            far_view_px=WINDOW_PX,
             desk=SessionRecorder(Path(folder)),
             labels=LabelDesk(Database.in_file(Path(folder) / "labels.db")),
         )

@@ -79,8 +79,8 @@ class PipelineOptions:
     set: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME=VALUE")] = ()
     """Change one parameter, e.g. cluster.z_weight=0.4 (repeatable; `cipv params` lists them)"""
     own_motion: Literal["auto", "can", "gnss", "lidar", "off"] | None = None
-    """Where own speed and yaw rate come from (motion.source). auto: what is recorded, and the LiDAR where that is
-    missing; can: the car's bus, its odometry or inertial unit; gnss: a receiver; lidar: the LiDAR alone; off: none"""
+    """Where ego speed and yaw rate come from (motion.source). auto: what is recorded, and LiDAR odometry where that is
+    missing; can: vehicle bus, odometry or IMU; gnss: GNSS receiver; lidar: LiDAR odometry alone; off: none"""
     detector: str | None = None
     """Name or path of an ONNX detector. Default: the registered one, then $CIPV_DATA/models, then the embedded
     one, trained on simulated cars only, which is the default for sim:"""

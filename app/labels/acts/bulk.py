@@ -61,7 +61,7 @@ def put_proposals(
     known = len(found.tracks) - counts[-1]
     flat = sum(all(each.cuboid is None for each in track.sightings) for track in found.tracks)
     more = [
-        f"{known} more are labelled already" if known else "",
+        f"{known} more are already labelled" if known else "",
         f"{flat} seen by the camera only, without a cuboid" if flat else "",
     ]
     return "; ".join((acted.what, *filter(None, more)))
@@ -100,7 +100,7 @@ def importing(
         return f"imported {len(found.tracks) - len(known)} tracks and {len(found.leads)} ranges of the lead"
 
     said = labels.log.act("import", person, apply).what
-    twice = (f"{len(known)} tracks are there already, place for place",) if known else ()
+    twice = (f"{len(known)} tracks are already here, identical in every frame",) if known else ()
     return "; ".join((said, *twice, *notes))
 
 

@@ -26,7 +26,7 @@ def clear_lead(draft: Draft, scope: Scope, act: ClearLead) -> str:
     scope.check(act.first, act.last)
     if not clear(draft, act.first, act.last):
         raise ActRefused(f"no lead is labelled in {frames_text(act.first, act.last)}")
-    return f"lead of {frames_text(act.first, act.last)}: not said"
+    return f"lead of {frames_text(act.first, act.last)}: cleared"
 
 
 def trim_lead(draft: Draft, scope: Scope, act: TrimLead) -> str:
@@ -39,7 +39,7 @@ def trim_lead(draft: Draft, scope: Scope, act: TrimLead) -> str:
         state = old.state if old.origin.maker == "person" else "corrected"
         new = replace(old, first=act.first, last=act.last, state=state, origin=by_person(draft), reviewer="")
         paint(draft, new, act.range)
-    return f"lead {lead_text(old.lead)} in {frames_text(act.first, act.last)}, not {frames_text(old.first, old.last)}"
+    return f"lead {lead_text(old.lead)}: {frames_text(old.first, old.last)} → {frames_text(act.first, act.last)}"
 
 
 def paint(draft: Draft, new: LeadRange, number: int | None = None) -> None:

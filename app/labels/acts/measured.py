@@ -46,7 +46,7 @@ def refitted(labels: DriveLabels, frame: Frame, params: Params, act: Refit) -> t
     if sighting.cuboid is not None:
         found = refit(frame.sweep.points, sighting.cuboid)
         cuboid = found.cuboid
-        note = f"fitted to {found.points} points" + ("" if found.turned else "; its heading is not visible from them")
+        note = f"fitted to {found.points} points" + ("" if found.turned else "; they do not show its heading")
     else:
         seen = lift(frame, params, track.label, sighting.bbox)
         if not seen.points:
@@ -82,4 +82,4 @@ def _given(cuboid: Cuboid) -> CuboidShape:
     try:
         return CuboidShape(center=(x, y, z), size=(length, width, height), yaw_rad=round(cuboid.yaw_rad, _DECIMALS))
     except ValidationError:
-        raise ActRefused(f"the points there are {length:.0f} × {width:.0f} × {height:.0f} m: no vehicle") from None
+        raise ActRefused(f"the points there are {length:.0f} × {width:.0f} × {height:.0f} m: not a vehicle") from None

@@ -40,7 +40,7 @@ def review_ok(draft: Draft, scope: Scope, act: ReviewOk) -> str:
     for ref in act.items:
         value = stated(draft.get(ref.kind, ref.id, ref.revision))
         if value.reviewer == draft.person:
-            raise ActRefused(f"you have reviewed {_name(value)} already")
+            raise ActRefused(f"you have already reviewed {_name(value)}")
         made = value.origin.name if value.origin.maker == "person" else None
         if draft.person in (made, draft.changed_by(ref.kind, ref.id)):
             raise ActRefused(f"you changed {_name(value)} last: a second person must review it")

@@ -43,7 +43,7 @@ def drop_sightings(draft: Draft, scope: Scope, act: DropSightings) -> str:
         raise ActRefused(f"#{track.id} is not in {frames_text(act.first, act.last)}")
     draft.put_sightings(track.id, dict.fromkeys(there))
     corrected(draft, track)
-    return f"took #{track.id} out of {frames_text(act.first, act.last)}"
+    return f"removed #{track.id} from {frames_text(act.first, act.last)}"
 
 
 def size_along(draft: Draft, scope: Scope, act: SizeAlong) -> str:
@@ -57,7 +57,7 @@ def size_along(draft: Draft, scope: Scope, act: SizeAlong) -> str:
         raise ActRefused(f"#{track.id} has no cuboid in any frame")
     _put(draft, track.id, old, after)
     corrected(draft, track)
-    return "sized #{} {} m in every frame".format(track.id, " × ".join(f"{side:.2f}" for side in act.size))
+    return "resized #{} to {} m in every frame".format(track.id, " × ".join(f"{side:.2f}" for side in act.size))
 
 
 def _put(draft: Draft, track: int, old: Mapping[int, Sighting], new: Mapping[int, Sighting]) -> None:

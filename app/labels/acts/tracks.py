@@ -35,7 +35,7 @@ def add_measured(draft: Draft, scope: Scope, act: AddMeasured) -> str:
 def relabel(draft: Draft, scope: Scope, act: Relabel) -> str:
     track, label = track_of(draft, act.track, act.revision), canonical(act.label)
     corrected(draft, replace(track, label=label))
-    return f"called #{track.id} a {label}"
+    return f"changed #{track.id} to {label}"
 
 
 def split(draft: Draft, scope: Scope, act: Split) -> str:
@@ -60,7 +60,7 @@ def split(draft: Draft, scope: Scope, act: Split) -> str:
 def merge(draft: Draft, scope: Scope, act: Merge) -> str:
     first, second = (track_of(draft, ref.id, ref.revision) for ref in act.tracks)
     if first.id == second.id:
-        raise ActRefused("one track cannot be merged with itself")
+        raise ActRefused("a track cannot be merged with itself")
     ours, theirs = draft.sightings(first.id), draft.sightings(second.id)
     draft.put_sightings(first.id, {frame: each for frame, each in theirs.items() if frame not in ours})
     corrected(draft, first)

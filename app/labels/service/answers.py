@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from app.labels.store.values import Item, ItemKind, value_to_json
+from app.labels.store.values import HistoryEntry, Item, ItemKind, value_to_json
 from pipeline.labels.model import LabelTrack, Sighting
 
 if TYPE_CHECKING:
-    from app.labels.store.act_log import HistoryEntry
     from app.labels.store.drive_labels import Changes, DriveInfo, DriveLabels
 
 _LISTS: dict[ItemKind, str] = {"track": "tracks", "lead": "leads", "path": "paths", "event": "events", "tag": "tags"}
@@ -64,16 +63,7 @@ def placed_json(sighting: Sighting) -> dict[str, Any]:
 
 
 def history_json(entry: HistoryEntry) -> dict[str, Any]:
-    return {
-        "act": entry.act,
-        "what": entry.what,
-        "note": entry.note,
-        "person": entry.person,
-        "t_unix_ms": entry.t_unix_ms,
-        "before": _content_json(entry.before),
-        "after": _content_json(entry.after),
-        "undone": entry.undone,
-    }
+    return {**vars(entry), "before": _content_json(entry.before), "after": _content_json(entry.after)}
 
 
 def _content_json(content: dict[str, Any] | None) -> dict[str, Any] | None:

@@ -21,11 +21,11 @@ What = Literal["unlabelled", "disagreement", "proposed", "sent_back", "unreviewe
 Key = tuple[ItemKind, int]
 """TaskKind and number of a label."""
 _NOTHING: dict[What, str] = {
-    "unlabelled": "who leads is said in every frame there",
+    "unlabelled": "the lead is labelled in every frame there",
     "disagreement": "the pipeline and the accepted labels agree there",
-    "proposed": "no proposal is waiting there",
-    "sent_back": "nothing was sent back there",
-    "unreviewed": "nothing of others is waiting for a review there",
+    "proposed": "no proposals there",
+    "sent_back": "no labels sent back there",
+    "unreviewed": "no labels from others to review there",
 }
 
 
@@ -89,7 +89,7 @@ def _unlabelled(labels: DriveLabels) -> list[Place]:
     for lead in _leads(labels):
         if lead.state != "rejected":
             said.update(range(lead.first, lead.last + 1))
-    return [Place(index, "nobody has said who leads") for index in range(len(labels.info.t_ns)) if index not in said]
+    return [Place(index, "lead not labelled") for index in range(len(labels.info.t_ns)) if index not in said]
 
 
 def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[Place]:
@@ -116,7 +116,7 @@ def _unreviewed(labels: DriveLabels, person: str) -> list[Place]:
         made = value.origin.name if value.origin.maker == "person" else ""
         last = changed_by.get((item.kind, item.id), made)
         if person not in (made, last):
-            places.append(Place(frame, f"{_name(item)} of {last or value.origin.name}", (item.kind, item.id)))
+            places.append(Place(frame, f"{_name(item)} by {last or value.origin.name}", (item.kind, item.id)))
     return places
 
 
@@ -159,7 +159,7 @@ def _unjudged(labels: DriveLabels, scores: LabelScores, run: DriveRun | None) ->
     if score is not None and any(frame.judged is not None for frame in score.frames):
         return ""
     _, truth = scores.truth(labels)
-    return " ".join(("no frame is judged:", *(truth.notes[:1] if truth is not None else ("nothing is accepted yet",))))
+    return " ".join(("no frame is scored:", *(truth.notes[:1] if truth is not None else ("nothing is accepted yet",))))
 
 
 def _otherwise(judged: Judged, cipv: int | None, leads: Iterable[LeadRange], index: int) -> str:

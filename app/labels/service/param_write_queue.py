@@ -52,7 +52,7 @@ class SettlingQueue:
         change = _Change(uri, log, changes, person, merges)
         with self._changed:
             if len(self._waiting) >= _MOST:
-                return self._failed(1, f"{_MOST} before it wait for the database")
+                return self._failed(1, f"{_MOST} earlier changes are waiting for the database")
             self._waiting.append(change)
             if self._thread is None:
                 self._thread = threading.Thread(target=self._write_all, name="cipv-settling", daemon=True)
@@ -101,7 +101,7 @@ class SettlingQueue:
                 each.over.set()
 
     def _failed(self, count: int, why: str) -> None:
-        many = "A change of parameters" if count == 1 else f"{count} changes of parameters"
+        many = "A parameter change" if count == 1 else f"{count} parameter changes"
         self.trouble = f"{many} cannot be undone: {why}"
         logger.warning(self.trouble)
 

@@ -22,7 +22,7 @@ from app.labels.store.draft import Draft, name_of
 from app.labels.store.invariants import check_whole
 from app.labels.store.tables import ActRow, ChangeRow, DriveRow
 from app.labels.store.undo_order import Steps, Way
-from app.labels.store.values import ItemKind, unpack, unpack_pair
+from app.labels.store.values import HistoryEntry, ItemKind, unpack, unpack_pair
 
 _LONGEST_HISTORY = 200
 
@@ -37,20 +37,6 @@ class Acted:
     what: str
     note: str = ""
     params: Mapping[str, Any] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class HistoryEntry:
-    """One act in the life of an item; contents as plain values, null where it was not there. note: as of ``Acted``."""
-
-    act: int
-    what: str
-    note: str
-    person: str
-    t_unix_ms: int
-    before: dict[str, Any] | None
-    after: dict[str, Any] | None
-    undone: bool
 
 
 @dataclass
@@ -135,7 +121,7 @@ class Log:
                 return done
             step = self._steps.following(connection, way, person)
             if step is None:
-                raise ActRefused(f"there is nothing to {way}")
+                raise ActRefused(f"nothing to {way}")
             acts = self._steps.acts_of(connection, step)
             for number, _ in reversed(acts) if way == "undo" else acts:
                 self._put(connection, draft, number, way)
@@ -149,7 +135,7 @@ class Log:
                 .where(ActRow.drive_id == self._drive_id, ActRow.number.in_([number for number, _ in acts]))
                 .values(status=status)
             )
-            said = f"took back: {what}" if way == "undo" else f"did again: {what}"
+            said = f"undone: {what}" if way == "undo" else f"redone: {what}"
             self._write(turn, way, said, target=step, act_id=act_id)
             return Acted(draft.number, draft.number, what, params=draft.params)
 
@@ -256,7 +242,7 @@ class Log:
             here, there = (row.after, row.before) if way == "undo" else (row.before, row.after)
             if row.kind == "param":
                 if (other := self._steps.changed_since(connection, row, draft.person)) is not None:
-                    raise ActRefused(f"{other} changed {row.item} since; {way} would take that back too")
+                    raise ActRefused(f"{other} changed {row.item} since; {way} would revert that too")
                 draft.put_param(row.item, unpack(here), unpack(there))
                 continue
             kind: ItemKind = row.kind
@@ -264,7 +250,7 @@ class Log:
             was, to = unpack_pair(kind, here, there)
             if not draft.stands(kind, number, was):
                 other = self._steps.changed_since(connection, row, draft.person) or "somebody"
-                raise ActRefused(f"{other} changed {name_of(kind, number)} since; {way} would take that back too")
+                raise ActRefused(f"{other} changed {name_of(kind, number)} since; {way} would revert that too")
             draft.put(kind, number, to.value)
             if kind == "track":
                 draft.put_sightings(number, to.frames)

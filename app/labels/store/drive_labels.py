@@ -159,7 +159,7 @@ class DriveLabels:
 
     def freeze(self, name: str, person: str) -> Version:
         """Keep all labels as they are now under a name. ActRefused when it is taken."""
-        taken = f"there is a version {name!r} already; versions are never overwritten"
+        taken = f"version {name!r} already exists; versions are never overwritten"
         if name == WORKING or any(version.name == name for version in self.versions()):
             raise ActRefused(taken)
         labels = replace(self.label_set(), name=name)

@@ -54,6 +54,21 @@ class Content:
     frames: Frames
 
 
+@dataclass(frozen=True)
+class HistoryEntry:
+    """One act in an item's life. before, after: the item, null where it was not there; of a track, with the sightings
+    that the act changed. note: what there was to say about it."""
+
+    act: int
+    what: str
+    note: str
+    person: str
+    t_unix_ms: int
+    before: dict[str, Any] | None
+    after: dict[str, Any] | None
+    undone: bool
+
+
 def value_to_json(kind: ItemKind, value: Value) -> dict[str, Any]:
     """Plain values, as the native file has them; a track without its sightings."""
     if isinstance(value, LabelTrack):

@@ -59,7 +59,7 @@ class ParamsGui:
     def _add(self, name: str, spec: Mapping[str, Any], value: Any) -> None:
         label, hint = _label(name, spec), spec.get("description", "")
         if "anyOf" in spec:
-            auto = self._gui.add_checkbox(f"{label} auto", value is None, hint="Use the value of the calibration")
+            auto = self._gui.add_checkbox(f"{label} auto", value is None, hint="Use the calibration's value")
             self._autos[name] = auto
             auto.on_update(lambda event: self._auto_moved(name, event))
         handle = self._input(label, hint, spec, value)

@@ -119,10 +119,10 @@ def _sentence(found: EdgeScore) -> str:
     if found.borders < FEWEST:
         return "Too few LiDAR depth borders in the pictures for a score"
     if found.score is None:
-        return f"No mount rotation within {REACH_DEG:.0f}° matches the picture edges clearly best: no score"
+        return f"No mount rotation within {REACH_DEG:.0f}° matches the picture edges clearly best; no score"
     if found.better:
         return f"LiDAR depth borders match the picture edges better with {_words(found.better)}"
-    return f"No mount rotation within {REACH_DEG:.0f}° matches the picture edges clearly better than the present one"
+    return f"No mount rotation within {REACH_DEG:.0f}° matches the picture edges clearly better than the current one"
 
 
 def _words(better: Mapping[str, float]) -> str:

@@ -121,7 +121,7 @@ def runs_router(engine: Engine, drives: BackgroundRuns) -> APIRouter:
 
     @router.delete("/runs/{number}")
     def delete(number: int) -> Runs:
-        """Delete a run. The present run and the base cannot be deleted."""
+        """Delete a run. The current run and the base cannot be deleted."""
         recording = open_recording(drives)
         with refusing():
             recording.runs.delete(number)

@@ -72,7 +72,7 @@ def score_drive(results: Iterable[Result], truth: DriveTruth, rules: Rules) -> D
     """Judge the results of one run. Frames are matched by their ticks; BadInput when no labelled frame has a result."""
     pairs = [(result, truth.frames[result.t_ns]) for result in results if result.t_ns in truth.frames]
     if not pairs:
-        raise BadInput(f"{truth.uri}: no labelled frame has a result; these results are of another recording")
+        raise BadInput(f"{truth.uri}: no labelled frame has a result: these are results of another recording")
     index = {tick: n for n, tick in enumerate(truth.ticks)}
     pairs.sort(key=lambda pair: index[pair[0].t_ns])  # times may run back from one clip to the next
     frames, moments, guarded = [], [], []

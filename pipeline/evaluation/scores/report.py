@@ -86,12 +86,12 @@ def _scores(run: Drives) -> Section:
         f"distance off by more than {100 * rule.range_slack:.0f} % and {rule.range_slack_m:.0f} m. Errors are mean "
         "absolute errors of every labelled vehicle that an object matches.",
         f"Vehicles are scored up to {MAX_RANGE_M:.0f} m and 35° to either side. Two positions match within "
-        f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class does not claim to be a vehicle: it counts where "
-        "there is one, so the LiDAR alone has no false detections. Detection and tracking are scored in frames whose "
-        "vehicles are all labelled; an object there without a label counts as a false detection.",
+        f"{tracking.MATCH_M:.0f} m. A LiDAR object without a class makes no claim to be a vehicle: it counts only "
+        "where there is one, so the LiDAR alone has no false detections. Detection and tracking are scored in frames "
+        "whose vehicles are all labelled; an object there without a label counts as a false detection.",
     ]
     text += [
-        f"{drive.uri}: {drive.clips} clips, each judged as a drive of its own: nothing is carried or counted across."
+        f"{drive.uri}: {drive.clips} clips, each scored as a separate drive: nothing carries over between them."
         for drive in run
         if drive.clips > 1
     ]
@@ -107,7 +107,7 @@ def _scores(run: Drives) -> Section:
         (each.figure.title, each.figure.unit, each.value, *_ends(each.interval), _GOOD[each.figure.better])
         for each in measure(run)
     )
-    columns = ("figure", "unit", "value", "95 % from", "to", "better")
+    columns = ("figure", "unit", "value", "95 % low", "high", "better")
     per_drive = tuple(
         (
             drive.uri,
@@ -143,7 +143,7 @@ def _moments(run: Drives, link: Link) -> Section:
         (
             Linked(f"#{each.lead}", link(drive.uri, drive.index_of(each.t_ns))),
             drive.uri,
-            "when the recording began" if each.from_start else "during it",
+            "from the start" if each.from_start else "later",
             each.range_m,
             each.after_s,
             each.drop_outs,
@@ -173,7 +173,7 @@ def _moments(run: Drives, link: Link) -> Section:
         Table("Cut-ins", ("vehicle", "drive", "latency s"), cut_ins),
         Table(
             "Warning and braking",
-            ("what", "drive", "due", "done", "after it was due s", "true TTC then s"),
+            ("stage", "drive", "due", "given", "delay s", "true TTC s"),
             acts,
             "Due: by the emergency brake's own limits, from the labelled lead's range and closing speed.",
         ),
@@ -188,7 +188,7 @@ def _worst(run: Drives, link: Link) -> Section:
     return Section(
         "worst",
         "Worst frames",
-        ("A link opens the dashboard at the frame, where `cipv serve` runs.",),
+        ("Links open the dashboard at the frame while `cipv serve` runs.",),
         (_frames("Wrong leads first, then the largest distance errors", worst(run, MOST), link),),
     )
 
@@ -206,7 +206,7 @@ def _frames(title: str, bad: Sequence[Bad], link: Link) -> Table:
         )
         for each in bad
     )
-    columns = ("frame", "drive", "in the base", "verdict", "lead at m", "CIPV at m", "error m")
+    columns = ("frame", "drive", "baseline", "verdict", "lead at m", "CIPV at m", "error m")
     if any(each.before for each in bad):
         return Table(title, columns, rows)
     return Table(title, (*columns[:2], *columns[3:]), tuple((*row[:2], *row[3:]) for row in rows))
@@ -225,17 +225,17 @@ def _comparison(base: Drives, run: Drives, link: Link) -> Section:
         )
         for each in compare(base, run)
     )
-    columns = ("figure", "unit", "base", "run", "run − base", "95 % from", "to", "")
+    columns = ("figure", "unit", "baseline", "run", "run − baseline", "95 % low", "high", "")
     return Section(
         "comparison",
-        "Against the base",
+        "Compared with the baseline",
         (
-            "The same frames, judged by the same truth. Better or worse is reported where the interval excludes "
-            f"0, from {FEW} drives on.",
+            "The same frames, scored against the same ground truth. Better or worse is reported where the interval "
+            f"excludes 0, from {FEW} drives on.",
         ),
         (
-            Table("Two runs", columns, rows),
-            _frames("Frames with another verdict", changed(base, run, MOST), link),
+            Table("Run and baseline", columns, rows),
+            _frames("Frames with a different verdict", changed(base, run, MOST), link),
         ),
     )
 

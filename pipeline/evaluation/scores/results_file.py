@@ -43,7 +43,7 @@ def _result(line: str, where: str) -> Result:
     try:
         row = json.loads(line, parse_constant=_refuse)
         if row["version"] != VERSION:
-            raise BadInput(f"{where}: version {row['version']!r} of results; this one reads {VERSION}")
+            raise BadInput(f"{where}: version {row['version']!r} of results; this program reads {VERSION}")
         return Result(
             frame=str(row["frame"]),
             t_ns=int(row["t_ns"]),

@@ -156,7 +156,7 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
     own, places = _as_proposed(labels)
     if own:
         notes.append(
-            f"{own} of {places} labelled positions are as the pipeline proposed them: there it is compared with itself."
+            f"{own} of {places} labelled positions are unchanged proposals: there the pipeline is compared with itself."
         )
     whole = sum(frame.whole for frame in frames.values())
     if whole == len(frames):
@@ -166,7 +166,7 @@ def _notes(labels: LabelSet, ranges: Sequence[LeadRange], frames: Mapping[int, F
     unsaid = len(frames) - whole - left
     why = [
         f"In {left} a vehicle is only proposed: accept or reject it." if left else "",
-        f"Of {unsaid} no one has confirmed that every vehicle is labelled: tag them “{WHOLE_TAG}”." if unsaid else "",
+        f"Not confirmed as fully labelled: {unsaid}. Tag them “{WHOLE_TAG}”." if unsaid else "",
     ]
     judged = f"Detection and tracking are scored in {whole} of {len(frames)} labelled frames."
     notes.append(" ".join((judged, *filter(None, why))))

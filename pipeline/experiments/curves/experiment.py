@@ -241,7 +241,7 @@ def _verdict(layout: str, by_source: dict[str, list[Frames]]) -> str:
     kind, drives = scenarios.LAYOUTS[layout], by_source["fused"]
     near, far = share_right(drives, 60.0)[0], share_right(drives)[0]
     wrong_s = max(longest_wrong_s(drive) for drive in drives)
-    held = "as wanted" if _held(layout, drives) else "less than wanted"
+    held = "requirement met" if _held(layout, drives) else "requirement missed"
     alone = share_right(by_source[LIDAR_ALONE])[0]
     better = "better than" if far > alone + 0.005 else "no better than"
     return (

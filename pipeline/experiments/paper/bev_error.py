@@ -96,7 +96,7 @@ def as_drive(case: BevCase, seen: list[Sighting]) -> ExperimentDrive:
     far_m = max((abs(error.distance_m) for error in errors), default=0.0)
     return ExperimentDrive(
         f"bev_error_{case.layout}_{case.sensors}_{case.boxes}_{case.seed}",
-        f"Place of fused objects: {LAYOUTS[case.layout]}, {who}, run {case.seed}",
+        f"Position of fused objects: {LAYOUTS[case.layout]}, {who}, run {case.seed}",
         (f"Placed in {len(errors)} of {len(seen)} frames, {far_m:.1f} m off in range at most.",),
         _scenario(case),
         _PARAMS,
@@ -151,7 +151,7 @@ def report(cases: Sequence[BevCase], runs: Sequence[list[Sighting]]) -> Section:
             rows += [(title, source, "measured, network", *_figures(seen, source)) for source in ("VL", "V")]
     return Section(
         "bev_error",
-        "Place of fused objects (Table 4)",
+        "Position of fused objects (Table 4)",
         (
             "Measured over all ranges to 60 m. VL is the LiDAR's place and so exists within its reach; V is the "
             "camera's, mostly beyond it: its error is what a few pixels of box height are worth at that range. The "
@@ -230,4 +230,4 @@ def _figures(seen: list[Sighting], source: str) -> tuple[Cell, ...]:
     return tuple(figures)
 
 
-BEV_ERROR = Experiment("bev_error", "paper", "Place of fused objects (Table 4)", cases, run, report, as_drive)
+BEV_ERROR = Experiment("bev_error", "paper", "Position of fused objects (Table 4)", cases, run, report, as_drive)

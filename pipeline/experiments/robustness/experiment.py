@@ -138,7 +138,7 @@ def report(cases: Sequence[Kilometre], outcomes: Sequence[DriveOutcome]) -> Sect
     tables = [
         Table(
             "Failures in 1,000 km",
-            ("failure", "count", "in 1,000 km", "95 % from", "to", "allowed"),
+            ("failure", "count", "in 1,000 km", "95 % low", "high", "allowed"),
             tuple((kind, counts[kind], *_rate(counts[kind], km), ALLOWED.get(kind)) for kind in KINDS),
             "Bounds of a Poisson rate (Garwood 1936).",
         ),

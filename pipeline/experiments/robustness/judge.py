@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, cos, dist, hypot, sin
-from typing import Literal
+from typing import Literal, get_args
 
 from pipeline.common.geometry import closest_on_polygon
 from pipeline.decision.aeb import required_decel_mps2
@@ -31,15 +31,7 @@ Kind = Literal[
     "lead late",
     "switch",
 ]
-KINDS: tuple[Kind, ...] = (
-    "phantom full braking",
-    "phantom partial braking",
-    "phantom comfort braking",
-    "phantom lead",
-    "lead missed",
-    "lead late",
-    "switch",
-)
+KINDS: tuple[Kind, ...] = get_args(Kind)
 MISSED_S = 0.5
 """A lead may be missed for so long, and may take so long to be found beyond its confirmation."""
 _SOON_S = (0.75, 1.5, 2.25, 3.0)

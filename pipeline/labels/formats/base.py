@@ -131,7 +131,7 @@ def check_extrinsic(labels: LabelSet, drive: LabeledDrive, what: str) -> None:
             apart += sum(not _touch(one, box) for one, (_, box) in zip(seen, pairs, strict=True))
     if count >= _FEWEST_PAIRS and apart > count / 2:
         raise BadInput(
-            f"{what}: {apart} of {count} cuboids do not fall where their boxes are in the picture; "
+            f"{what}: {apart} of {count} cuboids do not project onto their boxes in the picture; "
             "is an extrinsic inverted?"
         )
 

@@ -79,7 +79,7 @@ def onto(labels: LabelSet, drive: LabeledDrive, what: str) -> Imported:
     here = {key: index for index, key in enumerate(zip(drive.frames, drive.t_ns, strict=True))}
     to = {old: here[key] for old, key in enumerate(zip(labels.frames, labels.t_ns, strict=True)) if key in here}
     if not to:
-        raise BadInput(f"{what}: these labels are of another recording ({labels.source}): no frame is the same")
+        raise BadInput(f"{what}: these labels are of another recording ({labels.source}): no frame matches")
     moved = replace(
         labels,
         source=drive.uri,

@@ -30,7 +30,9 @@ class CameraModel(Strict):
     def _sees_its_corners(self) -> CameraModel:
         radius = np.linspace(0.0, _WIDEST_TAN, 200)
         if np.any(1.0 + 3.0 * self.k1 * radius**2 + 5.0 * self.k2 * radius**4 <= 0.1):
-            raise ValueError(f"k1 = {self.k1:g}, k2 = {self.k2:g}: the lens folds the picture over at its corners")
+            raise ValueError(
+                f"k1 = {self.k1:g}, k2 = {self.k2:g}: the lens model folds over at the corners of the picture"
+            )
         return self
 
 

@@ -84,7 +84,7 @@ def _lane_m(actor: CrossingActor, road: Road, crossing: Crossing) -> float:
         lanes = road.lanes_forward if actor.approach == "ahead" else road.lanes_oncoming
         inner, width = road.median_m / 2, road.lane_width_m
     if actor.lane > lanes:
-        raise ValueError(f"actor {actor.id}: no lane {actor.lane} for what comes from {actor.approach}: {lanes} there")
+        raise ValueError(f"actor {actor.id}: no lane {actor.lane} for {actor.approach} traffic: {lanes} there")
     return inner + (actor.lane - 0.5) * width
 
 

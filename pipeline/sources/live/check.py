@@ -78,5 +78,5 @@ def _cost(ego: StreamHealth) -> str | None:
     if ego.rate_hz >= _ENOUGH_HZ - 0.1:
         return None
     lag_s = yaw_rate_lag_s(round(ego.rate_hz, 1))
-    yaw_rate = "the yaw rate is never known" if lag_s is None else f"the yaw rate lags by {lag_s:.1f} s more"
-    return f"own speed is up to {1.0 / ego.rate_hz:.1f} s old, {yaw_rate}: let the receiver send at {_ENOUGH_HZ:g} Hz"
+    yaw_rate = "yaw rate is never available" if lag_s is None else f"yaw rate lags by another {lag_s:.1f} s"
+    return f"ego speed is up to {1.0 / ego.rate_hz:.1f} s old, {yaw_rate}: set the receiver to {_ENOUGH_HZ:g} Hz"

@@ -161,7 +161,7 @@ class EgoConfig(Strict):
     @model_validator(mode="after")
     def _check(self) -> EgoConfig:
         if (self.source == "can") != (self.can is not None):
-            raise ValueError("`can:` with its DBC file belongs to `source: can`, and only there")
+            raise ValueError("`source: can` needs `can:` with its DBC file; any other source must not have it")
         return self
 
 

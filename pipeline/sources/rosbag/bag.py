@@ -91,7 +91,7 @@ def _topics(reader: AnyReader) -> dict[str, Topic]:
         count = found[connection.topic].held if connection.topic in found else 0
         kind = connection.msgtype.rpartition("/")[2]
         if not isinstance(connection.topic, str):
-            raise ValueError("a topic whose name is no text")
+            raise ValueError("a topic with an invalid name")
         found[connection.topic] = Topic(connection.topic, kind, count + connection.msgcount)
     return found
 

@@ -38,7 +38,7 @@ class TopicMap(NamedTuple):
     def about(self, topics: Mapping[str, Topic]) -> str:
         """``topics: lidar /velodyne_points (PointCloud2), …``."""
         parts = [f"{role} {name} ({topics[name].kind})" for role, name in self._asdict().items() if name]
-        return f"topics: {', '.join(parts)}; others with ?lidar=/name&camera=…, none to leave one out"
+        return f"topics: {', '.join(parts)}; choose others with ?lidar=/name&camera=…; `none` leaves one out"
 
 
 def map_topics(topics: Mapping[str, Topic], wanted: Mapping[str, str]) -> TopicMap:

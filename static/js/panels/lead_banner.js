@@ -93,13 +93,13 @@ function whyNone(result) {
 }
 
 /** What measures own speed. */
-const MOTION_WORDS = { can: "car's bus", ins: "inertial unit", gnss: "GNSS", lidar: "LiDAR" };
+const MOTION_WORDS = { can: "CAN", ins: "IMU", gnss: "GNSS", lidar: "LiDAR" };
 
 /** @param {Result} result */
 function updateAcc({ acc: command, ego, own_motion: from }) {
   mark(acc, "state", command?.state ?? "off");
   text(state, command ? ACC_WORDS[command.state] : "Off");
-  desired.title = from ? `Own speed: ${MOTION_WORDS[from.speed_from]} ± ${num(from.speed_sigma_mps, 1)} m/s` : "";
+  desired.title = from ? `Ego speed: ${MOTION_WORDS[from.speed_from]} ± ${num(from.speed_sigma_mps, 1)} m/s` : "";
   const own = ego ? `${num(kmh(ego.speed_mps), 0)} → ` : "";
   text(desired, command ? `${own}${num(kmh(command.desired_speed_mps), 0)} km/h` : "");
   for (const pedal of /** @type {const} */ (["accelerator", "brake"])) {

@@ -49,7 +49,7 @@ function update() {
   const isLead = id !== null && result.cipv?.id === id;
   content.hidden = !item;
   nothing.hidden = Boolean(item);
-  text($("#why-facts"), item ? (isLead ? "why this is the CIPV" : "why this is not the CIPV") : "");
+  text($("#why-facts"), item ? (isLead ? "this is the CIPV" : "this is not the CIPV") : "");
   text(
     nothing,
     id === null

@@ -142,8 +142,16 @@ function reflectTab(shown) {
   }
   $("#bev-layers").hidden = shown !== "plan";
   const three = $("#three-body");
-  if (shown === "3d" && !three.firstChild) three.append(el("iframe", { src: "viser/", title: "3D view" }));
+  if (shown === "3d" && !three.firstChild) three.append(...threeView());
   if (shown === "rerun") showRerun($("#rerun-body"));
+}
+
+/** The 3D view, with a note until its page is there. */
+function threeView() {
+  const note = el("p", { class: "busy", aria: { role: "status" }, textContent: "Opening the 3D view …" });
+  const view = el("iframe", { src: "viser/", title: "3D view" });
+  view.addEventListener("load", () => note.remove());
+  return [note, view];
 }
 
 /** @param {KeyboardEvent} event */

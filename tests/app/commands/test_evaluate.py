@@ -85,7 +85,7 @@ def test_a_report_that_compares_two_runs(
     files = ("--results", str(other), "--against", str(results), "--truth", str(truth))
     assert evaluate(SOURCE, *files, "--report", str(page), "--dashboard", "http://car.local:9000") == 0
     text = page.read_text(encoding="utf-8")
-    assert "Against the base" in text
+    assert "Compared with the baseline" in text
     assert "Worst frames" in text
     assert "CIPV correct" in capsys.readouterr().out
     links = re.findall(r'href="http://car\.local:9000/#([^"]+)"', text)

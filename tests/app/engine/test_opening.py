@@ -61,7 +61,7 @@ def test_what_takes_long_to_open_says_how_far_it_is(slowly: tuple[Engine, Slowly
         assert shown.uri == "test:car", "what is open stays until then"
         opens.goes_on.release()
     opens.goes_on.release(2)
-    assert engine.wait_for(lambda s: s.uri == "test:long", WAIT_S).busy is None
+    assert engine.wait_for(lambda s: s.uri == "test:long" and s.busy is None, WAIT_S)
 
 
 def test_what_takes_long_to_open_is_given_up_for_something_else(slowly: tuple[Engine, Slowly]):
@@ -73,6 +73,20 @@ def test_what_takes_long_to_open_is_given_up_for_something_else(slowly: tuple[En
     assert opens.given_up.wait(WAIT_S)
     shown = engine.wait_for(lambda s: s.uri == "test:other" and s.processed is not None, WAIT_S)
     assert (shown.busy, [n for n in shown.notices if n.level == "error"]) == (None, [])
+
+
+def test_while_kernels_compile_the_first_frame_is_announced(
+    slowly: tuple[Engine, Slowly], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engine, _ = slowly
+    compiled = threading.Event()
+    monkeypatch.setattr("app.engine.engine.is_warm", compiled.is_set)
+    monkeypatch.setattr("app.engine.engine.warm_up", lambda: compiled.wait(WAIT_S))
+    engine.control.change(uri="test:other")
+    shown = engine.wait_for(lambda s: s.uri == "test:other", WAIT_S)
+    assert (shown.busy or "").startswith("Preparing the pipeline")
+    compiled.set()
+    engine.wait_for(lambda s: s.processed is not None and s.busy is None, WAIT_S)
 
 
 def test_with_another_recording_nothing_of_the_old_one_is_told():

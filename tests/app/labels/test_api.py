@@ -56,7 +56,7 @@ def test_a_lead_whose_track_is_only_proposed_judges_nothing_and_it_is_said(
     said = f"#{track['id']} leads in 30 frames but is only proposed: not scored until accepted."
     assert (score.judged, score.metrics, score.errors, score.notes[0]) == (0, [], [], said)
     following = client.get("/api/labels/next", params={"what": "disagreement", "frame": 0}).json()
-    assert (following["frame"], following["why"]) == (None, f"no frame is judged: {said}")
+    assert (following["frame"], following["why"]) == (None, f"no frame is scored: {said}")
     compared = client.get("/api/compare").json()
     assert (compared["truth"], compared["judged"]) == ("recording", 20), "the labels that come with it judge"
 
@@ -79,7 +79,7 @@ def test_a_wrong_lead_is_among_the_worst_frames(engine: Engine, client: httpx.Cl
 def test_what_a_person_has_looked_at_is_not_proposed_again(engine: Engine, client: httpx.Client) -> None:
     track = proposed(engine, client)
     act(client, kind="reject", items=[ref(track)])
-    assert task(engine, act(client, kind="propose")).endswith("1 more are labelled already")
+    assert task(engine, act(client, kind="propose")).endswith("1 more are already labelled")
     (again,) = labels(client)["tracks"]
     assert (again["id"], again["state"]) == (track["id"], "rejected")
 
@@ -140,7 +140,7 @@ def test_the_cuboid_is_laid_on_the_points_and_a_car_lifted_out_of_the_picture(
     engine: Engine, client: httpx.Client
 ) -> None:
     lifted = act(client, kind="lift", frame=10, pixel=[160, 92], label="car").json()
-    assert lifted["note"].startswith("laid on the")
+    assert lifted["note"].startswith("fitted to the")
     (track,) = labels(client)["tracks"]
     assert (track["state"], track["origin"]["how"]) == ("proposed", lifted["note"]), "nobody has said that it is so"
     (past,) = client.get("/api/labels/history", params={"kind": "track", "id": track["id"]}).json()

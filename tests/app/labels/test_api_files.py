@@ -38,7 +38,7 @@ def test_truth_is_imported_and_points_out_where_the_pipeline_says_otherwise(
     assert client.get("/api/labels/next", params={"what": "unlabelled", "frame": 5}).json()["frame"] == 13
     assert client.get("/api/labels/next", params={"what": "proposed", "frame": 5}).json() == {
         "frame": None,
-        "why": "no proposal is waiting there",
+        "why": "no proposals there",
         "item": None,
         "left": 0,
     }
@@ -50,7 +50,7 @@ def test_truth_is_imported_and_points_out_where_the_pipeline_says_otherwise(
 
 
 def test_what_is_there_already_is_not_imported_twice(engine: Engine, client: httpx.Client) -> None:
-    for said in ("imported 1 tracks", "1 tracks are there already, place for place"):
+    for said in ("imported 1 tracks", "1 tracks are already here, identical in every frame"):
         assert said in task(engine, act(client, kind="import", what="truth"))
     assert len(labels(client)["tracks"]) == 1
 

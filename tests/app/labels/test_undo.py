@@ -83,7 +83,7 @@ def test_each_takes_back_only_their_own(labels: DriveLabels) -> None:
 def test_what_somebody_else_changed_since_is_not_taken_back(labels: DriveLabels) -> None:
     number = add(labels, "Ada")
     relabel(labels, number, "bus", "Bob")
-    with pytest.raises(ActRefused, match="Bob changed #1 since; undo would take that back too"):
+    with pytest.raises(ActRefused, match="Bob changed #1 since; undo would revert that too"):
         labels.log.move("undo", "Ada")
     assert label_of(labels, number) == "bus"
     labels.log.move("undo", "Bob")
@@ -116,7 +116,7 @@ CLEARED = {"kind": "clear_lead", "first": 0, "last": 10}
         ([("Ada", CAR), ("Bob", LEAD | {"lead": 1}), ("Bob", "undo"), ("Ada", "undo"), ("Bob", "redo")],
          "lead 1 names #1, which would no longer exist"),
         ([("Bob", CAR), ("Ada", PLACED), ("Ada", "undo"), ("Bob", "undo"), ("Ada", "redo")],
-         "Bob changed #1 since; redo would take that back too"),
+         "Bob changed #1 since; redo would revert that too"),
     ],
 )  # fmt: skip
 def test_going_back_never_breaks_what_another_did_beside_it(

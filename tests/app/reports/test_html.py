@@ -62,7 +62,7 @@ def test_a_chart_draws_each_point_inside_its_frame() -> None:
 
 
 def test_an_empty_chart_says_so() -> None:
-    assert "nothing was measured" in chart_svg(Chart("Empty", "x", "y", (Series("none", (), ()),)))
+    assert "no data" in chart_svg(Chart("Empty", "x", "y", (Series("none", (), ()),)))
 
 
 @given(st.floats(-1e4, 1e4), st.floats(0.0, 1e4))

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
 import select
 import socket
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import cast
 from urllib.parse import urlsplit
 
 import httpx
 import pytest
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
@@ -91,6 +96,20 @@ def test_displays_that_ask_for_much_hold_nobody_up_and_what_they_leave_ends(addr
     for client in clients:
         client.close()
     assert slow.cancelled.acquire(timeout=WAIT_S), "what nobody waits for ends"
+
+
+def test_a_client_that_leaves_is_no_error_of_the_program() -> None:
+    class Gone:
+        async def is_disconnected(self) -> bool:
+            return True
+
+    def work(progress: Progress) -> None:
+        while True:
+            threading.Event().wait(0.01)
+            progress(0, 1)
+
+    with ThreadPoolExecutor(1) as threads, pytest.raises(HTTPException, match="the client has left"):
+        asyncio.run(quotas.while_waited_for(cast("Request", Gone()), threads, work))
 
 
 def test_a_display_has_no_say_in_the_3d_view(address: str, looks: SharedViewState):

@@ -26,4 +26,4 @@ def test_recordings_are_found_by_what_they_look_like(tmp_path: Path, monkeypatch
         (f"video:{tmp_path}/town.mp4", "video · town.mp4"),
         (f"pcap:{tmp_path}/town.pcap", "pcap · town.pcap"),
     ]
-    assert ("sim:straight", "Simulation · straight") in catalog()
+    assert ("sim:straight", "Simulation · Following on a straight motorway") in catalog()

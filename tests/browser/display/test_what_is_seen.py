@@ -130,9 +130,9 @@ def test_whatever_acc_reacts_to_is_drawn_also_when_it_is_not_the_lead(open_displ
     result = httpx.get(f"{site.address}/api/result", timeout=WAIT_S).json()
     other = next(o for o in result["objects"] if o["bev"] and o["id"] != result["cipv"]["id"] and o["distance_m"] < 60)
     assert page.evaluate(ALARM_PIXELS, "#plan") == 0
-    page.evaluate(SHOW, {"state": "warn", "reason": f"#{other['id']} would be hit in 1.9 s", "object_id": other["id"]})
+    page.evaluate(SHOW, {"state": "warn", "reason": f"would hit #{other['id']} in 1.9 s", "object_id": other["id"]})
     assert page.evaluate(ALARM_PIXELS, "#plan") > 20
-    expect(page.locator("#acc-reason")).to_contain_text(f"#{other['id']} would be hit")
+    expect(page.locator("#acc-reason")).to_contain_text(f"would hit #{other['id']}")
     page.evaluate(SHOW, {"state": "warn", "reason": "it is not here any more", "object_id": 987654})
     assert page.evaluate(ALARM_PIXELS, "#plan") == 0
 

@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 from tests.browser.conftest import WAIT_MS
 from tests.browser.looks import box_of
 
-FROM_M, TO_M, HALF_M = -5.0, 74.0, 13.0
+FROM_M, TO_M, HALF_M, TOOLS_PX = -5.0, 74.0, 13.0, 36
 """What the plan shows until a person moves it (static/js/views/drawing/viewport.js)."""
 KEYSTROKE_S = {"key": 0.28, "press": 0.20, "point": 1.10, "decide": 1.35}
 """Seconds of the keystroke-level model (Card, Moran and Newell 1980): a key, a mouse button down and up, pointing at
@@ -67,8 +67,8 @@ class Hand:
     def plan(self, x: float, y: float) -> Spot:
         """The pixel of a place of the plan."""
         box = box_of(self.page.locator("#bev"))
-        scale = min(box["height"] / (TO_M - FROM_M), box["width"] / (2 * HALF_M))
-        middle = FROM_M + box["height"] / (2 * scale)
+        scale = min((box["height"] - TOOLS_PX) / (TO_M - FROM_M), box["width"] / (2 * HALF_M))
+        middle = FROM_M + (box["height"] / 2 - TOOLS_PX) / scale
         return box["x"] + box["width"] / 2 - y * scale, box["y"] + box["height"] / 2 - (x - middle) * scale
 
     def picture(self, u: float, v: float, width: int, height: int) -> Spot:

@@ -315,7 +315,7 @@ def test_the_drive_is_labelled_with_and_without_proposals(
     assert figures == exported_score(astyx.engine, labels), "the exported file says the same"
     notes = page.locator(".label-score .notes")
     expect(notes).not_to_contain_text("Detection and tracking")
-    expect(notes).to_contain_text("labelled positions are as the pipeline proposed them")
+    expect(notes).to_contain_text("labelled positions are unchanged proposals")
     every = page.locator(".label-score .errors tr[data-vehicles=all][data-seen=any] td")
     assert int(every.first.inner_text()) >= COUNT, "each frame has its lead at least"
     assert page.locator(".label-score").evaluate("(pane) => pane.scrollWidth <= pane.clientWidth"), (

@@ -86,7 +86,7 @@ def test_what_the_picture_shows_is_lifted_and_boxed(hand: Hand, labels: Labels, 
     lifted = labels.cuboid(made, START)
     assert lifted["center"][:2] == pytest.approx((LEAD_X, LEAD_Y), abs=2.5), "where the car is"
     expect(page.locator(".said")).to_contain_text("points")
-    expect(page.locator(".track-detail .how")).to_contain_text("laid on the")
+    expect(page.locator(".track-detail .how")).to_contain_text("fitted to the")
     assert labels.tracks[made]["state"] == "proposed", "until a person says that it is so"
 
     box = labels.sighting(made, START)["bbox"] or list(lead.bbox)

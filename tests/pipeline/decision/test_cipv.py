@@ -216,7 +216,7 @@ def test_where_the_path_is_not_known_nobody_new_leads() -> None:
     vague = dataclasses.replace(PATH, profile_m=np.full(len(PATH.center), 5.0))
     (item,), lead, _, (why,) = choose(CipvState(), (fused(1, 40.0),), vague, moment(), PARAMS)[1]
     assert lead is None
-    assert why.reason == "its position across the path is uncertain by 5.0 m"
+    assert why.reason == "lateral position uncertain by 5.0 m"
     assert item.in_path
     assert item.in_path_probability == pytest.approx(0.51, abs=0.01)
     assert choose(CipvState(1), (fused(1, 40.0),), vague, moment(), PARAMS)[1].lead is not None, "who led may stay"

@@ -46,12 +46,12 @@ def test_the_same_sweeps_give_the_same_bytes() -> None:
 def test_a_tunnel_fixes_nothing_along_the_road_and_is_named() -> None:
     last = drive(tunnel(), 20.0, prior=EgoState(0, 20.0, 0.0))[-1]
     assert last.motion is None
-    assert last.note == "own motion from the LiDAR: nothing fixes it along the road, as in a tunnel"
+    assert last.note == "LiDAR odometry: no structure along the road, as in a tunnel"
 
 
 def test_too_few_points_are_named() -> None:
     last = drive(STREET[:6], 10.0)[-1]
-    assert (last.motion, last.note) == (None, "own motion from the LiDAR: too little stands around that is no vehicle")
+    assert (last.motion, last.note) == (None, "LiDAR odometry: too few static objects nearby")
 
 
 def test_another_place_is_refused_and_odometry_starts_anew() -> None:
@@ -61,7 +61,7 @@ def test_another_place_is_refused_and_odometry_starts_anew() -> None:
     for k in range(4):
         found = follow(found.state, seen(elsewhere, 1.2 * k, 0.0, 0.0, k), ROAD, (), 0.1, None)
         if k == 0:
-            assert found.note == "own motion from the LiDAR: sweeps contradict each other"
+            assert found.note == "LiDAR odometry: sweeps contradict each other"
     for k in range(4, 9):
         found = follow(found.state, seen(elsewhere, 1.2 * k, 0.0, 0.0, k), ROAD, (), 0.1, None)
     assert found.motion is not None

@@ -69,12 +69,12 @@ def test_a_lidar_that_sees_too_little_is_said_only_where_it_is_missed() -> None:
     params, around = MotionParams(), Seen(ROAD, (), None)
     assert own_motion.measure(OwnMotionState(), bare, None, around, 0.1, params).notes == ()
     alone = own_motion.measure(OwnMotionState(), replace(bare, gnss=None), None, around, 0.1, params)
-    assert alone.notes == ("own motion from the LiDAR: too little stands around that is no vehicle",)
+    assert alone.notes == ("LiDAR odometry: too few static objects nearby",)
 
 
 def test_a_bus_that_counts_in_miles_is_contradicted() -> None:
     (note,) = driven("lidar", EgoState(0, 7.5, 0.0)).notes
-    assert note.startswith("own speed: LiDAR 4")
+    assert note.startswith("ego speed: LiDAR 4")
     assert note.endswith("km/h, CAN 27 km/h")
-    assert driven("auto", CAN, gnss_mps=20.0).notes == ("own speed: CAN 43 km/h, GNSS 72 km/h",)
+    assert driven("auto", CAN, gnss_mps=20.0).notes == ("ego speed: CAN 43 km/h, GNSS 72 km/h",)
     assert driven("lidar", CAN).notes == ()

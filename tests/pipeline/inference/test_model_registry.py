@@ -213,7 +213,7 @@ def test_the_list_names_every_known_network_and_what_is_here(tmp_path: Path) -> 
 def test_a_network_without_an_official_file_says_how_to_get_one() -> None:
     with pytest.raises(
         model_registry.ModelError,
-        match=r"then `cipv models register PATH ufld --task lanes`; the project is https://\S+",
+        match=r"then `cipv models register PATH ufld --task lanes`; see https://\S+",
     ):
         model_registry.pull("ufld")
     assert _files() == []

@@ -99,7 +99,7 @@ BOX = (150.0, 86.0, 170.0, 101.0)
 
 def test_a_box_around_points_is_laid_on_them(frame: Frame) -> None:
     found = lift(frame, Params(), "car", bbox=BOX)
-    assert found.how == f"laid on the {found.points} points that are seen there"
+    assert found.how == f"fitted to the {found.points} points there"
     assert found.cuboid.center[0] - found.cuboid.size[0] / 2 == pytest.approx(26.0, abs=0.05)
     assert found.cuboid.center[1] == pytest.approx(0.0, abs=0.05)
     assert found.cuboid.center[2] - found.cuboid.size[2] / 2 == pytest.approx(GROUND_M, abs=0.1)

@@ -39,7 +39,7 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
         (1, "car", [0, 2]),
     ]
     assert notes[0] == "1 of 3 frames are not labelled"
-    assert "linked over frames by nearness" in notes[1]
+    assert "linked from frame to frame by distance" in notes[1]
 
 
 def test_the_simulator_knows_who_is_who() -> None:

@@ -142,12 +142,12 @@ def test_an_own_motion_that_is_lost_goes_on_for_a_while_and_is_said() -> None:
             commands.append(result.acc)
             path_sources.append(result.path.source)
             assert result.ego is None
-            assert any(note.startswith("own speed not measured for ") for note in result.notes)
+            assert any(note.startswith("ego speed not measured for ") for note in result.notes)
     coasted = round(params.motion.coast_s * 10)
     assert path_sources[:5] == ["gnss"] * 5
     assert all(command is not None and command.accelerator == 0.0 for command in commands[: coasted - 1])
     assert commands[0] is not None
-    assert commands[0].reason == "own speed not measured for 0.1 s: ACC will not accelerate"
+    assert commands[0].reason == "ego speed not measured for 0.1 s: ACC will not accelerate"
     assert commands[coasted + 1 :] == [None] * len(commands[coasted + 1 :])
 
 

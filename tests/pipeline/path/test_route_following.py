@@ -136,7 +136,7 @@ def test_a_jump_that_stays_is_doubted_for_long() -> None:
     assert state.placed_anew
     assert 4.0 < state.doubt_m < 5.0
     assert sum(each == "GNSS jumped by 5.0 m: fix ignored" for each in said) == 19
-    assert said[-1] == "GNSS position reset after a jump, uncertain by 5.0 m: it does not show the lane"
+    assert said[-1] == "GNSS position reset after a jump, uncertain by 5.0 m: too inaccurate to tell the lane"
 
 
 def test_the_doubt_of_a_jump_ends() -> None:

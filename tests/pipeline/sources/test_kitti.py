@@ -129,7 +129,7 @@ def test_oxts_needs_all_fields() -> None:
         (rings_file()[:-7], "truncated in the middle of a point"),
         (np.array([[10, 1, 9, 0.5]], dtype="<f4").tobytes(), "none of its rings lies where a VLP-16 has one"),
         (rings_file(60), "60 rings instead of 64"),
-        (rings_file(70), "not in KITTI's order; their rings are told by elevation"),
+        (rings_file(70), "not in KITTI's order; rings are assigned by elevation"),
         (np.array([[np.nan, 0, 0, 0.5]], dtype="<f4").tobytes() + rings_file(), "1 unreadable points skipped"),
     ],
 )
@@ -147,7 +147,7 @@ def test_a_few_points_out_of_order_cost_no_sweep(kitti: Path, rings: int) -> Non
     stray = np.array([[20.0, -0.1, 0.7, 0.5], [20.0, 0.1, 0.7, 0.5]], dtype="<f4")
     path.write_bytes(path.read_bytes() + stray.tobytes())
     frame = open_source(f"kitti:{kitti}", rings=rings).frame(2)
-    assert "told by elevation" in " ".join(frame.notes)
+    assert "assigned by elevation" in " ".join(frame.notes)
     assert whole is not None
     assert frame.sweep is not None
     np.testing.assert_array_equal(frame.sweep.ring[: len(whole.ring)], whole.ring)

@@ -63,7 +63,7 @@ def test_places_of_a_utm_zone(tmp_path: Path, text: str, asked: str) -> None:
 @pytest.mark.parametrize(
     ("text", "asked", "says"),
     [
-        pytest.param("easting,northing\n1,2\n3,4\n", "", "its UTM zone is not said", id="no zone"),
+        pytest.param("easting,northing\n1,2\n3,4\n", "", "no UTM zone given", id="no zone"),
         pytest.param("easting,northing\n1,2\n3,4\n", "?epsg=4326", "not one UTM zone: 4326", id="no UTM"),
         pytest.param("easting,northing\n1,2\n3,4\n", "?epsg=61N", "not one UTM zone: 61N", id="no such zone"),
         pytest.param("east,north,zone\n1,2,32N\n3,4,33N\n", "", "not one UTM zone: 32N, 33N", id="two zones"),
@@ -125,7 +125,7 @@ def test_nmea_logs_say_how_good_they_are(tmp_path: Path, text: str, sigma_m: flo
         pytest.param("a.csv", "lat,lon\n480,11\n481,11\n", "0 distinct positions on the Earth", id="not on the Earth"),
         pytest.param("a.csv", 'lat,lon\n"48,11\n' + "48.1,11.2\n" * 20_000, "not CSV: field larger", id="open quote"),
         pytest.param("a.gpx", "<gpx", "not XML", id="cut off"),
-        pytest.param("a.gpx", '<!DOCTYPE x [<!ENTITY a "b">]><gpx/>', "no document type", id="entities"),
+        pytest.param("a.gpx", '<!DOCTYPE x [<!ENTITY a "b">]><gpx/>', "document type", id="entities"),
         pytest.param("a.nmea", GGA.replace("E,4,", "E,0,"), "no route:", id="no fix, wrong checksums"),
     ],
 )

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 _ANSWERS: dict[int | str, dict[str, Any]] = {
     200: {"model": ActedJson},
-    202: {"model": TaskBegun, "description": "It goes on; state.labels.task tells how far it is"},
-    409: {"model": StaleJson, "description": "Somebody changed it since, or it cannot be done"},
+    202: {"model": TaskBegun, "description": "Still running; state.labels.task has its progress"},
+    409: {"model": StaleJson, "description": "Changed by someone else since, or not possible"},
 }
 
 

@@ -11,10 +11,10 @@ from app.labels.acts.request_fields import MOST_FRAMES, Id, Index, PersonOrNobod
 from app.labels.service.answers import changes_json, history_json, track_json, window_json
 from app.labels.service.desk import LabelDesk
 from app.labels.service.next_work import Asked, What, where_next
-from app.labels.store.values import ItemKind
+from app.labels.store.values import HistoryEntry, ItemKind
 from app.web.routes.drive import current
 from app.web.routes.labels.score_shapes import BadFrameJson, ScoreJson, errors_json
-from app.web.routes.labels.shapes import HistoryJson, ItemKey, LabelsOfPerson, NextJson, WholeTrack, Window
+from app.web.routes.labels.shapes import ItemKey, LabelsOfPerson, NextJson, WholeTrack, Window
 from app.web.routes.refusals import refusing
 from app.web.routes.shapes import MetricJson
 
@@ -89,7 +89,7 @@ def labels_router(desk: LabelDesk) -> APIRouter:
                 ],
             )
 
-    @router.get("/history", responses={200: {"model": list[HistoryJson]}})
+    @router.get("/history", responses={200: {"model": list[HistoryEntry]}})
     def history(kind: ItemKind, number: Annotated[Id, Query(alias="id")]) -> Response:
         """Get the history of a label: up to 200 changes, newest first."""
         with refusing():

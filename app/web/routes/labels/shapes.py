@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel
 
@@ -153,20 +153,6 @@ class WholeTrack(StatedItem):
 
     label: str
     sightings: list[PlacedFrame]
-
-
-class HistoryJson(BaseModel):
-    """One act in an item's life. before, after: the item, null where it was not there; of a track, with the sightings
-    that the act changed. note: what there was to say about it."""
-
-    act: int
-    what: str
-    note: str
-    person: str
-    t_unix_ms: int
-    before: dict[str, Any] | None
-    after: dict[str, Any] | None
-    undone: bool
 
 
 class NextJson(BaseModel):

@@ -75,7 +75,7 @@ def read_objects(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     frames = {name: index for index, name in enumerate(drive.file_names())}
     known = {frames[name]: (name, file) for name, file in files.items() if name in frames}
     if not known:
-        raise BadInput(f"{path}: no label file is named like a frame of {drive.uri}")
+        raise BadInput(f"{path}: no label file has the name of a frame of {drive.uri}")
     rows: dict[int, list[LabelRow]] = {}
     for frame, (name, file) in sorted(known.items()):
         T_rect_ego, camera = _view_beside(home, name, drive.shots[frame])
@@ -92,9 +92,9 @@ def read_objects(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     )
     unknown = len(files) - len(known)
     notes = (
-        f"{unknown} files are named as no frame of this recording: left out" if unknown else "",
+        f"{unknown} files match no frame of this recording: left out" if unknown else "",
         LINKED if tracks else "",
-        f"{len(flat):,} objects without a cuboid are a track each" if flat else "",
+        f"{len(flat):,} objects without a cuboid become a track each" if flat else "",
     )
     labels = replace(drive.empty(), tracks=(*tracks, *alone))
     return Imported(labels, (*filter(None, notes), *_notes([row for found in rows.values() for row in found])))
@@ -104,7 +104,7 @@ def read_tracking(path: Path, drive: LabeledDrive, origin: Origin) -> Imported:
     """A folder with ``label_02`` in it, such a folder with one file, or the file."""
     home, files = _files(path, _TRACKING)
     if len(files) != 1:
-        raise BadInput(f"{path}: {len(files)} tracking files; name one of them")
+        raise BadInput(f"{path}: {len(files)} tracking files; choose one")
     ((name, file),) = files.items()
     shot = next((each for each in drive.shots if each.camera is not None), Shot("", 0))
     T_rect_ego, camera = _view_beside(home, name, shot)

@@ -249,13 +249,13 @@ def _poses(drive: LabeledDrive) -> tuple[list[F64], bool]:
 
 
 def _changes(labels: LabelSet, drive: LabeledDrive, is_known: bool) -> tuple[str, ...]:
-    changes = ["pictures and point clouds are not written, only what their files would be called"]
+    changes = ["pictures and point clouds are not written, only their file names"]
     if not is_known:
-        changes.append("own speed or yaw rate is not known: the global frame is each frame's ego frame")
+        changes.append("ego speed or yaw rate is unknown: the global frame is each frame's ego frame")
     if any(shot.camera is not None and shot.camera.distortion.size for shot in drive.shots):
-        changes.append("the lens's distortion is not written: no place for it")
+        changes.append("lens distortion is not written: the format has no field for it")
     if any(track.sightings for track in labels.tracks):
-        changes.append("how much of an object is visible is not known: written as empty")
+        changes.append("visibility of objects is unknown: written as empty")
     return tuple(changes)
 
 

@@ -10,7 +10,7 @@ from pipeline.sources.live.devices.sensor_input import Deliver
 from pipeline.sources.live.health import StreamStats
 from pipeline.types.camera_shot import Shot, is_whole_jpeg
 
-_ARRIVAL = "times are when its pictures arrive: it sends none of its own"
+_ARRIVAL = "sends no time stamps: pictures are stamped on arrival"
 
 
 class CameraInput:

@@ -50,9 +50,9 @@ def read_mjpeg(url: str, receive: Receive, stop: Stop) -> None:
     except _Stopped:
         return
     except TimeoutError:
-        raise DeviceLost(f"{url}: does not answer") from None
+        raise DeviceLost(f"{url}: no response") from None
     except (http.client.HTTPException, ValueError) as error:
-        raise DeviceLost(f"{url}: not understood: {type(error).__name__}") from None
+        raise DeviceLost(f"{url}: unexpected response: {type(error).__name__}") from None
     except OSError as error:
         raise DeviceLost(f"{url}: {error.strerror or error}") from None
     finally:
@@ -94,7 +94,7 @@ def _headers(response: http.client.HTTPResponse, url: str, stop: Stop) -> Mappin
         name, colon, value = line.decode("latin-1").partition(":")
         if colon:
             headers[name.strip().lower()] = value.strip()
-    raise DeviceLost(f"{url}: not understood: headers without end")
+    raise DeviceLost(f"{url}: unexpected response: headers without end")
 
 
 def _until_jpeg_end(response: http.client.HTTPResponse, url: str, stop: Stop) -> bytes:

@@ -5,6 +5,8 @@
 
 /** @typedef {{x: number, y: number}} Place */
 /** @typedef {"ahead"|"around"} View */
+/** Height of the tools at the bottom edge, which must not cover the ego vehicle. */
+const TOOLS_PX = 36;
 /**
  * Extent of each view in metres. "ahead" covers the farthest relevant lead and the adjacent lanes.
  */
@@ -54,8 +56,9 @@ export class Viewport {
     this.height = height;
     if (this.view === null) return;
     const { from, to, half } = VIEWS[this.view];
-    this.scale = Math.max(0.1, Math.min(height / (to - from), width / (2 * half)));
-    this.x = this.view === "ahead" ? from + height / (2 * this.scale) : (from + to) / 2;
+    const free = this.view === "ahead" ? height - TOOLS_PX : height;
+    this.scale = Math.max(0.1, Math.min(free / (to - from), width / (2 * half)));
+    this.x = this.view === "ahead" ? from + (height / 2 - TOOLS_PX) / this.scale : (from + to) / 2;
     this.y = 0;
   }
 

@@ -107,7 +107,7 @@ def test_a_proposal_nobody_looked_at_is_what_the_file_says_of_it(
 ) -> None:
     put(labels, ours)
     said = importing(labels, of(labels, car(9, "accepted", FILE, "sure")), "Ada", ())
-    assert "1 tracks are there already" in said
+    assert "1 tracks are already here" in said
     assert labels.label_set().tracks == (ours if kept else car(1, "accepted", FILE, "sure"),)
 
 

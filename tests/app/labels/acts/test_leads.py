@@ -68,7 +68,7 @@ def test_a_range_that_comes_to_one_that_says_the_same_is_one_with_it(labels: Dri
     number, later = max(labels.items("lead").items())
     act(labels, kind="trim_lead", range=number, revision=later.revision, first=51, last=70)
     assert leads(labels)[1:] == [(40, 70, 2, "accepted")]
-    assert labels.log.history("lead", number)[0].what == "lead #2 in frames 52–71, not frames 61–71"
+    assert labels.log.history("lead", number)[0].what == "lead #2: frames 61–71 → frames 52–71"
 
 
 def test_the_lead_can_be_unsaid(labels: DriveLabels) -> None:

@@ -26,7 +26,7 @@ def test_points_that_are_no_vehicle_are_said(size: tuple[float, float, float], m
     monkeypatch.setattr(measured, "lift", lambda *_: found)
     assert measured.lifted(frame, Params(), act)[1] == "laid on 9 points"
     monkeypatch.setattr(measured, "lift", lambda *_: replace(found, cuboid=found.cuboid._replace(size=size)))
-    with pytest.raises(ActRefused, match="no vehicle"):
+    with pytest.raises(ActRefused, match="not a vehicle"):
         measured.lifted(frame, Params(), act)
 
 
@@ -36,7 +36,7 @@ def test_what_only_the_picture_shows_is_laid_on_points_but_not_put_where_its_hei
     labels, box = DriveLabels(sqlite_database, fresh(), "here"), (10.0, 10.0, 40.0, 30.0)
     act(labels, "Ada", AddTrack(kind="add_track", label="car", frame=0, bbox=box))
     snap, frame = Refit(kind="refit", track=1, revision=1, frame=0), Recording().frame(0)
-    found = Lifted(Cuboid((20.0, 0.0, 0.7), (4.0, 1.8, 1.5), 0.0), box, 9, "laid on the 9 points that are seen there")
+    found = Lifted(Cuboid((20.0, 0.0, 0.7), (4.0, 1.8, 1.5), 0.0), box, 9, "fitted to the 9 points there")
     monkeypatch.setattr(measured, "lift", lambda *asked: found if asked[2:] == ("car", box) else None)
     placed, note = measured.refitted(labels, frame, Params(), snap)
     assert (placed.sighting().cuboid, placed.bbox, note) == (found.cuboid, box, found.how)

@@ -29,7 +29,7 @@ def test_a_correction_that_is_accepted_stays_one_until_a_second_person_reviews_i
         act(labels, kind="review_ok", items=[("track", 1)])
     act(labels, "Bob", kind="review_ok", items=[("track", 1)])
     assert (track(labels).state, track(labels).origin.name, track(labels).reviewer) == ("accepted", "Ada", "Bob")
-    with pytest.raises(ActRefused, match="you have reviewed #1 already"):
+    with pytest.raises(ActRefused, match="you have already reviewed #1"):
         act(labels, "Bob", kind="review_ok", items=[("track", 1)])
     act(labels, "Cy", kind="relabel", track=1, label="Bus")
     assert track(labels).reviewer == "", "what is changed is to be reviewed again"

@@ -208,7 +208,7 @@ def test_what_could_not_be_written_is_said_until_it_can(
         control.change_params({"cipv.confirm_hits": 5})
         until(desk, lambda: desk.state.trouble)
         assert not desk.possible("")[0]
-    words = f"A change of parameters cannot be undone: labels, {file}: database is locked"
+    words = f"A parameter change cannot be undone: labels, {file}: database is locked"
     assert desk.state.trouble == words
     assert Snapshot(Params(), labels=desk.state).state_json()["notices"] == [{"level": "warning", "text": words}]
     control.change_params({"cipv.confirm_hits": 6})

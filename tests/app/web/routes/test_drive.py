@@ -224,7 +224,7 @@ def test_nothing_to_undo_is_said(client: httpx.Client, engine: Engine):
     while client.post("/api/params/undo").status_code == 200:
         pass
     answer = client.post("/api/params/undo")
-    assert (answer.status_code, answer.json()) == (409, {"detail": "there is nothing to undo"})
+    assert (answer.status_code, answer.json()) == (409, {"detail": "nothing to undo"})
     change(client, engine, cipv__confirm_hits=4)
     assert client.post("/api/params/redo").status_code == 409
 

@@ -258,9 +258,9 @@ def test_what_a_person_should_know_is_said() -> None:
     assert [frame.velocity_mps for frame in known.frames.values()] == [{}, {}, {}]
     notes = " ".join(known.notes)
     assert "1 track jumps in 3 places" in notes
-    assert "3 of 3 labelled positions are as the pipeline proposed them" in notes
+    assert "3 of 3 labelled positions are unchanged proposals" in notes
     assert "In 3 a vehicle is only proposed" in notes
-    assert "no one has confirmed that every vehicle" not in notes
+    assert "Not confirmed as fully labelled" not in notes
     by_hand = " ".join(of_labels(labels(track(4, 30.0, by=PERSON), tags=TAGGED), RULE).notes)
-    assert "Of 1 no one has confirmed that every vehicle is labelled: tag them “all labelled”" in by_hand
-    assert not any(words in by_hand for words in ("jump", "as the pipeline proposed", "only proposed"))
+    assert "Not confirmed as fully labelled: 1. Tag them “all labelled”" in by_hand
+    assert not any(words in by_hand for words in ("jump", "unchanged proposals", "only proposed"))

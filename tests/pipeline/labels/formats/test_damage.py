@@ -156,7 +156,7 @@ def test_labels_that_do_not_fall_where_their_boxes_are_are_refused(name: FormatN
         for t in labels.tracks
     )
     export_labels(replace(labels, tracks=moved), here, name, tmp_path / "bad")
-    with pytest.raises(BadInput, match="4 of 4 cuboids do not fall where their boxes are"):
+    with pytest.raises(BadInput, match="4 of 4 cuboids do not project onto their boxes"):
         import_labels(tmp_path / "bad", here, name, IMPORT)
 
 

@@ -100,7 +100,7 @@ def test_astyx_truth_comes_back(astyx: tuple[str, LabeledDrive], name: str, tmp_
     uri, drive = astyx
     labels, notes = truth_labels(open_source(uri), drive.frames, IMPORT)
     assert len(labels.tracks) > 20
-    assert any("linked over frames by nearness" in note for note in notes)
+    assert any("linked from frame to frame by distance" in note for note in notes)
     export_labels(labels, drive, name, tmp_path / "out")  # type: ignore[arg-type]
     back = import_labels(tmp_path / "out", drive, name, IMPORT)  # type: ignore[arg-type]
     assert_same(back.labels, labels, 1e-5)

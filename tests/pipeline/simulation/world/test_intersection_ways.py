@@ -98,7 +98,7 @@ def test_at_its_time_it_is_halfway_round() -> None:
     ("change", "says"),
     [
         ({"crossing": 1}, "no crossing 1"),
-        ({"lane": 2}, "no lane 2 for what comes from oncoming"),
+        ({"lane": 2}, "no lane 2 for oncoming traffic"),
         ({"approach": "above"}, "crossing_actors.0.approach"),
         ({"brake": {"at_gap_m": 20, "decel_mps2": 3}}, "give at_s"),
     ],

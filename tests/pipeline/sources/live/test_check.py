@@ -68,9 +68,9 @@ class Ego(Sensor):
     [
         (10.0, None),
         (4.98, None),
-        (2.02, "own speed is up to 0.5 s old, the yaw rate lags by 0.5 s more: let the receiver send at 5 Hz"),
-        (1.0, "own speed is up to 1.0 s old, the yaw rate lags by 0.5 s more: let the receiver send at 5 Hz"),
-        (0.5, "own speed is up to 2.0 s old, the yaw rate is never known: let the receiver send at 5 Hz"),
+        (2.02, "ego speed is up to 0.5 s old, yaw rate lags by another 0.5 s: set the receiver to 5 Hz"),
+        (1.0, "ego speed is up to 1.0 s old, yaw rate lags by another 0.5 s: set the receiver to 5 Hz"),
+        (0.5, "ego speed is up to 2.0 s old, yaw rate is never available: set the receiver to 5 Hz"),
         (None, "too few fixes for a rate: listen longer with --seconds"),
     ],
 )

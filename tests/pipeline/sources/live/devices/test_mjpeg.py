@@ -84,8 +84,8 @@ def test_pictures_come_as_they_are(
     ("case", "answer", "complaint"),
     [
         ("not found", b"HTTP/1.0 404 Not Found\r\n\r\n", "HTTP 404"),
-        ("no HTTP", b"\x00\x01\x02\r\n\r\n", "not understood"),
-        ("nothing", b"", "not understood"),
+        ("no HTTP", b"\x00\x01\x02\r\n\r\n", "unexpected response"),
+        ("nothing", b"", "unexpected response"),
         ("cut in a picture", MULTIPART + part(small_jpeg(), "Content-Length: 99999"), "closed the connection"),
         ("headers without end", MULTIPART + b"A: b\r\n" * 1000 + part(small_jpeg()), "headers without end"),
         ("a line without end", MULTIPART + b"A:" + b"b" * 100_000 + b"\n" + part(small_jpeg()), "headers without end"),
