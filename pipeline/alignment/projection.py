@@ -143,11 +143,11 @@ def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignm
 
 
 def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
-    """(4, 4) rotation of the camera in its mount, in ego axes: its position stays."""
+    """(4, 4) rotation of the camera in its mount, in ego axes, about its position, which then moves."""
     turn = rotation(*(np.radians(angle) for angle in (params.roll_deg, params.pitch_deg, params.yaw_deg)))
     place = inverse(camera.T_camera_ego)[:3, 3]
     correction = np.eye(4)
-    correction[:3, :3], correction[:3, 3] = turn, place - turn @ place
+    correction[:3, :3], correction[:3, 3] = turn, place - turn @ place + [0.0, params.left_m, params.up_m]
     return correction
 
 

@@ -113,6 +113,8 @@ class AlignmentParams(Section):
     yaw_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount to the left")
     pitch_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount downwards")
     roll_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount clockwise")
+    left_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: correction of the camera's place to the left")
+    up_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: correction of the camera's place upwards")
 
 
 class ExistenceParams(Section):
