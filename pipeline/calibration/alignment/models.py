@@ -34,7 +34,8 @@ ZOOM_REACH = 1.35
 
 @dataclass(frozen=True)
 class FitModel:
-    """A model of one camera. A vector of unknowns is in degrees and metres (pinhole), or in logarithms and degrees (angular)."""
+    """A model of one camera. A vector of unknowns is in degrees and metres (pinhole), or in logarithms and degrees
+    (angular)."""
 
     name: ModelName
     camera: CameraCalibration | None

@@ -127,7 +127,8 @@ class PairTable:
 
 
 def coarse_scores(table: PairTable, model: FitModel, grid: F64, widen: float, slack_px: float) -> F64:
-    """(K,) of each vector: how many boxes have a cluster where it says, each counted by how well. Pairs ascend by box."""
+    """(K,) of each vector: how many boxes have a cluster where it says, each counted by how well. The table's pairs
+    ascend by box."""
     corners = replace(table, outline=np.ascontiguousarray(table.outline[:, :ENDS]))
     across, down = table.deviations(widen, slack_px)
     boxes, whole = table.boxes[table.box], table.whole[table.box]

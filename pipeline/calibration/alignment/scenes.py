@@ -69,7 +69,7 @@ def fit_scene(frame: Frame, params: Params) -> FitScene | None:
     seen = segmentation.segment(frame.sweep, frame.ego, params, Stopwatch())
     if not detections or seen.ground is None:
         return None
-    outlines = _outlines(frame.sweep, seen.points, seen.kind, seen.ground)
+    outlines = _outlines(frame.sweep, seen.points, seen.kind, seen.ground, params)
     if not outlines:
         return None
     boxes = np.array([d.bbox for d in detections], dtype=np.float64)
@@ -80,7 +80,9 @@ def fit_scene(frame: Frame, params: Params) -> FitScene | None:
     return FitScene(boxes, whole, outline, roof, foot, range_m, frame.picture_size, frame.camera, frame.t_ns)
 
 
-def _outlines(sweep: Sweep, points: F32, kind: np.ndarray, ground: Ground) -> list[tuple[F64, F64, F64]]:
+def _outlines(
+    sweep: Sweep, points: F32, kind: np.ndarray, ground: Ground, params: Params
+) -> list[tuple[F64, F64, F64]]:
     """Outline, roof and foot of each cluster that may be a vehicle."""
     xyz = points[:, :3].astype(np.float64) - sweep.origin
     elevations = _ring_elevations(xyz, sweep)
@@ -95,6 +97,8 @@ def _outlines(sweep: Sweep, points: F32, kind: np.ndarray, ground: Ground) -> li
             continue
         outline = _outline(own, half_beam) + sweep.origin
         roof = _roof(own, elevations) + sweep.origin
+        if ground.above(roof[None])[0] > params.cluster.max_height_m:  # what is higher was never clustered
+            roof = np.full(3, np.nan)
         found.append((outline, roof, _foot(own + sweep.origin, ground)))
     return found
 
@@ -126,7 +130,8 @@ def _outline(own: F64, half_beam: float) -> F64:
 
 
 def _roof(own: F64, elevations: F64) -> F64:
-    """(3,) where the next ring would have met the cluster's highest part; NaN above the topmost ring."""
+    """(3,) where the next ring would have met the cluster's highest part; NaN above the topmost ring. own: seen from the
+    sensor."""
     range_m = np.hypot(own[:, 0], own[:, 1])
     elevation = np.arctan2(own[:, 2], range_m)
     top = int(elevation.argmax())
