@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -41,6 +41,8 @@ SQUARE_SIGMA = 0.02
 BOOTSTRAPS = 24
 STEPS = _COARSE_STEPS + STARTS + BOOTSTRAPS
 """Units of progress that a fit tells."""
+CLEAR_SIGMAS = 3.0
+"""Blocks of the drive that differ by chance differ less in sum."""
 BLOCK_NS = 1_000_000_000
 """Frames within a second show the same cars, and are drawn together."""
 HELD_OUT = 5
@@ -126,7 +128,11 @@ def fit_alignment(
     vector, rows = found[0].vector, found[0].rows
     if len(rows) < FEWEST_PAIRS:
         raise NothingToFit(_too_few(len(rows), len(table.boxes)))
-    spread = _bootstrap(table, model, vector, _blocks([scenes[k] for k in train]), progress)
+    blocks = _blocks([scenes[k] for k in train])
+    spread = _bootstrap(table, model, vector, blocks, progress)
+    warnings = warnings_of(table, model, found, model.spread(spread))
+    if looks_undistorted(table, model, vector, blocks):
+        warnings += ("the boxes lie better without the lens distortion: are the pictures undistorted already?",)
     judged = PairTable.of([scenes[k] for k in held]) if held else table
     start = model.vector(present)
     after, *before = _overlaps(judged, model, [vector, *([start] if start is not None else [])])
@@ -139,7 +145,7 @@ def fit_alignment(
         before=before[0] if before else None,
         after=after,
         held_out=bool(held),
-        warnings=warnings_of(table, model, found, model.spread(spread)),
+        warnings=warnings,
     )
 
 
@@ -205,9 +211,13 @@ def refine(table: PairTable, model: FitModel, start: F64, gates: Sequence[tuple[
             off, np.clip(vector, low + 1e-9, high - 1e-9), bounds=(low, high), loss="soft_l1", f_scale=LOSS_SCALE
         )
         vector = solved.x
-    last = np.mean(table.residuals(model.aligned(vector), 1.5) ** 2, axis=1)
-    explained = float(np.exp(-0.5 * last[table.matched(np.sqrt(last)[:, None], np.inf)]).sum()) if len(last) else 0.0
-    return Found(vector, rows, explained)
+    return Found(vector, rows, _explained(table, model, vector))
+
+
+def _explained(table: PairTable, model: FitModel, vector: F64) -> float:
+    """How many boxes have a cluster of their own, each counted by how well."""
+    off = table.residuals(model.aligned(vector), 1.5)
+    return float(np.exp(-0.5 * np.mean(off[table.matched(off, np.inf)] ** 2, axis=1)).sum())
 
 
 def _prior(model: FitModel, vector: F64) -> F64:
@@ -218,6 +228,17 @@ def _prior(model: FitModel, vector: F64) -> F64:
 
 
 # ---------------------------------------------------------------- doubt
+
+
+def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: list[I64]) -> bool:
+    """Whether the boxes lie better on a camera without the calibration's distortion, as in pictures that were
+    undistorted already: in sum over the blocks of the drive clearly, by what single blocks say."""
+    if model.name != "pinhole" or model.camera is None or not np.any(model.camera.distortion):
+        return False
+    flat = replace(model, camera=replace(model.camera, distortion=np.zeros(0)))
+    both = [(each, refine(table, each, vector, GATES[-3:]).vector) for each in (model, flat)]
+    gained = np.array([np.subtract(*(_explained(table.taken(block), m, v) for m, v in both)) for block in blocks])
+    return bool(-gained.sum() > CLEAR_SIGMAS * np.sqrt(np.sum(gained**2)))
 
 
 def _bootstrap(table: PairTable, model: FitModel, vector: F64, blocks: list[I64], progress: Progress) -> F64:

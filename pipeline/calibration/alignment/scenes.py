@@ -130,8 +130,8 @@ def _outline(own: F64, half_beam: float) -> F64:
 
 
 def _roof(own: F64, elevations: F64) -> F64:
-    """(3,) where the next ring would have met the cluster's highest part; NaN above the topmost ring. own: seen from the
-    sensor."""
+    """(3,) where the next ring would have met the cluster's highest part; NaN above the topmost ring. own: (K, 3) from
+    the sensor."""
     range_m = np.hypot(own[:, 0], own[:, 1])
     elevation = np.arctan2(own[:, 2], range_m)
     top = int(elevation.argmax())

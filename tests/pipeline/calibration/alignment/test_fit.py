@@ -88,6 +88,15 @@ def test_without_a_calibration_there_is_no_pinhole_model():
         fit_alignment(made(None), "pinhole", AlignmentParams())
 
 
+@pytest.mark.parametrize("are_undistorted", [True, False])
+def test_undistorted_pictures_with_the_distortion_of_raw_ones_are_noticed(are_undistorted: bool):
+    bent = replace(CAMERA, distortion=np.array([-0.35, 0.15, 0.0, 0.0]))
+    seen = resolve(AlignmentParams(), CAMERA if are_undistorted else bent)
+    assert seen is not None
+    warnings = fit_alignment(drive(seen, camera=bent), "pinhole", AlignmentParams()).warnings
+    assert any("undistorted already" in each for each in warnings) == are_undistorted
+
+
 def test_a_fit_in_words():
     fit = fit_alignment(made(), "pinhole", AlignmentParams())
     assert "boxes of frames set aside" in overlap_sentence(fit)
