@@ -157,6 +157,12 @@ class FusionParams(Section):
     size_gate: bool = choice(
         True, "Do not join a box with a cluster longer than any vehicle of its class: hedges, walls, rails"
     )
+    drift_s: float = slider(
+        30.0, 5.0, 120.0, 1.0, "s", "A turned mount is told by the vehicles of the last so many seconds"
+    )
+    drift_sigmas: float = slider(
+        4.0, 2.0, 10.0, 0.1, "σ", "A turned mount is reported when its angle is this many standard deviations from zero"
+    )
     disagree_s: float = slider(2.0, 0.2, 10.0, 0.1, "s", "Time over which disagreement of camera and LiDAR is averaged")
     disagree_share: float = slider(
         0.25, 0.05, 1.0, 0.05, "", "ACC will not accelerate if camera and LiDAR disagree about a larger share of cars"
