@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 
 from app.core.jobs import BackgroundJob
 from app.drive.background_runs import BackgroundRuns
@@ -14,7 +13,6 @@ from pipeline.calibration.alignment.models import ModelName
 from pipeline.common.errors import BadInput
 from pipeline.common.progress import Progress
 from pipeline.params import Params
-from pipeline.types import Frame
 
 FitJob = BackgroundJob[AlignmentFit]
 
@@ -46,7 +44,8 @@ class AlignmentFitting:
                 raise FitRefused("a fit is under way")
 
             def work(progress: Progress) -> AlignmentFit:
-                return fit_drive(self._looked_at(recording), recording.setup.total, model, params, offset, progress)
+                # not in turn with the background runs: somebody waits for it
+                return fit_drive(recording.with_boxes, recording.setup.total, model, params, offset, progress)
 
             job: FitJob = BackgroundJob(
                 work, is_superseded=lambda: self._drives.recording is not recording, name="alignment fit"
@@ -63,10 +62,3 @@ class AlignmentFitting:
             self._job[1].cancel()
             self._job = None
             return True
-
-    def _looked_at(self, recording: OpenRecording) -> Callable[[int], Frame]:
-        def frame_of(index: int) -> Frame:
-            with self._drives.turn.background(to_the_end=True):
-                return recording.with_boxes(index)
-
-        return frame_of

@@ -236,9 +236,10 @@ def looks_undistorted(table: PairTable, model: FitModel, vector: F64, blocks: li
     if model.name != "pinhole" or model.camera is None or not np.any(model.camera.distortion):
         return False
     flat = replace(model, camera=replace(model.camera, distortion=np.zeros(0)))
-    both = [(each, refine(table, each, vector, GATES[-3:]).vector) for each in (model, flat)]
-    gained = np.array([np.subtract(*(_explained(table.taken(block), m, v) for m, v in both)) for block in blocks])
-    return bool(-gained.sum() > CLEAR_SIGMAS * np.sqrt(np.sum(gained**2)))
+    without = refine(table, flat, vector, GATES[-3:]).vector
+    parts = [table.taken(block) for block in blocks]
+    gained = np.array([_explained(part, flat, without) - _explained(part, model, vector) for part in parts])
+    return bool(gained.sum() > CLEAR_SIGMAS * np.sqrt(np.sum(gained**2)))
 
 
 def _bootstrap(table: PairTable, model: FitModel, vector: F64, blocks: list[I64], progress: Progress) -> F64:

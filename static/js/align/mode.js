@@ -40,7 +40,7 @@ export function setUp() {
   bar.append(
     model("angular"),
     model("pinhole"),
-    el("span", { class: "facts", textContent: "Match" }),
+    el("span", { class: "facts match", textContent: "Match" }),
     score,
     fitControl,
     el("span", { class: "spacer" }),
