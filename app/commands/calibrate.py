@@ -35,7 +35,6 @@ class Calibrate:
     """Fit to the detections in a recording, for another car or camera: the distance law d = a·h^b for each class, or
     the alignment of LiDAR and camera, from ordinary traffic.
 
-    Example: cipv calibrate distance astyx:PATH --out law.yaml
     Example: cipv calibrate alignment kitti:PATH --model angular --out alignment.yaml
     """
 

@@ -21,7 +21,6 @@ class ConvertCalibration:
     """Check the calibration of a recording or of a file, and write it for KITTI, ROS, OpenCV, or as a rig file.
 
     Example: cipv calibration astyx:PATH --params alignment.yaml --to ros --out front_camera
-    Example: cipv calibration calib.yaml --format opencv --to rig --out rig.yaml
     """
 
     origin: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SOURCE")]
