@@ -33,6 +33,7 @@ COMMANDS = {
     "models": "app.commands.models:Models",
     "params": "app.commands.params:ListParams",
     "calibrate": "app.commands.calibrate:Calibrate",
+    "calibration": "app.commands.calibration:ConvertCalibration",
     "scenarios": "app.commands.scenarios:Scenarios",
     "evaluate": "app.commands.evaluate:Evaluate",
     "bench": "app.commands.bench:Bench",

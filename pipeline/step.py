@@ -18,7 +18,7 @@ from pipeline.common.clips import begins_clip
 from pipeline.common.stopwatch import Stopwatch
 from pipeline.decision import acc, aeb, braking_evidence, cipv, object_motion
 from pipeline.ego_motion import coasting, own_motion
-from pipeline.fusion import agreement, existence, returns
+from pipeline.fusion import agreement, drift, existence, returns
 from pipeline.fusion import fuse as fusion
 from pipeline.lanes import road_lines as lanes
 from pipeline.lidar import segmentation
@@ -55,6 +55,7 @@ class State:
     fusion: fusion.FusionState = fusion.FusionState()
     existence: existence.ExistenceState = existence.ExistenceState()
     agreement: agreement.AgreementState = agreement.AgreementState()
+    drift: drift.DriftState = drift.DriftState()
     own: EgoState | None = None
     measured: own_motion.OwnMotionState = own_motion.OwnMotionState()
     ground: Ground | None = None
@@ -94,6 +95,8 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         state.fusion, lidar_tracks, vision_tracks, aligned, frame.picture_size, params.fusion
     )
     vision_state = vision_tracking.learn_heights(vision_state, fused.ranged_boxes(), params.vision_tracking)
+    # A mount that was knocked: what both sensors see of the same vehicles lies apart
+    drift_state, turned = drift.follow(state.drift, fused, aligned, frame.picture_size, frame.t_ns, params.fusion)
     clock.lap("fusion")
     # Existence: what each sensor says for and against every object being where it is said to be
     existence_state, objects = existence.weigh(state.existence, fused.objects, sweep, now.dt_s, params.existence)
@@ -144,7 +147,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         next_cipv=chosen.next_lead,
         rejected=chosen.rejected,
         acc=command,
-        notes=(*frame.notes, *yaw_rate.doubts(frame.ego), *motion.notes, *path.notes),
+        notes=(*frame.notes, *yaw_rate.doubts(frame.ego), *motion.notes, *path.notes, *_note_of(turned)),
         streams=frame.streams,
         timing_ms={**frame.timing_ms, **clock.timing_ms()},
         layers=layers,
@@ -156,6 +159,7 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         fusion=fusion_state,
         existence=existence_state,
         agreement=agreement_state,
+        drift=drift_state,
         own=now.motion,
         measured=motion.state,
         ground=sweep.ground,
@@ -166,6 +170,10 @@ def step(state: State, frame: Frame, params: Params, motion: own_motion.Measured
         aeb=aeb_state,
     )
     return following, result
+
+
+def _note_of(turned: drift.Drift | None) -> tuple[str, ...]:
+    return (turned.note,) if turned is not None else ()
 
 
 def measure_own_motion(state: State, frame: Frame, params: Params) -> own_motion.Measured:

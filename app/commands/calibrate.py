@@ -1,4 +1,5 @@
-"""`cipv calibrate distance`: fit the paper's regression from box height to distance for another camera."""
+"""`cipv calibrate distance` fits the paper's regression from box height to distance for another camera, `cipv calibrate
+alignment` where LiDAR points are in the picture."""
 
 from __future__ import annotations
 
@@ -15,40 +16,89 @@ from rich.console import Console
 from rich.table import Table
 
 from app.commands.support.options import PipelineOptions, SourceOptions
+from app.commands.support.progress_bars import frames_progress, task_progress
+from pipeline.calibration.alignment.drive import fit_drive
+from pipeline.calibration.alignment.fit import overlap_sentence
 from pipeline.calibration.distance import LawFit, as_law, as_overrides, collect_pairs, fit_laws
 from pipeline.common.errors import BadInput
-from pipeline.detection import detector_for
+from pipeline.detection import Detectors, detect, detector_for
 from pipeline.inference.distance_laws import keep_law
 from pipeline.inference.model_registry import EMBEDDED, find
+from pipeline.params import Params
+from pipeline.types import Frame
 from pipeline.types.source import Source
+from pipeline.vision.detector import Detector
 
 
 @dataclass(frozen=True)
 class Calibrate:
-    """Fit the distance law d = a·h^b for each class to the detections in a recording, for another car or camera.
+    """Fit to the detections in a recording, for another car or camera: the distance law d = a·h^b for each class, or
+    the alignment of LiDAR and camera, from ordinary traffic.
 
-    Example: cipv calibrate distance astyx:PATH --out law.yaml
+    Example: cipv calibrate alignment kitti:PATH --model angular --out alignment.yaml
     """
 
-    what: tyro.conf.Positional[Literal["distance"]]
-    """What to fit: distance from box height"""
+    what: tyro.conf.Positional[Literal["distance", "alignment"]]
+    """What to fit: distance from box height, or where LiDAR points are in the picture"""
     source: SourceOptions
     pipeline: PipelineOptions = field(default_factory=PipelineOptions)
     truth: Literal["labels", "lidar"] = "labels"
     """Source of the true distances: labelled cuboids, or LiDAR boxes (needs no labels)"""
     free_exponent: bool = False
     """Fit b too, as in the paper. By default b = −1, which follows from a pinhole camera and generalises better"""
+    model: Literal["angular", "pinhole"] = "pinhole"
+    """alignment: angular needs no calibration; pinhole corrects the mount of the recording's calibration"""
+    offset: bool = False
+    """alignment: fit the pinhole camera's place too, sideways and in height; angles are then less sure"""
     out: Path | None = None
     """Write a preset file for `cipv run --params`"""
     keep: bool = False
     """Store the law with the detector; it is then used with that network unless a parameter overrides it"""
     json: bool = False
-    """Print the laws and their figures as JSON"""
+    """Print what was fitted and its figures as JSON"""
 
     def __call__(self) -> int:
+        self._check()
         params = self.pipeline.parameters()
         source = self.source.open()
         detector = detector_for(source, self.pipeline.detector)
+        return (self._fit_distance if self.what == "distance" else self._fit_alignment)(params, source, detector)
+
+    def _check(self) -> None:
+        """BadInput for an option of the other fit."""
+        others = (
+            {"--model": self.model != "pinhole", "--offset": self.offset}
+            if self.what == "distance"
+            else {"--truth": self.truth != "labels", "--free-exponent": self.free_exponent, "--keep": self.keep}
+        )
+        for name in (name for name, given in others.items() if given):
+            raise BadInput(f"{name} does not belong to `cipv calibrate {self.what}`")
+        if self.offset and self.model == "angular":
+            raise BadInput("--offset needs the pinhole model: the angular one has no place")
+
+    def _fit_alignment(self, params: Params, source: Source, detector: Detector) -> int:
+        def frame_of(index: int) -> Frame:
+            return detect(source.frame(index), Detectors(detector))
+
+        with frames_progress() as bar:
+            told = task_progress(bar, "fitting")
+            fit = fit_drive(frame_of, len(source), self.model, params, self.offset, told)
+        if self.json:
+            print(json.dumps(asdict(fit), indent=1))
+        else:
+            table = Table("parameter", "value", "± 1 σ", title=f"{fit.pairs} vehicles in {fit.frames} frames")
+            for name, value in fit.values.items():
+                table.add_row(f"alignment.{name}", f"{value:g}", f"{fit.sigmas[name]:.2g}")
+            Console().print(table)
+            print(overlap_sentence(fit))
+        for warning in fit.warnings:
+            print(f"cipv: {warning}", file=sys.stderr)
+        if self.out is not None:
+            section = {"model": fit.model, **fit.values}
+            self.out.write_text(yaml.safe_dump({"alignment": section}, sort_keys=False), encoding="utf-8")
+        return 0
+
+    def _fit_distance(self, params: Params, source: Source, detector: Detector) -> int:
         if self.keep and detector.path == find(EMBEDDED):
             raise BadInput(
                 "the law of the embedded detector is built in; write a preset with --out and use it with --params"

@@ -104,6 +104,10 @@ class OpenRecording:
         self.inputs.offer(frame)
         return frame
 
+    def with_boxes(self, index: int) -> Frame:
+        """A frame from its source with the detector's boxes alone: no lanes, no far view."""
+        return sensed(self.as_read(index), Detectors(self.setup.detectors.boxes), ask=self._ask)
+
     def has_been_looked_at(self, index: int) -> bool:
         """Whether no network has to run on a frame any more."""
         is_without = self.setup.sensors == "lidar" or self.setup.detectors == Detectors()

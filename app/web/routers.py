@@ -17,6 +17,7 @@ from app.streaming.stream import Stream
 from app.views.rerun.web import ViewerFiles
 from app.web.metrics import Metrics
 from app.web.routes.alignment import alignment_router
+from app.web.routes.alignment_fit import alignment_fit_router
 from app.web.routes.clips import clips_router
 from app.web.routes.drive import drive_router
 from app.web.routes.health import health_router
@@ -57,6 +58,7 @@ ROUTERS: list[Callable[[Services], APIRouter]] = [
     lambda on: label_files_router(on.engine.labels),
     lambda on: clips_router(on.engine, on.exports),
     lambda on: alignment_router(on.engine),
+    lambda on: alignment_fit_router(on.engine),
     lambda on: project_router(on.engine),
     lambda on: rerun_router(on.engine, on.viewer),
     lambda on: help_router(),

@@ -13,7 +13,7 @@ y = −d·sin(x_img·h_res). The printed arctan(−y/x) is an atan2 here, and th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import cv2
@@ -128,7 +128,7 @@ def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignm
     """The model to use: parameters where they are set, the recording's calibration for the rest. None when neither is
     known, and nothing can be projected. Pinhole needs a calibration; angular does not, if all four values are set."""
     if params.model == "pinhole" and camera is not None:
-        return Pinhole(camera.K, camera.distortion, camera.T_camera_ego @ inverse(_correction(params, camera)))
+        return Pinhole(camera.K, camera.distortion, corrected(params, camera).T_camera_ego)
     measured = angular_from_calibration(camera) if camera is not None else None
     typed = (params.h_res_deg, params.v_res_deg, params.cx_px, params.cy_px)
     if measured is None and any(value is None for value in typed):
@@ -142,12 +142,17 @@ def resolve(params: AlignmentParams, camera: CameraCalibration | None) -> Alignm
     return Angular(float(np.radians(h_deg)), float(np.radians(v_deg)), float(cx), float(cy))
 
 
+def corrected(params: AlignmentParams, camera: CameraCalibration) -> CameraCalibration:
+    """The calibration as the parameters correct its mount."""
+    return replace(camera, T_camera_ego=camera.T_camera_ego @ inverse(_correction(params, camera)))
+
+
 def _correction(params: AlignmentParams, camera: CameraCalibration) -> F64:
-    """(4, 4) rotation of the camera in its mount, in ego axes: its position stays."""
+    """(4, 4) rotation of the camera in its mount, in ego axes, about its position, which then moves."""
     turn = rotation(*(np.radians(angle) for angle in (params.roll_deg, params.pitch_deg, params.yaw_deg)))
     place = inverse(camera.T_camera_ego)[:3, 3]
     correction = np.eye(4)
-    correction[:3, :3], correction[:3, 3] = turn, place - turn @ place
+    correction[:3, :3], correction[:3, 3] = turn, place - turn @ place + [0.0, params.left_m, params.up_m]
     return correction
 
 

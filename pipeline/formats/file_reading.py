@@ -13,6 +13,7 @@ import numpy.typing as npt
 from pipeline.common.picture_decoding import TooMuch, decode_within_budget
 from pipeline.common.user_file_errors import reason_of
 from pipeline.common.user_files import check_allowed, read_regular
+from pipeline.formats.extrinsic_mistakes import likely_mistake, looks_ahead
 from pipeline.types import F64, U8, CameraCalibration, Picture
 from pipeline.types.source import SourceError
 
@@ -172,11 +173,9 @@ def check_looks_ahead(camera: CameraCalibration, what: str) -> None:
     """SourceError unless ego +x falls inside the picture widened by half its size on every side.
 
     A front camera sees where the car drives. The usual mistake, an extrinsic given the wrong way round, throws ego +x
-    far to the side or behind.
+    far to the side or behind; the text names the mistake where undoing it helps.
     """
-    forward = camera.T_camera_ego[:3, 0]
-    if forward[2] > 1e-3:
-        u, v = (camera.K @ (forward / forward[2]))[:2]
-        if -0.5 <= u / camera.width <= 1.5 and -0.5 <= v / camera.height <= 1.5:
-            return
-    raise SourceError(f"{what}: the camera does not look ahead; is its extrinsic inverted?")
+    size = camera.width, camera.height
+    if not looks_ahead(camera.K, camera.T_camera_ego, size):
+        mistake = likely_mistake(camera.K, camera.T_camera_ego, size)
+        raise SourceError(f"{what}: the camera does not look ahead; {mistake}")

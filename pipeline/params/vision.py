@@ -113,6 +113,8 @@ class AlignmentParams(Section):
     yaw_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount to the left")
     pitch_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount downwards")
     roll_deg: float = slider(0.0, -10.0, 10.0, 0.05, "°", "pinhole: correction of the mount clockwise")
+    left_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: correction of the camera's place to the left")
+    up_m: float = slider(0.0, -1.0, 1.0, 0.01, "m", "pinhole: correction of the camera's place upwards")
 
 
 class ExistenceParams(Section):
@@ -159,6 +161,12 @@ class FusionParams(Section):
     )
     size_gate: bool = choice(
         True, "Do not join a box with a cluster longer than any vehicle of its class: hedges, walls, rails"
+    )
+    drift_s: float = slider(
+        30.0, 5.0, 120.0, 1.0, "s", "A turned mount is told by the vehicles of the last so many seconds"
+    )
+    drift_sigmas: float = slider(
+        4.0, 2.0, 10.0, 0.1, "σ", "A turned mount is reported when its angle is this many standard deviations from zero"
     )
     disagree_s: float = slider(2.0, 0.2, 10.0, 0.1, "s", "Time over which disagreement of camera and LiDAR is averaged")
     disagree_share: float = slider(

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from pipeline.common.geometry import inverse
+from pipeline.formats.extrinsic_mistakes import T_OPTICAL_BODY
 from pipeline.formats.file_reading import camera_matrix, check_looks_ahead, rigid_transform
 from pipeline.types import F64, CameraCalibration
 from pipeline.types.source import SourceError
 
 TF_STATIC = "/tf_static"
 _BASES = ("base_link", "base_footprint", "vehicle", "ego_vehicle", "rear_axle")
-_T_OPTICAL_BODY = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
 _DISTORTIONS = {"plumb_bob": (5, 4), "rational_polynomial": (8,), "": (5, 4, 0)}
 
 
@@ -91,7 +91,7 @@ def _looking_ahead(K: F64, distortion: F64, T_camera_ego: F64, size: tuple[int, 
     try:
         check_looks_ahead(given, "the transform to the camera")
     except SourceError:
-        turned = CameraCalibration(K, distortion, _T_OPTICAL_BODY @ T_camera_ego, *size)
+        turned = CameraCalibration(K, distortion, T_OPTICAL_BODY @ T_camera_ego, *size)
         check_looks_ahead(turned, "the transform to the camera")
         return turned
     return given

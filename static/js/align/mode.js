@@ -6,6 +6,7 @@ import { newestOnly, request } from "../core/api.js";
 import { $, el, press, text } from "../core/dom.js";
 import { get, on, set } from "../core/store.js";
 import { change, reveal } from "../panels/params.js";
+import { fitControl, resultPanel } from "./fit.js";
 import { followHand } from "./pointer.js";
 import { drawEdges } from "./picture_edges.js";
 import { addLayer } from "../views/camera.js";
@@ -39,13 +40,15 @@ export function setUp() {
   bar.append(
     model("angular"),
     model("pinhole"),
-    el("span", { class: "facts", textContent: "Match" }),
+    el("span", { class: "facts match", textContent: "Match" }),
     score,
+    fitControl,
     el("span", { class: "spacer" }),
     how,
     blendSlider(),
     edgesButton(),
   );
+  bar.after(el("div", { class: "fit-place" }, resultPanel));
   followHand($("#camera", HTMLCanvasElement), isOn);
   addLayer((ctx, frame, place) => isOn() && get("align")?.edges && drawEdges(ctx, frame, place));
   on(["frame"], () => isOn() && fetchScore(undefined));
@@ -64,6 +67,7 @@ export function toggleAlign() {
 
 function reflect() {
   bar.hidden = !isOn();
+  $(".fit-place").hidden = !isOn();
   press(button, isOn());
   document.body.classList.toggle("is-aligning", isOn());
   const isAngular = get("params")?.values["alignment.model"] === "angular";

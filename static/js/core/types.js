@@ -226,5 +226,21 @@
  * @property {Record<string, number>} better
  * @property {string} brief
  * @property {string} text
+ *
+ * @typedef {object} AlignmentFit
+ * @property {"none"|"waiting"|"running"|"done"|"failed"|"cancelled"} state
+ * @property {number} progress
+ * @property {string} note
+ * @property {AlignmentFitResult|null} result
+ *
+ * @typedef {object} AlignmentFitResult
+ * @property {Record<string, number|string>} changes
+ * @property {Record<string, number>} sigmas
+ * @property {number} frames
+ * @property {number} pairs
+ * @property {number|null} iou_before
+ * @property {number} iou_after
+ * @property {string} text
+ * @property {string[]} warnings
  */
 export {};

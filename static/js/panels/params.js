@@ -21,6 +21,8 @@ const MODEL_OF = {
   "alignment.yaw_deg": "pinhole",
   "alignment.pitch_deg": "pinhole",
   "alignment.roll_deg": "pinhole",
+  "alignment.left_m": "pinhole",
+  "alignment.up_m": "pinhole",
 };
 const PROMINENT = new Set(["alignment.h_res_deg", "alignment.v_res_deg"]);
 

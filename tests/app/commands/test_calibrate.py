@@ -1,4 +1,5 @@
-"""`cipv calibrate distance` as a person types it: the law is printed, written as parameters, kept with a network."""
+"""`cipv calibrate` as a person types it: a law is printed, written as parameters, kept with a network; an alignment is
+fitted without a start."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ import yaml
 from app.cli import main
 from pipeline.inference.distance_laws import find_law
 from pipeline.inference.model_registry import EMBEDDED, find
+from pipeline.params import Params, from_yaml
 
 SCENE = """
 title: cars ahead
@@ -41,9 +43,9 @@ def network(tmp_path: Path) -> Path:
     return Path(shutil.copy(embedded, tmp_path / "copy.onnx"))
 
 
-def calibrate(*arguments: str) -> int:
+def calibrate(*arguments: str, what: str = "distance") -> int:
     with pytest.raises(SystemExit) as ended:
-        main(["calibrate", "distance", *arguments])
+        main(["calibrate", what, *arguments])
     assert isinstance(ended.value.code, int)
     return ended.value.code
 
@@ -79,3 +81,26 @@ def test_what_cannot_be_kept_is_refused(
     assert calibrate(scene, *[str(network) if each == "NETWORK" else each for each in arguments]) == 2
     assert named in capsys.readouterr().err
     assert find_law(network).law is None
+
+
+def test_an_alignment_is_fitted_and_written_as_parameters(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = tmp_path / "turned.yaml", tmp_path / "alignment.yaml"
+    path.write_text(SCENE + "detections: {boxes: {}}\nfaults: {camera_yaw_deg: 2.0, camera_pitch_deg: -1.5}\n")
+    assert calibrate(f"sim:{path}", "--out", str(out), "--json", what="alignment") == 0
+    printed = capsys.readouterr()
+    assert yaml.safe_load(out.read_text())["alignment"] == {"model": "pinhole", **json.loads(printed.out)["values"]}
+    fitted = from_yaml(out, Params()).alignment
+    assert fitted.yaw_deg == pytest.approx(2.0, abs=0.3)
+    assert fitted.pitch_deg == pytest.approx(-1.5, abs=0.3)
+    assert "only" in printed.err, "one second of three cars"
+
+
+@pytest.mark.parametrize(
+    ("what", "arguments"),
+    [("alignment", ["--keep"]), ("distance", ["--offset"]), ("alignment", ["--offset", "--model", "angular"])],
+)
+def test_options_of_the_other_fit_are_refused(
+    what: str, arguments: list[str], scene: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert calibrate(scene, *arguments, what=what) == 2
+    assert arguments[0] in capsys.readouterr().err

@@ -99,6 +99,7 @@ def collect(engine: Engine, client: httpx.Client) -> dict[str, Any]:
         "Comparison": comparison,
         "Job": job,
         "AlignmentScore": get("/api/alignment/score"),
+        "AlignmentFit": get("/api/alignment/fit"),
         **labelled(engine, client),
     }
 

@@ -33,7 +33,8 @@ GET /api/runs/{number}/params.yaml · GET /api/compare · GET /api/labels · GET
 GET /api/labels/tracks/{number} · GET /api/labels/next · GET /api/labels/score · GET /api/labels/history ·
 GET /api/labels/formats · GET /api/labels/export · GET /api/labels/export/notes · GET /api/labels/versions ·
 GET /api/labels/versions/{name} · GET /api/jobs · GET /api/jobs/{number} · GET /api/jobs/{number}/file ·
-GET /api/alignment/score · GET /api/rerun/open · GET /api/rerun.rrd · GET /openapi.json · HEAD /openapi.json ·
+GET /api/alignment/score · GET /api/alignment/fit · GET /api/alignment/fit.yaml ·
+GET /api/rerun/open · GET /api/rerun.rrd · GET /openapi.json · HEAD /openapi.json ·
 WEBSOCKET /api/stream · GET /rerun/re_viewer.js · GET /rerun/re_viewer_bg.wasm · GET /rerun/ · GET /help ·
 GET /help/{address:path} · GET /palette.css · GET / · HEAD /
 """
@@ -42,7 +43,8 @@ POST /api/playback · POST /api/source · PATCH /api/params · POST /api/params 
 POST /api/params/redo · POST /api/params/preset · DELETE /api/marks/{number} · POST /api/runs/{number}/keep ·
 POST /api/runs/{number}/base · POST /api/runs/{number}/use · DELETE /api/runs/{number} · POST /api/labels/act ·
 POST /api/labels/undo · POST /api/labels/redo · POST /api/labels/import · POST /api/labels/versions · POST /api/clip ·
-DELETE /api/jobs/{number} · POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ ·
+DELETE /api/jobs/{number} · POST /api/alignment/fit · DELETE /api/alignment/fit ·
+POST /api/project · POST /api/project/ray · WEBSOCKET /viser · WEBSOCKET /viser/ ·
 GET /viser · GET /viser/{path:path}
 """
 RULES: dict[str, Rule] = {

@@ -1,0 +1,68 @@
+"""What a drive cannot tell, in sentences: too few cars, all of them in one place, values that stay unsure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.calibration.alignment.models import FitModel
+from pipeline.calibration.alignment.pairs import PairTable
+from pipeline.types import F64, I64
+
+FEW_PAIRS = 40
+SAME_RANGE = 1.5
+"""Ranges of the pairs (9 in 10 to 1 in 10) that are nearer to each other than this are one distance."""
+SAME_BEARING_DEG = 4.0
+"""Bearings (standard deviation) that are nearer to each other than this are one direction."""
+UNSURE = {"yaw_deg": 0.3, "pitch_deg": 0.3, "roll_deg": 1.0, "left_m": 0.1, "up_m": 0.1, "res": 0.03, "origin_deg": 0.3}
+"""Standard deviations beyond which a parameter is named as not told by the drive."""
+AMBIGUOUS = 0.8
+"""Another place that explains this share of what the best one does makes the fit ambiguous."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    vector: F64
+    rows: I64
+    """Of the pairs that belong together."""
+    explained: float
+    """How many boxes have a cluster where it says, each counted by how well."""
+
+
+def warnings_of(
+    table: PairTable, model: FitModel, found: Sequence[Found], sigmas: Mapping[str, float]
+) -> tuple[str, ...]:
+    """What the drive lacks."""
+    best, warnings = found[0], []
+    cluster = table.cluster[best.rows]
+    near, far = np.quantile(table.range_m[cluster], [0.1, 0.9])
+    bearing_deg = np.degrees(np.arctan2(table.foot[cluster, 1, 1], table.foot[cluster, 1, 0]))
+    if len(best.rows) < FEW_PAIRS:
+        warnings.append(f"only {len(best.rows)} vehicles are seen by both sensors")
+    if far < SAME_RANGE * near:
+        warnings.append(f"all vehicles are {near:.0f}–{far:.0f} m away: an angle and an offset look alike there")
+    if bearing_deg.std() < SAME_BEARING_DEG:
+        warnings.append("all vehicles are in one direction: roll and resolution show only to the sides")
+    for name, sigma in sigmas.items():
+        limit, unit = _limit(model, best.vector, name)
+        if sigma > limit:
+            warnings.append(f"{name.rpartition('_')[0]} is known to ±{sigma:.2g}{unit} only")
+    others = [each for each in found[1:] if _apart(model, best.vector, each.vector)]
+    if others and others[0].explained > AMBIGUOUS * best.explained:
+        warnings.append("another alignment explains the drive nearly as well: choose a drive with more traffic")
+    return tuple(warnings)
+
+
+def _apart(model: FitModel, a: F64, b: F64) -> bool:
+    """Whether two results are different ones."""
+    return bool(np.abs((a - b)[-2:] if model.name == "angular" else (a - b)[:2]).max() > 1.0)
+
+
+def _limit(model: FitModel, vector: F64, name: str) -> tuple[float, str]:
+    if name.endswith("_px"):
+        return UNSURE["origin_deg"] / model.values(vector)["h_res_deg"], " px"
+    if name.endswith("res_deg"):
+        return UNSURE["res"] * model.values(vector)[name], "°/px"
+    return UNSURE[name], " m" if name.endswith("_m") else "°"

@@ -1,0 +1,130 @@
+"""The two models as numbers to be fitted: what is searched, how far, and which parameters come of it.
+
+A pinhole model keeps the lens of the recording's calibration. The angular model has no mount, so its origin stands for
+yaw and pitch, and its two resolutions for the lens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.alignment.projection import Alignment, Angular, angular_from_calibration, resolve
+from pipeline.params import AlignmentParams
+from pipeline.types import F64, CameraCalibration
+
+ModelName = Literal["angular", "pinhole"]
+
+REACH_DEG = 10.0
+"""Mounts are searched this far to all sides of the recording's calibration."""
+FARTHEST_OFF_M = 1.0
+"""How far the camera's place may be from where the calibration has it."""
+STEP_DEG = 1.0
+"""Between two mounts of the coarse search; the coarse score still falls off no faster."""
+VIEWS_DEG = (20.0, 130.0)
+"""Horizontal views of lenses that are searched where no calibration tells."""
+ZOOM_STEP = 1.12
+"""Between two lenses of the coarse search: the sides of a car move by 6 % of its width."""
+ZOOM_REACH = 1.35
+"""Lenses are searched up to so many times narrower and wider than the calibration's."""
+
+
+@dataclass(frozen=True)
+class FitModel:
+    """A model of one camera. A vector of unknowns is in degrees and metres (pinhole), or in logarithms and degrees
+    (angular)."""
+
+    name: ModelName
+    camera: CameraCalibration | None
+    """The recording's calibration; the angular model does without."""
+    size: tuple[int, int]
+    """Width and height of the pictures."""
+    offset: bool = False
+    """Pinhole: the camera's place is fitted too, sideways and in height. Along the optical axis boxes say nothing."""
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """The parameters that are fitted, in the order of the vector."""
+        if self.name == "pinhole":
+            return ("yaw_deg", "pitch_deg", "roll_deg", "left_m", "up_m")[: 5 if self.offset else 3]
+        return ("h_res_deg", "v_res_deg", "cx_px", "cy_px")
+
+    def values(self, vector: F64) -> dict[str, float]:
+        """The vector as values of parameters."""
+        if self.name == "pinhole":
+            return dict(zip(self.unknowns, map(float, vector), strict=True))
+        h, v = np.exp(vector[:2])
+        return {
+            "h_res_deg": float(h),
+            "v_res_deg": float(v),
+            "cx_px": float(self.size[0] / 2 + vector[2] / h),
+            "cy_px": float(self.size[1] / 2 + vector[3] / h),
+        }
+
+    def vector(self, params: AlignmentParams) -> F64 | None:
+        """Present parameters as a vector, where they say enough."""
+        if self.name == "pinhole":
+            return np.array([getattr(params, name) for name in self.unknowns])
+        aligned = resolve(params.model_copy(update={"model": "angular"}), self.camera)
+        if not isinstance(aligned, Angular):
+            return None
+        h, v = np.degrees([aligned.h_res_rad, aligned.v_res_rad])
+        cx, cy = aligned.cx - self.size[0] / 2, aligned.cy - self.size[1] / 2
+        return np.array([np.log(h), np.log(v), cx * h, cy * h])
+
+    def params(self, vector: F64) -> AlignmentParams:
+        """As parameters, unrounded and outside of their bounds too, while a search goes on."""
+        return AlignmentParams.model_construct(
+            **{**AlignmentParams().model_dump(), "model": self.name, **self.values(vector)}
+        )
+
+    def aligned(self, vector: F64, camera: CameraCalibration | None = None) -> Alignment:
+        """The projection. camera: of the frame, where frames differ."""
+        found = resolve(self.params(vector), camera or self.camera)
+        assert found is not None
+        return found
+
+    def spread(self, vectors: F64) -> Mapping[str, float]:
+        """Standard deviation of each parameter over (K, P) vectors."""
+        rows = [list(self.values(each).values()) for each in vectors]
+        return dict(zip(self.unknowns, np.std(rows, axis=0, ddof=1).tolist(), strict=True))
+
+    def grid(self) -> F64:
+        """(K, P) vectors of the coarse search."""
+        turns = np.arange(-REACH_DEG, REACH_DEG + STEP_DEG / 2, STEP_DEG)
+        if self.name == "pinhole":
+            return _product([turns, turns, *[[0.0]] * (len(self.unknowns) - 2)])
+        width, height = self.size
+        if self.camera is not None:
+            usual = angular_from_calibration(self.camera)
+            middle = np.log(np.degrees(usual.h_res_rad))
+            half = np.log(ZOOM_REACH)
+            zooms = np.arange(middle - half, middle + half + 1e-9, np.log(ZOOM_STEP))
+        else:
+            narrowest, widest = np.log(np.array(VIEWS_DEG) / width).tolist()
+            zooms = np.arange(narrowest, widest, np.log(ZOOM_STEP))
+        rows = []
+        for zoom in zooms:
+            h = float(np.exp(zoom))
+            reach_u, reach_v = min(0.4 * width * h, 2.5 * REACH_DEG), min(0.7 * height * h, 1.5 * REACH_DEG)
+            step = max(STEP_DEG, 0.015 * width * h)
+            us, vs = (np.arange(-reach, reach + step / 2, step) for reach in (reach_u, reach_v))
+            rows.append(_product([[zoom], [0.0], us, vs]))
+        grid = np.concatenate(rows)
+        grid[:, 1] = grid[:, 0]
+        return grid
+
+    def bounds(self) -> tuple[F64, F64]:
+        """Lowest and highest vector that the refinement may reach."""
+        if self.name == "pinhole":
+            reach = np.array([REACH_DEG] * 3 + [FARTHEST_OFF_M] * 2)[: len(self.unknowns)]
+            return -reach, reach
+        low, high = np.log(np.array([0.005, 0.3]))
+        return np.array([low, low, -60.0, -45.0]), np.array([high, high, 60.0, 45.0])
+
+
+def _product(axes: Sequence[Sequence[float] | F64]) -> F64:
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))

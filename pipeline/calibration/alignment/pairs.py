@@ -1,0 +1,164 @@
+"""Which cluster belongs to which box under an alignment, and how far apart their edges are.
+
+Edges are compared in standard deviations of what a detector's box is off by, which grows with the box. A roof that lies
+between two rings is off by nothing as long as the box ends between them too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numba
+import numpy as np
+
+from pipeline.alignment.projection import Alignment
+from pipeline.calibration.alignment.models import FitModel
+from pipeline.calibration.alignment.scenes import ENDS, FitScene
+from pipeline.types import F64, I64
+
+BOX_NOISE, EDGE_PX = 0.05, 2.0
+"""A box's edge is off by this share of its side, and by so many pixels where it is small (1 σ)."""
+_LEFT, _TOP, _RIGHT, _BOTTOM = range(4)
+
+
+@dataclass(frozen=True, eq=False)
+class PairTable:
+    """All boxes (B) and clusters (C) of several frames, and which of them are of one frame (P pairs)."""
+
+    boxes: F64
+    """(B, 4)."""
+    whole: np.ndarray
+    """(B, 4) bool."""
+    outline: F64
+    """(C, K, 3)."""
+    roof: F64
+    """(C, 3)."""
+    foot: F64
+    """(C, 3, 3)."""
+    range_m: F64
+    """(C,)."""
+    box: I64
+    """(P,) the pair's box; ascending."""
+    cluster: I64
+    """(P,) the pair's cluster."""
+    frame: I64
+    """(B,) which frame the box is of."""
+
+    @classmethod
+    def of(cls, scenes: Sequence[FitScene]) -> PairTable:
+        boxes = [len(each.boxes) for each in scenes]
+        clusters = [len(each.outline) for each in scenes]
+        first_box, first_cluster = np.cumsum([0, *boxes]), np.cumsum([0, *clusters])
+        pairs = [
+            (first_box[k] + i, first_cluster[k] + j)
+            for k in range(len(scenes))
+            for i in range(boxes[k])
+            for j in range(clusters[k])
+        ]
+        box, cluster = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+        joined = {
+            name: np.concatenate([getattr(each, name) for each in scenes])
+            for name in ("boxes", "whole", "outline", "roof", "foot", "range_m")
+        }
+        return cls(**joined, box=box, cluster=cluster, frame=np.repeat(np.arange(len(scenes)), boxes))
+
+    def taken(self, frames: I64) -> PairTable:
+        """Only the boxes of these frames; a frame that is named twice counts twice."""
+        return self.only(np.concatenate([np.flatnonzero(self.frame[self.box] == frame) for frame in frames]))
+
+    def only(self, rows: I64) -> PairTable:
+        """Only these pairs, and what of the clusters they need."""
+        used, cluster = np.unique(self.cluster[rows], return_inverse=True)
+        parts = {name: getattr(self, name)[used] for name in ("outline", "roof", "foot", "range_m")}
+        return PairTable(**{**vars(self), **parts, "box": self.box[rows], "cluster": cluster})
+
+    def extents(self, aligned: Alignment) -> F64:
+        """(C, 5) left, right, roof at its lowest and at its highest (−inf where no ring is above), foot; pixels. NaN
+        behind the camera."""
+        count = len(self.outline)
+        points = np.concatenate([self.outline, self.roof[:, None], self.foot], axis=1).reshape(-1, 3)
+        known = np.isfinite(points[:, 0])
+        uv = aligned.project(np.where(known[:, None], points, 1.0)).reshape(count, -1, 2)
+        around, roof, foot = uv[:, :-4], uv[:, -4, 1], uv[:, -3:, 1]
+        highest = np.where(np.isfinite(self.roof[:, 0]), roof, -np.inf)
+        low = around[..., 1].min(axis=1)
+        return np.column_stack(
+            [around[..., 0].min(axis=1), around[..., 0].max(axis=1), low, np.minimum(highest, low), foot.max(axis=1)]
+        )
+
+    def deviations(self, widen: float, slack_px: float) -> tuple[F64, F64]:
+        """(P,) and (P,) standard deviations of a box's upright and lying edges, pixels."""
+        sides = (self.boxes[:, 2:] - self.boxes[:, :2])[self.box].T
+        across, down = np.hypot(np.hypot(BOX_NOISE * sides, EDGE_PX) * widen, slack_px)
+        return across, down
+
+    def residuals(self, aligned: Alignment, widen: float = 1.0, slack_px: float = 0.0) -> F64:
+        """(P, 4) how far left, top, right and bottom of each pair's cluster are from its box's, in standard deviations;
+        0 where an edge says nothing. widen, slack_px: of the deviation, for a search that is still far away."""
+        left, right, low, high, foot = self.extents(aligned)[self.cluster].T
+        x1, y1, x2, y2 = self.boxes[self.box].T
+        across, down = self.deviations(widen, slack_px)
+        top = np.where(y1 > low, low - y1, np.where(y1 < high, high - y1, 0.0))
+        off = np.column_stack([(left - x1) / across, top / down, (right - x2) / across, (foot - y2) / down])
+        off = np.where(self.whole[self.box], off, 0.0)
+        return np.where(np.isfinite(off), off, 1e3)
+
+    def matched(self, off: F64, gate: float) -> I64:
+        """Rows of the pairs that belong together: each box's nearest cluster whose nearest box it is, within ``gate``
+        (root mean square of the deviations). off: (P, 4) residuals."""
+        distance = np.sqrt(np.mean(off**2, axis=1))
+        best_of_box = np.full(len(self.boxes), np.inf)
+        best_of_cluster = np.full(len(self.outline), np.inf)
+        np.minimum.at(best_of_box, self.box, distance)
+        np.minimum.at(best_of_cluster, self.cluster, distance)
+        is_best = (distance <= best_of_box[self.box]) & (distance <= best_of_cluster[self.cluster])
+        return np.flatnonzero(is_best & (distance < gate))
+
+    def overlap(self, aligned: Alignment) -> F64:
+        """(P,) IoU of each pair's box and projected cluster. A roof between two rings is where the box has it."""
+        left, right, low, high, foot = self.extents(aligned)[self.cluster].T
+        x1, y1, x2, y2 = self.boxes[self.box].T
+        top = np.clip(y1, high, low)
+        across = np.maximum(np.minimum(right, x2) - np.maximum(left, x1), 0.0)
+        down = np.maximum(np.minimum(foot, y2) - np.maximum(top, y1), 0.0)
+        both = across * down
+        return np.nan_to_num(both / ((right - left) * (foot - top) + (x2 - x1) * (y2 - y1) - both))
+
+
+def coarse_scores(table: PairTable, model: FitModel, grid: F64, widen: float, slack_px: float) -> F64:
+    """(K,) of each vector: how many boxes have a cluster where it says, each counted by how well. The table's pairs
+    ascend by box."""
+    corners = replace(table, outline=np.ascontiguousarray(table.outline[:, :ENDS]))
+    across, down = table.deviations(widen, slack_px)
+    boxes, whole = table.boxes[table.box], table.whole[table.box]
+    return np.array(
+        [
+            _covered(corners.extents(model.aligned(vector)), table.box, table.cluster, boxes, whole, across, down)
+            for vector in grid
+        ]
+    )
+
+
+@numba.njit(cache=True, nogil=True)
+def _covered(extents, box, cluster, boxes, whole, across, down):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Sum over boxes of how well their best cluster lies on them. extents: (C, 5). The rest: (P, …) of each pair."""
+    total, best = 0.0, 0.0
+    for p in range(len(box)):
+        if p and box[p] != box[p - 1]:
+            total, best = total + best, 0.0
+        left, right, low, high, foot = extents[cluster[p]]
+        x1, y1, x2, y2 = boxes[p]
+        off = 0.0
+        if whole[p, 0]:
+            off += ((left - x1) / across[p]) ** 2
+        if whole[p, 1]:
+            off += (max(y1 - low, high - y1, 0.0) / down[p]) ** 2
+        if whole[p, 2]:
+            off += ((right - x2) / across[p]) ** 2
+        if whole[p, 3]:
+            off += ((foot - y2) / down[p]) ** 2
+        fits = np.exp(-off / 8)
+        if fits > best:  # not where it is behind the camera: NaN
+            best = fits
+    return total + best

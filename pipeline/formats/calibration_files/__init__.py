@@ -1,0 +1,31 @@
+"""Camera calibrations as files of others: what each format is called, how it is read and written.
+
+Every reader returns a ``CameraCalibration`` whose ego frame is the LiDAR's own, and raises SourceError, in one
+sentence, for what cannot be meant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from pipeline.formats.calibration_files import kitti, opencv, rig, ros
+from pipeline.types import CameraCalibration
+
+
+class Format(NamedTuple):
+    """One kind of file."""
+
+    read: Callable[[Path, tuple[int, int] | None], CameraCalibration] | None
+    """From a file or folder. The size (width, height) is needed where the file does not say; None: cannot be read."""
+    write: Callable[[Path, CameraCalibration], object]
+    """To a file or folder."""
+
+
+FORMATS: Mapping[str, Format] = {
+    "kitti": Format(kitti.read, kitti.write),
+    "ros": Format(ros.read, ros.write),
+    "opencv": Format(opencv.read, opencv.write),
+    "rig": Format(None, rig.write),
+}

@@ -1,0 +1,44 @@
+"""`cipv calibration` as a person types it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.cli import main
+from pipeline.alignment.projection import resolve
+from pipeline.params import Params, with_changes
+from pipeline.sources import open_source
+from pipeline.sources.rig import load_rig
+
+
+def run(*arguments: str) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main(["calibration", *arguments])
+    assert isinstance(ended.value.code, int)
+    return ended.value.code
+
+
+def test_a_recordings_calibration_goes_through_every_format_with_its_correction(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    turned = with_changes(Params(), {"alignment.yaw_deg": 1.5, "alignment.up_m": 0.1}).alignment
+    options = ["--set", "alignment.yaw_deg=1.5", "--set", "alignment.up_m=0.1"]
+    ros, opencv, rig = tmp_path / "ros", tmp_path / "opencv.yaml", tmp_path / "rig.yaml"
+    assert run("sim:straight", "--to", "ros", "--out", str(ros), *options) == 0
+    assert run(str(ros), "--format", "ros", "--to", "opencv", "--out", str(opencv)) == 0
+    assert run(str(opencv), "--format", "opencv", "--out", str(rig)) == 0
+    assert "1280×720" in capsys.readouterr().out
+    ahead = np.array([[20.0, 1.0, 0.5], [40.0, -3.0, 1.0]])
+    right = resolve(turned, open_source("sim:straight").frame(0).camera)
+    found = resolve(Params().alignment, load_rig(rig).camera_calibration())
+    assert right is not None
+    assert found is not None
+    np.testing.assert_allclose(found.project(ahead), right.project(ahead), atol=1e-3)
+
+
+def test_a_format_that_lacks_something_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(str(tmp_path / "none.txt"), "--format", "kitti", "--out", str(tmp_path / "out.yaml")) == 2
+    assert "size of the pictures" in capsys.readouterr().err

@@ -1,0 +1,69 @@
+"""Edges of boxes and clusters: what counts as off, who belongs to whom."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.alignment.projection import resolve
+from pipeline.calibration.alignment.models import FitModel
+from pipeline.calibration.alignment.pairs import PairTable, coarse_scores
+from pipeline.params import AlignmentParams
+from tests.pipeline.calibration.alignment.made_drive import CAMERA, SIZE, drive
+
+ALIGNED = resolve(AlignmentParams(), CAMERA)
+assert ALIGNED is not None
+
+
+def table(**how: int) -> PairTable:
+    assert ALIGNED is not None
+    return PairTable.of(drive(ALIGNED, **{"frames": 6, "cars": 3, "walls": 2} | how))
+
+
+def test_a_car_lies_on_its_box_and_no_other():
+    found = table()
+    off = found.residuals(ALIGNED)
+    rows = found.matched(off, 2.5)
+    cars = found.box[rows] % 5 < 3
+    assert (found.box[rows] == found.cluster[rows])[cars].all()
+    assert cars.sum() >= 0.8 * 18
+    assert np.abs(off[rows]).mean() < 1.0
+
+
+def test_a_roof_between_two_rings_is_off_by_nothing_and_beyond_them_by_the_rest():
+    found = table(frames=1, cars=1, walls=0)
+    low, high = found.extents(ALIGNED)[0, 2:4]
+    assert high < low
+    for y1, expected_px in ((low - 0.1, 0.0), (high + 0.1, 0.0), (low + 20.0, -20.0), (high - 20.0, 20.0)):
+        boxed = replace(found, boxes=np.array([[*found.boxes[0, :1], y1, *found.boxes[0, 2:]]]))
+        _, down = boxed.deviations(1.0, 0.0)
+        assert boxed.residuals(ALIGNED)[0, 1] * down[0] == pytest.approx(expected_px, abs=1e-6)
+
+
+def test_an_edge_of_the_picture_says_nothing():
+    found = table(frames=1, cars=1, walls=0)
+    cut = replace(found, whole=np.array([[False, True, True, True]]), boxes=found.boxes - [300.0, 0.0, 0.0, 0.0])
+    assert cut.residuals(ALIGNED)[0, 0] == 0.0
+    assert found.residuals(ALIGNED)[0, 1:] == pytest.approx(cut.residuals(ALIGNED)[0, 1:], abs=3.0)
+
+
+def test_the_coarse_score_is_highest_at_the_right_mount():
+    model, turns = FitModel("pinhole", CAMERA, SIZE), np.array([[0.0, 0, 0], [2, 0, 0], [0, -2, 0], [-8, 5, 0]])
+    scores = coarse_scores(table(), model, turns, 2.0, 5.0)
+    assert scores.argmax() == 0
+    assert scores[0] > 1.5 * scores[3]
+
+
+def test_frames_drawn_twice_count_twice():
+    found = table()
+    assert len(found.taken(np.array([2, 2])).box) == 2 * len(found.taken(np.array([2])).box)
+    assert found.taken(np.array([2])).extents(ALIGNED).shape == (5, 5)
+
+
+def test_overlap_is_that_of_the_boxes():
+    found = table(frames=1, cars=1, walls=0)
+    assert found.overlap(ALIGNED)[0] > 0.8
+    shifted = replace(found, boxes=found.boxes + 1000.0)
+    assert shifted.overlap(ALIGNED)[0] == 0.0

@@ -1,0 +1,98 @@
+"""Calibrations written in every format come back as they were; what cannot be meant is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from pipeline.common.geometry import inverse, rotation
+from pipeline.formats.calibration_files import FORMATS
+from pipeline.formats.calibration_files.ros import TRANSFORM
+from pipeline.sources.rig import load_rig
+from pipeline.types import CameraCalibration
+from pipeline.types.source import SourceError
+from tests.pipeline.calibration.alignment.made_drive import CAMERA
+
+TURN = np.eye(4)
+TURN[:3, :3] = rotation(*np.radians([1.5, -4.0, 7.0]))
+STRAIGHT = replace(CAMERA, T_camera_ego=CAMERA.T_camera_ego @ TURN)
+BENT = replace(STRAIGHT, distortion=np.array([-0.31, 0.12, 0.001, -0.002, 0.01]))
+
+
+def written(name: str, camera: CameraCalibration, folder: Path) -> Path:
+    path = folder / f"{name}.yaml"
+    FORMATS[name].write(path, camera)
+    return path
+
+
+def same(a: CameraCalibration | None, b: CameraCalibration) -> None:
+    assert a is not None
+    np.testing.assert_allclose(a.T_camera_ego, b.T_camera_ego, atol=1e-7)
+    np.testing.assert_allclose(a.K, b.K)
+    np.testing.assert_allclose(a.distortion, b.distortion)
+    assert (a.width, a.height) == (b.width, b.height)
+
+
+@pytest.mark.parametrize("camera", [STRAIGHT, BENT], ids=["undistorted", "distorted"])
+@pytest.mark.parametrize("name", ["kitti", "ros", "opencv"])
+def test_what_is_written_is_read(name: str, camera: CameraCalibration, tmp_path: Path):
+    if name == "kitti" and camera is BENT:
+        with pytest.raises(SourceError, match="undistorted"):
+            written(name, camera, tmp_path)
+        return
+    read = FORMATS[name].read
+    assert read is not None
+    same(read(written(name, camera, tmp_path), (camera.width, camera.height)), camera)
+
+
+def test_a_rig_file_is_that_of_captures(tmp_path: Path):
+    same(load_rig(written("rig", BENT, tmp_path)).camera_calibration(), BENT)
+
+
+def test_kitti_needs_the_size(tmp_path: Path):
+    with pytest.raises(SourceError, match="size of the pictures"):
+        FORMATS["kitti"].read(written("kitti", STRAIGHT, tmp_path), None)  # type: ignore[misc]
+
+
+def changed(path: Path, **values: object) -> Path:
+    file = path / TRANSFORM
+    file.write_text(yaml.safe_dump({**yaml.safe_load(file.read_text()), **values}))
+    return path
+
+
+def test_frames_say_which_way_a_transform_of_ros_goes(tmp_path: Path):
+    folder = written("ros", replace(STRAIGHT, T_camera_ego=inverse(STRAIGHT.T_camera_ego)), tmp_path)
+    read = FORMATS["ros"].read
+    assert read is not None
+    with pytest.raises(SourceError, match="is its extrinsic inverted"):
+        read(folder, None)
+    turned = changed(folder, header={"frame_id": "lidar"}, child_frame_id="camera_optical")
+    same(read(turned, None), STRAIGHT)
+    with pytest.raises(SourceError, match="the camera's frame is camera_optical"):
+        read(changed(folder, header={"frame_id": "a"}, child_frame_id="b"), None)
+
+
+@pytest.mark.parametrize(
+    ("rotation_", "named"),
+    [
+        ({"roll": -90.0, "pitch": 0.0, "yaw": -90.0}, "look like degrees"),
+        ({"x": 1.0, "y": 1.0, "z": 0.0, "w": 1.0}, "unit length"),
+        ({"roll": 0.0}, "incomplete"),
+    ],
+)
+def test_rotations_that_are_none_are_refused(rotation_: dict[str, float], named: str, tmp_path: Path):
+    folder = written("ros", STRAIGHT, tmp_path)
+    changed(folder, transform={"translation": {"x": 0.0, "y": 0.0, "z": 0.0}, "rotation": rotation_})
+    with pytest.raises(SourceError, match=named):
+        FORMATS["ros"].read(folder, None)  # type: ignore[misc]
+
+
+def test_a_file_of_something_else_is_refused(tmp_path: Path):
+    file = tmp_path / "other.yaml"
+    file.write_text("%YAML:1.0\n---\nimage_width: 640\n")
+    with pytest.raises(SourceError, match="no camera_matrix"):
+        FORMATS["opencv"].read(file, None)  # type: ignore[misc]
