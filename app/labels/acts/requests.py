@@ -121,6 +121,12 @@ class SizeAlong(_OfTrack):
     size: tuple[Meters, Meters, Meters]
 
 
+class Flip(_OfTrack):
+    """It faces the other way, in every frame."""
+
+    kind: Literal["flip"]
+
+
 class Refit(_OfTrack):
     """The cuboid onto the points in and near it."""
 
@@ -262,8 +268,8 @@ class Import(Strict):
 
 
 Act = Annotated[
-    Accept | Reject | SendBack | ReviewOk | Remove | SetSighting | DropKeyframe | DropSightings | SizeAlong | Refit
-    | AddTrack | Lift | Relabel | Split | Merge | SetLead | ClearLead | TrimLead | SetPath | RemovePath | AddEvent
-    | Tag | Propose | Import,
+    Accept | Reject | SendBack | ReviewOk | Remove | SetSighting | DropKeyframe | DropSightings | SizeAlong | Flip
+    | Refit | AddTrack | Lift | Relabel | Split | Merge | SetLead | ClearLead | TrimLead | SetPath | RemovePath
+    | AddEvent | Tag | Propose | Import,
     Field(discriminator="kind"),
 ]  # fmt: skip
