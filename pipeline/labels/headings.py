@@ -26,6 +26,8 @@ _TRAVELLED_M = 2.0
 """Half a car's length: by so much a box may wander along a parked car as other sides of it come into view."""
 _OWN_SHARE = 0.1
 """Of our own way is added to that: an own speed that is off carries everything that stands with it."""
+_FEWEST_STEPS = 2
+"""One step may be from one vehicle to another under the same number."""
 _STEADY_SHARE = 0.8
 """Of the steps of something that drives go its way; those of a flickering cluster go anywhere."""
 _LANE_M = 1.75
@@ -171,7 +173,7 @@ def travelled(sightings: Sequence[Sighting], poses: Mapping[int, Pose]) -> Trave
         time_s += to.t_s - at.t_s
     agree = sum(step * along_m > 0 for step in steps)
     is_far = abs(along_m) >= _TRAVELLED_M + _OWN_SHARE * own_m and abs(along_m) >= _MOVING_MPS * time_s
-    return Travelled(along_m, is_far and agree >= _STEADY_SHARE * len(steps))
+    return Travelled(along_m, is_far and len(steps) >= _FEWEST_STEPS and agree >= _STEADY_SHARE * len(steps))
 
 
 def _speeds(frames: Sequence[int], moments: Mapping[int, Moment]) -> dict[int, float | None]:

@@ -48,6 +48,23 @@ def test_two_people_see_each_other_and_choose_when_they_disagree(
     assert [each["person"] for each in labels.get(f"/history?kind=track&id={made}")] == ["Ada", "Bob", "Bob", "Ada"]
 
 
+def test_leads_that_overlap_are_a_conflict_shown_with_both_ranges(hand: Hand, labels: Labels, line: Line):
+    page = hand.page
+    labels.act("Bob", {"kind": "set_lead", "first": START + 4, "last": START + 9, "lead": "unknown"})
+    expect(page.locator(".leads button").first).to_be_visible()
+    line.deaf = True  # the other's change does not reach this page before its own act
+    labels.act("Bob", {"kind": "set_lead", "first": START, "last": START + 3, "lead": "unknown"})
+    hand.keys("0")
+    dialog = page.get_by_role("dialog", name="Two people changed the same label")
+    expect(dialog).to_contain_text(f"Bob changed the lead of frame {START + 1} since")
+    expect(dialog.locator(".conflict-range")).to_have_count(2)
+    assert [each[2] for each in labels.leads] == ["unknown"], "nothing was written"
+    line.deaf = False
+    dialog.get_by_role("button", name="Keep mine").click()
+    labels.wait_for(lambda now: (START, START, "none") in now.leads)
+    is_saved(page)
+
+
 def test_what_is_called_saved_is_what_the_server_answered(hand: Hand, labels: Labels, line: Line):
     page = hand.page
     made = draw(hand, labels)

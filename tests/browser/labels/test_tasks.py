@@ -128,6 +128,7 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
     expect(page.locator(".track-row")).not_to_have_count(0)
     assert {each["state"] for each in labels.tracks.values()} == {"proposed"}
     expect(page.locator(".leads button[aria-pressed=true]")).to_have_count(1)
+    only_sure_ones_are_listed(hand, labels)
     hand.keys("Shift+A")
     labels.wait_for(lambda now: any(each["state"] == "accepted" for each in now.everything["leads"]))
     page.get_by_role("tab", name="Score").click()
@@ -142,6 +143,27 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
         page.locator("#menu").get_by_text("CIPV Studio").click()
     written = json.loads(download.value.path().read_text(encoding="utf-8"))
     assert {each["id"] for each in written["labels"]["tracks"]} == set(labels.tracks)
+
+
+def only_sure_ones_are_listed(hand: Hand, labels: Labels) -> None:
+    """The slider, from nothing to everything; one is turned round, and taken back."""
+    page, count = hand.page, len(labels.tracks)
+    slider = page.get_by_label("Least confidence of proposals")
+    slider.fill("1")
+    expect(page.locator(".sureness .above")).to_have_text(f"≥ 100 %: 0 proposed, {count} hidden")
+    expect(page.locator(".track-row")).to_have_count(0)
+    slider.fill("0")
+    expect(page.locator(".sureness .above")).to_have_text(f"≥ 0 %: {count} proposed, 0 hidden")
+    expect(page.locator(".track-row")).not_to_have_count(0)
+    slider.blur()
+    hand.keys(".")
+    chosen = int(page.locator(".track-row[aria-selected=true]").get_attribute("data-id") or -1)
+    before = labels.cuboid(chosen, START)["yaw_rad"]
+    hand.keys("Shift+X")
+    labels.wait_for(lambda now: math.cos(now.cuboid(chosen, START)["yaw_rad"] - before) < -0.999)
+    hand.keys("Control+z")
+    labels.wait_for(lambda now: now.cuboid(chosen, START)["yaw_rad"] == before)
+    hand.keys("Escape")
 
 
 def test_a_drive_is_reviewed_frozen_and_taken_back_in(hand: Hand, labels: Labels, tmp_path: Path):

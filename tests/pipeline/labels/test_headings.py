@@ -45,6 +45,11 @@ def test_a_vehicle_faces_where_it_drives(relative_mps: float, own_mps: float | N
     assert all((math.cos(yaw) < 0) == faces_us for yaw in yaws(found))
 
 
+def test_one_step_may_be_from_one_vehicle_to_the_next() -> None:
+    seen = track((6.0, 4.0), (11.0, 4.0))
+    assert faced(seen, (), own_poses(moments(13.0)))[1] == "unknown"
+
+
 def test_what_stands_still_while_we_turn_drives_nowhere() -> None:
     """Ego at 10 m/s on a curve of 20 m: a parked car swings sideways by metres in the ego frame."""
     turn = own_poses(moments(10.0, 0.5))

@@ -97,7 +97,9 @@ function showSureness() {
 }
 
 /** Sent back first, then the surest proposals, then by number. @param {LabelTrack} a @param {LabelTrack} b */
-const bySureness = (a, b) => (b.comment ? 2 : (b.confidence ?? 0)) - (a.comment ? 2 : (a.confidence ?? 0)) || a.id - b.id;
+const bySureness = (a, b) => rank(b) - rank(a) || a.id - b.id;
+/** @param {LabelTrack} track */
+const rank = ({ comment, confidence }) => (comment ? 2 : (confidence ?? 0));
 
 /** @returns {LabelTrack[]} */
 function fitting() {
