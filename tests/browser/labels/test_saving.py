@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.labels.conftest import Line
-from tests.browser.labels.hands import Hand, Labels, begin, draw, is_saved
+from tests.browser.labels.hands import Hand, Labels, begin, draw, is_at, is_saved
 from tests.browser.looks import wait_for_frame
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
@@ -25,6 +25,14 @@ def test_two_people_see_each_other_and_choose_when_they_disagree(
     other = open_page()
     wait_for_frame(other, START)
     second = begin(other, "Bob")
+    second.keys("Home")
+    is_at(other, 0)
+    is_at(hand.page, START)  # each has a playhead of its own, and watchers stay where they are
+    assert site.engine.snapshot.index == START
+    second.keys("ArrowRight")
+    is_at(other, 1)
+    other.get_by_role("button", name="Follow", exact=True).click()
+    is_at(other, START)
     row = other.locator(f".track-row[data-id='{made}']")
     expect(row).to_contain_text("car")
     row.click()

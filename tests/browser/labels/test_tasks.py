@@ -11,8 +11,8 @@ from playwright.sync_api import expect
 
 from pipeline.params import Params
 from tests.browser.conftest import START, Site
-from tests.browser.labels.hands import LEADS_Y, Hand, Labels, begin, draw, is_at, is_saved
-from tests.browser.looks import box_of, go_to, on_timeline, pixels, repainted, wait_for_frame, whole_drive
+from tests.browser.labels.hands import LEADS_Y, Hand, Labels, draw, is_at, is_saved
+from tests.browser.looks import box_of, go_to, on_timeline, pixels, repainted, whole_drive
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
@@ -49,8 +49,7 @@ def test_everything_is_done_by_keys_and_taken_back(hand: Hand, labels: Labels):
     is_saved(page)
 
     page.reload()
-    wait_for_frame(page, START + 3)
-    begin(page)
+    is_at(page, START + 3)  # labeling goes on where it was
     expect(page.locator(".track-row")).not_to_have_count(0)
     page.keyboard.press("Control+z")
     labels.wait_for(lambda now: now.tracks[made]["state"] != "rejected")

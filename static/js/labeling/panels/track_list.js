@@ -44,6 +44,8 @@ const slider = el("input", {
   above = el("span", { class: "facts above" }),
   sureness = el("div", { class: "list-bar sureness", hidden: true }, slider, above);
 const list = new LongList(body, (/** @type {LabelTrack} */ { id }) => id, create, update);
+/** The selected track that was brought into view. @type {number|null} */
+let scrolledTo = null;
 /** @type {Which} */
 let which = memory.read("labelTracks", "here");
 
@@ -82,6 +84,8 @@ export function setUp(parent) {
     const found = fitting();
     text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
     list.show(found.slice(0, MOST));
+    if (get("track") !== scrolledTo) body.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest" });
+    scrolledTo = get("track") ?? null;
     nothing.hidden = found.length > 0;
     text(nothing, emptyWords());
     begin.hidden = (get("labels")?.tracks.size ?? 0) > 0;
