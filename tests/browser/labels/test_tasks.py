@@ -139,9 +139,12 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
     expect(page.locator(".track-detail")).to_be_visible()
     with page.expect_download() as download:
         page.locator("#label-pane").get_by_role("button", name="Export").click()
+        page.locator("#menu").get_by_role("button", name="Accepted").click()
         page.locator("#menu").get_by_text("CIPV Studio").click()
+    assert download.value.suggested_filename == "labels-native-accepted.json"
     written = json.loads(download.value.path().read_text(encoding="utf-8"))
-    assert {each["id"] for each in written["labels"]["tracks"]} == set(labels.tracks)
+    accepted = {number for number, each in labels.tracks.items() if each["state"] == "accepted"}
+    assert {each["id"] for each in written["labels"]["tracks"]} == accepted
 
 
 def only_sure_ones_are_listed(hand: Hand, labels: Labels) -> None:
