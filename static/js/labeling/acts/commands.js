@@ -7,7 +7,7 @@ import { CLASSES, moved, turned } from "../views/cuboid.js";
 import * as draft from "../state/draft.js";
 import { chosen, leadAt, shown, trackOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
-import { isSure } from "../state/threshold.js";
+import { isSure, parted } from "../state/threshold.js";
 import * as span from "../state/marked_frames.js";
 
 /** @typedef {import("../state/types.js").LabelTrack} LabelTrack */
@@ -55,6 +55,12 @@ export function acceptHere() {
   if (lead?.state === "proposed") items.push({ kind: "lead", id: lead.id, revision: lead.revision });
   if (items.length) act({ kind: "accept", items });
   else say("No proposals in this frame");
+}
+
+/** Reject all proposals that the threshold hides. */
+export function rejectHidden() {
+  const items = parted().hidden.map(refOf);
+  if (items.length) act({ kind: "reject", items });
 }
 
 /** Select the next or previous label of the current frame. @param {1|-1} direction */

@@ -4,11 +4,11 @@ import { percent } from "../../core/format.js";
 import { seekTo } from "../../drive/seek.js";
 import { LongList } from "../../core/long_list.js";
 import { get, paintAfter, set } from "../../core/store.js";
-import { mergeWith, propose } from "../acts/commands.js";
+import { mergeWith, propose, rejectHidden } from "../acts/commands.js";
 import { present } from "../state/draft.js";
 import { isKnown } from "../state/sightings.js";
 import { shown, trackOf } from "../state/labels.js";
-import { counts, isSure, setThreshold, threshold } from "../state/threshold.js";
+import { isSure, parted, setThreshold, threshold } from "../state/threshold.js";
 import { isReviewing } from "../acts/review.js";
 
 /** @typedef {import("../state/types.js").LabelTrack} LabelTrack */
@@ -42,7 +42,13 @@ const slider = el("input", {
     aria: { label: "Least confidence of proposals" },
   }),
   above = el("span", { class: "facts above" }),
-  sureness = el("div", { class: "list-bar sureness", hidden: true }, slider, above);
+  reject = el("button", {
+    type: "button",
+    textContent: "Reject hidden",
+    title: "Reject all proposals below the slider, in the whole drive",
+    onclick: rejectHidden,
+  }),
+  sureness = el("div", { class: "list-bar sureness", hidden: true }, slider, above, reject);
 const list = new LongList(body, (/** @type {LabelTrack} */ { id }) => id, create, update);
 /** The selected track that was brought into view. @type {number|null} */
 let scrolledTo = null;
@@ -94,10 +100,11 @@ export function setUp(parent) {
 
 /** The threshold and what it leaves, while there are proposals it applies to. */
 function showSureness() {
-  const { shown: left, hidden } = counts();
-  sureness.hidden = !left && !hidden;
+  const { shown: left, hidden } = parted();
+  sureness.hidden = !left.length && !hidden.length;
+  reject.hidden = !hidden.length;
   slider.value = String(threshold());
-  text(above, `≥ ${percent(threshold())}: ${left} proposed, ${hidden} hidden`);
+  text(above, `≥ ${percent(threshold())}: ${left.length} proposed, ${hidden.length} hidden`);
 }
 
 /** Sent back first, then the surest proposals, then by number. @param {LabelTrack} a @param {LabelTrack} b */

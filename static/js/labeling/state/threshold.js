@@ -22,9 +22,8 @@ export const isSure = (track) => !isJudged(track) || /** @type {number} */ (trac
 /** Whether the threshold applies. @param {LabelTrack} track */
 const isJudged = ({ state, comment, confidence }) => state === "proposed" && !comment && confidence !== null;
 
-/** Proposals at and below the threshold. @returns {{shown: number, hidden: number}} */
-export function counts() {
-  const judged = [...(get("labels")?.tracks.values() ?? [])].filter(isJudged),
-    shown = judged.filter(isSure).length;
-  return { shown, hidden: judged.length - shown };
+/** Proposals that the threshold leaves, and that it hides. @returns {{shown: LabelTrack[], hidden: LabelTrack[]}} */
+export function parted() {
+  const judged = [...(get("labels")?.tracks.values() ?? [])].filter(isJudged);
+  return { shown: judged.filter(isSure), hidden: judged.filter((track) => !isSure(track)) };
 }
