@@ -105,7 +105,7 @@ export function context(canvas, settings) {
 }
 
 /** Values kept in a storage. Without it, they are lost. @param {() => Storage} storage */
-const kept = (storage) => ({
+const keptIn = (storage) => ({
   /** @template T @param {string} key @param {T} fallback @returns {T} */
   read(key, fallback) {
     try {
@@ -125,9 +125,9 @@ const kept = (storage) => ({
 });
 
 /** Settings of this browser. */
-export const memory = kept(() => localStorage);
+export const memory = keptIn(() => localStorage);
 /** What this tab was doing, for when it is reloaded. */
-export const tabMemory = kept(() => sessionStorage);
+export const tabMemory = keptIn(() => sessionStorage);
 /** Whether the page was reloaded, not opened. */
 export const isReloaded = () =>
   performance.getEntriesByType("navigation").some((each) => "type" in each && each.type === "reload");

@@ -2,7 +2,7 @@
  * Label files: export (with what each format loses), import, ground truth of the recording, and versions.
  */
 import { Refused, request } from "../../core/api.js";
-import { el, text, press } from "../../core/dom.js";
+import { el, press, text } from "../../core/dom.js";
 import { get } from "../../core/store.js";
 import { attachMenu, refill } from "../../workspace/menu.js";
 import { act } from "../acts/queue.js";
