@@ -17,6 +17,7 @@ from app.drive.timeline_columns import EXTRA_COLUMNS, ColumnValue
 from pipeline.decision.object_motion import closing_speed_mps
 from pipeline.evaluation.lead_verdict import Judged
 from pipeline.fusion.rows import LIDAR_RANGE_SIGMA_M
+from pipeline.path.yaw_rate import usable_rate
 from pipeline.types import OBJECT_SOURCES, VEHICLES, Frame, FusedObject, Result, VisionTrack
 from pipeline.vision.classes import COCO_80
 
@@ -49,11 +50,12 @@ OBJECT = np.dtype(
         ("bev", "f4", 8),
         ("velocity_mps", "f4", 2),
         ("hits", "i4"),
+        ("score", "f4"),
     ]
 )
 """``source`` is a place in ``SOURCES``; ``vehicle``: of a vehicle's class, or nameless; ``vl_gap``: camera's minus
 LiDAR's distance of a VL object, also in standard deviations of both. ``label`` is a place in ``LABELS``. ``cuboid``:
-center x y z, length, width, height, yaw; ``bev``: x y of four corners."""
+center x y z, length, width, height, yaw; ``bev``: x y of four corners. ``score``: the detector's, of its class."""
 Objects = npt.NDArray[np.void]
 
 
@@ -80,9 +82,15 @@ class Row(NamedTuple):
     """The verdict against truth; None where there is none."""
     extra: tuple[ColumnValue, ...] = ()
     """Values of ``EXTRA_COLUMNS``, in their order."""
+    yaw_rate_radps: float | None = None
+    """Own yaw rate; None where nothing gives it."""
+    reach_m: float = 0.0
+    """How far ahead a vehicle in the path would have been noticed (``lead_reach_m``)."""
 
 
-_OWN_COLUMNS = tuple(name for name in Row._fields if name not in ("t_ns", "judged", "extra"))
+_INSIDE = ("t_ns", "judged", "extra", "yaw_rate_radps", "reach_m")
+"""What no timeline draws."""
+_OWN_COLUMNS = tuple(name for name in Row._fields if name not in _INSIDE)
 
 
 def column_names() -> tuple[str, ...]:
@@ -113,7 +121,16 @@ def row_of(frame: Frame, result: Result, judged: Judged | None = None) -> Row:
         vl_disagreement_m=abs(gap[0]) if gap else None,
         judged=judged,
         extra=tuple(column(frame, result) for column in EXTRA_COLUMNS.values()),
+        yaw_rate_radps=usable_rate(result.ego) if result.ego is not None else None,
+        reach_m=lead_reach_m(frame, result),
     )
+
+
+def lead_reach_m(frame: Frame, result: Result) -> float:
+    """How far ahead a vehicle in the path would have been noticed: as far as it is known where the path goes. 0 unless
+    the camera looks: a LiDAR of 16 beams has hardly a point on a car beyond 35 m."""
+    looks = frame.picture is not None and frame.raw_boxes is not None
+    return result.path.reach_m if looks else 0.0
 
 
 def objects_of(result: Result) -> Objects:
@@ -140,6 +157,7 @@ def objects_of(result: Result) -> Objects:
             [value for corner in item.bev for value in corner] if item.bev is not None else _FLAT,
             item.velocity_mps if item.velocity_mps is not None else _STILL,
             item.hits,
+            _float(item.score),
         )
     return records
 

@@ -6,13 +6,14 @@ Numbers were kept in 32 bits, which is some micrometres; the path, gates, health
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
 from app.drive.frame_rows import LABELS, SOURCES, Objects, Row
 from app.drive.full_run import DriveRun
 from pipeline.common.geometry import Cuboid
 from pipeline.evaluation.scores.results_file import EMPTY, NO_HEALTH, NO_PATH
+from pipeline.labels.headings import Moment
 from pipeline.labels.propose import Seen
 from pipeline.types import AccCommand, Box, Cipv, EgoState, FusedObject, Result
 
@@ -29,9 +30,15 @@ def seen_of(records: Objects) -> list[Seen]:
             _bbox(record),
             bool(record["in_path"]),
             bool(record["carried"]),
+            _known(record["score"]),
         )
         for record in records
     ]
+
+
+def moments_of(rows: Sequence[Row]) -> dict[int, Moment]:
+    """What the car was doing at each frame, by index."""
+    return {index: Moment(row.t_ns, row.speed_mps, row.yaw_rate_radps, row.reach_m) for index, row in enumerate(rows)}
 
 
 def results_of(run: DriveRun, *, leads_only: bool = False) -> Iterator[Result]:
@@ -71,7 +78,7 @@ def _object(record: Any) -> FusedObject:
         id=int(record["id"]),
         source=source,
         label=LABELS[record["label"]] or None,
-        score=None,
+        score=_known(record["score"]),
         bbox=_bbox(record),
         bev=cast("Any", tuple((float(x), float(y)) for x, y in corners)) if math.isfinite(corners[0, 0]) else None,
         cuboid=_cuboid(record),

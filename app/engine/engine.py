@@ -20,6 +20,7 @@ from app.core.watchdog import Stuck, Watchdog, at_work
 from app.drive.background_runs import BackgroundRuns
 from app.drive.open_recording import RunSetup
 from app.engine.detector_pool import DetectorPool, OpenDetector, OpenLanes
+from app.engine.page_frames import PageFrames
 from app.engine.player import Player
 from app.engine.processed_frame import ProcessedFrame
 from app.engine.recorded_player import RecordedPlayer
@@ -92,6 +93,8 @@ class Engine:
         self._detections = DetectionCache()
         self.drives = BackgroundRuns(self._detections)
         self.control.on_ask = self.drives.turn.asked
+        self.page_frames = PageFrames(self.drives.turn.foreground)
+        """For pages that do not follow what is shown."""
         self.desk = desk or SessionRecorder()
         self.labels = labels or LabelDesk()
         self._whole_drives = whole_drives
@@ -265,6 +268,7 @@ class Engine:
             )
 
     def _player_of(self, source: AnySource, detectors: Detectors) -> Player:
+        self.page_frames.open(None)
         if is_live_source(source):
             # what decodes sensors' packets takes 0.1 s to import: only who has sensors pays
             from app.engine.live_pipeline import LivePipeline
@@ -272,7 +276,12 @@ class Engine:
 
             return LivePlayer(LivePipeline(source, detectors, self._sensors), self.control, self.drives, self.desk)
         recording = cast("Source", source)
-        pipeline = SeekablePipeline(recording, detectors, self._detections, self._sensors, self.drives.state_before)
+
+        def seekable() -> SeekablePipeline:
+            return SeekablePipeline(recording, detectors, self._detections, self._sensors, self.drives.state_before)
+
+        pipeline = seekable()
+        self.page_frames.open(seekable())
         setup = RunSetup(recording, pipeline.timeline_s, detectors, self._sensors) if self._whole_drives else None
         watching = partial(self.takeovers.watching_helper, "reading ahead")
         return RecordedPlayer(pipeline, self.control, self.drives, setup, self.desk, watching)

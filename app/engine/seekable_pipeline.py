@@ -126,6 +126,10 @@ class SeekablePipeline:
             return False
         return self._known(shown.frame.index, shown.params) is not None
 
+    def knows(self, index: int, params: Params) -> bool:
+        """Whether the frame can be shown exactly as in the whole drive."""
+        return self._known(index, params) is not None
+
     def _known(self, index: int, params: Params) -> State | None:
         return State() if index == 0 else self._state_before(index, params)
 

@@ -25,8 +25,8 @@ class NoSuchLabel(BadInput):
 
 class Stale(ActRefused):
     """Somebody changed an item, of that kind and number, since. theirs: the item as it stands; None where it was
-    removed."""
+    removed. revision: of the labels in which it stands so."""
 
-    def __init__(self, text: str, kind: str, number: int, theirs: dict[str, Any] | None) -> None:
+    def __init__(self, text: str, kind: str, number: int, theirs: dict[str, Any] | None, revision: int = 0) -> None:
         super().__init__(text)
-        self.kind, self.number, self.theirs = kind, number, theirs
+        self.kind, self.number, self.theirs, self.revision = kind, number, theirs, revision

@@ -10,7 +10,8 @@ ahead of that. With ``{"picture_px": 833}`` it says how wide it shows the pictur
 as wide as the widest of them needs. It may come with ``?picture_px=833`` too.
 ``{"selected": 7}`` and ``{"hides_3d": true}`` are for the views that the server draws. So is ``{"held": {"track": 7,
 "cuboid": …}}``, a label that may be dragged in 3D, or None; the page that holds it hears of the drag as
-``{"type": "held", "track": 7, "cuboid": …, "ended": true}``. What is picked in 3D comes to all as
+``{"type": "held", "track": 7, "cuboid": …, "ended": true}``. ``{"own": 12}`` is a page with a playhead of its own, at
+that frame; ``{"own": null}`` follows the others again. What is picked in 3D comes to all as
 ``{"type": "selected", "id": 7}``.
 """
 
@@ -31,12 +32,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from app.core.client_role import is_display
 from app.core.request_shapes import CuboidShape
 from app.core.shared_view_state import HeldCuboid, SharedViewState
+from app.engine.page_frames import PageFrames
 from app.engine.snapshot import Snapshot
 from app.streaming.encode import Encoder
+from app.streaming.own_playhead import OwnPlayhead
 from app.streaming.picture import MAX_WIDTH_PX, width_for
-
-FRAMES_UNDER_WAY = 2
-"""One being painted while the next is on its way."""
+from app.streaming.slot import Slot, Traffic
 
 DISPLAY_MAY_SAY = frozenset({"ping", "picture_px", "painted"})
 """What changes nothing for others; of a display everything else is ignored, whatever is added."""
@@ -53,68 +54,6 @@ class _Held(BaseModel):
     cuboid: CuboidShape
 
 
-@dataclass
-class Traffic:
-    """Frames of all clients since the start: sent, and dropped because a newer one replaced them."""
-
-    sent: int = 0
-    dropped: int = 0
-
-
-class Slot:
-    """The newest unsent messages of one client, by kind. Used on the server's event loop only.
-
-    ``paced``: frames wait for ``painted``. ``traffic`` counts frames. picture_px: how wide it shows the image, None
-    until it says so."""
-
-    def __init__(self, paced: bool = False, traffic: Traffic | None = None) -> None:
-        self.picture_px: int | None = None
-        self._paced = paced
-        self._traffic = traffic or Traffic()
-        self._under_way = 0
-        self._unsent: dict[str, str | bytes] = {}
-        self._newest: dict[str, int] = {}
-        self._state_after_frame: str | bytes | None = None
-        self._filled = asyncio.Event()
-
-    def put(self, kind: str, message: str | bytes, order: int = 0) -> None:
-        """Replace the unsent message of this kind; a message older than the last one put is ignored."""
-        if order < self._newest.get(kind, order):
-            return
-        self._newest[kind] = order
-        replaced = self._unsent.pop(kind, None)  # so that the kinds stand in the order in which they came
-        self._traffic.dropped += kind == "frame" and replaced is not None
-        self._unsent[kind] = message
-        if kind == "frame":
-            self._state_after_frame = None
-        elif kind == "state" and "frame" in self._unsent:
-            self._state_after_frame = message
-        self._filled.set()
-
-    def painted(self) -> None:
-        """The client has painted one of its frames."""
-        self._under_way = max(0, self._under_way - 1)
-        self._filled.set()
-
-    async def take(self) -> list[str | bytes]:
-        """Wait for messages that may be sent, and take them all."""
-        while True:
-            await self._filled.wait()
-            self._filled.clear()
-            is_full = self._paced and self._under_way >= FRAMES_UNDER_WAY
-            ready = {kind: message for kind, message in self._unsent.items() if not (is_full and kind == "frame")}
-            self._under_way += "frame" in ready
-            self._traffic.sent += "frame" in ready
-            self._unsent = {kind: message for kind, message in self._unsent.items() if kind not in ready}
-            if "frame" in ready:
-                ready.pop("state", None)  # the frame includes the state as it was
-                if self._state_after_frame is not None:  # also when it has been sent: the frame, late, says what was
-                    ready["state"] = self._state_after_frame
-                    self._state_after_frame = None
-            if ready:
-                return list(ready.values())
-
-
 @dataclass(frozen=True)
 class _Encoded:
     """A frame's message, and the snapshot whose state it carries. By default none."""
@@ -127,8 +66,11 @@ class _Encoded:
 class Stream:
     """Between the engine's thread, which publishes, and the clients' slots on the event loop."""
 
-    def __init__(self, looks: SharedViewState | None = None) -> None:
+    def __init__(self, looks: SharedViewState | None = None, frames: PageFrames | None = None) -> None:
+        """frames: for pages with a playhead of their own; without it every page follows."""
         self.traffic = Traffic()
+        self._page_frames = frames
+        self._pages = ThreadPoolExecutor(1, "cipv-pages")
         self._looks = looks or SharedViewState()
         self._looks.on_drag(self._tell_dragged)
         self._looks.on_pick(self._picked)
@@ -154,7 +96,7 @@ class Stream:
             return
         frame = self._encoded(snapshot) if snapshot.sequence > self._frame.sequence else _Encoded()
         try:
-            loop.call_soon_threadsafe(self._distribute, state_message(snapshot), frame, frame.of is snapshot)
+            loop.call_soon_threadsafe(self._distribute, snapshot, state_message(snapshot), frame)
         except RuntimeError:  # the server closed its loop in between
             return
 
@@ -167,7 +109,10 @@ class Stream:
         self._slots.append(slot)
         self._fit_width()
         try:
-            if self._snapshot is not None:
+            own = _number_of(socket.query_params.get("own"))
+            if own is not None:
+                await self._go(slot, own)
+            elif self._snapshot is not None:
                 await self._put_newest(slot, self._snapshot)
             async with asyncio.TaskGroup() as both:
                 sender = both.create_task(_send(socket, slot))
@@ -179,6 +124,8 @@ class Stream:
             self._slots.remove(slot)
             self._looks.hide(slot, False)
             self._looks.let_go(slot)
+            if slot.own is not None:
+                slot.own.leave()
             self._fit_width()
 
     async def _receive(self, socket: WebSocket, slot: Slot) -> None:
@@ -204,6 +151,33 @@ class Stream:
                 self._looks.hide(slot, said["hides_3d"])
             if "held" in said:
                 self._hold(slot, said["held"])
+            if "own" in said and _is_id_or_null(said["own"]):
+                await self._go(slot, said["own"])
+
+    async def _go(self, slot: Slot, index: int | None) -> None:
+        """A page goes to a frame by itself, or follows the others again."""
+        if index is None or self._page_frames is None:
+            if slot.own is not None:
+                slot.own.leave()
+                slot.own = None
+                if self._snapshot is not None:
+                    await self._put_newest(slot, self._snapshot)
+            return
+        if slot.own is None:
+            slot.own = OwnPlayhead(
+                index, self._page_frames, self._pages, self._newest, lambda *each: self._tell_own(slot, *each)
+            )
+        slot.own.show(index)
+
+    def _newest(self) -> tuple[Snapshot | None, int]:
+        """What all are shown, and how wide pictures are sent. Any thread."""
+        return self._snapshot, self._width_px
+
+    def _tell_own(self, slot: Slot, message: bytes, order: int) -> None:
+        """Called on the thread that made a page's own frame."""
+        if self._loop is not None:
+            with suppress(RuntimeError):  # the server closed its loop
+                self._loop.call_soon_threadsafe(slot.put_own, message, order)
 
     def _hold(self, slot: Slot, said: Any) -> None:
         """None for anything that is not a valid label."""
@@ -224,6 +198,9 @@ class Stream:
 
     async def _put_newest(self, slot: Slot, snapshot: Snapshot) -> None:
         """The frame, and the state as it is now: the one in the frame may be older than what was told meanwhile."""
+        if slot.own is not None:
+            slot.own.show(slot.own.index)
+            return
         frame = await asyncio.get_running_loop().run_in_executor(self._threads, self._encoded, snapshot)
         if frame.message is not None:
             slot.put("frame", frame.message, frame.sequence)
@@ -258,9 +235,14 @@ class Stream:
         for slot in self._slots:
             slot.put(kind, message)
 
-    def _distribute(self, state: str, frame: _Encoded, is_said: bool) -> None:
-        """is_said: the frame includes this state. A frame encoded again for a wider page may include an older one."""
+    def _distribute(self, snapshot: Snapshot, state: str, frame: _Encoded) -> None:
+        """state: of the snapshot. The frame may include an older one, when it was encoded again for a wider page."""
+        is_said = frame.of is snapshot
         for slot in self._slots:
+            if slot.own is not None:
+                slot.own.seen(snapshot)
+                slot.put("state", state_message(slot.own.snapshot(snapshot)))
+                continue
             slot.put("state", state)
             if frame.message is not None:
                 slot.put("frame", frame.message, frame.sequence)
@@ -296,6 +278,11 @@ def _number(value: Any, limit: float) -> float | None:
 
 def _is_id_or_null(value: Any) -> bool:
     return value is None or (isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**53)
+
+
+def _number_of(text: str | None) -> int | None:
+    """A frame's number of an address; None for what is none."""
+    return int(text) if text is not None and text.isascii() and text.isdecimal() and len(text) < 10 else None
 
 
 def _width(shown_px: Any) -> int | None:

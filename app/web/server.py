@@ -57,7 +57,7 @@ def create_app(
     marked moments are kept; None forgets them at the end. ``looks``: hears what people look at. ``tokens``: what who
     comes must have; None where only this machine can come. ``audit``: the file of who did what; None keeps none."""
     access = Access(hosts)
-    stream = Stream(looks)
+    stream = Stream(looks, engine.page_frames)
     exports, viewer, metrics = ExportQueue(engine.drives.changed), ViewerFiles(), Metrics(engine, stream)
     services = Services(engine, stream, marks or Marks(), exports, viewer, metrics)
 

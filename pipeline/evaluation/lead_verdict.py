@@ -12,6 +12,7 @@ import numpy as np
 
 from pipeline.common.geometry import closest_on_polygon, iou_matrix
 from pipeline.decision.path_position import near_face_middle
+from pipeline.labels.model import FARTHEST_LEAD_M
 from pipeline.types import VEHICLES, Box, Point2, Result
 from pipeline.types.source import TruthObject
 
@@ -36,7 +37,7 @@ class LeadRule:
     """
 
     half_lane_m: float = 1.5
-    max_range_m: float = 60.0
+    max_range_m: float = FARTHEST_LEAD_M
     lateral_slack_m: float = 0.3
     range_slack: float = 0.15
     range_slack_m: float = 2.0

@@ -18,6 +18,14 @@ State = Literal["proposed", "accepted", "corrected", "rejected"]
 it is kept, so that it is not proposed again."""
 
 
+Heading = Literal["", "motion", "lane", "unknown"]
+"""What told the front of proposed cuboids from their rear: how the vehicle moved, or the lane it is in. unknown:
+nothing did, and somebody has to look. Empty where a person or a file has said it."""
+
+FARTHEST_LEAD_M = 60.0
+"""A vehicle in the path that is farther away is not asked for: ``none`` says that nothing nearer is in the path."""
+
+
 @dataclass(frozen=True)
 class Origin:
     """Who made a label. name: the person, or the file or run that it came from. params, calibration: digests of what
@@ -47,7 +55,8 @@ class Sighting:
 class LabelTrack:
     """One vehicle or person over time. label: class name as in ``pipeline.types.VEHICLES`` and COCO. sightings: by
     ascending frame, at most one a frame. comment: what whoever sent it back wants to have looked at. reviewer: who
-    found it right, another than who made it; empty while nobody has, and again once it is changed."""
+    found it right, another than who made it; empty while nobody has, and again once it is changed. confidence: of a
+    proposal, 0–1, how sure it is a road user at all; None for what nobody asked that of."""
 
     id: int
     label: str
@@ -56,13 +65,16 @@ class LabelTrack:
     origin: Origin
     comment: str = ""
     reviewer: str = ""
+    confidence: float | None = None
+    heading: Heading = ""
 
     def at(self, frame: int) -> Sighting | None:
         return next((each for each in self.sightings if each.frame == frame), None)
 
 
 Lead = int | Literal["none", "unknown"]
-"""The lead of a frame: a track's id, ``none`` when nothing is ahead in the path, ``unknown`` when one can't tell."""
+"""The lead of a frame: a track's id, ``none`` when nothing nearer than ``FARTHEST_LEAD_M`` is in the path, ``unknown``
+when one can't tell."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import { $ } from "./core/dom.js";
 import * as drive from "./drive/sync.js";
 import * as live from "./drive/live_buffer.js";
 import * as object from "./drive/object_curve.js";
+import * as ownPlayhead from "./drive/own_playhead.js";
 import * as seek from "./drive/seek.js";
 import * as shuttle from "./drive/shuttle.js";
 import { toEvent } from "./drive/jumps.js";
@@ -34,7 +35,8 @@ import * as panes from "./workspace/panes.js";
 import * as share from "./workspace/share_link.js";
 import * as theme from "./workspace/theme.js";
 
-for (const part of [theme, panes, gutters, layers, trails, three, seek, shuttle, drive, live, object]) part.setUp();
+for (const part of [theme, panes, gutters, layers, trails, three, ownPlayhead, seek, shuttle, drive, live, object])
+  part.setUp();
 // text before canvases: a canvas that measures text forces a layout, and each later change of text another one
 for (const part of [banner, objects, why, transport, notices, vitals, camera, bev, timeline, exporting]) part.setUp();
 for (const part of [params, history, runs, align, labeling, sources, layouts, share, keyboard]) part.setUp();

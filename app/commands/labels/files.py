@@ -24,6 +24,7 @@ from pipeline.labels.formats.reading import read_bytes
 from pipeline.labels.formats.registry import FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
 from pipeline.labels.recorded_truth import truth_labels
+from pipeline.labels.selection import Selection, selected
 from pipeline.types.source import Source
 
 if TYPE_CHECKING:
@@ -53,6 +54,8 @@ class ExportLabels:
     """A file of labels in the native format"""
     version: Annotated[str, tyro.conf.arg(metavar="NAME")] = WORKING
     """A frozen version of the labels in the database; default: their present state"""
+    only: Selection = "all"
+    """Write only accepted labels, or only those that a second person reviewed; the set's name says so"""
     database: Database = None
     """Label database; default: $CIPV_LABELS_URL, then sessions/labels.db"""
 
@@ -60,6 +63,7 @@ class ExportLabels:
         source = opened_recording(self.source)
         drive = _drive(source)
         labels, notes = self._labels(source, drive)
+        labels = selected(labels, self.only)
         lost = export_labels(labels, drive, self.format, self.out)
         say(*notes, *lost, f"{self.out}: {_amount(labels)}")
         return 0

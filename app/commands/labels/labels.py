@@ -32,33 +32,39 @@ class ProposeLabels:
     """Author of the change, who can undo it in the dashboard"""
 
     def __call__(self) -> int:
+        from app.drive.frame_rows import lead_reach_m
         from app.drive.full_run import calibration_digest, digest
         from app.labels.acts.bulk import put_proposals
         from app.labels.store.database import open_database
         from app.labels.store.drive_labels import DriveLabels, info_of
+        from pipeline.labels.headings import Moment
         from pipeline.labels.model import Origin
         from pipeline.labels.propose import Seen, propose
+        from pipeline.path.yaw_rate import usable_rate
         from pipeline.run import run
 
         params, source = self.pipeline.parameters(), self.source.open()
         detectors = self.pipeline.open_detectors(source)
         frames: dict[int, list[Seen]] = {}
         leads: dict[int, int | None] = {}
+        moments: dict[int, Moment] = {}
         names, calibration = [], ""
         with frames_progress() as bar:
             task = bar.add_task(source.title, total=len(source))
             for frame, result in run(source, params, detectors):
                 frames[frame.index] = [
-                    Seen(each.id, each.label, each.cuboid, each.bbox, each.in_path, each.carried)
+                    Seen(each.id, each.label, each.cuboid, each.bbox, each.in_path, each.carried, each.score)
                     for each in result.objects
                 ]
                 leads[frame.index] = result.cipv.id if result.cipv is not None else None
+                speed, rate = (ego.speed_mps, usable_rate(ego)) if (ego := result.ego) is not None else (None, None)
+                moments[frame.index] = Moment(frame.t_ns, speed, rate, lead_reach_m(frame, result))
                 names.append(frame.name)
                 calibration = calibration or calibration_digest(frame.camera, params)
                 bar.update(task, completed=len(names))
         made_from = digest(source.uri, detectors.names, "both", params)
         origin = Origin("pipeline", "cipv labels propose", int(time.time() * 1000), made_from, calibration)
-        found = propose(frames, leads, origin)
+        found = propose(frames, leads, origin, moments)
         database = open_database(self.database)
         try:
             kept = DriveLabels(database, info_of(source, lambda: tuple(names)))

@@ -9,7 +9,7 @@ from typing import cast
 
 from app.drive.full_run import DriveRun
 from app.drive.open_recording import OpenRecording
-from app.drive.run_results import seen_of
+from app.drive.run_results import moments_of, seen_of
 from app.labels.acts.leads import clear
 from app.labels.acts.tags import put_tag
 from app.labels.errors import ActRefused
@@ -172,7 +172,7 @@ def _proposals(recording: OpenRecording, run: DriveRun, first: int, last: int) -
         recording.digest(run.params),
         recording.calibration_digest(run.params),
     )
-    return propose(frames, leads, origin)
+    return propose(frames, leads, origin, moments_of(rows))
 
 
 def _put_proposals(draft: Draft, found: Proposals, first: int, last: int) -> int:

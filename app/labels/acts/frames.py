@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import cast
 
+from app.labels.acts.overlaps import check_seen
 from app.labels.acts.requests import AddEvent, RemovePath, SetPath
 from app.labels.acts.scope import Scope, by_person, track_of
 from app.labels.errors import NoSuchLabel
@@ -15,6 +16,7 @@ from pipeline.labels.model import EventLabel, PathLabel
 def set_path(draft: Draft, scope: Scope, act: SetPath) -> str:
     scope.check(act.frame)
     left, right = act.lines()
+    check_seen(draft, "path", act.frame, act.frame, act)
     path = PathLabel(act.frame, left, right, "corrected", by_person(draft))
     number = _path_at(draft, act.frame)
     if number is None:
@@ -25,6 +27,7 @@ def set_path(draft: Draft, scope: Scope, act: SetPath) -> str:
 
 
 def remove_path(draft: Draft, scope: Scope, act: RemovePath) -> str:
+    check_seen(draft, "path", act.frame, act.frame, act)
     number = _path_at(draft, act.frame)
     if number is None:
         raise NoSuchLabel(f"there is no path in {frames_text(act.frame)}")
@@ -37,6 +40,7 @@ def add_event(draft: Draft, scope: Scope, act: AddEvent) -> str:
     tracks = tuple(dict.fromkeys(act.tracks))
     for number in tracks:
         track_of(draft, number)
+    check_seen(draft, "event", act.frame, act.frame, act, act.event)
     draft.add("event", EventLabel(act.frame, act.event, tracks, "accepted", by_person(draft)))
     of = f" of {', '.join(f'#{number}' for number in tracks)}" if tracks else ""
     return f"{act.event.replace('_', '-')}{of} in {frames_text(act.frame)}"

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
+from app.labels.acts.overlaps import check_seen
 from app.labels.acts.requests import ClearLead, SetLead, TrimLead
 from app.labels.acts.scope import Scope, by_person, track_of
 from app.labels.errors import ActRefused
 from app.labels.store.draft import Draft
-from app.labels.store.frame_ranges import outside
+from app.labels.store.frame_ranges import free_spans, outside
 from app.labels.wording import frames_text, lead_text
 from pipeline.labels.model import LeadRange
 
@@ -18,12 +19,14 @@ def set_lead(draft: Draft, scope: Scope, act: SetLead) -> str:
     scope.check(act.first, act.last)
     if isinstance(act.lead, int):
         track_of(draft, act.lead)
+    check_seen(draft, "lead", act.first, act.last, act)
     paint(draft, LeadRange(act.first, act.last, act.lead, "accepted", by_person(draft)))
     return f"lead of {frames_text(act.first, act.last)}: {lead_text(act.lead)}"
 
 
 def clear_lead(draft: Draft, scope: Scope, act: ClearLead) -> str:
     scope.check(act.first, act.last)
+    check_seen(draft, "lead", act.first, act.last, act)
     if not clear(draft, act.first, act.last):
         raise ActRefused(f"no lead is labelled in {frames_text(act.first, act.last)}")
     return f"lead of {frames_text(act.first, act.last)}: cleared"
@@ -35,6 +38,8 @@ def trim_lead(draft: Draft, scope: Scope, act: TrimLead) -> str:
     old = cast("LeadRange", draft.get("lead", act.range, act.revision).value)
     if old.state == "rejected":
         raise ActRefused("that range is rejected: label the lead there instead")
+    for first, last in free_spans(act.first, act.last, range(old.first, old.last + 1)):
+        check_seen(draft, "lead", first, last, act)
     if (old.first, old.last) != (act.first, act.last):
         state = old.state if old.origin.maker == "person" else "corrected"
         new = replace(old, first=act.first, last=act.last, state=state, origin=by_person(draft), reviewer="")

@@ -61,6 +61,14 @@ class _OfTrack(Strict):
     revision: Id
 
 
+class OverFrames(Strict):
+    """seen: the revision of the labels that the person saw; what others have said in these frames since is a conflict.
+    None says it whatever was said. over_reviewed: what a second person has reviewed there may be cut."""
+
+    seen: Id | None = None
+    over_reviewed: bool = False
+
+
 class Accept(_OfItems):
     """It is so."""
 
@@ -121,6 +129,12 @@ class SizeAlong(_OfTrack):
     size: tuple[Meters, Meters, Meters]
 
 
+class Flip(_OfTrack):
+    """It faces the other way, in every frame."""
+
+    kind: Literal["flip"]
+
+
 class Refit(_OfTrack):
     """The cuboid onto the points in and near it."""
 
@@ -174,7 +188,7 @@ class Merge(Strict):
     tracks: tuple[TrackRef, TrackRef]
 
 
-class SetLead(Strict):
+class SetLead(OverFrames):
     """Who leads from first to last, whatever was said there before."""
 
     kind: Literal["set_lead"]
@@ -183,7 +197,7 @@ class SetLead(Strict):
     lead: Id | Literal["none", "unknown"]
 
 
-class ClearLead(Strict):
+class ClearLead(OverFrames):
     """Nobody has said who leads from first to last."""
 
     kind: Literal["clear_lead"]
@@ -191,7 +205,7 @@ class ClearLead(Strict):
     last: Index
 
 
-class TrimLead(Strict):
+class TrimLead(OverFrames):
     """A range begins or ends elsewhere: it is from first to last now, whatever was said where it was not before."""
 
     kind: Literal["trim_lead"]
@@ -201,7 +215,7 @@ class TrimLead(Strict):
     last: Index
 
 
-class SetPath(Strict):
+class SetPath(OverFrames):
     """The ego lane's lines in a frame: ego x, y from the bumper on."""
 
     kind: Literal["set_path"]
@@ -219,14 +233,14 @@ class SetPath(Strict):
         )
 
 
-class RemovePath(Strict):
+class RemovePath(OverFrames):
     """The pipeline's path is right after all."""
 
     kind: Literal["remove_path"]
     frame: Index
 
 
-class AddEvent(Strict):
+class AddEvent(OverFrames):
     """Something happens: ``cut_in``, ``cut_out``, or another word."""
 
     kind: Literal["add_event"]
@@ -235,7 +249,7 @@ class AddEvent(Strict):
     tracks: list[Id] = Field(default_factory=list, max_length=100)
 
 
-class Tag(Strict):
+class Tag(OverFrames):
     """A word about the frames from first to last, or no more."""
 
     kind: Literal["tag"]
@@ -262,8 +276,8 @@ class Import(Strict):
 
 
 Act = Annotated[
-    Accept | Reject | SendBack | ReviewOk | Remove | SetSighting | DropKeyframe | DropSightings | SizeAlong | Refit
-    | AddTrack | Lift | Relabel | Split | Merge | SetLead | ClearLead | TrimLead | SetPath | RemovePath | AddEvent
-    | Tag | Propose | Import,
+    Accept | Reject | SendBack | ReviewOk | Remove | SetSighting | DropKeyframe | DropSightings | SizeAlong | Flip
+    | Refit | AddTrack | Lift | Relabel | Split | Merge | SetLead | ClearLead | TrimLead | SetPath | RemovePath
+    | AddEvent | Tag | Propose | Import,
     Field(discriminator="kind"),
 ]  # fmt: skip

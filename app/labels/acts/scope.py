@@ -42,7 +42,9 @@ def corrected(draft: Draft, track: LabelTrack, *, placed: bool = False) -> None:
     was put somewhere by hand. Until then, where it was only pointed at, what was measured stays what it is worth."""
     how = "" if placed else track.origin.how
     state = track.state if how else "corrected"
-    draft.put("track", track.id, replace(track, state=state, origin=by_person(draft, how), reviewer=""))
+    draft.put(
+        "track", track.id, replace(track, state=state, origin=by_person(draft, how), reviewer="", confidence=None)
+    )
 
 
 def stated(item: Item) -> Stated:

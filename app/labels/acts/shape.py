@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from app.labels.acts.requests import DropKeyframe, DropSightings, SetSighting, SizeAlong
+from app.labels.acts.requests import DropKeyframe, DropSightings, Flip, SetSighting, SizeAlong
 from app.labels.acts.scope import Scope, corrected, track_of
 from app.labels.errors import ActRefused
 from app.labels.store.draft import Draft
 from app.labels.wording import frames_text
 from pipeline.labels import interpolate
+from pipeline.labels.headings import half_turned
 from pipeline.labels.model import Sighting
 
 
@@ -21,7 +22,8 @@ def set_sighting(draft: Draft, scope: Scope, act: SetSighting) -> str:
     after = interpolate.put_keyframe(old, new, scope.t_ns, interpolate=act.interpolate)
     _put(draft, track.id, old, after)
     before = old.get(act.frame)
-    corrected(draft, track, placed=before is None or before.cuboid != new.cuboid)
+    placed = before is None or before.cuboid != new.cuboid
+    corrected(draft, replace(track, heading="") if placed else track, placed=placed)
     return f"{_verb(before, new)} #{track.id} in {frames_text(act.frame)}"
 
 
@@ -58,6 +60,19 @@ def size_along(draft: Draft, scope: Scope, act: SizeAlong) -> str:
     _put(draft, track.id, old, after)
     corrected(draft, track)
     return "resized #{} to {} m in every frame".format(track.id, " × ".join(f"{side:.2f}" for side in act.size))
+
+
+def flip(draft: Draft, scope: Scope, act: Flip) -> str:
+    track = track_of(draft, act.track, act.revision)
+    old = draft.sightings(track.id)
+    after = {
+        frame: replace(each, cuboid=half_turned(each.cuboid)) for frame, each in old.items() if each.cuboid is not None
+    }
+    if not after:
+        raise ActRefused(f"#{track.id} has no cuboid in any frame")
+    _put(draft, track.id, old, {**old, **after})
+    corrected(draft, replace(track, heading=""))
+    return f"turned #{track.id} round in every frame"
 
 
 def _put(draft: Draft, track: int, old: Mapping[int, Sighting], new: Mapping[int, Sighting]) -> None:

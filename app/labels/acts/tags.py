@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import cast
 
+from app.labels.acts.overlaps import check_seen
 from app.labels.acts.requests import Tag
 from app.labels.acts.scope import Scope, by_person
 from app.labels.store.draft import Draft
@@ -16,6 +17,7 @@ from pipeline.labels.model import FrameTag
 def tag(draft: Draft, scope: Scope, act: Tag) -> str:
     scope.check(act.first, act.last)
     frames = frames_text(act.first, act.last)
+    check_seen(draft, "tag", act.first, act.last, act, act.tag)
     if act.on:
         put_tag(draft, FrameTag(act.first, act.last, act.tag, by_person(draft)))
         return f"tagged {frames} {act.tag}"

@@ -85,11 +85,17 @@ def _places(labels: DriveLabels, scores: LabelScores, run: DriveRun | None, aske
 
 
 def _unlabelled(labels: DriveLabels) -> list[Place]:
+    """A proposal is nobody's word."""
     said: set[int] = set()
+    proposed: set[int] = set()
     for lead in _leads(labels):
         if lead.state != "rejected":
-            said.update(range(lead.first, lead.last + 1))
-    return [Place(index, "lead not labelled") for index in range(len(labels.info.t_ns)) if index not in said]
+            (proposed if lead.state == "proposed" else said).update(range(lead.first, lead.last + 1))
+    return [
+        Place(index, "lead only proposed" if index in proposed else "lead not labelled")
+        for index in range(len(labels.info.t_ns))
+        if index not in said
+    ]
 
 
 def _waiting(labels: DriveLabels, *, sent_back: bool) -> list[Place]:

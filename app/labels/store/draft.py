@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any
 
 from sqlalchemy import Connection, and_, bindparam, delete, func, insert, select, tuple_
 
 from app.labels.errors import ActRefused, NoSuchLabel, Stale
-from app.labels.store.items import read_item, read_items, read_track
+from app.labels.store.items import Change, read_changes_of_others, read_item, read_items, read_track
 from app.labels.store.tables import ActRow, ChangeRow, ItemRow, SightingRow
 from app.labels.store.undo_order import WAYS
-from app.labels.store.values import Content, Frames, Item, ItemKind, Value, pack, pack_content, row_of, value_to_json
+from app.labels.store.values import (
+    Content,
+    Frames,
+    Item,
+    ItemKind,
+    Value,
+    pack,
+    pack_content,
+    row_of,
+    value_to_json,
+)
 from pipeline.labels.model import LabelTrack, Sighting
 
 _COLUMNS = tuple(column.name for column in SightingRow.__table__.columns)
@@ -62,10 +72,18 @@ class Draft:
             removed_by = self._last_change(kind, number)
             if removed_by is None:
                 raise NoSuchLabel(f"there is no {kind} {number}")
-            raise Stale(f"{self.who(removed_by)} removed {name_of(kind, number)} since", kind, number, None)
+            raise Stale(
+                f"{self.who(removed_by)} removed {name_of(kind, number)} since", kind, number, None, self.number - 1
+            )
         if found.revision != revision and (kind, number) not in self._after:
             theirs = {"id": number, **value_to_json(kind, found.value), "revision": found.revision}
-            raise Stale(f"{self.who(found.revision)} changed {name_of(kind, number)} since", kind, number, theirs)
+            raise Stale(
+                f"{self.who(found.revision)} changed {name_of(kind, number)} since",
+                kind,
+                number,
+                theirs,
+                self.number - 1,
+            )
         return found
 
     def all(self, kind: ItemKind) -> dict[int, Item]:
@@ -210,6 +228,10 @@ class Draft:
             .order_by(ActRow.number.desc())
             .limit(1)
         ).first()
+
+    def changes_of_others(self, kind: ItemKind, since: int) -> Iterator[Change]:
+        """What other persons' acts after ``since`` did to items of a kind, act by act."""
+        return read_changes_of_others(self._connection, self._drive_id, kind, since, self.person)
 
     def who(self, act: int) -> str:
         """The person of an act."""

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import groupby
 from typing import Any, cast
 
 from sqlalchemy import Connection, and_, func, select
 
 from app.labels.store.tables import ActRow, ChangeRow, ItemRow, SightingRow
 from app.labels.store.undo_order import WAYS
-from app.labels.store.values import KINDS, Item, ItemKind, sighting_of, value_from_json
+from app.labels.store.values import KINDS, Item, ItemKind, Value, sighting_of, unpack_content, value_from_json
 from pipeline.labels.model import Sighting
 
 SIGHTINGS = tuple(SightingRow.__table__.columns)
@@ -113,6 +115,31 @@ def read_changers(connection: Connection, drive_id: int) -> dict[tuple[ItemKind,
         )
     )
     return {(cast("ItemKind", row.kind), int(row.item)): row.person for row in found}
+
+
+@dataclass(frozen=True)
+class Change:
+    """What an act did to items of one kind: those that it changed or removed, before, and those it left, after."""
+
+    person: str
+    before: list[Value]
+    after: list[Value]
+
+
+def read_changes_of_others(
+    connection: Connection, drive_id: int, kind: ItemKind, since: int, person: str
+) -> Iterator[Change]:
+    """What the acts after ``since`` of everybody but a person did to items of a kind, act by act."""
+    rows = connection.execute(
+        select(ActRow.number, ActRow.person, ChangeRow.before, ChangeRow.after)
+        .join(ChangeRow, and_(ActRow.drive_id == ChangeRow.drive_id, ActRow.number == ChangeRow.act))
+        .where(ChangeRow.drive_id == drive_id, ChangeRow.act > since, ChangeRow.kind == kind, ActRow.person != person)
+        .order_by(ActRow.number)
+    ).all()
+    for (_, who), changed in groupby(rows, key=lambda row: (row.number, row.person)):
+        both = [(unpack_content(kind, row.before).value, unpack_content(kind, row.after).value) for row in changed]
+        before, after = zip(*both, strict=True)
+        yield Change(who, [each for each in before if each], [each for each in after if each])
 
 
 def _item(kind: ItemKind, row: Any) -> Item:

@@ -22,6 +22,7 @@ from pipeline.common.progress import Progress, silent
 from pipeline.labels.formats.base import LabeledDrive, drive_of
 from pipeline.labels.formats.registry import FORMATS, FormatName, export_labels, import_labels
 from pipeline.labels.model import LabelSet, Origin
+from pipeline.labels.selection import Selection, selected
 
 _LARGEST_UNPACKED = 512 << 20
 _MOST_PARTS = 100_000
@@ -40,12 +41,13 @@ class Exported:
     lost: tuple[str, ...]
 
 
-def exported(recording: OpenRecording, labels: LabelSet, name: FormatName) -> Exported:
+def exported(recording: OpenRecording, labels: LabelSet, name: FormatName, only: Selection = "all") -> Exported:
     """A file, of a format that makes a folder a .zip of it. BadInput when it cannot be."""
     folder = Path(tempfile.mkdtemp(prefix="cipv-export-"))
     try:
-        out = folder / f"labels-{name}{FORMATS[name].suffix}"
-        lost = export_labels(labels, drive_for(recording), name, out)
+        which = "" if only == "all" else f"-{only}"
+        out = folder / f"labels-{name}{which}{FORMATS[name].suffix}"
+        lost = export_labels(selected(labels, only), drive_for(recording), name, out)
         file = _zipped(out) if out.is_dir() else out
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)

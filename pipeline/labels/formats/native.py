@@ -1,7 +1,7 @@
-"""Our own file, ``cipv-labels`` version 2: JSON with every field of ``LabelSet`` under its own name; nothing is lost.
+"""Our own file, ``cipv-labels`` version 3: JSON with every field of ``LabelSet`` under its own name; nothing is lost.
 
 A reader of this version takes what it does not know for a mistake, and a newer version for one it cannot read. In
-version 1 a tag was of one frame.
+version 1 a tag was of one frame; up to version 2 tracks had neither confidence nor heading.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pipeline.labels.model import EventLabel, FrameTag, LabelSet, LabelTrack, Le
 from pipeline.labels.validate import check
 
 KIND = "cipv-labels"
-VERSION = 2
+VERSION = 3
 _LABELS = TypeAdapter(LabelSet)
 _AtFrame = TypeVar("_AtFrame", PathLabel, EventLabel)
 _Range = TypeVar("_Range", LeadRange, FrameTag)

@@ -80,8 +80,18 @@ const merged = (waiting, newer) => ({
   ...(newer.step ? { step: (waiting.step ?? 0) + newer.step } : {}),
 });
 
-/** Change playback. */
-export const playback = newestOnly(
+const shared = newestOnly(
   (/** @type {PlaybackChange} */ body) => request("api/playback", "POST", body).catch(() => {}),
   merged,
 );
+
+/** @type {(change: PlaybackChange) => boolean} */
+let local = () => false;
+
+/** Ask this first about each change of playback. @param {(change: PlaybackChange) => boolean} handles */
+export function handlePlayback(handles) {
+  local = handles;
+}
+
+/** Change playback: of this page, if it has a playhead of its own, else of all. @param {PlaybackChange} change */
+export const playback = (change) => (local(change) ? Promise.resolve() : shared(change));

@@ -58,10 +58,20 @@ export function tell(name, value) {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ [name]: value }));
 }
 
+/** @type {(state: import("./types.js").State) => import("./types.js").State} */
+let patch = (state) => state;
+
+/** What this page knows better than the server. @param {typeof patch} how */
+export function patchState(how) {
+  patch = how;
+}
+
 export function connect() {
   const url = new URL("../../api/stream?paced=1", import.meta.url);
   const width = told.get("picture_px");
   if (width) url.searchParams.set("picture_px", String(width));
+  const own = told.get("own");
+  if (typeof own === "number") url.searchParams.set("own", String(own));
   url.protocol = url.protocol.replace("http", "ws");
   const opened = new WebSocket(url);
   socket = opened;
@@ -110,7 +120,7 @@ export function connect() {
 function onText(message, number) {
   if (message.type === "state") {
     stateNumber = number;
-    set("state", message.state);
+    set("state", patch(message.state));
   }
   if (message.type === "held") set("dragged", message);
   if (message.type === "selected") set("selection", message.id);
@@ -146,7 +156,7 @@ async function show({ buffer, number, done }) {
   shownJpeg = jpeg;
   if (number > stateNumber) {
     stateNumber = number;
-    set("state", frame.state);
+    set("state", patch(frame.state));
   }
   set("frame", frame);
   drawNow();

@@ -104,12 +104,12 @@ export function context(canvas, settings) {
   return ctx;
 }
 
-/** Settings stored in this browser. Without storage, they are lost. */
-export const memory = {
+/** Values kept in a storage. Without it, they are lost. @param {() => Storage} storage */
+const keptIn = (storage) => ({
   /** @template T @param {string} key @param {T} fallback @returns {T} */
   read(key, fallback) {
     try {
-      return JSON.parse(localStorage.getItem(`cipv.${key}`) ?? "null") ?? fallback;
+      return JSON.parse(storage().getItem(`cipv.${key}`) ?? "null") ?? fallback;
     } catch {
       return fallback;
     }
@@ -117,9 +117,17 @@ export const memory = {
   /** @param {string} key @param {unknown} value */
   write(key, value) {
     try {
-      localStorage.setItem(`cipv.${key}`, JSON.stringify(value));
+      storage().setItem(`cipv.${key}`, JSON.stringify(value));
     } catch {
       // storage is disabled
     }
   },
-};
+});
+
+/** Settings of this browser. */
+export const memory = keptIn(() => localStorage);
+/** What this tab was doing, for when it is reloaded. */
+export const tabMemory = keptIn(() => sessionStorage);
+/** Whether the page was reloaded, not opened. */
+export const isReloaded = () =>
+  performance.getEntriesByType("navigation").some((each) => "type" in each && each.type === "reload");

@@ -38,3 +38,6 @@ export function side(offset) {
   if (offset === null || offset === undefined) return DASH;
   return `${Math.abs(offset).toFixed(1)} ${offset >= 0 ? "L" : "R"}`;
 }
+
+/** A share from 0 to 1, as whole percent. @param {number} share */
+export const percent = (share) => `${Math.round(100 * share)} %`;

@@ -31,6 +31,7 @@
  * @property {import("../labeling/views/three.js").Dragged} dragged the selected label being dragged in the 3D view
  * @property {string} person name of the annotator, once known
  * @property {import("../labeling/state/undo_state.js").Steps} steps
+ * @property {number} threshold how sure a proposal must be to be shown, 0–1
  * @property {string} said status message of the labeling mode
  * @property {import("../labeling/views/projection.js").Projected} projected
  * @property {{left: import("./types.js").Point2[], right: import("./types.js").Point2[]}} drawnPath a path being drawn
@@ -38,9 +39,9 @@
 /**
  * @typedef
  *   {{on: boolean, tool: null|"new"|"shape"|"merge"|"path", from: number|null, hasObjects: boolean, review: boolean,
- *   item: {kind: import("../labeling/state/types.js").ItemKind, id: number}|null}}
+ *   follows: boolean, item: {kind: import("../labeling/state/types.js").ItemKind, id: number}|null}}
  *   Labeling tool: what the next drag or click does; from: the track to merge; hasObjects: whether pipeline objects are
- *   drawn; review: whether review is on; item: the label under review
+ *   drawn; review: whether review is on; follows: the shared playhead; item: the label under review
  */
 /** @typedef {keyof Values} Key */
 

@@ -1,6 +1,7 @@
 /** Seeking. At most one seek is in flight; of those requested meanwhile, the newest wins. */
 import { request } from "../core/api.js";
 import { get, on, set } from "../core/store.js";
+import { go, isOwn } from "./own_playhead.js";
 
 /** Timeout, in case the server shows another frame instead (new recording, end of playback). */
 const PATIENCE_MS = 1000;
@@ -37,6 +38,7 @@ function ask(target) {
   underWay = target;
   clearTimeout(patience);
   patience = setTimeout(arrived, PATIENCE_MS);
+  if (isOwn()) return go(target) ? undefined : arrived();
   request("api/playback", "POST", { seek: target }).catch(arrived);
 }
 

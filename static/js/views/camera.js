@@ -48,7 +48,20 @@ const Y = (/** @type {number} */ v) => laid.y + v * laid.scale;
 
 export function setUp() {
   const invalidate = paint(
-    ["frame", "layers", "colorBy", "selection", "theme", "align", "tape", "labeling", "track", "draft", "projected"],
+    [
+      "frame",
+      "layers",
+      "colorBy",
+      "selection",
+      "theme",
+      "align",
+      "tape",
+      "labeling",
+      "track",
+      "draft",
+      "projected",
+      "threshold",
+    ],
     draw,
   );
   surface = new Surface(canvas, invalidate, "panel");

@@ -64,6 +64,7 @@ export function setUp() {
       "track",
       "draft",
       "drawnPath",
+      "threshold",
     ],
     draw,
   );

@@ -7,7 +7,7 @@ import socket
 import struct
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 from urllib.parse import quote
@@ -20,14 +20,16 @@ from websockets.sync.client import ClientConnection, connect
 
 from app.core.detection_cache import DetectionCache
 from app.core.server_address import listen_socket
+from app.engine.page_frames import PageFrames
 from app.engine.seekable_pipeline import SeekablePipeline
 from app.engine.snapshot import Snapshot
 from app.streaming.picture import MAX_WIDTH_PX
-from app.streaming.stream import FRAMES_UNDER_WAY, Stream
+from app.streaming.slot import FRAMES_UNDER_WAY
+from app.streaming.stream import Stream
 from app.web.server import Server
 from pipeline.common.geometry import Cuboid
 from pipeline.detection import Detectors
-from pipeline.params import Params
+from pipeline.params import Params, with_changes
 from pipeline.types import Picture
 from tests.app.engine.recording_helpers import CountingDetector, Recording
 
@@ -59,7 +61,9 @@ class Site:
 
 @pytest.fixture
 def site() -> Iterator[Site]:
-    stream = Stream()
+    frames = PageFrames(nullcontext)
+    frames.open(_pipeline())
+    stream = Stream(frames=frames)
     bound, is_ready = listen_socket("127.0.0.1", 0), threading.Event()
     app = Starlette(routes=[WebSocketRoute("/", stream.serve)])
     server = Server(app, "http://ready", lambda _: is_ready.set())  # type: ignore[arg-type]
@@ -75,13 +79,16 @@ def site() -> Iterator[Site]:
 
 def _first() -> Snapshot:
     """A frame with a picture wider than any page needs, of noise: its JPEG is large."""
-    recording = Recording()
-    pipeline = SeekablePipeline(recording, Detectors(CountingDetector(), None), DetectionCache(), "both")
+    pipeline = _pipeline()
     tick = pipeline.seek(0, Params())
     assert tick is not None
     noise = np.random.default_rng(0).integers(0, 255, (900, 2560, 3), np.uint8)
     tick = replace(tick, frame=replace(tick.frame, picture=Picture(0, noise)))
-    return Snapshot(Params(), uri=recording.uri, count=1, processed=tick)
+    return Snapshot(Params(), uri=pipeline.source.uri, count=1, processed=tick)
+
+
+def _pipeline() -> SeekablePipeline:
+    return SeekablePipeline(Recording(), Detectors(CountingDetector(), None), DetectionCache(), "both")
 
 
 def next_header(client: ClientConnection) -> dict[str, Any]:
@@ -299,3 +306,31 @@ def _heard(client: ClientConnection) -> None:
     client.send(json.dumps({"ping": 1}))
     while isinstance(message := client.recv(WAIT_S), bytes) or json.loads(message)["type"] != "pong":
         pass
+
+
+def index_of(header: dict[str, Any]) -> int:
+    return int(header["state"]["index"])
+
+
+def test_a_page_with_its_own_playhead_is_moved_by_nobody_and_moves_nobody(site: Site):
+    with site.connected() as own, site.connected() as other:
+        next_header(own)
+        own.send(json.dumps({"own": 3}))
+        mine = header_where(own, lambda header: index_of(header) == 3)
+        assert mine["result"]["frame"] != site.first.processed.result.frame  # type: ignore[union-attr]
+        site.show(5, playing=True)
+        assert index_of(header_where(other, lambda header: sequence_of(header) == 5)) == 5
+        own.send(json.dumps({"own": 2}))
+        now = next_header(own)
+        assert (index_of(now), now["state"]["playing"]) == (2, False), "what all are shown did not come in between"
+        own.send(json.dumps({"own": None}))
+        assert index_of(header_where(own, lambda header: index_of(header) != 2)) == 5
+
+
+def test_a_page_with_its_own_playhead_gets_its_frame_again_with_other_parameters_and_after_a_loss(site: Site):
+    with site.connected("?own=3") as own:
+        assert index_of(next_header(own)) == 3
+        other = with_changes(Params(), {"cluster.min_points": 7})
+        site.show(6, params=other)
+        again = next_header(own)
+        assert (index_of(again), sequence_of(again)) == (3, 6)

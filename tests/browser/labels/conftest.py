@@ -73,6 +73,7 @@ def hand(desk: tuple[Page, Line], site: Site) -> Hand:
         page.keyboard.press("Escape")
     page.get_by_role("tab", name="Tracks").click()
     page.get_by_role("button", name="Here", exact=True).click()
+    page.evaluate("async (index) => (await import('/js/drive/seek.js')).seekTo(index)", START)
     is_at(page, START)
     expect(page.locator(".track-row")).to_have_count(0)
     return Hand(page)

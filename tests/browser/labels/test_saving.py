@@ -9,7 +9,7 @@ from playwright.sync_api import expect
 
 from tests.browser.conftest import START, OpenPage, Site
 from tests.browser.labels.conftest import Line
-from tests.browser.labels.hands import Hand, Labels, begin, draw, is_saved
+from tests.browser.labels.hands import Hand, Labels, begin, draw, is_at, is_saved
 from tests.browser.looks import wait_for_frame
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
@@ -25,6 +25,14 @@ def test_two_people_see_each_other_and_choose_when_they_disagree(
     other = open_page()
     wait_for_frame(other, START)
     second = begin(other, "Bob")
+    second.keys("Home")
+    is_at(other, 0)
+    is_at(hand.page, START)  # each has a playhead of its own, and watchers stay where they are
+    assert site.engine.snapshot.index == START
+    second.keys("ArrowRight")
+    is_at(other, 1)
+    other.get_by_role("button", name="Follow", exact=True).click()
+    is_at(other, START)
     row = other.locator(f".track-row[data-id='{made}']")
     expect(row).to_contain_text("car")
     row.click()
@@ -46,6 +54,23 @@ def test_two_people_see_each_other_and_choose_when_they_disagree(
     labels.wait_for(lambda now: now.tracks[made]["label"] == "car")
     is_saved(hand.page)
     assert [each["person"] for each in labels.get(f"/history?kind=track&id={made}")] == ["Ada", "Bob", "Bob", "Ada"]
+
+
+def test_leads_that_overlap_are_a_conflict_shown_with_both_ranges(hand: Hand, labels: Labels, line: Line):
+    page = hand.page
+    labels.act("Bob", {"kind": "set_lead", "first": START + 4, "last": START + 9, "lead": "unknown"})
+    expect(page.locator(".leads button").first).to_be_visible()
+    line.deaf = True  # the other's change does not reach this page before its own act
+    labels.act("Bob", {"kind": "set_lead", "first": START, "last": START + 3, "lead": "unknown"})
+    hand.keys("0")
+    dialog = page.get_by_role("dialog", name="Two people changed the same label")
+    expect(dialog).to_contain_text(f"Bob changed the lead of frame {START + 1} since")
+    expect(dialog.locator(".conflict-range")).to_have_count(2)
+    assert [each[2] for each in labels.leads] == ["unknown"], "nothing was written"
+    line.deaf = False
+    dialog.get_by_role("button", name="Keep mine").click()
+    labels.wait_for(lambda now: (START, START, "none") in now.leads)
+    is_saved(page)
 
 
 def test_what_is_called_saved_is_what_the_server_answered(hand: Hand, labels: Labels, line: Line):

@@ -11,8 +11,8 @@ from playwright.sync_api import expect
 
 from pipeline.params import Params
 from tests.browser.conftest import START, Site
-from tests.browser.labels.hands import LEADS_Y, Hand, Labels, begin, draw, is_at, is_saved
-from tests.browser.looks import box_of, go_to, on_timeline, pixels, repainted, wait_for_frame, whole_drive
+from tests.browser.labels.hands import LEADS_Y, Hand, Labels, draw, is_at, is_saved
+from tests.browser.looks import box_of, go_to, on_timeline, pixels, repainted, whole_drive
 
 pytestmark = pytest.mark.usefixtures("paused_in_traffic")
 
@@ -49,8 +49,7 @@ def test_everything_is_done_by_keys_and_taken_back(hand: Hand, labels: Labels):
     is_saved(page)
 
     page.reload()
-    wait_for_frame(page, START + 3)
-    begin(page)
+    is_at(page, START + 3)  # labeling goes on where it was
     expect(page.locator(".track-row")).not_to_have_count(0)
     page.keyboard.press("Control+z")
     labels.wait_for(lambda now: now.tracks[made]["state"] != "rejected")
@@ -128,6 +127,7 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
     expect(page.locator(".track-row")).not_to_have_count(0)
     assert {each["state"] for each in labels.tracks.values()} == {"proposed"}
     expect(page.locator(".leads button[aria-pressed=true]")).to_have_count(1)
+    only_sure_ones_are_listed(hand, labels)
     hand.keys("Shift+A")
     labels.wait_for(lambda now: any(each["state"] == "accepted" for each in now.everything["leads"]))
     page.get_by_role("tab", name="Score").click()
@@ -139,9 +139,33 @@ def test_proposals_are_accepted_exported_and_scored(hand: Hand, labels: Labels, 
     expect(page.locator(".track-detail")).to_be_visible()
     with page.expect_download() as download:
         page.locator("#label-pane").get_by_role("button", name="Export").click()
+        page.locator("#menu").get_by_role("button", name="Accepted").click()
         page.locator("#menu").get_by_text("CIPV Studio").click()
+    assert download.value.suggested_filename == "labels-native-accepted.json"
     written = json.loads(download.value.path().read_text(encoding="utf-8"))
-    assert {each["id"] for each in written["labels"]["tracks"]} == set(labels.tracks)
+    accepted = {number for number, each in labels.tracks.items() if each["state"] == "accepted"}
+    assert {each["id"] for each in written["labels"]["tracks"]} == accepted
+
+
+def only_sure_ones_are_listed(hand: Hand, labels: Labels) -> None:
+    """The slider, from nothing to everything; one is turned round, and taken back."""
+    page, count = hand.page, len(labels.tracks)
+    slider = page.get_by_label("Least confidence of proposals")
+    slider.fill("1")
+    expect(page.locator(".sureness .above")).to_have_text(f"≥ 100 %: 0 proposed, {count} hidden")
+    expect(page.locator(".track-row")).to_have_count(0)
+    slider.fill("0")
+    expect(page.locator(".sureness .above")).to_have_text(f"≥ 0 %: {count} proposed, 0 hidden")
+    expect(page.locator(".track-row")).not_to_have_count(0)
+    slider.blur()
+    hand.keys(".")
+    chosen = int(page.locator(".track-row[aria-selected=true]").get_attribute("data-id") or -1)
+    before = labels.cuboid(chosen, START)["yaw_rad"]
+    hand.keys("Shift+X")
+    labels.wait_for(lambda now: math.cos(now.cuboid(chosen, START)["yaw_rad"] - before) < -0.999)
+    hand.keys("Control+z")
+    labels.wait_for(lambda now: now.cuboid(chosen, START)["yaw_rad"] == before)
+    hand.keys("Escape")
 
 
 def test_a_drive_is_reviewed_frozen_and_taken_back_in(hand: Hand, labels: Labels, tmp_path: Path):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from pipeline.common.geometry import Cuboid
+from pipeline.labels.headings import Moment
 from pipeline.labels.model import LabelSet, LabelTrack, Origin, Sighting
 from pipeline.labels.propose import Seen, known_as, propose
 from pipeline.labels.validate import check
@@ -29,8 +30,9 @@ def frames_of(track: LabelTrack) -> list[int]:
     [
         ([seen(7), seen(7)], True),
         ([seen(7)], False),
+        ([seen(7, bbox=(1.0, 2.0, 3.0, 4.0))], True),
         ([seen(7, label=None), seen(7, label=None)], False),
-        ([seen(7, label=None, in_path=True), seen(7, label=None)], True),
+        ([seen(7, label=None, in_path=True), seen(7, label=None)], False),
         ([seen(7, label="traffic light"), seen(7, label="traffic light")], False),
         ([seen(7, label="person", cuboid=PERSON), seen(7, label=None, cuboid=PERSON)], True),
         ([seen(7, carried=True), seen(7, carried=True)], False),
@@ -40,6 +42,7 @@ def frames_of(track: LabelTrack) -> list[int]:
     ids=[
         "a car",
         "once",
+        "once, in the picture",
         "a return beside the road",
         "in the path",
         "no road user",
@@ -54,12 +57,59 @@ def test_what_is_worth_a_look_is_proposed(life: list[Seen], is_proposed: bool) -
     assert [track.id for track in found.tracks] == ([7] if is_proposed else [])
 
 
-def test_the_lead_is_proposed_whatever_it_is() -> None:
-    found = propose({0: [seen(7, label=None)], 1: []}, {0: 7, 1: None}, BY)
-    assert [(track.id, track.label, track.state, track.origin) for track in found.tracks] == [
-        (7, "car", "proposed", BY)
-    ]
-    assert [(each.first, each.last, each.lead) for each in found.leads] == [(0, 0, 7), (1, 1, "none")]
+def test_what_was_seen_once_is_a_box_alone() -> None:
+    (track,) = propose({0: [seen(7, bbox=(1.0, 2.0, 3.0, 4.0), score=0.6)]}, {}, BY).tracks
+    assert track.sightings[0].cuboid is None
+    assert track.sightings[0].bbox == (1.0, 2.0, 3.0, 4.0)
+    assert track.confidence == pytest.approx(0.3)
+
+
+def moment(index: int, speed_mps: float | None = 10.0, reach_m: float = 80.0) -> Moment:
+    return Moment(index * 100_000_000, speed_mps, 0.0, reach_m)
+
+
+@pytest.mark.parametrize(
+    ("objects", "reach_m", "lead"),
+    [
+        ([], 80.0, "none"),
+        ([], 40.0, "unknown"),
+        ([seen(8, label="car", in_path=True, cuboid=None, bbox=(1.0, 2.0, 3.0, 4.0))], 80.0, "unknown"),
+        ([seen(9, label="car", in_path=False)], 80.0, "none"),
+    ],
+    ids=["seen to be free", "beyond reach", "a car in the path that nobody chose", "a car beside the path"],
+)
+def test_nobody_leads_only_where_that_could_be_seen(objects: list[Seen], reach_m: float, lead: str) -> None:
+    found = propose({0: objects}, {0: None}, BY, {0: moment(0, reach_m=reach_m)})
+    assert [each.lead for each in found.leads] == [lead]
+
+
+def test_a_lead_that_is_no_vehicle_for_sure_is_not_proposed() -> None:
+    """The pipeline brakes for what it does not know; a label says what it is."""
+    life = {index: [seen(7, label=None, in_path=True)] for index in range(4)}
+    found = propose(life, dict.fromkeys(range(4), 7), BY, {index: moment(index) for index in range(4)})
+    assert found.tracks == ()
+    assert [(each.first, each.last, each.lead) for each in found.leads] == [(0, 3, "unknown")]
+
+
+def test_what_drives_steadily_is_proposed_without_a_camera_and_a_flickering_wall_is_not() -> None:
+    """Both go along with us at 10 m/s; the one is always as large as a car's rear, the other now a metre, now three."""
+    rear = [seen(7, label=None, cuboid=Cuboid((20.0, 3.5, 0.6), (0.4, 1.6, 1.2), 0.0)) for _ in range(8)]
+    wall = [seen(8, label=None, cuboid=Cuboid((20.0, 9.0, 0.6), (1.0 + 2 * (n % 2), 0.3, 1.2), 0.0)) for n in range(8)]
+    frames = {index: [rear[index], wall[index]] for index in range(8)}
+    (track,) = propose(frames, {}, BY, {index: moment(index) for index in range(8)}).tracks
+    assert (track.id, track.heading, track.confidence) == (7, "motion", 0.5)
+    assert propose(frames, {}, BY, {index: moment(index, None) for index in range(8)}).tracks == ()
+
+
+def test_the_surer_a_detector_and_the_more_often_the_surer_the_proposal() -> None:
+    def sure(*scores: float | None) -> float:
+        life = {n: [seen(7, label="car" if score else None, score=score)] for n, score in enumerate(scores)}
+        (track,) = propose(life, {}, BY).tracks
+        assert track.confidence is not None
+        return track.confidence
+
+    assert sure(0.9, 0.9) > sure(0.5, 0.5) > sure(0.5, None)
+    assert sure(0.5, 0.5, 0.5, 0.5) > sure(0.5, 0.5)
 
 
 def test_a_track_has_the_name_it_was_called_most_and_ends_where_it_was_last_seen() -> None:
@@ -88,12 +138,11 @@ def test_a_vehicle_is_proposed_whole_and_of_one_size_and_what_was_seen_of_it_sta
         ("car", (7.4, 2.3, 2.9), True),
         ("car", (4.5, 4.0, 1.5), False),
         ("car", (4.5, 1.8, 4.5), False),
-        (None, (28.7, 5.4, 3.0), False),
         ("truck", (18.7, 2.6, 4.0), True),
     ],
 )
 def test_a_cluster_larger_than_any_of_its_class_has_a_box_alone(
-    label: str | None, size: tuple[float, float, float], is_kept: bool
+    label: str, size: tuple[float, float, float], is_kept: bool
 ) -> None:
     """Its middle is that of the hedge beside it."""
     large, box = Cuboid((27.0, 9.0, 0.7), size, 0.0), (500.0, 300.0, 560.0, 340.0)
@@ -103,7 +152,7 @@ def test_a_cluster_larger_than_any_of_its_class_has_a_box_alone(
     assert [each.cuboid is not None for each in track.sightings] == [True, True, is_kept, True]
     assert all(each.bbox == box for each in track.sightings)
     only = propose({index: [seen(7, label=label, cuboid=large, in_path=True)] for index in range(4)}, {0: 7}, BY)
-    assert (len(only.tracks), len(only.leads)) == ((1, 1) if is_kept else (0, 0)), "what is nowhere is not proposed"
+    assert [each.lead for each in only.leads] == [7 if is_kept else "unknown"], "what is nowhere is not proposed"
 
 
 def test_one_size_is_no_larger_than_the_class() -> None:
@@ -115,7 +164,8 @@ def test_one_size_is_no_larger_than_the_class() -> None:
 
 def test_who_leads_is_one_range_as_long_as_it_stays_the_same() -> None:
     frames = {index: [seen(7), seen(8)] for index in range(6)}
-    found = propose(frames, {0: 7, 1: 7, 2: None, 3: 8, 4: 8, 5: 7}, BY)
+    moments = {index: moment(index) for index in range(6)}
+    found = propose(frames, {0: 7, 1: 7, 2: None, 3: 8, 4: 8, 5: 7}, BY, moments)
     assert [(each.first, each.last, each.lead) for each in found.leads] == [
         (0, 1, 7), (2, 2, "none"), (3, 4, 8), (5, 5, 7),
     ]  # fmt: skip

@@ -63,9 +63,10 @@ class TaskBegun(BaseModel):
 
 class StaleJson(BaseModel):
     """Nothing was written. item: what somebody changed; theirs: it as it is now, null when it was removed; yours: what
-    was sent."""
+    was sent; revision: of the labels in which it is so, to base the act on when it is sent again."""
 
     detail: str
     item: ItemKey | None = None
     theirs: dict[str, Any] | None = None
     yours: dict[str, Any] | None = None
+    revision: int | None = None

@@ -40,7 +40,8 @@ def label_acts_router(desk: LabelDesk) -> APIRouter:
         except Stale as stale:
             yours = body.act.model_dump(mode="json", by_alias=True)
             item = {"kind": stale.kind, "id": stale.number}
-            return JSONResponse({"detail": str(stale), "item": item, "theirs": stale.theirs, "yours": yours}, 409)
+            answer = {"detail": str(stale), "item": item, "theirs": stale.theirs, "yours": yours}
+            return JSONResponse(answer | {"revision": stale.revision}, 409)
 
     @router.post("/undo", responses={200: {"model": ActedJson}})
     def undo(body: Who) -> Response:

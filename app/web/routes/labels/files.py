@@ -23,6 +23,7 @@ from app.web.routes.labels.file_shapes import VERSION_NAME, FormatJson, LostJson
 from app.web.routes.refusals import refusing
 from app.web.routes.shapes import file_of
 from pipeline.labels.formats.registry import FORMATS, FormatName
+from pipeline.labels.selection import Selection, selected
 
 IMPORT = "/api/labels/import"
 _BYTES = "application/octet-stream"
@@ -68,13 +69,14 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         return [FormatJson(name=each.name, title=each.title, about=each.about) for each in FORMATS.values()]
 
     @router.get("/export", response_class=FileResponse, responses=_FILE)
-    def export(format: FormatName = "native", version: VersionName = WORKING) -> FileResponse:
-        """Download all labels as a file, or as a .zip for a format that is a folder. The header X-Cipv-Lost counts the
+    def export(format: FormatName = "native", version: VersionName = WORKING, only: Selection = "all") -> FileResponse:
+        """Download labels as a file, or as a .zip for a format that is a folder. only: those that are accepted, or
+        reviewed; the file's name and the set's say which. The header X-Cipv-Lost counts the
         kinds of information that the format cannot express; /api/labels/export/notes lists them."""
         from app.labels.transfer.files import exported  # the formats' libraries: only who exchanges labels pays
 
         with refusing():
-            made = exported(desk.recording, desk.labels.label_set(version), format)
+            made = exported(desk.recording, desk.labels.label_set(version), format, only)
         return FileResponse(
             made.file,
             filename=made.file.name,
@@ -84,12 +86,12 @@ def label_files_router(desk: LabelDesk) -> APIRouter:
         )
 
     @router.get("/export/notes")
-    def notes(format: FormatName = "native", version: VersionName = WORKING) -> LostJson:
+    def notes(format: FormatName = "native", version: VersionName = WORKING, only: Selection = "all") -> LostJson:
         """List what a format cannot express, one sentence each, before exporting."""
         from pipeline.labels.formats.parts import reduce
 
         with refusing():
-            _, lost = reduce(desk.labels.label_set(version), FORMATS[format].holds)
+            _, lost = reduce(selected(desk.labels.label_set(version), only), FORMATS[format].holds)
         return LostJson(lost=list(lost))
 
     @router.get("/versions", responses={200: {"model": list[VersionJson]}})

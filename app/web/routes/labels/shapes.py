@@ -8,7 +8,7 @@ from pydantic import BaseModel
 
 from app.labels.store.values import ItemKind
 from app.web.routes.shapes import CuboidJson, Point
-from pipeline.labels.model import State
+from pipeline.labels.model import Heading, State
 
 
 class OriginJson(BaseModel):
@@ -40,9 +40,13 @@ class StatedItem(LabelItem):
 
 
 class TrackHead(StatedItem):
-    """A track without its sightings. first, last: frames; null while it has none. sightings: how many."""
+    """A track without its sightings. first, last: frames; null while it has none. sightings: how many. confidence: of a
+    proposal, how sure it is a road user, 0–1; null for others. heading: what told front from rear of a proposal:
+    ``motion``, ``lane`` or ``unknown``, which somebody has to look at; empty once somebody has."""
 
     label: str
+    confidence: float | None
+    heading: Heading
     first: int | None
     last: int | None
     keyframes: list[int]
@@ -152,6 +156,8 @@ class WholeTrack(StatedItem):
     """With every sighting."""
 
     label: str
+    confidence: float | None
+    heading: Heading
     sightings: list[PlacedFrame]
 
 

@@ -18,11 +18,23 @@ from pipeline.labels.formats.base import Imported, LabeledDrive
 from pipeline.labels.formats.openlabel import write as ol
 from pipeline.labels.formats.openlabel.file_types import Agent, Content, Data, Element, File, Shape
 from pipeline.labels.formats.reading import fit, parse_as, read_bytes
-from pipeline.labels.model import EventLabel, FrameTag, LabelTrack, Lead, LeadRange, Origin, PathLabel, Sighting, State
+from pipeline.labels.model import (
+    EventLabel,
+    FrameTag,
+    Heading,
+    LabelTrack,
+    Lead,
+    LeadRange,
+    Origin,
+    PathLabel,
+    Sighting,
+    State,
+)
 from pipeline.types import F64, Point2
 from pipeline.vision.classes import canonical
 
 _STATE: TypeAdapter[State] = TypeAdapter(State)
+_HEADING: TypeAdapter[Heading] = TypeAdapter(Heading)
 _MAKER: TypeAdapter[Literal["pipeline", "person", "import"]] = TypeAdapter(Literal["pipeline", "person", "import"])
 _LARGEST_ID = 2**63
 _DEEPEST = 32
@@ -86,7 +98,8 @@ class _Reading:
             state, origin = self._made(each.object_data)
             label = each.type if self.is_ours else canonical(each.type)
             seen_in_order = tuple(sorted(sightings[uid], key=lambda s: s.frame))
-            yield LabelTrack(number, label, seen_in_order, state, origin, *_reviewed(each.object_data))
+            data = each.object_data
+            yield LabelTrack(number, label, seen_in_order, state, origin, *_reviewed(data), *self._sureness(data))
 
     def _sighting(self, frame: int, data: Data) -> Sighting:
         cuboid = self._cuboid(data.cuboid[0]) if data.cuboid else None
@@ -213,6 +226,12 @@ class _Reading:
         params, calibration = (str(text) if text is not None else None for text in texts)
         by, how = (str(data.said(name) or "") for name in ("by", "how"))
         return state, Origin(maker, by, at if type(at) is int else 0, params, calibration, how)
+
+    def _sureness(self, data: Data) -> tuple[float | None, Heading]:
+        """How sure a track is, and what told its heading, where the file says them."""
+        confidence = data.said("confidence")
+        sure = float(confidence) if isinstance(confidence, (int, float)) and not isinstance(confidence, bool) else None
+        return sure, fit(_HEADING, data.said("heading") or "", f"{self.what}, heading")
 
     def _notes(self) -> Iterable[str]:
         if self.is_ours:

@@ -157,10 +157,14 @@ def _marks(origin: Origin, marked: LabelTrack | LeadRange | PathLabel | EventLab
     texts: dict[str, str | None] = {"maker": origin.maker, "by": origin.name, "how": origin.how or None}
     texts |= {"params": origin.params, "calibration": origin.calibration}
     if marked is not None:
+        texts |= {"heading": (marked.heading or None) if isinstance(marked, LabelTrack) else None}
         texts |= {"state": marked.state, "comment": marked.comment or None, "reviewer": marked.reviewer or None}
+    numbers: list[dict[str, str | float]] = [{"name": "made_unix_ms", "val": origin.t_unix_ms}]
+    if isinstance(marked, LabelTrack) and marked.confidence is not None:
+        numbers.append({"name": "confidence", "val": marked.confidence})
     return {
         "text": [{"name": name, "val": value} for name, value in texts.items() if value is not None],
-        "num": [{"name": "made_unix_ms", "val": origin.t_unix_ms}],
+        "num": numbers,
     }
 
 

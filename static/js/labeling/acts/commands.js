@@ -7,6 +7,7 @@ import { CLASSES, moved, turned } from "../views/cuboid.js";
 import * as draft from "../state/draft.js";
 import { chosen, leadAt, shown, trackOf } from "../state/labels.js";
 import { setTool } from "../state/mode.js";
+import { isSure, parted } from "../state/threshold.js";
 import * as span from "../state/marked_frames.js";
 
 /** @typedef {import("../state/types.js").LabelTrack} LabelTrack */
@@ -49,19 +50,26 @@ export function acceptHere() {
   const tracks = draft
     .present()
     .map(({ track }) => get("labels")?.tracks.get(track))
-    .filter((track) => track?.state === "proposed");
+    .filter((track) => track?.state === "proposed" && isSure(track));
   const items = tracks.map((track) => refOf(/** @type {LabelTrack} */ (track)));
   if (lead?.state === "proposed") items.push({ kind: "lead", id: lead.id, revision: lead.revision });
   if (items.length) act({ kind: "accept", items });
   else say("No proposals in this frame");
 }
 
+/** Reject all proposals that the threshold hides. */
+export function rejectHidden() {
+  const items = parted().hidden.map(refOf);
+  if (items.length) act({ kind: "reject", items });
+}
+
 /** Select the next or previous label of the current frame. @param {1|-1} direction */
 export function selectNext(direction) {
   const ids = draft
     .present()
-    .map(({ track }) => track)
-    .filter((id) => get("labels")?.tracks.get(id)?.state !== "rejected")
+    .map(({ track }) => trackOf(track))
+    .filter((track) => track && track.state !== "rejected" && isSure(track))
+    .map((track) => /** @type {LabelTrack} */ (track).id)
     .sort((a, b) => a - b);
   const at = ids.indexOf(get("track") ?? -1);
   const next = at < 0 ? (direction > 0 ? 0 : ids.length - 1) : (at + direction + ids.length) % ids.length;
@@ -84,6 +92,8 @@ function change(how) {
 }
 
 export const snap = () => withTrack(({ id, revision }) => act({ kind: "refit", track: id, revision, frame: shown() }));
+/** Turn the track's cuboids round, in every frame: front and rear were mistaken. */
+export const flip = () => withTrack(({ id, revision }) => act({ kind: "flip", track: id, revision }));
 export const splitHere = () =>
   withTrack(({ id, revision }) => act({ kind: "split", track: id, revision, frame: shown() }));
 export const dropKeyframe = () =>

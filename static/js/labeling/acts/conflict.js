@@ -1,6 +1,8 @@
 /** Conflict dialog: two people changed the same label; shows both versions and lets the user choose. */
 import { request } from "../../core/api.js";
 import { el } from "../../core/dom.js";
+import { num } from "../../core/format.js";
+import { fromAbove, inPicture, range } from "./conflict_picture.js";
 import { open } from "../panels/dialogs.js";
 import { based } from "./revisions.js";
 
@@ -11,12 +13,14 @@ import { based } from "./revisions.js";
  * @param {Act} act
  * @param {string} sentence what the server says
  * @param {{kind: import("../state/types.js").ItemKind, id: number}} item which they changed
- * @param {any} theirs the item as it is now
+ * @param {any} theirs the item as it is now; null if it was removed
+ * @param {number} [revision] of the labels in which it is so
  * @returns {Promise<Act|null>}
  */
-export async function choose(act, sentence, item, theirs) {
-  const place =
-    typeof act.track === "number" && typeof act.frame === "number" ? await placeOf(act.track, act.frame) : null;
+export async function choose(act, sentence, item, theirs, revision) {
+  const isPlaced = typeof act.track === "number" && typeof act.frame === "number",
+    place = isPlaced ? await placeOf(act.track, act.frame) : null,
+    [mine, other] = isPlaced ? await inPixels([act, place ?? {}]) : [{}, {}];
   const body = el(
     "div",
     {},
@@ -24,15 +28,22 @@ export async function choose(act, sentence, item, theirs) {
     el(
       "div",
       { class: "conflict" },
-      side("Yours", act),
-      side("Theirs", { ...theirs, cuboid: place?.cuboid, bbox: place?.bbox }),
+      side("Yours", act, ...pictures(act, mine, other)),
+      theirs
+        ? side("Theirs", { ...theirs, cuboid: place?.cuboid, bbox: place?.bbox }, ...pictures(theirs, other, mine))
+        : el("div", {}, el("h3", { textContent: "Theirs: removed" })),
     ),
   );
   return open("Two people changed the same label", body, null, [
     ["Use theirs", null],
     [
       "Keep mine",
-      () => based(act, (ref) => (ref.kind === item.kind && ref.id === item.id ? theirs.revision : ref.revision)),
+      () => ({
+        ...based(act, (ref) =>
+          theirs && ref.kind === item.kind && ref.id === item.id ? theirs.revision : ref.revision,
+        ),
+        ...(typeof act.seen === "number" ? { seen: revision, over_reviewed: Boolean(theirs?.reviewer) } : {}),
+      }),
     ],
   ]);
 }
@@ -51,6 +62,38 @@ async function placeOf(track, frame) {
   return sightings[frame]?.find((each) => each.track === track) ?? null;
 }
 
+/**
+ * Both shapes with their cuboids in pixels of the image.
+ * @param {any[]} shapes
+ * @returns {Promise<import("./conflict_picture.js").Shape[]>}
+ */
+async function inPixels(shapes) {
+  const cuboids = shapes.flatMap(({ cuboid }) => (cuboid ? [cuboid] : []));
+  /** @type {{pixels: import("../../core/types.js").Pixels[]|null}} */
+  const { pixels } = cuboids.length
+    ? await request("api/project", "POST", { cuboids }).catch(() => ({ pixels: null }))
+    : { pixels: null };
+  return shapes.map(({ cuboid, bbox }) => ({
+    cuboid,
+    bbox,
+    pixels: cuboid ? (pixels?.[cuboids.indexOf(cuboid)] ?? null) : null,
+  }));
+}
+
+/**
+ * Pictures of one person's version beside the other's.
+ * @param {any} item
+ * @param {import("./conflict_picture.js").Shape} own
+ * @param {import("./conflict_picture.js").Shape} other
+ * @returns {Node[]}
+ */
+const pictures = (item, own, other) =>
+  [
+    fromAbove(own.cuboid, other.cuboid),
+    inPicture(own, other),
+    typeof item.first === "number" && typeof item.last === "number" ? range(item.first, item.last) : null,
+  ].filter((each) => each !== null);
+
 /** Fields that are not shown. */
 const HIDDEN = [
   "kind",
@@ -64,6 +107,10 @@ const HIDDEN = [
   "sightings",
   "origin",
   "keyframes",
+  "seen",
+  "over_reviewed",
+  "confidence",
+  "heading",
 ];
 
 /** Fields displayed counting from 1. */
@@ -80,8 +127,8 @@ const ACTS = {
   trim_lead: "range end",
 };
 
-/** @param {string} title @param {Record<string, any>} item */
-function side(title, item) {
+/** @param {string} title @param {Record<string, any>} item @param {...Node} shown pictures */
+function side(title, item, ...shown) {
   const rows = Object.entries(item).filter(
     ([key, value]) => !HIDDEN.includes(key) && value !== null && value !== undefined && value !== "",
   );
@@ -89,16 +136,24 @@ function side(title, item) {
     "div",
     {},
     el("h3", { textContent: item.kind ? `${title}: ${ACTS[item.kind] ?? item.kind.replaceAll("_", " ")}` : title }),
+    ...shown,
     el(
       "dl",
       { class: "facts-list" },
       ...rows.flatMap(([key, value]) => [
         el("dt", { textContent: { bbox: "box" }[key] ?? key.replaceAll("_", " ") }),
-        el("dd", { textContent: words(FRAMES.includes(key) ? value + 1 : value) }),
+        el("dd", {
+          textContent: FRAMES.includes(key) ? words(value + 1) : key === "cuboid" ? cuboidWords(value) : words(value),
+        }),
       ]),
     ),
   );
 }
+
+/** In metres and degrees. @param {import("../state/types.js").Cuboid} cuboid */
+const cuboidWords = ({ center: [x, y, z], size, yaw_rad }) =>
+  `x ${num(x, 2)} y ${num(y, 2)} z ${num(z, 2)} m · ${size.map((side) => num(side, 2)).join(" × ")} m · ` +
+  `yaw ${num((yaw_rad * 180) / Math.PI, 1)}°`;
 
 /** @param {any} value @returns {string} */
 function words(value) {

@@ -26,6 +26,9 @@ import { driveNow } from "../state/undo_state.js";
 /** HTTP statuses of an unavailable server or proxy: the act may be resent. */
 const AWAY = [502, 503, 504];
 
+/** Acts over frames: they carry the revision of the labels that the page shows, as acts on tracks carry theirs. */
+const OVER_FRAMES = ["set_lead", "clear_lead", "trim_lead", "set_path", "remove_path", "add_event", "tag"];
+
 /** @type {Waiting[]} the first is in flight, or waits for the server */
 const queue = [];
 let busy = false;
@@ -43,7 +46,9 @@ export function setUp() {
  */
 export async function act(act) {
   const person = await personName();
-  return person === null ? null : put(act, "api/labels/act", person);
+  if (person === null) return null;
+  const seen = OVER_FRAMES.includes(act.kind) ? { seen: get("labels")?.revision ?? 0 } : {};
+  return put({ ...act, ...seen }, "api/labels/act", person);
 }
 
 /**
@@ -124,10 +129,10 @@ export function discard() {
  * @param {Refused} refusal
  */
 async function refused(waiting, refusal) {
-  const { detail, item, theirs } = refusal.answer ?? {};
+  const { detail, item, theirs, revision } = refusal.answer ?? {};
   data.look(); // this page may be behind the server
-  if (item && theirs) {
-    const mine = await choose(waiting.act, detail, item, theirs);
+  if (item && (theirs || typeof waiting.act.seen === "number")) {
+    const mine = await choose(waiting.act, detail, item, theirs, revision);
     if (mine) return queue.unshift({ ...waiting, act: mine, body: { ...waiting.body, act_id: newId() } });
   }
   tell("saved");

@@ -9,7 +9,7 @@ import { present } from "../state/draft.js";
 import { isKnown } from "../state/sightings.js";
 import { leadAt, leadName, shown, trackOf } from "../state/labels.js";
 import { labelKeys } from "../keys.js";
-import { setTool } from "../state/mode.js";
+import { setTool, toggleFollows } from "../state/mode.js";
 import { newLabel, setNewLabel } from "../state/new_class.js";
 import { askName, knownName } from "../state/person.js";
 import * as review from "../acts/review.js";
@@ -65,6 +65,14 @@ const fresh = el("button", {
   textContent: "New",
   title: "New label: drag in the plan, drag or click in the image, or press Enter (G)",
   onclick: () => setTool("new"),
+});
+
+const follow = el("button", {
+  type: "button",
+  class: "toggle rarely",
+  textContent: "Follow",
+  title: "Follow the shared playhead; otherwise this page has its own while labeling",
+  onclick: toggleFollows,
 });
 
 const reviewToggle = el("button", {
@@ -143,6 +151,7 @@ export function setUp() {
       fresh,
       kind,
       reviewToggle,
+      follow,
       el("span", { class: "spacer" }),
       back,
       forth,
@@ -213,6 +222,7 @@ function reflect() {
         ? rangeWords(range)
         : "lead not labelled",
   );
+  press(follow, get("labeling")?.follows === true);
   press(reviewToggle, review.isReviewing());
   reviewed.hidden = !review.isReviewing();
   text(under, review.target()?.name ?? "nothing");

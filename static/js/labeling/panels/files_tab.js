@@ -2,7 +2,7 @@
  * Label files: export (with what each format loses), import, ground truth of the recording, and versions.
  */
 import { Refused, request } from "../../core/api.js";
-import { el, text } from "../../core/dom.js";
+import { el, press, text } from "../../core/dom.js";
 import { get } from "../../core/store.js";
 import { attachMenu, refill } from "../../workspace/menu.js";
 import { act } from "../acts/queue.js";
@@ -37,18 +37,40 @@ export function exportButton() {
     title: "Export labels to a file",
   });
   attachMenu(button, "Export labels", () => {
-    if (!formats.length) listFormats().then(() => refill(button, exportRows));
-    return exportRows();
+    const rows = () => exportRows(() => refill(button, rows));
+    if (!formats.length) listFormats().then(() => refill(button, rows));
+    return rows();
   });
   return button;
 }
 
-/** One download link for each format. */
-function exportRows() {
+const ONLY = /** @type {const} */ ([
+  ["all", "All", "Everything, with each label's state where the format has one"],
+  ["accepted", "Accepted", "What somebody has accepted or corrected"],
+  ["reviewed", "Reviewed", "What a second person has found right"],
+]);
+/** Which labels are exported. @type {"all"|"accepted"|"reviewed"} */
+let only = "all";
+
+/** Which labels, and one download link for each format. @param {() => void} again draws the rows anew */
+function exportRows(again) {
+  const choices = ONLY.map(([key, words, title]) => {
+    const choice = el("button", {
+      type: "button",
+      textContent: words,
+      title,
+      onclick: () => {
+        only = key;
+        again();
+      },
+    });
+    press(choice, only === key);
+    return choice;
+  });
   const links = formats.map(({ name, title, about }) => {
     const link = el(
       "a",
-      { class: "item", href: `api/labels/export?format=${name}&version=working` },
+      { class: "item", href: `api/labels/export?format=${name}&version=working&only=${only}` },
       el("b", { textContent: title }),
       el("span", { class: "facts", textContent: about }),
     );
@@ -56,7 +78,8 @@ function exportRows() {
     tellLoss(name, link);
     return link;
   });
-  return [el("h3", { textContent: "Export labels" }), ...links];
+  const which = el("div", { class: "list-bar" }, el("div", { class: "joined" }, ...choices));
+  return [el("h3", { textContent: "Export labels" }), which, ...links];
 }
 
 /** Ask the server which formats it reads and writes; without an answer the next look asks again. */
@@ -68,7 +91,9 @@ async function listFormats() {
 /** @param {string} key @param {HTMLElement} node */
 async function tellLoss(key, node) {
   /** @type {{lost: string[]}} */
-  const { lost } = await request(`api/labels/export/notes?format=${key}`).catch((error) => ({ lost: [error.message] }));
+  const { lost } = await request(`api/labels/export/notes?format=${key}&only=${only}`).catch((error) => ({
+    lost: [error.message],
+  }));
   if (!lost.length) return;
   node.title = lost.join("\n");
   node.append(el("span", { class: "loses", textContent: `loses ${lost.length}` }));

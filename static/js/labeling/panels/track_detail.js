@@ -1,6 +1,6 @@
 /** Details of the selected track: actions, position in this frame, history. */
 import { el, text } from "../../core/dom.js";
-import { DASH, num } from "../../core/format.js";
+import { DASH, num, percent } from "../../core/format.js";
 import { on, paint } from "../../core/store.js";
 import * as commands from "../acts/commands.js";
 import { CLASSES } from "../views/cuboid.js";
@@ -50,6 +50,7 @@ export function setUp(parent) {
       button("Send back", "H", "Send back with a comment", review.sendBack),
       button("Reviewed", "Shift H", "Approve as a second annotator", review.reviewOk),
       button("Snap", "S", "Fit the cuboid to the points", commands.snap),
+      button("Turn round", "Shift X", "Front and rear are mistaken: turn the whole track round", commands.flip),
       button("Size along", "W", "Apply this size to the whole track", commands.sizeAlong),
       button("Keyframe", "K", "Set a keyframe in this frame", commands.keyframe),
       button("Draw", "Shift G", "Draw the shape in this frame", () => setTool("shape")),
@@ -68,17 +69,26 @@ export function setUp(parent) {
   });
 }
 
+/** How front and rear of a proposal were told apart. */
+const HEADINGS = {
+  "": "",
+  motion: "faces the way it drives",
+  lane: "faces the way of the lane",
+  unknown: "front and rear not told apart: turn it round (Shift X), or accept it as it is",
+};
+
 function show() {
   const track = chosen();
   panel.hidden = !track;
   if (!track) return;
   text(title, nameOf(track));
-  text(state, track.reviewer ? `reviewed by ${track.reviewer}` : track.state);
+  const sure = track.state === "proposed" && track.confidence !== null ? ` ${percent(track.confidence)}` : "";
+  text(state, track.reviewer ? `reviewed by ${track.reviewer}` : track.state + sure);
   state.dataset.state = track.state;
   if (document.activeElement !== classes) classes.value = track.label;
   text(comment, track.comment ? `Sent back: ${track.comment}` : "");
   text(how, track.origin.how ? `Placed by ${track.origin.name}: ${track.origin.how}` : "");
-  text(facts, placeWords(track, presentOf(track.id)));
+  text(facts, [placeWords(track, presentOf(track.id)), HEADINGS[track.heading]].filter(Boolean).join(" · "));
 }
 
 /**

@@ -1,12 +1,14 @@
 /** The list of labelled tracks: state, class, frames, author. */
 import { el, memory, press, text, within } from "../../core/dom.js";
+import { percent } from "../../core/format.js";
 import { seekTo } from "../../drive/seek.js";
 import { LongList } from "../../core/long_list.js";
 import { get, paintAfter, set } from "../../core/store.js";
-import { mergeWith, propose } from "../acts/commands.js";
+import { mergeWith, propose, rejectHidden } from "../acts/commands.js";
 import { present } from "../state/draft.js";
 import { isKnown } from "../state/sightings.js";
 import { shown, trackOf } from "../state/labels.js";
+import { isSure, parted, setThreshold, threshold } from "../state/threshold.js";
 import { isReviewing } from "../acts/review.js";
 
 /** @typedef {import("../state/types.js").LabelTrack} LabelTrack */
@@ -31,7 +33,25 @@ const begin = el("button", {
   onclick: propose,
 });
 const count = el("span", { class: "facts" });
+const slider = el("input", {
+    type: "range",
+    min: "0",
+    max: "1",
+    step: "0.05",
+    title: "How sure a proposal must be to be listed and drawn",
+    aria: { label: "Least confidence of proposals" },
+  }),
+  above = el("span", { class: "facts above" }),
+  reject = el("button", {
+    type: "button",
+    textContent: "Reject hidden",
+    title: "Reject all proposals below the slider, in the whole drive",
+    onclick: rejectHidden,
+  }),
+  sureness = el("div", { class: "list-bar sureness", hidden: true }, slider, above, reject);
 const list = new LongList(body, (/** @type {LabelTrack} */ { id }) => id, create, update);
+/** The selected track that was brought into view. @type {number|null} */
+let scrolledTo = null;
 /** @type {Which} */
 let which = memory.read("labelTracks", "here");
 
@@ -48,11 +68,13 @@ export function setUp(parent) {
       el("span", { class: "spacer" }),
       count,
     ),
+    sureness,
     body,
   );
+  slider.addEventListener("input", () => setThreshold(slider.valueAsNumber));
   body.append(nothing, begin);
   body.addEventListener("click", (event) => pick(within(event, ".track-row")));
-  const reflect = paintAfter(["labels", "labelFrames", "frame", "track", "labeling", "draft"], show);
+  const reflect = paintAfter(["labels", "labelFrames", "frame", "track", "labeling", "draft", "threshold"], show);
   /** @param {Which} key */
   function choose(key) {
     which = key;
@@ -63,23 +85,41 @@ export function setUp(parent) {
   function show() {
     if (!get("labeling")?.on) return;
     for (const button of buttons) press(button, button.dataset.which === which);
+    showSureness();
     if (which === "here" && !isKnown(shown())) return;
     const found = fitting();
     text(count, found.length > MOST ? `${MOST} of ${found.length}` : String(found.length));
     list.show(found.slice(0, MOST));
+    if (get("track") !== scrolledTo) body.querySelector("[aria-selected=true]")?.scrollIntoView({ block: "nearest" });
+    scrolledTo = get("track") ?? null;
     nothing.hidden = found.length > 0;
     text(nothing, emptyWords());
     begin.hidden = (get("labels")?.tracks.size ?? 0) > 0;
   }
 }
 
+/** The threshold and what it leaves, while there are proposals it applies to. */
+function showSureness() {
+  const { shown: left, hidden } = parted();
+  sureness.hidden = !left.length && !hidden.length;
+  reject.hidden = !hidden.length;
+  slider.value = String(threshold());
+  text(above, `≥ ${percent(threshold())}: ${left.length} proposed, ${hidden.length} hidden`);
+}
+
+/** Sent back first, then the surest proposals, then by number. @param {LabelTrack} a @param {LabelTrack} b */
+const bySureness = (a, b) => rank(b) - rank(a) || a.id - b.id;
+/** @param {LabelTrack} track */
+const rank = ({ comment, confidence }) => (comment ? 2 : (confidence ?? 0));
+
 /** @returns {LabelTrack[]} */
 function fitting() {
-  const tracks = [...(get("labels")?.tracks.values() ?? [])],
+  const isListed = (/** @type {LabelTrack} */ track) => isSure(track) || track.id === get("track"),
+    tracks = [...(get("labels")?.tracks.values() ?? [])].filter(isListed).sort((a, b) => a.id - b.id),
     here = new Set(present().map(({ track }) => track));
-  if (which === "here") return tracks.filter(({ id }) => here.has(id)).sort((a, b) => a.id - b.id);
-  if (which === "open") return tracks.filter(isReviewing() ? isUnreviewed : isOpen).sort((a, b) => a.id - b.id);
-  return tracks.sort((a, b) => a.id - b.id);
+  if (which === "here") return tracks.filter(({ id }) => here.has(id));
+  if (which === "open") return isReviewing() ? tracks.filter(isUnreviewed) : tracks.filter(isOpen).sort(bySureness);
+  return tracks;
 }
 
 /** @param {LabelTrack} track */
@@ -106,7 +146,7 @@ function create() {
 }
 
 /** @param {HTMLElement} row @param {LabelTrack} track */
-function update(row, { id, label, state, first, last, keyframes, origin, comment, reviewer }) {
+function update(row, { id, label, state, first, last, keyframes, origin, comment, reviewer, confidence }) {
   row.setAttribute("aria-selected", String(id === get("track")));
   row.dataset.state = comment && state === "proposed" ? "sent-back" : state;
   const [mark, name, what, frames, who] = [...row.children];
@@ -127,7 +167,8 @@ function update(row, { id, label, state, first, last, keyframes, origin, comment
       ? "no frames"
       : `${first + 1}–${last + 1}${keyframes.length ? ` · ${keyframes.length} key` : ""}`,
   );
-  text(who, reviewer || (origin.maker === "person" ? origin.name : origin.maker));
+  const sure = state === "proposed" && confidence !== null ? percent(confidence) : null;
+  text(who, reviewer || (origin.maker === "person" ? origin.name : (sure ?? origin.maker)));
   const made = `made by ${origin.name || origin.maker}${reviewer ? `, reviewed by ${reviewer}` : ""}`;
   row.title = [`${state}${comment ? `, sent back: ${comment}` : ""}`, made, origin.how].filter(Boolean).join("; ");
 }

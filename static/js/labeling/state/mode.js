@@ -1,19 +1,23 @@
 /** The labeling mode: the pipeline proposes labels, people correct them. */
-import { playback } from "../../core/api.js";
-import { $, press } from "../../core/dom.js";
+import { $, isReloaded, press, tabMemory } from "../../core/dom.js";
 import { get, on, set } from "../../core/store.js";
+import * as playhead from "../../drive/own_playhead.js";
 import { toggle as togglePane } from "../../workspace/panes.js";
 import { personName } from "./person.js";
 
 /** @type {import("../../core/store.js").Labeling} */
-const OFF = { on: false, tool: null, from: null, hasObjects: false, review: false, item: null };
+const OFF = { on: false, tool: null, from: null, hasObjects: false, review: false, item: null, follows: false };
 
 const button = $("#label-button", HTMLButtonElement);
+
+/** Whether labeling was on when the page was reloaded, and is to go on. */
+let resumes = isReloaded() && tabMemory.read("labeling", false);
 
 export function setUp() {
   set("labeling", OFF);
   button.addEventListener("click", toggle);
-  on(["labeling", "state"], reflect);
+  on(["labeling", "state", "frame"], reflect);
+  on(["labeling", "layout", "frame"], place);
 }
 
 export const isOn = () => get("labeling")?.on === true;
@@ -23,14 +27,24 @@ const canLabel = () => get("state")?.labels != null;
 export function toggle() {
   if (!isOn() && !canLabel()) return;
   change({ ...OFF, on: !isOn(), hasObjects: get("labeling")?.hasObjects ?? false });
+  tabMemory.write("labeling", isOn());
   set("draft", null);
   set("marked", null);
   set("trimmed", null);
   if (!isOn()) return;
-  if (get("state")?.playing) playback({ playing: false }); // labels refer to the displayed frame
   togglePane("params", true); // the labels panel is in the inspector column
   personName();
 }
+
+/** A page that labels has its own playhead: nobody moves it to another frame, nor is moved. */
+function place() {
+  if (!isOn()) playhead.end(false);
+  else if (get("labeling")?.follows || playhead.isShared()) playhead.end(playhead.isShared());
+  else playhead.begin();
+}
+
+/** Follow the shared playhead, or leave it. */
+export const toggleFollows = () => change({ follows: !get("labeling")?.follows });
 
 /** @type {Record<string, string>} */
 const HINTS = {
@@ -78,6 +92,10 @@ function change(changes) {
 }
 
 function reflect() {
+  if (resumes && get("frame") && canLabel()) {
+    resumes = false;
+    if (!isOn()) return toggle();
+  }
   if (isOn() && get("state") && !canLabel()) return change({ on: false, tool: null });
   press(button, isOn());
   button.disabled = !canLabel();

@@ -24,6 +24,8 @@
  * @property {LabelOrigin} origin
  * @property {string} comment why it was sent back
  * @property {string} reviewer who approved it, other than its author; "" if not reviewed
+ * @property {number|null} confidence of a proposal, 0–1; null for others
+ * @property {""|"motion"|"lane"|"unknown"} heading what told its front from its rear; "" once somebody has looked
  * @property {number|null} first null if the track is in no frame
  * @property {number|null} last
  * @property {number[]} keyframes

@@ -41,6 +41,7 @@ export function drawInPlan(ctx, view, tags) {
       width: 2.5,
       isLead: false,
       isChosen: true,
+      isFacing: true,
       name: "",
     });
 }
@@ -63,8 +64,10 @@ function drawOne(ctx, view, cuboid, isKeyframe, look) {
   ctx.setLineDash(look.dash);
   ctx.stroke();
   ctx.setLineDash([]);
-  trace(ctx, view, [[cuboid.center[0], cuboid.center[1]], nose(cuboid)]);
-  ctx.stroke();
+  if (look.isFacing) {
+    trace(ctx, view, [[cuboid.center[0], cuboid.center[1]], nose(cuboid)]);
+    ctx.stroke();
+  }
   if (!isKeyframe) return;
   ctx.beginPath();
   ctx.arc(view.u(cuboid.center[1]), view.v(cuboid.center[0]), HANDLE_PX - 0.5, 0, 2 * Math.PI);

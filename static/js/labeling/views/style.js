@@ -2,14 +2,18 @@
 import { color, onPicture, ui } from "../../core/colors.js";
 import { get } from "../../core/store.js";
 import { leadAt, shown, trackOf } from "../state/labels.js";
+import { isSure } from "../state/threshold.js";
 
-/** @typedef {{tint: string, dash: number[], width: number, isLead: boolean, isChosen: boolean, name: string}} Look */
+/**
+ * @typedef {{tint: string, dash: number[], width: number, isLead: boolean, isChosen: boolean, isFacing: boolean,
+ *   name: string}} Look isFacing: front and rear are told apart
+ */
 
 /** @param {number} id @param {boolean} isOnPicture @returns {Look|null} null if hidden */
 export function lookOf(id, isOnPicture) {
   const track = trackOf(id),
     isChosen = id === get("track");
-  if (!track || (track.state === "rejected" && !isChosen)) return null;
+  if (!track || (!isChosen && (track.state === "rejected" || !isSure(track)))) return null;
   const isLead = leadAt(shown())?.lead === id;
   const shade = (/** @type {string} */ role) => (isOnPicture ? onPicture(role) : color(role));
   const tint =
@@ -26,6 +30,7 @@ export function lookOf(id, isOnPicture) {
     width: isChosen ? 2.5 : 1.5,
     isLead,
     isChosen,
-    name: `${isLead ? "lead " : ""}#${id} ${track.label}`,
+    isFacing: track.heading !== "unknown",
+    name: `${isLead ? "lead " : ""}#${id} ${track.label}${track.heading === "unknown" ? " ⇅?" : ""}`,
   };
 }

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+from typing import cast
+
 import pytest
 
 from app.labels.errors import ActRefused
+from app.labels.store.draft import Draft
 from app.labels.store.drive_labels import DriveLabels
-from pipeline.labels.model import Sighting
+from pipeline.labels.model import LabelTrack, Sighting
 from tests.app.labels.acts.doing import act, leads, track
 
 
@@ -34,3 +39,22 @@ def test_merged_tracks_are_the_first_and_the_lead_follows(labels: DriveLabels) -
     assert [each[:3] for each in leads(labels)] == [(10, 20, 2)]
     with pytest.raises(ActRefused, match="with itself"):
         act(labels, kind="merge", tracks=[{"id": 2, "revision": labels.track(2).revision}] * 2)
+
+
+def test_a_track_is_turned_round_in_every_frame_and_its_heading_is_a_persons(labels: DriveLabels) -> None:
+    def unsure(draft: Draft) -> str:
+        value = cast("LabelTrack", draft.get("track", 1).value)
+        draft.put("track", 1, replace(value, heading="unknown", confidence=0.4))
+        return "proposed"
+
+    labels.log.act("propose", "Ada", unsure)
+    act(labels, kind="flip", track=1)
+    found = track(labels, 1)
+    assert {each.cuboid.yaw_rad for each in found.sightings if each.cuboid is not None} == {math.pi}
+    assert (found.heading, found.state, found.confidence) == ("", "corrected", None)
+    assert not any(each.keyframe for each in found.sightings), "it says nothing of where it is"
+    act(labels, kind="flip", track=1)
+    assert {each.cuboid.yaw_rad for each in track(labels, 1).sightings if each.cuboid is not None} == {0.0}
+    act(labels, kind="add_track", label="car", frame=40, bbox=[1, 2, 30, 40])
+    with pytest.raises(ActRefused, match="no cuboid"):
+        act(labels, kind="flip", track=3)

@@ -87,7 +87,9 @@ def full_set() -> LabelSet:
     by = Origin("pipeline", "run", 5, "p", "c")
     seen = Sighting(0, Cuboid((20.0, 0.0, 0.5), (4.0, 1.8, 1.5), 0.1), (500.0, 300.0, 700.0, 420.0))
     tracks = (
-        LabelTrack(3, "car", (seen, replace(seen, frame=1, keyframe=False)), "proposed", by, "look again"),
+        LabelTrack(
+            3, "car", (seen, replace(seen, frame=1, keyframe=False)), "proposed", by, "look again", "", 0.625, "unknown"
+        ),
         LabelTrack(4, "car", (replace(seen, frame=2, cuboid=None),), "rejected", by),
         LabelTrack(5, "bus", (replace(seen, frame=2, bbox=None),), "corrected", by, reviewer="Bob"),
         LabelTrack(6, "bus", (), "accepted", by),

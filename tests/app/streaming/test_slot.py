@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from app.streaming.stream import FRAMES_UNDER_WAY, Slot
+from app.streaming.slot import FRAMES_UNDER_WAY, Slot
 from tests.app.waiting import loop_apart
 
 Taken = Callable[[Slot], list[str | bytes] | None]

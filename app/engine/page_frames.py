@@ -1,0 +1,56 @@
+"""Single frames for pages that have a playhead of their own: whoever labels is not moved by others, nor moves them."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+from app.engine.processed_frame import ProcessedFrame
+from app.engine.seekable_pipeline import SeekablePipeline
+from pipeline.params import Params
+
+
+@dataclass(frozen=True, eq=False)
+class PageFrame:
+    """A frame as one page sees it. uri: of the recording. time_s: its place on the playback timeline."""
+
+    uri: str
+    time_s: float
+    processed: ProcessedFrame
+
+
+class PageFrames:
+    """Any thread; frames are made one at a time, ahead of what is computed in the background. foreground: as of
+    ``compute_scheduler``."""
+
+    def __init__(self, foreground: Callable[[], AbstractContextManager[object]]) -> None:
+        self._foreground = foreground
+        self._lock = threading.Lock()
+        self._pipeline: SeekablePipeline | None = None
+
+    def open(self, pipeline: SeekablePipeline | None) -> None:
+        """Frames come from this one; None while no recording is open. What is being made is made of the old one."""
+        self._pipeline = pipeline
+
+    def can_be_exact(self, frame: PageFrame) -> bool:
+        """Whether more is known of it by now: made again, it would be exactly as in the whole drive."""
+        pipeline, shown = self._pipeline, frame.processed
+        if pipeline is None or shown.exact or not shown.whole:
+            return False
+        return pipeline.knows(shown.frame.index, shown.params)
+
+    def make(self, index: int, params: Params, superseded: Callable[[], bool], *, at_once: bool) -> PageFrame | None:
+        """The frame, as the shared playhead would show it. None without a recording, or when ``superseded`` turned
+        true on the way. at_once: as of ``SeekablePipeline.seek``."""
+        with self._lock:
+            pipeline = self._pipeline
+            if pipeline is None or superseded():
+                return None
+            index = min(max(index, 0), len(pipeline.source) - 1)
+            with self._foreground():
+                processed = pipeline.seek(index, params, superseded, at_once=at_once)
+            if processed is None:
+                return None
+            return PageFrame(pipeline.source.uri, float(pipeline.timeline_s[index]), processed)

@@ -1,0 +1,82 @@
+"""The newest unsent messages of one client: a slow one skips frames, and gets none that is outdated."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from app.streaming.own_playhead import OwnPlayhead
+
+FRAMES_UNDER_WAY = 2
+"""One being painted while the next is on its way."""
+
+
+@dataclass
+class Traffic:
+    """Frames of all clients since the start: sent, and dropped because a newer one replaced them."""
+
+    sent: int = 0
+    dropped: int = 0
+
+
+class Slot:
+    """The newest unsent messages of one client, by kind. Used on the server's event loop only.
+
+    ``paced``: frames wait for ``painted``. ``traffic`` counts frames. picture_px: how wide it shows the image, None
+    until it says so."""
+
+    def __init__(self, paced: bool = False, traffic: Traffic | None = None) -> None:
+        self.picture_px: int | None = None
+        self.own: OwnPlayhead | None = None
+        """None while the page follows the shared playhead."""
+        self._paced = paced
+        self._traffic = traffic or Traffic()
+        self._under_way = 0
+        self._unsent: dict[str, str | bytes] = {}
+        self._newest: dict[str, int] = {}
+        self._state_after_frame: str | bytes | None = None
+        self._filled = asyncio.Event()
+
+    def put(self, kind: str, message: str | bytes, order: int = 0) -> None:
+        """Replace the unsent message of this kind; a message older than the last one put is ignored."""
+        if order < self._newest.get(kind, order):
+            return
+        self._newest[kind] = order
+        replaced = self._unsent.pop(kind, None)  # so that the kinds stand in the order in which they came
+        self._traffic.dropped += kind == "frame" and replaced is not None
+        self._unsent[kind] = message
+        if kind == "frame":
+            self._state_after_frame = None
+        elif kind == "state" and "frame" in self._unsent:
+            self._state_after_frame = message
+        self._filled.set()
+
+    def put_own(self, message: bytes, order: int) -> None:
+        """A frame of the page's own playhead; ignored once it follows the others again."""
+        if self.own is not None:
+            self.put("frame", message, order)
+
+    def painted(self) -> None:
+        """The client has painted one of its frames."""
+        self._under_way = max(0, self._under_way - 1)
+        self._filled.set()
+
+    async def take(self) -> list[str | bytes]:
+        """Wait for messages that may be sent, and take them all."""
+        while True:
+            await self._filled.wait()
+            self._filled.clear()
+            is_full = self._paced and self._under_way >= FRAMES_UNDER_WAY
+            ready = {kind: message for kind, message in self._unsent.items() if not (is_full and kind == "frame")}
+            self._under_way += "frame" in ready
+            self._traffic.sent += "frame" in ready
+            self._unsent = {kind: message for kind, message in self._unsent.items() if kind not in ready}
+            if "frame" in ready:
+                ready.pop("state", None)  # the frame includes the state as it was
+                if self._state_after_frame is not None:  # also when it has been sent: the frame, late, says what was
+                    ready["state"] = self._state_after_frame
+                    self._state_after_frame = None
+            if ready:
+                return list(ready.values())

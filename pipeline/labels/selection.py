@@ -1,0 +1,35 @@
+"""The labels of a set that somebody stands behind: for who trains or scores with them elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from pipeline.labels.model import EventLabel, LabelSet, LabelTrack, LeadRange, PathLabel
+
+Selection = Literal["all", "accepted", "reviewed"]
+"""accepted: accepted or corrected by a person or a file. reviewed: found right by a second person, too."""
+
+
+def selected(labels: LabelSet, what: Selection) -> LabelSet:
+    """The set without the others; its name says so. A lead or event of a track that is left out goes with it, since it
+    would name nothing."""
+    if what == "all":
+        return labels
+
+    def stands(label: LabelTrack | LeadRange | PathLabel | EventLabel) -> bool:
+        is_accepted = label.state in ("accepted", "corrected") and not label.comment
+        return is_accepted and (what == "accepted" or bool(label.reviewer))
+
+    tracks = tuple(filter(stands, labels.tracks))
+    kept = {track.id for track in tracks}
+    return replace(
+        labels,
+        tracks=tracks,
+        leads=tuple(
+            each for each in labels.leads if stands(each) and (isinstance(each.lead, str) or each.lead in kept)
+        ),
+        paths=tuple(filter(stands, labels.paths)),
+        events=tuple(each for each in labels.events if stands(each) and kept.issuperset(each.tracks)),
+        name=f"{labels.name}, {what} only",
+    )
