@@ -29,7 +29,7 @@ EDGE_SIGMA_M = 0.5
 @dataclass(frozen=True, eq=False)
 class FusedPath:
     """The path of all sources together. center: (K, 2). sigma_m: (K,). left_m, right_m: (K,) distances to the edges.
-    shares: (K, 4) of ``SOURCES``. behind_m: (K,) how far it still lags behind its sources."""
+    shares: (K, S) of ``SOURCES``. behind_m: (K,) how far it still lags behind its sources."""
 
     center: F64
     sigma_m: F64

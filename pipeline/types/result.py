@@ -12,7 +12,7 @@ from pipeline.types.frame import EgoState, Frame, OwnMotion, StreamHealth
 from pipeline.types.lane import EgoLane
 from pipeline.types.objects import FusedObject, Ground, LidarTrack, Obstacle, VisionTrack
 
-PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "fused"]
+PathSource = Literal["lane", "gnss", "yaw_rate", "straight", "edges", "area", "lead", "fused"]
 
 
 @dataclass(frozen=True)

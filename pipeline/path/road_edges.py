@@ -1,0 +1,73 @@
+"""The path along the road's edges as the LiDAR sees them (``road_structure``, ``road_shape``)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.common.geometry import F64
+from pipeline.params import PathParams
+from pipeline.path import road_shape, road_structure
+from pipeline.path.estimates import PathEstimate
+from pipeline.path.road_structure import NONE, Cells
+from pipeline.types import F32, I32, U8, FusedObject, Ground, LidarTrack, Moment
+
+_FEWEST_CELLS = 25
+
+
+class Surroundings(NamedTuple):
+    """What the stages before found in a frame."""
+
+    points: F32
+    kind: I32
+    ring: U8 | None
+    ground: Ground | None
+    tracks: tuple[LidarTrack, ...]
+    objects: tuple[FusedObject, ...]
+    lead_id: int | None
+    """Of the lead in the frame before: what is in the path is no edge of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeState:
+    """What one frame leaves to the next."""
+
+    cells: Cells = NONE
+    """Structure beside the road."""
+    shape: F64 | None = None
+    """(K, 2) the road's shape in that frame."""
+
+
+class Edges(NamedTuple):
+    """The road by its edges."""
+
+    path: PathEstimate
+    cells: F64
+    """(M, 2) the structure that it was taken from."""
+
+
+def follow(state: EdgeState, around: Surroundings, now: Moment, params: PathParams) -> tuple[EdgeState, Edges | None]:
+    """One frame. None without own motion, which places earlier sweeps, and where too little stands beside the road."""
+    ego = now.ego
+    if ego is None or not params.use_edges:
+        return EdgeState(), None
+    dt_s = now.dt_s
+    before = road_structure.moved(state.cells, ego, dt_s) if dt_s else NONE
+    fresh = np.zeros((0, 2))
+    if around.ground is not None and around.ring is not None and around.ground.fitted.any():
+        fresh = road_structure.seen(around.points, around.kind, around.ring, around.ground, _not_edges(around))
+    cells = road_structure.merged(before, fresh)
+    if len(cells.xy) < _FEWEST_CELLS:
+        return EdgeState(cells, None), None
+    center, sigma = road_shape.fitted(cells.xy, road_shape.begin(state.shape, ego, dt_s, params), ego, params)
+    return EdgeState(cells, center), Edges(PathEstimate("edges", center, sigma), cells.xy)
+
+
+def _not_edges(around: Surroundings) -> list[int]:
+    """Clusters of what drives, and of the lead."""
+    cluster_of = {track.id: track.obstacle.cluster for track in around.tracks if not track.carried}
+    found = road_structure.driving(around.objects, cluster_of)
+    leads = [item for item in around.objects if item.id == around.lead_id and item.lidar_track in cluster_of]
+    return found + [cluster_of[item.lidar_track] for item in leads if item.lidar_track is not None]

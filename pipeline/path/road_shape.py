@@ -1,0 +1,182 @@
+"""The shape of a road from what runs beside it, as a line with a sigma at each distance.
+
+Kerbs, hedges, walls, rails and rows of parked cars are parallel to the road, each at its own distance. So of all shapes
+that the road may have, the true one is that from which the cells beside it lie at the fewest distances: the
+log-likelihood of their distances under their own histogram is highest (least entropy). Nothing has to be told apart as
+left or right, kerb or car, and gaps in a row do no harm. Weighed with what roads can be (a prior of curvature), all
+shapes together give the mean and its sigma at each distance: with little beside the road the sigma is the prior's.
+
+The line keeps to the distance from the edges that the car has now."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from pipeline.common.geometry import F64
+from pipeline.params import PathParams
+from pipeline.path.corridor import nearest
+from pipeline.path.estimates import arc, samples
+from pipeline.types import EgoState
+
+_NODES_M = (20.0, 40.0)
+"""A shape is a cubic: where it is aside at these two distances, and its heading at the car."""
+_TEMPER = 0.25
+"""Cells of one car or one hedge are not independent of each other: four are worth one."""
+_BAND_M = 12.0
+_MODEL_SIGMA_PER_M2 = 0.0004
+"""A street is no cubic."""
+
+
+class Grid(NamedTuple):
+    """Which shapes are tried: how far aside at the two nodes (m) and the heading (rad), each from −most to most."""
+
+    first_m: tuple[float, float]
+    second_m: tuple[float, float]
+    heading: tuple[float, float]
+    bin_m: float
+
+
+_ROUNDS = (
+    Grid((4.0, 0.5), (15.0, 1.25), (0.02, 0.02), 1.0),
+    Grid((1.5, 0.25), (4.5, 0.5), (0.03, 0.015), 0.5),
+)
+
+
+def begin(before: F64 | None, ego: EgoState, dt_s: float | None, params: PathParams) -> F64:
+    """The line from which shapes are measured: that of the frame before, moved on, else the arc of own motion."""
+    s = samples(params.length_m)
+    if before is not None and dt_s:
+        return _moved_on(before, ego, dt_s, s)
+    rate = ego.yaw_rate_radps or 0.0
+    curvature = rate / ego.speed_mps if ego.speed_mps > params.min_speed_mps else 0.0
+    return arc(curvature, s)[0]
+
+
+def _moved_on(shape: F64, ego: EgoState, dt_s: float, s: F64) -> F64:
+    """The shape of the frame before, from the car on, parallel to itself."""
+    turned, way = (ego.yaw_rate_radps or 0.0) * dt_s, ego.speed_mps * dt_s
+    c, sn = np.cos(turned), np.sin(turned)
+    away = shape - (way * np.cos(0.5 * turned), way * np.sin(0.5 * turned))
+    line = np.column_stack([away[:, 0] * c + away[:, 1] * sn, away[:, 1] * c - away[:, 0] * sn])
+    return _resampled(line, s)
+
+
+def _resampled(line: F64, s: F64) -> F64:
+    """The line from beside the origin on, at ``s``, moved so that it begins there; straight beyond its end."""
+    aside, along = nearest(line, np.zeros((1, 2)))
+    lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
+    at = s + max(float(along[0]), 0.0)
+    out = np.column_stack([np.interp(at, lengths, line[:, k]) for k in (0, 1)])
+    over = np.maximum(at - lengths[-1], 0.0)
+    way = line[-1] - line[-3]
+    out = out + over[:, None] * way / max(np.hypot(*way), 1e-9)
+    return out - out[0]
+
+
+def fitted(xy: F64, start: F64, ego: EgoState, params: PathParams) -> tuple[F64, F64]:
+    """(K, 2) the most probable shape and (K,) its sigma."""
+    s = samples(params.length_m)
+    speed2 = max(ego.speed_mps, params.min_speed_mps, 0.1) ** 2
+    curvature_sigma = min(params.lateral_accel_mps2 / speed2, 0.02)
+    heading_sigma = max(params.lane_keeping_sigma_mps / max(ego.speed_mps, params.min_speed_mps), 0.01)
+    line, sigma = start, np.zeros(len(s))
+    for grid in _ROUNDS:
+        aside, along = nearest(line, xy)
+        keep = (along > 0.0) & (along < _NODES_M[1] + 5.0) & (np.abs(aside) < 2.0 * _BAND_M)
+        heading0, bends = _bends(line)
+        first, second, heading = (_steps(*each) for each in (grid.first_m, grid.second_m, grid.heading))
+        weights = _weights(
+            along[keep], aside[keep], first, second, heading, grid.bin_m, _BAND_M, _TEMPER,
+            heading0, bends[0], bends[1], curvature_sigma, heading_sigma,
+        )  # fmt: skip
+        mean, sigma = _moments(s, first, second, heading, weights)
+        line = _shifted(line, mean, s)
+    return line, np.sqrt(sigma**2 + params.lane_keeping_sigma_m**2 + (_MODEL_SIGMA_PER_M2 * s * s) ** 2)
+
+
+def _steps(most: float, step: float) -> F64:
+    count = round(most / step)
+    return np.arange(-count, count + 1) * step
+
+
+def _bends(line: F64) -> tuple[float, tuple[float, float]]:
+    """Heading at the car, and mean curvature from 0 to 20 and from 20 to 40 m."""
+    way = np.diff(line, axis=0)
+    heading = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
+    return float(heading[0]), (float(heading[19] - heading[0]) / 19.0, float(heading[39] - heading[20]) / 19.0)
+
+
+def _shifted(line: F64, aside: F64, s: F64) -> F64:
+    """The line moved along its normals by (K,) metres."""
+    way = np.gradient(line, axis=0)
+    normal = np.column_stack([-way[:, 1], way[:, 0]]) / np.maximum(np.hypot(*way.T), 1e-9)[:, None]
+    return _resampled(line + aside[:, None] * normal, s)
+
+
+def _cubic(first, second, heading):  # type: ignore[no-untyped-def]
+    """a, b of heading·s + a·s² + b·s³ through the nodes."""
+    b = (second - 4.0 * first + 40.0 * heading) / 32000.0
+    return (first - 20.0 * heading - 8000.0 * b) / 400.0, b
+
+
+_cubic_compiled = numba.njit(cache=True, nogil=True, inline="always")(_cubic)
+
+
+def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tuple[F64, F64]:
+    """Mean and standard deviation of how far aside the shape is at ``s``, straight beyond the last node."""
+    h, u, w = np.meshgrid(heading, first, second, indexing="ij")
+    a, b = _cubic(u, w, h)
+    near = np.minimum(s, _NODES_M[1])
+    over = s - near
+    rows = np.stack([near, near**2 + 2.0 * near * over, near**3 + 3.0 * near**2 * over])
+    rows[0] += over
+    p = weights.ravel()
+    terms = np.stack([h.ravel(), a.ravel(), b.ravel()])
+    mean = terms @ p
+    spread = (terms - mean[:, None]) * p @ (terms - mean[:, None]).T
+    return mean @ rows, np.sqrt(np.maximum(np.einsum("ik,ij,jk->k", rows, spread, rows), 0.0))
+
+
+@numba.njit(cache=True, nogil=True)
+def _weights(s, d, first, second, heading, bin_m, band_m, temper, heading0, bend0, bend1, bend_sigma, heading_sigma):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """(H, U, W) probability of each shape."""
+    bins = int(2.0 * band_m / bin_m) + 3
+    count = np.zeros(bins, np.int32)
+    logs = np.log(np.maximum(np.arange(4 * len(s) + 8) / 4.0 - 0.5, 0.0) + 0.25)
+    out = np.empty((len(heading), len(first), len(second)))
+    best = -np.inf
+    for i in range(len(heading)):
+        for j in range(len(first)):
+            for k in range(len(second)):
+                b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
+                a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
+                k0, k1 = bend0 + 2.0 * a + 60.0 * b, bend1 + 2.0 * a + 180.0 * b
+                prior = 0.5 * ((k0 / bend_sigma) ** 2 + (k1 / bend_sigma) ** 2)
+                prior += 0.5 * ((heading0 + heading[i]) / heading_sigma) ** 2
+                out[i, j, k] = -np.inf
+                if prior > 12.0:
+                    continue
+                count[:] = 0
+                outside = 0
+                for n in range(len(s)):
+                    at = (d[n] - s[n] * (heading[i] + s[n] * (a + s[n] * b)) + band_m) / bin_m
+                    if 0.0 <= at < bins - 3:
+                        count[int(at) + 1] += 1
+                    else:
+                        outside += 1
+                total = outside * logs[0]
+                for c in range(1, bins - 1):
+                    if count[c]:
+                        total += count[c] * logs[count[c - 1] + 2 * count[c] + count[c + 1]]
+                out[i, j, k] = temper * total - prior
+                best = max(best, out[i, j, k])
+    whole = 0.0
+    for i in range(len(heading)):
+        for j in range(len(first)):
+            for k in range(len(second)):
+                out[i, j, k] = np.exp(out[i, j, k] - best)
+                whole += out[i, j, k]
+    return out / whole

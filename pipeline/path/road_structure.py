@@ -1,0 +1,135 @@
+"""What stands beside the road, as cells on the ground: kerbs, hedges, walls, rails, and parked cars as a row.
+
+One sweep of 16 rings shows little of an edge: a kerb on two rings, of the row of parked cars the nearest corners. Cells
+of earlier sweeps, moved by own motion, complete it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from pipeline.types import F32, F64, GROUND, I32, U8, VEHICLES, EgoState, FusedObject, Ground
+
+REACH_M, ASIDE_M = 48.0, 24.0
+"""Farther ahead, or farther to the side, a 16-channel LiDAR shows nothing of a road's edge."""
+_BEHIND_M = -8.0
+CELL_M = 0.5
+"""One vote a cell: rings lie so close on what is near that it would outvote all that is far."""
+_LOW_M, _HIGH_M = 0.3, 2.5
+"""Above the road's own unevenness, below the crowns of trees."""
+_STEP_M, _STEP_MOST_M = 0.06, 0.25
+"""Height of a kerb: six sigmas of the noise of a LiDAR's height at 10 m, up to where it counts as standing."""
+_STEP_WITHIN_M = 0.5
+_GROUP = 3
+_KERBS_TO_M = 30.0
+_KEPT_S = 2.5
+"""Own motion places a cell as well as it was measured for as long: 1 % of 25 m, and 0.5° of heading."""
+_DRIVES_MPS = 4.0
+"""What the LiDAR alone takes for moving may be a hedge of which ever more is seen; faster it is a vehicle."""
+_LONGEST_M = 15.0
+
+
+class Cells(NamedTuple):
+    """Cells of structure."""
+
+    xy: F64
+    """(M, 2) ego x, y."""
+    age_s: F64
+    """(M,) time since each was last seen."""
+
+
+NONE = Cells(np.zeros((0, 2)), np.zeros(0))
+
+
+def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
+    """Where the cells of ``dt_s`` ago lie now, without those too old or too far behind."""
+    turned, way = (ego.yaw_rate_radps or 0.0) * dt_s, ego.speed_mps * dt_s
+    c, s = np.cos(turned), np.sin(turned)
+    away = cells.xy - (way * np.cos(0.5 * turned), way * np.sin(0.5 * turned))
+    xy = np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s])
+    age_s = cells.age_s + dt_s
+    keep = (xy[:, 0] > _BEHIND_M) & (age_s <= _KEPT_S)
+    return Cells(xy[keep], age_s[keep])
+
+
+def seen(points: F32, kind: I32, ring: U8, ground: Ground, moving: Sequence[int]) -> F64:
+    """(M, 2) ego x, y of cells of one sweep.
+
+    Args:
+        points: (N, 4) of the sweep.
+        kind: (N,) what each was taken for; ≥ 0 the number of its cluster.
+        ring: (N,) the channel of each.
+        ground: the road below them.
+        moving: clusters of vehicles that drive.
+    """
+    near = (points[:, 0] > 0.0) & (points[:, 0] < REACH_M) & (np.abs(points[:, 1]) < ASIDE_M)
+    above = ground.above(points)
+    standing = near & (above > _LOW_M) & (above < _HIGH_M) & (kind != GROUND)
+    if len(moving):
+        standing &= ~np.isin(kind, np.array(moving))
+    low = near & (above < _LOW_M) & (points[:, 0] < _KERBS_TO_M)
+    kerbs = _steps(points[low], ring[low], above[low])
+    return np.vstack([points[standing, :2], kerbs]).astype(np.float64)
+
+
+def merged(before: Cells, fresh: F64) -> Cells:
+    """All cells, one in each square of the grid, the fresh ones first."""
+    xy = np.vstack([fresh, before.xy])
+    age_s = np.concatenate([np.zeros(len(fresh)), before.age_s])
+    if not len(xy):
+        return NONE
+    at = np.floor(xy / CELL_M).astype(np.int64)
+    _, first = np.unique(at[:, 0] * 100_003 + at[:, 1], return_index=True)
+    return Cells(xy[first], age_s[first])
+
+
+def driving(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int]:
+    """Clusters of vehicles that drive. cluster_of: by LiDAR track."""
+    found = []
+    for item in objects:
+        if item.lidar_track not in cluster_of or not item.moving or item.cuboid is None:
+            continue
+        fast = (item.speed_over_ground_mps or 0.0) > _DRIVES_MPS and max(item.cuboid.size[:2]) < _LONGEST_M
+        if item.label in VEHICLES or fast:
+            found.append(cluster_of[item.lidar_track])
+    return found
+
+
+def _steps(points: F32, ring: U8, above: F64) -> F64:
+    """(M, 2) places where the road steps up by a kerb's height, along each ring."""
+    if not len(points):
+        return np.zeros((0, 2))
+    order = np.lexsort((np.arctan2(points[:, 1], points[:, 0]), ring))
+    found = _kernel(
+        points[order].astype(np.float64), ring[order], above[order], _GROUP, _STEP_WITHIN_M, _STEP_M, _STEP_MOST_M
+    )
+    return np.asarray(found)
+
+
+@numba.njit(cache=True, nogil=True)
+def _kernel(points, ring, above, group, within, low, high):  # type: ignore[no-untyped-def]  # pragma: no cover
+    """Between each three neighbours and the next three of a ring: level before and after, and a step between."""
+    out = np.empty((len(points), 2))
+    count, since = 0, -group
+    for k in range(group, len(points) - group):
+        if ring[k - group] != ring[k + group - 1] or k - since < group:
+            continue
+        gap = np.hypot(points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1])
+        if gap > within:
+            continue
+        before, after = 0.0, 0.0
+        low_a, high_a, low_b, high_b = np.inf, -np.inf, np.inf, -np.inf
+        for j in range(group):
+            a, b = above[k - 1 - j], above[k + j]
+            before, after = before + a / group, after + b / group
+            low_a, high_a = min(low_a, a), max(high_a, a)
+            low_b, high_b = min(low_b, b), max(high_b, b)
+        step = abs(after - before)
+        if low < step < high and high_a - low_a < 0.5 * step and high_b - low_b < 0.5 * step:
+            out[count, 0], out[count, 1] = points[k, 0], points[k, 1]
+            count += 1
+            since = k
+    return out[:count]
