@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
-
 from pipeline.common.geometry import F64
 from pipeline.params import PathParams
 from pipeline.path import road_shape, road_structure
@@ -55,19 +53,20 @@ def follow(state: EdgeState, around: Surroundings, now: Moment, params: PathPara
         return EdgeState(), None
     dt_s = now.dt_s
     before = road_structure.moved(state.cells, ego, dt_s) if dt_s else NONE
-    fresh = np.zeros((0, 2))
+    fresh = NONE
     if around.ground is not None and around.ring is not None and around.ground.fitted.any():
-        fresh = road_structure.seen(around.points, around.kind, around.ring, around.ground, _not_edges(around))
+        cluster_of = {track.id: track.obstacle.cluster for track in around.tracks if not track.carried}
+        fresh = road_structure.seen(
+            around.points,
+            around.kind,
+            around.ring,
+            around.ground,
+            road_structure.long(around.objects, cluster_of),
+        )
+    not_edges = [item for item in around.objects if item.id == around.lead_id or road_structure.drives(item)]
+    fresh, before = road_structure.without(fresh, not_edges), road_structure.without(before, not_edges)
     cells = road_structure.merged(before, fresh)
     if len(cells.xy) < _FEWEST_CELLS:
         return EdgeState(cells, None), None
-    center, sigma = road_shape.fitted(cells.xy, road_shape.begin(state.shape, ego, dt_s, params), ego, params)
+    center, sigma = road_shape.fitted(cells.xy, cells.blocks, road_shape.begin(state.shape, ego, dt_s, params), ego, params)
     return EdgeState(cells, center), Edges(PathEstimate("edges", center, sigma), cells.xy)
-
-
-def _not_edges(around: Surroundings) -> list[int]:
-    """Clusters of what drives, and of the lead."""
-    cluster_of = {track.id: track.obstacle.cluster for track in around.tracks if not track.carried}
-    found = road_structure.driving(around.objects, cluster_of)
-    leads = [item for item in around.objects if item.id == around.lead_id and item.lidar_track in cluster_of]
-    return found + [cluster_of[item.lidar_track] for item in leads if item.lidar_track is not None]

@@ -26,6 +26,11 @@ _NODES_M = (20.0, 40.0)
 _TEMPER = 0.25
 """Cells of one car or one hedge are not independent of each other: four are worth one."""
 _BAND_M = 12.0
+_IMPROBABLE = 12.0
+_CLEAR_M = 0.9
+"""Half a car's width."""
+_SOON_PER_M = 0.01
+"""How much a road's curvature may differ from that of the way just driven."""
 _MODEL_SIGMA_PER_M2 = 0.0004
 """A street is no cubic."""
 
@@ -39,20 +44,20 @@ class Grid(NamedTuple):
     bin_m: float
 
 
+_WIDE = Grid((8.0, 1.0), (24.0, 2.0), (0.0, 1.0), 1.5)
 _ROUNDS = (
     Grid((4.0, 0.5), (15.0, 1.25), (0.02, 0.02), 1.0),
     Grid((1.5, 0.25), (4.5, 0.5), (0.03, 0.015), 0.5),
 )
 
 
-def begin(before: F64 | None, ego: EgoState, dt_s: float | None, params: PathParams) -> F64:
-    """The line from which shapes are measured: that of the frame before, moved on, else the arc of own motion."""
+def begin(before: F64 | None, ego: EgoState, dt_s: float | None, params: PathParams) -> list[F64]:
+    """Lines from which shapes are measured: the arc of own motion, and that of the frame before, moved on."""
     s = samples(params.length_m)
-    if before is not None and dt_s:
-        return _moved_on(before, ego, dt_s, s)
     rate = ego.yaw_rate_radps or 0.0
     curvature = rate / ego.speed_mps if ego.speed_mps > params.min_speed_mps else 0.0
-    return arc(curvature, s)[0]
+    own = arc(curvature, s)[0]
+    return [own, _moved_on(before, ego, dt_s, s)] if before is not None and dt_s else [own]
 
 
 def _moved_on(shape: F64, ego: EgoState, dt_s: float, s: F64) -> F64:
@@ -61,12 +66,16 @@ def _moved_on(shape: F64, ego: EgoState, dt_s: float, s: F64) -> F64:
     c, sn = np.cos(turned), np.sin(turned)
     away = shape - (way * np.cos(0.5 * turned), way * np.sin(0.5 * turned))
     line = np.column_stack([away[:, 0] * c + away[:, 1] * sn, away[:, 1] * c - away[:, 0] * sn])
-    return _resampled(line, s)
+    line = _resampled(line, s)
+    turned = np.arctan2(line[1, 1], line[1, 0])  # a road that the car is not along is not the road
+    turned = turned - np.clip(turned, -0.02, 0.02)
+    c, sn = np.cos(turned), np.sin(turned)
+    return np.column_stack([line[:, 0] * c + line[:, 1] * sn, line[:, 1] * c - line[:, 0] * sn])
 
 
 def _resampled(line: F64, s: F64) -> F64:
     """The line from beside the origin on, at ``s``, moved so that it begins there; straight beyond its end."""
-    aside, along = nearest(line, np.zeros((1, 2)))
+    _, along = nearest(line, np.zeros((1, 2)))
     lengths = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     at = s + max(float(along[0]), 0.0)
     out = np.column_stack([np.interp(at, lengths, line[:, k]) for k in (0, 1)])
@@ -76,24 +85,39 @@ def _resampled(line: F64, s: F64) -> F64:
     return out - out[0]
 
 
-def fitted(xy: F64, start: F64, ego: EgoState, params: PathParams) -> tuple[F64, F64]:
-    """(K, 2) the most probable shape and (K,) its sigma."""
+def fitted(xy: F64, blocks: F64, starts: list[F64], ego: EgoState, params: PathParams) -> tuple[F64, F64]:
+    """(K, 2) the most probable shape and (K,) its sigma.
+
+    Args:
+        xy: (M, 2) cells.
+        blocks: (M,) how strongly each says that no road leads through it, in log-likelihood.
+        starts: (K, 2) lines from which shapes are measured.
+        ego: own motion.
+        params: of the path.
+    """
     s = samples(params.length_m)
     speed2 = max(ego.speed_mps, params.min_speed_mps, 0.1) ** 2
     curvature_sigma = min(params.lateral_accel_mps2 / speed2, 0.02)
-    heading_sigma = max(params.lane_keeping_sigma_mps / max(ego.speed_mps, params.min_speed_mps), 0.01)
-    line, sigma = start, np.zeros(len(s))
-    for grid in _ROUNDS:
-        aside, along = nearest(line, xy)
-        keep = (along > 0.0) & (along < _NODES_M[1] + 5.0) & (np.abs(aside) < 2.0 * _BAND_M)
-        heading0, bends = _bends(line)
-        first, second, heading = (_steps(*each) for each in (grid.first_m, grid.second_m, grid.heading))
-        weights = _weights(
-            along[keep], aside[keep], first, second, heading, grid.bin_m, _BAND_M, _TEMPER,
-            heading0, bends[0], bends[1], curvature_sigma, heading_sigma,
-        )  # fmt: skip
-        mean, sigma = _moments(s, first, second, heading, weights)
-        line = _shifted(line, mean, s)
+    speed = max(ego.speed_mps, params.min_speed_mps)
+    heading_sigma = max(params.lane_keeping_sigma_mps / speed, 0.01)
+    own = (ego.yaw_rate_radps or 0.0) / speed if ego.speed_mps > params.min_speed_mps else 0.0
+    own_sigma = float(np.hypot(2.0 * params.yaw_rate_sigma_radps / speed, _SOON_PER_M)) if ego.yaw_rate_radps is not None else 1.0
+    best, line, sigma = -np.inf, starts[0], np.zeros(len(s))
+    for n, start in enumerate(starts):
+        evidence, found, found_sigma = -np.inf, start, sigma
+        for grid in _ROUNDS if n else (_WIDE, *_ROUNDS):
+            aside, along = nearest(found, xy)
+            keep = np.flatnonzero((along > 0.0) & (along < _NODES_M[1] + 5.0) & (np.abs(aside) < 2.0 * _BAND_M))
+            heading0, bends = _bends(found)
+            first, second, heading = (_steps(*each) for each in (grid.first_m, grid.second_m, grid.heading))
+            weights, evidence = _weights(
+                along[keep], aside[keep], blocks[keep], len(xy), first, second, heading, grid.bin_m, _BAND_M, _TEMPER,
+                heading0, bends, own, own_sigma, curvature_sigma, heading_sigma,
+            )  # fmt: skip
+            mean, found_sigma = _moments(s, first, second, heading, weights)
+            found = _shifted(found, mean, s)
+        if evidence > best:
+            best, line, sigma = evidence, found, found_sigma
     return line, np.sqrt(sigma**2 + params.lane_keeping_sigma_m**2 + (_MODEL_SIGMA_PER_M2 * s * s) ** 2)
 
 
@@ -102,11 +126,12 @@ def _steps(most: float, step: float) -> F64:
     return np.arange(-count, count + 1) * step
 
 
-def _bends(line: F64) -> tuple[float, tuple[float, float]]:
-    """Heading at the car, and mean curvature from 0 to 20 and from 20 to 40 m."""
+def _bends(line: F64) -> tuple[float, F64]:
+    """Heading at the car, and (3,) mean curvature from 0 to 6, from 0 to 20 and from 20 to 40 m."""
     way = np.diff(line, axis=0)
     heading = np.unwrap(np.arctan2(way[:, 1], way[:, 0]))
-    return float(heading[0]), (float(heading[19] - heading[0]) / 19.0, float(heading[39] - heading[20]) / 19.0)
+    from_to = ((0, 6), (0, 19), (20, 39))
+    return float(heading[0]), np.array([(heading[b] - heading[a]) / (b - a) for a, b in from_to])
 
 
 def _shifted(line: F64, aside: F64, s: F64) -> F64:
@@ -120,9 +145,6 @@ def _cubic(first, second, heading):  # type: ignore[no-untyped-def]
     """a, b of heading·s + a·s² + b·s³ through the nodes."""
     b = (second - 4.0 * first + 40.0 * heading) / 32000.0
     return (first - 20.0 * heading - 8000.0 * b) / 400.0, b
-
-
-_cubic_compiled = numba.njit(cache=True, nogil=True, inline="always")(_cubic)
 
 
 def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tuple[F64, F64]:
@@ -141,33 +163,47 @@ def _moments(s: F64, first: F64, second: F64, heading: F64, weights: F64) -> tup
 
 
 @numba.njit(cache=True, nogil=True)
-def _weights(s, d, first, second, heading, bin_m, band_m, temper, heading0, bend0, bend1, bend_sigma, heading_sigma):  # type: ignore[no-untyped-def]  # pragma: no cover
+def _weights(s, d, blocks, cells, first, second, heading, bin_m, band_m, temper, heading0, bends, own, own_sigma, bend_sigma, heading_sigma):  # type: ignore[no-untyped-def]  # pragma: no cover
     """(H, U, W) probability of each shape."""
     bins = int(2.0 * band_m / bin_m) + 3
     count = np.zeros(bins, np.int32)
-    logs = np.log(np.maximum(np.arange(4 * len(s) + 8) / 4.0 - 0.5, 0.0) + 0.25)
+    by_chance = max(0.5 * cells / bins, 0.25)
+    logs = np.log(np.maximum(np.arange(4 * cells + 8) / 4.0 - 0.5, 0.0) + by_chance)
     out = np.empty((len(heading), len(first), len(second)))
-    best = -np.inf
+    likeliest = np.inf
     for i in range(len(heading)):
         for j in range(len(first)):
             for k in range(len(second)):
                 b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
                 a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
-                k0, k1 = bend0 + 2.0 * a + 60.0 * b, bend1 + 2.0 * a + 180.0 * b
-                prior = 0.5 * ((k0 / bend_sigma) ** 2 + (k1 / bend_sigma) ** 2)
-                prior += 0.5 * ((heading0 + heading[i]) / heading_sigma) ** 2
-                out[i, j, k] = -np.inf
-                if prior > 12.0:
+                prior = ((bends[1] + 2.0 * a + 60.0 * b) / bend_sigma) ** 2
+                prior += ((bends[2] + 2.0 * a + 180.0 * b) / bend_sigma) ** 2
+                prior += ((heading0 + heading[i]) / heading_sigma) ** 2
+                prior += ((bends[0] + 2.0 * a + 18.0 * b - own) / own_sigma) ** 2
+                out[i, j, k] = 0.5 * prior
+                likeliest = min(likeliest, out[i, j, k])
+    best = -np.inf
+    for i in range(len(heading)):
+        for j in range(len(first)):
+            for k in range(len(second)):
+                prior = out[i, j, k]
+                if prior > likeliest + _IMPROBABLE:
+                    out[i, j, k] = -np.inf
                     continue
+                b = (second[k] - 4.0 * first[j] + 40.0 * heading[i]) / 32000.0
+                a = (first[j] - 20.0 * heading[i] - 8000.0 * b) / 400.0
                 count[:] = 0
-                outside = 0
+                outside, blocked = cells - len(s), 0.0
                 for n in range(len(s)):
-                    at = (d[n] - s[n] * (heading[i] + s[n] * (a + s[n] * b)) + band_m) / bin_m
+                    aside = d[n] - s[n] * (heading[i] + s[n] * (a + s[n] * b))
+                    at = (aside + band_m) / bin_m
+                    if abs(aside) < _CLEAR_M:
+                        blocked += blocks[n]
                     if 0.0 <= at < bins - 3:
                         count[int(at) + 1] += 1
                     else:
                         outside += 1
-                total = outside * logs[0]
+                total = outside * logs[0] - blocked
                 for c in range(1, bins - 1):
                     if count[c]:
                         total += count[c] * logs[count[c - 1] + 2 * count[c] + count[c + 1]]
@@ -179,4 +215,4 @@ def _weights(s, d, first, second, heading, bin_m, band_m, temper, heading0, bend
             for k in range(len(second)):
                 out[i, j, k] = np.exp(out[i, j, k] - best)
                 whole += out[i, j, k]
-    return out / whole
+    return out / whole, best + np.log(whole)

@@ -29,7 +29,10 @@ _KEPT_S = 2.5
 """Own motion places a cell as well as it was measured for as long: 1 % of 25 m, and 0.5° of heading."""
 _DRIVES_MPS = 4.0
 """What the LiDAR alone takes for moving may be a hedge of which ever more is seen; faster it is a vehicle."""
-_LONGEST_M = 15.0
+_LONG_M = 6.0
+_MARGIN_M = 0.8
+_BLOCKED, _PERHAPS_A_LEAD = 12.0, 3.0
+"""Nobody drives over a kerb or through a hedge. A car in the way may be a parked one in a bend, or a lead."""
 
 
 class Cells(NamedTuple):
@@ -37,11 +40,13 @@ class Cells(NamedTuple):
 
     xy: F64
     """(M, 2) ego x, y."""
+    blocks: F64
+    """(M,) how strongly each says that no road leads through it, in log-likelihood."""
     age_s: F64
     """(M,) time since each was last seen."""
 
 
-NONE = Cells(np.zeros((0, 2)), np.zeros(0))
+NONE = Cells(np.zeros((0, 2)), np.zeros(0), np.zeros(0))
 
 
 def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
@@ -52,50 +57,71 @@ def moved(cells: Cells, ego: EgoState, dt_s: float) -> Cells:
     xy = np.column_stack([away[:, 0] * c + away[:, 1] * s, away[:, 1] * c - away[:, 0] * s])
     age_s = cells.age_s + dt_s
     keep = (xy[:, 0] > _BEHIND_M) & (age_s <= _KEPT_S)
-    return Cells(xy[keep], age_s[keep])
+    return Cells(xy[keep], cells.blocks[keep], age_s[keep])
 
 
-def seen(points: F32, kind: I32, ring: U8, ground: Ground, moving: Sequence[int]) -> F64:
-    """(M, 2) ego x, y of cells of one sweep.
+def seen(points: F32, kind: I32, ring: U8, ground: Ground, long: Sequence[int]) -> Cells:
+    """Cells of one sweep.
 
     Args:
         points: (N, 4) of the sweep.
         kind: (N,) what each was taken for; ≥ 0 the number of its cluster.
         ring: (N,) the channel of each.
         ground: the road below them.
-        moving: clusters of vehicles that drive.
+        long: clusters that are too long for a car.
     """
     near = (points[:, 0] > 0.0) & (points[:, 0] < REACH_M) & (np.abs(points[:, 1]) < ASIDE_M)
     above = ground.above(points)
     standing = near & (above > _LOW_M) & (above < _HIGH_M) & (kind != GROUND)
-    if len(moving):
-        standing &= ~np.isin(kind, np.array(moving))
     low = near & (above < _LOW_M) & (points[:, 0] < _KERBS_TO_M)
     kerbs = _steps(points[low], ring[low], above[low])
-    return np.vstack([points[standing, :2], kerbs]).astype(np.float64)
+    xy = np.vstack([points[standing, :2], kerbs]).astype(np.float64)
+    blocks = np.full(len(xy), _BLOCKED)
+    blocks[: len(xy) - len(kerbs)][~np.isin(kind[standing], np.array(long, dtype=np.int64))] = _PERHAPS_A_LEAD
+    return Cells(xy, blocks, np.zeros(len(xy)))
 
 
-def merged(before: Cells, fresh: F64) -> Cells:
+def merged(before: Cells, fresh: Cells) -> Cells:
     """All cells, one in each square of the grid, the fresh ones first."""
-    xy = np.vstack([fresh, before.xy])
-    age_s = np.concatenate([np.zeros(len(fresh)), before.age_s])
+    xy, blocks, age_s = (np.concatenate(pair) for pair in zip(fresh, before, strict=True))
     if not len(xy):
         return NONE
     at = np.floor(xy / CELL_M).astype(np.int64)
     _, first = np.unique(at[:, 0] * 100_003 + at[:, 1], return_index=True)
-    return Cells(xy[first], age_s[first])
+    return Cells(xy[first], blocks[first], age_s[first])
 
 
-def driving(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int]:
-    """Clusters of vehicles that drive. cluster_of: by LiDAR track."""
-    found = []
+def without(cells: Cells, objects: Sequence[FusedObject]) -> Cells:
+    """The cells that are in none of the objects, nor right beside them."""
+    keep = np.ones(len(cells.xy), np.bool_)
     for item in objects:
-        if item.lidar_track not in cluster_of or not item.moving or item.cuboid is None:
-            continue
-        fast = (item.speed_over_ground_mps or 0.0) > _DRIVES_MPS and max(item.cuboid.size[:2]) < _LONGEST_M
-        if item.label in VEHICLES or fast:
-            found.append(cluster_of[item.lidar_track])
-    return found
+        if item.cuboid is not None:
+            (x, y, _), (length, width, _), yaw = item.cuboid.center, item.cuboid.size, item.cuboid.yaw_rad
+            c, s = np.cos(yaw), np.sin(yaw)
+            dx, dy = cells.xy[:, 0] - x, cells.xy[:, 1] - y
+            along, across = np.abs(dx * c + dy * s), np.abs(dy * c - dx * s)
+            keep &= (along > length / 2 + _MARGIN_M) | (across > width / 2 + _MARGIN_M)
+    return Cells(*(each[keep] for each in cells))
+
+
+def drives(item: FusedObject) -> bool:
+    """Whether it is a vehicle that drives."""
+    if not item.moving or item.cuboid is None:
+        return False
+    fast = (item.speed_over_ground_mps or 0.0) > _DRIVES_MPS and max(item.cuboid.size[:2]) < _LONG_M
+    return item.label in VEHICLES or fast
+
+
+def long(objects: Sequence[FusedObject], cluster_of: dict[int, int]) -> list[int]:
+    """Clusters that are too long for a car: hedges, walls, rails."""
+    return [
+        cluster_of[item.lidar_track]
+        for item in objects
+        if item.lidar_track in cluster_of
+        and item.cuboid is not None
+        and max(item.cuboid.size[:2]) > _LONG_M
+        and item.label not in VEHICLES
+    ]
 
 
 def _steps(points: F32, ring: U8, above: F64) -> F64:

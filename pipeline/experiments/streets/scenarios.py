@@ -1,5 +1,5 @@
-"""The streets of the experiment ``streets``: no paint, no route, bends of 30–150 m radius between parked rows, hedges and
-kerbs; with a lead that draws away or slows down, or with nothing ahead at all."""
+"""The streets of the experiment ``streets``: no paint, no route, bends of 30–150 m radius between parked rows, hedges
+and kerbs; with a lead that draws away or slows down, or with nothing ahead at all."""
 
 from __future__ import annotations
 
@@ -101,8 +101,8 @@ def _segments(street: Street, side: float) -> list[dict[str, float]]:
 
 
 def _strips(street: Street, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """Kerbs everywhere, at the back of the parking strip or, where nobody parks, at the lane; hedges and walls behind the
-    pavement in stretches, with gaps as for drives and gardens."""
+    """Kerbs everywhere, at the back of the parking strip or, where nobody parks, at the lane; hedges and walls behind
+    the pavement in stretches, with gaps as for drives and gardens."""
     strips: list[dict[str, Any]] = []
     for side in (-1.0, 1.0):
         kerb_m = LANE_WIDTH_M + (PARKING_M if _parks(street) else 0.3)

@@ -97,7 +97,7 @@ class Beacon(Strict):
 
 
 class Strip(Strict):
-    """A kerb with its pavement, a hedge or a wall along the road: where its middle runs, how wide and how high it is."""
+    """A kerb with its pavement, a hedge or a wall along the road: where its middle runs, how wide and high it is."""
 
     kind: Literal["kerb", "hedge", "wall"]
     d_m: float
